@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every record that kernels and host share, defined once. Only 4-byte scalars and arrays of them, explicit
+// padding, so that every compiler lays them out alike; the layout_probe kernel and a test compare both sides.
+#ifndef RS_SHARED_LAYOUT_H
+#define RS_SHARED_LAYOUT_H
+
+#include "shared/compat.h"
+
+// Axis-aligned box. Empty (never met by a ray) when lo > hi.
+typedef struct {
+  rs_float lo[3];
+  rs_float hi[3];
+} RsAabb;
+RS_STATIC_ASSERT_SIZE(RsAabb, 24);
+
+// Inner node of the LBVH, one cache line: the boxes of both children beside their references.
+// A reference >= 0 is an inner node, ~reference is a position in the sorted leaf order.
+typedef struct {
+  rs_float left_lo[3];
+  rs_float left_hi[3];
+  rs_float right_lo[3];
+  rs_float right_hi[3];
+  rs_int left;
+  rs_int right;
+  rs_int first;  // the node covers the sorted leaves first..last
+  rs_int last;
+} RsBvhNode;
+RS_STATIC_ASSERT_SIZE(RsBvhNode, 64);
+
+// What one view needs of one Gaussian, one cache line (docs/model.md, "The camera line").
+// Projective form: x0 y0 m_z a | b c D0 e_x | e_y C00 C01 C11 | opacity r g b.
+// General form: whitening matrix in camera axes, rows M0 M1 M2 (9), whitened origin o' (3), opacity r g b.
+typedef struct {
+  rs_float v[16];
+} RsLine;
+RS_STATIC_ASSERT_SIZE(RsLine, 64);
+
+#define RS_LINE_HIDDEN 0      // no ray of this view meets it
+#define RS_LINE_PROJECTIVE 1  // mean well in front of the camera
+#define RS_LINE_GENERAL 2     // mean beside or behind the camera plane
+
+// Culling record of one Gaussian in one view.
+typedef struct {
+  rs_float x0, y0, x1, y1;  // box of the outline in tangent coordinates X = x/z, Y = y/z
+  rs_float depth;           // no hit is nearer than this
+  rs_float quantile;        // Q of this Gaussian (smaller than the option when the radius is adaptive)
+  rs_int kind;              // RS_LINE_*
+  rs_int padding;
+} RsViewBounds;
+RS_STATIC_ASSERT_SIZE(RsViewBounds, 32);
+
+// Pinhole camera of one view. Camera axes: x right, y down, z forward.
+typedef struct {
+  rs_float rotation[9];  // world to camera, row-major
+  rs_float center[3];    // world
+  rs_float fx, fy, cx, cy;
+  rs_int width, height;
+  rs_float near_depth;  // Gaussians whose mean is nearer along z are skipped; 0 = off
+  rs_int padding;
+} RsCamera;
+RS_STATIC_ASSERT_SIZE(RsCamera, 80);
+
+// Adam's constants for one parameter group in one step (Kingma and Ba 2015).
+typedef struct {
+  rs_float learning_rate;
+  rs_float beta1, beta2, epsilon;
+  rs_float bias1, bias2;  // 1 - beta^step
+  rs_uint count;          // number of scalars
+  rs_int padding;
+} RsAdamGroup;
+RS_STATIC_ASSERT_SIZE(RsAdamGroup, 32);
+
+#endif

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string_view>
+
+namespace raysplats {
+
+/// A file that appears whole or not at all: everything goes to a temporary name in the same folder, commit()
+/// syncs and renames it over the target. Without commit() the temporary file is removed and the target keeps
+/// its old content. Failures throw DataError with the path and the system's reason (disk full, permissions).
+class AtomicFile {
+ public:
+  explicit AtomicFile(std::filesystem::path target);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+
+  /// Path to write to, for libraries that open files themselves; it keeps the target's extension.
+  const std::filesystem::path& temporary() const { return temporary_; }
+  void write(const void* data, std::size_t bytes);
+  void write(std::string_view text) { write(text.data(), text.size()); }
+  void commit();
+
+ private:
+  void fail(const char* action) const;
+  std::filesystem::path target_;
+  std::filesystem::path temporary_;
+  int descriptor_ = -1;
+  bool committed_ = false;
+};
+
+/// Writes a whole text file atomically.
+void write_text_file(const std::filesystem::path& path, std::string_view text);
+
+}  // namespace raysplats

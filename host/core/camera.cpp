@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raysplats/camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace raysplats {
+
+Camera downscaled(const Camera& camera, double factor) {
+  Camera out = camera;
+  out.width = std::max(1, static_cast<int>(std::lround(camera.width / factor)));
+  out.height = std::max(1, static_cast<int>(std::lround(camera.height / factor)));
+  // Rounded sizes change the two axes by slightly different factors; the field of view stays.
+  const double sx = static_cast<double>(out.width) / camera.width;
+  const double sy = static_cast<double>(out.height) / camera.height;
+  out.fx *= sx;
+  out.cx *= sx;
+  out.fy *= sy;
+  out.cy *= sy;
+  return out;
+}
+
+Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, const glm::dvec3& up, int width, int height,
+               double focal) {
+  const glm::dvec3 forward = glm::normalize(target - eye);
+  glm::dvec3 right = glm::cross(forward, up);
+  // Looking along `up` leaves the roll open: any perpendicular will do.
+  if (glm::length(right) < 1e-9) {
+    right = glm::cross(forward, std::abs(forward.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
+  }
+  right = glm::normalize(right);
+  const glm::dvec3 down = glm::cross(forward, right);
+  Camera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = camera.fy = focal;
+  camera.cx = width / 2.0;
+  camera.cy = height / 2.0;
+  camera.rotation = glm::transpose(glm::dmat3(right, down, forward));
+  camera.translation = -(camera.rotation * eye);
+  return camera;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/buffer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "device/context_impl.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+
+RawBuffer::Impl::~Impl() { context->allocated -= bytes; }
+
+RawBuffer::RawBuffer(Context& context, std::size_t bytes, const std::string& label)
+    : bytes_(bytes), context_(&context) {
+  Context::Impl& owner = context.impl();
+  if (bytes > owner.info.max_allocation) {
+    throw ResourceError(fmt::format(
+        "The buffer '{}' needs {:.1f} MiB but {} allows {:.1f} MiB at once: use fewer Gaussians (--max-gaussians) "
+        "or a larger --downscale",
+        label, static_cast<double>(bytes) / (1 << 20), owner.info.name,
+        static_cast<double>(owner.info.max_allocation) / (1 << 20)));
+  }
+  try {
+    cl::Buffer buffer(owner.context, CL_MEM_READ_WRITE, bytes);
+    impl_ = std::shared_ptr<Impl>(new Impl{&owner, buffer, bytes, label});
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Allocating {:.1f} MiB for '{}' on {}",
+                                      static_cast<double>(bytes) / (1 << 20), label, owner.info.name));
+  }
+  owner.allocated += bytes;
+  owner.peak = std::max(owner.peak, owner.allocated);
+}
+
+void RawBuffer::write(const void* source, std::size_t bytes, std::size_t offset) {
+  try {
+    impl_->context->queue.enqueueWriteBuffer(impl_->buffer, CL_TRUE, offset, bytes, source);
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Writing {} bytes to '{}'", bytes, impl_->label));
+  }
+}
+
+void RawBuffer::read(void* target, std::size_t bytes, std::size_t offset) const {
+  try {
+    impl_->context->queue.enqueueReadBuffer(impl_->buffer, CL_TRUE, offset, bytes, target);
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Reading {} bytes from '{}'", bytes, impl_->label));
+  }
+}
+
+void RawBuffer::fill(std::uint32_t pattern, std::size_t bytes, std::size_t offset) {
+  try {
+    impl_->context->queue.enqueueFillBuffer(impl_->buffer, pattern, offset, bytes);
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Filling '{}'", impl_->label));
+  }
+}
+
+void RawBuffer::copy_from(const RawBuffer& source, std::size_t bytes, std::size_t source_offset,
+                          std::size_t offset) {
+  try {
+    impl_->context->queue.enqueueCopyBuffer(source.impl_->buffer, impl_->buffer, source_offset, offset, bytes);
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Copying {} bytes from '{}' to '{}'", bytes, source.impl_->label, impl_->label));
+  }
+}
+
+}  // namespace raysplats

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/context.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "device/context_impl.hpp"
+#include "device/platform.hpp"
+#include "device/program_cache.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+// Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not.
+constexpr const char* kCompilerOptions = "-cl-std=CL1.2 -cl-mad-enable";
+
+cl::Program compile(Context::Impl& context,
+                    const std::string& path,
+                    const std::string& source,
+                    const std::string& options) {
+  cl::Program program(context.context, source);
+  try {
+    program.build({context.device}, options.c_str());
+  } catch (const cl::Error& error) {
+    throw DeviceError(fmt::format("Kernel file {} does not compile on {} with '{}' ({}):\n{}", path,
+                                  context.info.name, options, cl_error_name(error.err()),
+                                  program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(context.device)));
+  }
+  return program;
+}
+
+// Empty when the binary is not accepted, for example after a driver update with the same version string.
+std::optional<cl::Program> from_binary(Context::Impl& context,
+                                       const std::vector<unsigned char>& binary,
+                                       const std::string& options) {
+  try {
+    cl::Program program(context.context, {context.device}, cl::Program::Binaries{binary});
+    program.build({context.device}, options.c_str());
+    return program;
+  } catch (const cl::Error&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+Context::Context(const DeviceInfo& device, const ContextOptions& options) : impl_(std::make_unique<Impl>()) {
+  impl_->options = options;
+  const std::vector<PlatformDevice> devices = platform_devices();
+  if (device.index >= devices.size() || devices[device.index].info.name != device.name) {
+    throw DeviceError(fmt::format("OpenCL device {} ({}) is gone", device.index, device.name));
+  }
+  impl_->info = device;
+  impl_->device = devices[device.index].device;
+  try {
+    impl_->context = cl::Context(impl_->device);
+    impl_->queue = cl::CommandQueue(impl_->context, impl_->device,
+                                    options.profile ? cl::QueueProperties::Profiling : cl::QueueProperties::None);
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Opening the OpenCL device {}", device.name));
+  }
+}
+
+Context::~Context() {
+  try {
+    impl_->queue.finish();
+  } catch (const cl::Error& error) {
+    spdlog::debug("closing the queue: {}", cl_error_name(error.err()));
+  }
+}
+
+const DeviceInfo& Context::device() const { return impl_->info; }
+
+Kernel Context::kernel(const std::string& program, const std::string& name, const BuildOptions& options) {
+  cl::Program& built = impl_->program(program, options);
+  auto kernel = std::make_shared<Kernel::Impl>();
+  kernel->context = impl_.get();
+  kernel->name = name;
+  try {
+    kernel->kernel = cl::Kernel(built, name.c_str());
+    kernel->argument_count = kernel->kernel.getInfo<CL_KERNEL_NUM_ARGS>();
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Kernel {} of {}", name, program));
+  }
+  return Kernel(kernel);
+}
+
+void Context::finish() {
+  try {
+    impl_->queue.finish();
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Waiting for {}", impl_->info.name));
+  }
+}
+
+Profiler& Context::profiler() {
+  impl_->collect_profile();
+  return impl_->profiler;
+}
+
+std::size_t Context::allocated_bytes() const { return impl_->allocated; }
+std::size_t Context::peak_allocated_bytes() const { return impl_->peak; }
+
+cl::Program& Context::Impl::program(const std::string& path, const BuildOptions& build) {
+  const std::string key = path + " " + build.text();
+  if (const auto found = programs.find(key); found != programs.end()) return found->second;
+  const std::string source = resolve_kernel_source(path);
+  const std::string flags = build.text().empty() ? kCompilerOptions : fmt::format("{} {}", kCompilerOptions, build.text());
+  if (!options.kernel_cache) return programs[key] = compile(*this, path, source, flags);
+
+  const ProgramCache cache(options.cache_directory);
+  const std::string cache_key = ProgramCache::key(source, flags, info);
+  if (const auto binary = cache.load(cache_key)) {
+    if (auto program = from_binary(*this, *binary, flags)) return programs[key] = *program;
+    cache.remove(cache_key);
+  }
+  cl::Program program = compile(*this, path, source, flags);
+  const cl::Program::Binaries binaries = program.getInfo<CL_PROGRAM_BINARIES>();
+  if (binaries.size() == 1 && !binaries[0].empty()) cache.store(cache_key, binaries[0]);
+  return programs[key] = program;
+}
+
+void Context::Impl::collect_profile() {
+  if (pending.empty()) return;
+  queue.finish();
+  for (const auto& [name, event] : pending) {
+    profiler.add(name, event.getProfilingInfo<CL_PROFILING_COMMAND_END>() -
+                           event.getProfilingInfo<CL_PROFILING_COMMAND_START>());
+  }
+  pending.clear();
+}
+
+}  // namespace raysplats

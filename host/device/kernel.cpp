@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/kernel.hpp"
+
+#include <fmt/format.h>
+
+#include "device/context_impl.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+
+const std::string& Kernel::name() const { return impl_->name; }
+
+std::size_t Kernel::max_work_group_size() const {
+  return impl_->kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(impl_->context->device);
+}
+
+void Kernel::begin(std::size_t argument_count) {
+  if (argument_count != impl_->argument_count) {
+    throw DeviceError(fmt::format("Kernel {} takes {} arguments, {} were given", impl_->name, impl_->argument_count,
+                                  argument_count));
+  }
+}
+
+void Kernel::set_buffer(unsigned index, const RawBuffer& buffer) {
+  if (buffer.empty()) throw DeviceError(fmt::format("Argument {} of kernel {} is an empty buffer", index, impl_->name));
+  try {
+    impl_->kernel.setArg(index, buffer.impl()->buffer);
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Argument {} of kernel {}", index, impl_->name));
+  }
+}
+
+void Kernel::set_bytes(unsigned index, const void* value, std::size_t bytes) {
+  try {
+    impl_->kernel.setArg(index, bytes, value);
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Argument {} of kernel {}", index, impl_->name));
+  }
+}
+
+void Kernel::enqueue(const Range& range) {
+  const auto& g = range.global;
+  const auto& l = range.local;
+  if (g[0] == 0 || g[1] == 0 || g[2] == 0) return;
+  const cl::NDRange global(g[0], g[1], g[2]);
+  const cl::NDRange local = l[0] == 0 ? cl::NullRange : cl::NDRange(l[0], l[1], l[2]);
+  Context::Impl& context = *impl_->context;
+  try {
+    if (context.options.profile) {
+      cl::Event event;
+      context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local, nullptr, &event);
+      context.pending.emplace_back(impl_->name, event);
+      if (context.pending.size() >= 4096) context.collect_profile();
+    } else {
+      context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local);
+    }
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Launching kernel {} with global size {}x{}x{} and local size {}x{}x{} on {}",
+                                      impl_->name, g[0], g[1], g[2], l[0], l[1], l[2], context.info.name));
+  }
+}
+
+}  // namespace raysplats

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <type_traits>
+
+#include "device/buffer.hpp"
+
+namespace raysplats {
+
+/// Work-group local memory as a kernel argument.
+struct LocalMemory {
+  std::size_t bytes;
+};
+
+/// Sizes of a launch; unused dimensions are 1. `local` of all zeros lets the driver choose.
+struct Range {
+  std::array<std::size_t, 3> global{1, 1, 1};
+  std::array<std::size_t, 3> local{0, 0, 0};
+
+  /// One dimension of at least `count` work-items in groups of `group` (rounded up: kernels check their id).
+  static Range linear(std::size_t count, std::size_t group) {
+    const std::size_t groups = (count + group - 1) / group;
+    return Range{{groups * group, 1, 1}, {group, 1, 1}};
+  }
+  /// Two dimensions, rounded up likewise.
+  static Range plane(std::size_t width, std::size_t height, std::size_t group_width, std::size_t group_height) {
+    const auto up = [](std::size_t n, std::size_t g) { return (n + g - 1) / g * g; };
+    return Range{{up(width, group_width), up(height, group_height), 1}, {group_width, group_height, 1}};
+  }
+};
+
+/// A compiled kernel bound to the queue of its context.
+class Kernel {
+ public:
+  Kernel() = default;
+
+  /// Sets the arguments in order and enqueues. Arguments are Buffer<T>, LocalMemory or trivially copyable
+  /// values of exactly the kernel's parameter size. A global size of 0 enqueues nothing.
+  template <class... Arguments>
+  void launch(const Range& range, const Arguments&... arguments) {
+    begin(sizeof...(Arguments));
+    unsigned index = 0;
+    (set(index++, arguments), ...);
+    enqueue(range);
+  }
+
+  const std::string& name() const;
+  std::size_t max_work_group_size() const;
+
+  struct Impl;
+  explicit Kernel(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+ private:
+  template <class T>
+  void set(unsigned index, const Buffer<T>& buffer) {
+    set_buffer(index, buffer.raw());
+  }
+  void set(unsigned index, const LocalMemory& memory) { set_bytes(index, nullptr, memory.bytes); }
+  template <class T>
+  void set(unsigned index, const T& value) {
+    static_assert(std::is_trivially_copyable_v<T> && !std::is_pointer_v<T>);
+    set_bytes(index, &value, sizeof(T));
+  }
+  void begin(std::size_t argument_count);
+  void set_buffer(unsigned index, const RawBuffer& buffer);
+  void set_bytes(unsigned index, const void* value, std::size_t bytes);
+  void enqueue(const Range& range);
+
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <string_view>
+
+#include "device/cl.hpp"
+#include "device/platform.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+// The smallest work-group every launch can be cut down to.
+constexpr std::size_t kMinWorkGroup = 64;
+constexpr std::uint64_t kMinAllocation = 64ull << 20;
+
+std::string trimmed(std::string text) {
+  while (!text.empty() && (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back())))) {
+    text.pop_back();
+  }
+  return text;
+}
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+DeviceType type_of(cl_device_type type) {
+  if (type & CL_DEVICE_TYPE_GPU) return DeviceType::kGpu;
+  if (type & CL_DEVICE_TYPE_CPU) return DeviceType::kCpu;
+  if (type & CL_DEVICE_TYPE_ACCELERATOR) return DeviceType::kAccelerator;
+  return DeviceType::kOther;
+}
+
+std::vector<std::string> problems_of(const cl::Device& device, const DeviceInfo& info) {
+  std::vector<std::string> problems;
+  if (!device.getInfo<CL_DEVICE_AVAILABLE>()) problems.emplace_back("the driver says it is not available");
+  if (!device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>()) problems.emplace_back("it has no OpenCL C compiler");
+  if (!device.getInfo<CL_DEVICE_ENDIAN_LITTLE>()) problems.emplace_back("it is big-endian");
+  int major = 0;
+  int minor = 0;
+  if (std::sscanf(info.version.c_str(), "OpenCL %d.%d", &major, &minor) == 2 && major * 10 + minor < 12) {
+    problems.emplace_back("it offers less than OpenCL 1.2");
+  }
+  if (info.max_work_group_size < kMinWorkGroup) {
+    problems.push_back(fmt::format("its work-groups hold {} work-items, {} are needed",
+                                   info.max_work_group_size, kMinWorkGroup));
+  }
+  if (info.max_allocation < kMinAllocation) {
+    problems.push_back(fmt::format("its largest buffer is {} MiB, {} MiB are needed",
+                                   info.max_allocation >> 20, kMinAllocation >> 20));
+  }
+  return problems;
+}
+
+DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
+  DeviceInfo info;
+  info.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
+  info.vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>());
+  info.platform = trimmed(platform.getInfo<CL_PLATFORM_NAME>());
+  info.platform_version = trimmed(platform.getInfo<CL_PLATFORM_VERSION>());
+  info.version = trimmed(device.getInfo<CL_DEVICE_VERSION>());
+  info.language_version = trimmed(device.getInfo<CL_DEVICE_OPENCL_C_VERSION>());
+  info.driver_version = trimmed(device.getInfo<CL_DRIVER_VERSION>());
+  info.type = type_of(device.getInfo<CL_DEVICE_TYPE>());
+  info.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+  info.global_memory = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
+  info.max_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+  info.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
+  info.max_work_group_size = device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>();
+  info.float_vector_width = std::max<std::uint32_t>(1, device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>());
+  const std::string extensions = device.getInfo<CL_DEVICE_EXTENSIONS>();
+  const auto has = [&](const char* name) { return extensions.find(name) != std::string::npos; };
+  info.has_fp64 = has("cl_khr_fp64");
+  info.has_int64_atomics = has("cl_khr_int64_base_atomics");
+  info.has_float_atomics = has("cl_ext_float_atomics");
+  info.problems = problems_of(device, info);
+  return info;
+}
+
+}  // namespace
+
+std::vector<PlatformDevice> platform_devices() {
+  std::vector<cl::Platform> platforms;
+  try {
+    cl::Platform::get(&platforms);
+  } catch (const cl::Error&) {
+    return {};  // the loader reports "no platform" as an error (CL_PLATFORM_NOT_FOUND_KHR)
+  }
+  std::vector<PlatformDevice> found;
+  for (const cl::Platform& platform : platforms) {
+    std::vector<cl::Device> devices;
+    try {
+      platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
+    } catch (const cl::Error&) {
+      continue;  // a platform without devices is an error too
+    }
+    for (const cl::Device& device : devices) {
+      DeviceInfo info = query(platform, device);
+      info.index = found.size();
+      found.push_back({std::move(info), device});
+    }
+  }
+  return found;
+}
+
+std::vector<DeviceInfo> list_devices() {
+  std::vector<DeviceInfo> infos;
+  for (PlatformDevice& entry : platform_devices()) infos.push_back(std::move(entry.info));
+  return infos;
+}
+
+DeviceInfo select_device(const std::string& selector) {
+  const std::vector<DeviceInfo> devices = list_devices();
+  if (devices.empty()) {
+    throw DeviceError(
+        "No OpenCL platform is installed: install your GPU's OpenCL driver, or pocl-opencl-icd to run on the CPU");
+  }
+  if (selector.empty()) {
+    for (const DeviceType wanted : {DeviceType::kGpu, DeviceType::kCpu}) {
+      for (const DeviceInfo& info : devices) {
+        if (info.type == wanted && info.usable()) return info;
+      }
+    }
+    for (const DeviceInfo& info : devices) {
+      if (info.usable()) return info;
+    }
+    throw DeviceError("No OpenCL device is usable: 'raysplats devices' says why for each");
+  }
+  const auto checked = [](const DeviceInfo& info) {
+    if (!info.usable()) {
+      throw DeviceError(fmt::format("Device {} ({}) is not usable: {}; choose another with --device",
+                                    info.index, info.name, fmt::join(info.problems, ", ")));
+    }
+    return info;
+  };
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(selector.data(), selector.data() + selector.size(), index);
+  if (error == std::errc() && end == selector.data() + selector.size()) {
+    if (index >= devices.size()) {
+      throw UsageError(fmt::format("--device {}: there are {} devices; 'raysplats devices' lists them",
+                                   selector, devices.size()));
+    }
+    return checked(devices[index]);
+  }
+  for (const DeviceInfo& info : devices) {
+    if (lower(info.name).find(lower(selector)) != std::string::npos) return checked(info);
+  }
+  throw UsageError(fmt::format("--device {}: no device has that in its name; 'raysplats devices' lists them", selector));
+}
+
+}  // namespace raysplats

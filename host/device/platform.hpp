@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "device/cl.hpp"
+#include "raysplats/device.hpp"
+
+namespace raysplats {
+
+struct PlatformDevice {
+  DeviceInfo info;
+  cl::Device device;
+};
+
+/// Every device of every platform with its handle, in list_devices() order.
+std::vector<PlatformDevice> platform_devices();
+
+}  // namespace raysplats

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/program_cache.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <array>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+
+namespace raysplats {
+namespace {
+
+constexpr std::array<char, 8> kMagic{'R', 'S', 'K', 'E', 'R', 'N', '0', '1'};
+
+struct Header {
+  std::array<char, 8> magic;
+  std::uint64_t bytes;
+  std::uint64_t checksum;
+};
+
+std::uint64_t checksum(const std::vector<unsigned char>& data) { return XXH3_64bits(data.data(), data.size()); }
+
+}  // namespace
+
+std::filesystem::path default_cache_directory() {
+  if (const char* xdg = std::getenv("XDG_CACHE_HOME"); xdg != nullptr && *xdg != '\0') {
+    return std::filesystem::path(xdg) / "raysplats";
+  }
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0') {
+    return std::filesystem::path(home) / ".cache" / "raysplats";
+  }
+  return {};
+}
+
+ProgramCache::ProgramCache(const std::string& directory)
+    : directory_(directory.empty() ? default_cache_directory() : std::filesystem::path(directory)) {
+  if (directory_.empty()) return;
+  std::error_code error;
+  std::filesystem::create_directories(directory_, error);
+  if (error) {
+    spdlog::debug("kernel cache off: {} cannot be created ({})", directory_.string(), error.message());
+    directory_.clear();
+  }
+}
+
+std::string ProgramCache::key(const std::string& source, const std::string& options, const DeviceInfo& device) {
+  const std::string text = fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", source, options, device.platform,
+                                       device.platform_version, device.name, device.version, device.driver_version);
+  const XXH128_hash_t hash = XXH3_128bits(text.data(), text.size());
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+std::optional<std::vector<unsigned char>> ProgramCache::load(const std::string& key) const {
+  if (directory_.empty()) return std::nullopt;
+  std::ifstream stream(file(key), std::ios::binary | std::ios::ate);
+  if (!stream) return std::nullopt;
+  const auto size = static_cast<std::uint64_t>(stream.tellg());
+  stream.seekg(0);
+  Header header{};
+  if (size < sizeof(header) || !stream.read(reinterpret_cast<char*>(&header), sizeof(header))) return std::nullopt;
+  if (header.magic != kMagic || header.bytes != size - sizeof(header)) return std::nullopt;
+  std::vector<unsigned char> binary(header.bytes);
+  if (!stream.read(reinterpret_cast<char*>(binary.data()), static_cast<std::streamsize>(binary.size()))) {
+    return std::nullopt;
+  }
+  if (checksum(binary) != header.checksum) return std::nullopt;
+  return binary;
+}
+
+void ProgramCache::store(const std::string& key, const std::vector<unsigned char>& binary) const {
+  if (directory_.empty()) return;
+  const std::filesystem::path target = file(key);
+  const std::filesystem::path temporary = directory_ / fmt::format(".{}.{}.tmp", key, ::getpid());
+  const Header header{kMagic, binary.size(), checksum(binary)};
+  std::error_code error;
+  {
+    std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
+    stream.write(reinterpret_cast<const char*>(&header), sizeof(header));
+    stream.write(reinterpret_cast<const char*>(binary.data()), static_cast<std::streamsize>(binary.size()));
+    stream.close();
+    if (!stream) {
+      std::filesystem::remove(temporary, error);
+      return;
+    }
+  }
+  std::filesystem::rename(temporary, target, error);
+  if (error) std::filesystem::remove(temporary, error);
+}
+
+void ProgramCache::remove(const std::string& key) const {
+  std::error_code error;
+  if (!directory_.empty()) std::filesystem::remove(file(key), error);
+}
+
+}  // namespace raysplats

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "raysplats/device.hpp"
+
+namespace raysplats {
+
+/// Compiled programs on disk, one file each: a header with a checksum, then the driver's binary. Files are
+/// written under a temporary name and renamed, so concurrent processes never see half a program; a file that
+/// does not check out is ignored and overwritten.
+class ProgramCache {
+ public:
+  /// "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats. An unusable directory turns the cache off.
+  explicit ProgramCache(const std::string& directory);
+
+  /// Key of a program: source, options, device, driver and this library's version.
+  static std::string key(const std::string& source, const std::string& options, const DeviceInfo& device);
+
+  std::optional<std::vector<unsigned char>> load(const std::string& key) const;
+  void store(const std::string& key, const std::vector<unsigned char>& binary) const;
+  void remove(const std::string& key) const;
+  const std::filesystem::path& directory() const { return directory_; }
+
+ private:
+  std::filesystem::path file(const std::string& key) const { return directory_ / (key + ".bin"); }
+  std::filesystem::path directory_;  // empty = off
+};
+
+/// The directory used when none is named.
+std::filesystem::path default_cache_directory();
+
+}  // namespace raysplats

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "device/buffer.hpp"
+#include "device/context.hpp"
+
+namespace raysplats {
+
+/// Exclusive prefix sum of 32-bit unsigned integers on the device.
+class Scan {
+ public:
+  explicit Scan(Context& context);
+
+  /// values[i] becomes the sum of values[0..i) for i < count; values[count] becomes the total, so the buffer
+  /// must hold count + 1 elements. The sum must stay below 2^32. In place; scratch is kept between calls.
+  void exclusive(Buffer<std::uint32_t>& values, std::size_t count);
+
+ private:
+  Context* context_;
+};
+
+}  // namespace raysplats

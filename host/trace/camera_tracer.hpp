@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "bvh/lbvh.hpp"
+#include "device/context.hpp"
+#include "raysplats/camera.hpp"
+#include "raysplats/image.hpp"
+#include "raysplats/trace_options.hpp"
+#include "trace/device_gaussians.hpp"
+
+namespace raysplats {
+
+/// Traces the rays of a pinhole camera in packets (docs/model.md, "The camera line"), forward and backward.
+class CameraTracer {
+ public:
+  struct Statistics {
+    std::uint64_t capped_rays = 0;  ///< rays that stopped because of max_hits
+    std::uint64_t candidates = 0;   ///< (tile, Gaussian) pairs tested
+    std::uint64_t hits = 0;         ///< blended (ray, Gaussian) pairs
+  };
+  /// Gradient of the loss for the camera's pose: translation of the centre (world axes) and a small rotation
+  /// vector applied on the left of the world-to-camera rotation (camera axes).
+  struct PoseGradient {
+    std::array<double, 3> center{};
+    std::array<double, 3> rotation{};
+  };
+
+  CameraTracer(Context& context, const TraceOptions& options);
+  ~CameraTracer();
+
+  /// Brings the tree up to date with the Gaussians: rebuilds it when the count changed, every `rebuild_every`
+  /// calls, or when `rebuild` is set; refits it otherwise. forward() needs it after every parameter change.
+  void update(const DeviceGaussians& gaussians, bool rebuild = false);
+
+  /// Traces one view. With `keep_hits` the hit lists stay for backward() when they fit the memory budget and
+  /// are recomputed there when they do not.
+  void forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits = false);
+
+  /// Result of the last forward(): planar R, G, B (background blended), A = 1 - T; 4 x height x width.
+  const Buffer<float>& image() const;
+  /// With options.depth: planar expected depth, median depth, hits per ray; 3 x height x width.
+  const Buffer<float>& depth() const;
+  /// The same as interleaved host images.
+  Image download_image() const;
+  Image download_depth() const;
+
+  /// Gradients of the last forward(keep_hits = true) view from `image_gradient` (planar dL/dR, dL/dG, dL/dB,
+  /// dL/dA; 4 x height x width). Overwrites `gradients`, growing its buffers as needed.
+  void backward(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient, GaussianGradients& gradients);
+  /// After backward(): the gradient for the pose of the view.
+  PoseGradient pose_gradient(const DeviceGaussians& gaussians);
+
+  Statistics statistics() const;
+  const Lbvh& tree() const;
+  TraceOptions& options();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <string>
+
+namespace raysplats {
+
+/// OpenCV lens distortion, r² = x² + y² in normalised image coordinates.
+struct Distortion {
+  double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0;
+  bool any() const { return k1 != 0 || k2 != 0 || k3 != 0 || p1 != 0 || p2 != 0; }
+};
+
+/// A pinhole camera with a pose. Camera axes are OpenCV's and COLMAP's: x right, y down, z forward;
+/// the pixel (column i, row j) has its centre at (i + 0.5, j + 0.5).
+struct Camera {
+  std::string name;  ///< image name the view belongs to, with its folder, without meaning to the tracer
+  int width = 0;
+  int height = 0;
+  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
+  glm::dmat3 rotation{1.0};               ///< world to camera
+  glm::dvec3 translation{0.0};            ///< world to camera: x_cam = rotation * x + translation
+
+  glm::dvec3 center() const { return -(glm::transpose(rotation) * translation); }
+};
+
+/// The camera of the same view for an image reduced by `factor` (a positive number; sizes round to nearest).
+Camera downscaled(const Camera& camera, double factor);
+
+/// A camera at `eye` that looks at `target`; `up` is the world direction that points up in the image.
+Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, const glm::dvec3& up, int width,
+               int height, double focal);
+
+}  // namespace raysplats

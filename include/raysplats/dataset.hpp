@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/image.hpp"
+
+namespace raysplats {
+
+enum class DatasetKind { kColmap, kBlender, kNerfstudio };
+enum class Split { kTrain, kTest, kAll };
+
+/// One photo and the camera that took it, at the size it is used (after --downscale).
+struct View {
+  Camera camera;                     ///< undistorted pinhole
+  std::filesystem::path image_path;  ///< the photo on disk, possibly distorted and larger
+  std::filesystem::path mask_path;   ///< optional mask (black = ignore); empty when there is none
+  Camera source_camera;              ///< intrinsics of the photo on disk
+  Distortion distortion;             ///< of the photo on disk
+  bool test = false;
+};
+
+/// Sparse points of a COLMAP model or a PLY named by the data set.
+struct PointCloud {
+  std::vector<float> positions;  ///< 3 N, world units
+  std::vector<float> colors;     ///< 3 N, in [0, 1]
+  std::size_t size() const { return positions.size() / 3; }
+};
+
+/// Photos, cameras and points of one scene. Images stay on disk until load_view_image().
+struct Dataset {
+  DatasetKind kind = DatasetKind::kColmap;
+  std::filesystem::path root;
+  std::vector<View> views;  ///< sorted by name within a split
+  PointCloud points;
+  bool alpha_is_background = false;  ///< RGBA is composited over the background (Blender), else alpha is a mask
+
+  std::vector<std::size_t> indices(Split split) const;
+};
+
+struct DatasetOptions {
+  double downscale = 1.0;  ///< COLMAP: images_N is used when it exists, the rest is resampled
+  int test_every = 8;      ///< every n-th view of a data set without a split of its own; 0 = none
+};
+
+/// Detects the kind of data set (COLMAP, nerfstudio, Blender) and reads everything but the pixels.
+/// Throws DataError for a folder that is none, a missing image, an unsupported camera model, no views.
+Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& options = {});
+
+/// The photo of a view as RGBA float at camera.width x camera.height: undistorted, resampled (area average).
+/// A is the mask or coverage: 1 where the photo is valid; RGB is straight (not premultiplied).
+Image load_view_image(const View& view);
+
+/// RGB of `rgba` over a constant background.
+Image composite(const Image& rgba, const float background[3]);
+
+}  // namespace raysplats

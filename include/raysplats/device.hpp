@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace raysplats {
+
+enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
+
+/// What one OpenCL device offers, queried once.
+struct DeviceInfo {
+  std::size_t index = 0;  ///< position in list_devices(), the number `--device` takes
+  std::string name;
+  std::string vendor;
+  std::string platform;
+  std::string platform_version;
+  std::string version;           ///< OpenCL version string of the device
+  std::string language_version;  ///< OpenCL C version string
+  std::string driver_version;
+  DeviceType type = DeviceType::kOther;
+  std::uint32_t compute_units = 0;
+  std::uint64_t global_memory = 0;   ///< bytes
+  std::uint64_t max_allocation = 0;  ///< bytes of the largest single buffer
+  std::uint64_t local_memory = 0;    ///< bytes per work-group
+  std::size_t max_work_group_size = 0;
+  std::uint32_t float_vector_width = 1;  ///< native float lanes
+  bool has_fp64 = false;
+  bool has_int64_atomics = false;
+  bool has_float_atomics = false;
+  std::vector<std::string> problems;  ///< why the device cannot be used; empty when it can
+
+  bool usable() const { return problems.empty(); }
+};
+
+/// Every device of every installed platform, in the order the loader reports them.
+/// An empty list means that no OpenCL platform is installed.
+std::vector<DeviceInfo> list_devices();
+
+/// The device that `selector` names: an index, a part of its name (case is ignored), or "" for the
+/// first usable GPU, else the first usable CPU, else any usable device.
+/// Throws DeviceError with the remedy when there is none, UsageError when the selector fits no device.
+DeviceInfo select_device(const std::string& selector);
+
+}  // namespace raysplats

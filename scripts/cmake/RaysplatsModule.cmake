@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+# raysplats_module(NAME DEPENDS ...) makes the static library raysplats_NAME from host/NAME/*.cpp.
+
+set(RAYSPLATS_WARNINGS -Wall -Wextra -Wpedantic)
+if(RAYSPLATS_WERROR)
+  list(APPEND RAYSPLATS_WARNINGS -Werror)
+endif()
+
+function(raysplats_compile_options target)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_compile_options(${target} PRIVATE ${RAYSPLATS_WARNINGS})
+  if(RAYSPLATS_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=${RAYSPLATS_SANITIZE} -fno-omit-frame-pointer
+                                             -fno-sanitize-recover=undefined)
+    target_link_options(${target} PUBLIC -fsanitize=${RAYSPLATS_SANITIZE})
+  endif()
+endfunction()
+
+function(raysplats_module name)
+  cmake_parse_arguments(ARG "" "" "DEPENDS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/host/${name}/*.cpp)
+  set(target raysplats_${name})
+  if(NOT sources)
+    add_library(${target} INTERFACE)
+    target_include_directories(${target} INTERFACE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/host ${PROJECT_SOURCE_DIR}/cl)
+    return()
+  endif()
+  add_library(${target} STATIC ${sources})
+  set_target_properties(${target} PROPERTIES LINKER_LANGUAGE CXX EXPORT_NAME ${name}
+                                             POSITION_INDEPENDENT_CODE ON)
+  target_include_directories(
+    ${target}
+    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+           $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/host> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/cl>)
+  target_link_libraries(${target} PUBLIC ${ARG_DEPENDS})
+  raysplats_compile_options(${target})
+endfunction()
