@@ -96,4 +96,18 @@ void ProgramCache::remove(const std::string& key) const {
   if (!directory_.empty()) std::filesystem::remove(file(key), error);
 }
 
+std::size_t clear_program_cache(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::vector<std::filesystem::path> programs;
+  for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".bin") programs.push_back(entry->path());
+  }
+  std::size_t removed = 0;
+  for (const std::filesystem::path& path : programs) {
+    if (std::filesystem::remove(path, error)) ++removed;
+  }
+  return removed;
+}
+
 }  // namespace raysplats

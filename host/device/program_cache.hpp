@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -33,5 +34,9 @@ class ProgramCache {
 
 /// The directory used when none is named.
 std::filesystem::path default_cache_directory();
+
+/// Removes every compiled program from `directory` and returns how many there were. Programs that other
+/// processes store meanwhile may stay.
+std::size_t clear_program_cache(const std::filesystem::path& directory);
 
 }  // namespace raysplats

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+namespace raysplats {
+
+/// Makes sure that `path` is a folder that files can be written to, creating it and its parents
+/// when needed. Throws DataError with the system's reason.
+void make_output_directory(const std::filesystem::path& path);
+
+}  // namespace raysplats

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/orbit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+#include "core/statistics.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180.0;
+
+double median(std::vector<double> values) {
+  const double half = 0.5;
+  return quantiles(std::move(values), std::span<const double>(&half, 1))[0];
+}
+
+void check(const OrbitOptions& options) {
+  if (options.frames < 1) {
+    throw UsageError(
+        fmt::format("An orbit of {} frames is none: ask for at least one", options.frames));
+  }
+  if (options.width < 1 || options.height < 1) {
+    throw UsageError(fmt::format("An image of {}x{} pixels is none: both sides must be at least 1",
+                                 options.width, options.height));
+  }
+  if (!(options.fov_degrees > 0.0 && options.fov_degrees < 180.0)) {
+    throw UsageError(
+        fmt::format("A field of view of {} degrees makes no image: choose one between 0 and 180",
+                    options.fov_degrees));
+  }
+  if (!(std::abs(options.elevation_degrees) < 90.0)) {
+    throw UsageError(
+        fmt::format("An orbit at {} degrees of elevation is a point: stay between -90 and 90",
+                    options.elevation_degrees));
+  }
+  if (!(options.distance >= 0.0) || !std::isfinite(options.distance)) {
+    throw UsageError(fmt::format("An orbit at distance {} has no eye: choose a positive number",
+                                 options.distance));
+  }
+  const double length = glm::length(options.up);
+  if (!(length > 0.0) || !std::isfinite(length)) {
+    throw UsageError(
+        "The up direction of the orbit has no length: give three numbers that are not all zero");
+  }
+}
+
+}  // namespace
+
+SceneExtent scene_extent(const Gaussians& model) {
+  std::array<std::vector<double>, 3> axes;
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const float* mean = &model.means[3 * i];
+    if (!std::isfinite(mean[0]) || !std::isfinite(mean[1]) || !std::isfinite(mean[2])) continue;
+    const double opacity = 1.0 / (1.0 + std::exp(-static_cast<double>(model.opacities[i])));
+    for (std::size_t k = 0; k < 3; ++k) axes[k].push_back(static_cast<double>(mean[k]));
+    weights.push_back(std::isfinite(opacity) ? opacity : 0.0);
+  }
+  SceneExtent extent;
+  if (weights.empty()) return extent;
+  extent.center = {weighted_quantile(axes[0], weights, 0.5),
+                   weighted_quantile(axes[1], weights, 0.5),
+                   weighted_quantile(axes[2], weights, 0.5)};
+  std::vector<double> distances(weights.size());
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    distances[i] = glm::length(glm::dvec3(axes[0][i], axes[1][i], axes[2][i]) - extent.center);
+  }
+  const double middle = weighted_quantile(distances, weights, 0.5);
+  const double far = weighted_quantile(distances, weights, 0.9);
+  extent.radius = middle > 0.0 ? std::min(far, 2.0 * middle) : far;
+  if (!(extent.radius > 0.0)) extent.radius = 1.0;
+  return extent;
+}
+
+glm::dvec3 estimate_up(std::span<const Camera> cameras) {
+  glm::dvec3 sum(0.0);
+  for (const Camera& camera : cameras) {
+    // Row 1 of world-to-camera is the camera's y axis in the world; it points down in the image.
+    sum -= glm::transpose(camera.rotation) * glm::dvec3(0.0, 1.0, 0.0);
+  }
+  const double length = glm::length(sum);
+  const double least = 1e-3 * static_cast<double>(cameras.size());
+  return length > least && std::isfinite(length) ? sum / length : glm::dvec3(0.0, -1.0, 0.0);
+}
+
+OrbitOptions orbit_like(std::span<const Camera> cameras,
+                        const glm::dvec3& center,
+                        OrbitOptions options) {
+  if (cameras.empty()) return options;
+  const glm::dvec3 up = glm::normalize(options.up);
+  std::vector<double> distances;
+  std::vector<double> elevations;
+  for (const Camera& camera : cameras) {
+    const glm::dvec3 arm = camera.center() - center;
+    const double distance = glm::length(arm);
+    if (!(distance > 0.0)) continue;
+    distances.push_back(distance);
+    elevations.push_back(std::asin(std::clamp(glm::dot(arm, up) / distance, -1.0, 1.0)) / kRadians);
+  }
+  if (distances.empty()) return options;
+  options.distance = median(distances);
+  options.elevation_degrees = std::clamp(median(elevations), -80.0, 80.0);
+  return options;
+}
+
+std::vector<Camera> orbit_cameras(const SceneExtent& extent, const OrbitOptions& options) {
+  check(options);
+  const glm::dvec3 up = glm::normalize(options.up);
+  // Two axes that span the circle's plane; the world axis least parallel to `up` starts the
+  // construction.
+  const glm::dvec3 magnitude = glm::abs(up);
+  glm::dvec3 helper(0.0);
+  if (magnitude.x <= magnitude.y && magnitude.x <= magnitude.z) {
+    helper.x = 1.0;
+  } else if (magnitude.y <= magnitude.z) {
+    helper.y = 1.0;
+  } else {
+    helper.z = 1.0;
+  }
+  const glm::dvec3 first = glm::normalize(helper - glm::dot(helper, up) * up);
+  const glm::dvec3 second = glm::cross(up, first);
+
+  const double half_fov = 0.5 * options.fov_degrees * kRadians;
+  const double distance =
+      options.distance > 0.0 ? options.distance : extent.radius / std::sin(half_fov);
+  const double focal = 0.5 * std::min(options.width, options.height) / std::tan(half_fov);
+  const double elevation = options.elevation_degrees * kRadians;
+  std::vector<Camera> cameras;
+  cameras.reserve(static_cast<std::size_t>(options.frames));
+  for (int i = 0; i < options.frames; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / options.frames;
+    const glm::dvec3 ring = std::cos(angle) * first + std::sin(angle) * second;
+    const glm::dvec3 eye =
+        extent.center + distance * (std::cos(elevation) * ring + std::sin(elevation) * up);
+    cameras.push_back(look_at(eye, extent.center, up, options.width, options.height, focal));
+    cameras.back().name = fmt::format("frame_{:04d}", i);
+  }
+  return cameras;
+}
+
+}  // namespace raysplats

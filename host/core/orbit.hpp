@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/gaussians.hpp"
+
+namespace raysplats {
+
+/// Where the matter of a model is: a centre and a radius that a few stray or distant Gaussians do
+/// not move.
+struct SceneExtent {
+  glm::dvec3 center{0.0};
+  double radius = 1.0;
+};
+
+/// Opacity-weighted median of the means, and the 0.9 quantile of the distance to it, but at most
+/// twice its median (backgrounds of outdoor captures reach hundreds of times further than the
+/// subject). Non-finite means are left out. An empty model gives the unit sphere.
+SceneExtent scene_extent(const Gaussians& model);
+
+/// The world direction that points up in most of the photos: the mean of the cameras' up axes,
+/// normalised. No cameras, or cameras that cancel out, give {0, -1, 0}: the y axis of COLMAP's and
+/// 3DGS' worlds points down.
+glm::dvec3 estimate_up(std::span<const Camera> cameras);
+
+struct OrbitOptions {
+  int frames = 60;
+  int width = 800;
+  int height = 800;
+  double fov_degrees = 45.0;        ///< of the smaller image side
+  double elevation_degrees = 20.0;  ///< of the eye above the plane through the centre
+  double distance = 0.0;  ///< of the eye from the centre; 0 = the extent just fits the image
+  glm::dvec3 up{0.0, -1.0, 0.0};
+};
+
+/// Distance and elevation at which photos were taken, for an orbit that stays where the model was
+/// seen. Medians over the cameras relative to `center` and `up`; leaves `options` as they are
+/// without cameras.
+OrbitOptions orbit_like(std::span<const Camera> cameras,
+                        const glm::dvec3& center,
+                        OrbitOptions options);
+
+/// Cameras on a full circle around `extent`, equally spaced, counter-clockwise seen from above, all
+/// looking at the centre. Throws UsageError for sizes, counts, angles or directions that make no
+/// camera.
+std::vector<Camera> orbit_cameras(const SceneExtent& extent, const OrbitOptions& options);
+
+}  // namespace raysplats

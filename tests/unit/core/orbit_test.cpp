@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/orbit.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "base/rng.hpp"
+#include "raysplats/error.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+/// Opaque Gaussians on a sphere of radius 2 around `center`.
+Gaussians sphere_model(const glm::dvec3& center, std::size_t count) {
+  Gaussians model;
+  model.resize(count);
+  CounterRng rng(7, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 point =
+        center + 2.0 * glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
+    for (int k = 0; k < 3; ++k)
+      model.means[3 * i + static_cast<std::size_t>(k)] = static_cast<float>(point[k]);
+    model.opacities[i] = 4.0f;
+  }
+  return model;
+}
+
+glm::dvec3 to_camera(const Camera& camera, const glm::dvec3& point) {
+  return camera.rotation * point + camera.translation;
+}
+
+}  // namespace
+
+TEST_CASE("the extent ignores stray, transparent and non-finite Gaussians") {
+  const glm::dvec3 center(10, -20, 30);
+  Gaussians model = sphere_model(center, 2000);
+  const std::size_t before = model.size();
+  model.resize(before + 1200);
+  for (std::size_t i = before; i < model.size(); ++i) {
+    const bool stray = i < before + 40;
+    model.means[3 * i] = stray ? 1e6f : 500.0f;
+    model.opacities[i] = stray ? 4.0f : -20.0f;
+  }
+  model.means[3 * before] = std::numeric_limits<float>::quiet_NaN();
+  const SceneExtent extent = scene_extent(model);
+  CHECK(glm::length(extent.center - center) < 0.2);
+  CHECK(extent.radius == doctest::Approx(2.0).epsilon(0.1));
+  CHECK(scene_extent(Gaussians{}).radius == 1.0);
+}
+
+TEST_CASE("a far background does not inflate the radius") {
+  Gaussians model = sphere_model(glm::dvec3(0), 700);
+  const std::size_t before = model.size();
+  Gaussians background = sphere_model(glm::dvec3(0), 300);
+  model.resize(1000);
+  for (std::size_t i = 0; i < 300; ++i) {
+    for (std::size_t k = 0; k < 3; ++k)
+      model.means[3 * (before + i) + k] = 500.0f * background.means[3 * i + k];
+    model.opacities[before + i] = 4.0f;
+  }
+  CHECK(scene_extent(model).radius < 4.5);
+}
+
+TEST_CASE("orbit cameras look at the centre from a circle and stay upright") {
+  const SceneExtent extent{glm::dvec3(1, 2, 3), 2.0};
+  for (const glm::dvec3& up : {glm::dvec3(0, -1, 0), glm::dvec3(0, 0, 3), glm::dvec3(1, 1, -1)}) {
+    OrbitOptions options;
+    options.frames = 8;
+    options.width = 64;
+    options.height = 48;
+    options.fov_degrees = 40.0;
+    options.elevation_degrees = 30.0;
+    options.up = up;
+    const std::vector<Camera> cameras = orbit_cameras(extent, options);
+    REQUIRE(cameras.size() == 8);
+    CHECK(cameras[3].name == "frame_0003");
+    const glm::dvec3 axis = glm::normalize(up);
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      const Camera& camera = cameras[i];
+      const glm::dvec3 target = to_camera(camera, extent.center);
+      CHECK(std::abs(target.x) < 1e-9);
+      CHECK(std::abs(target.y) < 1e-9);
+      CHECK(target.z == doctest::Approx(2.0 / std::sin(20.0 * 3.14159265358979 / 180.0)));
+      // A point above the centre is above it in the image (y points down), in the middle column.
+      const glm::dvec3 above = to_camera(camera, extent.center + axis);
+      CHECK(above.y < -0.5);
+      CHECK(std::abs(above.x) < 1e-9);
+      const glm::dvec3 arm = camera.center() - extent.center;
+      CHECK(glm::dot(arm, axis) / glm::length(arm) == doctest::Approx(0.5));
+      // Counter-clockwise seen from above, one eighth of a turn each.
+      const glm::dvec3 next = cameras[(i + 1) % 8].center() - extent.center;
+      const glm::dvec3 flat = arm - glm::dot(arm, axis) * axis;
+      const glm::dvec3 flat_next = next - glm::dot(next, axis) * axis;
+      CHECK(glm::dot(glm::cross(flat, flat_next), axis) > 0.0);
+      CHECK(glm::dot(glm::normalize(flat), glm::normalize(flat_next)) ==
+            doctest::Approx(std::sqrt(0.5)));
+    }
+    // The sphere of the extent touches the border of the smaller side.
+    CHECK(cameras[0].fy * std::tan(20.0 * 3.14159265358979 / 180.0) == doctest::Approx(24.0));
+  }
+}
+
+TEST_CASE("up, distance and elevation come from the cameras") {
+  OrbitOptions options;
+  options.frames = 12;
+  options.up = glm::dvec3(0, 0, 1);
+  options.elevation_degrees = 35.0;
+  options.distance = 5.0;
+  const SceneExtent extent{glm::dvec3(1, 0, 0), 1.0};
+  const std::vector<Camera> cameras = orbit_cameras(extent, options);
+  const glm::dvec3 up = estimate_up(cameras);
+  CHECK(glm::dot(up, glm::dvec3(0, 0, 1)) > 0.999);
+  OrbitOptions fitted;
+  fitted.up = up;
+  fitted = orbit_like(cameras, extent.center, fitted);
+  CHECK(fitted.distance == doctest::Approx(5.0));
+  CHECK(fitted.elevation_degrees == doctest::Approx(35.0));
+  CHECK(estimate_up({}) == glm::dvec3(0, -1, 0));
+}
+
+TEST_CASE("orbits that make no camera are refused") {
+  const SceneExtent extent;
+  const auto refused = [&](auto change) {
+    OrbitOptions options;
+    change(options);
+    CHECK_THROWS_AS(orbit_cameras(extent, options), UsageError);
+  };
+  refused([](OrbitOptions& o) { o.frames = 0; });
+  refused([](OrbitOptions& o) { o.width = 0; });
+  refused([](OrbitOptions& o) { o.fov_degrees = 180.0; });
+  refused([](OrbitOptions& o) { o.elevation_degrees = 90.0; });
+  refused([](OrbitOptions& o) { o.up = glm::dvec3(0.0); });
+  refused([](OrbitOptions& o) { o.distance = -1.0; });
+}
