@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "reference/tracer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+namespace raysplats::reference {
+namespace {
+
+void lower(double& margin, double distance, double scale) {
+  margin = std::min(margin, std::abs(distance) / std::max(std::abs(scale), 1e-300));
+}
+
+/// Tests one Gaussian; true when the ray meets it. Paper prop. 3.1 and appendix A.1, A.2.
+bool intersect(const PreparedGaussian& g,
+               const TraceOptions& options,
+               const glm::dvec3& origin,
+               const glm::dvec3& direction,
+               double t_min,
+               double t_max,
+               Hit& hit,
+               double& margin) {
+  if (!g.visible || g.quantile < 0.0) return false;
+  const glm::dvec3 o = g.whitening * (origin - g.mean);
+  const glm::dvec3 d = g.whitening * direction;
+  const double dd = glm::dot(d, d);
+  const double od = glm::dot(o, d);
+  if (!(dd > 0.0)) return false;
+  hit.slope = od / dd;
+  hit.residual = o - hit.slope * d;
+  hit.t_peak = -hit.slope;
+  const double delta2 = glm::dot(hit.residual, hit.residual);
+
+  hit.t = hit.t_peak;
+  if (options.hit_order == HitOrder::kEntry && delta2 <= g.quantile) {
+    const double root = std::sqrt(dd * (g.quantile - delta2));
+    const double far_from_zero = (-od - (od >= 0.0 ? root : -root)) / dd;
+    hit.t = od >= 0.0 ? far_from_zero : (glm::dot(o, o) - g.quantile) / (dd * far_from_zero);
+  }
+  const bool in_range = hit.t >= std::max(t_min, 0.0) && hit.t <= t_max;
+  if (in_range) lower(margin, delta2 - g.quantile, g.quantile);
+  if (delta2 > g.quantile) return false;
+  const double size = 1.0 / std::sqrt(dd);
+  lower(margin, hit.t - std::max(t_min, 0.0), size);
+  lower(margin, hit.t - t_max, size);
+  hit.alpha = g.opacity * std::exp(-0.5 * delta2);
+  return in_range;
+}
+
+glm::dvec3 color_direction(ColorMode mode,
+                           const glm::dvec3& mean,
+                           const glm::dvec3& origin,
+                           const glm::dvec3& direction) {
+  const glm::dvec3 v = mode == ColorMode::kFromOrigin ? mean - origin : direction;
+  const double length = glm::length(v);
+  return length > 0.0 ? v / length : glm::normalize(direction);
+}
+
+}  // namespace
+
+std::vector<PreparedGaussian> prepare(const Parameters& parameters, const TraceOptions& options) {
+  std::vector<PreparedGaussian> out(parameters.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i].mean = parameters.mean(i);
+    out[i].whitening = whitening_matrix(parameters, i);
+    out[i].opacity = sigmoid(parameters.opacities[i]);
+    out[i].quantile = effective_quantile(options, out[i].opacity);
+  }
+  return out;
+}
+
+RayTrace trace_ray(const Parameters& parameters,
+                   const TraceOptions& options,
+                   const glm::dvec3& origin,
+                   const glm::dvec3& direction,
+                   double t_min,
+                   double t_max,
+                   ColorMode color_mode) {
+  return trace_ray(parameters, prepare(parameters, options), options, origin, direction, t_min,
+                   t_max, color_mode);
+}
+
+RayTrace trace_ray(const Parameters& parameters,
+                   const std::vector<PreparedGaussian>& prepared,
+                   const TraceOptions& options,
+                   const glm::dvec3& origin,
+                   const glm::dvec3& direction,
+                   double t_min,
+                   double t_max,
+                   ColorMode color_mode) {
+  RayTrace out;
+  std::vector<Hit> all;
+  for (std::size_t i = 0; i < prepared.size(); ++i) {
+    Hit hit;
+    hit.index = static_cast<std::uint32_t>(i);
+    if (intersect(prepared[i], options, origin, direction, t_min, t_max, hit, out.margin))
+      all.push_back(hit);
+  }
+  std::sort(all.begin(), all.end(),
+            [](const Hit& a, const Hit& b) { return a.t != b.t ? a.t < b.t : a.index < b.index; });
+
+  const double stop = options.min_transmittance;
+  const auto max_hits = static_cast<std::size_t>(std::max(options.max_hits, 0));
+  double depth_sum = 0.0;
+  double weight_sum = 0.0;
+  double& transmittance = out.transmittance;
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    if (n > 0) lower(out.margin, all[n].t - all[n - 1].t, all[n].t);
+    if (transmittance < stop) break;
+    if (n == max_hits) {
+      out.capped = true;
+      break;
+    }
+    Hit& hit = all[n];
+    const std::size_t i = hit.index;
+    hit.transmittance = transmittance;
+    hit.color =
+        color(parameters, i, color_direction(color_mode, prepared[i].mean, origin, direction));
+    const double weight = transmittance * hit.alpha;
+    out.color += weight * hit.color;
+    depth_sum += weight * hit.t_peak;
+    weight_sum += weight;
+    transmittance *= 1.0 - hit.alpha;
+    if (hit.transmittance >= 0.5 && transmittance < 0.5) out.median_depth = hit.t_peak;
+    lower(out.margin, transmittance - stop, stop);
+    out.hits.push_back(hit);
+  }
+  out.color += transmittance *
+               glm::dvec3(options.background[0], options.background[1], options.background[2]);
+  out.alpha = 1.0 - transmittance;
+  if (weight_sum > 0.0) out.expected_depth = depth_sum / weight_sum;
+  return out;
+}
+
+glm::dvec3 pixel_direction(const Camera& camera, int column, int row) {
+  return {(column + 0.5 - camera.cx) / camera.fx, (row + 0.5 - camera.cy) / camera.fy, 1.0};
+}
+
+std::vector<PreparedGaussian> prepare_view(const Parameters& parameters,
+                                           const TraceOptions& options,
+                                           const Camera& camera) {
+  auto out = prepare(parameters, options);
+  if (options.near_depth > 0.0f) {
+    for (PreparedGaussian& g : out) {
+      g.visible = (camera.rotation * g.mean + camera.translation).z >= options.near_depth;
+    }
+  }
+  return out;
+}
+
+Render render(const Parameters& parameters, const TraceOptions& options, const Camera& camera) {
+  const auto prepared = prepare_view(parameters, options, camera);
+  const glm::dmat3 to_world = glm::transpose(camera.rotation);
+  const glm::dvec3 center = camera.center();
+  Render out;
+  out.width = camera.width;
+  out.height = camera.height;
+  const std::size_t pixels = out.pixels();
+  out.image.resize(4 * pixels);
+  out.depth.resize(3 * pixels);
+  out.margin.resize(pixels);
+  out.signature = 0xcbf29ce484222325ull;  // FNV-1a
+  const auto hash = [&](std::uint64_t value) {
+    out.signature = (out.signature ^ value) * 0x100000001b3ull;
+  };
+  std::size_t pixel = 0;
+  for (int row = 0; row < camera.height; ++row) {
+    for (int column = 0; column < camera.width; ++column, ++pixel) {
+      const glm::dvec3 direction = to_world * pixel_direction(camera, column, row);
+      const RayTrace ray =
+          trace_ray(parameters, prepared, options, center, direction, 0.0,
+                    std::numeric_limits<double>::infinity(), ColorMode::kFromOrigin);
+      for (int channel = 0; channel < 3; ++channel) {
+        out.image[static_cast<std::size_t>(channel) * pixels + pixel] = ray.color[channel];
+      }
+      out.image[3 * pixels + pixel] = ray.alpha;
+      out.depth[pixel] = ray.expected_depth;
+      out.depth[pixels + pixel] = ray.median_depth;
+      out.depth[2 * pixels + pixel] = static_cast<double>(ray.hits.size());
+      out.margin[pixel] = ray.margin;
+      out.capped_rays += ray.capped ? 1 : 0;
+      out.hits += ray.hits.size();
+      for (const Hit& hit : ray.hits) hash(hit.index + 1u);
+      hash(0);
+    }
+  }
+  return out;
+}
+
+}  // namespace raysplats::reference
