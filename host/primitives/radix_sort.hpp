@@ -6,20 +6,42 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
+#include "primitives/chunk_shape.hpp"
+#include "primitives/scan.hpp"
 
 namespace raysplats {
 
-/// Stable least-significant-digit radix sort of 32-bit keys with 32-bit values, 8 bits a pass; few large chunks
-/// on CPUs, many on GPUs. Scratch memory is kept between calls.
+/// Stable least-significant-digit radix sort of 32-bit keys with 32-bit values, 8 bits a pass; few
+/// large chunks on CPUs, many on GPUs. Scratch memory is kept between calls.
 class RadixSort {
  public:
   explicit RadixSort(Context& context);
+  /// With an explicit division of the work; the result is the same for every shape.
+  RadixSort(Context& context, const ChunkShape& shape);
 
-  /// Sorts the first `count` pairs in place by the lowest `bits` bits of the keys (a multiple of 8 is used).
-  void sort(Buffer<std::uint32_t>& keys, Buffer<std::uint32_t>& values, std::size_t count, int bits = 32);
+  /// Sorts the first `count` pairs in place by the lowest `bits` bits of the keys (rounded up to a
+  /// multiple of 8, 0 to 32). The buffers may be longer. Throws UsageError when they are shorter.
+  void sort(Buffer<std::uint32_t>& keys,
+            Buffer<std::uint32_t>& values,
+            std::size_t count,
+            int bits = 32);
 
  private:
+  void pass(const Buffer<std::uint32_t>& keys,
+            const Buffer<std::uint32_t>& values,
+            Buffer<std::uint32_t>& keys_out,
+            Buffer<std::uint32_t>& values_out,
+            std::size_t count,
+            std::uint32_t shift);
+
   Context* context_;
+  ChunkShape shape_;
+  Scan scan_;
+  Kernel count_digits_;
+  Kernel scatter_pairs_;
+  Buffer<std::uint32_t> keys_;
+  Buffer<std::uint32_t> values_;
+  Buffer<std::uint32_t> table_;
 };
 
 }  // namespace raysplats

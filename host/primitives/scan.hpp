@@ -6,6 +6,7 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
+#include "primitives/chunk_shape.hpp"
 
 namespace raysplats {
 
@@ -13,13 +14,20 @@ namespace raysplats {
 class Scan {
  public:
   explicit Scan(Context& context);
+  /// With an explicit division of the work; the result is the same for every shape.
+  Scan(Context& context, const ChunkShape& shape);
 
-  /// values[i] becomes the sum of values[0..i) for i < count; values[count] becomes the total, so the buffer
-  /// must hold count + 1 elements. The sum must stay below 2^32. In place; scratch is kept between calls.
+  /// values[i] becomes the sum of values[0..i) for i < count; values[count] becomes the total, so
+  /// the buffer must hold count + 1 elements (UsageError when it does not). The sum must stay below
+  /// 2^32. In place; scratch is kept between calls.
   void exclusive(Buffer<std::uint32_t>& values, std::size_t count);
 
  private:
   Context* context_;
+  ChunkShape shape_;
+  Kernel sum_chunks_;
+  Kernel scan_values_;
+  Buffer<std::uint32_t> sums_;
 };
 
 }  // namespace raysplats
