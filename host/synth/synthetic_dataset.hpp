@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+namespace raysplats {
+
+/// Size and variant of a generated data set.
+struct SyntheticOptions {
+  int size = 160;          ///< width and height of every image in pixels, 8 to 4096
+  int train_views = 48;    ///< 1 to 10000
+  int test_views = 8;      ///< 1 to 10000
+  std::uint64_t seed = 0;  ///< varies noise textures, pebbles and the azimuth of the cameras
+};
+
+/// Ray-traces a procedural still life (curved, textured and thin parts on a round table top, inside
+/// a ball of radius 1.2 around the origin, Z up) and writes it as a Blender / NeRF-synthetic data
+/// set: transforms_train.json, transforms_test.json, train/r_N.png and test/r_N.png (RGBA, straight
+/// alpha, transparent where nothing is hit). The cameras lie 4 units from the origin above the
+/// table top and look at the origin; the held-out views lie between the training views. Equal
+/// options give equal bytes. Throws UsageError for options outside their range, DataError when
+/// `directory` cannot be written.
+void generate_dataset(const std::filesystem::path& directory, const SyntheticOptions& options = {});
+
+}  // namespace raysplats
