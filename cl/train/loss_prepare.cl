@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// Turns a rendered image x and a packed photo y into the planes u = x' + y and v = x' - y that SSIM
+// and its gradient read, and sums the pixel term. x' = y + m (x - y) with the mask m: where m = 0
+// both images are equal.
+//
+// Launch: one work-item per tile of TILE x ROWS pixels, grid tiles_x x tiles_y; any work-group
+// size.
+//   pair      3 planes u (R, G, B), then 3 planes v, padded as in train/ssim_window.h, borders zero
+//   partials  per tile {sum m rho(x - y), sum m (clamp(x) - y)^2, 3 sum m, 0} over R, G, B
+// Complexity: one pass over the pixels.
+#include "train/ssim_window.h"
+
+#ifndef PIXEL_L2
+#define PIXEL_L2 0
+#endif
+
+typedef struct {
+  lanes pixel, square, weight;
+} TileSums;
+
+void store_pair(
+    lanes x, lanes y, lanes mask, __global float* u, __global float* v, TileSums* sums) {
+  const lanes difference = x - y;
+  const lanes masked = mask * difference;
+  rs_store(masked + 2.0f * y, u);
+  rs_store(masked, v);
+#if PIXEL_L2
+  sums->pixel += masked * difference;
+#else
+  sums->pixel += fabs(masked);
+#endif
+  lanes shown = rs_pick(x > 1.0f, 1.0f, x);
+  shown = rs_pick(shown < 0.0f, 0.0f, shown);
+  sums->square += mask * (shown - y) * (shown - y);
+  sums->weight += mask;
+}
+
+__kernel void prepare_pair(const __global float* image,
+                           const __global uint* target,
+                           __global float* pair,
+                           __global float4* partials,
+                           int width,
+                           int height,
+                           int stride,
+                           int plane,
+                           int composite,
+                           float red,
+                           float green,
+                           float blue) {
+  const int tile_x = get_global_id(0);
+  const int tile_y = get_global_id(1);
+  const int tiles_x = (width + TILE - 1) / TILE;
+  const int first = tile_x * TILE;
+  const int top = tile_y * ROWS;
+  if (first >= width || top >= height) return;
+  const int last = min(first + TILE, width);
+  const int bottom = min(top + ROWS, height);
+  const int pixels = width * height;
+
+  TileSums sums = {(lanes)(0.0f), (lanes)(0.0f), (lanes)(0.0f)};
+  for (int row = top; row < bottom; ++row) {
+    for (int column = first; column < last; column += VECTOR) {
+      const int in = row * width + column;
+      lane_words words;
+      lanes x[3];
+      lanes valid = (lanes)(1.0f);
+      if (column + VECTOR <= last) {
+        words = rs_load_words(target + in);
+        for (int c = 0; c < 3; ++c) x[c] = rs_load(image + c * pixels + in);
+      } else {
+        // The last columns: lanes beyond the image are x = y = m = 0.
+        uint word_tail[VECTOR];
+        float tail[4][VECTOR];
+        for (int i = 0; i < VECTOR; ++i) {
+          const bool inside = column + i < last;
+          word_tail[i] = inside ? target[in + i] : 0;
+          for (int c = 0; c < 3; ++c) tail[c][i] = inside ? image[c * pixels + in + i] : 0.0f;
+          tail[3][i] = inside ? 1.0f : 0.0f;
+        }
+        words = rs_load_private_words(word_tail);
+        for (int c = 0; c < 3; ++c) x[c] = rs_load_private(tail[c]);
+        valid = rs_load_private(tail[3]);
+      }
+      lanes y[3];
+      y[0] = rs_to_float(words & 255u) * (1.0f / 255.0f);
+      y[1] = rs_to_float((words >> 8) & 255u) * (1.0f / 255.0f);
+      y[2] = rs_to_float((words >> 16) & 255u) * (1.0f / 255.0f);
+      const lanes alpha = rs_to_float(words >> 24) * (1.0f / 255.0f);
+      lanes mask = alpha;
+      if (composite) {
+        const lanes rest = valid - alpha;
+        y[0] = y[0] * alpha + red * rest;
+        y[1] = y[1] * alpha + green * rest;
+        y[2] = y[2] * alpha + blue * rest;
+        mask = valid;
+      }
+      __global float* out = pair + RS_PADDED(row, stride) + column;
+      for (int c = 0; c < 3; ++c) {
+        store_pair(x[c], y[c], mask, out + c * plane, out + (3 + c) * plane, &sums);
+      }
+    }
+  }
+  partials[tile_y * tiles_x + tile_x] =
+      (float4)(rs_lanes_sum(sums.pixel), rs_lanes_sum(sums.square), rs_lanes_sum(sums.weight),
+               0.0f);
+}

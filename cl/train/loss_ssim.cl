@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+// SSIM (Wang et al. 2004) of the pair u = x + y, v = x - y and its gradient with respect to x.
+//
+// With a = mu_u^2, b = mu_v^2, p = sigma_u^2, q = sigma_v^2 (window moments of u and v)
+//   SSIM = (a - b + 2 C1)(p - q + 2 C2) / ((a + b + 2 C1)(p + q + 2 C2)),
+// which needs four moments instead of five and has no cancellation where x is close to y. The
+// gradient of sum SSIM is three windowed sums (model.md, "Loss"): w * E + u (w * F) + v (w * G)
+// with E = dS/dmu_u + dS/dmu_v, F = 2 dS/d(w * u^2), G = 2 dS/d(w * v^2); the window is symmetric.
+//
+// Launch of both kernels: one work-item per tile of TILE x ROWS pixels and channel, grid tiles_x x
+// tiles_y x 3.
+//   pair    3 planes u, 3 planes v     slopes  per channel planes E, F, G     (padded, borders
+//   zero)
+// Complexity: 2 x 11 multiply-adds per moment and pixel: a column pass into private memory, then a
+// row pass.
+#include "train/ssim_window.h"
+
+#ifndef PIXEL_L2
+#define PIXEL_L2 0
+#endif
+// 0 when SSIM is only reported and has no weight in the loss.
+#ifndef SSIM_GRADIENT
+#define SSIM_GRADIENT 1
+#endif
+
+#define C1 0.0001f
+#define C2 0.0009f
+
+// partials[channel * tiles + tile] = sum of SSIM over the tile.
+__kernel void ssim_slopes(const __global float* pair,
+                          __global float* slopes,
+                          __global float* partials,
+                          int width,
+                          int height,
+                          int stride,
+                          int plane) {
+  const int tile_x = get_global_id(0);
+  const int tile_y = get_global_id(1);
+  const int channel = get_global_id(2);
+  const int tiles_x = (width + TILE - 1) / TILE;
+  const int tiles_y = (height + ROWS - 1) / ROWS;
+  const int first = tile_x * TILE;
+  const int top = tile_y * ROWS;
+  if (first >= width || top >= height || channel >= 3) return;
+  const int last = min(first + TILE, width);
+  const int bottom = min(top + ROWS, height);
+  const int span = (last - first + VECTOR - 1) / VECTOR * VECTOR + 2 * HALO;
+
+  float mean_u[TILE_SPAN], mean_v[TILE_SPAN], square_u[TILE_SPAN], square_v[TILE_SPAN];
+  lanes sum = (lanes)(0.0f);
+  for (int row = top; row < bottom; ++row) {
+    const __global float* u = pair + channel * plane + RS_PADDED(row, stride) + first - HALO;
+    const __global float* v = u + 3 * plane;
+    for (int i = 0; i < span; i += VECTOR) {
+      const __global float* pu = u + i;
+      const __global float* pv = v + i;
+      lanes a = rs_load(pu);
+      lanes b = rs_load(pv);
+      lanes mu = W0 * a, mv = W0 * b;
+      lanes qu = mu * a, qv = mv * b;
+#define RS_TAP(k, weight)                     \
+  {                                           \
+    a = rs_load(pu - k * stride);             \
+    b = rs_load(pv - k * stride);             \
+    const lanes c = rs_load(pu + k * stride); \
+    const lanes d = rs_load(pv + k * stride); \
+    mu += weight * (a + c);                   \
+    mv += weight * (b + d);                   \
+    qu += weight * (a * a + c * c);           \
+    qv += weight * (b * b + d * d);           \
+  }
+      RS_TAP(1, W1)
+      RS_TAP(2, W2)
+      RS_TAP(3, W3)
+      RS_TAP(4, W4)
+      RS_TAP(5, W5)
+#undef RS_TAP
+      rs_store_private(mu, mean_u + i);
+      rs_store_private(mv, mean_v + i);
+      rs_store_private(qu, square_u + i);
+      rs_store_private(qv, square_v + i);
+    }
+    __global float* out = slopes + 3 * channel * plane + RS_PADDED(row, stride) + first;
+    for (int i = 0; first + i < last; i += VECTOR) {
+      const lanes mu = rs_window_row(mean_u + HALO + i);
+      const lanes mv = rs_window_row(mean_v + HALO + i);
+      const lanes a = mu * mu;
+      const lanes b = mv * mv;
+      const lanes p = rs_window_row(square_u + HALO + i) - a;
+      const lanes q = rs_window_row(square_v + HALO + i) - b;
+      const lanes bottom1 = a + b + 2.0f * C1;
+      const lanes bottom2 = p + q + 2.0f * C2;
+      const lanes inverse = 1.0f / (bottom1 * bottom2);
+      const lanes inverse1 = inverse * bottom2;
+      const lanes inverse2 = inverse * bottom1;
+      const lanes ratio1 = (a - b + 2.0f * C1) * inverse1;
+      const lanes ratio2 = (p - q + 2.0f * C2) * inverse2;
+      const lane_mask inside = first + i + RS_LANE_IDS < last;
+      sum += rs_pick(inside, ratio1 * ratio2, 0.0f);
+#if SSIM_GRADIENT
+      const lanes slope_p = 2.0f * q * ratio1 * inverse2 * inverse2;
+      const lanes slope_q = -ratio1 * (1.0f + ratio2) * inverse2;
+      const lanes slope_a = 2.0f * b * ratio2 * inverse1 * inverse1 - slope_p;
+      const lanes slope_b = -ratio2 * (1.0f + ratio1) * inverse1 - slope_q;
+      rs_store(rs_pick(inside, 2.0f * (mu * slope_a + mv * slope_b), 0.0f), out + i);
+      rs_store(rs_pick(inside, 2.0f * slope_p, 0.0f), out + plane + i);
+      rs_store(rs_pick(inside, 2.0f * slope_q, 0.0f), out + 2 * plane + i);
+#endif
+    }
+  }
+  partials[(channel * tiles_y + tile_y) * tiles_x + tile_x] = rs_lanes_sum(sum);
+}
+
+// gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B; the A plane is
+// zeroed.
+__kernel void loss_gradient(const __global float* pair,
+                            const __global float* slopes,
+                            const __global uint* target,
+                            __global float* gradient,
+                            int width,
+                            int height,
+                            int stride,
+                            int plane,
+                            int masked,
+                            float pixel_scale,
+                            float ssim_scale) {
+  const int tile_x = get_global_id(0);
+  const int tile_y = get_global_id(1);
+  const int channel = get_global_id(2);
+  const int first = tile_x * TILE;
+  const int top = tile_y * ROWS;
+  if (first >= width || top >= height || channel >= 3) return;
+  const int last = min(first + TILE, width);
+  const int bottom = min(top + ROWS, height);
+  const int span = (last - first + VECTOR - 1) / VECTOR * VECTOR + 2 * HALO;
+  const int pixels = width * height;
+
+  float e[TILE_SPAN], f[TILE_SPAN], g[TILE_SPAN];
+  for (int row = top; row < bottom; ++row) {
+#if SSIM_GRADIENT
+    const __global float* in = slopes + 3 * channel * plane + RS_PADDED(row, stride) + first - HALO;
+    for (int i = 0; i < span; i += VECTOR) {
+      rs_store_private(rs_window_column(in + i, stride), e + i);
+      rs_store_private(rs_window_column(in + plane + i, stride), f + i);
+      rs_store_private(rs_window_column(in + 2 * plane + i, stride), g + i);
+    }
+#endif
+    for (int i = 0; first + i < last; i += VECTOR) {
+      const __global float* center = pair + channel * plane + RS_PADDED(row, stride) + first + i;
+      const lanes v = rs_load(center + 3 * plane);
+      const int column = first + i;
+      const int pixel = row * width + column;
+      const bool whole = column + VECTOR <= last;
+      lanes mask = (lanes)(1.0f);
+      if (masked) {
+        if (whole) {
+          mask = rs_to_float(rs_load_words(target + pixel) >> 24) * (1.0f / 255.0f);
+        } else {
+          uint tail[VECTOR];
+          for (int k = 0; k < VECTOR; ++k) tail[k] = column + k < last ? target[pixel + k] : 0;
+          mask = rs_to_float(rs_load_private_words(tail) >> 24) * (1.0f / 255.0f);
+        }
+      }
+#if PIXEL_L2
+      // v is m (x - y) already.
+      lanes result = 2.0f * pixel_scale * v;
+#else
+      lanes result = mask * rs_pick(v > 0.0f, pixel_scale, rs_pick(v < 0.0f, -pixel_scale, v));
+#endif
+#if SSIM_GRADIENT
+      const lanes u = rs_load(center);
+      result += ssim_scale * mask *
+                (rs_window_row(e + HALO + i) + u * rs_window_row(f + HALO + i) +
+                 v * rs_window_row(g + HALO + i));
+#endif
+      __global float* out = gradient + channel * pixels + pixel;
+      __global float* alpha = gradient + 3 * pixels + pixel;
+      if (whole) {
+        rs_store(result, out);
+        if (channel == 0) rs_store((lanes)(0.0f), alpha);
+      } else {
+        float tail[VECTOR];
+        rs_store_private(result, tail);
+        for (int k = 0; column + k < last; ++k) {
+          out[k] = tail[k];
+          if (channel == 0) alpha[k] = 0.0f;
+        }
+      }
+    }
+  }
+}

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "device/buffer.hpp"
+#include "device/context.hpp"
+#include "raysplats/train_options.hpp"
+
+namespace raysplats {
+
+/// L = (1 - lambda) * pixel + lambda * (1 - SSIM) of a rendered image and a photo, with its
+/// gradient.
+///
+/// pixel = sum over pixels and R, G, B of m * rho(x - y), divided by 3 * width * height, where rho
+/// is |.| (kL1) or the square (kL2). SSIM is the mean over all 3 * width * height window positions
+/// (11 x 11 Gaussian, sigma 1.5, C1 = 0.01^2, C2 = 0.03^2, zeros beyond the borders; Wang et al.
+/// 2004) of x' = y + m (x - y) and y. With an alpha that is a mask, m = a / 255: both means are
+/// still taken over *all* pixels, so masking takes a pixel's share out of the loss and leaves the
+/// weight of the others as it was; a masked pixel (m = 0) is equal in both images and contributes
+/// neither value nor gradient. With alpha_is_background y = rgb * a + background * (1 - a) and m =
+/// 1 everywhere.
+class ImageLoss {
+ public:
+  struct Value {
+    double total = 0;
+    double pixel = 0;
+    double ssim = 0;
+    double psnr = 0;  ///< decibels over the pixels weighted by m, image clamped to [0, 1]; infinity
+                      ///< when equal
+  };
+
+  /// `ssim_weight` is lambda, in [0, 1]. `vector` is the number of pixels per vector (1, 4, 8 or
+  /// 16); 0 = the device's own. Throws UsageError for other values.
+  ImageLoss(Context& context, PixelLoss pixel_loss, float ssim_weight, int vector = 0);
+  ~ImageLoss();
+
+  /// Enqueues loss and gradient. `image`: planar R, G, B, A (A is not read), 4 x height x width.
+  /// `target`: packed r | g << 8 | b << 16 | a << 24, height x width. `gradient` is grown as needed
+  /// and overwritten: planar dL/dR, dL/dG, dL/dB and zeros for A. Nothing is waited for.
+  void evaluate(const Buffer<float>& image,
+                const Buffer<std::uint32_t>& target,
+                bool alpha_is_background,
+                std::array<float, 3> background,
+                int width,
+                int height,
+                Buffer<float>& gradient);
+
+  /// Loss of the last evaluate(); blocks. Sums are taken in a fixed order: equal inputs give equal
+  /// values.
+  Value value();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/image_loss.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "base/rng.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+Context& context() {
+  static Context instance(select_device(""));
+  return instance;
+}
+
+struct Scene {
+  int width = 0;
+  int height = 0;
+  std::vector<float> image;           // planar R, G, B, A
+  std::vector<std::uint32_t> target;  // packed
+  bool alpha_is_background = false;
+  std::array<float, 3> background{0, 0, 0};
+
+  std::size_t pixels() const { return target.size(); }
+};
+
+// Smooth image with noise and a photo that differs from it; alpha in whole steps and between.
+Scene make_scene(int width, int height, std::uint64_t seed, bool random_alpha) {
+  Scene s;
+  s.width = width;
+  s.height = height;
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  s.image.resize(4 * pixels);
+  s.target.resize(pixels);
+  CounterRng rng(seed, 1);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const double x = static_cast<double>(i % static_cast<std::size_t>(width));
+    const double y = static_cast<double>(i / static_cast<std::size_t>(width));
+    std::uint32_t packed = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double base =
+          0.5 + 0.3 * std::sin(0.2 * x + static_cast<double>(c)) * std::cos(0.15 * y);
+      s.image[c * pixels + i] = static_cast<float>(base + 0.15 * (rng.uniform() - 0.5));
+      const double photo = std::clamp(base + 0.3 * (rng.uniform() - 0.5), 0.0, 1.0);
+      packed |= static_cast<std::uint32_t>(std::lround(photo * 255)) << (8 * c);
+    }
+    s.image[3 * pixels + i] = static_cast<float>(rng.uniform());
+    const double draw = rng.uniform();
+    const std::uint32_t alpha = !random_alpha ? 255u
+                                : draw < 0.3  ? 0u
+                                : draw < 0.6  ? 255u
+                                              : static_cast<std::uint32_t>(draw * 255);
+    s.target[i] = packed | alpha << 24;
+  }
+  return s;
+}
+
+double photo_value(const Scene& s, std::size_t pixel, std::size_t c) {
+  const double value = ((s.target[pixel] >> (8 * c)) & 255u) / 255.0;
+  const double alpha = (s.target[pixel] >> 24) / 255.0;
+  return s.alpha_is_background ? value * alpha + static_cast<double>(s.background[c]) * (1 - alpha)
+                               : value;
+}
+
+double photo_weight(const Scene& s, std::size_t pixel) {
+  return s.alpha_is_background ? 1.0 : (s.target[pixel] >> 24) / 255.0;
+}
+
+std::array<double, 11> window() {
+  std::array<double, 11> w{};
+  double sum = 0;
+  for (int k = -5; k <= 5; ++k) sum += w[static_cast<std::size_t>(k + 5)] = std::exp(-k * k / 4.5);
+  for (double& value : w) value /= sum;
+  return w;
+}
+
+// The definition of SSIM, window by window, without separating anything.
+double ssim_at(const std::vector<double>& x,
+               const std::vector<double>& y,
+               int width,
+               int height,
+               int cx,
+               int cy) {
+  static const std::array<double, 11> kWindow = window();
+  double mx = 0, my = 0, xx = 0, yy = 0, xy = 0;
+  for (int dy = -5; dy <= 5; ++dy) {
+    for (int dx = -5; dx <= 5; ++dx) {
+      const int px = cx + dx, py = cy + dy;
+      if (px < 0 || py < 0 || px >= width || py >= height) continue;
+      const double w =
+          kWindow[static_cast<std::size_t>(dx + 5)] * kWindow[static_cast<std::size_t>(dy + 5)];
+      const auto i = static_cast<std::size_t>(py * width + px);
+      mx += w * x[i];
+      my += w * y[i];
+      xx += w * x[i] * x[i];
+      yy += w * y[i] * y[i];
+      xy += w * x[i] * y[i];
+    }
+  }
+  constexpr double c1 = 1e-4, c2 = 9e-4;
+  return (2 * mx * my + c1) * (2 * (xy - mx * my) + c2) /
+         ((mx * mx + my * my + c1) * (xx - mx * mx + yy - my * my + c2));
+}
+
+struct Reference {
+  double total, pixel, ssim, psnr;
+};
+
+Reference reference_loss(const Scene& s,
+                         const std::vector<double>& image,
+                         PixelLoss pixel_loss,
+                         double weight) {
+  Reference out{};
+  double square = 0, weights = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<double> x(s.pixels()), y(s.pixels());
+    for (std::size_t i = 0; i < s.pixels(); ++i) {
+      const double m = photo_weight(s, i);
+      const double value = image[c * s.pixels() + i];
+      y[i] = photo_value(s, i, c);
+      x[i] = y[i] + m * (value - y[i]);
+      const double d = value - y[i];
+      out.pixel += m * (pixel_loss == PixelLoss::kL2 ? d * d : std::abs(d));
+      const double shown = std::clamp(value, 0.0, 1.0) - y[i];
+      square += m * shown * shown;
+      weights += m;
+    }
+    for (int py = 0; py < s.height; ++py) {
+      for (int px = 0; px < s.width; ++px) out.ssim += ssim_at(x, y, s.width, s.height, px, py);
+    }
+  }
+  const double samples = 3.0 * static_cast<double>(s.pixels());
+  out.pixel /= samples;
+  out.ssim /= samples;
+  out.total = (1 - weight) * out.pixel + weight * (1 - out.ssim);
+  out.psnr = 10 * std::log10(weights / square);
+  return out;
+}
+
+struct Result {
+  ImageLoss::Value value;
+  std::vector<float> gradient;
+};
+
+Result run(const Scene& s, ImageLoss& loss) {
+  Buffer<float> image(context(), s.image.size(), "image");
+  Buffer<std::uint32_t> target(context(), s.target.size(), "target");
+  // More than is needed, filled with a value that must be overwritten exactly where the gradient
+  // lies.
+  Buffer<float> gradient(context(), s.image.size() + 64, "gradient");
+  image.upload(s.image);
+  target.upload(s.target);
+  gradient.upload(std::vector<float>(s.image.size() + 64, 7.0f));
+  loss.evaluate(image, target, s.alpha_is_background, s.background, s.width, s.height, gradient);
+  Result result{loss.value(), std::vector<float>(s.image.size() + 64)};
+  gradient.download(std::span<float>(result.gradient));
+  for (std::size_t i = s.image.size(); i < result.gradient.size(); ++i)
+    CHECK(result.gradient[i] == 7.0f);
+  result.gradient.resize(s.image.size());
+  return result;
+}
+
+Result run(const Scene& s, PixelLoss pixel_loss, float weight, int vector) {
+  ImageLoss loss(context(), pixel_loss, weight, vector);
+  return run(s, loss);
+}
+
+void check_value(const Scene& s,
+                 PixelLoss pixel_loss,
+                 float weight,
+                 const ImageLoss::Value& value) {
+  const Reference expected = reference_loss(s, std::vector<double>(s.image.begin(), s.image.end()),
+                                            pixel_loss, static_cast<double>(weight));
+  CHECK(value.pixel == doctest::Approx(expected.pixel).epsilon(2e-6));
+  CHECK(value.ssim == doctest::Approx(expected.ssim).epsilon(5e-6));
+  CHECK(value.total == doctest::Approx(expected.total).epsilon(1e-5));
+  CHECK(value.psnr == doctest::Approx(expected.psnr).epsilon(1e-5));
+}
+
+// Central differences of the double reference at some elements.
+void check_gradient(const Scene& s,
+                    PixelLoss pixel_loss,
+                    float weight,
+                    const std::vector<float>& gradient) {
+  std::vector<double> image(s.image.begin(), s.image.end());
+  const double scale = 1.0 / (3.0 * static_cast<double>(s.pixels()));
+  const std::size_t step = std::max<std::size_t>(1, 3 * s.pixels() / 23);
+  for (std::size_t i = 0; i < 3 * s.pixels(); i += step) {
+    const double h = 1e-6;
+    const double center = image[i];
+    image[i] = center + h;
+    const double above = reference_loss(s, image, pixel_loss, static_cast<double>(weight)).total;
+    image[i] = center - h;
+    const double below = reference_loss(s, image, pixel_loss, static_cast<double>(weight)).total;
+    image[i] = center;
+    const double expected = (above - below) / (2 * h);
+    CAPTURE(i);
+    CHECK(std::abs(static_cast<double>(gradient[i]) - expected) <
+          2e-4 * std::abs(expected) + 2e-4 * scale);
+  }
+  for (std::size_t i = 3 * s.pixels(); i < 4 * s.pixels(); ++i) CHECK(gradient[i] == 0.0f);
+}
+
+}  // namespace
+
+TEST_CASE("image loss: value and gradient agree with the definition in double precision") {
+  struct Size {
+    int width, height;
+  };
+  for (const Size size :
+       {Size{1, 1}, Size{3, 2}, Size{7, 5}, Size{17, 9}, Size{16, 11}, Size{33, 19}}) {
+    for (const PixelLoss pixel_loss : {PixelLoss::kL1, PixelLoss::kL2}) {
+      for (const float weight : {0.0f, 0.2f, 1.0f}) {
+        CAPTURE(size.width);
+        CAPTURE(size.height);
+        CAPTURE(weight);
+        const Scene s = make_scene(size.width, size.height, 3, false);
+        const Result result = run(s, pixel_loss, weight, 0);
+        check_value(s, pixel_loss, weight, result.value);
+        check_gradient(s, pixel_loss, weight, result.gradient);
+      }
+    }
+  }
+}
+
+TEST_CASE("image loss: masks weigh pixels, alpha over a background composites the photo") {
+  for (const bool alpha_is_background : {false, true}) {
+    for (const PixelLoss pixel_loss : {PixelLoss::kL1, PixelLoss::kL2}) {
+      CAPTURE(alpha_is_background);
+      Scene s = make_scene(21, 14, 5, true);
+      s.alpha_is_background = alpha_is_background;
+      s.background = {1.0f, 0.5f, 0.25f};
+      const Result result = run(s, pixel_loss, 0.2f, 0);
+      check_value(s, pixel_loss, 0.2f, result.value);
+      check_gradient(s, pixel_loss, 0.2f, result.gradient);
+      if (alpha_is_background) continue;
+      for (std::size_t i = 0; i < s.pixels(); ++i) {
+        if (s.target[i] >> 24 != 0) continue;
+        for (std::size_t c = 0; c < 3; ++c) CHECK(result.gradient[c * s.pixels() + i] == 0.0f);
+      }
+    }
+  }
+}
+
+TEST_CASE("image loss: what lies under a mask changes nothing") {
+  Scene s = make_scene(40, 23, 11, true);
+  const Result before = run(s, PixelLoss::kL1, 0.2f, 0);
+  for (std::size_t i = 0; i < s.pixels(); ++i) {
+    if (s.target[i] >> 24 != 0) continue;
+    for (std::size_t c = 0; c < 3; ++c)
+      s.image[c * s.pixels() + i] = 0.1f + 0.4f * static_cast<float>(c);
+  }
+  const Result after = run(s, PixelLoss::kL1, 0.2f, 0);
+  CHECK(after.value.total == doctest::Approx(before.value.total).epsilon(1e-6));
+  for (std::size_t i = 0; i < before.gradient.size(); ++i) {
+    CHECK(after.gradient[i] == doctest::Approx(before.gradient[i]).epsilon(1e-4));
+  }
+}
+
+TEST_CASE("image loss: every vector width gives the same result") {
+  Scene s = make_scene(150, 37, 7, true);
+  const Result narrow = run(s, PixelLoss::kL1, 0.2f, 1);
+  for (const int vector : {4, 8, 16}) {
+    CAPTURE(vector);
+    const Result wide = run(s, PixelLoss::kL1, 0.2f, vector);
+    CHECK(wide.value.total == doctest::Approx(narrow.value.total).epsilon(1e-6));
+    CHECK(wide.value.psnr == doctest::Approx(narrow.value.psnr).epsilon(1e-6));
+    double largest = 0, worst = 0;
+    for (std::size_t i = 0; i < narrow.gradient.size(); ++i) {
+      largest = std::max(largest, std::abs(static_cast<double>(narrow.gradient[i])));
+      worst = std::max(worst, std::abs(static_cast<double>(wide.gradient[i]) -
+                                       static_cast<double>(narrow.gradient[i])));
+    }
+    CHECK(worst < 1e-4 * largest);
+  }
+}
+
+TEST_CASE("image loss: finite differences through value()") {
+  Scene s = make_scene(20, 13, 13, true);
+  ImageLoss loss(context(), PixelLoss::kL2, 0.5f);
+  const std::vector<float> gradient = run(s, loss).gradient;
+  for (std::size_t i = 4; i < 3 * s.pixels(); i += 97) {
+    const float center = s.image[i];
+    const float h = 4e-3f;
+    s.image[i] = center + h;
+    const double above = run(s, loss).value.total;
+    const double upper = static_cast<double>(s.image[i]);
+    s.image[i] = center - h;
+    const double below = run(s, loss).value.total;
+    const double slope = (above - below) / (upper - static_cast<double>(s.image[i]));
+    s.image[i] = center;
+    CHECK(static_cast<double>(gradient[i]) ==
+          doctest::Approx(slope).epsilon(0.02).scale(1.0 / 780));
+  }
+}
+
+TEST_CASE("image loss: one object serves images of changing size, and repeats to the bit") {
+  ImageLoss loss(context(), PixelLoss::kL1, 0.2f);
+  const Scene large = make_scene(61, 45, 17, true);
+  const Scene small = make_scene(9, 30, 19, false);
+  const Result first = run(large, loss);
+  const Result second = run(small, loss);
+  const Result third = run(large, loss);
+  check_value(large, PixelLoss::kL1, 0.2f, first.value);
+  check_value(small, PixelLoss::kL1, 0.2f, second.value);
+  CHECK(first.value.total == third.value.total);
+  CHECK(first.gradient == third.gradient);
+}
+
+TEST_CASE("image loss: equal images have no loss, and bad arguments are refused") {
+  Scene s = make_scene(12, 12, 23, false);
+  for (std::size_t i = 0; i < s.pixels(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      s.image[c * s.pixels() + i] =
+          static_cast<float>((s.target[i] >> (8 * c)) & 255u) * (1.0f / 255.0f);
+    }
+  }
+  const Result result = run(s, PixelLoss::kL1, 0.2f, 0);
+  CHECK(result.value.total == doctest::Approx(0).epsilon(1e-7));
+  CHECK(std::isinf(result.value.psnr));
+  for (const float g : result.gradient) CHECK(std::abs(g) < 1e-7f);
+
+  CHECK_THROWS_AS(ImageLoss(context(), PixelLoss::kL1, 1.5f), UsageError);
+  CHECK_THROWS_AS(ImageLoss(context(), PixelLoss::kL1, 0.2f, 3), UsageError);
+  ImageLoss loss(context(), PixelLoss::kL1, 0.2f);
+  CHECK_THROWS_AS(loss.value(), UsageError);
+  Buffer<float> image(context(), 16, "image"), gradient;
+  Buffer<std::uint32_t> target(context(), 4, "target");
+  CHECK_THROWS_AS(loss.evaluate(image, target, false, {0, 0, 0}, 3, 3, gradient), UsageError);
+}
+
+}  // namespace raysplats
