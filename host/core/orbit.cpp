@@ -93,6 +93,12 @@ glm::dvec3 estimate_up(std::span<const Camera> cameras) {
   return length > least && std::isfinite(length) ? sum / length : glm::dvec3(0.0, -1.0, 0.0);
 }
 
+double field_of_view(const Camera& camera) {
+  const bool portrait = camera.width < camera.height;
+  const double half = 0.5 * (portrait ? camera.width : camera.height);
+  return 2.0 * std::atan(half / (portrait ? camera.fx : camera.fy)) / kRadians;
+}
+
 OrbitOptions orbit_like(std::span<const Camera> cameras,
                         const glm::dvec3& center,
                         OrbitOptions options) {

@@ -27,6 +27,9 @@ SceneExtent scene_extent(const Gaussians& model);
 /// 3DGS' worlds points down.
 glm::dvec3 estimate_up(std::span<const Camera> cameras);
 
+/// Field of view along the smaller image side, in degrees.
+double field_of_view(const Camera& camera);
+
 struct OrbitOptions {
   int frames = 60;
   int width = 800;

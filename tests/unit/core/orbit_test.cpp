@@ -100,6 +100,7 @@ TEST_CASE("orbit cameras look at the centre from a circle and stay upright") {
             doctest::Approx(std::sqrt(0.5)));
     }
     // The sphere of the extent touches the border of the smaller side.
+    CHECK(field_of_view(cameras[0]) == doctest::Approx(40.0));
     CHECK(cameras[0].fy * std::tan(20.0 * 3.14159265358979 / 180.0) == doctest::Approx(24.0));
   }
 }

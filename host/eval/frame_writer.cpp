@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "eval/frame_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr int kMaxSupersample = 16;
+
+std::filesystem::path extension(FrameFormat format) {
+  switch (format) {
+    case FrameFormat::kExr:
+      return ".exr";
+    case FrameFormat::kJpg:
+      return ".jpg";
+    case FrameFormat::kPng:
+      break;
+  }
+  return ".png";
+}
+
+/// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
+std::string joined(const std::filesystem::path& name) {
+  std::string out;
+  for (const std::filesystem::path& part : name.parent_path().relative_path()) {
+    if (part != "." && part != ".." && !part.empty()) out += part.string() + "_";
+  }
+  return out + name.stem().string();
+}
+
+Image with_channels(const Image& image, int channels) {
+  Image out(image.width, image.height, channels);
+  const auto from = static_cast<std::size_t>(image.channels);
+  const auto to = static_cast<std::size_t>(channels);
+  for (std::size_t i = 0; i < image.pixels(); ++i) {
+    for (std::size_t c = 0; c < std::min(from, to); ++c)
+      out.data[i * to + c] = image.data[i * from + c];
+  }
+  return out;
+}
+
+/// Expected depth at the size of the frame. Samples that met nothing carry no depth, so blocks
+/// average by alpha.
+Image average_depth(const Image& depth, const Image& rgba, int factor) {
+  Image weighted(depth.width, depth.height, 2);
+  for (std::size_t i = 0; i < depth.pixels(); ++i) {
+    const float alpha = rgba.data[4 * i + 3];
+    const float z = depth.data[i * static_cast<std::size_t>(depth.channels)];
+    weighted.data[2 * i] = alpha * z;
+    weighted.data[2 * i + 1] = alpha;
+  }
+  const Image mean = box_average(weighted, factor);
+  Image out(mean.width, mean.height, 1);
+  for (std::size_t i = 0; i < mean.pixels(); ++i) {
+    const float alpha = mean.data[2 * i + 1];
+    out.data[i] = alpha > 0.0f ? mean.data[2 * i] / alpha : 0.0f;
+  }
+  return out;
+}
+
+void write_frame(const std::filesystem::path& stem,
+                 const Image& rgba,
+                 const Image& depth,
+                 const FrameOptions& options) {
+  const auto file = [&](const char* suffix, const std::filesystem::path& type) {
+    std::filesystem::path path = stem;
+    path += suffix;
+    path += type;
+    return path;
+  };
+  if (options.format == FrameFormat::kExr) {
+    if (!options.depth) {
+      write_image(file("", extension(options.format)), rgba);
+      return;
+    }
+    Image channels = with_channels(rgba, 5);
+    for (std::size_t i = 0; i < channels.pixels(); ++i) channels.data[5 * i + 4] = depth.data[i];
+    write_image(file("", extension(options.format)), channels, {"Z"});
+    return;
+  }
+  write_image(file("", extension(options.format)), with_channels(rgba, 3));
+  if (options.depth) write_image(file("_depth", ".png"), depth_preview(depth, rgba));
+}
+
+}  // namespace
+
+std::vector<std::string> frame_names(std::span<const Camera> cameras) {
+  std::vector<std::string> names(cameras.size());
+  std::map<std::string, std::size_t> stems;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    names[i] = std::filesystem::path(cameras[i].name).stem().string();
+    if (names[i].empty()) names[i] = fmt::format("frame_{:04d}", i);
+    ++stems[names[i]];
+  }
+  std::set<std::string> used;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    std::string name = names[i];
+    if (stems[name] > 1) {
+      name = joined(cameras[i].name);
+      if (name.empty()) name = names[i];
+    }
+    std::string unique = name;
+    for (int n = 2; !used.insert(unique).second; ++n) unique = fmt::format("{}_{}", name, n);
+    names[i] = unique;
+  }
+  return names;
+}
+
+Image box_average(const Image& image, int factor) {
+  if (factor == 1) return image;
+  Image out(image.width / factor, image.height / factor, image.channels);
+  const float scale = 1.0f / static_cast<float>(factor * factor);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      for (int c = 0; c < out.channels; ++c) {
+        float sum = 0.0f;
+        for (int v = 0; v < factor; ++v) {
+          for (int u = 0; u < factor; ++u) sum += image.at(x * factor + u, y * factor + v, c);
+        }
+        out.at(x, y, c) = sum * scale;
+      }
+    }
+  }
+  return out;
+}
+
+Image depth_preview(const Image& depth, const Image& rgba) {
+  const auto covered = [&](std::size_t i) { return rgba.data[4 * i + 3] >= 0.5f; };
+  float low = std::numeric_limits<float>::infinity();
+  float high = -low;
+  for (std::size_t i = 0; i < depth.pixels(); ++i) {
+    if (!covered(i)) continue;
+    low = std::min(low, depth.data[i]);
+    high = std::max(high, depth.data[i]);
+  }
+  Image out(depth.width, depth.height, 1);
+  for (std::size_t i = 0; i < depth.pixels(); ++i) {
+    if (covered(i)) out.data[i] = high > low ? (high - depth.data[i]) / (high - low) : 1.0f;
+  }
+  return out;
+}
+
+FrameReport write_frames(CameraTracer& tracer,
+                         const DeviceGaussians& gaussians,
+                         std::span<const Camera> cameras,
+                         const std::filesystem::path& folder,
+                         const FrameOptions& options,
+                         const std::function<bool(std::size_t)>& done) {
+  if (options.supersample < 1 || options.supersample > kMaxSupersample) {
+    throw UsageError(fmt::format("--supersample {} is out of range: use 1 to {}",
+                                 options.supersample, kMaxSupersample));
+  }
+  const std::vector<std::string> names = frame_names(cameras);
+  FrameReport report;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const Camera camera = downscaled(cameras[i], 1.0 / options.supersample);
+    const auto start = std::chrono::steady_clock::now();
+    tracer.forward(gaussians, camera);
+    const Image samples = tracer.download_image();
+    Image depth;
+    if (options.depth) depth = average_depth(tracer.download_depth(), samples, options.supersample);
+    report.trace_seconds +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report.capped_rays += tracer.statistics().capped_rays;
+    report.rays += samples.pixels();
+    write_frame(folder / names[i], box_average(samples, options.supersample), depth, options);
+    ++report.frames;
+    if (done && !done(report.frames)) break;
+  }
+  return report;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/image.hpp"
+#include "trace/camera_tracer.hpp"
+#include "trace/device_gaussians.hpp"
+
+namespace raysplats {
+
+enum class FrameFormat {
+  kExr,  ///< float R, G, B (background blended), A = 1 - T, and Z with depth
+  kPng,  ///< 8-bit RGB, values as trained
+  kJpg,
+};
+
+struct FrameOptions {
+  FrameFormat format = FrameFormat::kPng;
+  int supersample = 1;  ///< rays per pixel side; the samples are box-averaged
+  bool depth =
+      false;  ///< EXR: channel Z; PNG and JPG: a file NAME_depth.png, near white, far black
+};
+
+struct FrameReport {
+  std::size_t frames = 0;
+  std::uint64_t rays = 0;
+  std::uint64_t capped_rays = 0;  ///< rays that stopped because of max_hits
+  double trace_seconds = 0;       ///< tracing and download, without the files
+};
+
+/// One file name without extension and folder per camera: the stem of the image name; where stems
+/// collide the folders join in ("left_0001"), and a number where that collides too. A camera
+/// without a name is frame_%04d.
+std::vector<std::string> frame_names(std::span<const Camera> cameras);
+
+/// The mean of every factor x factor block. Sizes are multiples of `factor`.
+Image box_average(const Image& image, int factor);
+
+/// Expected depth (1 channel) as grey in [0, 1]: the nearest pixel 1, the farthest 0. Pixels whose
+/// alpha (channel 3 of `rgba`) is below one half are 0 and do not count.
+Image depth_preview(const Image& depth, const Image& rgba);
+
+/// Traces every camera and writes its files to `folder`, which exists. `done` hears the number of
+/// finished frames and returns false to stop early. The tracer is up to date with the Gaussians,
+/// and has options().depth set when options.depth is. Throws UsageError for a supersampling factor
+/// outside 1..16, DataError when a file fails.
+FrameReport write_frames(CameraTracer& tracer,
+                         const DeviceGaussians& gaussians,
+                         std::span<const Camera> cameras,
+                         const std::filesystem::path& folder,
+                         const FrameOptions& options,
+                         const std::function<bool(std::size_t)>& done = {});
+
+}  // namespace raysplats
