@@ -21,8 +21,8 @@ inline RsBox box_empty(void) {
 
 inline RsBox box_union(RsBox a, RsBox b) {
   RsBox box;
-  box.lo = select(b.lo, a.lo, a.lo < b.lo);
-  box.hi = select(b.hi, a.hi, a.hi > b.hi);
+  box.lo = a.lo < b.lo ? a.lo : b.lo;
+  box.hi = a.hi > b.hi ? a.hi : b.hi;
   return box;
 }
 

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh/gaussian_bounds.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kGroup = 64;
+constexpr std::size_t kMaxCount = std::size_t{1} << 31;
+
+}  // namespace
+
+GaussianBounds::GaussianBounds(Context& context, bool sigmoid_scale, bool adaptive_radius)
+    : context_(&context),
+      kernel_(context.kernel("bvh/gaussian_bounds.cl",
+                             "gaussian_bounds",
+                             BuildOptions()
+                                 .define("RS_SIGMOID_SCALE", sigmoid_scale ? 1 : 0)
+                                 .define("RS_ADAPTIVE_RADIUS", adaptive_radius ? 1 : 0))) {}
+
+void GaussianBounds::compute(const Buffer<float>& means,
+                             const Buffer<float>& quaternions,
+                             const Buffer<float>& scales,
+                             const Buffer<float>& opacities,
+                             std::size_t count,
+                             float quantile,
+                             Buffer<RsAabb>& boxes) {
+  if (count >= kMaxCount || means.size() < 3 * count || quaternions.size() < 4 * count ||
+      scales.size() < 3 * count || opacities.size() < count) {
+    throw UsageError(
+        fmt::format("Bounds of {} Gaussians need buffers of as many and at most 2^31", count));
+  }
+  boxes.ensure(*context_, count, "Gaussian bounds");
+  kernel_.launch(Range::linear(count, kGroup), means, quaternions, scales, opacities, boxes,
+                 quantile, static_cast<std::uint32_t>(count));
+}
+
+}  // namespace raysplats
