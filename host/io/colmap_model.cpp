@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/colmap_model.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <span>
+#include <string_view>
+
+#include "io/byte_reader.hpp"
+#include "io/text_reader.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Camera models by COLMAP's number; the parameters are those of COLMAP's documentation of camera
+/// models.
+struct ModelType {
+  const char* name;
+  std::size_t parameters;
+  bool supported;
+};
+constexpr std::array<ModelType, 18> kModels{{{"SIMPLE_PINHOLE", 3, true},
+                                             {"PINHOLE", 4, true},
+                                             {"SIMPLE_RADIAL", 4, true},
+                                             {"RADIAL", 5, true},
+                                             {"OPENCV", 8, true},
+                                             {"OPENCV_FISHEYE", 8, false},
+                                             {"FULL_OPENCV", 12, false},
+                                             {"FOV", 5, false},
+                                             {"SIMPLE_RADIAL_FISHEYE", 4, false},
+                                             {"RADIAL_FISHEYE", 5, false},
+                                             {"THIN_PRISM_FISHEYE", 12, false},
+                                             {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false},
+                                             {"SIMPLE_DIVISION", 4, false},
+                                             {"DIVISION", 5, false},
+                                             {"SIMPLE_FISHEYE", 3, false},
+                                             {"FISHEYE", 4, false},
+                                             {"EUCM", 6, false},
+                                             {"EQUIRECTANGULAR", 2, false}}};
+constexpr std::size_t kMaxParameters = 16;
+constexpr std::size_t kMaxNameBytes = 4096;
+constexpr std::uint64_t kMaxCameraSide = 1u << 20;
+
+using Fail = std::function<void(const std::string&)>;
+
+/// The model or an error that names it.
+const ModelType& checked_model(const ModelType* model, const std::string& name, const Fail& fail) {
+  if (model == nullptr || !model->supported) {
+    fail(fmt::format(
+        "the camera model {} is not supported, undistort the images to PINHOLE first: found",
+        name));
+  }
+  return *model;
+}
+
+ColmapCamera make_camera(const ModelType& model,
+                         std::uint64_t width,
+                         std::uint64_t height,
+                         std::span<const double> p,
+                         const Fail& fail) {
+  ColmapCamera out;
+  Camera& camera = out.camera;
+  Distortion& d = out.distortion;
+  if (width < 1 || height < 1 || width > kMaxCameraSide || height > kMaxCameraSide) {
+    fail(fmt::format("a camera has the impossible size {} x {}", width, height));
+  }
+  for (const double value : p) {
+    if (!std::isfinite(value)) fail("a camera parameter is not finite");
+  }
+  camera.width = static_cast<int>(width);
+  camera.height = static_cast<int>(height);
+  const std::string_view name = model.name;
+  const bool two_focal_lengths = name == "PINHOLE" || name == "OPENCV";
+  const std::size_t center = two_focal_lengths ? 2 : 1;
+  camera.fx = p[0];
+  camera.fy = p[center - 1];
+  camera.cx = p[center];
+  camera.cy = p[center + 1];
+  if (name == "SIMPLE_RADIAL" || name == "RADIAL") d.k1 = p[3];
+  if (name == "RADIAL") d.k2 = p[4];
+  if (name == "OPENCV") d = {p[4], p[5], 0.0, p[6], p[7]};
+  if (!(camera.fx > 0 && camera.fy > 0)) fail("a camera has a focal length that is not positive");
+  return out;
+}
+
+ColmapImage make_image(std::string name,
+                       std::uint64_t camera_id,
+                       std::span<const double, 7> pose,
+                       const Fail& fail) {
+  for (const double value : pose) {
+    if (!std::isfinite(value)) fail(fmt::format("the pose of image '{}' is not finite", name));
+  }
+  glm::dquat rotation(pose[0], pose[1], pose[2], pose[3]);
+  if (glm::length(rotation) < 1e-6) fail(fmt::format("the rotation of image '{}' is zero", name));
+  if (name.empty()) fail("an image has no name");
+  if (camera_id > UINT32_MAX) fail(fmt::format("the camera number {} is too large", camera_id));
+  ColmapImage image;
+  image.name = std::move(name);
+  image.camera_id = static_cast<std::uint32_t>(camera_id);
+  image.rotation = glm::mat3_cast(glm::normalize(rotation));
+  image.translation = {pose[4], pose[5], pose[6]};
+  return image;
+}
+
+void add_point(PointCloud& points,
+               const glm::dvec3& position,
+               std::span<const double, 3> rgb,
+               const Fail& fail) {
+  for (int i = 0; i < 3; ++i) {
+    const auto value = static_cast<float>(position[i]);
+    if (!std::isfinite(value)) fail("a point has a coordinate that is not finite");
+    points.positions.push_back(value);
+  }
+  for (const double value : rgb) {
+    points.colors.push_back(static_cast<float>(std::clamp(value, 0.0, 255.0) / 255.0));
+  }
+}
+
+void add_camera(ColmapModel& model, std::uint64_t id, ColmapCamera camera, const Fail& fail) {
+  if (id > UINT32_MAX) fail(fmt::format("the camera number {} is too large", id));
+  if (!model.cameras.emplace(static_cast<std::uint32_t>(id), std::move(camera)).second) {
+    fail(fmt::format("the camera {} appears twice", id));
+  }
+}
+
+void read_cameras_binary(const fs::path& path, ColmapModel& model) {
+  const auto bytes = read_file(path);
+  ByteReader reader(bytes, path);
+  const Fail fail = [&](const std::string& message) { reader.fail(message); };
+  const std::uint64_t count = reader.count("number of cameras", 24);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const auto id = reader.read<std::uint32_t>("the camera number");
+    const auto type = reader.read<std::int32_t>("the camera model");
+    const auto width = reader.read<std::uint64_t>("the camera width");
+    const auto height = reader.read<std::uint64_t>("the camera height");
+    const bool known = type >= 0 && static_cast<std::size_t>(type) < kModels.size();
+    const ModelType* candidate = known ? &kModels[static_cast<std::size_t>(type)] : nullptr;
+    const ModelType& checked =
+        checked_model(candidate, known ? candidate->name : fmt::format("number {}", type), fail);
+    std::array<double, kMaxParameters> parameters{};
+    for (std::size_t p = 0; p < checked.parameters; ++p) {
+      parameters[p] = reader.read<double>("a camera parameter");
+    }
+    add_camera(
+        model, id,
+        make_camera(checked, width, height, std::span(parameters).first(checked.parameters), fail),
+        fail);
+  }
+}
+
+void read_cameras_text(const fs::path& path, ColmapModel& model) {
+  const auto bytes = read_file(path);
+  TextReader reader(bytes, path);
+  const Fail fail = [&](const std::string& message) { reader.fail(message); };
+  while (reader.next_content_line()) {
+    const std::uint64_t id = reader.unsigned_integer("the camera number");
+    const std::string name(reader.word().substr(0, 64));
+    const auto found = std::find_if(kModels.begin(), kModels.end(),
+                                    [&](const ModelType& type) { return type.name == name; });
+    const ModelType& checked =
+        checked_model(found == kModels.end() ? nullptr : &*found, "'" + name + "'", fail);
+    const std::uint64_t width = reader.unsigned_integer("the camera width");
+    const std::uint64_t height = reader.unsigned_integer("the camera height");
+    std::array<double, kMaxParameters> parameters{};
+    for (std::size_t p = 0; p < checked.parameters; ++p)
+      parameters[p] = reader.number("a camera parameter");
+    add_camera(
+        model, id,
+        make_camera(checked, width, height, std::span(parameters).first(checked.parameters), fail),
+        fail);
+  }
+}
+
+void read_images_binary(const fs::path& path, ColmapModel& model) {
+  const auto bytes = read_file(path);
+  ByteReader reader(bytes, path);
+  const Fail fail = [&](const std::string& message) { reader.fail(message); };
+  // Number, pose, camera, a name of one letter and the count of its points.
+  const std::uint64_t count = reader.count("number of images", 4 + 7 * 8 + 4 + 2 + 8);
+  model.images.reserve(static_cast<std::size_t>(count));
+  for (std::uint64_t i = 0; i < count; ++i) {
+    reader.skip(4, "the image number");
+    std::array<double, 7> pose;
+    for (double& value : pose) value = reader.read<double>("the pose of an image");
+    const auto camera = reader.read<std::uint32_t>("the camera of an image");
+    std::string name = reader.zero_terminated("the name of an image", kMaxNameBytes);
+    model.images.push_back(make_image(std::move(name), camera, pose, fail));
+    constexpr std::uint64_t kPointBytes = 24;
+    reader.skip(kPointBytes * reader.count("number of image points", kPointBytes),
+                "the points of an image");
+  }
+}
+
+void read_images_text(const fs::path& path, ColmapModel& model) {
+  const auto bytes = read_file(path);
+  TextReader reader(bytes, path);
+  const Fail fail = [&](const std::string& message) { reader.fail(message); };
+  while (reader.next_content_line()) {
+    reader.unsigned_integer("the image number");
+    std::array<double, 7> pose;
+    for (double& value : pose) value = reader.number("the pose of an image");
+    const std::uint64_t camera = reader.unsigned_integer("the camera of an image");
+    model.images.push_back(make_image(std::string(reader.rest()), camera, pose, fail));
+    reader.next_line();  // the image's points, an empty line when there are none
+  }
+}
+
+void read_points_binary(const fs::path& path, PointCloud& points) {
+  const auto bytes = read_file(path);
+  ByteReader reader(bytes, path);
+  const Fail fail = [&](const std::string& message) { reader.fail(message); };
+  const std::uint64_t count = reader.count("number of points", 8 + 3 * 8 + 3 + 8 + 8);
+  points.positions.reserve(3 * static_cast<std::size_t>(count));
+  points.colors.reserve(3 * static_cast<std::size_t>(count));
+  for (std::uint64_t i = 0; i < count; ++i) {
+    reader.skip(8, "the number of a point");
+    glm::dvec3 position;
+    for (int axis = 0; axis < 3; ++axis)
+      position[axis] = reader.read<double>("a point's coordinate");
+    std::array<double, 3> rgb;
+    for (double& value : rgb) value = reader.read<std::uint8_t>("a point's colour");
+    reader.skip(8, "the error of a point");
+    add_point(points, position, rgb, fail);
+    reader.skip(8 * reader.count("track length", 8), "the track of a point");
+  }
+}
+
+void read_points_text(const fs::path& path, PointCloud& points) {
+  const auto bytes = read_file(path);
+  TextReader reader(bytes, path);
+  const Fail fail = [&](const std::string& message) { reader.fail(message); };
+  while (reader.next_content_line()) {
+    reader.unsigned_integer("the number of a point");
+    glm::dvec3 position;
+    for (int axis = 0; axis < 3; ++axis) position[axis] = reader.number("a point's coordinate");
+    std::array<double, 3> rgb;
+    for (double& value : rgb)
+      value = static_cast<double>(reader.unsigned_integer("a point's colour"));
+    add_point(points, position, rgb, fail);
+  }
+}
+
+/// The binary file of `stem`, else the text file, else nothing.
+std::optional<fs::path> model_file(const fs::path& folder, const char* stem) {
+  for (const char* extension : {".bin", ".txt"}) {
+    const fs::path path = folder / (std::string(stem) + extension);
+    std::error_code error;
+    if (fs::is_regular_file(path, error)) return path;
+  }
+  return std::nullopt;
+}
+
+bool is_binary(const fs::path& path) { return path.extension() == ".bin"; }
+
+void read_images(const fs::path& path, ColmapModel& model) {
+  is_binary(path) ? read_images_binary(path, model) : read_images_text(path, model);
+}
+
+}  // namespace
+
+std::optional<fs::path> find_colmap_model(const fs::path& root) {
+  std::vector<fs::path> candidates;
+  const auto add = [&](const fs::path& folder) {
+    if (model_file(folder, "cameras") && model_file(folder, "images")) candidates.push_back(folder);
+  };
+  for (const fs::path& parent : {root / "sparse", root / "colmap" / "sparse"}) {
+    std::vector<fs::path> children;
+    std::error_code error;
+    for (fs::directory_iterator entry(parent, error), end; !error && entry != end;
+         entry.increment(error)) {
+      if (entry->is_directory(error)) children.push_back(entry->path());
+    }
+    std::sort(children.begin(), children.end());
+    for (const fs::path& child : children) add(child);
+    add(parent);
+  }
+  add(root);
+  if (candidates.size() <= 1) {
+    return candidates.empty() ? std::nullopt : std::optional(candidates.front());
+  }
+  std::size_t best = 0;
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    ColmapModel model;
+    read_images(*model_file(candidates[i], "images"), model);
+    if (model.images.size() > most) {
+      most = model.images.size();
+      best = i;
+    }
+  }
+  spdlog::info("Of {} COLMAP models {} is used: it has most images ({})", candidates.size(),
+               candidates[best].string(), most);
+  return candidates[best];
+}
+
+ColmapModel read_colmap_model(const fs::path& folder) {
+  ColmapModel model;
+  const std::optional<fs::path> cameras = model_file(folder, "cameras");
+  const std::optional<fs::path> images = model_file(folder, "images");
+  if (!cameras || !images) {
+    throw DataError(fmt::format(
+        "{} is no COLMAP model: cameras or images (.bin or .txt) are missing", folder.string()));
+  }
+  is_binary(*cameras) ? read_cameras_binary(*cameras, model) : read_cameras_text(*cameras, model);
+  read_images(*images, model);
+  for (const ColmapImage& image : model.images) {
+    if (!model.cameras.contains(image.camera_id)) {
+      throw DataError(fmt::format("{}: the image '{}' uses the camera {}, which {} does not have",
+                                  images->string(), image.name, image.camera_id,
+                                  cameras->string()));
+    }
+  }
+  std::sort(model.images.begin(), model.images.end(),
+            [](const ColmapImage& a, const ColmapImage& b) { return a.name < b.name; });
+  const auto twice = std::adjacent_find(
+      model.images.begin(), model.images.end(),
+      [](const ColmapImage& a, const ColmapImage& b) { return a.name == b.name; });
+  if (twice != model.images.end()) {
+    throw DataError(fmt::format("{}: the image '{}' appears twice", images->string(), twice->name));
+  }
+  if (const std::optional<fs::path> points = model_file(folder, "points3D")) {
+    is_binary(*points) ? read_points_binary(*points, model.points)
+                       : read_points_text(*points, model.points);
+  } else {
+    spdlog::warn("{} has no points3D.bin or points3D.txt: the data set has no points to start from",
+                 folder.string());
+  }
+  return model;
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
+
+namespace raysplats::io {
+
+/// Intrinsics of a COLMAP model; only sizes, focal lengths and principal point of `camera` are set.
+struct ColmapCamera {
+  Camera camera;
+  Distortion distortion;
+};
+
+struct ColmapImage {
+  std::string name;
+  std::uint32_t camera_id = 0;
+  glm::dmat3 rotation{1.0};     ///< world to camera
+  glm::dvec3 translation{0.0};  ///< world to camera
+};
+
+/// What this program uses of a COLMAP sparse model.
+struct ColmapModel {
+  std::map<std::uint32_t, ColmapCamera> cameras;
+  std::vector<ColmapImage> images;  ///< sorted by name
+  PointCloud points;
+};
+
+/// The folder of the model to use below a data set: of sparse/*, sparse, colmap/sparse/*,
+/// colmap/sparse and the root itself the one with most registered images, the first in that order
+/// when several have as many. Nothing when there is no model.
+std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root);
+
+/// Reads cameras, images and points3D (.bin, else .txt) of a folder. Points are optional. Throws
+/// DataError with byte offset or line for malformed files, and for camera models other than
+/// SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL and OPENCV.
+ColmapModel read_colmap_model(const std::filesystem::path& folder);
+
+}  // namespace raysplats::io

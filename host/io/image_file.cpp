@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/image_file.hpp"
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "base/atomic_file.hpp"
+#include "io/byte_reader.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr int kMaxSide = 32768;
+constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
+constexpr const char* kFormats = "PNG, JPEG, EXR, TIFF or BMP";
+
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return extension;
+}
+
+/// OpenImageIO's name of the format that the first bytes belong to; "" for any other.
+std::string_view format_of(std::string_view magic) {
+  if (magic.starts_with("\x89PNG\r\n\x1a\n")) return "png";
+  if (magic.starts_with("\xff\xd8\xff")) return "jpeg";
+  if (magic.starts_with("\x76\x2f\x31\x01")) return "openexr";
+  if (magic.starts_with("BM")) return "bmp";
+  const std::array<std::string_view, 4> tiff{
+      std::string_view("II*\0", 4), std::string_view("MM\0*", 4), std::string_view("II+\0", 4),
+      std::string_view("MM\0+", 4)};
+  for (const std::string_view start : tiff) {
+    if (magic.starts_with(start)) return "tiff";
+  }
+  return "";
+}
+
+std::string reason(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text.empty() ? "its data are damaged" : text;
+}
+
+/// The end-of-image marker ends every whole JPEG. The decoder fills the rest of a truncated one
+/// with grey instead of failing, so the segments are walked here (ITU-T T.81, annex B).
+bool is_whole_jpeg(const std::vector<std::byte>& bytes) {
+  const auto byte_at = [&](std::size_t i) { return std::to_integer<unsigned>(bytes[i]); };
+  std::size_t i = 2;
+  while (i + 1 < bytes.size()) {
+    if (byte_at(i) != 0xff) {
+      ++i;  // entropy-coded data
+      continue;
+    }
+    const unsigned marker = byte_at(i + 1);
+    if (marker == 0xd9) return true;
+    if (marker == 0xff) {
+      ++i;  // fill byte
+    } else if (marker == 0x00 || marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8)) {
+      i += 2;  // stuffed byte or a marker without a segment
+    } else {
+      if (i + 3 >= bytes.size()) return false;
+      i += 2 + (byte_at(i + 2) << 8 | byte_at(i + 3));
+    }
+  }
+  return false;
+}
+
+/// Opens an image, its size checked before anything is decoded.
+std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw DataError(
+        fmt::format("The image {} {}", path.string(),
+                    std::filesystem::exists(path, error) ? "is not a file" : "does not exist"));
+  }
+  if (!io::has_image_extension(path)) {
+    throw DataError(fmt::format("The image {} has an unknown extension: it must be {}",
+                                path.string(), kFormats));
+  }
+  std::array<char, 8> magic{};
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream)
+    throw DataError(fmt::format("The image {} cannot be opened for reading", path.string()));
+  stream.read(magic.data(), magic.size());
+  if (stream.gcount() == 0) throw DataError(fmt::format("The image {} is empty", path.string()));
+  const std::string_view format =
+      format_of(std::string_view(magic.data(), static_cast<std::size_t>(stream.gcount())));
+  if (format.empty()) {
+    throw DataError(fmt::format("The image {} is corrupt: it does not start as a {} file",
+                                path.string(), kFormats));
+  }
+  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(std::string(format));
+  if (!input) {
+    throw DataError(fmt::format("The image {} cannot be read: OpenImageIO is built without {}",
+                                path.string(), format));
+  }
+  // Straight alpha as in the file: OpenImageIO multiplies it into PNG and TIFF colours otherwise.
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  OIIO::ImageSpec spec;
+  if (!input->open(path.string(), spec, config)) {
+    throw DataError(
+        fmt::format("The image {} cannot be read: {}", path.string(), reason(input->geterror())));
+  }
+  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep) {
+    throw DataError(fmt::format("The image {} is not a flat picture with pixels", path.string()));
+  }
+  if (spec.width > kMaxSide || spec.height > kMaxSide ||
+      static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height) >
+          kMaxPixels) {
+    throw DataError(fmt::format(
+        "The image {} has {} x {} pixels, more than {} a side or {} million: make it smaller",
+        path.string(), spec.width, spec.height, kMaxSide, kMaxPixels >> 20));
+  }
+  return input;
+}
+
+std::vector<std::uint8_t> to_bytes(const Image& image, int channels) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(image.pixels() * static_cast<std::size_t>(channels));
+  for (std::size_t pixel = 0; pixel < image.pixels(); ++pixel) {
+    const float* values = &image.data[pixel * static_cast<std::size_t>(image.channels)];
+    for (int c = 0; c < channels; ++c) {
+      // Written so that NaN becomes 0.
+      const float value = values[c] > 0.0f ? std::min(values[c], 1.0f) : 0.0f;
+      bytes.push_back(static_cast<std::uint8_t>(std::lround(value * 255.0f)));
+    }
+  }
+  return bytes;
+}
+
+std::vector<std::string> exr_channel_names(const Image& image,
+                                           const std::vector<std::string>& extra) {
+  static const std::array<std::vector<std::string>, 5> kNames{
+      {{}, {"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}}};
+  const int base = image.channels - static_cast<int>(extra.size());
+  if (base < 1 || base > 4) return {};
+  std::vector<std::string> names = kNames[static_cast<std::size_t>(base)];
+  names.insert(names.end(), extra.begin(), extra.end());
+  return names;
+}
+
+}  // namespace
+
+namespace io {
+
+bool has_image_extension(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  const std::array<const char*, 7> known{".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".bmp"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+ImageSize image_size(const std::filesystem::path& path) {
+  const auto input = open_image(path);
+  return {input->spec().width, input->spec().height};
+}
+
+}  // namespace io
+
+Image read_image(const std::filesystem::path& path) {
+  const auto input = open_image(path);
+  if (std::string_view(input->format_name()) == "jpeg" && !is_whole_jpeg(io::read_file(path))) {
+    throw DataError(fmt::format("The image {} is truncated: it has no end marker", path.string()));
+  }
+  const OIIO::ImageSpec& spec = input->spec();
+  Image image(spec.width, spec.height, std::min(spec.nchannels, 4));
+  if (!input->read_image(0, 0, 0, image.channels, OIIO::TypeFloat, image.data.data())) {
+    throw DataError(fmt::format("The image {} cannot be decoded: {}", path.string(),
+                                reason(input->geterror())));
+  }
+  return image;
+}
+
+void write_image(const std::filesystem::path& path,
+                 const Image& image,
+                 const std::vector<std::string>& extra_channels) {
+  const std::string extension = lower_extension(path);
+  const bool jpeg = extension == ".jpg" || extension == ".jpeg";
+  const bool exr = extension == ".exr";
+  if (!jpeg && !exr && extension != ".png") {
+    throw DataError(fmt::format(
+        "The image {} cannot be written: its extension must be .png, .jpg or .exr", path.string()));
+  }
+  const int extra = static_cast<int>(extra_channels.size());
+  if (image.width < 1 || image.height < 1 || image.channels < 1 || image.channels - extra < 1 ||
+      image.channels - extra > 4 || (extra > 0 && !exr) ||
+      image.data.size() != image.pixels() * static_cast<std::size_t>(image.channels)) {
+    throw DataError(
+        fmt::format("The image {} cannot be written: {} x {} pixels with {} channels ({} of them "
+                    "named) do not fit the format",
+                    path.string(), image.width, image.height, image.channels, extra));
+  }
+  // JPEG has neither alpha nor grey with alpha.
+  const int channels = jpeg ? (image.channels >= 3 ? 3 : 1) : image.channels;
+  OIIO::ImageSpec spec(image.width, image.height, channels,
+                       exr ? OIIO::TypeFloat : OIIO::TypeUInt8);
+  spec.attribute("oiio:UnassociatedAlpha", 1);
+  if (jpeg) {
+    spec.attribute("Compression", "jpeg:95");
+    spec.attribute("jpeg:subsampling", "4:4:4");
+  }
+  if (exr) {
+    spec.attribute("compression", "zip");
+    spec.channelnames = exr_channel_names(image, extra_channels);
+  }
+  AtomicFile file(path);
+  const std::string format = exr ? "openexr" : (jpeg ? "jpeg" : "png");
+  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(format);
+  bool written = output && output->open(file.temporary().string(), spec);
+  if (written && exr) {
+    written = output->write_image(OIIO::TypeFloat, image.data.data());
+  } else if (written) {
+    written = output->write_image(OIIO::TypeUInt8, to_bytes(image, channels).data());
+  }
+  written = written && output->close();
+  if (!written) {
+    throw DataError(
+        fmt::format("The image {} cannot be written: {}", path.string(),
+                    output ? reason(output->geterror()) : "OpenImageIO lacks the format"));
+  }
+  file.commit();
+}
+
+}  // namespace raysplats

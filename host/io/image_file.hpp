@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+namespace raysplats::io {
+
+/// Size of an image file without its pixels.
+struct ImageSize {
+  int width = 0;
+  int height = 0;
+};
+
+/// Reads the header of an image that read_image() accepts. Throws DataError as read_image() does.
+ImageSize image_size(const std::filesystem::path& path);
+
+/// Whether read_image() knows the extension (.png, .jpg, .jpeg, .exr, .tif, .tiff, .bmp in any
+/// case).
+bool has_image_extension(const std::filesystem::path& path);
+
+}  // namespace raysplats::io

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/ply_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+constexpr std::size_t kMaxHeaderBytes = 1u << 20;
+constexpr std::size_t kMaxProperties = 1024;
+
+std::optional<PlyType> type_named(std::string_view name) {
+  if (name == "char" || name == "int8") return PlyType::kInt8;
+  if (name == "uchar" || name == "uint8") return PlyType::kUint8;
+  if (name == "short" || name == "int16") return PlyType::kInt16;
+  if (name == "ushort" || name == "uint16") return PlyType::kUint16;
+  if (name == "int" || name == "int32") return PlyType::kInt32;
+  if (name == "uint" || name == "uint32") return PlyType::kUint32;
+  if (name == "float" || name == "float32") return PlyType::kFloat;
+  if (name == "double" || name == "float64") return PlyType::kDouble;
+  return std::nullopt;
+}
+
+std::size_t size_of(PlyType type) {
+  switch (type) {
+    case PlyType::kInt8:
+    case PlyType::kUint8:
+      return 1;
+    case PlyType::kInt16:
+    case PlyType::kUint16:
+      return 2;
+    case PlyType::kInt32:
+    case PlyType::kUint32:
+    case PlyType::kFloat:
+      return 4;
+    case PlyType::kDouble:
+      break;
+  }
+  return 8;
+}
+
+}  // namespace
+
+PlyFile::PlyFile(const std::filesystem::path& path) : path_(path), bytes_(read_file(path)) {
+  parse_header();
+  locate_rows();
+}
+
+std::optional<std::size_t> PlyFile::column(std::string_view name) const {
+  const auto found = std::find_if(properties_.begin(), properties_.end(),
+                                  [&](const PlyProperty& p) { return p.name == name; });
+  if (found == properties_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - properties_.begin());
+}
+
+void PlyFile::parse_header() {
+  const auto header =
+      std::span<const std::byte>(bytes_).first(std::min(bytes_.size(), kMaxHeaderBytes));
+  TextReader reader(header, path_);
+  if (!reader.next_line() || reader.rest() != "ply") {
+    throw DataError(
+        fmt::format("{} is not a PLY file: its first line is not 'ply'", path_.string()));
+  }
+  enum class At { kBefore, kVertex, kAfter } at = At::kBefore;
+  bool has_format = false;
+  bool ended = false;
+  std::uint64_t element_rows = 0;
+  std::uint64_t element_bytes = 0;
+  const auto close_element = [&] {
+    if (at == At::kBefore) {
+      rows_before_ += std::min(element_rows, UINT64_MAX - rows_before_);
+      const std::uint64_t bytes = saturating_product(element_rows, element_bytes);
+      bytes_before_ += std::min(bytes, UINT64_MAX - bytes_before_);
+    }
+    element_bytes = 0;
+  };
+  while (!ended && reader.next_line()) {
+    const std::string_view key = reader.word();
+    if (key == "end_header") {
+      ended = true;
+    } else if (key == "format") {
+      const std::string_view format = reader.word();
+      if (format == "ascii") {
+        ascii_ = true;
+      } else if (format == "binary_big_endian") {
+        order_ = std::endian::big;
+      } else if (format != "binary_little_endian") {
+        reader.fail(fmt::format("the PLY format '{}' is unknown", format));
+      }
+      has_format = true;
+    } else if (key == "element") {
+      close_element();
+      if (at == At::kVertex) at = At::kAfter;
+      const bool vertex = reader.word() == "vertex";
+      element_rows = reader.unsigned_integer("the element count");
+      if (vertex) {
+        if (at == At::kAfter) reader.fail("there is a second vertex element");
+        at = At::kVertex;
+        rows_ = static_cast<std::size_t>(element_rows);
+      }
+    } else if (key == "property") {
+      if (at == At::kAfter) continue;
+      const std::string_view type_name = reader.word();
+      if (type_name == "list") {
+        reader.fail(at == At::kVertex
+                        ? "the vertex element has a list property, which is not supported"
+                        : "a list property precedes the vertices, which is not supported");
+      }
+      const std::optional<PlyType> type = type_named(type_name);
+      if (!type) reader.fail(fmt::format("the property type '{}' is unknown", type_name));
+      element_bytes += size_of(*type);
+      if (at != At::kVertex) continue;
+      const std::string name(reader.word());
+      if (name.empty()) reader.fail("a property has no name");
+      if (column(name)) reader.fail(fmt::format("the property '{}' appears twice", name));
+      if (properties_.size() == kMaxProperties) {
+        reader.fail(fmt::format("there are more than {} properties", kMaxProperties));
+      }
+      properties_.push_back({name, *type});
+      row_bytes_ += size_of(*type);
+    } else if (key != "comment" && key != "obj_info" && !key.empty()) {
+      reader.fail(fmt::format("the PLY header has the unknown keyword '{}'", key.substr(0, 40)));
+    }
+  }
+  if (!ended) reader.fail("the PLY header has no end_header");
+  if (!has_format) reader.fail("the PLY header has no format line");
+  if (at == At::kBefore) reader.fail("the PLY header has no vertex element");
+  if (properties_.empty()) reader.fail("the vertex element has no properties");
+  data_offset_ = std::min(reader.next_offset(), bytes_.size());
+}
+
+void PlyFile::locate_rows() {
+  const std::uint64_t left = bytes_.size() - data_offset_;
+  // A number of an ASCII file takes at least a digit and a separator, which the last one may lack.
+  const std::uint64_t least_row = ascii_ ? 2 * properties_.size() : row_bytes_;
+  const std::uint64_t before = ascii_ ? rows_before_ : bytes_before_;
+  const std::uint64_t room = left + (ascii_ ? 1 : 0);
+  if (before > room || saturating_product(rows_, least_row) > room - before) {
+    throw DataError(
+        fmt::format("{} is truncated or its header is wrong: it declares {} vertices of {} bytes, "
+                    "but only {} bytes "
+                    "follow the header, which ends at byte {}",
+                    path_.string(), rows_, least_row, left - std::min(left, before), data_offset_));
+  }
+}
+
+ByteReader PlyFile::binary_rows() const {
+  ByteReader reader(bytes_, path_);
+  reader.skip(data_offset_ + bytes_before_, "the vertex element");
+  return reader;
+}
+
+TextReader PlyFile::text_rows() const {
+  // Line numbers of errors count from the top of the file.
+  TextReader reader(bytes_, path_);
+  while (reader.next_offset() < data_offset_ && reader.next_line()) {
+  }
+  for (std::uint64_t i = 0; i < rows_before_; ++i) {
+    if (!reader.next_line()) reader.fail("the file ends before the vertices");
+  }
+  return reader;
+}
+
+void PlyFile::read_text_row(TextReader& reader, std::span<double> values) const {
+  if (!reader.next_line()) reader.fail("the file is truncated, vertices are missing");
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = reader.number(properties_[i].name.c_str());
+  }
+}
+
+void PlyFile::read_binary_row(ByteReader& reader, std::span<double> values) const {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const char* name = properties_[i].name.c_str();
+    switch (properties_[i].type) {
+      case PlyType::kInt8:
+        values[i] = reader.read<std::int8_t>(name);
+        break;
+      case PlyType::kUint8:
+        values[i] = reader.read<std::uint8_t>(name);
+        break;
+      case PlyType::kInt16:
+        values[i] = reader.read<std::int16_t>(name, order_);
+        break;
+      case PlyType::kUint16:
+        values[i] = reader.read<std::uint16_t>(name, order_);
+        break;
+      case PlyType::kInt32:
+        values[i] = reader.read<std::int32_t>(name, order_);
+        break;
+      case PlyType::kUint32:
+        values[i] = reader.read<std::uint32_t>(name, order_);
+        break;
+      case PlyType::kFloat:
+        values[i] = static_cast<double>(reader.read<float>(name, order_));
+        break;
+      case PlyType::kDouble:
+        values[i] = reader.read<double>(name, order_);
+        break;
+    }
+  }
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/byte_reader.hpp"
+#include "io/text_reader.hpp"
+
+namespace raysplats::io {
+
+enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
+
+struct PlyProperty {
+  std::string name;
+  PlyType type;
+};
+
+/// The vertex element of a PLY file (Turk 1994) as a table of numbers: ASCII or binary of both byte
+/// orders, scalar properties of every type. Elements with lists may follow it, but not precede it.
+/// Throws DataError for anything malformed or truncated, and for a count that the file cannot hold.
+class PlyFile {
+ public:
+  explicit PlyFile(const std::filesystem::path& path);
+
+  std::size_t rows() const { return rows_; }
+  const std::vector<PlyProperty>& properties() const { return properties_; }
+  /// Column of a property, nothing when there is none.
+  std::optional<std::size_t> column(std::string_view name) const;
+
+  /// Calls visit(row, values) for every row in order; values has one double per property.
+  template <class Visit>
+  void for_each_row(Visit visit) const {
+    std::vector<double> values(properties_.size());
+    if (ascii_) {
+      TextReader reader = text_rows();
+      for (std::size_t row = 0; row < rows_; ++row) {
+        read_text_row(reader, values);
+        visit(row, std::span<const double>(values));
+      }
+    } else {
+      ByteReader reader = binary_rows();
+      for (std::size_t row = 0; row < rows_; ++row) {
+        read_binary_row(reader, values);
+        visit(row, std::span<const double>(values));
+      }
+    }
+  }
+
+ private:
+  void parse_header();
+  void locate_rows();
+  TextReader text_rows() const;
+  ByteReader binary_rows() const;
+  void read_text_row(TextReader& reader, std::span<double> values) const;
+  void read_binary_row(ByteReader& reader, std::span<double> values) const;
+
+  std::filesystem::path path_;
+  std::vector<std::byte> bytes_;
+  bool ascii_ = false;
+  std::endian order_ = std::endian::little;
+  std::vector<PlyProperty> properties_;
+  std::size_t rows_ = 0;
+  std::size_t row_bytes_ = 0;
+  std::size_t data_offset_ = 0;     ///< end of the header
+  std::uint64_t rows_before_ = 0;   ///< rows of the elements before the vertices
+  std::uint64_t bytes_before_ = 0;  ///< their size in a binary file
+};
+
+}  // namespace raysplats::io

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include <string>
+#include <vector>
+
+#include "base/atomic_file.hpp"
+#include "io/ply_file.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr int kMaxShDegree = 4;
+
+std::size_t coefficients(int degree) { return static_cast<std::size_t>(sh_coefficients(degree)); }
+
+/// Columns of the file in the order of a Gaussian's numbers in memory.
+struct Columns {
+  int sh_degree = 0;
+  std::array<std::size_t, 3> mean{}, log_scale{};
+  std::array<std::size_t, 4> quaternion{};
+  std::size_t opacity = 0;
+  std::vector<std::size_t> sh;  ///< coefficients x 3
+};
+
+int degree_of_rest(std::size_t count, const std::filesystem::path& path) {
+  for (int degree = 0; degree <= kMaxShDegree; ++degree) {
+    if (count == 3 * (coefficients(degree) - 1)) return degree;
+  }
+  throw DataError(
+      fmt::format("{} has {} f_rest properties, which is no spherical-harmonics degree from 0 to 4 "
+                  "(0, 9, 24, 45 or 72)",
+                  path.string(), count));
+}
+
+Columns find_columns(const io::PlyFile& file, const std::filesystem::path& path) {
+  if (file.column("packed_position")) {
+    throw DataError(
+        fmt::format("{} is a compressed PLY of SuperSplat, which is not supported: convert it to "
+                    "an uncompressed 3DGS "
+                    "PLY first, for example with splat-transform",
+                    path.string()));
+  }
+  Columns columns;
+  std::vector<std::string> missing;
+  const auto find = [&](const std::string& name) -> std::size_t {
+    const auto column = file.column(name);
+    if (!column) missing.push_back(name);
+    return column.value_or(0);
+  };
+  const std::array<const char*, 3> axes{"x", "y", "z"};
+  for (std::size_t i = 0; i < 3; ++i) columns.mean[i] = find(axes[i]);
+  columns.sh.resize(3);
+  for (std::size_t i = 0; i < 3; ++i) columns.sh[i] = find(fmt::format("f_dc_{}", i));
+  columns.opacity = find("opacity");
+  for (std::size_t i = 0; i < 3; ++i) columns.log_scale[i] = find(fmt::format("scale_{}", i));
+  for (std::size_t i = 0; i < 4; ++i) columns.quaternion[i] = find(fmt::format("rot_{}", i));
+  if (!missing.empty()) {
+    throw DataError(fmt::format("{} is no 3D Gaussian model: it has no {}", path.string(),
+                                fmt::join(missing, ", ")));
+  }
+  std::size_t rest = 0;
+  for (const io::PlyProperty& property : file.properties()) {
+    if (property.name.starts_with("f_rest_")) ++rest;
+  }
+  columns.sh_degree = degree_of_rest(rest, path);
+  const std::size_t higher = coefficients(columns.sh_degree) - 1;
+  for (std::size_t k = 0; k < higher; ++k) {
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      columns.sh.push_back(find(fmt::format("f_rest_{}", channel * higher + k)));
+    }
+  }
+  if (!missing.empty()) {
+    throw DataError(fmt::format("{} has {} f_rest properties but no {}", path.string(), rest,
+                                fmt::join(missing, ", ")));
+  }
+  return columns;
+}
+
+}  // namespace
+
+Gaussians read_ply(const std::filesystem::path& path) {
+  const io::PlyFile file(path);
+  const Columns columns = find_columns(file, path);
+  Gaussians model;
+  model.sh_degree = columns.sh_degree;
+  model.resize(file.rows());
+  std::size_t without_rotation = 0;
+  file.for_each_row([&](std::size_t row, std::span<const double> values) {
+    const auto number = [&](std::size_t column) {
+      const auto value = static_cast<float>(values[column]);
+      if (!std::isfinite(value)) {
+        throw DataError(fmt::format("{}: '{}' of Gaussian {} is not finite", path.string(),
+                                    file.properties()[column].name, row));
+      }
+      return value;
+    };
+    for (std::size_t i = 0; i < 3; ++i) {
+      model.means[3 * row + i] = number(columns.mean[i]);
+      model.log_scales[3 * row + i] = number(columns.log_scale[i]);
+    }
+    float* quaternion = &model.quaternions[4 * row];
+    double norm = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      quaternion[i] = number(columns.quaternion[i]);
+      norm += static_cast<double>(quaternion[i]) * static_cast<double>(quaternion[i]);
+    }
+    if (norm == 0) {
+      quaternion[0] = 1.0f;
+      ++without_rotation;
+    }
+    model.opacities[row] = number(columns.opacity);
+    float* sh = &model.sh[columns.sh.size() * row];
+    for (std::size_t k = 0; k < columns.sh.size(); ++k) sh[k] = number(columns.sh[k]);
+  });
+  if (without_rotation > 0) {
+    spdlog::warn("{}: {} Gaussians have a zero quaternion and are taken as not rotated",
+                 path.string(), without_rotation);
+  }
+  return model;
+}
+
+void write_ply(const std::filesystem::path& path, const Gaussians& model) {
+  const std::size_t count = model.size();
+  if (model.sh_degree < 0 || model.sh_degree > kMaxShDegree) {
+    throw DataError(
+        fmt::format("{} cannot be written: the model has the spherical-harmonics degree {}",
+                    path.string(), model.sh_degree));
+  }
+  const std::size_t bands = coefficients(model.sh_degree);
+  if (model.means.size() != 3 * count || model.log_scales.size() != 3 * count ||
+      model.quaternions.size() != 4 * count || model.sh.size() != 3 * bands * count) {
+    throw DataError(fmt::format("{} cannot be written: the model's arrays have different lengths",
+                                path.string()));
+  }
+  std::string header = fmt::format(
+      "ply\nformat binary_little_endian 1.0\ncomment Generated by raysplats {}\ncomment SH degree: "
+      "{}\n"
+      "element vertex {}\n",
+      RAYSPLATS_VERSION, model.sh_degree, count);
+  std::size_t columns = 0;
+  const auto property = [&](const std::string& name) {
+    header += "property float " + name + "\n";
+    ++columns;
+  };
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
+    property(name);
+  for (std::size_t i = 0; i < 3 * (bands - 1); ++i) property(fmt::format("f_rest_{}", i));
+  for (const char* name :
+       {"opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"}) {
+    property(name);
+  }
+  header += "end_header\n";
+
+  AtomicFile file(path);
+  file.write(header);
+  std::vector<float> rows;
+  constexpr std::size_t kRowsPerWrite = 4096;
+  rows.reserve(kRowsPerWrite * columns);
+  const auto flush = [&] {
+    if constexpr (std::endian::native == std::endian::big) {
+      for (float& value : rows) {
+        auto raw = std::bit_cast<std::array<std::byte, sizeof(float)>>(value);
+        std::reverse(raw.begin(), raw.end());
+        value = std::bit_cast<float>(raw);
+      }
+    }
+    file.write(rows.data(), rows.size() * sizeof(float));
+    rows.clear();
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* sh = &model.sh[3 * bands * i];
+    const float* q = &model.quaternions[4 * i];
+    rows.insert(rows.end(), {model.means[3 * i], model.means[3 * i + 1], model.means[3 * i + 2]});
+    rows.insert(rows.end(), {0.0f, 0.0f, 0.0f, sh[0], sh[1], sh[2]});
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      for (std::size_t k = 1; k < bands; ++k) rows.push_back(sh[3 * k + channel]);
+    }
+    rows.push_back(model.opacities[i]);
+    for (std::size_t axis = 0; axis < 3; ++axis) rows.push_back(model.log_scales[3 * i + axis]);
+    double norm = 0;
+    for (std::size_t c = 0; c < 4; ++c)
+      norm += static_cast<double>(q[c]) * static_cast<double>(q[c]);
+    norm = std::sqrt(norm);
+    for (std::size_t c = 0; c < 4; ++c) {
+      const float identity = c == 0 ? 1.0f : 0.0f;
+      rows.push_back(norm > 0 ? static_cast<float>(static_cast<double>(q[c]) / norm) : identity);
+    }
+    if (rows.size() >= kRowsPerWrite * columns) flush();
+  }
+  flush();
+  file.commit();
+}
+
+}  // namespace raysplats

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/resample.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace raysplats::io {
+namespace {
+
+constexpr std::size_t kChannels = 4;
+
+/// Source pixels [first, first + weights.size()) of one target pixel along an axis; the weights sum
+/// to 1.
+struct Span {
+  int first = 0;
+  std::vector<float> weights;
+};
+
+std::vector<Span> area_spans(int source, int target) {
+  std::vector<Span> spans(static_cast<std::size_t>(target));
+  const double step = static_cast<double>(source) / target;
+  for (int i = 0; i < target; ++i) {
+    const double begin = i * step;
+    const double end = std::min(begin + step, static_cast<double>(source));
+    Span& span = spans[static_cast<std::size_t>(i)];
+    span.first = std::min(static_cast<int>(begin), source - 1);
+    // Ends that are whole up to rounding must not touch the next pixel.
+    const int last = std::clamp(static_cast<int>(std::ceil(end - 1e-9)), span.first + 1, source);
+    double sum = 0;
+    for (int p = span.first; p < last; ++p)
+      sum += std::min(end, p + 1.0) - std::max(begin, static_cast<double>(p));
+    for (int p = span.first; p < last; ++p) {
+      const double overlap = std::min(end, p + 1.0) - std::max(begin, static_cast<double>(p));
+      span.weights.push_back(static_cast<float>(overlap / sum));
+    }
+  }
+  return spans;
+}
+
+/// Writes a sum of alpha-weighted colours as straight colour and alpha.
+void store_straight(const std::array<float, kChannels>& sum, float* out) {
+  if (sum[3] > 0) {
+    for (std::size_t c = 0; c < 3; ++c) out[c] = sum[c] / sum[3];
+    out[3] = sum[3];
+  }
+}
+
+/// Square of the normalised radius up to which the radial polynomial grows; infinity when it never
+/// stops within `limit`.
+double growing_radius2(const Distortion& d, double limit) {
+  const auto slope = [&](double s) { return 1 + s * (3 * d.k1 + s * (5 * d.k2 + s * 7 * d.k3)); };
+  constexpr int kSteps = 4096;
+  for (int i = 1; i <= kSteps; ++i) {
+    if (slope(limit * i / kSteps) > 0) continue;
+    double low = limit * (i - 1) / kSteps;
+    double high = limit * i / kSteps;
+    for (int bisection = 0; bisection < 50; ++bisection) {
+      const double middle = 0.5 * (low + high);
+      (slope(middle) > 0 ? low : high) = middle;
+    }
+    return low;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+Image area_resample(const Image& rgba, int width, int height) {
+  if (width == rgba.width && height == rgba.height) return rgba;
+  const std::vector<Span> columns = area_spans(rgba.width, width);
+  const std::vector<Span> rows = area_spans(rgba.height, height);
+  Image out(width, height, static_cast<int>(kChannels));
+  const std::size_t row_floats = static_cast<std::size_t>(width) * kChannels;
+  // Rows are averaged first, so that one row of sums is all the memory there is.
+  std::vector<std::array<float, kChannels>> sums(static_cast<std::size_t>(rgba.width));
+  for (int y = 0; y < height; ++y) {
+    std::fill(sums.begin(), sums.end(), std::array<float, kChannels>{});
+    const Span& span = rows[static_cast<std::size_t>(y)];
+    for (std::size_t k = 0; k < span.weights.size(); ++k) {
+      const float* source = &rgba.data[static_cast<std::size_t>(span.first + static_cast<int>(k)) *
+                                       static_cast<std::size_t>(rgba.width) * kChannels];
+      for (std::array<float, kChannels>& sum : sums) {
+        const float weight = span.weights[k] * source[3];
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * source[c];
+        sum[3] += weight;
+        source += kChannels;
+      }
+    }
+    float* target = &out.data[static_cast<std::size_t>(y) * row_floats];
+    for (const Span& column : columns) {
+      std::array<float, kChannels> sum{};
+      for (std::size_t k = 0; k < column.weights.size(); ++k) {
+        const auto& source = sums[static_cast<std::size_t>(column.first) + k];
+        for (std::size_t c = 0; c < kChannels; ++c) sum[c] += column.weights[k] * source[c];
+      }
+      store_straight(sum, target);
+      target += kChannels;
+    }
+  }
+  return out;
+}
+
+void distort(const Distortion& d, double x, double y, double& distorted_x, double& distorted_y) {
+  const double r2 = x * x + y * y;
+  const double radial = 1 + r2 * (d.k1 + r2 * (d.k2 + r2 * d.k3));
+  distorted_x = x * radial + 2 * d.p1 * x * y + d.p2 * (r2 + 2 * x * x);
+  distorted_y = y * radial + d.p1 * (r2 + 2 * y * y) + 2 * d.p2 * x * y;
+}
+
+Image undistort(const Image& rgba, const Camera& camera, const Distortion& distortion) {
+  const int width = rgba.width;
+  const int height = rgba.height;
+  Image out(width, height, static_cast<int>(kChannels));
+  const double far_x = std::max(camera.cx, width - camera.cx) / camera.fx;
+  const double far_y = std::max(camera.cy, height - camera.cy) / camera.fy;
+  const double limit = growing_radius2(distortion, far_x * far_x + far_y * far_y);
+  float* target = out.data.data();
+  for (int j = 0; j < height; ++j) {
+    for (int i = 0; i < width; ++i, target += kChannels) {
+      const double x = (i + 0.5 - camera.cx) / camera.fx;
+      const double y = (j + 0.5 - camera.cy) / camera.fy;
+      if (x * x + y * y > limit) continue;
+      double dx = 0;
+      double dy = 0;
+      distort(distortion, x, y, dx, dy);
+      const double u = dx * camera.fx + camera.cx;
+      const double v = dy * camera.fy + camera.cy;
+      if (!(u >= 0 && u <= width && v >= 0 && v <= height)) continue;
+      // Between the outermost pixel centres and the border the border pixel goes on.
+      const double px = std::clamp(u - 0.5, 0.0, width - 1.0);
+      const double py = std::clamp(v - 0.5, 0.0, height - 1.0);
+      const int x0 = std::min(static_cast<int>(px), std::max(width - 2, 0));
+      const int y0 = std::min(static_cast<int>(py), std::max(height - 2, 0));
+      const auto wx = static_cast<float>(px - x0);
+      const auto wy = static_cast<float>(py - y0);
+      const std::size_t step_x = width > 1 ? kChannels : 0;
+      const std::size_t step_y = height > 1 ? static_cast<std::size_t>(width) * kChannels : 0;
+      const float* source =
+          &rgba.data[(static_cast<std::size_t>(y0) * static_cast<std::size_t>(width) +
+                      static_cast<std::size_t>(x0)) *
+                     kChannels];
+      const std::array<const float*, 4> taps{source, source + step_x, source + step_y,
+                                             source + step_x + step_y};
+      const std::array<float, 4> weights{(1 - wx) * (1 - wy), wx * (1 - wy), (1 - wx) * wy,
+                                         wx * wy};
+      std::array<float, kChannels> sum{};
+      for (std::size_t tap = 0; tap < 4; ++tap) {
+        const float weight = weights[tap] * taps[tap][3];
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * taps[tap][c];
+        sum[3] += weight;
+      }
+      store_straight(sum, target);
+    }
+  }
+  return out;
+}
+
+}  // namespace raysplats::io

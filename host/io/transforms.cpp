@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/transforms.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+#include "base/atomic_file.hpp"
+#include "io/image_file.hpp"
+#include "io/json_file.hpp"
+#include "io/resample.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace io {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr double kRigidTolerance = 1e-3;
+constexpr int kMaxSide = 1 << 20;
+
+/// One scope of keys: the file or a frame of it, with its name for errors.
+struct Scope {
+  const json& object;
+  const fs::path& path;
+  std::string where;
+
+  [[noreturn]] void fail(const std::string& message) const {
+    throw DataError(fmt::format("{}, {}: {}", path.string(), where, message));
+  }
+  std::optional<double> number(const char* key) const {
+    const auto found = object.find(key);
+    if (found == object.end() || found->is_null()) return std::nullopt;
+    if (!found->is_number())
+      fail(fmt::format("'{}' is not a number, it is a {}", key, found->type_name()));
+    const auto value = found->get<double>();
+    if (!std::isfinite(value)) fail(fmt::format("'{}' is not finite", key));
+    return value;
+  }
+  std::string text(const char* key) const {
+    const auto found = object.find(key);
+    if (found == object.end() || found->is_null()) return {};
+    if (!found->is_string())
+      fail(fmt::format("'{}' is not a text, it is a {}", key, found->type_name()));
+    return found->get<std::string>();
+  }
+  std::optional<double> positive(const char* key) const {
+    const auto value = number(key);
+    if (value && !(*value > 0)) fail(fmt::format("'{}' is {}, which is not positive", key, *value));
+    return value;
+  }
+  std::optional<int> side(const char* key) const {
+    const auto value = number(key);
+    if (!value) return std::nullopt;
+    if (!(*value >= 1 && *value <= kMaxSide) || *value != std::floor(*value)) {
+      fail(fmt::format("'{}' is {}, which is no image size", key, *value));
+    }
+    return static_cast<int>(*value);
+  }
+  std::optional<double> angle(const char* key) const {
+    const auto value = number(key);
+    if (value && !(*value > 0 && *value < std::numbers::pi)) {
+      fail(fmt::format("'{}' is {}, which is no angle between 0 and pi", key, *value));
+    }
+    return value;
+  }
+};
+
+/// Overrides what is known by the keys of a scope.
+void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
+  const std::string model = scope.text("camera_model");
+  const std::array<const char*, 6> supported{"",       "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL",
+                                             "RADIAL", "OPENCV"};
+  if (std::find(supported.begin(), supported.end(), model) == supported.end()) {
+    scope.fail(
+        fmt::format("the camera_model '{}' is not supported (PINHOLE and OPENCV are), undistort "
+                    "the images first",
+                    model));
+  }
+  const auto fisheye = scope.object.find("is_fisheye");
+  if (fisheye != scope.object.end() && *fisheye == true) {
+    scope.fail("the fisheye lens is not supported, undistort the images first");
+  }
+  if (scope.number("k4").value_or(0) != 0) {
+    scope.fail("'k4' is not supported, undistort the images first");
+  }
+  if (const auto width = scope.side("w")) frame.width = width;
+  if (const auto height = scope.side("h")) frame.height = height;
+  const auto fx = scope.positive("fl_x");
+  const auto fy = scope.positive("fl_y");
+  const auto angle_x = scope.angle("camera_angle_x");
+  const auto angle_y = scope.angle("camera_angle_y");
+  if (fx || angle_x) {
+    // A focal length of a frame must not be mixed with an angle of the file.
+    frame.fx = fx;
+    frame.fy = fy;
+    frame.angle_x = angle_x;
+    frame.angle_y = angle_y;
+  }
+  if (const auto cx = scope.number("cx")) frame.cx = cx;
+  if (const auto cy = scope.number("cy")) frame.cy = cy;
+  Distortion& d = frame.distortion;
+  d.k1 = scope.number("k1").value_or(d.k1);
+  d.k2 = scope.number("k2").value_or(d.k2);
+  d.k3 = scope.number("k3").value_or(d.k3);
+  d.p1 = scope.number("p1").value_or(d.p1);
+  d.p2 = scope.number("p2").value_or(d.p2);
+}
+
+void read_pose(const Scope& scope, TransformsFrame& frame) {
+  const auto found = scope.object.find("transform_matrix");
+  if (found == scope.object.end()) scope.fail("the transform_matrix is missing");
+  if (!found->is_array() || (found->size() != 3 && found->size() != 4)) {
+    scope.fail("the transform_matrix has not 4 rows");
+  }
+  glm::dmat3 rotation;
+  glm::dvec3 position;
+  for (std::size_t row = 0; row < found->size(); ++row) {
+    const json& line = (*found)[row];
+    if (!line.is_array() || line.size() != 4)
+      scope.fail("a row of the transform_matrix has not 4 numbers");
+    for (std::size_t column = 0; column < 4; ++column) {
+      if (!line[column].is_number())
+        scope.fail("the transform_matrix holds something that is no number");
+      const auto value = line[column].get<double>();
+      if (!std::isfinite(value)) scope.fail("the transform_matrix is not finite");
+      const int i = static_cast<int>(row);
+      const int j = static_cast<int>(column);
+      if (row == 3) {
+        if (std::abs(value - (column == 3 ? 1.0 : 0.0)) > 1e-6) {
+          scope.fail("the last row of the transform_matrix is not 0 0 0 1");
+        }
+      } else if (column == 3) {
+        position[i] = value;
+      } else {
+        rotation[j][i] = value;
+      }
+    }
+  }
+  const glm::dmat3 gram = glm::transpose(rotation) * rotation;
+  double deviation = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j)
+      deviation = std::max(deviation, std::abs(gram[i][j] - (i == j ? 1.0 : 0.0)));
+  }
+  if (deviation > kRigidTolerance || glm::determinant(rotation) < 0) {
+    scope.fail(
+        "the transform_matrix is no rotation with a translation (it scales, shears or mirrors)");
+  }
+  // Newton's iteration for the nearest rotation (Higham 1986); two steps end at rounding from 1e-3.
+  for (int step = 0; step < 3; ++step) {
+    rotation = 0.5 * (rotation + glm::transpose(glm::inverse(rotation)));
+  }
+  // OpenGL's camera looks along -z with y up.
+  rotation[1] = -rotation[1];
+  rotation[2] = -rotation[2];
+  frame.rotation = glm::transpose(rotation);
+  frame.translation = -(frame.rotation * position);
+}
+
+std::optional<std::vector<std::string>> read_names(const Scope& scope, const char* key) {
+  const auto found = scope.object.find(key);
+  if (found == scope.object.end() || found->is_null()) return std::nullopt;
+  if (!found->is_array()) scope.fail(fmt::format("'{}' is no list", key));
+  std::vector<std::string> names;
+  for (const json& name : *found) {
+    if (!name.is_string()) scope.fail(fmt::format("'{}' holds something that is no text", key));
+    names.push_back(name.get<std::string>());
+  }
+  return names;
+}
+
+}  // namespace
+
+TransformsFile read_transforms(const fs::path& path) {
+  const json root = read_json_object(path);
+  const Scope scope{root, path, "the file"};
+  TransformsFile file;
+  file.path = path;
+  file.ply_file_path = scope.text("ply_file_path");
+  file.train_filenames = read_names(scope, "train_filenames");
+  file.val_filenames = read_names(scope, "val_filenames");
+  file.test_filenames = read_names(scope, "test_filenames");
+  TransformsFrame common;
+  read_intrinsics(scope, common);
+  const auto frames = root.find("frames");
+  if (frames == root.end() || !frames->is_array()) {
+    throw DataError(fmt::format("{} has no list of frames: it is no camera file", path.string()));
+  }
+  for (const json& object : *frames) {
+    const Scope frame_scope{object, path, fmt::format("frame {}", file.frames.size())};
+    if (!object.is_object()) frame_scope.fail("it is no JSON object");
+    TransformsFrame frame = common;
+    read_intrinsics(frame_scope, frame);
+    read_pose(frame_scope, frame);
+    frame.file_path = frame_scope.text("file_path");
+    frame.mask_path = frame_scope.text("mask_path");
+    file.frames.push_back(std::move(frame));
+  }
+  return file;
+}
+
+Camera frame_camera(const TransformsFile& file, std::size_t index, int width, int height) {
+  const TransformsFrame& frame = file.frames[index];
+  const double nominal_width = frame.width.value_or(width);
+  const double nominal_height = frame.height.value_or(height);
+  Camera camera;
+  if (frame.fx) {
+    camera.fx = *frame.fx;
+    camera.fy = frame.fy.value_or(camera.fx);
+  } else if (frame.angle_x) {
+    camera.fx = 0.5 * nominal_width / std::tan(0.5 * *frame.angle_x);
+    camera.fy = frame.angle_y ? 0.5 * nominal_height / std::tan(0.5 * *frame.angle_y) : camera.fx;
+  } else {
+    throw DataError(
+        fmt::format("{}: frame {} has neither fl_x nor camera_angle_x, in it or in the file",
+                    file.path.string(), index));
+  }
+  const double scale_x = width / nominal_width;
+  const double scale_y = height / nominal_height;
+  camera.cx = frame.cx.value_or(0.5 * nominal_width) * scale_x;
+  camera.cy = frame.cy.value_or(0.5 * nominal_height) * scale_y;
+  camera.fx *= scale_x;
+  camera.fy *= scale_y;
+  camera.width = width;
+  camera.height = height;
+  camera.rotation = frame.rotation;
+  camera.translation = frame.translation;
+  return camera;
+}
+
+std::string inner_name(const fs::path& path) {
+  fs::path name;
+  for (const fs::path& part : path.lexically_normal().relative_path()) {
+    if (part != ".." && part != ".") name /= part;
+  }
+  return name.generic_string();
+}
+
+std::optional<fs::path> find_image(const fs::path& folder, const fs::path& file_path) {
+  const fs::path exact = (folder / file_path).lexically_normal();
+  std::error_code error;
+  if (fs::is_regular_file(exact, error)) return exact;
+  if (has_image_extension(exact)) return std::nullopt;
+  for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".exr", ".tif", ".tiff", ".bmp"}) {
+    const fs::path candidate = exact.string() + extension;
+    if (fs::is_regular_file(candidate, error)) return candidate;
+  }
+  return std::nullopt;
+}
+
+}  // namespace io
+
+std::vector<Camera> read_cameras(const std::filesystem::path& path) {
+  const io::TransformsFile file = io::read_transforms(path);
+  if (file.frames.empty()) throw DataError(fmt::format("{} has no frames", path.string()));
+  std::vector<Camera> cameras;
+  bool distorted = false;
+  for (std::size_t i = 0; i < file.frames.size(); ++i) {
+    const io::TransformsFrame& frame = file.frames[i];
+    io::ImageSize size{frame.width.value_or(0), frame.height.value_or(0)};
+    if (!frame.width || !frame.height) {
+      // Blender's files state no size, but the photos beside them have one.
+      const auto image = frame.file_path.empty()
+                             ? std::nullopt
+                             : io::find_image(path.parent_path(), frame.file_path);
+      if (!image) {
+        throw DataError(
+            fmt::format("{}: frame {} has no image size: add \"w\" and \"h\" to it or to the file",
+                        path.string(), i));
+      }
+      size = io::image_size(*image);
+      if (frame.width) size.width = *frame.width;
+      if (frame.height) size.height = *frame.height;
+    }
+    cameras.push_back(io::frame_camera(file, i, size.width, size.height));
+    cameras.back().name =
+        frame.file_path.empty() ? fmt::format("frame_{:04d}", i) : io::inner_name(frame.file_path);
+    distorted = distorted || frame.distortion.any();
+  }
+  if (distorted)
+    spdlog::info("{}: the lens distortion is left out, the cameras are pinholes", path.string());
+  return cameras;
+}
+
+void write_cameras(const std::filesystem::path& path, const std::vector<Camera>& cameras) {
+  const auto intrinsics = [](const Camera& camera) {
+    return nlohmann::json{{"w", camera.width}, {"h", camera.height}, {"fl_x", camera.fx},
+                          {"fl_y", camera.fy}, {"cx", camera.cx},    {"cy", camera.cy}};
+  };
+  nlohmann::json root{{"camera_model", "PINHOLE"}, {"frames", nlohmann::json::array()}};
+  // Readers of instant-ngp's dialect know intrinsics of the file only.
+  const bool shared = std::all_of(cameras.begin(), cameras.end(), [&](const Camera& camera) {
+    return intrinsics(camera) == intrinsics(cameras.front());
+  });
+  if (shared && !cameras.empty()) root.update(intrinsics(cameras.front()));
+  for (const Camera& camera : cameras) {
+    nlohmann::json frame = shared ? nlohmann::json::object() : intrinsics(camera);
+    const glm::dmat3 to_world = glm::transpose(camera.rotation);
+    const glm::dvec3 center = camera.center();
+    nlohmann::json matrix = nlohmann::json::array();
+    for (int row = 0; row < 3; ++row) {
+      matrix.push_back({to_world[0][row], -to_world[1][row], -to_world[2][row], center[row]});
+    }
+    matrix.push_back({0.0, 0.0, 0.0, 1.0});
+    frame["file_path"] = camera.name;
+    frame["transform_matrix"] = std::move(matrix);
+    root["frames"].push_back(std::move(frame));
+  }
+  // Names with bytes that are not UTF-8 must not stop the writing.
+  write_text_file(path, root.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace raysplats

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+
+namespace raysplats::io {
+
+/// Intrinsics of one frame, as far as the file states them.
+struct TransformsFrame {
+  std::string file_path;  ///< as in the file; may be empty
+  std::string mask_path;  ///< as in the file; usually empty
+  std::optional<int> width, height;
+  std::optional<double> fx, fy, cx, cy;    ///< pixels
+  std::optional<double> angle_x, angle_y;  ///< field of view, radians
+  Distortion distortion;
+  glm::dmat3 rotation{1.0};     ///< world to camera, OpenCV axes
+  glm::dvec3 translation{0.0};  ///< world to camera, OpenCV axes
+};
+
+/// A transforms.json of Blender / NeRF-synthetic, instant-ngp or nerfstudio.
+struct TransformsFile {
+  std::filesystem::path path;
+  std::vector<TransformsFrame> frames;
+  std::string ply_file_path;  ///< sparse points, usually empty
+  std::optional<std::vector<std::string>> train_filenames, val_filenames, test_filenames;
+};
+
+/// Throws DataError for malformed JSON, camera models that are neither pinhole nor OPENCV (named)
+/// and matrices that are not finite or no rigid motion to 1e-3; smaller deviations are
+/// orthonormalised.
+TransformsFile read_transforms(const std::filesystem::path& path);
+
+/// The camera of a frame whose photo has the given size; the file's own size scales its intrinsics.
+/// Throws DataError when the frame has no focal length or angle.
+Camera frame_camera(const TransformsFile& file, std::size_t frame, int width, int height);
+
+/// A name without root, "." and ".." components, so that files named after it stay inside their
+/// folder.
+std::string inner_name(const std::filesystem::path& path);
+
+/// The image that `file_path` means, relative to `folder` and possibly without extension; nothing
+/// when absent.
+std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
+                                                const std::filesystem::path& file_path);
+
+}  // namespace raysplats::io

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <glm/matrix.hpp>
+
+#include "io/view_loader.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/io.hpp"
+#include "scratch.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+struct Expected {
+  const char* folder;
+  DatasetKind kind;
+  double downscale;
+  std::size_t train, test, points;
+  int width, height;
+};
+
+/// Share of the points of a cloud that a camera sees inside its picture.
+double visible_share(const PointCloud& points, const Camera& camera) {
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const glm::dvec3 world(points.positions[3 * i], points.positions[3 * i + 1],
+                           points.positions[3 * i + 2]);
+    const glm::dvec3 p = camera.rotation * world + camera.translation;
+    if (p.z <= 0) continue;
+    const double u = camera.fx * p.x / p.z + camera.cx;
+    const double v = camera.fy * p.y / p.z + camera.cy;
+    if (u >= 0 && u < camera.width && v >= 0 && v < camera.height) ++seen;
+  }
+  return points.size() == 0 ? 0 : static_cast<double>(seen) / static_cast<double>(points.size());
+}
+
+void check_dataset(const fs::path& root, const Expected& expected) {
+  INFO(root.string());
+  DatasetOptions options;
+  options.downscale = expected.downscale;
+  const auto start = std::chrono::steady_clock::now();
+  const Dataset dataset = load_dataset(root, options);
+  const double open_seconds = seconds_since(start);
+  CHECK(dataset.kind == expected.kind);
+  CHECK(dataset.indices(Split::kTrain).size() == expected.train);
+  CHECK(dataset.indices(Split::kTest).size() == expected.test);
+  CHECK(dataset.indices(Split::kAll).size() == expected.train + expected.test);
+  CHECK(dataset.points.size() == expected.points);
+  for (const View& view : dataset.views) {
+    CHECK(view.camera.width == expected.width);
+    CHECK(view.camera.height == expected.height);
+    CHECK(std::abs(glm::determinant(view.camera.rotation) - 1.0) < 1e-9);
+    if (expected.points > 0) CHECK(visible_share(dataset.points, view.camera) > 0.05);
+  }
+  const auto decode = std::chrono::steady_clock::now();
+  io::ViewLoader loader(dataset.views, std::size_t{1} << 30);
+  loader.prefetch(dataset.indices(Split::kAll));
+  for (std::size_t i = 0; i < dataset.views.size(); ++i) {
+    CHECK(loader.get(i)->pixels.size() ==
+          static_cast<std::size_t>(expected.width) * static_cast<std::size_t>(expected.height));
+  }
+  std::printf(
+      "%-40s /%g: %zu train, %zu test, %d x %d, %zu points, opened in %.3f s, all views in %.2f "
+      "s\n",
+      expected.folder, expected.downscale, expected.train, expected.test, expected.width,
+      expected.height, dataset.points.size(), open_seconds, seconds_since(decode));
+}
+
+}  // namespace
+
+TEST_CASE("real data sets have the views, points and sizes that their descriptions state") {
+  const auto data = test_data();
+  if (!data) return;
+  for (const Expected& expected : {
+           Expected{"colmap/fox_undistorted", DatasetKind::kColmap, 1, 43, 7, 14736, 270, 480},
+           Expected{"colmap/can_tiles", DatasetKind::kColmap, 2, 62, 9, 4414, 360, 640},
+           Expected{"colmap/snowmiku_plush", DatasetKind::kColmap, 1, 84, 13, 25784, 990, 742},
+           Expected{"colmap/snowmiku_plush", DatasetKind::kColmap, 8, 84, 13, 25784, 495, 371},
+           Expected{"nerfstudio/fox", DatasetKind::kNerfstudio, 1, 43, 7, 0, 540, 960},
+           Expected{"nerf_synthetic/lego", DatasetKind::kBlender, 1, 100, 50, 0, 400, 400},
+       }) {
+    check_dataset(*data / expected.folder, expected);
+  }
+}
+
+TEST_CASE("a real COLMAP model reads the same from text and from binary files") {
+  const auto data = test_data();
+  if (!data) return;
+  const fs::path source = *data / "colmap/can_tiles";
+  const Scratch scratch;
+  fs::create_directory_symlink(source / "images", scratch / "images");
+  fs::create_directory_symlink(source / "sparse_txt", scratch / "sparse");
+  const Dataset binary = load_dataset(source);
+  const Dataset text = load_dataset(scratch.path());
+  REQUIRE(binary.views.size() == text.views.size());
+  for (std::size_t i = 0; i < binary.views.size(); ++i) {
+    const View& a = binary.views[i];
+    const View& b = text.views[i];
+    CHECK(a.camera.name == b.camera.name);
+    CHECK(a.camera.fx == doctest::Approx(b.camera.fx).epsilon(1e-12));
+    CHECK(a.distortion.k1 == doctest::Approx(b.distortion.k1).epsilon(1e-12));
+    CHECK(glm::length(a.camera.center() - b.camera.center()) < 1e-9);
+    CHECK(a.test == b.test);
+  }
+  REQUIRE(binary.points.size() == text.points.size());
+  double sum_binary = 0;
+  double sum_text = 0;
+  for (std::size_t i = 0; i < binary.points.positions.size(); ++i) {
+    sum_binary += static_cast<double>(binary.points.positions[i]);
+    sum_text += static_cast<double>(text.points.positions[i]);
+  }
+  CHECK(sum_binary == doctest::Approx(sum_text).epsilon(1e-9));
+}
+
+TEST_CASE("real trained models load, and survive writing and reading") {
+  const auto data = test_data();
+  if (!data) return;
+  struct Model {
+    const char* folder;
+    std::size_t count;
+    int degree;
+  };
+  const Scratch scratch;
+  for (const Model& expected : {Model{"rock_lawn", 80000, 3}, Model{"pool_lod4", 212464, 0},
+                                Model{"guitar", 90854, 0}, Model{"fox_opensplat", 37173, 3}}) {
+    const auto start = std::chrono::steady_clock::now();
+    const Gaussians model = read_ply(*data / "trained_3dgs" / expected.folder / "point_cloud.ply");
+    const double seconds = seconds_since(start);
+    CHECK(model.size() == expected.count);
+    CHECK(model.sh_degree == expected.degree);
+    write_ply(scratch / "model.ply", model);
+    const Gaussians again = read_ply(scratch / "model.ply");
+    CHECK(again.means == model.means);
+    CHECK(again.log_scales == model.log_scales);
+    CHECK(again.opacities == model.opacities);
+    CHECK(again.sh == model.sh);
+    std::printf("%-40s %zu Gaussians, SH degree %d, read in %.3f s\n", expected.folder,
+                model.size(), model.sh_degree, seconds);
+  }
+  const std::string refused =
+      data_error([&] { read_ply(*data / "trained_3dgs/guitar/guitar.compressed.ply"); });
+  CHECK(contains(refused, "SuperSplat"));
+  const std::vector<Camera> cameras =
+      read_cameras(*data / "trained_3dgs/fox_opensplat/transforms.json");
+  CHECK(cameras.size() == 50);
+  CHECK(cameras.front().width == 269);
+  CHECK(cameras.front().height == 479);
+  const std::vector<Camera> lego = read_cameras(*data / "nerf_synthetic/lego/transforms_test.json");
+  CHECK(lego.size() == 50);
+  CHECK(lego.front().width == 400);
+  CHECK(lego.front().fx == doctest::Approx(200.0 / std::tan(0.5 * 0.6911112070083618)));
+}
