@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "train/lanes.hpp"
 
 namespace raysplats {
 namespace {
@@ -17,13 +18,6 @@ namespace {
 constexpr int kPad = 16;
 constexpr int kRadius = 5;
 constexpr std::size_t kFoldItems = 64;
-
-int device_vector(const DeviceInfo& device) {
-  // GPUs hide latency by many work-items; a CPU fills its lanes from one.
-  if (device.type != DeviceType::kCpu) return 4;
-  if (device.float_vector_width >= 16) return 16;
-  return device.float_vector_width >= 8 ? 8 : 4;
-}
 
 }  // namespace
 
@@ -50,15 +44,12 @@ struct ImageLoss::Impl {
       throw UsageError(
           fmt::format("The weight of SSIM in the loss is {}; give a value from 0 to 1", weight));
     }
-    const int lanes = vector == 0 ? device_vector(owner.device()) : vector;
-    if (lanes != 1 && lanes != 4 && lanes != 8 && lanes != 16) {
-      throw UsageError(
-          fmt::format("The loss has no kernels for vectors of {}; use 1, 4, 8 or 16", lanes));
-    }
     tile = serial ? 128 : 16;
     rows = serial ? 8 : 1;
     BuildOptions build;
-    build.define("VECTOR", lanes).define("TILE", tile).define("ROWS", rows);
+    build.define("VECTOR", lane_count(owner.device(), vector))
+        .define("TILE", tile)
+        .define("ROWS", rows);
     build.define("PIXEL_L2", pixel_loss == PixelLoss::kL2 ? 1 : 0);
     prepare = owner.kernel("train/loss_prepare.cl", "prepare_pair", build);
     build.define("SSIM_GRADIENT", weight > 0.0f ? 1 : 0);

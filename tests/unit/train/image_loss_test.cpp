@@ -12,6 +12,7 @@
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "reference/ssim.hpp"
 
 namespace raysplats {
 namespace {
@@ -74,42 +75,6 @@ double photo_weight(const Scene& s, std::size_t pixel) {
   return s.alpha_is_background ? 1.0 : (s.target[pixel] >> 24) / 255.0;
 }
 
-std::array<double, 11> window() {
-  std::array<double, 11> w{};
-  double sum = 0;
-  for (int k = -5; k <= 5; ++k) sum += w[static_cast<std::size_t>(k + 5)] = std::exp(-k * k / 4.5);
-  for (double& value : w) value /= sum;
-  return w;
-}
-
-// The definition of SSIM, window by window, without separating anything.
-double ssim_at(const std::vector<double>& x,
-               const std::vector<double>& y,
-               int width,
-               int height,
-               int cx,
-               int cy) {
-  static const std::array<double, 11> kWindow = window();
-  double mx = 0, my = 0, xx = 0, yy = 0, xy = 0;
-  for (int dy = -5; dy <= 5; ++dy) {
-    for (int dx = -5; dx <= 5; ++dx) {
-      const int px = cx + dx, py = cy + dy;
-      if (px < 0 || py < 0 || px >= width || py >= height) continue;
-      const double w =
-          kWindow[static_cast<std::size_t>(dx + 5)] * kWindow[static_cast<std::size_t>(dy + 5)];
-      const auto i = static_cast<std::size_t>(py * width + px);
-      mx += w * x[i];
-      my += w * y[i];
-      xx += w * x[i] * x[i];
-      yy += w * y[i] * y[i];
-      xy += w * x[i] * y[i];
-    }
-  }
-  constexpr double c1 = 1e-4, c2 = 9e-4;
-  return (2 * mx * my + c1) * (2 * (xy - mx * my) + c2) /
-         ((mx * mx + my * my + c1) * (xx - mx * mx + yy - my * my + c2));
-}
-
 struct Reference {
   double total, pixel, ssim, psnr;
 };
@@ -133,13 +98,10 @@ Reference reference_loss(const Scene& s,
       square += m * shown * shown;
       weights += m;
     }
-    for (int py = 0; py < s.height; ++py) {
-      for (int px = 0; px < s.width; ++px) out.ssim += ssim_at(x, y, s.width, s.height, px, py);
-    }
+    out.ssim += reference::ssim(x, y, s.width, s.height).mean / 3;
   }
   const double samples = 3.0 * static_cast<double>(s.pixels());
   out.pixel /= samples;
-  out.ssim /= samples;
   out.total = (1 - weight) * out.pixel + weight * (1 - out.ssim);
   out.psnr = 10 * std::log10(weights / square);
   return out;

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "device/buffer.hpp"
+#include "device/context.hpp"
+#include "trace/device_gaussians.hpp"
+
+namespace raysplats {
+
+enum class ParameterGroup { kMeans, kQuaternions, kScales, kOpacities, kSh };
+constexpr std::array<ParameterGroup, 5> kParameterGroups{
+    ParameterGroup::kMeans, ParameterGroup::kQuaternions, ParameterGroup::kScales,
+    ParameterGroup::kOpacities, ParameterGroup::kSh};
+/// "means", "quaternions", "scales", "opacities" or "sh".
+const char* group_name(ParameterGroup group);
+
+struct AdamOptions {
+  double beta1 = 0.9;
+  double beta2 = 0.999;
+  double epsilon =
+      1e-15;  ///< added to the root of the second moment: 3DGS 1e-15, the paper's program 1e-8
+  bool visible_only = false;  ///< leave Gaussians alone that no ray of the view met ("sparse Adam")
+};
+
+/// Learning rates of one step.
+struct AdamRates {
+  double means = 0;
+  double quaternions = 0;
+  double scales = 0;
+  double opacities = 0;
+  double sh_dc = 0;    ///< first SH coefficient
+  double sh_rest = 0;  ///< the others
+};
+
+/// Adam (Kingma and Ba 2015) for the parameters of DeviceGaussians: one launch per step. A Gaussian
+/// with any non-finite gradient is left as it was in that step and counted.
+class Adam {
+ public:
+  /// `vector` is the number of floats per vector (1, 4, 8 or 16); 0 = the device's own.
+  Adam(Context& context, const AdamOptions& options, int vector = 0);
+
+  /// Makes moments of zeros for `count` Gaussians and sets steps() to 0.
+  void initialize(std::size_t count, int sh_degree);
+
+  /// Applies one step; enqueues without waiting. The first call initialises by itself. Throws
+  /// UsageError when the number of Gaussians or SH coefficients is not that of the moments (remap()
+  /// or initialize() was forgotten).
+  void step(DeviceGaussians& gaussians, const GaussianGradients& gradients, const AdamRates& rates);
+
+  /// After densification: Gaussian i continues with the moments of the old Gaussian source[i], or
+  /// with zeros when that is 0xffffffff.
+  void remap(const Buffer<std::uint32_t>& source, std::size_t new_count);
+  /// Zeroes the moments of one group (after an opacity reset).
+  void reset(ParameterGroup group);
+
+  /// Steps done; bias correction depends on it, so checkpoints keep it.
+  std::int64_t steps() const { return steps_; }
+  void set_steps(std::int64_t steps) { steps_ = steps; }
+
+  /// Moments, laid out as the parameters. Empty before initialize().
+  const Buffer<float>& first_moment(ParameterGroup group) const { return moments(group).first; }
+  const Buffer<float>& second_moment(ParameterGroup group) const { return moments(group).second; }
+  /// Uploads both moments of a group; the sizes must be those of initialize().
+  void restore(ParameterGroup group, std::span<const float> first, std::span<const float> second);
+
+  /// Updates skipped since the start because a gradient was not finite; blocks.
+  std::uint32_t skipped() const { return skipped_.read(0); }
+
+ private:
+  struct Moments {
+    Buffer<float> first, second;
+    std::size_t width = 0;  // floats per Gaussian
+  };
+  Moments& moments(ParameterGroup group) { return moments_[static_cast<std::size_t>(group)]; }
+  const Moments& moments(ParameterGroup group) const {
+    return moments_[static_cast<std::size_t>(group)];
+  }
+
+  Context& context_;
+  AdamOptions options_;
+  std::size_t block_;
+  bool serial_;
+  Kernel step_kernel_, remap_kernel_;
+  Buffer<std::uint32_t> skipped_;
+  std::array<Moments, kParameterGroups.size()> moments_;
+  std::size_t count_ = 0;
+  std::int64_t steps_ = 0;
+};
+
+}  // namespace raysplats
