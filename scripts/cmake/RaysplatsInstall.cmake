@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+# The install target: program, static libraries, public headers, configurations and the package that
+# find_package(raysplats) reads. The reference module and the tests stay in the build folder.
+include(CMakePackageConfigHelpers)
+
+set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/raysplats)
+
+install(
+  TARGETS raysplats
+          raysplats_base
+          raysplats_core
+          raysplats_device
+          raysplats_primitives
+          raysplats_bvh
+          raysplats_trace
+          raysplats_io
+          raysplats_eval
+          raysplats_train
+          raysplats_synth
+  EXPORT raysplatsTargets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS raysplats_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(DIRECTORY include/raysplats DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY configs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/raysplats/configs FILES_MATCHING PATTERN "*.toml")
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/raysplats)
+
+install(EXPORT raysplatsTargets NAMESPACE raysplats:: DESTINATION ${package_directory})
+set(RAYSPLATS_USES_OPENCV ${OpenCV_FOUND})
+configure_package_config_file(
+  scripts/cmake/raysplatsConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/package/raysplatsConfig.cmake
+  INSTALL_DESTINATION ${package_directory} NO_SET_AND_CHECK_MACRO)
+# Before 1.0 a minor version may change the interface.
+write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/package/raysplatsConfigVersion.cmake
+                                 COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/package/raysplatsConfig.cmake
+              ${CMAKE_CURRENT_BINARY_DIR}/package/raysplatsConfigVersion.cmake
+              scripts/cmake/RaysplatsOpenCV.cmake
+        DESTINATION ${package_directory})

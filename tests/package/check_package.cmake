@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+# Run by cmake -P from the test: installs BUILD below WORK, then configures, builds and runs SOURCE against it.
+
+function(run what)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT status EQUAL 0)
+    message(FATAL_ERROR "${what} failed with ${status}:\n${output}")
+  endif()
+  message(STATUS "${what}: done")
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+set(prefix ${WORK}/prefix)
+file(REMOVE_RECURSE ${prefix} ${WORK}/consumer)
+run("install" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix} --config ${CONFIG})
+
+foreach(file bin/raysplats include/raysplats/device.hpp share/raysplats/configs)
+  if(NOT EXISTS ${prefix}/${file})
+    message(FATAL_ERROR "${file} was not installed")
+  endif()
+endforeach()
+file(GLOB_RECURSE strays ${prefix}/*reference* ${prefix}/*test*)
+if(strays)
+  message(FATAL_ERROR "Files of the tests were installed: ${strays}")
+endif()
+
+set(flags "")
+if(SANITIZE)
+  set(flags -fsanitize=${SANITIZE})
+endif()
+run("configure" ${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/consumer -G ${GENERATOR} -DCMAKE_BUILD_TYPE=${CONFIG}
+    -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
+    -DCMAKE_CXX_FLAGS=${flags} -DEXPECTED_VERSION=${VERSION})
+run("build" ${CMAKE_COMMAND} --build ${WORK}/consumer --config ${CONFIG})
+run("run" ${WORK}/consumer/consumer)
+message(STATUS "${output}")
