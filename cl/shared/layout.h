@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every record that kernels and host share, defined once. Only 4-byte scalars and arrays of them, explicit
-// padding, so that every compiler lays them out alike; the layout_probe kernel and a test compare both sides.
+// Every record that kernels and host share, defined once. Only 4-byte scalars and arrays of them,
+// explicit padding, so that every compiler lays them out alike; the layout_probe kernel and a test
+// compare both sides.
 #ifndef RS_SHARED_LAYOUT_H
 #define RS_SHARED_LAYOUT_H
 
@@ -29,7 +30,8 @@ RS_STATIC_ASSERT_SIZE(RsBvhNode, 64);
 
 // What one view needs of one Gaussian, one cache line (docs/model.md, "The camera line").
 // Projective form: x0 y0 m_z a | b c D0 e_x | e_y C00 C01 C11 | opacity r g b.
-// General form: whitening matrix in camera axes, rows M0 M1 M2 (9), whitened origin o' (3), opacity r g b.
+// General form: whitening matrix in camera axes, rows M0 M1 M2 (9), whitened origin o' (3), opacity
+// r g b.
 typedef struct {
   rs_float v[16];
 } RsLine;
@@ -43,8 +45,8 @@ RS_STATIC_ASSERT_SIZE(RsLine, 64);
 typedef struct {
   rs_float x0, y0, x1, y1;  // box of the outline in tangent coordinates X = x/z, Y = y/z
   rs_float depth;           // no hit is nearer than this
-  rs_float quantile;        // Q of this Gaussian (smaller than the option when the radius is adaptive)
-  rs_int kind;              // RS_LINE_*
+  rs_float quantile;  // Q of this Gaussian (smaller than the option when the radius is adaptive)
+  rs_int kind;        // RS_LINE_*
   rs_int padding;
 } RsViewBounds;
 RS_STATIC_ASSERT_SIZE(RsViewBounds, 32);

@@ -48,6 +48,8 @@ class Kernel {
     enqueue(range);
   }
 
+  /// False for a default-constructed kernel.
+  explicit operator bool() const { return impl_ != nullptr; }
   const std::string& name() const;
   std::size_t max_work_group_size() const;
 

@@ -14,7 +14,8 @@
 
 namespace raysplats {
 
-/// Traces the rays of a pinhole camera in packets (docs/model.md, "The camera line"), forward and backward.
+/// Traces the rays of a pinhole camera in packets (docs/model.md, "The camera line"), forward and
+/// backward.
 class CameraTracer {
  public:
   struct Statistics {
@@ -22,8 +23,8 @@ class CameraTracer {
     std::uint64_t candidates = 0;   ///< (tile, Gaussian) pairs tested
     std::uint64_t hits = 0;         ///< blended (ray, Gaussian) pairs
   };
-  /// Gradient of the loss for the camera's pose: translation of the centre (world axes) and a small rotation
-  /// vector applied on the left of the world-to-camera rotation (camera axes).
+  /// Gradient of the loss for the camera's pose: translation of the centre (world axes) and a small
+  /// rotation vector applied on the left of the world-to-camera rotation (camera axes).
   struct PoseGradient {
     std::array<double, 3> center{};
     std::array<double, 3> rotation{};
@@ -32,15 +33,17 @@ class CameraTracer {
   CameraTracer(Context& context, const TraceOptions& options);
   ~CameraTracer();
 
-  /// Brings the tree up to date with the Gaussians: rebuilds it when the count changed, every `rebuild_every`
-  /// calls, or when `rebuild` is set; refits it otherwise. forward() needs it after every parameter change.
+  /// Brings the tree up to date with the Gaussians: rebuilds it when the count changed, every
+  /// `rebuild_every` calls, or when `rebuild` is set; refits it otherwise. forward() needs it after
+  /// every parameter change.
   void update(const DeviceGaussians& gaussians, bool rebuild = false);
 
-  /// Traces one view. With `keep_hits` the hit lists stay for backward() when they fit the memory budget and
-  /// are recomputed there when they do not.
+  /// Traces one view. With `keep_hits` the hit lists stay for backward() when they fit the memory
+  /// budget and are recomputed there when they do not.
   void forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits = false);
 
-  /// Result of the last forward(): planar R, G, B (background blended), A = 1 - T; 4 x height x width.
+  /// Result of the last forward(): planar R, G, B (background blended), A = 1 - T; 4 x height x
+  /// width.
   const Buffer<float>& image() const;
   /// With options.depth: planar expected depth, median depth, hits per ray; 3 x height x width.
   const Buffer<float>& depth() const;
@@ -48,9 +51,12 @@ class CameraTracer {
   Image download_image() const;
   Image download_depth() const;
 
-  /// Gradients of the last forward(keep_hits = true) view from `image_gradient` (planar dL/dR, dL/dG, dL/dB,
-  /// dL/dA; 4 x height x width). Overwrites `gradients`, growing its buffers as needed.
-  void backward(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient, GaussianGradients& gradients);
+  /// Gradients of the last forward(keep_hits = true) view from `image_gradient` (planar dL/dR,
+  /// dL/dG, dL/dB, dL/dA; 4 x height x width). Overwrites `gradients`, growing its buffers as
+  /// needed.
+  void backward(const DeviceGaussians& gaussians,
+                const Buffer<float>& image_gradient,
+                GaussianGradients& gradients);
   /// After backward(): the gradient for the pose of the view.
   PoseGradient pose_gradient(const DeviceGaussians& gaussians);
 

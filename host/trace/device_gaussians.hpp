@@ -10,12 +10,14 @@
 
 namespace raysplats {
 
-/// The trained parameters on the device, one flat float buffer per group, Gaussian-major as in Gaussians.
-/// `scales` hold the parameter before `activation`: log-scale for kExp, logit of the scale for kSigmoid.
+/// The trained parameters on the device, one flat float buffer per group, Gaussian-major as in
+/// Gaussians. `scales` hold the parameter before `activation`: log-scale for kExp, logit of the
+/// scale for kSigmoid.
 struct DeviceGaussians {
   std::size_t count = 0;
-  int sh_degree = 0;         ///< degree the sh buffer is laid out for
-  int active_sh_degree = 0;  ///< bands above this are not evaluated (they are switched on over time)
+  int sh_degree = 0;  ///< degree the sh buffer is laid out for
+  int active_sh_degree =
+      0;  ///< bands above this are not evaluated (they are switched on over time)
   ScaleActivation activation = ScaleActivation::kExp;
   Buffer<float> means;        ///< 3 N
   Buffer<float> quaternions;  ///< 4 N
@@ -24,19 +26,23 @@ struct DeviceGaussians {
   Buffer<float> sh;           ///< N x coefficients x 3
 
   /// Copies a host model to the device. For kSigmoid a scale of 1 or more is clamped just below 1.
-  static DeviceGaussians upload(Context& context, const Gaussians& model, ScaleActivation activation);
+  static DeviceGaussians upload(Context& context,
+                                const Gaussians& model,
+                                ScaleActivation activation);
   Gaussians download() const;
 };
 
-/// Gradient of the loss for every parameter, laid out as DeviceGaussians, and what densification needs.
+/// Gradient of the loss for every parameter, laid out as DeviceGaussians, and what densification
+/// needs.
 struct GaussianGradients {
   Buffer<float> means;
   Buffer<float> quaternions;
   Buffer<float> scales;  ///< with respect to the parameter before activation
   Buffer<float> opacities;
   Buffer<float> sh;
-  /// Per Gaussian and view: {norm of the gradient at the projected mean in normalised device coordinates
-  /// (as 3DGS), the same from absolute values per ray (as AbsGS), 1 when any ray met it else 0}.
+  /// Per Gaussian and view: {norm of the gradient at the projected mean in normalised device
+  /// coordinates (as 3DGS), the same from absolute values per ray (as AbsGS), 1 when any ray met it
+  /// else 0}.
   Buffer<float> screen;  ///< 3 N
 };
 

@@ -42,7 +42,8 @@ class RayTracer {
   RayTracer(Context& context, const TraceOptions& options);
   ~RayTracer();
   void update(const DeviceGaussians& gaussians);
-  std::vector<RayResult> trace(const DeviceGaussians& gaussians, std::span<const Ray> rays,
+  std::vector<RayResult> trace(const DeviceGaussians& gaussians,
+                               std::span<const Ray> rays,
                                ColorDirection color_direction = ColorDirection::kRay);
 
  private:

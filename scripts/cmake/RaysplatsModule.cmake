@@ -33,6 +33,7 @@ function(raysplats_module name)
     ${target}
     PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
            $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/host> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/cl>)
+  target_compile_definitions(${target} PRIVATE RAYSPLATS_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${target} PUBLIC ${ARG_DEPENDS})
   raysplats_compile_options(${target})
 endfunction()

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "trace/camera_tracer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "bvh/gaussian_bounds.hpp"
+#include "raysplats/error.hpp"
+#include "trace/candidate_lists.hpp"
+#include "trace/packet_shape.hpp"
+
+namespace raysplats {
+namespace {
+
+using Stream = std::array<std::uint32_t, 2>;
+
+constexpr std::size_t kLineGradientBytes = 64;
+constexpr std::uint32_t kChunkEntries =
+    32;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
+constexpr std::size_t kChunkBytes = kChunkEntries * sizeof(Stream);
+constexpr std::size_t kFinalizeGroup = 64;
+
+std::array<float, 4> background_of(const TraceOptions& options) {
+  return {options.background[0], options.background[1], options.background[2], 0.0f};
+}
+
+}  // namespace
+
+struct CameraTracer::Impl {
+  Impl(Context& context_in, const TraceOptions& options_in)
+      : context(context_in),
+        options(options_in),
+        packet(packet_shape(context_in.device(), options_in.packet_width)),
+        tree(context_in),
+        lists(context_in, options_in, packet.tile),
+        counters(context_in, 3, "trace counters") {}
+
+  void trace_rows(const DeviceGaussians& gaussians,
+                  std::uint32_t row,
+                  std::uint32_t rows,
+                  bool keep);
+  void launch_forward(std::uint32_t row, std::uint32_t rows, bool keep);
+  void launch_backward(const Buffer<float>& image_gradient, std::uint32_t row, std::uint32_t rows);
+  void backward_rows(const DeviceGaussians& gaussians,
+                     const Buffer<float>& image_gradient,
+                     std::uint32_t row,
+                     std::uint32_t rows);
+  void finalize(const DeviceGaussians& gaussians, GaussianGradients& gradients, bool pose);
+  void choose_gradient_copies(std::size_t count);
+  void grow_pool(std::size_t chunks);
+  Kernel& forward_kernel(bool keep);
+  float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
+  float screen_y() const { return static_cast<float>(camera.height) / (2.0f * camera.fy); }
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  }
+  std::size_t pool_capacity() const { return pool.size() / kChunkEntries; }
+  std::size_t packet_count() const {
+    return static_cast<std::size_t>((camera.width + packet.width - 1) / packet.width) *
+           static_cast<std::size_t>((camera.height + packet.height - 1) / packet.height);
+  }
+  std::size_t pool_limit() const {
+    return std::min<std::size_t>(options.memory_budget / 2, context.device().max_allocation) /
+           kChunkBytes;
+  }
+
+  Context& context;
+  TraceOptions options;
+  PacketShape packet;
+  Lbvh tree;
+  Buffer<RsAabb> boxes;
+  CandidateLists lists;
+  RsCamera camera{};
+  std::array<Kernel, 2> forward_kernels;  // without and with kept hits
+  int forward_variant = -1;
+  Buffer<float> image;
+  Buffer<float> depth;
+  Buffer<float> last_transmittance;
+  Buffer<Stream> stream_ends;
+  Buffer<Stream> pool;
+  Buffer<std::uint32_t> counters;  // chunks wanted, capped rays, hits
+  std::uint64_t candidates = 0;
+  Statistics saved;
+  bool statistics_saved = false;
+  bool hits_kept = false;      // the last forward() was asked to keep hits
+  bool hits_complete = false;  // and all of them fit
+  std::size_t copies = 1;
+  bool private_copies = false;
+  Buffer<std::array<float, 16>> line_gradients;
+  Buffer<float> pose;
+  GaussianGradients pose_scratch;
+};
+
+CameraTracer::CameraTracer(Context& context, const TraceOptions& options)
+    : impl_(std::make_unique<Impl>(context, options)) {
+  if (!(options.quantile > 0.0f) || !(options.min_transmittance >= 1e-6f) ||
+      options.min_transmittance >= 1.0f || options.max_hits < 1) {
+    throw UsageError(
+        fmt::format("Trace options out of range: quantile {} must be positive, min-transmittance "
+                    "{} in [1e-6, 1), max-hits {} at least 1",
+                    options.quantile, options.min_transmittance, options.max_hits));
+  }
+}
+CameraTracer::~CameraTracer() = default;
+
+const Buffer<float>& CameraTracer::image() const { return impl_->image; }
+const Buffer<float>& CameraTracer::depth() const { return impl_->depth; }
+const Lbvh& CameraTracer::tree() const { return impl_->tree; }
+TraceOptions& CameraTracer::options() { return impl_->options; }
+
+void CameraTracer::update(const DeviceGaussians& gaussians, bool rebuild) {
+  Impl& self = *impl_;
+  GaussianBounds bounds(self.context, gaussians.activation == ScaleActivation::kSigmoid,
+                        self.options.adaptive_radius);
+  bounds.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
+                 gaussians.count, self.options.quantile, self.boxes);
+  if (rebuild || gaussians.count != self.tree.size()) {
+    self.tree.build(self.boxes, gaussians.count);
+  } else {
+    self.tree.refit(self.boxes);
+  }
+}
+
+void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits) {
+  Impl& self = *impl_;
+  if (camera.width < 1 || camera.height < 1 || !(camera.fx > 0) || !(camera.fy > 0)) {
+    throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
+  }
+  if (self.tree.size() != gaussians.count) {
+    throw UsageError("CameraTracer::update() must follow every change of the Gaussians");
+  }
+  self.camera = device_camera(camera, self.options.near_depth);
+  self.image.ensure(self.context, 4 * self.pixels(), "image");
+  self.depth.ensure(self.context, self.options.depth ? 3 * self.pixels() : 1, "depth");
+  self.last_transmittance.ensure(self.context, keep_hits ? self.pixels() : 1, "last transmittance");
+  self.stream_ends.ensure(self.context, keep_hits ? self.packet_count() : 1, "hit streams");
+  if (self.pool.size() == 0) self.grow_pool(keep_hits ? 2 * self.packet_count() : 1);
+  self.hits_kept = keep_hits;
+  self.statistics_saved = false;
+  self.candidates = 0;
+  self.counters.clear();
+  self.lists.prepare(gaussians, self.camera, self.options);
+  self.trace_rows(gaussians, 0, self.lists.tile_rows(), keep_hits);
+  if (!keep_hits) return;
+  const std::size_t wanted = self.counters.read(0);
+  self.hits_complete = wanted <= self.pool_capacity();
+  if (self.hits_complete) return;
+  self.grow_pool(wanted);
+  if (wanted > self.pool_limit()) return;  // backward() traces again, band by band
+  self.counters.clear();
+  self.candidates = 0;
+  self.trace_rows(gaussians, 0, self.lists.tile_rows(), true);
+  self.hits_complete = self.counters.read(0) <= self.pool_capacity();
+}
+
+// Splits the rows until the candidate lists of each part fit their share of the budget.
+void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
+                                    std::uint32_t row,
+                                    std::uint32_t rows,
+                                    bool keep) {
+  if (rows > lists.max_rows() || !lists.build(tree, camera, row, rows, options.memory_budget / 4)) {
+    trace_rows(gaussians, row, rows / 2, keep);
+    trace_rows(gaussians, row + rows / 2, rows - rows / 2, keep);
+    return;
+  }
+  candidates += lists.candidates();
+  launch_forward(row, rows, keep);
+}
+
+Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
+  const int variant = (options.depth ? 1 : 0) | (options.hit_order == HitOrder::kPeak ? 2 : 0);
+  if (variant != forward_variant) {
+    forward_variant = variant;
+    forward_kernels = {};
+  }
+  Kernel& kernel = forward_kernels[keep ? 1 : 0];
+  if (!kernel) {
+    BuildOptions build;
+    build.define("PACKET", packet.lanes)
+        .define("TILE", packet.tile)
+        .define("PENDING", packet.pending)
+        .define("CHUNK", kChunkEntries)
+        .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
+        .define("WITH_DEPTH", options.depth ? 1 : 0)
+        .define("KEEP_HITS", keep ? 1 : 0);
+    kernel = context.kernel("trace/forward.cl", "trace_forward", build);
+  }
+  return kernel;
+}
+
+void CameraTracer::Impl::launch_forward(std::uint32_t row, std::uint32_t rows, bool keep) {
+  Kernel& kernel = forward_kernel(keep);
+  const auto group = packet_group(packet, kernel.max_work_group_size());
+  const auto up = [](int a, int b) { return static_cast<std::size_t>((a + b - 1) / b); };
+  const Range range = Range::plane(
+      up(camera.width, packet.width),
+      static_cast<std::size_t>(rows) * static_cast<std::size_t>(packet.tile / packet.height),
+      group[0], group[1]);
+  kernel.launch(range, lists.lines(), lists.references(), lists.boxes(), lists.box_stride(),
+                lists.limits(), lists.offsets(), camera, lists.tiles_x(), row,
+                options.min_transmittance, options.max_hits, background_of(options), image, depth,
+                last_transmittance, stream_ends, pool,
+                static_cast<std::uint32_t>(keep ? pool_capacity() : 0), counters);
+}
+
+void CameraTracer::Impl::grow_pool(std::size_t chunks) {
+  const std::size_t room = std::max<std::size_t>(1, std::min(chunks + chunks / 4, pool_limit()));
+  pool.ensure(context, room * kChunkEntries, "hit pool");
+}
+
+void CameraTracer::Impl::choose_gradient_copies(std::size_t count) {
+  // CPUs add to private copies: no atomics and the same sum every time. GPUs have too many groups
+  // for that.
+  const std::size_t wanted = 2 * static_cast<std::size_t>(context.device().compute_units);
+  const std::size_t bytes = std::max<std::size_t>(count, 1) * kLineGradientBytes;
+  const std::size_t room =
+      std::min<std::size_t>(options.memory_budget / 4, context.device().max_allocation) / bytes;
+  private_copies =
+      context.device().type == DeviceType::kCpu && room >= context.device().compute_units;
+  copies = private_copies ? std::min(wanted, room) : 1;
+}
+
+void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
+                                         std::uint32_t row,
+                                         std::uint32_t rows) {
+  BuildOptions build;
+  build.define("PACKET", packet.lanes)
+      .define("TILE", packet.tile)
+      .define("CHUNK", kChunkEntries)
+      .define("PRIVATE_COPIES", private_copies ? 1 : 0);
+  Kernel kernel = context.kernel("trace/backward.cl", "trace_backward", build);
+  Range range{{copies, 1, 1}, {1, 1, 1}};
+  if (!private_copies) {
+    const auto group = packet_group(packet, kernel.max_work_group_size());
+    const auto up = [](int a, int b) { return static_cast<std::size_t>((a + b - 1) / b); };
+    range = Range::plane(
+        up(camera.width, packet.width),
+        static_cast<std::size_t>(rows) * static_cast<std::size_t>(packet.tile / packet.height),
+        group[0], group[1]);
+  }
+  kernel.launch(range, static_cast<std::uint32_t>(tree.size()), static_cast<std::uint32_t>(copies),
+                lists.lines(), image_gradient, last_transmittance, stream_ends, pool, camera,
+                lists.tiles_x(), row, rows, background_of(options), screen_x(), screen_y(),
+                line_gradients);
+}
+
+// Traces rows again with the pool to themselves, then runs them backwards; halves them until their
+// hits fit.
+void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
+                                       const Buffer<float>& image_gradient,
+                                       std::uint32_t row,
+                                       std::uint32_t rows) {
+  counters.clear();
+  trace_rows(gaussians, row, rows, true);
+  const std::size_t wanted = counters.read(0);
+  if (wanted > pool_capacity() && rows > 1) {
+    backward_rows(gaussians, image_gradient, row, rows / 2);
+    backward_rows(gaussians, image_gradient, row + rows / 2, rows - rows / 2);
+    return;
+  }
+  if (wanted > pool_capacity()) {
+    throw ResourceError(fmt::format(
+        "The hits of one row of tiles need {:.1f} MiB, the memory budget leaves {:.1f} MiB: "
+        "raise --memory-budget or --downscale",
+        static_cast<double>(wanted * kChunkBytes) / (1 << 20),
+        static_cast<double>(pool_capacity() * kChunkBytes) / (1 << 20)));
+  }
+  launch_backward(image_gradient, row, rows);
+}
+
+void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
+                                  GaussianGradients& gradients,
+                                  bool with_pose) {
+  const std::size_t n = gaussians.count;
+  gradients.means.ensure(context, 3 * n, "mean gradients");
+  gradients.quaternions.ensure(context, 4 * n, "quaternion gradients");
+  gradients.scales.ensure(context, 3 * n, "scale gradients");
+  gradients.opacities.ensure(context, n, "opacity gradients");
+  gradients.sh.ensure(context, gaussians.sh.size(), "SH gradients");
+  gradients.screen.ensure(context, 3 * n, "screen gradients");
+  pose.ensure(context, with_pose ? 6 * n : 1, "pose gradients");
+  BuildOptions build;
+  build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
+      .define("POSE", with_pose ? 1 : 0);
+  Kernel kernel = context.kernel("trace/finalize_gradients.cl", "finalize_gradients", build);
+  kernel.launch(Range::linear(n, kFinalizeGroup), static_cast<std::uint32_t>(n),
+                static_cast<std::uint32_t>(copies), line_gradients, lists.bounds(), lists.lines(),
+                gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
+                gaussians.sh, sh_coefficients(gaussians.sh_degree), gaussians.active_sh_degree,
+                camera, screen_x(), screen_y(), gradients.means, gradients.quaternions,
+                gradients.scales, gradients.opacities, gradients.sh, gradients.screen, pose);
+}
+
+void CameraTracer::backward(const DeviceGaussians& gaussians,
+                            const Buffer<float>& image_gradient,
+                            GaussianGradients& gradients) {
+  Impl& self = *impl_;
+  if (!self.hits_kept || self.tree.size() != gaussians.count) {
+    throw UsageError(
+        "CameraTracer::backward() must follow forward(keep_hits = true) of the same Gaussians");
+  }
+  self.saved = statistics();
+  self.statistics_saved = true;
+  self.choose_gradient_copies(gaussians.count);
+  self.line_gradients.ensure(self.context, self.copies * gaussians.count, "line gradients");
+  self.line_gradients.clear();
+  if (self.hits_complete) {
+    self.launch_backward(image_gradient, 0, self.lists.tile_rows());
+  } else {
+    self.backward_rows(gaussians, image_gradient, 0, self.lists.tile_rows());
+  }
+  self.finalize(gaussians, gradients, false);
+}
+
+CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& gaussians) {
+  Impl& self = *impl_;
+  self.finalize(gaussians, self.pose_scratch, true);
+  const std::vector<float> parts = self.pose.download();
+  PoseGradient sum;
+  for (std::size_t i = 0; i + 6 <= parts.size(); i += 6) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      sum.center[j] += parts[i + j];
+      sum.rotation[j] += parts[i + 3 + j];
+    }
+  }
+  return sum;
+}
+
+CameraTracer::Statistics CameraTracer::statistics() const {
+  if (impl_->statistics_saved) return impl_->saved;
+  const std::vector<std::uint32_t> counters = impl_->counters.download();
+  return {counters[1], impl_->candidates, counters[2]};
+}
+
+namespace {
+
+Image interleaved(const std::vector<float>& planes, int width, int height, int channels) {
+  Image out(width, height, channels);
+  const std::size_t pixels = out.pixels();
+  const auto n = static_cast<std::size_t>(channels);
+  for (std::size_t c = 0; c < n; ++c) {
+    for (std::size_t i = 0; i < pixels; ++i) out.data[i * n + c] = planes[c * pixels + i];
+  }
+  return out;
+}
+
+}  // namespace
+
+Image CameraTracer::download_image() const {
+  return interleaved(impl_->image.download(), impl_->camera.width, impl_->camera.height, 4);
+}
+
+Image CameraTracer::download_depth() const {
+  if (!impl_->options.depth) throw UsageError("Depth was not traced: set TraceOptions::depth");
+  return interleaved(impl_->depth.download(), impl_->camera.width, impl_->camera.height, 3);
+}
+
+}  // namespace raysplats

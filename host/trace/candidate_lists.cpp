@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "trace/candidate_lists.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+// Vector loads of boxes may run past the end of a list by one vector.
+constexpr std::size_t kBoxPadding = 16;
+constexpr std::size_t kBytesPerCandidate =
+    2 * 2 * 4 + 4 * 4 + 8;  // keys and values twice (sort), box, limits
+constexpr std::size_t kPrepareGroup = 64;
+
+std::size_t with_headroom(std::size_t count) { return count + count / 4 + 1024; }
+
+}  // namespace
+
+RsCamera device_camera(const Camera& camera, float near_depth) {
+  RsCamera out{};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      out.rotation[3 * row + column] = static_cast<float>(camera.rotation[column][row]);
+    }
+  }
+  const glm::dvec3 center = camera.center();
+  for (int j = 0; j < 3; ++j) out.center[j] = static_cast<float>(center[j]);
+  out.fx = static_cast<float>(camera.fx);
+  out.fy = static_cast<float>(camera.fy);
+  out.cx = static_cast<float>(camera.cx);
+  out.cy = static_cast<float>(camera.cy);
+  out.width = camera.width;
+  out.height = camera.height;
+  out.near_depth = near_depth;
+  return out;
+}
+
+CandidateLists::CandidateLists(Context& context, const TraceOptions&, int tile_size)
+    : context_(&context), tile_size_(tile_size), sort_(context), scan_(context) {
+  BuildOptions build;
+  build.define("TILE", tile_size);
+  count_kernel_ = context.kernel("trace/tile_lists.cl", "count_tile_candidates", build);
+  fill_kernel_ = context.kernel("trace/tile_lists.cl", "fill_tile_candidates", build);
+  gather_kernel_ = context.kernel("trace/tile_lists.cl", "gather_candidates", build);
+}
+
+void CandidateLists::require_prepare_kernel(const DeviceGaussians& gaussians,
+                                            const TraceOptions& options) {
+  const bool sigmoid = gaussians.activation == ScaleActivation::kSigmoid;
+  const bool peak = options.hit_order == HitOrder::kPeak;
+  const int variant = (sigmoid ? 1 : 0) | (peak ? 2 : 0) | (options.adaptive_radius ? 4 : 0);
+  if (variant == prepared_variant_) return;
+  BuildOptions build;
+  build.define("SIGMOID_SCALE", sigmoid ? 1 : 0)
+      .define("PEAK_ORDER", peak ? 1 : 0)
+      .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0);
+  prepare_kernel_ = context_->kernel("trace/prepare_view.cl", "prepare_view", build);
+  prepared_variant_ = variant;
+}
+
+void CandidateLists::prepare(const DeviceGaussians& gaussians,
+                             const RsCamera& camera,
+                             const TraceOptions& options) {
+  if (gaussians.count >= (std::size_t{1} << 31)) {
+    throw ResourceError(fmt::format(
+        "{} Gaussians are more than the 2^31 - 1 that one scene can hold", gaussians.count));
+  }
+  require_prepare_kernel(gaussians, options);
+  count_ = gaussians.count;
+  tiles_x_ = static_cast<std::uint32_t>((camera.width + tile_size_ - 1) / tile_size_);
+  tile_rows_ = static_cast<std::uint32_t>((camera.height + tile_size_ - 1) / tile_size_);
+  lines_.ensure(*context_, count_, "lines of the view");
+  bounds_.ensure(*context_, count_, "bounds of the view");
+  const std::array<float, 4> window{-camera.cx / camera.fx, -camera.cy / camera.fy,
+                                    (static_cast<float>(camera.width) - camera.cx) / camera.fx,
+                                    (static_cast<float>(camera.height) - camera.cy) / camera.fy};
+  prepare_kernel_.launch(Range::linear(count_, kPrepareGroup), static_cast<std::uint32_t>(count_),
+                         gaussians.means, gaussians.quaternions, gaussians.scales,
+                         gaussians.opacities, gaussians.sh, sh_coefficients(gaussians.sh_degree),
+                         gaussians.active_sh_degree, camera, options.quantile, window, lines_,
+                         bounds_);
+}
+
+bool CandidateLists::build(const Lbvh& tree,
+                           const RsCamera& camera,
+                           std::uint32_t row,
+                           std::uint32_t rows,
+                           std::size_t budget) {
+  const std::uint32_t tiles = tiles_x_ * rows;
+  offsets_.ensure(*context_, tiles + 1, "tile offsets");
+  candidates_ = 0;
+  const std::size_t group = context_->device().type == DeviceType::kCpu ? 1 : 32;
+  if (tree.size() > 0) {
+    count_kernel_.launch(Range::linear(tiles, group), tree.root(), tree.nodes(), tree.leaves(),
+                         bounds_, camera, tiles_x_, row, tiles, offsets_);
+    scan_.exclusive(offsets_, tiles);
+    candidates_ = offsets_.read(tiles);
+  } else {
+    offsets_.clear();
+  }
+  const std::size_t allowed =
+      std::min<std::size_t>(budget / kBytesPerCandidate, context_->device().max_allocation / 16);
+  if (candidates_ > allowed && rows > 1) return false;
+  stride_ = static_cast<std::uint32_t>(candidates_ + kBoxPadding);
+  if (keys_.size() < candidates_ || keys_.size() == 0) {
+    const std::size_t room = std::min(with_headroom(candidates_), std::max(allowed, candidates_));
+    keys_.ensure(*context_, room, "candidate keys");
+    values_.ensure(*context_, room, "candidate references");
+    limits_.ensure(*context_, room, "candidate limits");
+    boxes_.ensure(*context_, 4 * (room + kBoxPadding), "candidate boxes");
+  }
+  if (candidates_ == 0) return true;
+  fill_kernel_.launch(Range::linear(tiles, group), tree.root(), tree.nodes(), tree.leaves(),
+                      bounds_, camera, tiles_x_, row, tiles, offsets_, keys_, values_);
+  sort_.sort(keys_, values_, candidates_, 16 + std::bit_width(tiles - 1));
+  gather_kernel_.launch(Range::linear(candidates_, kPrepareGroup),
+                        static_cast<std::uint32_t>(candidates_), stride_, keys_, values_, bounds_,
+                        boxes_, limits_);
+  return true;
+}
+
+}  // namespace raysplats

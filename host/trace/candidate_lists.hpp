@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "bvh/lbvh.hpp"
+#include "device/context.hpp"
+#include "primitives/radix_sort.hpp"
+#include "primitives/scan.hpp"
+#include "raysplats/camera.hpp"
+#include "raysplats/trace_options.hpp"
+#include "shared/layout.h"
+#include "trace/device_gaussians.hpp"
+
+namespace raysplats {
+
+/// The record of a camera that kernels read.
+RsCamera device_camera(const Camera& camera, float near_depth);
+
+/// What the tiles of one view may hit: the line of every visible Gaussian and, per tile, the list
+/// of candidates found by walking the LBVH with the tile's frustum, sorted by a lower bound of the
+/// hit depth.
+class CandidateLists {
+ public:
+  CandidateLists(Context& context, const TraceOptions& options, int tile_size);
+
+  /// Lines and culling records of all Gaussians for a view.
+  void prepare(const DeviceGaussians& gaussians,
+               const RsCamera& camera,
+               const TraceOptions& options);
+
+  /// Lists of the tile rows [row, row + rows). Returns false, having made nothing, when they would
+  /// take more than `budget` bytes and there is more than one row.
+  bool build(const Lbvh& tree,
+             const RsCamera& camera,
+             std::uint32_t row,
+             std::uint32_t rows,
+             std::size_t budget);
+
+  std::uint32_t tiles_x() const { return tiles_x_; }
+  std::uint32_t tile_rows() const { return tile_rows_; }
+  /// Most tile rows one build() accepts: tile numbers are 16 bits wide.
+  std::uint32_t max_rows() const { return 65535u / tiles_x_; }
+  std::size_t candidates() const { return candidates_; }
+
+  const Buffer<RsLine>& lines() const { return lines_; }
+  const Buffer<RsViewBounds>& bounds() const { return bounds_; }
+  const Buffer<std::uint32_t>& references() const { return values_; }
+  const Buffer<std::uint32_t>& offsets() const { return offsets_; }
+  const Buffer<float>& boxes() const { return boxes_; }
+  std::uint32_t box_stride() const { return stride_; }
+  const Buffer<std::array<float, 2>>& limits() const { return limits_; }
+
+ private:
+  void require_prepare_kernel(const DeviceGaussians& gaussians, const TraceOptions& options);
+
+  Context* context_;
+  int tile_size_;
+  Kernel prepare_kernel_;
+  int prepared_variant_ = -1;
+  Kernel count_kernel_;
+  Kernel fill_kernel_;
+  Kernel gather_kernel_;
+  RadixSort sort_;
+  Scan scan_;
+  std::size_t count_ = 0;
+  std::size_t candidates_ = 0;
+  std::uint32_t tiles_x_ = 1;
+  std::uint32_t tile_rows_ = 1;
+  std::uint32_t stride_ = 0;
+  Buffer<RsLine> lines_;
+  Buffer<RsViewBounds> bounds_;
+  Buffer<std::uint32_t> offsets_;
+  Buffer<std::uint32_t> keys_;
+  Buffer<std::uint32_t> values_;
+  Buffer<float> boxes_;
+  Buffer<std::array<float, 2>> limits_;
+};
+
+}  // namespace raysplats

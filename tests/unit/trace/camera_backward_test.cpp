@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include "trace_fixture.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+struct Errors {
+  double means, quaternions, scales, opacities, sh;
+  double worst() const { return std::max({means, quaternions, scales, opacities, sh}); }
+};
+
+struct Host {
+  std::vector<float> means, quaternions, scales, opacities, sh, screen;
+};
+
+Host gradients_on_device(Context& context,
+                         const Gaussians& model,
+                         const TraceOptions& options,
+                         const Camera& camera,
+                         ScaleActivation activation,
+                         const std::vector<float>& image_gradient) {
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
+  CameraTracer tracer(context, options);
+  tracer.update(gaussians);
+  tracer.forward(gaussians, camera, true);
+  Buffer<float> gradient(context, image_gradient.size(), "image gradient");
+  gradient.upload(image_gradient);
+  GaussianGradients out;
+  tracer.backward(gaussians, gradient, out);
+  return {out.means.download(),     out.quaternions.download(), out.scales.download(),
+          out.opacities.download(), out.sh.download(),          out.screen.download()};
+}
+
+// The image gradient with zeros where single precision may order or cut hits otherwise than double.
+std::vector<float> without_ties(std::vector<float> gradient, const reference::Render& render) {
+  for (std::size_t i = 0; i < render.pixels(); ++i) {
+    if (render.margin[i] >= 1e-4) continue;
+    for (std::size_t c = 0; c < 4; ++c) gradient[c * render.pixels() + i] = 0.0f;
+  }
+  return gradient;
+}
+
+Errors compare_gradients(Context& context,
+                         const Gaussians& model,
+                         const TraceOptions& options,
+                         const Camera& camera,
+                         ScaleActivation activation = ScaleActivation::kExp) {
+  const reference::Parameters parameters(model, activation);
+  const reference::Render render = reference::render(parameters, options, camera);
+  const std::vector<float> image_gradient =
+      without_ties(random_image_gradient(render.pixels(), 3), render);
+  const std::vector<double> wide(image_gradient.begin(), image_gradient.end());
+  const reference::Gradient expected =
+      reference::render_gradient(parameters, options, camera, wide);
+  const Host got = gradients_on_device(context, model, options, camera, activation, image_gradient);
+  return {relative_error(got.means, expected.parameters.means),
+          relative_error(got.quaternions, expected.parameters.quaternions),
+          relative_error(got.scales, expected.parameters.scales),
+          relative_error(got.opacities, expected.parameters.opacities),
+          relative_error(got.sh, expected.parameters.sh)};
+}
+
+#define CHECK_ERRORS(errors, limit)                                                  \
+  do {                                                                               \
+    const Errors e_ = errors;                                                        \
+    INFO("means ", e_.means, " quaternions ", e_.quaternions, " scales ", e_.scales, \
+         " opacities ", e_.opacities, " sh ", e_.sh);                                \
+    CHECK(e_.worst() < (limit));                                                     \
+  } while (false)
+
+}  // namespace
+
+TEST_CASE("gradients equal the double reference in every variant [small]") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(250, 21, 2);
+  const Camera camera = reference::cube_camera(21, 18);
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    for (const bool adaptive : {false, true}) {
+      for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
+        CAPTURE(static_cast<int>(order));
+        CAPTURE(adaptive);
+        CAPTURE(static_cast<int>(activation));
+        TraceOptions options;
+        options.hit_order = order;
+        options.adaptive_radius = adaptive;
+        options.background = {0.25f, 0.5f, 1.0f};
+        CHECK_ERRORS(compare_gradients(context, model, options, camera, activation), 1e-3);
+      }
+    }
+  }
+}
+
+TEST_CASE("gradients of every SH degree, the direction's part included") {
+  Context context = make_test_context();
+  for (int degree = 0; degree <= 4; ++degree) {
+    CAPTURE(degree);
+    CHECK_ERRORS(compare_gradients(context, reference::random_scene(150, 22, degree), {},
+                                   reference::cube_camera(25, 19)),
+                 1e-3);
+  }
+}
+
+TEST_CASE("gradients of opaque and of vanishing Gaussians") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(200, 23, 0);
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    if (i % 3 == 0) model.opacities[i] = 40.0f;  // the sigmoid is exactly 1 in float
+    if (i % 3 == 1) model.opacities[i] = -12.0f;
+  }
+  CHECK_ERRORS(compare_gradients(context, model, {}, reference::cube_camera(30, 30)), 2e-3);
+}
+
+TEST_CASE("gradients from a camera inside the scene") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(400, 24, 1);
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    TraceOptions options;
+    options.hit_order = order;
+    const Camera camera = look_at({0.1, -0.2, 0.15}, {1, 0.3, 0.5}, {0, 1, 0}, 41, 33, 28);
+    CHECK_ERRORS(compare_gradients(context, model, options, camera), 2e-3);
+  }
+}
+
+TEST_CASE(
+    "packet widths, private copies, atomic adds and recomputed hits give the same gradients") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(3000, 25, 1);
+  const Camera camera = reference::cube_camera(70, 66);
+  TraceOptions options;
+  const std::vector<float> image_gradient = random_image_gradient(70 * 66, 5);
+  options.packet_width = 16;
+  const Host base =
+      gradients_on_device(context, model, options, camera, ScaleActivation::kExp, image_gradient);
+  const auto check = [&](const TraceOptions& variant, const char* what) {
+    CAPTURE(what);
+    const Host got =
+        gradients_on_device(context, model, variant, camera, ScaleActivation::kExp, image_gradient);
+    const auto error = [](const std::vector<float>& a, const std::vector<float>& b) {
+      return relative_error(a, std::vector<double>(b.begin(), b.end()));
+    };
+    CHECK(error(got.means, base.means) < 1e-4);
+    CHECK(error(got.quaternions, base.quaternions) < 1e-4);
+    CHECK(error(got.scales, base.scales) < 1e-4);
+    CHECK(error(got.opacities, base.opacities) < 1e-4);
+    CHECK(error(got.sh, base.sh) < 1e-4);
+  };
+  for (const int lanes : {1, 2, 4, 8}) {
+    TraceOptions variant = options;
+    variant.packet_width = lanes;
+    check(variant, "packet width");
+  }
+  TraceOptions tight = options;
+  tight.memory_budget = 1700000;  // two private copies, hit lists in bands
+  check(tight, "memory budget");
+  tight.memory_budget = 1000000;  // too little for private copies: atomic adds
+  check(tight, "smaller memory budget");
+}
+
+TEST_CASE("pose gradient equals the double reference") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(200, 26, 2);
+  const Camera camera = look_at({0.5, -1.0, -3.5}, {0, 0, 0}, {0, 1, 0}, 30, 26, 40);
+  const reference::Parameters parameters(model);
+  const reference::Render render = reference::render(parameters, {}, camera);
+  const std::vector<float> image_gradient =
+      without_ties(random_image_gradient(render.pixels(), 6), render);
+  const std::vector<double> wide(image_gradient.begin(), image_gradient.end());
+  const reference::Gradient expected = reference::render_gradient(parameters, {}, camera, wide);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  CameraTracer tracer(context, {});
+  tracer.update(gaussians);
+  tracer.forward(gaussians, camera, true);
+  Buffer<float> gradient(context, image_gradient.size(), "image gradient");
+  gradient.upload(image_gradient);
+  GaussianGradients out;
+  tracer.backward(gaussians, gradient, out);
+  const CameraTracer::PoseGradient pose = tracer.pose_gradient(gaussians);
+  for (int j = 0; j < 3; ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    CHECK(pose.center[k] == doctest::Approx(expected.center[j]).epsilon(2e-3));
+    CHECK(pose.rotation[k] == doctest::Approx(expected.rotation[j]).epsilon(2e-3));
+  }
+}
+
+TEST_CASE("the backward pass gives the same bits every time on a CPU") {
+  Context context = make_test_context();
+  if (context.device().type != DeviceType::kCpu) return;
+  const Gaussians model = reference::random_scene(1000, 27, 1);
+  const Camera camera = reference::cube_camera(100, 90);
+  const std::vector<float> image_gradient = random_image_gradient(9000, 7);
+  const Host a =
+      gradients_on_device(context, model, {}, camera, ScaleActivation::kExp, image_gradient);
+  const Host b =
+      gradients_on_device(context, model, {}, camera, ScaleActivation::kExp, image_gradient);
+  CHECK(a.means == b.means);
+  CHECK(a.quaternions == b.quaternions);
+  CHECK(a.scales == b.scales);
+  CHECK(a.sh == b.sh);
+  CHECK(a.screen == b.screen);
+}

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "base/rng.hpp"
+#include "device/context.hpp"
+#include "raysplats/device.hpp"
+#include "reference/gradients.hpp"
+#include "reference/scenes.hpp"
+#include "reference/tracer.hpp"
+#include "trace/camera_tracer.hpp"
+
+namespace raysplats {
+
+/// The device the tests run on: RAYSPLATS_DEVICE, or the default.
+inline Context make_test_context() {
+  const char* selector = std::getenv("RAYSPLATS_DEVICE");
+  return Context(select_device(selector == nullptr ? "" : selector));
+}
+
+struct Difference {
+  double mean = 0;          ///< absolute, over compared values
+  double maximum = 0;       ///< over pixels that are no near-ties
+  std::size_t excused = 0;  ///< pixels with a decision within `tie_margin` of going the other way
+  std::size_t pixels = 0;
+};
+
+/// Compares a traced RGBA image with the reference. Pixels on which single precision may decide
+/// otherwise (order of near-coincident hits, inside or outside an ellipsoid) count in the mean but
+/// not in the maximum.
+inline Difference compare(const Image& image,
+                          const reference::Render& expected,
+                          double tie_margin = 1e-5) {
+  Difference out;
+  out.pixels = expected.pixels();
+  for (std::size_t i = 0; i < out.pixels; ++i) {
+    const bool tie = expected.margin[i] < tie_margin;
+    out.excused += tie ? 1 : 0;
+    for (std::size_t c = 0; c < 4; ++c) {
+      const double d =
+          std::abs(static_cast<double>(image.data[4 * i + c]) - expected.image[c * out.pixels + i]);
+      out.mean += d / static_cast<double>(4 * out.pixels);
+      if (!(d <= 1e30)) out.maximum = 1e30;
+      if (!tie) out.maximum = std::max(out.maximum, d);
+    }
+  }
+  return out;
+}
+
+inline Image trace_image(Context& context,
+                         const Gaussians& model,
+                         const TraceOptions& options,
+                         const Camera& camera,
+                         ScaleActivation activation = ScaleActivation::kExp) {
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
+  CameraTracer tracer(context, options);
+  tracer.update(gaussians);
+  tracer.forward(gaussians, camera);
+  return tracer.download_image();
+}
+
+/// |a - b| / |b| of two vectors as wholes.
+inline double relative_error(const std::vector<float>& a, const std::vector<double>& b) {
+  double difference = 0;
+  double norm = 0;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    difference += (a[i] - b[i]) * (a[i] - b[i]);
+    norm += b[i] * b[i];
+  }
+  return std::sqrt(difference / std::max(norm, 1e-300));
+}
+
+inline std::vector<float> random_image_gradient(std::size_t pixels, std::uint64_t seed) {
+  CounterRng rng(seed, 77);
+  std::vector<float> out(4 * pixels);
+  for (float& value : out) value = static_cast<float>(rng.normal());
+  return out;
+}
+
+}  // namespace raysplats
