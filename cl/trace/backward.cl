@@ -113,8 +113,10 @@ void packet_backward(const RsCamera* camera,
       const bool general = entry.x & 1;
       const iv mine = rs_lane_mask(entry.y);
       __global const float* v = lines[entry.x >> 1].v;
-      const PacketResponse r = rs_response(v, general, X, Y);
-      const fv response = select((fv)(0.0f), native_exp(-0.5f * r.distance2), mine);
+      const PacketMeeting m = rs_meet(v, general, 0.0f, X, Y);
+      const fv inverse = 1.0f / m.direction2;
+      const fv distance2 = m.numerator * inverse;
+      const fv response = select((fv)(0.0f), rs_exp(-0.5f * distance2), mine);
       const fv alpha = v[12] * response;
       T = select(T / (1.0f - alpha), T, at_last | ~mine);
       at_last &= ~mine;
@@ -131,8 +133,8 @@ void packet_backward(const RsCamera* camera,
       if (!general) {
         const fv dx = X - v[0];
         const fv dy = Y - v[1];
-        const fv gN = g_distance2 / r.direction2;
-        const fv gD = -gN * r.distance2;
+        const fv gN = g_distance2 * inverse;
+        const fv gD = -gN * distance2;
         const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
         g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
         g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
@@ -148,10 +150,11 @@ void packet_backward(const RsCamera* camera,
         g[11] = gDy * dy;
       } else {
         // g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'.
+        const fv peak = m.along * inverse;
         for (int k = 0; k < 3; ++k) {
           const fv direction = v[3 * k] * X + v[3 * k + 1] * Y + v[3 * k + 2];
-          const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + r.peak * direction);
-          const fv g_direction = r.peak * g_origin;
+          const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
+          const fv g_direction = peak * g_origin;
           g[3 * k] = g_direction * X;
           g[3 * k + 1] = g_direction * Y;
           g[3 * k + 2] = g_direction;

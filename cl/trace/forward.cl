@@ -171,9 +171,10 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
           const fv after = p.T * (1.0f - a);
           p.T_last = select(p.T_last, p.T, mine);
 #if WITH_DEPTH
-          const PacketResponse r = rs_response(v, reference & 1, p.X, p.Y);
-          p.depth_sum += w * select((fv)(0.0f), r.peak, mine);
-          p.median = select(p.median, r.peak, mine & RS_MASK(p.T >= 0.5f) & RS_MASK(after < 0.5f));
+          const PacketMeeting m = rs_meet(v, reference & 1, 0.0f, p.X, p.Y);
+          const fv peak = m.along / m.direction2;
+          p.depth_sum += w * select((fv)(0.0f), peak, mine);
+          p.median = select(p.median, peak, mine & RS_MASK(p.T >= 0.5f) & RS_MASK(after < 0.5f));
 #endif
           p.T = after;
 #if KEEP_HITS
@@ -187,17 +188,19 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
       const uint reference = references[k];
       const bool general = reference & 1;
       __global const float* v = lines[reference >> 1].v;
-      const PacketResponse r = rs_response(v, general, p.X, p.Y);
-      iv hit = RS_MASK(r.distance2 <= quantile) & p.alive;
+      const PacketMeeting m = rs_meet(v, general, quantile, p.X, p.Y);
+      iv hit = m.inside & p.alive;
       if (!any(hit)) continue;
+      const fv inverse = 1.0f / m.direction2;
+      const fv distance2 = m.numerator * inverse;
+      const fv peak = m.along * inverse;
 #if PEAK_ORDER
-      fv key = r.peak;
+      fv key = peak;
       hit &= RS_MASK(key >= 0.0f);
 #else
       // Near root by Viete's formula from the far one: no difference of near equals.
-      const fv reach = sqrt(fmax(quantile - r.distance2, (fv)(0.0f)) / r.direction2);
-      const fv far_root = r.peak + reach;
-      fv key = (rs_origin_distance2(v, general) - quantile) / (r.direction2 * far_root);
+      const fv far_root = peak + sqrt(fmax(quantile - distance2, (fv)(0.0f)) * inverse);
+      fv key = (rs_origin_distance2(v, general) - quantile) * inverse / far_root;
       hit &= RS_MASK(key >= 0.0f) & RS_MASK(far_root > 0.0f);
 #endif
       if (!first_pass) {
@@ -205,7 +208,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
                (RS_MASK(key == floor_key) & RS_MASK((iv)(reference) > floor_reference));
       }
       if (!any(hit)) continue;
-      fv alpha = select((fv)(0.0f), v[12] * native_exp(-0.5f * r.distance2), hit);
+      fv alpha = select((fv)(0.0f), v[12] * rs_exp(-0.5f * distance2), hit);
       iv id = (iv)(reference);
       // Later passes keep misses behind every hit, so that a full list always makes progress.
       key = select(first_pass ? fmax(key, (fv)(bound)) : (fv)(INFINITY), key, hit);

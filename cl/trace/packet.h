@@ -20,6 +20,8 @@ typedef int iv;
 #define RS_LANE_Y (0.0f)
 #define RS_LANE_INDEX (0)
 #define rs_load_float(p) (*(p))
+#define rs_as_int(v) as_int(v)
+#define rs_as_float(v) as_float(v)
 #else
 #define RS_MASK(comparison) (comparison)
 #if PACKET == 2
@@ -31,6 +33,8 @@ typedef int2 iv;
 #define RS_LANE_Y ((fv)(0, 0))
 #define RS_LANE_INDEX ((iv)(0, 1))
 #define rs_load_float(p) vload2(0, p)
+#define rs_as_int(v) as_int2(v)
+#define rs_as_float(v) as_float2(v)
 #elif PACKET == 4
 typedef float4 fv;
 typedef int4 iv;
@@ -40,6 +44,8 @@ typedef int4 iv;
 #define RS_LANE_Y ((fv)(0, 0, 1, 1))
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3))
 #define rs_load_float(p) vload4(0, p)
+#define rs_as_int(v) as_int4(v)
+#define rs_as_float(v) as_float4(v)
 #elif PACKET == 8
 typedef float8 fv;
 typedef int8 iv;
@@ -49,6 +55,8 @@ typedef int8 iv;
 #define RS_LANE_Y ((fv)(0, 0, 0, 0, 1, 1, 1, 1))
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7))
 #define rs_load_float(p) vload8(0, p)
+#define rs_as_int(v) as_int8(v)
+#define rs_as_float(v) as_float8(v)
 #elif PACKET == 16
 typedef float16 fv;
 typedef int16 iv;
@@ -58,6 +66,8 @@ typedef int16 iv;
 #define RS_LANE_Y ((fv)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 #define rs_load_float(p) vload16(0, p)
+#define rs_as_int(v) as_int16(v)
+#define rs_as_float(v) as_float16(v)
 #endif
 #endif
 
@@ -115,6 +125,22 @@ float rs_lane_sum(fv v) {
 #endif
 }
 
+// exp(x) for x <= 0 with a relative error below 2e-7 (arguments below -80 count as -80): some OpenCL
+// implementations evaluate the built-in lane by lane. 2^n by exponent arithmetic, 2^f by a polynomial on
+// [-1/2, 1/2] (Taylor of 2^f, degree 6).
+fv rs_exp(fv x) {
+  const fv y = fmax(x, (fv)(-80.0f)) * 1.44269504f;
+  const fv shifted = y + 12582912.0f;  // 1.5 * 2^23: rounds y to an integer in the low bits
+  const fv f = y - (shifted - 12582912.0f);
+  fv p = 1.54035304e-4f * f + 1.33335581e-3f;
+  p = p * f + 9.61812911e-3f;
+  p = p * f + 5.55041087e-2f;
+  p = p * f + 0.240226507f;
+  p = p * f + 0.693147181f;
+  p = p * f + 1.0f;
+  return rs_as_float(rs_as_int(p) + (rs_as_int(shifted) << 23));
+}
+
 // A row of pixels of a packet stored to or loaded from an image plane; `width` and `height` bound
 // the image.
 void rs_store_pixels(__global float* plane, int width, int height, int x, int y, fv value) {
@@ -152,46 +178,46 @@ fv rs_load_pixels(__global const float* plane, int width, int height, int x, int
 #endif
 }
 
-// Squared whitened distance of the packet's rays to a Gaussian, depth of the maximum response and
-// <d', d'>.
+// How the packet's rays pass a Gaussian.
 typedef struct {
-  fv distance2;
-  fv peak;
-  fv direction2;
-} PacketResponse;
+  iv inside;      // squared whitened distance of the line at most Q
+  fv numerator;   // ||o' x d'||^2 = squared distance times <d', d'>
+  fv direction2;  // <d', d'>
+  fv along;       // -<o', d'>
+} PacketMeeting;
 
-// v: the line; X, Y: tangent coordinates of the rays (d = (X, Y, 1) in camera axes, t is depth
-// along z).
-PacketResponse rs_projective_response(__global const float* v, fv X, fv Y) {
-  PacketResponse r;
+// v: the line; X, Y: tangent coordinates of the rays (d = (X, Y, 1) in camera axes, t is depth along z).
+PacketMeeting rs_meet_projective(__global const float* v, float quantile, fv X, fv Y) {
+  PacketMeeting m;
   const fv dx = X - v[0];
   const fv dy = Y - v[1];
-  const fv N = dx * (v[3] * dx + 2.0f * v[4] * dy) + v[5] * dy * dy;
   const fv e = v[7] * dx + v[8] * dy;
-  r.direction2 = v[6] + 2.0f * e + dx * (v[9] * dx + 2.0f * v[10] * dy) + v[11] * dy * dy;
-  const fv inverse = 1.0f / r.direction2;
-  r.distance2 = N * inverse;
-  r.peak = v[2] * (v[6] + e) * inverse;
-  return r;
+  m.numerator = dx * (v[3] * dx + 2.0f * v[4] * dy) + v[5] * dy * dy;
+  m.direction2 = v[6] + 2.0f * e + dx * (v[9] * dx + 2.0f * v[10] * dy) + v[11] * dy * dy;
+  m.along = v[2] * (v[6] + e);
+  m.inside = RS_MASK(m.numerator <= quantile * m.direction2);
+  return m;
 }
 
 // The residual vector is formed before its norm (docs/model.md).
-PacketResponse rs_general_response(__global const float* v, fv X, fv Y) {
-  PacketResponse r;
+PacketMeeting rs_meet_general(__global const float* v, float quantile, fv X, fv Y) {
+  PacketMeeting m;
   const fv d0 = v[0] * X + v[1] * Y + v[2];
   const fv d1 = v[3] * X + v[4] * Y + v[5];
   const fv d2 = v[6] * X + v[7] * Y + v[8];
-  r.direction2 = d0 * d0 + d1 * d1 + d2 * d2;
-  r.peak = -(v[9] * d0 + v[10] * d1 + v[11] * d2) / r.direction2;
-  const fv r0 = v[9] + r.peak * d0;
-  const fv r1 = v[10] + r.peak * d1;
-  const fv r2 = v[11] + r.peak * d2;
-  r.distance2 = r0 * r0 + r1 * r1 + r2 * r2;
-  return r;
+  m.direction2 = d0 * d0 + d1 * d1 + d2 * d2;
+  m.along = -(v[9] * d0 + v[10] * d1 + v[11] * d2);
+  const fv peak = m.along / m.direction2;
+  const fv r0 = v[9] + peak * d0;
+  const fv r1 = v[10] + peak * d1;
+  const fv r2 = v[11] + peak * d2;
+  m.numerator = (r0 * r0 + r1 * r1 + r2 * r2) * m.direction2;
+  m.inside = RS_MASK(m.numerator <= quantile * m.direction2);
+  return m;
 }
 
-PacketResponse rs_response(__global const float* v, bool general, fv X, fv Y) {
-  return general ? rs_general_response(v, X, Y) : rs_projective_response(v, X, Y);
+PacketMeeting rs_meet(__global const float* v, bool general, float quantile, fv X, fv Y) {
+  return general ? rs_meet_general(v, quantile, X, Y) : rs_meet_projective(v, quantile, X, Y);
 }
 
 // |o'|^2: squared whitened distance of the camera to the mean.
