@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "eval/evaluator.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/atomic_file.hpp"
+#include "eval/error_map.hpp"
+#include "eval/frame_writer.hpp"
+#include "eval/metrics.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+struct Comparison {
+  Image render;  // RGB in [0, 1], equal to the photo where that is masked out
+  Image photo;   // RGB
+  double valid;  // share of the pixels that count
+};
+
+Comparison compare(const Image& traced,
+                   const Image& rgba,
+                   bool alpha_is_background,
+                   const std::array<float, 3>& background) {
+  Comparison out{Image(rgba.width, rgba.height, 3), Image(rgba.width, rgba.height, 3), 1.0};
+  if (alpha_is_background) out.photo = composite(rgba, background.data());
+  double weights = 0;
+  for (int y = 0; y < rgba.height; ++y) {
+    for (int x = 0; x < rgba.width; ++x) {
+      const float mask = alpha_is_background ? 1.0f : rgba.at(x, y, 3);
+      weights += static_cast<double>(mask);
+      for (int c = 0; c < 3; ++c) {
+        if (!alpha_is_background) out.photo.at(x, y, c) = rgba.at(x, y, c);
+        const float photo = out.photo.at(x, y, c);
+        out.render.at(x, y, c) =
+            photo + mask * (std::clamp(traced.at(x, y, c), 0.0f, 1.0f) - photo);
+      }
+    }
+  }
+  out.valid = weights / static_cast<double>(rgba.pixels());
+  return out;
+}
+
+nlohmann::json to_json(const EvaluationMetrics& metrics) {
+  nlohmann::json json;
+  if (!metrics.name.empty()) json["name"] = metrics.name;
+  json["psnr"] = metrics.psnr;
+  json["ssim"] = metrics.ssim;
+  if (metrics.lpips) json["lpips"] = *metrics.lpips;
+  return json;
+}
+
+EvaluationMetrics mean_of(const std::vector<EvaluationMetrics>& images) {
+  EvaluationMetrics mean;
+  const double share = 1.0 / static_cast<double>(images.size());
+  for (const EvaluationMetrics& image : images) {
+    mean.psnr += image.psnr * share;
+    mean.ssim += image.ssim * share;
+    if (image.lpips) mean.lpips = mean.lpips.value_or(0.0) + *image.lpips * share;
+  }
+  return mean;
+}
+
+// `count` of the indices, evenly spread.
+std::vector<std::size_t> spread(const std::vector<std::size_t>& indices, std::size_t count) {
+  if (count == 0 || count >= indices.size()) return indices;
+  std::vector<std::size_t> out(count);
+  for (std::size_t i = 0; i < count; ++i) out[i] = indices[i * indices.size() / count];
+  return out;
+}
+
+}  // namespace
+
+std::string EvaluationReport::table() const {
+  std::size_t width = 5;
+  for (const EvaluationMetrics& image : images) width = std::max(width, image.name.size());
+  const bool lpips = mean.lpips.has_value();
+  std::string out = fmt::format("{:<{}} {:>8} {:>8}{}\n", "image", width, "PSNR", "SSIM",
+                                lpips ? "    LPIPS" : "");
+  const auto line = [&](const std::string& name, const EvaluationMetrics& m) {
+    out += fmt::format("{:<{}} {:>8.3f} {:>8.4f}{}\n", name, width, m.psnr, m.ssim,
+                       m.lpips ? fmt::format(" {:>8.4f}", *m.lpips) : "");
+  };
+  for (const EvaluationMetrics& image : images) line(image.name, image);
+  line("mean", mean);
+  return out;
+}
+
+std::string EvaluationReport::json() const {
+  nlohmann::json json = to_json(mean);
+  json["images"] = nlohmann::json::array();
+  for (const EvaluationMetrics& image : images) json["images"].push_back(to_json(image));
+  return json.dump(2) + "\n";
+}
+
+EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
+                          const Dataset& dataset,
+                          Split split,
+                          const std::array<float, 3>& background,
+                          const std::filesystem::path& output,
+                          const EvaluationOptions& options) {
+  const std::vector<std::size_t> views = spread(dataset.indices(split), options.max_views);
+  if (views.empty()) {
+    throw UsageError(fmt::format(
+        "The data set {} has no views to evaluate; choose another split or --test-every",
+        dataset.root.string()));
+  }
+  std::vector<Camera> cameras;
+  for (const std::size_t view : views) cameras.push_back(dataset.views[view].camera);
+  const std::vector<std::string> names = frame_names(cameras);
+  if (!output.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(output, error);
+    if (error)
+      throw DataError(
+          fmt::format("The folder {} cannot be created: {}", output.string(), error.message()));
+  }
+
+  EvaluationReport report;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Image rgba = load_view_image(dataset.views[views[i]]);
+    const Image traced = render(cameras[i]);
+    if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
+      throw UsageError(fmt::format(
+          "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names[i],
+          traced.width, traced.height, traced.channels, rgba.width, rgba.height));
+    }
+    const Comparison pair = compare(traced, rgba, dataset.alpha_is_background, background);
+    EvaluationMetrics metrics;
+    metrics.name = cameras[i].name.empty() ? names[i] : cameras[i].name;
+    // Masked pixels are equal; they must not count as well reconstructed ones.
+    metrics.psnr = psnr(pair.render, pair.photo);
+    if (std::isfinite(metrics.psnr)) metrics.psnr += 10.0 * std::log10(pair.valid);
+    metrics.ssim = ssim(pair.render, pair.photo);
+    if (options.lpips != nullptr) metrics.lpips = options.lpips->distance(pair.render, pair.photo);
+    report.images.push_back(metrics);
+    if (!output.empty() && i < options.max_pictures.value_or(views.size())) {
+      write_image(output / (names[i] + ".png"), side_by_side(pair.photo, pair.render));
+    }
+    if (options.done && !options.done(i + 1)) break;
+  }
+  report.mean = mean_of(report.images);
+  if (!output.empty()) write_text_file(output / "metrics.json", report.json());
+  return report;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "eval/lpips.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/image.hpp"
+
+namespace raysplats {
+
+/// Measures of one view, or their means over views.
+struct EvaluationMetrics {
+  std::string name;
+  double psnr = 0;  ///< decibels, over the pixels that are not masked out
+  double ssim = 0;
+  std::optional<double> lpips;  ///< when a network was given
+};
+
+struct EvaluationReport {
+  EvaluationMetrics mean;
+  std::vector<EvaluationMetrics> images;
+
+  /// One line per image and the mean, aligned.
+  std::string table() const;
+  /// {"psnr", "ssim", "lpips" (if measured), "images": [{"name", "psnr", "ssim", ...}]}; an
+  /// infinite PSNR is null.
+  std::string json() const;
+};
+
+struct EvaluationOptions {
+  std::size_t max_views = 0;                ///< 0 = all; else so many, spread evenly over the split
+  std::optional<std::size_t> max_pictures;  ///< side-by-side pictures at most; all when unset
+  Lpips* lpips = nullptr;                   ///< not owned
+  std::function<bool(std::size_t)> done =
+      {};  ///< hears the number of finished views, returns false to stop early
+};
+
+/// Compares renders with the photos of a split. `render` yields RGB (further channels are ignored)
+/// of the camera's size, `background` blended in; it is clamped to [0, 1] and compared in floating
+/// point. The photo is composited over `background` when the data set's alpha is background; else
+/// alpha is a mask, and render and photo are blended to be equal where it is 0. With an output
+/// folder every view's photo | render | error goes to NAME.png there, and the report to
+/// metrics.json. Throws UsageError when the split has no views or a render has another size than
+/// its photo.
+EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
+                          const Dataset& dataset,
+                          Split split,
+                          const std::array<float, 3>& background,
+                          const std::filesystem::path& output = {},
+                          const EvaluationOptions& options = {});
+
+}  // namespace raysplats

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "raysplats/image.hpp"
+
+namespace raysplats {
+
+/// Peak signal-to-noise ratio in decibels for a peak of 1, over all pixels and channels; infinity
+/// for equal images. Throws UsageError when the sizes differ or there is nothing to compare.
+double psnr(const Image& image, const Image& photo);
+
+/// Structural similarity (Wang et al. 2004), mean over pixels and channels, in double precision:
+/// Gaussian window of sigma 1.5 and 11 x 11 pixels, C1 = 0.01^2, C2 = 0.03^2, population
+/// covariance. As scikit-image's structural_similarity(gaussian_weights=True, sigma=1.5,
+/// use_sample_covariance=False, data_range=1), which leaves out the 5 pixels along the borders.
+/// Images smaller than the window, which scikit-image refuses, are reflected at their edges and
+/// averaged over all pixels. (The training loss has zeros beyond the borders instead.) Throws
+/// UsageError like psnr().
+double ssim(const Image& image, const Image& photo);
+
+}  // namespace raysplats

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "eval/evaluator.hpp"
+
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "eval/metrics.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr int kWidth = 24;
+constexpr int kHeight = 18;
+
+// A folder with two test photos and one training photo; the right half of each is transparent.
+class Scene {
+ public:
+  Scene()
+      : folder_(std::filesystem::temp_directory_path() /
+                ("raysplats_eval_" + std::to_string(::getpid()))) {
+    std::filesystem::create_directories(folder_);
+    dataset.root = folder_;
+    for (int i = 0; i < 3; ++i) {
+      Image photo(kWidth, kHeight, 4);
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          for (int c = 0; c < 3; ++c)
+            photo.at(x, y, c) =
+                static_cast<float>((x * 7 + y * 3 + c * 11 + i * 40) % 256) / 255.0f;
+          photo.at(x, y, 3) = x < kWidth / 2 ? 1.0f : 0.0f;
+        }
+      }
+      View view;
+      view.camera.name = "photos/view_" + std::to_string(i) + ".png";
+      view.camera.width = kWidth;
+      view.camera.height = kHeight;
+      view.camera.fx = view.camera.fy = 20;
+      view.camera.cx = kWidth / 2.0;
+      view.camera.cy = kHeight / 2.0;
+      view.source_camera = view.camera;
+      view.image_path = folder_ / ("view_" + std::to_string(i) + ".png");
+      view.test = i < 2;
+      write_image(view.image_path, photo);
+      dataset.views.push_back(view);
+    }
+  }
+  ~Scene() {
+    std::error_code error;
+    std::filesystem::remove_all(folder_, error);
+  }
+  std::filesystem::path path(const char* name) const { return folder_ / name; }
+  const View& view(const std::string& name) const {
+    return *std::find_if(dataset.views.begin(), dataset.views.end(),
+                         [&](const View& v) { return v.camera.name == name; });
+  }
+
+  Dataset dataset;
+
+ private:
+  std::filesystem::path folder_;
+};
+
+constexpr std::array<float, 3> kBackground{1.0f, 0.5f, 0.0f};
+
+}  // namespace
+
+TEST_CASE("evaluator: a perfect render over the background, written with its pictures") {
+  Scene scene;
+  scene.dataset.alpha_is_background = true;
+  const auto render = [&](const Camera& camera) {
+    Image image = composite(load_view_image(scene.view(camera.name)), kBackground.data());
+    for (float& value : image.data) value += 0.1f;  // beyond 1 where the photo is bright: clamped
+    return image;
+  };
+  const std::filesystem::path output = scene.path("report");
+  const EvaluationReport report =
+      evaluate(render, scene.dataset, Split::kTest, kBackground, output);
+  REQUIRE(report.images.size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Image photo = composite(load_view_image(scene.dataset.views[i]), kBackground.data());
+    Image expected = photo;
+    for (float& value : expected.data) value = std::min(value + 0.1f, 1.0f);
+    CHECK(report.images[i].psnr == doctest::Approx(psnr(expected, photo)).epsilon(1e-6));
+    CHECK(report.images[i].ssim == doctest::Approx(ssim(expected, photo)).epsilon(1e-6));
+    CHECK(report.images[i].name == scene.dataset.views[i].camera.name);
+  }
+  CHECK(report.mean.psnr == doctest::Approx((report.images[0].psnr + report.images[1].psnr) / 2));
+  CHECK_FALSE(report.mean.lpips.has_value());
+
+  std::ifstream stream(output / "metrics.json");
+  const nlohmann::json json = nlohmann::json::parse(stream);
+  CHECK(json.at("psnr").get<double>() == doctest::Approx(report.mean.psnr));
+  CHECK(json.at("ssim").get<double>() == doctest::Approx(report.mean.ssim));
+  CHECK_FALSE(json.contains("lpips"));
+  REQUIRE(json.at("images").size() == 2);
+  CHECK(json.at("images")[1].at("name") == "photos/view_1.png");
+  CHECK(json.at("images")[1].at("psnr").get<double>() == doctest::Approx(report.images[1].psnr));
+  const Image picture = read_image(output / "view_0.png");
+  CHECK(picture.width == 3 * kWidth);
+  CHECK(picture.height == kHeight);
+  CHECK(std::filesystem::exists(output / "view_1.png"));
+  CHECK(report.table().find("mean") != std::string::npos);
+}
+
+TEST_CASE("evaluator: masked pixels neither help nor hurt") {
+  Scene scene;
+  // Off by 0.2 where the photo is valid, by anything elsewhere.
+  for (const float elsewhere : {0.0f, 0.9f}) {
+    const auto render = [&](const Camera& camera) {
+      const Image rgba = load_view_image(scene.view(camera.name));
+      Image image(kWidth, kHeight, 4, elsewhere);
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth / 2; ++x) {
+          for (int c = 0; c < 3; ++c)
+            image.at(x, y, c) = rgba.at(x, y, c) + (rgba.at(x, y, c) < 0.5f ? 0.2f : -0.2f);
+        }
+      }
+      return image;
+    };
+    EvaluationOptions options;
+    options.max_views = 1;
+    const EvaluationReport report =
+        evaluate(render, scene.dataset, Split::kTest, kBackground, {}, options);
+    REQUIRE(report.images.size() == 1);
+    CHECK(report.mean.psnr == doctest::Approx(-20 * std::log10(0.2)).epsilon(1e-4));
+    CHECK(report.mean.ssim < 0.999);
+  }
+}
+
+TEST_CASE("evaluator: limits, early stop, LPIPS and refusals") {
+  Scene scene;
+  const auto render = [](const Camera& camera) {
+    return Image(camera.width, camera.height, 3, 0.5f);
+  };
+  EvaluationOptions options;
+  options.max_pictures = 1;
+  std::size_t heard = 0;
+  options.done = [&](std::size_t finished) {
+    heard = finished;
+    return finished < 2;
+  };
+  EvaluationReport report =
+      evaluate(render, scene.dataset, Split::kAll, kBackground, scene.path("few"), options);
+  CHECK(heard == 2);
+  CHECK(report.images.size() == 2);
+  CHECK(std::filesystem::exists(scene.path("few") / "metrics.json"));
+  CHECK(std::distance(std::filesystem::directory_iterator(scene.path("few")),
+                      std::filesystem::directory_iterator()) == 2);
+
+  if (Lpips::available()) {
+    Lpips lpips(std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "tests/data/tiny_lpips.onnx");
+    options = {};
+    options.lpips = &lpips;
+    report = evaluate(render, scene.dataset, Split::kTrain, kBackground, {}, options);
+    REQUIRE(report.mean.lpips.has_value());
+    CHECK(*report.mean.lpips > 0);
+    CHECK(nlohmann::json::parse(report.json()).at("images")[0].contains("lpips"));
+  }
+
+  const auto wrong_size = [](const Camera&) { return Image(2, 2, 3); };
+  CHECK_THROWS_AS(evaluate(wrong_size, scene.dataset, Split::kTest, kBackground), UsageError);
+  for (View& view : scene.dataset.views) view.test = false;
+  CHECK_THROWS_AS(evaluate(render, scene.dataset, Split::kTest, kBackground), UsageError);
+}
+
+}  // namespace raysplats

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "eval/metrics.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "eval/error_map.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+struct Pair {
+  Image a, b;
+};
+
+// The constants below come from scikit-image 0.26.0 and these lines:
+//   import numpy as np
+//   from skimage.metrics import structural_similarity, peak_signal_noise_ratio
+//   def pair(h, w):
+//       y, x, c = np.mgrid[0:h, 0:w, 0:3].astype(np.float64)
+//       a = 0.5 + 0.4 * np.sin(0.3 * x + c) * np.cos(0.2 * y)
+//       b = np.clip(a + 0.1 * np.sin(1.7 * x + 0.9 * y * y + 2.0 * c) + 0.05, 0, 1)
+//       return a, b
+//   for h, w in ((24, 31), (11, 11), (40, 17)):
+//       a, b = pair(h, w)
+//       print(h, w, structural_similarity(a, b, gaussian_weights=True, sigma=1.5,
+//                                         use_sample_covariance=False, data_range=1,
+//                                         channel_axis=-1),
+//             peak_signal_noise_ratio(a, b, data_range=1))
+Pair make_pair(int height, int width) {
+  Pair out{Image(width, height, 3), Image(width, height, 3)};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        const double a = 0.5 + 0.4 * std::sin(0.3 * x + c) * std::cos(0.2 * y);
+        const double b = a + 0.1 * std::sin(1.7 * x + 0.9 * y * y + 2.0 * c) + 0.05;
+        out.a.at(x, y, c) = static_cast<float>(a);
+        out.b.at(x, y, c) = static_cast<float>(std::clamp(b, 0.0, 1.0));
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("metrics: SSIM and PSNR equal scikit-image's") {
+  struct Row {
+    int height, width;
+    double ssim, psnr;
+  };
+  for (const Row& row : {Row{24, 31, 0.7730406983287672, 21.28047430186107},
+                         Row{11, 11, 0.7778038701830804, 21.276702769016993},
+                         Row{40, 17, 0.776214761429232, 21.283908342315293}}) {
+    CAPTURE(row.height);
+    const Pair pair = make_pair(row.height, row.width);
+    CHECK(ssim(pair.a, pair.b) == doctest::Approx(row.ssim).epsilon(1e-6));
+    CHECK(ssim(pair.b, pair.a) == doctest::Approx(row.ssim).epsilon(1e-6));
+    CHECK(psnr(pair.a, pair.b) == doctest::Approx(row.psnr).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("metrics: closed forms") {
+  // Constant images have no variance: SSIM is the luminance term alone, PSNR the squared distance.
+  const Image a(20, 13, 3, 0.25f);
+  const Image b(20, 13, 3, 0.75f);
+  CHECK(ssim(a, b) ==
+        doctest::Approx((2 * 0.25 * 0.75 + 1e-4) / (0.0625 + 0.5625 + 1e-4)).epsilon(1e-9));
+  CHECK(psnr(a, b) == doctest::Approx(20 * std::log10(2.0)).epsilon(1e-9));
+  CHECK(ssim(a, a) == doctest::Approx(1).epsilon(1e-12));
+  CHECK(std::isinf(psnr(a, a)));
+  // Smaller than the window, down to one pixel: still the mean over the pixels.
+  for (const int size : {1, 2, 3, 7}) {
+    CHECK(ssim(Image(size, 2 * size, 1, 0.25f), Image(size, 2 * size, 1, 0.75f)) ==
+          doctest::Approx(ssim(a, b)).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("metrics: images of different size are refused") {
+  CHECK_THROWS_AS(psnr(Image(3, 4, 3), Image(4, 3, 3)), UsageError);
+  CHECK_THROWS_AS(ssim(Image(3, 4, 3), Image(3, 4, 1)), UsageError);
+  CHECK_THROWS_AS(psnr(Image(), Image()), UsageError);
+  CHECK_THROWS_AS(error_map(Image(3, 4, 3), Image(4, 3, 3)), UsageError);
+  CHECK_THROWS_AS(error_map(Image(3, 4, 1), Image(3, 4, 1)), UsageError);
+}
+
+TEST_CASE("error map: black, red, yellow, white; the picture shows photo, render and error") {
+  Image photo(4, 2, 3, 0.5f);
+  Image render = photo;
+  const float steps[] = {0.0f, 1.0f / 12, 1.0f / 6, 0.4f};
+  for (int x = 0; x < 4; ++x) {
+    for (int c = 0; c < 3; ++c) render.at(x, 1, c) += (c == 1 ? -1.0f : 1.0f) * steps[x];
+  }
+  const Image map = error_map(render, photo);
+  const float expected[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {1, 1, 1}};
+  for (int x = 0; x < 4; ++x) {
+    for (int c = 0; c < 3; ++c) {
+      CHECK(map.at(x, 0, c) == 0.0f);
+      CHECK(map.at(x, 1, c) == doctest::Approx(expected[x][c]).epsilon(1e-5));
+    }
+  }
+  const Image picture = side_by_side(photo, render);
+  REQUIRE(picture.width == 12);
+  REQUIRE(picture.height == 2);
+  for (int x = 0; x < 4; ++x) {
+    CHECK(picture.at(x, 1, 0) == photo.at(x, 1, 0));
+    CHECK(picture.at(4 + x, 1, 0) == render.at(x, 1, 0));
+    CHECK(picture.at(8 + x, 1, 0) == map.at(x, 1, 0));
+  }
+}
+
+}  // namespace raysplats
