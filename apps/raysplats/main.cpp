@@ -1,2 +1,69 @@
 // SPDX-License-Identifier: Apache-2.0
-int main() { return 0; }
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "options.hpp"
+#include "raysplats/error.hpp"
+
+namespace {
+
+int fail(raysplats::ErrorCode code, const std::string& message) {
+  fmt::print(stderr, "raysplats: {}\n", message);
+  return static_cast<int>(code);
+}
+
+int run(int argc, char** argv) {
+  using namespace raysplats::cli;
+  CLI::App app{"Trains and renders 3D Gaussians by ray tracing on any OpenCL device", "raysplats"};
+  app.set_version_flag("--version", "raysplats " RAYSPLATS_VERSION);
+  app.require_subcommand(1);
+  app.fallthrough();
+  GlobalOptions global;
+  add_global_options(app, global);
+  const std::vector<Command> commands{
+      add_devices_command(app),       add_generate_command(app),
+      add_train_command(app, global), add_render_command(app, global),
+      add_eval_command(app, global),  add_info_command(app)};
+  try {
+    std::vector<std::string> arguments = own_arguments(argc, argv);
+    std::reverse(arguments.begin(), arguments.end());  // the order that CLI11 takes them in
+    app.parse(std::move(arguments));
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return fail(raysplats::ErrorCode::kUsage, explain(error, app));
+  }
+  start_logging(global);
+  for (const Command& command : commands) {
+    if (command.app->parsed()) command.run();
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // A file over the process's size limit is then a failed write like any other, not the end of the
+  // process.
+  std::signal(SIGXFSZ, SIG_IGN);
+  try {
+    return run(argc, argv);
+  } catch (const raysplats::Error& error) {
+    return fail(error.code(), error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(raysplats::ErrorCode::kMemory,
+                "The host has no memory left: use fewer Gaussians, smaller images (--downscale) or "
+                "a smaller "
+                "--memory-budget");
+  } catch (const std::exception& error) {
+    return fail(raysplats::ErrorCode::kRuntime, error.what());
+  }
+}

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+
+#include "base/interrupt.hpp"
+#include "base/output_directory.hpp"
+#include "base/progress.hpp"
+#include "device/profiler.hpp"
+#include "eval/evaluator.hpp"
+#include "options.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "trace/camera_tracer.hpp"
+#include "train/model_source.hpp"
+
+namespace raysplats::cli {
+namespace {
+
+struct Options {
+  std::string model;
+  std::string output;
+  std::string lpips;
+  DataFlags data;
+  TraceFlags trace;
+  DeviceFlags device;
+};
+
+void run(const Options& options, const GlobalOptions& global) {
+  const ModelSource source = find_model(options.model);
+  const Gaussians model = read_ply(source.ply);
+  const Dataset dataset =
+      load_dataset(options.data.data, options.data.over(dataset_options(source)));
+  const Split split = parse_split(options.data.split);
+  const std::size_t views = dataset.indices(split).size();
+  if (views == 0) throw no_views(options.data);
+  std::unique_ptr<Lpips> lpips;
+  if (!options.lpips.empty()) lpips = std::make_unique<Lpips>(options.lpips);
+
+  const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
+  const std::unique_ptr<Context> context = open_context(options.device);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
+  CameraTracer tracer(*context, trace);
+  tracer.update(gaussians);
+  make_output_directory(options.output);
+  spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), views);
+
+  const InterruptGuard interrupt;
+  Progress progress("evaluating", static_cast<std::int64_t>(views), 0,
+                    global.quiet ? nullptr : stderr);
+  std::uint64_t rays = 0;
+  std::uint64_t capped = 0;
+  const auto render = [&](const Camera& camera) {
+    tracer.forward(gaussians, camera);
+    Image image = tracer.download_image();
+    rays += image.pixels();
+    capped += tracer.statistics().capped_rays;
+    return image;
+  };
+  EvaluationOptions evaluation;
+  evaluation.lpips = lpips.get();
+  evaluation.done = [&](std::size_t done) {
+    progress.update(static_cast<std::int64_t>(done), "");
+    return !interrupt.requested();
+  };
+  const EvaluationReport report =
+      evaluate(render, dataset, split, trace.background, options.output, evaluation);
+  progress.finish();
+  if (interrupt.requested()) {
+    throw Error(ErrorCode::kInterrupted,
+                fmt::format("Interrupted after {} of {} views: the means in {} are of those",
+                            report.images.size(), views, options.output));
+  }
+  warn_of_capped_rays(capped, rays, trace);
+  fmt::print("{}", report.table());
+  if (options.device.profile) fmt::print("{}", context->profiler().table());
+}
+
+}  // namespace
+
+Command add_eval_command(CLI::App& app, const GlobalOptions& global) {
+  CLI::App* command = app.add_subcommand("eval", "Compare a model with the photos of a data set");
+  auto options = std::make_shared<Options>();
+  command->add_option("MODEL", options->model, "3DGS PLY, or the folder of a training run")
+      ->required()
+      ->type_name("");
+  command->add_option("-o,--output", options->output, "Folder for metrics.json and pictures")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--lpips", options->lpips, "ONNX network of LPIPS, for that measure too")
+      ->type_name("NETWORK");
+  add_data_flags(*command, options->data)->required();
+  add_trace_flags(*command, options->trace);
+  add_device_flags(*command, options->device);
+  return {command, [options, &global] { run(*options, global); }};
+}
+
+}  // namespace raysplats::cli

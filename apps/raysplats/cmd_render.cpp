@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+
+#include "base/interrupt.hpp"
+#include "base/output_directory.hpp"
+#include "base/progress.hpp"
+#include "core/orbit.hpp"
+#include "device/profiler.hpp"
+#include "eval/frame_writer.hpp"
+#include "options.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "train/model_source.hpp"
+
+namespace raysplats::cli {
+namespace {
+
+struct Options {
+  std::string model;
+  DataFlags data;
+  std::string cameras;
+  std::optional<int> orbit;
+  std::string output;
+  std::string format = "png";
+  int supersample = 1;
+  bool depth = false;
+  std::optional<int> width;
+  std::optional<int> height;
+  std::optional<double> fov;
+  std::optional<double> elevation;
+  std::optional<double> distance;
+  std::optional<std::string> up;
+  TraceFlags trace;
+  DeviceFlags device;
+};
+
+FrameFormat parse_format(const std::string& name) {
+  if (name == "exr") return FrameFormat::kExr;
+  if (name == "jpg") return FrameFormat::kJpg;
+  return FrameFormat::kPng;
+}
+
+void check(const Options& options) {
+  const int sources = (options.data.data.empty() ? 0 : 1) + (options.cameras.empty() ? 0 : 1);
+  if (sources == 0 && !options.orbit) {
+    throw UsageError(
+        "There are no cameras to render from: give --data DATASET, --cameras transforms.json or "
+        "--orbit N");
+  }
+  if (sources == 2 || (options.orbit && !options.cameras.empty())) {
+    throw UsageError(
+        "--cameras is a path of its own: leave out --data and --orbit, or leave out --cameras "
+        "(--orbit goes with --data)");
+  }
+  const bool shaped = options.width || options.height || options.fov || options.elevation ||
+                      options.distance || options.up;
+  if (shaped && !options.orbit) {
+    throw UsageError(
+        "--width, --height, --fov, --elevation, --distance and --up shape an orbit: add --orbit N");
+  }
+}
+
+std::vector<Camera> cameras_of(const Dataset& dataset, Split split) {
+  std::vector<Camera> cameras;
+  for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
+  return cameras;
+}
+
+std::vector<Camera> orbit(const Options& options,
+                          const Gaussians& model,
+                          const std::vector<Camera>& photos) {
+  OrbitOptions shape;
+  shape.frames = *options.orbit;
+  shape.up = estimate_up(photos);
+  if (options.up) {
+    const std::array<double, 3> up = parse_triple(*options.up);
+    shape.up = {up[0], up[1], up[2]};
+  }
+  const SceneExtent extent = scene_extent(model);
+  // Check the direction before the photos are measured along it.
+  orbit_cameras(extent, shape);
+  shape = orbit_like(photos, extent.center, shape);
+  if (!photos.empty()) {
+    const Camera& first = photos.front();
+    shape.width = first.width;
+    shape.height = first.height;
+    shape.fov_degrees = field_of_view(first);
+  }
+  if (options.width) shape.width = *options.width;
+  if (options.height) shape.height = *options.height;
+  if (options.fov) shape.fov_degrees = *options.fov;
+  if (options.elevation) shape.elevation_degrees = *options.elevation;
+  if (options.distance) shape.distance = *options.distance;
+  return orbit_cameras(extent, shape);
+}
+
+void run(const Options& options, const GlobalOptions& global) {
+  check(options);
+  const ModelSource source = find_model(options.model);
+  const Gaussians model = read_ply(source.ply);
+  Dataset dataset;
+  if (!options.data.data.empty()) {
+    dataset = load_dataset(options.data.data, options.data.over(dataset_options(source)));
+  }
+
+  std::vector<Camera> cameras;
+  if (options.orbit) {
+    cameras = orbit(options, model, cameras_of(dataset, Split::kAll));
+  } else if (!options.cameras.empty()) {
+    for (const Camera& camera : read_cameras(options.cameras)) {
+      cameras.push_back(downscaled(camera, options.data.downscale.value_or(1.0)));
+    }
+  } else {
+    cameras = cameras_of(dataset, parse_split(options.data.split));
+  }
+  if (cameras.empty()) throw no_views(options.data);
+
+  TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
+  trace.depth = options.depth;
+  const std::unique_ptr<Context> context = open_context(options.device);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
+  CameraTracer tracer(*context, trace);
+  tracer.update(gaussians);
+  make_output_directory(options.output);
+  spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), cameras.size());
+
+  const InterruptGuard interrupt;
+  Progress progress("rendering", static_cast<std::int64_t>(cameras.size()), 0,
+                    global.quiet ? nullptr : stderr);
+  const FrameReport report = write_frames(
+      tracer, gaussians, cameras, options.output,
+      {parse_format(options.format), options.supersample, options.depth}, [&](std::size_t done) {
+        progress.update(static_cast<std::int64_t>(done), "");
+        return !interrupt.requested();
+      });
+  progress.finish();
+  if (report.frames < cameras.size()) {
+    throw Error(ErrorCode::kInterrupted,
+                fmt::format("Interrupted after {} of {} frames: what is in {} is whole",
+                            report.frames, cameras.size(), options.output));
+  }
+  warn_of_capped_rays(report.capped_rays, report.rays, trace);
+  fmt::print("{} frames in {} ({:.2f} s of tracing, {:.2f} million rays per second)\n",
+             report.frames, options.output, report.trace_seconds,
+             1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
+  if (options.device.profile) fmt::print("{}", context->profiler().table());
+}
+
+}  // namespace
+
+Command add_render_command(CLI::App& app, const GlobalOptions& global) {
+  CLI::App* command = app.add_subcommand(
+      "render", "Render a model from a data set's cameras, a file's or an orbit");
+  auto options = std::make_shared<Options>();
+  command->add_option("MODEL", options->model, "3DGS PLY, or the folder of a training run")
+      ->required()
+      ->type_name("");
+  command->add_option("-o,--output", options->output, "Folder for the frames")
+      ->required()
+      ->type_name("DIR");
+  command
+      ->add_option("--format", options->format, "exr (linear float RGBA), png or jpg (8-bit RGB)")
+      ->check(one_of({"exr", "png", "jpg"}))
+      ->capture_default_str();
+
+  add_data_flags(*command, options->data);
+  const std::string where = "Other cameras";
+  command->add_option("--cameras", options->cameras, "transforms.json with cameras")
+      ->group(where)
+      ->type_name("FILE");
+  command
+      ->add_option("--orbit", options->orbit,
+                   "N cameras on a circle around the model (with --data: as its cameras)")
+      ->group(where)
+      ->check(at_least(1))
+      ->type_name("N");
+
+  const std::string orbit = "Orbit";
+  command->add_option("--width", options->width, "Pixels (800, or the data set's)")
+      ->group(orbit)
+      ->check(at_least(1));
+  command->add_option("--height", options->height, "Pixels (800, or the data set's)")
+      ->group(orbit)
+      ->check(at_least(1));
+  command
+      ->add_option("--fov", options->fov, "Degrees along the smaller side (45, or the data set's)")
+      ->group(orbit);
+  command
+      ->add_option("--elevation", options->elevation,
+                   "Degrees above the centre (20, or the cameras' median)")
+      ->group(orbit);
+  command
+      ->add_option("--distance", options->distance,
+                   "Of the eye from the centre (the model fits, or the cameras' median)")
+      ->group(orbit);
+  command->add_option("--up", options->up, "World direction that is up (0,-1,0, or the cameras')")
+      ->group(orbit)
+      ->check(triple())
+      ->type_name("X,Y,Z");
+
+  command->add_option("--supersample", options->supersample, "S x S rays per pixel, averaged")
+      ->check(between(1, 16));
+  command->add_flag("--depth", options->depth,
+                    "Also expected depth: channel Z of an EXR, or NAME_depth.png");
+  add_trace_flags(*command, options->trace);
+  add_device_flags(*command, options->device);
+  return {command, [options, &global] { run(*options, global); }};
+}
+
+}  // namespace raysplats::cli

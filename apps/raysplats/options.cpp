@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "options.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "base/nearest_name.hpp"
+
+namespace raysplats::cli {
+namespace {
+
+std::optional<double> parse_number(const std::string& text) {
+  double value = 0.0;
+  if (!CLI::detail::lexical_cast(text, value) || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+CLI::Validator number_check(const std::string& wanted, const std::function<bool(double)>& valid) {
+  return CLI::Validator(
+      [=](const std::string& text) {
+        const std::optional<double> value = parse_number(text);
+        return value && valid(*value) ? std::string() : fmt::format("{} is not {}", text, wanted);
+      },
+      "");
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_group().empty()) continue;
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(command->get_name());
+  }
+  return names;
+}
+
+}  // namespace
+
+void add_global_options(CLI::App& app, GlobalOptions& options) {
+  app.add_option("--log-level", options.log_level,
+                 "Least severe log lines to show: debug, info, warn, error, off")
+      ->check(one_of({"debug", "info", "warn", "error", "off"}))
+      ->capture_default_str()
+      ->type_name("LEVEL");
+  app.add_flag("-q,--quiet", options.quiet, "Show errors only: no log lines, no progress");
+}
+
+void start_logging(const GlobalOptions& options) {
+  auto logger = spdlog::stderr_color_mt("raysplats");
+  logger->set_pattern("[%H:%M:%S] %^%l%$: %v");
+  logger->set_level(options.quiet ? spdlog::level::err
+                                  : spdlog::level::from_str(options.log_level));
+  spdlog::set_default_logger(logger);
+}
+
+void add_device_flags(CLI::App& app, DeviceFlags& flags) {
+  app.add_option("--device", flags.device,
+                 "Index or part of the name of a device ('raysplats devices' lists them)")
+      ->type_name("DEVICE");
+  app.add_flag("--profile", flags.profile, "Print the device time per kernel");
+  app.add_flag("--no-kernel-cache", flags.no_kernel_cache, "Compile every kernel again");
+}
+
+std::unique_ptr<Context> open_context(const DeviceFlags& flags) {
+  ContextOptions options;
+  options.profile = flags.profile;
+  options.kernel_cache = !flags.no_kernel_cache;
+  const DeviceInfo device = select_device(flags.device);
+  spdlog::info("device {}: {} ({})", device.index, device.name, device.platform);
+  return std::make_unique<Context>(device, options);
+}
+
+void add_trace_flags(CLI::App& app, TraceFlags& flags) {
+  app.add_option("--q,--quantile", flags.quantile,
+                 "Confidence of an ellipsoid: largest squared whitened distance of a hit")
+      ->check(above(0.0));
+  app.add_option("--min-transmittance", flags.min_transmittance,
+                 "A ray stops below this transmittance")
+      ->check(between(0.0, 1.0));
+  app.add_option("--max-hits", flags.max_hits, "A ray stops after this many hits")
+      ->check(at_least(1));
+  app.add_option("--hit-order", flags.hit_order,
+                 "Depth that orders hits: entry (the paper) or peak")
+      ->check(one_of({"entry", "peak"}));
+  app.add_flag("--adaptive-radius,!--no-adaptive-radius", flags.adaptive_radius,
+               "Shrink the ellipsoids of faint Gaussians to where they reach 1/255");
+  app.add_option("--near", flags.near_depth,
+                 "Skip Gaussians whose mean is nearer than this; 0 = off")
+      ->check(at_least(0.0));
+  app.add_option("--background", flags.background, "Colour behind the model, 0 to 1 each")
+      ->check(triple())
+      ->type_name("R,G,B");
+  app.add_option("--packet-width", flags.packet_width,
+                 "Rays per work-item: 1, 2, 4, 8, 16; 0 = the device's own")
+      ->check(one_of({"0", "1", "2", "4", "8", "16"}));
+  app.add_option("--memory-budget", flags.memory_budget, "MiB for hit lists on the device")
+      ->check(at_least(1));
+}
+
+TraceOptions TraceFlags::over(TraceOptions base) const {
+  if (quantile) base.quantile = *quantile;
+  if (min_transmittance) base.min_transmittance = *min_transmittance;
+  if (max_hits) base.max_hits = *max_hits;
+  if (hit_order) base.hit_order = *hit_order == "peak" ? HitOrder::kPeak : HitOrder::kEntry;
+  if (adaptive_radius) base.adaptive_radius = *adaptive_radius;
+  if (near_depth) base.near_depth = *near_depth;
+  if (background) {
+    const std::array<double, 3> color = parse_triple(*background);
+    std::transform(color.begin(), color.end(), base.background.begin(),
+                   [](double c) { return static_cast<float>(c); });
+  }
+  if (packet_width) base.packet_width = *packet_width;
+  if (memory_budget) base.memory_budget = *memory_budget << 20;
+  return base;
+}
+
+void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOptions& options) {
+  if (capped == 0) return;
+  spdlog::warn("{} of {} rays stopped at --max-hits {}: raise it for the rest of their colour",
+               capped, rays, options.max_hits);
+}
+
+DatasetOptions DataFlags::over(DatasetOptions base) const {
+  if (downscale) base.downscale = *downscale;
+  if (test_every) base.test_every = *test_every;
+  return base;
+}
+
+CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags) {
+  const std::string group = "Data set";
+  CLI::Option* data = app.add_option("-d,--data", flags.data,
+                                     "COLMAP, nerfstudio or Blender data set whose cameras to use");
+  data->group(group)->type_name("DATASET");
+  app.add_option("--split", flags.split, "test, train or all")
+      ->group(group)
+      ->check(one_of({"test", "train", "all"}))
+      ->capture_default_str();
+  app.add_option("--downscale", flags.downscale,
+                 "Divide the image sizes by this (1, or as the run was trained)")
+      ->group(group)
+      ->check(above(0.0));
+  app.add_option(
+         "--test-every", flags.test_every,
+         "Every n-th view is a test view where the data set has no split (8, or as the run)")
+      ->group(group)
+      ->check(at_least(0));
+  return data;
+}
+
+DataError no_views(const DataFlags& flags) {
+  return DataError(fmt::format("The {} split of {} has no views: choose another --split",
+                               flags.split, flags.data));
+}
+
+CLI::Validator at_least(double low) {
+  return number_check(fmt::format("a number of at least {}", low),
+                      [low](double v) { return v >= low; });
+}
+
+CLI::Validator above(double low) {
+  return number_check(fmt::format("a number above {}", low), [low](double v) { return v > low; });
+}
+
+CLI::Validator between(double low, double high) {
+  return number_check(fmt::format("a number from {} to {}", low, high),
+                      [=](double v) { return v >= low && v <= high; });
+}
+
+CLI::Validator one_of(std::vector<std::string> names) {
+  return CLI::Validator(
+      [names = std::move(names)](const std::string& text) {
+        if (std::find(names.begin(), names.end(), text) != names.end()) return std::string();
+        return fmt::format("'{}' is none of {}", text, fmt::join(names, ", "));
+      },
+      "");
+}
+
+CLI::Validator triple() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        const std::vector<std::string> parts = CLI::detail::split(text, ',');
+        const bool good = parts.size() == 3 &&
+                          std::all_of(parts.begin(), parts.end(), [](const std::string& part) {
+                            return parse_number(part).has_value();
+                          });
+        return good ? std::string()
+                    : fmt::format("'{}' is not three numbers with commas, as in 1,0.5,0", text);
+      },
+      "");
+}
+
+std::array<double, 3> parse_triple(const std::string& text) {
+  const std::vector<std::string> parts = CLI::detail::split(text, ',');
+  std::array<double, 3> out{};
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = parse_number(parts.at(k)).value_or(0.0);
+  return out;
+}
+
+Split parse_split(const std::string& name) {
+  if (name == "train") return Split::kTrain;
+  if (name == "all") return Split::kAll;
+  return Split::kTest;
+}
+
+std::vector<std::string> own_arguments(int argc, const char* const* argv) {
+  // gsplat's and OpenSplat's names for what every trainer needs.
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kForeign{
+      {{"--data_dir", "--data"},
+       {"--result_dir", "--output"},
+       {"--max_steps", "--iterations"},
+       {"--num-iters", "--iterations"},
+       {"--data_factor", "--downscale"}}};
+  std::vector<std::string> arguments;
+  for (int i = 1; i < argc; ++i) {
+    std::string word = argv[i];
+    const std::string_view name = std::string_view(word).substr(0, word.find('='));
+    for (const auto& [foreign, own] : kForeign) {
+      if (name != foreign) continue;
+      word.replace(0, foreign.size(), own);
+      break;
+    }
+    arguments.push_back(std::move(word));
+  }
+  return arguments;
+}
+
+std::string explain(const CLI::ParseError& error, const CLI::App& app) {
+  const std::vector<CLI::App*> parsed = app.get_subcommands();
+  const CLI::App& command = parsed.empty() ? app : *parsed.front();
+  const std::string help =
+      parsed.empty() ? "raysplats -h" : fmt::format("raysplats {} -h", command.get_name());
+  // What was left over explains more than what is missing because of it.
+  for (const std::string& text : app.remaining(true)) {
+    if (text.size() > 1 && text.front() == '-') {
+      const std::string name = text.substr(0, text.find('='));
+      std::vector<std::string> known = option_names(command);
+      for (std::string& global : option_names(app)) known.push_back(std::move(global));
+      return fmt::format("Unknown option {}: did you mean {}? '{}' lists all", name,
+                         nearest_name(name, known), help);
+    }
+    if (parsed.empty()) {
+      return fmt::format("Unknown command '{}': did you mean '{}'? '{}' lists all", text,
+                         nearest_name(text, command_names(app)), help);
+    }
+    return fmt::format("Unexpected argument '{}': '{}' shows what {} takes", text, help,
+                       command.get_name());
+  }
+  if (parsed.empty() && error.get_name() == "RequiredError") {
+    return fmt::format("No command given: use one of {}; 'raysplats -h' explains them",
+                       fmt::join(command_names(app), ", "));
+  }
+  return fmt::format("{} ('{}' explains the options)", error.what(), help);
+}
+
+std::string readable_bytes(std::uint64_t bytes) {
+  constexpr std::array<const char*, 5> kUnits{"B", "KiB", "MiB", "GiB", "TiB"};
+  auto value = static_cast<double>(bytes);
+  std::size_t unit = 0;
+  for (; value >= 1024.0 && unit + 1 < kUnits.size(); ++unit) value /= 1024.0;
+  return fmt::format("{:.{}f} {}", value, unit == 0 ? 0 : 1, kUnits[unit]);
+}
+
+}  // namespace raysplats::cli

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "device/context.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/trace_options.hpp"
+
+namespace raysplats::cli {
+
+/// Options that stand before or after any command.
+struct GlobalOptions {
+  std::string log_level = "info";
+  bool quiet = false;
+};
+void add_global_options(CLI::App& app, GlobalOptions& options);
+/// Log lines go to standard error, so that results on standard output can be piped.
+void start_logging(const GlobalOptions& options);
+
+/// A command of the program; `run` is called after everything has been parsed.
+struct Command {
+  CLI::App* app = nullptr;
+  std::function<void()> run;
+};
+Command add_devices_command(CLI::App& app);
+Command add_generate_command(CLI::App& app);
+Command add_train_command(CLI::App& app, const GlobalOptions& global);
+Command add_render_command(CLI::App& app, const GlobalOptions& global);
+Command add_eval_command(CLI::App& app, const GlobalOptions& global);
+Command add_info_command(CLI::App& app);
+
+struct DeviceFlags {
+  std::string device;
+  bool profile = false;
+  bool no_kernel_cache = false;
+};
+void add_device_flags(CLI::App& app, DeviceFlags& flags);
+std::unique_ptr<Context> open_context(const DeviceFlags& flags);
+
+/// Tracing options as given: what is not given stays as the model's run or the defaults have it.
+struct TraceFlags {
+  std::optional<float> quantile;
+  std::optional<float> min_transmittance;
+  std::optional<int> max_hits;
+  std::optional<std::string> hit_order;
+  std::optional<bool> adaptive_radius;
+  std::optional<float> near_depth;
+  std::optional<std::string> background;
+  std::optional<int> packet_width;
+  std::optional<std::size_t> memory_budget;  ///< MiB
+
+  TraceOptions over(TraceOptions base) const;
+};
+void add_trace_flags(CLI::App& app, TraceFlags& flags);
+
+/// One warning line when rays stopped at the cap on hits.
+void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOptions& options);
+
+/// A data set and which of its views to use at which size; what is not given is as in the model's
+/// run.
+struct DataFlags {
+  std::string data;
+  std::string split = "test";
+  std::optional<double> downscale;
+  std::optional<int> test_every;
+
+  DatasetOptions over(DatasetOptions base) const;
+};
+/// Returns the option --data.
+CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags);
+Split parse_split(const std::string& name);
+DataError no_views(const DataFlags& flags);
+
+/// Validators whose messages are one sentence.
+CLI::Validator at_least(double low);
+CLI::Validator above(double low);
+CLI::Validator between(double low, double high);
+CLI::Validator one_of(std::vector<std::string> names);
+/// Three numbers with commas, for example a colour or a direction.
+CLI::Validator triple();
+std::array<double, 3> parse_triple(const std::string& text);
+
+/// The arguments without the program's name; names that other trainers use for the same become
+/// ours.
+std::vector<std::string> own_arguments(int argc, const char* const* argv);
+
+/// One sentence for a command line that does not parse, with the nearest known command or option.
+std::string explain(const CLI::ParseError& error, const CLI::App& app);
+
+/// "1.5 GiB" and the like.
+std::string readable_bytes(std::uint64_t bytes);
+
+}  // namespace raysplats::cli

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/model_source.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "raysplats/error.hpp"
+#include "train/train_config.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::string_view kIterationPrefix = "iteration_";
+
+std::optional<std::int64_t> iteration_of(const std::filesystem::path& folder) {
+  const std::string name = folder.filename().string();
+  if (!name.starts_with(kIterationPrefix)) return std::nullopt;
+  std::int64_t value = 0;
+  const char* end = name.data() + name.size();
+  const auto [next, error] = std::from_chars(name.data() + kIterationPrefix.size(), end, value);
+  return error == std::errc() && next == end && value >= 0 ? std::optional(value) : std::nullopt;
+}
+
+std::filesystem::path config_of(const std::filesystem::path& run) { return run / "config.toml"; }
+
+void read_options(ModelSource& source, const std::filesystem::path& run) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(config_of(run), error)) return;
+  source.trained.emplace();
+  read_train_config(config_of(run), *source.trained);
+}
+
+}  // namespace
+
+bool is_run_folder(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(config_of(path), error) ||
+         std::filesystem::is_directory(path / "point_cloud", error);
+}
+
+ModelSource find_model(const std::filesystem::path& path) {
+  std::error_code error;
+  ModelSource source;
+  if (!std::filesystem::exists(path, error)) {
+    throw DataError(fmt::format("The model {} does not exist: check the path", path.string()));
+  }
+  if (!std::filesystem::is_directory(path, error)) {
+    source.ply = path;
+    const std::filesystem::path folder =
+        std::filesystem::absolute(path, error).lexically_normal().parent_path();
+    source.iteration = iteration_of(folder);
+    if (source.iteration && folder.parent_path().filename() == "point_cloud") {
+      read_options(source, folder.parent_path().parent_path());
+    }
+    return source;
+  }
+  for (std::filesystem::directory_iterator entry(path / "point_cloud", error), end;
+       !error && entry != end; entry.increment(error)) {
+    const std::optional<std::int64_t> iteration = iteration_of(entry->path());
+    const std::filesystem::path ply = entry->path() / "point_cloud.ply";
+    std::error_code ignored;
+    if (!iteration || (source.iteration && *iteration <= *source.iteration)) continue;
+    if (!std::filesystem::is_regular_file(ply, ignored)) continue;
+    source.iteration = iteration;
+    source.ply = ply;
+  }
+  if (!source.iteration) {
+    throw DataError(
+        fmt::format("The folder {} holds no point_cloud/iteration_N/point_cloud.ply: name a run "
+                    "that has saved a model, or a PLY",
+                    path.string()));
+  }
+  read_options(source, path);
+  return source;
+}
+
+DatasetOptions dataset_options(const ModelSource& source) {
+  DatasetOptions out;
+  if (source.trained) {
+    out.downscale = source.trained->downscale;
+    out.test_every = source.trained->test_every;
+  }
+  return out;
+}
+
+TraceOptions trace_options(const ModelSource& source, bool cut_out) {
+  TraceOptions out;
+  if (!source.trained) return out;
+  const TrainOptions& trained = *source.trained;
+  out.quantile = static_cast<float>(trained.quantile);
+  out.min_transmittance = static_cast<float>(trained.min_transmittance);
+  out.max_hits = trained.max_hits;
+  out.hit_order = trained.hit_order;
+  out.adaptive_radius = trained.adaptive_radius;
+  out.near_depth = static_cast<float>(trained.near_depth);
+  out.background = background_color(trained, cut_out);
+  out.packet_width = trained.packet_width;
+  out.memory_budget = static_cast<std::size_t>(trained.memory_budget) << 20;
+  return out;
+}
+
+}  // namespace raysplats

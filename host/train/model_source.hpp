@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include "raysplats/dataset.hpp"
+#include "raysplats/trace_options.hpp"
+#include "raysplats/train_options.hpp"
+
+namespace raysplats {
+
+/// A model on disk and the options it was trained with.
+struct ModelSource {
+  std::filesystem::path ply;
+  std::optional<TrainOptions>
+      trained;  ///< of the run folder it is in; none for a PLY from elsewhere
+  std::optional<std::int64_t> iteration;  ///< of RUN/point_cloud/iteration_N
+};
+
+/// Whether `path` is the folder of a training run.
+bool is_run_folder(const std::filesystem::path& path);
+
+/// Finds the newest RUN/point_cloud/iteration_N/point_cloud.ply of a run folder; a PLY file is
+/// taken as it is, and when it lies in a run folder at that depth, that run's configuration comes
+/// with it. Throws DataError when there is nothing to load, UsageError when the run's configuration
+/// is broken.
+ModelSource find_model(const std::filesystem::path& path);
+
+/// The image size and the held-out views of the model's training, the defaults when nothing is
+/// known.
+DatasetOptions dataset_options(const ModelSource& source);
+
+/// What a model has to be traced with to look as in training; `cut_out` as for background_color().
+/// The defaults of TraceOptions when nothing is known.
+TraceOptions trace_options(const ModelSource& source, bool cut_out);
+
+}  // namespace raysplats
