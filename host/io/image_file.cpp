@@ -23,6 +23,7 @@ namespace {
 
 constexpr int kMaxSide = 32768;
 constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
+constexpr std::string_view kPngStart = "\x89PNG\r\n\x1a\n";
 constexpr const char* kFormats = "PNG, JPEG, EXR, TIFF or BMP";
 
 std::string lower_extension(const std::filesystem::path& path) {
@@ -35,7 +36,7 @@ std::string lower_extension(const std::filesystem::path& path) {
 
 /// OpenImageIO's name of the format that the first bytes belong to; "" for any other.
 std::string_view format_of(std::string_view magic) {
-  if (magic.starts_with("\x89PNG\r\n\x1a\n")) return "png";
+  if (magic.starts_with(kPngStart)) return "png";
   if (magic.starts_with("\xff\xd8\xff")) return "jpeg";
   if (magic.starts_with("\x76\x2f\x31\x01")) return "openexr";
   if (magic.starts_with("BM")) return "bmp";
@@ -77,8 +78,50 @@ bool is_whole_jpeg(const std::vector<std::byte>& bytes) {
   return false;
 }
 
-/// Opens an image, its size checked before anything is decoded.
-std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path) {
+/// Signature and header chunk.
+constexpr std::size_t kPngHeaderBytes = 33;
+
+constexpr std::array<std::uint32_t, 256> crc_table() {
+  std::array<std::uint32_t, 256> table{};
+  for (std::uint32_t i = 0; i < table.size(); ++i) {
+    std::uint32_t value = i;
+    for (int bit = 0; bit < 8; ++bit) value = (value >> 1) ^ ((value & 1u) != 0 ? 0xedb88320u : 0u);
+    table[i] = value;
+  }
+  return table;
+}
+
+/// Whether the chunks of a PNG are whole, with their checksums (PNG specification, section 5), up
+/// to the end chunk or, with `header_only`, the header chunk. libpng would print a line of its own
+/// for what this finds.
+bool has_whole_png_chunks(std::string_view bytes, bool header_only) {
+  static constexpr std::array<std::uint32_t, 256> kTable = crc_table();
+  const auto big_endian = [&](std::size_t i) {
+    std::uint32_t value = 0;
+    for (std::size_t k = 0; k < 4; ++k)
+      value = value << 8 | static_cast<std::uint8_t>(bytes[i + k]);
+    return value;
+  };
+  std::size_t i = kPngStart.size();
+  constexpr std::size_t kAroundData = 12;  // length, type and checksum
+  while (bytes.size() - i >= kAroundData) {
+    const std::size_t length = big_endian(i);
+    if (length > bytes.size() - i - kAroundData) return false;
+    const std::string_view checked = bytes.substr(i + 4, length + 4);
+    std::uint32_t crc = 0xffffffffu;
+    for (const char c : checked)
+      crc = kTable[(crc ^ static_cast<std::uint8_t>(c)) & 0xffu] ^ (crc >> 8);
+    if ((crc ^ 0xffffffffu) != big_endian(i + 8 + length)) return false;
+    if (header_only) return checked.starts_with("IHDR");
+    if (checked.starts_with("IEND")) return true;
+    i += length + kAroundData;
+  }
+  return false;
+}
+
+/// Opens an image, its size checked before anything is decoded. `for_pixels`: checks that the file
+/// is whole.
+std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, bool for_pixels) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
     throw DataError(
@@ -89,17 +132,29 @@ std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path) 
     throw DataError(fmt::format("The image {} has an unknown extension: it must be {}",
                                 path.string(), kFormats));
   }
-  std::array<char, 8> magic{};
+  std::array<char, kPngHeaderBytes> magic{};
   std::ifstream stream(path, std::ios::binary);
   if (!stream)
     throw DataError(fmt::format("The image {} cannot be opened for reading", path.string()));
   stream.read(magic.data(), magic.size());
   if (stream.gcount() == 0) throw DataError(fmt::format("The image {} is empty", path.string()));
-  const std::string_view format =
-      format_of(std::string_view(magic.data(), static_cast<std::size_t>(stream.gcount())));
+  const std::string_view start(magic.data(), static_cast<std::size_t>(stream.gcount()));
+  const std::string_view format = format_of(start);
   if (format.empty()) {
     throw DataError(fmt::format("The image {} is corrupt: it does not start as a {} file",
                                 path.string(), kFormats));
+  }
+  bool whole = true;
+  if (for_pixels && (format == "png" || format == "jpeg")) {
+    const std::vector<std::byte> bytes = io::read_file(path);
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    whole = format == "png" ? has_whole_png_chunks(text, false) : is_whole_jpeg(bytes);
+  } else if (format == "png") {
+    whole = has_whole_png_chunks(start, true);
+  }
+  if (!whole) {
+    throw DataError(
+        fmt::format("The image {} is truncated or damaged: copy it again", path.string()));
   }
   std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(std::string(format));
   if (!input) {
@@ -163,17 +218,14 @@ bool has_image_extension(const std::filesystem::path& path) {
 }
 
 ImageSize image_size(const std::filesystem::path& path) {
-  const auto input = open_image(path);
+  const auto input = open_image(path, false);
   return {input->spec().width, input->spec().height};
 }
 
 }  // namespace io
 
 Image read_image(const std::filesystem::path& path) {
-  const auto input = open_image(path);
-  if (std::string_view(input->format_name()) == "jpeg" && !is_whole_jpeg(io::read_file(path))) {
-    throw DataError(fmt::format("The image {} is truncated: it has no end marker", path.string()));
-  }
+  const auto input = open_image(path, true);
   const OIIO::ImageSpec& spec = input->spec();
   Image image(spec.width, spec.height, std::min(spec.nchannels, 4));
   if (!input->read_image(0, 0, 0, image.channels, OIIO::TypeFloat, image.data.data())) {

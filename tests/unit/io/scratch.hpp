@@ -43,6 +43,8 @@ class Scratch {
 
 inline void write_bytes(const fs::path& path, const std::string& bytes) {
   fs::create_directories(path.parent_path());
+  // Some file systems flush to disk when a file is truncated, but not when it is removed.
+  fs::remove(path);
   std::ofstream(path, std::ios::binary) << bytes;
 }
 

@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "base/rng.hpp"
+#include "data_sets.hpp"
+#include "io/colmap_model.hpp"
+#include "raysplats/dataset.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+std::string model_error(const fs::path& folder) {
+  const std::string message = data_error([&] { io::read_colmap_model(folder); });
+  CHECK(message.find('\n') == std::string::npos);
+  return message;
+}
+
+/// The error of a binary model one file of which has been replaced.
+std::string error_with(const char* file, const std::string& content) {
+  const Scratch scratch;
+  small_colmap().write_binary(scratch.path());
+  write_bytes(scratch / file, content);
+  const std::string message = model_error(scratch.path());
+  CHECK(contains(message, file));
+  return message;
+}
+
+std::string text_error_with(const char* file, const std::string& content) {
+  const Scratch scratch;
+  small_colmap().write_text(scratch.path());
+  write_bytes(scratch / file, content);
+  const std::string message = model_error(scratch.path());
+  CHECK(contains(message, file));
+  return message;
+}
+
+}  // namespace
+
+TEST_CASE("binary and text COLMAP models of the same scene give the same data set") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "binary/sparse/0");
+  fixture.write_text(scratch / "text/sparse");
+  write_photos(fixture, scratch / "binary/images", 40, 30);
+  write_photos(fixture, scratch / "text/images", 40, 30);
+  const Dataset a = load_dataset(scratch / "binary");
+  const Dataset b = load_dataset(scratch / "text");
+  CHECK(a.kind == DatasetKind::kColmap);
+  CHECK(!a.alpha_is_background);
+  REQUIRE(a.views.size() == 10);
+  REQUIRE(b.views.size() == 10);
+  for (std::size_t i = 0; i < 10; ++i) {
+    const Camera& x = a.views[i].camera;
+    const Camera& y = b.views[i].camera;
+    CHECK(x.name == y.name);
+    CHECK(x.fx == y.fx);
+    CHECK(x.fy == y.fy);
+    CHECK(x.cx == y.cx);
+    CHECK(x.cy == y.cy);
+    CHECK(x.rotation == y.rotation);
+    CHECK(x.translation == y.translation);
+    CHECK(a.views[i].distortion.k1 == b.views[i].distortion.k1);
+    CHECK(a.views[i].distortion.p2 == b.views[i].distortion.p2);
+    CHECK(a.views[i].test == (i % 8 == 0));
+    if (i > 0) CHECK(a.views[i - 1].camera.name < x.name);
+  }
+  CHECK(a.views[0].camera.name == "left/photo 1.png");
+  CHECK(a.views[9].camera.name == "photo 8.png");
+  CHECK(a.points.positions == std::vector<float>{1, 2, 3, -1.5f, 0, 8, 0.125f, 4, 5});
+  CHECK(a.points.positions == b.points.positions);
+  CHECK(a.points.colors == b.points.colors);
+  CHECK(a.points.colors[2] == doctest::Approx(0.2));
+  CHECK(a.indices(Split::kTest) == std::vector<std::size_t>{0, 8});
+  CHECK(a.indices(Split::kTrain).size() == 8);
+  CHECK(a.indices(Split::kAll).size() == 10);
+}
+
+TEST_CASE("COLMAP poses and lens parameters mean what COLMAP documents") {
+  const Scratch scratch;
+  ColmapFixture fixture;
+  const double h = std::sqrt(0.5);
+  // A quarter turn about z: world x goes to camera y, world y to camera -x.
+  fixture.images = {{1, {h, 0, 0, h, 10, 20, 30}, 1, "a.png", 0}};
+  fixture.points = {{{0, 0, 1}, {0, 0, 0}}};
+  struct Case {
+    int model;
+    const char* name;
+    std::vector<double> parameters;
+    double fx, fy, cx, cy;
+    Distortion d;
+  };
+  for (const Case& c :
+       {Case{0, "SIMPLE_PINHOLE", {50, 21, 16}, 50, 50, 21, 16, {}},
+        Case{1, "PINHOLE", {50, 51, 21, 16}, 50, 51, 21, 16, {}},
+        Case{2, "SIMPLE_RADIAL", {50, 21, 16, 0.1}, 50, 50, 21, 16, {0.1, 0, 0, 0, 0}},
+        Case{3, "RADIAL", {50, 21, 16, 0.1, 0.2}, 50, 50, 21, 16, {0.1, 0.2, 0, 0, 0}},
+        Case{4,
+             "OPENCV",
+             {50, 51, 21, 16, 0.1, 0.2, 0.3, 0.4},
+             50,
+             51,
+             21,
+             16,
+             {0.1, 0.2, 0, 0.3, 0.4}}}) {
+    fixture.cameras = {{1, c.model, c.name, 40, 30, c.parameters}};
+    fixture.write_binary(scratch / c.name);
+    const io::ColmapModel model = io::read_colmap_model(scratch / c.name);
+    const io::ColmapCamera& camera = model.cameras.at(1);
+    CHECK(camera.camera.fx == c.fx);
+    CHECK(camera.camera.fy == c.fy);
+    CHECK(camera.camera.cx == c.cx);
+    CHECK(camera.camera.cy == c.cy);
+    CHECK(camera.distortion.k1 == c.d.k1);
+    CHECK(camera.distortion.k2 == c.d.k2);
+    CHECK(camera.distortion.p1 == c.d.p1);
+    CHECK(camera.distortion.p2 == c.d.p2);
+    const io::ColmapImage& image = model.images.front();
+    CHECK(glm::length(image.rotation * glm::dvec3(1, 0, 0) - glm::dvec3(0, 1, 0)) < 1e-12);
+    CHECK(glm::length(image.rotation * glm::dvec3(0, 1, 0) - glm::dvec3(-1, 0, 0)) < 1e-12);
+    CHECK(image.translation == glm::dvec3(10, 20, 30));
+  }
+}
+
+TEST_CASE("photos of another size scale the camera, and images_N and --downscale add up") {
+  const Scratch scratch;
+  ColmapFixture fixture = small_colmap();
+  fixture.cameras.resize(1);
+  for (auto& image : fixture.images) image.camera = 7;
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images_4", 10, 8);  // 30 / 4 = 7.5
+  const auto load = [&](double downscale) {
+    DatasetOptions options;
+    options.downscale = downscale;
+    return load_dataset(scratch.path(), options);
+  };
+  for (const double downscale : {1.0, 2.0, 4.0}) {
+    const View view = load(downscale).views.front();
+    CHECK(view.camera.width == 10);
+    CHECK(view.camera.height == 8);
+    CHECK(view.camera.fx == doctest::Approx(50.5 / 4));
+    CHECK(view.camera.fy == doctest::Approx(51.25 * 8 / 30));
+    CHECK(view.camera.cy == doctest::Approx(14.75 * 8 / 30));
+    CHECK(load_view_image(view).width == 10);
+  }
+  CHECK(load(8).views.front().camera.width == 5);
+  CHECK(load(8).views.front().camera.height == 4);
+  CHECK(load_view_image(load(8).views.front()).height == 4);
+  // The full size, once there, is used for every factor but 4.
+  write_photos(fixture, scratch / "images", 40, 30);
+  CHECK(load(1).views.front().camera.width == 40);
+  CHECK(load(2).views.front().camera.width == 20);
+  CHECK(contains(load(2).views.front().image_path.string(), "images/"));
+  CHECK(contains(load(4).views.front().image_path.string(), "images_4/"));
+  CHECK(load(3).views.front().camera.width == 13);
+  CHECK_THROWS_AS(load(0.5), UsageError);
+  CHECK_THROWS_AS(load(std::numeric_limits<double>::quiet_NaN()), UsageError);
+}
+
+TEST_CASE("of several COLMAP models the one with most images is used, in any documented place") {
+  const Scratch scratch;
+  const ColmapFixture all = small_colmap();
+  ColmapFixture part = all;
+  part.images.resize(4);
+  part.write_binary(scratch / "sparse/0");
+  all.write_text(scratch / "sparse/1");
+  part.write_binary(scratch / "sparse/2");
+  CHECK(io::find_colmap_model(scratch.path())->filename() == "1");
+  all.write_text(scratch / "sparse/0");  // binary files are preferred
+  CHECK(io::find_colmap_model(scratch.path())->filename() == "1");
+  for (const char* place : {"colmap/sparse/0", "colmap/sparse", "."}) {
+    const Scratch other;
+    all.write_binary(other / place);
+    CHECK(fs::equivalent(*io::find_colmap_model(other.path()), other / place));
+  }
+  const Scratch empty;
+  CHECK(!io::find_colmap_model(empty.path()));
+}
+
+TEST_CASE("masks beside the photos and test_every are honoured") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  Image mask(40, 30, 1, 1.0f);
+  mask.at(3, 4, 0) = 0.0f;
+  write_image(scratch / "masks/photo 8.png", mask);
+  DatasetOptions options;
+  options.test_every = 3;
+  const Dataset dataset = load_dataset(scratch.path(), options);
+  CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{0, 3, 6, 9});
+  CHECK(dataset.views[9].camera.name == "photo 8.png");
+  const View& masked = dataset.views[9];
+  REQUIRE(!masked.mask_path.empty());
+  CHECK(dataset.views[8].mask_path.empty());
+  if (!masked.distortion.any()) CHECK(load_view_image(masked).at(3, 4, 3) == 0.0f);
+  options.test_every = 0;
+  CHECK(load_dataset(scratch.path(), options).indices(Split::kTest).empty());
+  options.test_every = -1;
+  CHECK_THROWS_AS(load_dataset(scratch.path(), options), UsageError);
+}
+
+TEST_CASE("a data set without its photos, with foreign photos or without anything is refused") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  fs::remove(scratch / "images" / "left/photo 5.png");
+  const std::string missing = data_error([&] { load_dataset(scratch.path()); });
+  CHECK(contains(missing, "left/photo 5.png"));
+  CHECK(contains(missing, "does not exist"));
+  write_image(scratch / "images/left/photo 5.png", Image(30, 40, 3));
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "30 x 40"));
+  write_bytes(scratch / "images/left/photo 5.png", "");
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "empty"));
+  const Scratch empty;
+  CHECK(contains(data_error([&] { load_dataset(empty.path()); }), "no data set"));
+  CHECK(contains(data_error([&] { load_dataset(empty / "none"); }), "does not exist"));
+  write_bytes(empty / "file", "");
+  CHECK(contains(data_error([&] { load_dataset(empty / "file"); }), "is a file"));
+  ColmapFixture nothing = fixture;
+  nothing.images.clear();
+  nothing.write_binary(empty / "sparse");
+  CHECK(contains(data_error([&] { load_dataset(empty.path()); }), "no views"));
+}
+
+TEST_CASE("a photo that changed after the data set was opened is refused") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  const View view = load_dataset(scratch.path()).views.front();
+  write_image(view.image_path, Image(20, 15, 3));
+  CHECK(contains(data_error([&] { load_view_image(view); }), "20 x 15"));
+}
+
+TEST_CASE("malformed COLMAP models are refused with the place of the fault") {
+  ColmapFixture fixture = small_colmap();
+  fixture.cameras[0].model = 5;
+  CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()),
+                 "OPENCV_FISHEYE is not supported"));
+  fixture.cameras[0].model = 77;
+  CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()), "number 77"));
+  fixture = small_colmap();
+  fixture.cameras[1].model_name = "FOV";
+  CHECK(contains(text_error_with("cameras.txt", fixture.cameras_text()), "'FOV' is not supported"));
+  CHECK(contains(text_error_with("cameras.txt", "1 PINHOLE 40 30 1 2 3\n"),
+                 "parameter is missing in line 1"));
+  CHECK(contains(text_error_with("cameras.txt", "1 PINHOLE -40 30 1 2 3 4\n"), "'-40'"));
+  CHECK(contains(text_error_with("cameras.txt", "1 PINHOLE 40 30 1 nan 3 4\n"), "not finite"));
+  fixture.cameras[1].parameters[0] = -1;
+  CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()), "not positive"));
+  fixture = small_colmap();
+  fixture.cameras[0].width = std::uint64_t{1} << 40;
+  CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()), "impossible size"));
+  fixture = small_colmap();
+  fixture.cameras[1].id = 7;
+  CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()), "appears twice"));
+  fixture = small_colmap();
+  fixture.images[2].pose[1] = std::numeric_limits<double>::quiet_NaN();
+  CHECK(contains(error_with("images.bin", fixture.images_binary()), "not finite"));
+  fixture.images[2].pose = {0, 0, 0, 0, 1, 2, 3};
+  CHECK(contains(error_with("images.bin", fixture.images_binary()), "rotation"));
+  fixture = small_colmap();
+  fixture.images[2].camera = 123;
+  CHECK(contains(error_with("images.bin", fixture.images_binary()), "camera 123"));
+  fixture = small_colmap();
+  fixture.images[2].name = fixture.images[1].name;
+  CHECK(contains(error_with("images.bin", fixture.images_binary()), "appears twice"));
+  fixture = small_colmap();
+  fixture.points[1].position[2] = std::numeric_limits<double>::infinity();
+  CHECK(contains(error_with("points3D.bin", fixture.points_binary()), "not finite"));
+  CHECK(contains(text_error_with("points3D.txt", "1 2 3\n"), "in line 1"));
+  for (const char* file : {"cameras.bin", "images.bin", "points3D.bin"}) {
+    CHECK(contains(error_with(file, std::string(8, '\xff')), "18446744073709551615"));
+    std::string huge;
+    put<std::uint64_t>(huge, std::uint64_t{1} << 61);
+    CHECK(contains(error_with(file, huge + std::string(100, 'x')), "bytes can hold"));
+  }
+}
+
+TEST_CASE("no cut or flipped byte of a COLMAP model does anything but load or raise DataError") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch.path());
+  CounterRng rng(8, 9);
+  for (const auto& [file, whole] :
+       {std::pair<const char*, std::string>{"cameras.bin", fixture.cameras_binary()},
+        {"images.bin", fixture.images_binary()},
+        {"points3D.bin", fixture.points_binary()}}) {
+    for (std::size_t length = 0; length < whole.size(); ++length) {
+      write_bytes(scratch / file, whole.substr(0, length));
+      CHECK(model_error(scratch.path()) != "");
+    }
+    for (int trial = 0; trial < 500; ++trial) {
+      std::string bytes = whole;
+      for (int i = 0; i < 3; ++i)
+        bytes[rng.below(bytes.size())] = static_cast<char>(rng.below(256));
+      write_bytes(scratch / file, bytes);
+      model_error(scratch.path());
+    }
+    write_bytes(scratch / file, whole);
+  }
+}

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/resample.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "base/rng.hpp"
+#include "raysplats/dataset.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+/// Average of premultiplied colour and of alpha over a target pixel, straight, by overlap areas in
+/// double.
+void box_reference(const Image& image, int width, int height, int x, int y, double out[4]) {
+  const double x0 = static_cast<double>(x) * image.width / width;
+  const double x1 = static_cast<double>(x + 1) * image.width / width;
+  const double y0 = static_cast<double>(y) * image.height / height;
+  const double y1 = static_cast<double>(y + 1) * image.height / height;
+  double sum[4] = {};
+  for (int j = 0; j < image.height; ++j) {
+    for (int i = 0; i < image.width; ++i) {
+      const double overlap = std::max(0.0, std::min(x1, i + 1.0) - std::max(x0, double(i))) *
+                             std::max(0.0, std::min(y1, j + 1.0) - std::max(y0, double(j)));
+      const double alpha = static_cast<double>(image.at(i, j, 3));
+      for (int c = 0; c < 3; ++c)
+        sum[c] += overlap * alpha * static_cast<double>(image.at(i, j, c));
+      sum[3] += overlap * alpha;
+    }
+  }
+  for (int c = 0; c < 3; ++c) out[c] = sum[3] > 0 ? sum[c] / sum[3] : 0.0;
+  out[3] = sum[3] / ((x1 - x0) * (y1 - y0));
+}
+
+/// A smooth pattern over the plane of the undistorted camera, in pixels.
+double pattern(double u, double v, int channel) {
+  return 0.5 + 0.4 * std::sin(2 * std::numbers::pi * (u / 60.0 + 0.3 * channel)) *
+                   std::cos(2 * std::numbers::pi * v / 45.0);
+}
+
+/// Undistorted normalised point of a distorted one by fixed-point iteration.
+void undistorted_point(const Distortion& d, double dx, double dy, double& x, double& y) {
+  x = dx;
+  y = dy;
+  for (int i = 0; i < 200; ++i) {
+    double px = 0;
+    double py = 0;
+    io::distort(d, x, y, px, py);
+    x += dx - px;
+    y += dy - py;
+  }
+}
+
+}  // namespace
+
+TEST_CASE("area resampling equals the overlap-weighted average for whole and fractional factors") {
+  CounterRng rng(5, 6);
+  Image image(23, 17, 4);
+  for (float& value : image.data) value = static_cast<float>(rng.uniform());
+  for (std::size_t i = 0; i < image.pixels(); i += 3) image.data[4 * i + 3] = 0.0f;
+  for (const auto& [width, height] :
+       {std::pair{23, 17}, {11, 8}, {8, 6}, {5, 17}, {1, 1}, {22, 16}}) {
+    const Image out = io::area_resample(image, width, height);
+    double worst = 0;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        double expected[4];
+        box_reference(image, width, height, x, y, expected);
+        // Without resampling the colour of a transparent pixel stays what it is.
+        for (int c = expected[3] > 0 ? 0 : 3; c < 4; ++c) {
+          worst = std::max(worst, std::abs(static_cast<double>(out.at(x, y, c)) - expected[c]));
+        }
+      }
+    }
+    CHECK(worst < 1e-5);
+  }
+}
+
+TEST_CASE("transparent pixels do not bleed into the average") {
+  Image image(2, 1, 4);
+  image.data = {1.0f, 0.5f, 0.25f, 1.0f, 0.0f, 0.0f, 0.0f, 0.0f};
+  const Image out = io::area_resample(image, 1, 1);
+  CHECK(out.data == std::vector<float>{1.0f, 0.5f, 0.25f, 0.5f});
+}
+
+TEST_CASE("undistortion recovers an analytic pattern seen through a lens") {
+  Camera camera;
+  camera.width = 180;
+  camera.height = 140;
+  camera.fx = 150;
+  camera.fy = 155;
+  camera.cx = 86.5;
+  camera.cy = 71.25;
+  for (const Distortion& d :
+       {Distortion{0.12, -0.05, 0.0, 0.002, -0.003}, Distortion{-0.15, 0.03, 0.01, 0.0, 0.0}}) {
+    // The photo: each pixel shows the pattern where the undistorted ray of its distorted position
+    // goes.
+    Image photo(camera.width, camera.height, 4, 1.0f);
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        double ux = 0;
+        double uy = 0;
+        undistorted_point(d, (x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy,
+                          ux, uy);
+        for (int c = 0; c < 3; ++c) {
+          photo.at(x, y, c) = static_cast<float>(
+              pattern(ux * camera.fx + camera.cx, uy * camera.fy + camera.cy, c));
+        }
+      }
+    }
+    const Image out = io::undistort(photo, camera, d);
+    double worst = 0;
+    double worst_unchanged = 0;
+    std::size_t inside = 0;
+    std::size_t masked = 0;
+    std::size_t wrong_alpha = 0;
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        double u = 0;
+        double v = 0;
+        io::distort(d, (x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, u, v);
+        u = u * camera.fx + camera.cx;
+        v = v * camera.fy + camera.cy;
+        const bool in_photo = u >= 0 && u <= camera.width && v >= 0 && v <= camera.height;
+        wrong_alpha += std::abs(out.at(x, y, 3) - (in_photo ? 1.0f : 0.0f)) > 1e-6f ? 1 : 0;
+        masked += in_photo ? 0 : 1;
+        if (u < 1 || u > camera.width - 1 || v < 1 || v > camera.height - 1) continue;
+        ++inside;
+        for (int c = 0; c < 3; ++c) {
+          const double expected = pattern(x + 0.5, y + 0.5, c);
+          worst = std::max(worst, std::abs(static_cast<double>(out.at(x, y, c)) - expected));
+          worst_unchanged = std::max(worst_unchanged,
+                                     std::abs(static_cast<double>(photo.at(x, y, c)) - expected));
+        }
+      }
+    }
+    // Bilinear interpolation errs by at most |f''| / 8 per axis, here 0.004.
+    CHECK(worst < 0.005);
+    CHECK(worst_unchanged > 0.1);
+    CHECK(wrong_alpha == 0);
+    CHECK(inside > 20000);
+    if (d.k1 > 0) CHECK(masked > 100);
+  }
+}
+
+TEST_CASE("rays beyond the angle where the lens folds over are masked") {
+  Camera camera;
+  camera.width = camera.height = 100;
+  camera.fx = camera.fy = 40;
+  camera.cx = camera.cy = 50;
+  // r (1 - r^2 / 3) grows up to r = 1 and comes back into the photo beyond.
+  const Distortion d{-1.0 / 3.0, 0, 0, 0, 0};
+  const Image out = io::undistort(Image(100, 100, 4, 1.0f), camera, d);
+  std::size_t wrong = 0;
+  for (int y = 0; y < 100; ++y) {
+    for (int x = 0; x < 100; ++x) {
+      const double r = std::hypot(x + 0.5 - 50, y + 0.5 - 50) / 40;
+      if (std::abs(r - 1) > 1e-3 && std::abs(out.at(x, y, 3) - (r < 1 ? 1.0f : 0.0f)) > 1e-6f)
+        ++wrong;
+    }
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("compositing blends by alpha and repeats grey") {
+  const float background[3] = {1.0f, 0.5f, 0.0f};
+  Image rgba(1, 1, 4);
+  rgba.data = {0.2f, 0.4f, 0.6f, 0.25f};
+  const Image out = composite(rgba, background);
+  REQUIRE(out.channels == 3);
+  CHECK(out.data[0] == doctest::Approx(0.8));
+  CHECK(out.data[1] == doctest::Approx(0.475));
+  CHECK(out.data[2] == doctest::Approx(0.15));
+  CHECK(composite(Image(1, 1, 1, 0.3f), background).data == std::vector<float>{0.3f, 0.3f, 0.3f});
+  CHECK(composite(Image(1, 1, 3, 0.3f), background).data == std::vector<float>{0.3f, 0.3f, 0.3f});
+}

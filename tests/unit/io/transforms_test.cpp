@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <string>
+
+#include "base/rng.hpp"
+#include "data_sets.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/io.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+std::string frame(const std::string& file, double x, const std::string& more = "") {
+  return "{\"file_path\": \"" + file + "\", " + more + "\"transform_matrix\": " + matrix_json(x) +
+         "}";
+}
+
+std::string file_of(const std::string& keys, const std::string& frames) {
+  return std::string("{").append(keys).append("\"frames\": [").append(frames).append("]}");
+}
+
+std::string cameras_error(const std::string& json) {
+  const Scratch scratch;
+  write_bytes(scratch / "cameras.json", json);
+  const std::string message = data_error([&] { read_cameras(scratch / "cameras.json"); });
+  INFO(message);
+  CHECK(contains(message, "cameras.json"));
+  CHECK(message.find('\n') == std::string::npos);
+  return message;
+}
+
+std::vector<Camera> cameras_of(const std::string& json) {
+  const Scratch scratch;
+  write_bytes(scratch / "cameras.json", json);
+  return read_cameras(scratch / "cameras.json");
+}
+
+}  // namespace
+
+TEST_CASE("cameras take intrinsics from the file or the frame, as focal lengths or angles") {
+  const auto cameras = cameras_of(
+      file_of("\"w\": 40, \"h\": 30, \"fl_x\": 50, \"cx\": 19, ",
+              frame("a.png", 1) + "," +
+                  frame("b.png", 1, "\"fl_x\": 60, \"fl_y\": 61, \"cy\": 14, \"w\": 80.0, ") + "," +
+                  frame("./../c", 1, "\"camera_angle_x\": 1.0, ") + "," +
+                  frame("", 1, "\"camera_angle_x\": 1.0, \"camera_angle_y\": 0.5, ")));
+  REQUIRE(cameras.size() == 4);
+  CHECK(cameras[0].name == "a.png");
+  CHECK(cameras[0].fx == 50);
+  CHECK(cameras[0].fy == 50);
+  CHECK(cameras[0].cx == 19);
+  CHECK(cameras[0].cy == 15);
+  CHECK(cameras[1].width == 80);
+  CHECK(cameras[1].fx == 60);
+  CHECK(cameras[1].fy == 61);
+  CHECK(cameras[1].cy == 14);
+  CHECK(cameras[2].name == "c");
+  CHECK(cameras[2].fx == doctest::Approx(20 / std::tan(0.5)));
+  CHECK(cameras[2].fy == cameras[2].fx);
+  CHECK(cameras[3].fy == doctest::Approx(15 / std::tan(0.25)));
+  CHECK(cameras[3].name == "frame_0003");
+}
+
+TEST_CASE("OpenGL's camera axes become ours: y down, z forward") {
+  const Camera camera =
+      cameras_of(file_of("\"w\": 4, \"h\": 4, \"fl_x\": 5, ", frame("a", 7))).front();
+  CHECK(glm::length(camera.center() - glm::dvec3(7, 2, 3)) < 1e-12);
+  // The camera looks along the third column of the matrix, negated, and its up is the second
+  // column.
+  CHECK(glm::length(camera.rotation * glm::dvec3(-0.6, 0, -0.8) - glm::dvec3(0, 0, 1)) < 1e-12);
+  CHECK(glm::length(camera.rotation * glm::dvec3(0, 1, 0) - glm::dvec3(0, -1, 0)) < 1e-12);
+  CHECK(glm::length(camera.rotation * glm::dvec3(0.8, 0, -0.6) - glm::dvec3(1, 0, 0)) < 1e-12);
+}
+
+TEST_CASE("written cameras read back, with shared and with own intrinsics") {
+  const Scratch scratch;
+  std::vector<Camera> cameras;
+  for (int i = 0; i < 5; ++i) {
+    Camera camera = look_at({3 + i, 2, 0.1}, {0, 0.5, 0}, {0, 0, 1}, 64, 48, 70.123456789);
+    camera.name = "view/" + std::to_string(i) + ".png";
+    cameras.push_back(camera);
+  }
+  for (const bool shared : {true, false}) {
+    if (!shared) cameras[2].cx = 31.0 / 3.0;
+    write_cameras(scratch / "cameras.json", cameras);
+    const std::string text = read_bytes(scratch / "cameras.json");
+    const std::vector<Camera> again = read_cameras(scratch / "cameras.json");
+    REQUIRE(again.size() == cameras.size());
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      CHECK(again[i].name == cameras[i].name);
+      CHECK(again[i].width == 64);
+      CHECK(again[i].height == 48);
+      CHECK(again[i].fx == cameras[i].fx);
+      CHECK(again[i].cx == cameras[i].cx);
+      CHECK(glm::length(again[i].translation - cameras[i].translation) < 1e-12);
+      for (int c = 0; c < 3; ++c)
+        CHECK(glm::length(again[i].rotation[c] - cameras[i].rotation[c]) < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("small deviations from a rotation are removed, larger ones refused") {
+  const auto with_matrix = [](const std::string& matrix) {
+    return "{\"w\": 4, \"h\": 4, \"fl_x\": 5, \"frames\": [{\"transform_matrix\": " + matrix +
+           "}]}";
+  };
+  const Camera camera =
+      cameras_of(with_matrix("[[0.8003, 0, 0.6, 1], [0, 1, 0, 2], [-0.6, 0, 0.8, 3]]")).front();
+  const glm::dmat3 gram = glm::transpose(camera.rotation) * camera.rotation;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) CHECK(std::abs(gram[i][j] - (i == j ? 1 : 0)) < 1e-12);
+  }
+  CHECK(glm::length(camera.center() - glm::dvec3(1, 2, 3)) < 1e-12);
+  CHECK(contains(cameras_error(with_matrix("[[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]")),
+                 "no rotation"));
+  CHECK(contains(cameras_error(with_matrix("[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]")),
+                 "no rotation"));
+  CHECK(contains(cameras_error(with_matrix("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,2]]")),
+                 "last row"));
+  CHECK(contains(cameras_error(with_matrix("[[1,0,0,0],[0,1,0,0]]")), "4 rows"));
+  CHECK(contains(cameras_error(with_matrix("[[1,0,0],[0,1,0],[0,0,1]]")), "4 numbers"));
+  CHECK(contains(cameras_error(with_matrix("[[1,0,0,\"x\"],[0,1,0,0],[0,0,1,0]]")), "no number"));
+  CHECK(contains(cameras_error(with_matrix("[[1,0,0,NaN],[0,1,0,0],[0,0,1,0]]")), "byte"));
+  CHECK(
+      contains(cameras_error(with_matrix("[[1,0,0,1e999],[0,1,0,0],[0,0,1,0]]")), "out of range"));
+  CHECK(contains(cameras_error(with_matrix("7")), "4 rows"));
+}
+
+TEST_CASE("malformed camera files are refused with the frame or the byte") {
+  CHECK(contains(cameras_error(""), "byte"));
+  CHECK(contains(cameras_error("{\"frames\": ["), "byte 13"));
+  CHECK(contains(cameras_error("[]"), "no JSON object"));
+  CHECK(contains(cameras_error("{}"), "no list of frames"));
+  CHECK(contains(cameras_error("{\"frames\": []}"), "no frames"));
+  CHECK(contains(cameras_error("{\"frames\": [3]}"), "frame 0"));
+  CHECK(contains(cameras_error("{\"x\": " + std::string(100000, '[')), "levels deep"));
+  CHECK(contains(cameras_error(file_of("", frame("a", 1))), "\"w\" and \"h\""));
+  CHECK(contains(cameras_error(file_of("\"w\": 4, \"h\": 4, ", frame("a", 1))),
+                 "neither fl_x nor camera_angle_x"));
+  CHECK(contains(cameras_error(file_of("\"w\": 4, \"h\": 4, \"fl_x\": -1, ", frame("a", 1))),
+                 "'fl_x' is -1"));
+  CHECK(contains(cameras_error(file_of("\"w\": 4, \"h\": 4, \"fl_x\": \"1\", ", frame("a", 1))),
+                 "'fl_x' is not a number"));
+  CHECK(contains(cameras_error(file_of("\"w\": 4.5, \"h\": 4, ", frame("a", 1))), "'w' is 4.5"));
+  CHECK(
+      contains(cameras_error(file_of("\"w\": 1e30, \"h\": 4, ", frame("a", 1))), "no image size"));
+  CHECK(contains(cameras_error(file_of("\"camera_angle_x\": 4, ", frame("a", 1))), "no angle"));
+  CHECK(contains(cameras_error(file_of("\"camera_model\": \"OPENCV_FISHEYE\", ", frame("a", 1))),
+                 "'OPENCV_FISHEYE'"));
+  CHECK(
+      contains(cameras_error(file_of("", frame("a", 1, "\"camera_model\": \"EQUIRECTANGULAR\", "))),
+               "frame 0"));
+  CHECK(contains(cameras_error(file_of("\"is_fisheye\": true, ", frame("a", 1))), "fisheye"));
+  CHECK(contains(cameras_error(file_of("\"k4\": 0.1, ", frame("a", 1))), "'k4'"));
+  CHECK(contains(data_error([] { read_cameras("/nonexistent.json"); }), "does not exist"));
+}
+
+TEST_CASE("Blender scenes have their own test views, straight alpha and no size in the file") {
+  const Scratch scratch;
+  Image photo(20, 10, 4, 0.5f);
+  for (const char* name :
+       {"train/r_0.png", "train/r_1.png", "train/r_10.png", "test/r_0.png", "val/r_0.png"}) {
+    write_image(scratch / name, photo);
+  }
+  write_bytes(scratch / "transforms_train.json",
+              file_of("\"camera_angle_x\": 0.8, ", frame("./train/r_10", 1) + "," +
+                                                       frame("./train/r_0", 2) + "," +
+                                                       frame("./train/r_1", 3)));
+  write_bytes(scratch / "transforms_val.json",
+              file_of("\"camera_angle_x\": 0.8, ", frame("./val/r_0", 4)));
+  const auto load = [&] { return load_dataset(scratch.path()); };
+  CHECK(load().views.size() == 4);
+  CHECK(load().views.back().camera.name == "val/r_0.png");
+  CHECK(load().views.back().test);
+  write_bytes(scratch / "transforms_test.json",
+              file_of("\"camera_angle_x\": 0.8, ", frame("./test/r_0", 4)));
+  const Dataset dataset = load();
+  CHECK(dataset.kind == DatasetKind::kBlender);
+  CHECK(dataset.alpha_is_background);
+  REQUIRE(dataset.views.size() == 4);
+  CHECK(dataset.views[0].camera.name == "train/r_0.png");
+  CHECK(dataset.views[2].camera.name == "train/r_10.png");
+  CHECK(dataset.views[3].camera.name == "test/r_0.png");
+  CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{3});
+  CHECK(dataset.views[0].camera.fx == doctest::Approx(10 / std::tan(0.4)));
+  CHECK(dataset.views[0].camera.cy == 5);
+  const Image image = load_view_image(dataset.views[0]);
+  CHECK(image.channels == 4);
+  CHECK(image.at(3, 3, 0) == doctest::Approx(128.0 / 255));
+  CHECK(image.at(3, 3, 3) == doctest::Approx(128.0 / 255));
+  fs::remove(scratch / "test/r_0.png");
+  CHECK(contains(data_error([&] { load(); }), "./test/r_0"));
+}
+
+TEST_CASE("nerfstudio scenes: distortion, masks, points, lists of names, scaled photos") {
+  const Scratch scratch;
+  std::string frames;
+  for (int i = 0; i < 9; ++i) {
+    const std::string name = "images/f" + std::to_string(i) + ".png";
+    write_image(scratch / name, Image(20, 10, 3, 0.5f));
+    frames +=
+        (i > 0 ? "," : "") + frame(name, i, i == 2 ? "\"mask_path\": \"m.png\", \"k1\": 0, " : "");
+  }
+  Image mask(10, 5, 1, 1.0f);
+  mask.at(0, 0, 0) = 0.0f;
+  write_image(scratch / "m.png", mask);
+  write_bytes(scratch / "points.ply",
+              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+              "y\nproperty float z\n"
+              "end_header\n1 2 3\n");
+  const std::string keys =
+      "\"w\": 40, \"h\": 20, \"fl_x\": 50, \"fl_y\": 52, \"cx\": 21, \"cy\": 9, \"k1\": 0.1, "
+      "\"k2\": 0.2, \"k3\": 0.3, "
+      "\"p1\": 0.01, \"p2\": 0.02, \"camera_model\": \"OPENCV\", \"ply_file_path\": "
+      "\"points.ply\", ";
+  write_bytes(scratch / "transforms.json", file_of(keys, frames));
+  const Dataset dataset = load_dataset(scratch.path());
+  CHECK(dataset.kind == DatasetKind::kNerfstudio);
+  CHECK(!dataset.alpha_is_background);
+  REQUIRE(dataset.views.size() == 9);
+  CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{0, 8});
+  CHECK(dataset.points.positions == std::vector<float>{1, 2, 3});
+  const View& view = dataset.views[1];
+  CHECK(view.distortion.k1 == 0.1);
+  CHECK(view.distortion.k3 == 0.3);
+  CHECK(view.distortion.p2 == 0.02);
+  CHECK(view.camera.width == 20);
+  CHECK(view.camera.fx == 25);
+  CHECK(view.camera.fy == 26);
+  CHECK(view.camera.cx == 10.5);
+  CHECK(view.camera.cy == 4.5);
+  CHECK(dataset.views[2].distortion.k1 == 0);
+  CHECK(!dataset.views[2].mask_path.empty());
+  View plain = dataset.views[2];
+  plain.distortion = {};
+  const Image masked = load_view_image(plain);
+  CHECK(masked.at(1, 1, 3) == 0.0f);
+  CHECK(masked.at(2, 1, 3) == 1.0f);
+  // The file's own lists: frames in neither are left out.
+  write_bytes(
+      scratch / "transforms.json",
+      file_of(
+          keys +
+              "\"train_filenames\": [\"images/f3.png\", \"./images/f1.png\"], \"test_filenames\": "
+              "[\"images/f7.png\"], ",
+          frames));
+  const Dataset lists = load_dataset(scratch.path());
+  REQUIRE(lists.views.size() == 3);
+  CHECK(lists.views[0].camera.name == "images/f1.png");
+  CHECK(!lists.views[0].test);
+  CHECK(lists.views[2].test);
+  fs::remove(scratch / "m.png");
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "mask"));
+}
+
+TEST_CASE("no cut or flipped byte of a camera file does anything but load or raise DataError") {
+  const Scratch scratch;
+  const std::string whole =
+      file_of("\"w\": 40, \"h\": 30, \"fl_x\": 50, \"k1\": 0.1, \"is_fisheye\": false, ",
+              frame("a.png", 1) + "," + frame("b.png", 2));
+  CounterRng rng(10, 11);
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    CHECK(cameras_error(whole.substr(0, length)) != "");
+  }
+  for (int trial = 0; trial < 1000; ++trial) {
+    std::string bytes = whole;
+    for (int i = 0; i < 2; ++i)
+      bytes[rng.below(bytes.size())] = static_cast<char>(32 + rng.below(95));
+    write_bytes(scratch / "bad.json", bytes);
+    data_error([&] { read_cameras(scratch / "bad.json"); });
+  }
+}

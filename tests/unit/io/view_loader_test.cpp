@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/view_loader.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/rng.hpp"
+#include "raysplats/io.hpp"
+#include "scratch.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+constexpr int kSide = 16;
+constexpr std::size_t kBytes = kSide * kSide * 4;
+
+/// Views of photos whose red value is their index.
+std::vector<View> make_views(const Scratch& scratch, std::size_t count) {
+  std::vector<View> views(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    Image image(kSide, kSide, 3);
+    for (std::size_t p = 0; p < image.pixels(); ++p)
+      image.data[3 * p] = static_cast<float>(i) / 255.0f;
+    views[i].image_path = scratch / (std::to_string(i) + ".png");
+    write_image(views[i].image_path, image);
+    views[i].camera.width = views[i].source_camera.width = kSide;
+    views[i].camera.height = views[i].source_camera.height = kSide;
+  }
+  return views;
+}
+
+}  // namespace
+
+TEST_CASE("pixels are packed as r, g, b, a from the low byte, clamped and rounded") {
+  Image image(2, 1, 4);
+  image.data = {1.0f, 0.5f, 0.0f, 2.0f, 10.4f / 255, 10.6f / 255, -3.0f, std::nanf("")};
+  const io::PackedImage packed = io::pack(image);
+  CHECK(packed.width == 2);
+  CHECK(packed.height == 1);
+  CHECK(packed.pixels == std::vector<std::uint32_t>{0xff0080ffu, 0x00000b0au});
+}
+
+TEST_CASE("views come back right in any order, prefetched or not, within the budget") {
+  const Scratch scratch;
+  const auto views = make_views(scratch, 12);
+  for (const unsigned threads : {1u, 4u}) {
+    io::ViewLoader loader(views, 5 * kBytes + 10, threads);
+    CHECK(loader.size() == 12);
+    CounterRng rng(1, threads);
+    for (int step = 0; step < 200; ++step) {
+      std::vector<std::size_t> order;
+      for (int i = 0; i < 7; ++i) order.push_back(rng.below(13));  // one index too many is ignored
+      if (step % 3 != 0) loader.prefetch(order);
+      const std::size_t index = order[rng.below(3)] % 12;
+      const auto image = loader.get(index);
+      CHECK(image->pixels.size() == kSide * kSide);
+      CHECK(image->pixels[7] == (0xff000000u | static_cast<std::uint32_t>(index)));
+      CHECK(loader.cached_bytes() <= 5 * kBytes + 10);
+    }
+  }
+}
+
+TEST_CASE("what was used last stays: deleted files show what is kept") {
+  const Scratch scratch;
+  const auto views = make_views(scratch, 4);
+  io::ViewLoader loader(views, 2 * kBytes, 1);
+  for (const std::size_t index : {0u, 1u, 0u, 2u}) loader.get(index);
+  for (const View& view : views) fs::remove(view.image_path);
+  CHECK(loader.get(0)->pixels[0] == 0xff000000u);
+  CHECK(loader.get(2)->pixels[0] == 0xff000002u);
+  CHECK(contains(data_error([&] { loader.get(1); }), "1.png"));
+}
+
+TEST_CASE("a picture above the budget is returned and not kept, and outlives its eviction") {
+  const Scratch scratch;
+  const auto views = make_views(scratch, 2);
+  io::ViewLoader loader(views, 10, 2);
+  const auto first = loader.get(0);
+  const auto second = loader.get(1);
+  CHECK(first->pixels[0] == 0xff000000u);
+  CHECK(second->pixels[0] == 0xff000001u);
+  CHECK(loader.cached_bytes() == 0);
+}
+
+TEST_CASE("errors of the workers surface in get, and a repaired file is read again") {
+  const Scratch scratch;
+  const auto views = make_views(scratch, 3);
+  const std::string whole = read_bytes(views[1].image_path);
+  write_bytes(views[1].image_path, "");
+  io::ViewLoader loader(views, 100 * kBytes);
+  loader.prefetch(std::vector<std::size_t>{0, 1, 2});
+  CHECK(loader.get(2)->pixels[0] == 0xff000002u);
+  CHECK(contains(data_error([&] { loader.get(1); }), "empty"));
+  CHECK(contains(data_error([&] { loader.get(1); }), "empty"));
+  write_bytes(views[1].image_path, whole);
+  CHECK(loader.get(1)->pixels[0] == 0xff000001u);
+  CHECK_THROWS_AS(loader.get(3), UsageError);
+}
+
+TEST_CASE("several callers may ask at once, and a loader with queued work can be destroyed") {
+  const Scratch scratch;
+  const auto views = make_views(scratch, 8);
+  for (int round = 0; round < 10; ++round) {
+    io::ViewLoader loader(views, 2 * kBytes, 3);
+    std::vector<int> wrong(4, 0);
+    {
+      std::vector<std::jthread> callers;
+      for (std::size_t t = 0; t < 4; ++t) {
+        callers.emplace_back([&, t] {
+          CounterRng rng(t, static_cast<std::uint64_t>(round));
+          for (int i = 0; i < 50; ++i) {
+            const std::size_t index = rng.below(8);
+            if (i % 10 == 0) loader.prefetch(std::vector<std::size_t>{index, (index + 1) % 8});
+            if (loader.get(index)->pixels[3] != (0xff000000u | static_cast<std::uint32_t>(index)))
+              ++wrong[t];
+          }
+        });
+      }
+    }
+    CHECK(wrong == std::vector<int>{0, 0, 0, 0});
+    CHECK(loader.cached_bytes() <= 2 * kBytes);
+    loader.prefetch(std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7});
+  }
+  io::ViewLoader empty({}, 100);
+  empty.prefetch(std::vector<std::size_t>{0});
+  CHECK_THROWS_AS(empty.get(0), UsageError);
+}
