@@ -140,7 +140,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
       }
 
       while (pending.head < pending.size &&
-             (draining || all(RS_MASK(pending.key[pending.head] <= bound)))) {
+             (draining || rs_all(RS_MASK(pending.key[pending.head] <= bound)))) {
         const int h = pending.head++;
         const fv alpha = pending.alpha[h];
         iv active = RS_MASK(alpha > 0.0f) & p.alive;
@@ -149,7 +149,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
           active &= RS_MASK(key < limit_key) |
                     (RS_MASK(key == limit_key) & RS_MASK(pending.reference[h] < limit_reference));
         }
-        if (!any(active)) continue;
+        if (!rs_any(active)) continue;
         capped |= active & RS_MASK(p.hits >= max_hits);
         active &= RS_MASK(p.hits < max_hits);
         last_key = select(last_key, pending.key[h], active);
@@ -183,14 +183,14 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
         }
         p.alive &= RS_MASK(p.T >= min_transmittance) & ~capped;
       }
-      if (draining || !any(p.alive)) break;
+      if (draining || !rs_any(p.alive)) break;
 
       const uint reference = references[k];
       const bool general = reference & 1;
       __global const float* v = lines[reference >> 1].v;
       const PacketMeeting m = rs_meet(v, general, quantile, p.X, p.Y);
       iv hit = m.inside & p.alive;
-      if (!any(hit)) continue;
+      if (!rs_any(hit)) continue;
       const fv inverse = 1.0f / m.direction2;
       const fv distance2 = m.numerator * inverse;
       const fv peak = m.along * inverse;
@@ -207,7 +207,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
         hit &= RS_MASK(key > floor_key) |
                (RS_MASK(key == floor_key) & RS_MASK((iv)(reference) > floor_reference));
       }
-      if (!any(hit)) continue;
+      if (!rs_any(hit)) continue;
       fv alpha = select((fv)(0.0f), v[12] * rs_exp(-0.5f * distance2), hit);
       iv id = (iv)(reference);
       // Later passes keep misses behind every hit, so that a full list always makes progress.
@@ -236,7 +236,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
                            (RS_MASK(out_key == limit_key) & RS_MASK(out_id < limit_reference)));
           limit_key = select(limit_key, out_key, lost);
           limit_reference = select(limit_reference, out_id, lost);
-          dropped = dropped || any(lost);
+          dropped = dropped || rs_any(lost);
           key = select(last_k, key, nearer);
           alpha = select(pending.alpha[last], alpha, nearer);
           id = select(last_r, id, nearer);
@@ -249,7 +249,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
         const iv other_id = pending.reference[j - 1];
         const iv before =
             RS_MASK(key < other_key) | (RS_MASK(key == other_key) & RS_MASK(id < other_id));
-        if (!any(before)) break;
+        if (!rs_any(before)) break;
         const fv other_alpha = pending.alpha[j - 1];
         pending.key[j] = select(key, other_key, before);
         pending.alpha[j] = select(alpha, other_alpha, before);
@@ -266,7 +266,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
     floor_key = last_key;
     floor_reference = last_reference;
     first_pass = false;
-  } while (dropped && any(p.alive));
+  } while (dropped && rs_any(p.alive));
 
   const size_t plane = (size_t)camera.width * camera.height;
   rs_store_pixels(image, camera.width, camera.height, px, py, p.R + p.T * background.x);

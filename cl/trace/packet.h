@@ -71,6 +71,21 @@ typedef int16 iv;
 #endif
 #endif
 
+// Masks hold 0 or -1 in every lane. Compilers with vector reductions turn these into mask registers; the plain
+// forms below them give the same answers.
+#if PACKET > 1 && defined(__has_builtin)
+#if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_and)
+#define RS_VECTOR_REDUCTIONS 1
+#endif
+#endif
+#ifdef RS_VECTOR_REDUCTIONS
+#define rs_any(mask) (__builtin_reduce_or(mask) != 0)
+#define rs_all(mask) (__builtin_reduce_and(mask) != 0)
+#else
+#define rs_any(mask) any(mask)
+#define rs_all(mask) all(mask)
+#endif
+
 // One bit per lane whose mask is set, lane 0 lowest.
 uint rs_lane_bits(iv mask) {
 #if PACKET == 1
