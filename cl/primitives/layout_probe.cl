@@ -1,12 +1,61 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the size of every shared record as this device's compiler sees it; one work-item.
+// Writes the layout of every shared record as this device's compiler sees it: per record its size, then the
+// offset of each field in order of declaration. Launch: one work-item; returns how many words it wrote in
+// layout[0].
 #include "shared/layout.h"
 
-__kernel void layout_probe(__global uint* sizes) {
-  sizes[0] = sizeof(RsAabb);
-  sizes[1] = sizeof(RsBvhNode);
-  sizes[2] = sizeof(RsLine);
-  sizes[3] = sizeof(RsViewBounds);
-  sizes[4] = sizeof(RsCamera);
-  sizes[5] = sizeof(RsAdamGroup);
+#define RS_PUT(value) layout[next++] = (uint)(value)
+#define RS_FIELD(type, field) RS_PUT(__builtin_offsetof(type, field))
+
+__kernel void layout_probe(__global uint* layout) {
+  uint next = 1;
+  RS_PUT(sizeof(RsAabb));
+  RS_FIELD(RsAabb, lo);
+  RS_FIELD(RsAabb, hi);
+
+  RS_PUT(sizeof(RsBvhNode));
+  RS_FIELD(RsBvhNode, left_lo);
+  RS_FIELD(RsBvhNode, left_hi);
+  RS_FIELD(RsBvhNode, right_lo);
+  RS_FIELD(RsBvhNode, right_hi);
+  RS_FIELD(RsBvhNode, left);
+  RS_FIELD(RsBvhNode, right);
+  RS_FIELD(RsBvhNode, first);
+  RS_FIELD(RsBvhNode, last);
+
+  RS_PUT(sizeof(RsLine));
+  RS_FIELD(RsLine, v);
+
+  RS_PUT(sizeof(RsViewBounds));
+  RS_FIELD(RsViewBounds, x0);
+  RS_FIELD(RsViewBounds, y0);
+  RS_FIELD(RsViewBounds, x1);
+  RS_FIELD(RsViewBounds, y1);
+  RS_FIELD(RsViewBounds, depth);
+  RS_FIELD(RsViewBounds, quantile);
+  RS_FIELD(RsViewBounds, kind);
+  RS_FIELD(RsViewBounds, padding);
+
+  RS_PUT(sizeof(RsCamera));
+  RS_FIELD(RsCamera, rotation);
+  RS_FIELD(RsCamera, center);
+  RS_FIELD(RsCamera, fx);
+  RS_FIELD(RsCamera, fy);
+  RS_FIELD(RsCamera, cx);
+  RS_FIELD(RsCamera, cy);
+  RS_FIELD(RsCamera, width);
+  RS_FIELD(RsCamera, height);
+  RS_FIELD(RsCamera, near_depth);
+  RS_FIELD(RsCamera, padding);
+
+  RS_PUT(sizeof(RsAdamGroup));
+  RS_FIELD(RsAdamGroup, learning_rate);
+  RS_FIELD(RsAdamGroup, beta1);
+  RS_FIELD(RsAdamGroup, beta2);
+  RS_FIELD(RsAdamGroup, epsilon);
+  RS_FIELD(RsAdamGroup, bias1);
+  RS_FIELD(RsAdamGroup, bias2);
+  RS_FIELD(RsAdamGroup, count);
+  RS_FIELD(RsAdamGroup, padding);
+  layout[0] = next;
 }

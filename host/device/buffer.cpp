@@ -10,10 +10,10 @@
 
 namespace raysplats {
 
-RawBuffer::Impl::~Impl() { context->allocated -= bytes; }
+RawBuffer::Impl::~Impl() { memory->allocated -= bytes; }
 
 RawBuffer::RawBuffer(Context& context, std::size_t bytes, const std::string& label)
-    : bytes_(bytes), context_(&context) {
+    : bytes_(bytes) {
   Context::Impl& owner = context.impl();
   if (bytes > owner.info.max_allocation) {
     throw ResourceError(fmt::format(
@@ -24,45 +24,55 @@ RawBuffer::RawBuffer(Context& context, std::size_t bytes, const std::string& lab
   }
   try {
     cl::Buffer buffer(owner.context, CL_MEM_READ_WRITE, bytes);
-    impl_ = std::shared_ptr<Impl>(new Impl{&owner, buffer, bytes, label});
+    impl_ = std::shared_ptr<Impl>(new Impl{&owner, owner.memory, buffer, bytes, label});
   } catch (const cl::Error& error) {
     throw_cl_error(error, fmt::format("Allocating {:.1f} MiB for '{}' on {}",
                                       static_cast<double>(bytes) / (1 << 20), label, owner.info.name));
   }
-  owner.allocated += bytes;
-  owner.peak = std::max(owner.peak, owner.allocated);
+  owner.memory->allocated += bytes;
+  owner.memory->peak = std::max(owner.memory->peak, owner.memory->allocated);
+}
+
+RawBuffer::Impl& RawBuffer::checked() const {
+  if (!impl_) throw DeviceError("A buffer is used that was never allocated");
+  return *impl_;
 }
 
 void RawBuffer::write(const void* source, std::size_t bytes, std::size_t offset) {
+  Impl& impl = checked();
   try {
-    impl_->context->queue.enqueueWriteBuffer(impl_->buffer, CL_TRUE, offset, bytes, source);
+    impl.context->queue.enqueueWriteBuffer(impl.buffer, CL_TRUE, offset, bytes, source);
   } catch (const cl::Error& error) {
-    throw_cl_error(error, fmt::format("Writing {} bytes to '{}'", bytes, impl_->label));
+    throw_cl_error(error, fmt::format("Writing {} bytes to '{}'", bytes, impl.label));
   }
 }
 
 void RawBuffer::read(void* target, std::size_t bytes, std::size_t offset) const {
+  Impl& impl = checked();
   try {
-    impl_->context->queue.enqueueReadBuffer(impl_->buffer, CL_TRUE, offset, bytes, target);
+    impl.context->queue.enqueueReadBuffer(impl.buffer, CL_TRUE, offset, bytes, target);
   } catch (const cl::Error& error) {
-    throw_cl_error(error, fmt::format("Reading {} bytes from '{}'", bytes, impl_->label));
+    throw_cl_error(error, fmt::format("Reading {} bytes from '{}'", bytes, impl.label));
   }
 }
 
 void RawBuffer::fill(std::uint32_t pattern, std::size_t bytes, std::size_t offset) {
+  Impl& impl = checked();
   try {
-    impl_->context->queue.enqueueFillBuffer(impl_->buffer, pattern, offset, bytes);
+    impl.context->queue.enqueueFillBuffer(impl.buffer, pattern, offset, bytes);
   } catch (const cl::Error& error) {
-    throw_cl_error(error, fmt::format("Filling '{}'", impl_->label));
+    throw_cl_error(error, fmt::format("Filling '{}'", impl.label));
   }
 }
 
 void RawBuffer::copy_from(const RawBuffer& source, std::size_t bytes, std::size_t source_offset,
                           std::size_t offset) {
+  Impl& impl = checked();
+  const Impl& from = source.checked();
   try {
-    impl_->context->queue.enqueueCopyBuffer(source.impl_->buffer, impl_->buffer, source_offset, offset, bytes);
+    impl.context->queue.enqueueCopyBuffer(from.buffer, impl.buffer, source_offset, offset, bytes);
   } catch (const cl::Error& error) {
-    throw_cl_error(error, fmt::format("Copying {} bytes from '{}' to '{}'", bytes, source.impl_->label, impl_->label));
+    throw_cl_error(error, fmt::format("Copying {} bytes from '{}' to '{}'", bytes, from.label, impl.label));
   }
 }
 

@@ -3,21 +3,29 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
 
+#include "raysplats/error.hpp"
+
 namespace raysplats {
 
 class Context;
 
-/// Untyped device memory; move-only. A size over the device's largest allocation throws ResourceError.
+/// Untyped device memory; move-only. A size over the device's largest allocation throws ResourceError, access
+/// outside the memory DeviceError. It may outlive its context, but is of no use then.
 class RawBuffer {
  public:
   RawBuffer() = default;
   RawBuffer(Context& context, std::size_t bytes, const std::string& label);
+  RawBuffer(const RawBuffer&) = delete;
+  RawBuffer& operator=(const RawBuffer&) = delete;
+  RawBuffer(RawBuffer&&) = default;
+  RawBuffer& operator=(RawBuffer&&) = default;
 
   std::size_t bytes() const { return bytes_; }
   bool empty() const { return impl_ == nullptr; }
@@ -30,8 +38,8 @@ class RawBuffer {
   const Impl* impl() const { return impl_.get(); }
 
  private:
+  Impl& checked() const;
   std::size_t bytes_ = 0;
-  Context* context_ = nullptr;
   std::shared_ptr<Impl> impl_;
 };
 
@@ -43,14 +51,14 @@ class Buffer {
  public:
   Buffer() = default;
   Buffer(Context& context, std::size_t size, const std::string& label)
-      : context_(&context), label_(label), size_(size), raw_(context, bytes_for(size), label) {}
+      : size_(size), raw_(context, bytes_for(size, label), label) {}
 
   std::size_t size() const { return size_; }
 
   /// Makes room for at least `size` elements; the content is lost when the buffer has to grow.
   void ensure(Context& context, std::size_t size, const std::string& label) {
-    if (raw_.empty() || raw_.bytes() < bytes_for(size)) {
-      raw_ = RawBuffer();
+    if (raw_.empty() || raw_.bytes() < bytes_for(size, label)) {
+      raw_ = RawBuffer();  // the old memory goes first
       *this = Buffer(context, size, label);
     }
     size_ = size;
@@ -83,10 +91,13 @@ class Buffer {
 
  private:
   // A device buffer cannot be empty.
-  static std::size_t bytes_for(std::size_t size) { return (size > 0 ? size : 1) * sizeof(T); }
+  static std::size_t bytes_for(std::size_t size, const std::string& label) {
+    if (size > std::numeric_limits<std::size_t>::max() / sizeof(T)) {
+      throw ResourceError("The buffer '" + label + "' is larger than any memory: use fewer Gaussians");
+    }
+    return (size > 0 ? size : 1) * sizeof(T);
+  }
 
-  Context* context_ = nullptr;
-  std::string label_;
   std::size_t size_ = 0;
   RawBuffer raw_;
 };

@@ -99,8 +99,8 @@ Profiler& Context::profiler() {
   return impl_->profiler;
 }
 
-std::size_t Context::allocated_bytes() const { return impl_->allocated; }
-std::size_t Context::peak_allocated_bytes() const { return impl_->peak; }
+std::size_t Context::allocated_bytes() const { return impl_->memory->allocated; }
+std::size_t Context::peak_allocated_bytes() const { return impl_->memory->peak; }
 
 cl::Program& Context::Impl::program(const std::string& path, const BuildOptions& build) {
   const std::string key = path + " " + build.text();

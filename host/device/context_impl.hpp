@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,12 @@
 #include "device/profiler.hpp"
 
 namespace raysplats {
+
+/// Bytes in buffers; shared with them, so that one may go after its context.
+struct MemoryCount {
+  std::size_t allocated = 0;
+  std::size_t peak = 0;
+};
 
 struct Context::Impl {
   DeviceInfo info;
@@ -20,8 +27,7 @@ struct Context::Impl {
   Profiler profiler;
   std::map<std::string, cl::Program> programs;  // by program path and build options
   std::vector<std::pair<std::string, cl::Event>> pending;  // launches whose times are not read yet
-  std::size_t allocated = 0;
-  std::size_t peak = 0;
+  std::shared_ptr<MemoryCount> memory = std::make_shared<MemoryCount>();
 
   cl::Program& program(const std::string& path, const BuildOptions& build);
   void collect_profile();
@@ -36,6 +42,7 @@ struct Kernel::Impl {
 
 struct RawBuffer::Impl {
   Context::Impl* context;
+  std::shared_ptr<MemoryCount> memory;
   cl::Buffer buffer;
   std::size_t bytes;
   std::string label;

@@ -74,7 +74,11 @@ std::optional<std::vector<unsigned char>> ProgramCache::load(const std::string& 
 void ProgramCache::store(const std::string& key, const std::vector<unsigned char>& binary) const {
   if (directory_.empty()) return;
   const std::filesystem::path target = file(key);
-  const std::filesystem::path temporary = directory_ / fmt::format(".{}.{}.tmp", key, ::getpid());
+  // A name of its own for every writer: other processes and threads may be storing the same key.
+  std::string temporary = (directory_ / fmt::format(".{}.XXXXXX", key)).string();
+  const int descriptor = ::mkstemp(temporary.data());
+  if (descriptor < 0) return;
+  ::close(descriptor);
   const Header header{kMagic, binary.size(), checksum(binary)};
   std::error_code error;
   {

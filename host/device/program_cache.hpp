@@ -19,7 +19,7 @@ class ProgramCache {
   /// "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats. An unusable directory turns the cache off.
   explicit ProgramCache(const std::string& directory);
 
-  /// Key of a program: source, options, device, driver and this library's version.
+  /// Key of a program: source, options, platform, device and driver.
   static std::string key(const std::string& source, const std::string& options, const DeviceInfo& device);
 
   std::optional<std::vector<unsigned char>> load(const std::string& key) const;

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/layout.h"
+
+#include <doctest/doctest.h>
+
+#include <cstddef>
+#include <vector>
+
+#include "device/buffer.hpp"
+#include "device/context.hpp"
+
+using namespace raysplats;
+
+TEST_CASE("shared records: sizes and offsets agree between the compilers") {
+  // In the order of cl/primitives/layout_probe.cl.
+  const std::vector<std::size_t> expected{sizeof(RsAabb),
+                                          offsetof(RsAabb, lo),
+                                          offsetof(RsAabb, hi),
+                                          sizeof(RsBvhNode),
+                                          offsetof(RsBvhNode, left_lo),
+                                          offsetof(RsBvhNode, left_hi),
+                                          offsetof(RsBvhNode, right_lo),
+                                          offsetof(RsBvhNode, right_hi),
+                                          offsetof(RsBvhNode, left),
+                                          offsetof(RsBvhNode, right),
+                                          offsetof(RsBvhNode, first),
+                                          offsetof(RsBvhNode, last),
+                                          sizeof(RsLine),
+                                          offsetof(RsLine, v),
+                                          sizeof(RsViewBounds),
+                                          offsetof(RsViewBounds, x0),
+                                          offsetof(RsViewBounds, y0),
+                                          offsetof(RsViewBounds, x1),
+                                          offsetof(RsViewBounds, y1),
+                                          offsetof(RsViewBounds, depth),
+                                          offsetof(RsViewBounds, quantile),
+                                          offsetof(RsViewBounds, kind),
+                                          offsetof(RsViewBounds, padding),
+                                          sizeof(RsCamera),
+                                          offsetof(RsCamera, rotation),
+                                          offsetof(RsCamera, center),
+                                          offsetof(RsCamera, fx),
+                                          offsetof(RsCamera, fy),
+                                          offsetof(RsCamera, cx),
+                                          offsetof(RsCamera, cy),
+                                          offsetof(RsCamera, width),
+                                          offsetof(RsCamera, height),
+                                          offsetof(RsCamera, near_depth),
+                                          offsetof(RsCamera, padding),
+                                          sizeof(RsAdamGroup),
+                                          offsetof(RsAdamGroup, learning_rate),
+                                          offsetof(RsAdamGroup, beta1),
+                                          offsetof(RsAdamGroup, beta2),
+                                          offsetof(RsAdamGroup, epsilon),
+                                          offsetof(RsAdamGroup, bias1),
+                                          offsetof(RsAdamGroup, bias2),
+                                          offsetof(RsAdamGroup, count),
+                                          offsetof(RsAdamGroup, padding)};
+  Context context(select_device(""));
+  Buffer<std::uint32_t> layout(context, 256, "layout");
+  layout.clear();
+  context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, layout);
+  const std::vector<std::uint32_t> found = layout.download();
+  REQUIRE(found[0] == expected.size() + 1);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    CAPTURE(i);
+    CHECK(found[i + 1] == expected[i]);
+  }
+}
