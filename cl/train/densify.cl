@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// Adaptive density control after 3D Gaussian Splatting (Kerbl et al. 2023, section 5): gradient
+// statistics, the gather that builds the new set of Gaussians from the old one, and the opacity
+// reset. Launch: one work-item per Gaussian (of the new set for gather_gaussians), any group size,
+// ids checked. Complexity: O(N) memory traffic; no work-item reads what another one writes.
+
+#include "shared/layout.h"
+
+#ifndef SH_COEFFICIENTS
+#define SH_COEFFICIENTS 16
+#endif
+#ifndef SCALE_SIGMOID
+#define SCALE_SIGMOID 0
+#endif
+
+// What becomes of a Gaussian in the new set; host/train/density_plan.hpp names the same values.
+#define ROLE_KEEP 0u
+#define ROLE_CLONE 1u
+#define ROLE_FIRST_CHILD 2u
+
+// statistics: 2 N, {sum of the signal, number of views that saw the Gaussian}; signal 0 = screen, 1
+// = absolute.
+kernel void accumulate_screen(uint count,
+                              uint signal,
+                              global const float* screen,
+                              global float* statistics) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  const float visible = screen[3 * i + 2];
+  if (visible > 0.0f) {
+    statistics[2 * i] += screen[3 * i + signal];
+    statistics[2 * i + 1] += 1.0f;
+  }
+}
+
+// Four independent 32-bit words from four (Jarzynski and Olano 2020, "Hash Functions for GPU
+// Rendering", pcg4d).
+uint4 hash4(uint4 v) {
+  v = v * 1664525u + 1013904223u;
+  v.x += v.y * v.w;
+  v.y += v.z * v.x;
+  v.z += v.x * v.y;
+  v.w += v.y * v.z;
+  v ^= v >> 16;
+  v.x += v.y * v.w;
+  v.y += v.z * v.x;
+  v.z += v.x * v.y;
+  v.w += v.y * v.z;
+  return v;
+}
+
+// Three standard normal numbers (Box and Muller 1958) that depend on the key, the parent and the
+// child alone.
+float3 child_offset(uint key_low, uint key_high, uint parent, uint child) {
+  const uint4 bits = hash4((uint4)(parent, child, key_low, key_high));
+  // (0, 1]: the logarithm stays finite.
+  const float4 u = (convert_float4(bits >> 8) + 1.0f) * 5.9604644775390625e-8f;
+  const float2 radius = sqrt(-2.0f * log(u.xy));
+  const float2 angle = 6.283185307179586f * u.zw;
+  return (float3)(radius.x * cos(angle.x), radius.x * sin(angle.x), radius.y * cos(angle.y));
+}
+
+float3 rotate(float4 q, float3 v) {
+  // q = (real, i, j, k), normalised here as everywhere it is used.
+  q *= rsqrt(fmax(dot(q, q), 1e-30f));
+  const float3 t = 2.0f * cross(q.yzw, v);
+  return v + q.x * t + cross(q.yzw, t);
+}
+
+// Standard deviation of a trained scale parameter, and the way back.
+float scale_value(float parameter) {
+#if SCALE_SIGMOID
+  return 1.0f / (1.0f + exp(-parameter));
+#else
+  return exp(parameter);
+#endif
+}
+
+float scale_parameter(float value) {
+#if SCALE_SIGMOID
+  return log(value / (1.0f - value));
+#else
+  return log(value);
+#endif
+}
+
+// Gaussian i of the new set comes from source[i] of the old one in the role role[i]. The two
+// children of a split are drawn from the parent's own distribution and are smaller by split_factor.
+kernel void gather_gaussians(uint count,
+                             uint key_low,
+                             uint key_high,
+                             float split_factor,
+                             global const uint* source,
+                             global const uint* role,
+                             global const float* means,
+                             global const float* quaternions,
+                             global const float* scales,
+                             global const float* opacities,
+                             global const float* sh,
+                             global float* new_means,
+                             global float* new_quaternions,
+                             global float* new_scales,
+                             global float* new_opacities,
+                             global float* new_sh) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  const size_t from = source[i];
+  const size_t to = i;
+  float3 mean = vload3(from, means);
+  const float4 quaternion = vload4(from, quaternions);
+  float3 scale = vload3(from, scales);
+  if (role[i] >= ROLE_FIRST_CHILD) {
+    const float3 s = (float3)(scale_value(scale.x), scale_value(scale.y), scale_value(scale.z));
+    mean += rotate(quaternion,
+                   s * child_offset(key_low, key_high, (uint)from, role[i] - ROLE_FIRST_CHILD));
+    const float3 smaller = s / split_factor;
+    scale = (float3)(scale_parameter(smaller.x), scale_parameter(smaller.y),
+                     scale_parameter(smaller.z));
+  }
+  vstore3(mean, to, new_means);
+  vstore4(quaternion, to, new_quaternions);
+  vstore3(scale, to, new_scales);
+  new_opacities[to] = opacities[from];
+  for (uint k = 0; k < 3 * SH_COEFFICIENTS; ++k) {
+    new_sh[to * 3 * SH_COEFFICIENTS + k] = sh[from * 3 * SH_COEFFICIENTS + k];
+  }
+}
+
+// Lowers every opacity parameter to at most `limit` (a logit).
+kernel void limit_opacity(uint count, float limit, global float* opacities) {
+  const uint i = get_global_id(0);
+  if (i < count) opacities[i] = fmin(opacities[i], limit);
+}

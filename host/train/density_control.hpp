@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "device/context.hpp"
+#include "raysplats/train_options.hpp"
+#include "trace/device_gaussians.hpp"
+#include "train/density_plan.hpp"
+
+namespace raysplats {
+
+/// Adaptive density control (Kerbl et al. 2023, section 5): sums the screen-space gradient of every
+/// Gaussian on the device, and from time to time clones, splits and removes Gaussians. Everything
+/// random depends on the seed, the iteration and the Gaussian's index alone.
+class DensityControl {
+ public:
+  /// `extent` is the scene extent that the relative sizes of the options refer to.
+  DensityControl(Context& context, const TrainOptions& options, double extent);
+
+  /// Adds the statistics of one view; enqueues without waiting.
+  void accumulate(const DeviceGaussians& gaussians, const GaussianGradients& gradients);
+
+  /// Whether refine() is due after `iteration` (counted from 1), or resetting the opacities is.
+  bool refines_at(std::int64_t iteration) const;
+  bool resets_at(std::int64_t iteration) const;
+
+  /// Replaces `gaussians` by the new set and starts new statistics. The returned plan says where
+  /// each new Gaussian comes from, for whoever keeps state per Gaussian. Throws RuntimeError-coded
+  /// Error when no Gaussian is left.
+  DensityPlan refine(DeviceGaussians& gaussians, std::int64_t iteration);
+
+  /// Lowers opacities to opacity-reset-value.
+  void reset_opacities(DeviceGaussians& gaussians);
+
+  /// {summed signal, number of views} per Gaussian, for checkpoints. Empty before the first
+  /// accumulate().
+  const Buffer<float>& statistics() const { return statistics_; }
+  void restore_statistics(std::span<const float> statistics);
+
+ private:
+  void gather(DeviceGaussians& gaussians, const DensityPlan& plan, std::int64_t iteration);
+
+  Context& context_;
+  TrainOptions options_;
+  double extent_;
+  Buffer<float> statistics_;
+};
+
+}  // namespace raysplats

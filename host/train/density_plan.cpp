@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/density_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "train/morton_order.hpp"
+
+namespace raysplats {
+namespace {
+
+enum class Fate : std::uint8_t { kKeep, kClone, kSplit, kPrune };
+
+double sigmoid(double x) { return 1.0 / (1.0 + std::exp(-x)); }
+
+struct Candidate {
+  float score;
+  std::uint32_t index;
+};
+
+}  // namespace
+
+std::vector<std::uint32_t> DensityPlan::state_source() const {
+  std::vector<std::uint32_t> out(source);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (role[i] != static_cast<std::uint32_t>(DensityRole::kKeep)) out[i] = 0xffffffffu;
+  }
+  return out;
+}
+
+DensityPlan plan_density(std::span<const float> means,
+                         std::span<const float> scales,
+                         std::span<const float> opacities,
+                         std::span<const float> statistics,
+                         const DensityRules& rules) {
+  const std::size_t count = opacities.size();
+  DensityPlan plan;
+  std::vector<Fate> fates(count, Fate::kKeep);
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float parameter = std::max({scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]});
+    const double size = rules.activation == ScaleActivation::kExp
+                            ? std::exp(static_cast<double>(parameter))
+                            : sigmoid(parameter);
+    // A sum is finite when all of its terms are.
+    const float sum = means[3 * i] + means[3 * i + 1] + means[3 * i + 2] + scales[3 * i] +
+                      scales[3 * i + 1] + scales[3 * i + 2] + opacities[i];
+    const bool keep = std::isfinite(sum) && sigmoid(opacities[i]) >= rules.min_opacity &&
+                      (rules.max_size <= 0 || size <= rules.max_size) &&
+                      (rules.min_size <= 0 || size >= rules.min_size);
+    if (!keep) {
+      fates[i] = Fate::kPrune;
+      ++plan.pruned;
+      continue;
+    }
+    const float views = statistics[2 * i + 1];
+    const float score = views > 0 ? statistics[2 * i] / views : 0.0f;
+    if (views > 0 && score >= rules.gradient) {
+      candidates.push_back({score, static_cast<std::uint32_t>(i)});
+      fates[i] = size > rules.split_size ? Fate::kSplit : Fate::kClone;
+    }
+  }
+
+  const std::size_t survivors = count - plan.pruned;
+  const std::size_t room = rules.max_count > survivors ? rules.max_count - survivors : 0;
+  if (candidates.size() > room) {
+    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+      return a.score != b.score ? a.score > b.score : a.index < b.index;
+    });
+    plan.refused = candidates.size() - room;
+    for (std::size_t k = room; k < candidates.size(); ++k) fates[candidates[k].index] = Fate::kKeep;
+    candidates.resize(room);
+  }
+
+  plan.source.reserve(survivors + candidates.size());
+  plan.role.reserve(survivors + candidates.size());
+  const auto add = [&plan](std::uint32_t index, DensityRole role) {
+    plan.source.push_back(index);
+    plan.role.push_back(static_cast<std::uint32_t>(role));
+  };
+  for (const std::uint32_t i : morton_order(means)) {
+    switch (fates[i]) {
+      case Fate::kPrune:
+        break;
+      case Fate::kKeep:
+        add(i, DensityRole::kKeep);
+        break;
+      case Fate::kClone:
+        add(i, DensityRole::kKeep);
+        add(i, DensityRole::kClone);
+        ++plan.cloned;
+        break;
+      case Fate::kSplit:
+        add(i, DensityRole::kFirstChild);
+        add(i, DensityRole::kSecondChild);
+        ++plan.split;
+        break;
+    }
+  }
+  return plan;
+}
+
+}  // namespace raysplats

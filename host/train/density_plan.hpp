@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "raysplats/trace_options.hpp"
+
+namespace raysplats {
+
+/// What becomes of a Gaussian in the new set; cl/train/densify.cl names the same values.
+enum class DensityRole : std::uint32_t { kKeep = 0, kClone = 1, kFirstChild = 2, kSecondChild = 3 };
+
+/// Thresholds of one pass of density control, in world units.
+struct DensityRules {
+  double gradient = 0;  ///< densify at and above this mean signal
+  double split_size =
+      0;  ///< longest standard deviation above which a candidate is split, else cloned
+  double min_opacity = 0;  ///< remove below
+  double max_size = 0;     ///< remove above; 0 = off
+  double min_size = 0;     ///< remove below; 0 = off
+  std::size_t max_count = 0;
+  ScaleActivation activation = ScaleActivation::kExp;
+};
+
+/// The new set of Gaussians: entry i comes from source[i] in the role role[i]; ordered along the
+/// Morton curve of the sources' means.
+struct DensityPlan {
+  std::vector<std::uint32_t> source;
+  std::vector<std::uint32_t> role;  ///< DensityRole
+  std::size_t cloned = 0;
+  std::size_t split = 0;
+  std::size_t pruned = 0;
+  std::size_t refused = 0;  ///< candidates left as they are because of max_count
+  /// source[i] where i keeps its state, 0xffffffff where it is new.
+  std::vector<std::uint32_t> state_source() const;
+  bool changes() const { return cloned + split + pruned > 0; }
+};
+
+/// Decides from host copies of the parameters (means 3 N, scales 3 N and opacities N before
+/// activation) and of the statistics (2 N: summed signal, number of views). A Gaussian that is
+/// removed is no candidate; one with a parameter that is not finite is removed. Each candidate adds
+/// one Gaussian; under the cap the highest mean signals win, ties the lower index. Memory O(N),
+/// time O(N log N).
+DensityPlan plan_density(std::span<const float> means,
+                         std::span<const float> scales,
+                         std::span<const float> opacities,
+                         std::span<const float> statistics,
+                         const DensityRules& rules);
+
+}  // namespace raysplats

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/initialization.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <numeric>
+
+#include "base/rng.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::uint64_t kPointStream =
+    0x706f696e7473;  // random streams of one seed are told apart by a constant
+constexpr double kShBand0 = 0.28209479177387814;  // 1 / (2 sqrt(pi))
+constexpr double kMinScale = 1e-4;                // of the scene extent
+constexpr double kMaxScale = 0.1;
+constexpr std::size_t kNeighbours = 3;
+
+// Balanced k-d tree laid out in place: the median of a range is its node, its halves are the
+// children.
+class KdTree {
+ public:
+  explicit KdTree(std::span<const float> positions)
+      : positions_(positions), order_(positions.size() / 3) {
+    std::iota(order_.begin(), order_.end(), 0u);
+    axis_.resize(order_.size());
+    build(0, order_.size());
+  }
+
+  // Mean distance from point `index` to its nearest neighbours.
+  float mean_distance(std::uint32_t index) const {
+    Nearest nearest{};
+    nearest.fill(std::numeric_limits<float>::infinity());
+    search(index, 0, order_.size(), nearest);
+    double sum = 0;
+    std::size_t found = 0;
+    for (float squared : nearest) {
+      if (!std::isfinite(squared)) continue;
+      sum += std::sqrt(static_cast<double>(squared));
+      ++found;
+    }
+    return found > 0 ? static_cast<float>(sum / static_cast<double>(found)) : 0.0f;
+  }
+
+ private:
+  using Nearest = std::array<float, kNeighbours>;  // squared distances, ascending
+
+  float coordinate(std::uint32_t point, int axis) const {
+    return positions_[3 * static_cast<std::size_t>(point) + static_cast<std::size_t>(axis)];
+  }
+
+  void build(std::size_t begin, std::size_t end) {
+    if (end - begin < 2) return;
+    std::array<float, 3> low{}, high{};
+    low.fill(std::numeric_limits<float>::infinity());
+    high.fill(-std::numeric_limits<float>::infinity());
+    for (std::size_t i = begin; i < end; ++i) {
+      for (int a = 0; a < 3; ++a) {
+        const auto axis = static_cast<std::size_t>(a);
+        low[axis] = std::min(low[axis], coordinate(order_[i], a));
+        high[axis] = std::max(high[axis], coordinate(order_[i], a));
+      }
+    }
+    int axis = 0;
+    for (int a = 1; a < 3; ++a) {
+      const auto i = static_cast<std::size_t>(a), best = static_cast<std::size_t>(axis);
+      if (high[i] - low[i] > high[best] - low[best]) axis = a;
+    }
+    const std::size_t middle = begin + (end - begin) / 2;
+    const auto at = [this](std::size_t i) {
+      return order_.begin() + static_cast<std::ptrdiff_t>(i);
+    };
+    std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
+      return coordinate(a, axis) < coordinate(b, axis);
+    });
+    axis_[middle] = static_cast<std::uint8_t>(axis);
+    build(begin, middle);
+    build(middle + 1, end);
+  }
+
+  void search(std::uint32_t index, std::size_t begin, std::size_t end, Nearest& nearest) const {
+    if (begin >= end) return;
+    const std::size_t middle = begin + (end - begin) / 2;
+    const std::uint32_t point = order_[middle];
+    if (point != index) {
+      float squared = 0;
+      for (int a = 0; a < 3; ++a) {
+        const float d = coordinate(point, a) - coordinate(index, a);
+        squared += d * d;
+      }
+      for (std::size_t k = 0; k < kNeighbours; ++k) {
+        if (squared < nearest[k]) std::swap(squared, nearest[k]);
+      }
+    }
+    if (end - begin == 1) return;
+    const float offset = coordinate(index, axis_[middle]) - coordinate(point, axis_[middle]);
+    // Points equal to the median may lie on either side, hence "<=" below for the far side.
+    if (offset < 0) {
+      search(index, begin, middle, nearest);
+      if (offset * offset <= nearest.back()) search(index, middle + 1, end, nearest);
+    } else {
+      search(index, middle + 1, end, nearest);
+      if (offset * offset <= nearest.back()) search(index, begin, middle, nearest);
+    }
+  }
+
+  std::span<const float> positions_;
+  std::vector<std::uint32_t> order_;
+  std::vector<std::uint8_t> axis_;
+};
+
+glm::dvec3 view_axis(const Camera& camera) {
+  return glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1);
+}
+
+glm::dvec3 mean_center(std::span<const Camera> cameras) {
+  glm::dvec3 sum(0.0);
+  for (const Camera& camera : cameras) sum += camera.center();
+  return cameras.empty() ? sum : sum / static_cast<double>(cameras.size());
+}
+
+// At most `limit` of the model's Gaussians, evenly spread over their order.
+Gaussians subset(const Gaussians& model, std::size_t limit) {
+  if (model.size() <= limit) return model;
+  std::vector<std::uint32_t> indices(limit);
+  for (std::size_t i = 0; i < limit; ++i)
+    indices[i] = static_cast<std::uint32_t>(i * model.size() / limit);
+  return gathered(model, indices);
+}
+
+}  // namespace
+
+Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indices) {
+  Gaussians out;
+  out.sh_degree = model.sh_degree;
+  out.resize(indices.size());
+  const auto copy = [&](const std::vector<float>& from, std::vector<float>& to, std::size_t width) {
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(indices[i] * width), width,
+                  to.begin() + static_cast<std::ptrdiff_t>(i * width));
+    }
+  };
+  copy(model.means, out.means, 3);
+  copy(model.quaternions, out.quaternions, 4);
+  copy(model.log_scales, out.log_scales, 3);
+  copy(model.opacities, out.opacities, 1);
+  copy(model.sh, out.sh, static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree)));
+  return out;
+}
+
+double scene_extent(std::span<const Camera> cameras) {
+  const glm::dvec3 center = mean_center(cameras);
+  double radius = 0;
+  for (const Camera& camera : cameras)
+    radius = std::max(radius, glm::distance(camera.center(), center));
+  return radius > 1e-6 ? 1.1 * radius : 1.0;
+}
+
+Region visible_region(std::span<const Camera> cameras) {
+  const Region around{mean_center(cameras), 3.0 * scene_extent(cameras)};
+  // Least squares over the distances to the view axes: sum (I - d d^T) p = sum (I - d d^T) c.
+  glm::dmat3 normal(0.0);
+  glm::dvec3 right(0.0);
+  for (const Camera& camera : cameras) {
+    const glm::dvec3 d = view_axis(camera);
+    const glm::dmat3 projector = glm::dmat3(1.0) - glm::outerProduct(d, d);
+    normal += projector;
+    right += projector * camera.center();
+  }
+  const auto count = static_cast<double>(cameras.size());
+  // Parallel axes leave the depth open.
+  if (cameras.size() < 2 || std::abs(glm::determinant(normal)) < 1e-4 * count * count * count)
+    return around;
+  const glm::dvec3 target = glm::inverse(normal) * right;
+  std::vector<double> half_sides;
+  for (const Camera& camera : cameras) {
+    const double depth = glm::dot(target - camera.center(), view_axis(camera));
+    if (depth <= 0) continue;
+    half_sides.push_back(depth *
+                         std::min(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy));
+  }
+  if (4 * half_sides.size() < 3 * cameras.size()) return around;
+  const auto middle = half_sides.begin() + static_cast<std::ptrdiff_t>(half_sides.size() / 2);
+  std::nth_element(half_sides.begin(), middle, half_sides.end());
+  return {target, *middle};
+}
+
+std::vector<float> neighbour_distances(std::span<const float> positions) {
+  const KdTree tree(positions);
+  std::vector<float> out(positions.size() / 3);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = tree.mean_distance(static_cast<std::uint32_t>(i));
+  return out;
+}
+
+Gaussians gaussians_from_points(const PointCloud& points,
+                                int sh_degree,
+                                double opacity,
+                                double extent) {
+  PointCloud finite;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
+    finite.positions.insert(finite.positions.end(), p, p + 3);
+    finite.colors.insert(finite.colors.end(), points.colors.data() + 3 * i,
+                         points.colors.data() + 3 * i + 3);
+  }
+  Gaussians model;
+  model.sh_degree = sh_degree;
+  model.resize(finite.size());
+  const std::vector<float> distances = neighbour_distances(finite.positions);
+  const auto stride = static_cast<std::size_t>(3 * sh_coefficients(sh_degree));
+  const auto logit = static_cast<float>(std::log(opacity / (1.0 - opacity)));
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const double scale =
+        std::clamp(static_cast<double>(distances[i]), kMinScale * extent, kMaxScale * extent);
+    for (std::size_t a = 0; a < 3; ++a) {
+      model.means[3 * i + a] = finite.positions[3 * i + a];
+      model.log_scales[3 * i + a] = static_cast<float>(std::log(scale));
+      model.sh[stride * i + a] = static_cast<float>((finite.colors[3 * i + a] - 0.5) / kShBand0);
+    }
+    model.opacities[i] = logit;
+  }
+  return model;
+}
+
+PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed) {
+  CounterRng rng(seed, kPointStream);
+  PointCloud out;
+  out.positions.reserve(3 * count);
+  out.colors.reserve(3 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (int a = 0; a < 3; ++a) {
+      out.positions.push_back(
+          static_cast<float>(region.center[a] + region.half_side * (2.0 * rng.uniform() - 1.0)));
+    }
+    for (int a = 0; a < 3; ++a)
+      out.colors.push_back(static_cast<float>(0.5 + 0.1 * (rng.uniform() - 0.5)));
+  }
+  return out;
+}
+
+Gaussians initial_model(const Dataset& dataset,
+                        std::span<const Camera> cameras,
+                        const TrainOptions& options) {
+  const auto limit = static_cast<std::size_t>(options.max_gaussians);
+  const bool has_points = dataset.points.size() > 0;
+  if (options.init == "colmap" && !has_points) {
+    throw UsageError(
+        fmt::format("The data set {} has no sparse points to start from: use --init random",
+                    dataset.root.string()));
+  }
+  if (options.init != "auto" && options.init != "colmap" && options.init != "random") {
+    return subset(with_sh_degree(read_ply(options.init), options.sh_degree), limit);
+  }
+  const double extent = scene_extent(cameras);
+  if (has_points && options.init != "random") {
+    return subset(
+        gaussians_from_points(dataset.points, options.sh_degree, options.init_opacity, extent),
+        limit);
+  }
+  const std::size_t count = std::min(limit, static_cast<std::size_t>(options.init_count));
+  return gaussians_from_points(random_points(visible_region(cameras), count, options.seed),
+                               options.sh_degree, options.init_opacity, extent);
+}
+
+}  // namespace raysplats

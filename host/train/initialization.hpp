@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/gaussians.hpp"
+#include "raysplats/train_options.hpp"
+
+namespace raysplats {
+
+/// Radius of the camera centres about their mean, times 1.1, as in 3DGS: the length that learning
+/// rates and size thresholds are relative to. Never below a small positive number.
+double scene_extent(std::span<const Camera> cameras);
+
+/// An axis-aligned cube, world units.
+struct Region {
+  glm::dvec3 center{0.0};
+  double half_side = 1.0;
+};
+
+/// Where a random start puts its Gaussians. When most cameras look at a common point (the point
+/// nearest to all view axes in the least-squares sense lies in front of at least 3 of 4 cameras) it
+/// is the cube about that point that the median camera sees at the point's depth; otherwise the
+/// cube of three scene extents about the mean camera centre.
+Region visible_region(std::span<const Camera> cameras);
+
+/// Mean distance from each of N points (3 N numbers) to its three nearest neighbours (fewer when
+/// there are fewer points; 0 for a single one). k-d tree, O(N log N).
+std::vector<float> neighbour_distances(std::span<const float> positions);
+
+/// Isotropic Gaussians at the points: the scale is the mean distance of the three nearest
+/// neighbours, as in 3DGS, clamped to [1e-4, 0.1] of `extent`; band 0 holds the colours. Points
+/// that are not finite are left out.
+Gaussians gaussians_from_points(const PointCloud& points,
+                                int sh_degree,
+                                double opacity,
+                                double extent);
+
+/// `count` points uniform in the region, mid-grey with a little noise, a function of the seed.
+PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed);
+
+/// The Gaussians of the given indices, in their order.
+Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indices);
+
+/// The model a run starts from, by options.init, at most max_gaussians (an even subset of more).
+/// Throws UsageError when the data set has no points and `colmap` is asked for, DataError for a bad
+/// PLY.
+Gaussians initial_model(const Dataset& dataset,
+                        std::span<const Camera> cameras,
+                        const TrainOptions& options);
+
+}  // namespace raysplats

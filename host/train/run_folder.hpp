@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/gaussians.hpp"
+#include "raysplats/train_options.hpp"
+
+namespace raysplats {
+
+/// One row of metrics.csv.
+struct TrainRow {
+  std::int64_t iteration = 0;
+  double seconds = 0;  ///< of training, evaluation excluded
+  double loss = 0;
+  double psnr = 0;  ///< of the view just trained
+  std::size_t gaussians = 0;
+  double iterations_per_second = 0;
+};
+
+/// Mean over the test views at one iteration.
+struct EvaluationRow {
+  std::int64_t iteration = 0;
+  double training_seconds = 0;
+  double psnr = 0;
+  double ssim = 0;
+  std::size_t views = 0;
+  std::size_t gaussians = 0;
+};
+
+/// The folder of one training run: config.toml, cameras.json, metrics.csv, metrics.json,
+/// checkpoints/, eval/ and point_cloud/iteration_N/point_cloud.ply.
+class RunFolder {
+ public:
+  /// Makes the folder. Throws DataError when it cannot be written to.
+  explicit RunFolder(std::filesystem::path path);
+
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path evaluation_folder(std::int64_t iteration) const;
+
+  void write_config(const TrainOptions& options) const;
+  /// cameras.json as the viewers of 3DGS read it: centre and camera-to-world rotation of every
+  /// view.
+  void write_cameras(std::span<const Camera> cameras) const;
+  void write_model(const Gaussians& model, std::int64_t iteration) const;
+
+  /// Starts metrics.csv and the evaluations anew, keeping what was recorded up to `iteration` (0
+  /// keeps nothing).
+  void begin_metrics(std::int64_t iteration);
+  void append(const TrainRow& row);
+  void record(const EvaluationRow& row);
+  const std::vector<EvaluationRow>& evaluations() const { return evaluations_; }
+  /// metrics.json: the evaluations, and `summary` when the run is over or interrupted.
+  void write_metrics(const nlohmann::json& summary) const;
+
+ private:
+  std::filesystem::path path_;
+  std::vector<EvaluationRow> evaluations_;
+};
+
+}  // namespace raysplats

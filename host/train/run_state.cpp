@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/run_state.hpp"
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "raysplats/error.hpp"
+#include "raysplats/gaussians.hpp"
+
+namespace raysplats {
+namespace {
+
+const char* activation_name(ScaleActivation activation) {
+  return activation == ScaleActivation::kExp ? "exp" : "sigmoid";
+}
+
+std::size_t group_width(ParameterGroup group, int sh_degree) {
+  switch (group) {
+    case ParameterGroup::kMeans:
+    case ParameterGroup::kScales:
+      return 3;
+    case ParameterGroup::kQuaternions:
+      return 4;
+    case ParameterGroup::kOpacities:
+      return 1;
+    case ParameterGroup::kSh:
+      break;
+  }
+  return static_cast<std::size_t>(3 * sh_coefficients(sh_degree));
+}
+
+template <class Model>
+auto& group_buffer(Model& gaussians, ParameterGroup group) {
+  switch (group) {
+    case ParameterGroup::kMeans:
+      return gaussians.means;
+    case ParameterGroup::kQuaternions:
+      return gaussians.quaternions;
+    case ParameterGroup::kScales:
+      return gaussians.scales;
+    case ParameterGroup::kOpacities:
+      return gaussians.opacities;
+    case ParameterGroup::kSh:
+      break;
+  }
+  return gaussians.sh;
+}
+
+const std::vector<float>& section(const Checkpoint& checkpoint,
+                                  const std::string& name,
+                                  std::size_t size) {
+  const auto found = checkpoint.sections.find(name);
+  if (found == checkpoint.sections.end() || found->second.size() != size) {
+    throw DataError(fmt::format(
+        "The checkpoint of iteration {} lacks {} numbers in '{}': resume from another one",
+        checkpoint.iteration, size, name));
+  }
+  return found->second;
+}
+
+}  // namespace
+
+void store_state(const DeviceGaussians& gaussians,
+                 const Adam& adam,
+                 const DensityControl& density,
+                 Checkpoint& checkpoint) {
+  checkpoint.count = gaussians.count;
+  checkpoint.sh_degree = gaussians.sh_degree;
+  checkpoint.active_sh_degree = gaussians.active_sh_degree;
+  checkpoint.scale_activation = activation_name(gaussians.activation);
+  checkpoint.optimiser_steps = adam.steps();
+  for (const ParameterGroup group : kParameterGroups) {
+    const std::string name = group_name(group);
+    checkpoint.sections[name] = group_buffer(gaussians, group).download();
+    checkpoint.sections[name + ".first"] = adam.first_moment(group).download();
+    checkpoint.sections[name + ".second"] = adam.second_moment(group).download();
+  }
+  checkpoint.sections["density"] =
+      density.statistics().size() > 0 ? density.statistics().download() : std::vector<float>();
+}
+
+void restore_state(Context& context,
+                   const Checkpoint& checkpoint,
+                   const TrainOptions& options,
+                   DeviceGaussians& gaussians,
+                   Adam& adam,
+                   DensityControl& density) {
+  if (checkpoint.sh_degree != options.sh_degree ||
+      checkpoint.scale_activation != activation_name(options.scale_activation)) {
+    throw UsageError(
+        fmt::format("The checkpoint has SH degree {} and scale activation {}, but the options say "
+                    "{} and {}: resume with the "
+                    "configuration of the run",
+                    checkpoint.sh_degree, checkpoint.scale_activation, options.sh_degree,
+                    activation_name(options.scale_activation)));
+  }
+  const std::size_t count = checkpoint.count;
+  gaussians = DeviceGaussians();
+  gaussians.count = count;
+  gaussians.sh_degree = checkpoint.sh_degree;
+  gaussians.active_sh_degree = checkpoint.active_sh_degree;
+  gaussians.activation = options.scale_activation;
+  adam.initialize(count, checkpoint.sh_degree);
+  for (const ParameterGroup group : kParameterGroups) {
+    const std::string name = group_name(group);
+    const std::size_t size = count * group_width(group, checkpoint.sh_degree);
+    Buffer<float> buffer(context, size, name);
+    buffer.upload(section(checkpoint, name, size));
+    group_buffer(gaussians, group) = std::move(buffer);
+    adam.restore(group, section(checkpoint, name + ".first", size),
+                 section(checkpoint, name + ".second", size));
+  }
+  adam.set_steps(checkpoint.optimiser_steps);
+  const auto statistics = checkpoint.sections.find("density");
+  const bool accumulated = statistics != checkpoint.sections.end() && !statistics->second.empty();
+  density.restore_statistics(accumulated ? section(checkpoint, "density", 2 * count)
+                                         : std::vector<float>());
+}
+
+}  // namespace raysplats

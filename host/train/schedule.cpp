@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/schedule.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "base/rng.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::uint64_t kViewStream = 0x7669657773;
+constexpr std::uint64_t kBackgroundStream = 0x6261636b;
+
+}  // namespace
+
+double learning_rate(const LearningRate& rate,
+                     const TrainOptions& options,
+                     std::int64_t iteration) {
+  if (rate.initial <= 0) return 0.0;
+  if (options.lr_decay > 0) {
+    const double decayed =
+        rate.initial * std::exp(-options.lr_decay * static_cast<double>(iteration));
+    return rate.final_value < rate.initial ? std::max(decayed, rate.final_value) : rate.initial;
+  }
+  const auto last = static_cast<double>(std::max<std::int64_t>(options.iterations - 1, 1));
+  const double share = std::min(static_cast<double>(iteration) / last, 1.0);
+  return rate.initial * std::pow(rate.final_value / rate.initial, share);
+}
+
+int active_sh_degree(const TrainOptions& options, std::int64_t iteration) {
+  if (options.sh_degree_interval == 0) return options.sh_degree;
+  return static_cast<int>(
+      std::min<std::int64_t>(options.sh_degree, iteration / options.sh_degree_interval));
+}
+
+int resolution_divisor(const TrainOptions& options, std::int64_t iteration) {
+  const auto& schedule = options.resolution_schedule;
+  const auto passed =
+      std::upper_bound(schedule.begin(), schedule.end(), iteration) - schedule.begin();
+  return 1 << (static_cast<std::ptrdiff_t>(schedule.size()) - passed);
+}
+
+std::array<float, 3> step_background(const TrainOptions& options,
+                                     bool cut_out,
+                                     const std::array<float, 3>& constant,
+                                     std::int64_t iteration) {
+  if (options.background != "random") return constant;
+  if (!cut_out) return {0.0f, 0.0f, 0.0f};
+  CounterRng rng(options.seed, kBackgroundStream, 3 * static_cast<std::uint64_t>(iteration));
+  std::array<float, 3> color{};
+  for (float& channel : color) channel = static_cast<float>(rng.uniform());
+  return color;
+}
+
+std::size_t ViewOrder::at(std::int64_t iteration) {
+  const auto views = static_cast<std::int64_t>(permutation_.size());
+  if (iteration / views != epoch_) {
+    epoch_ = iteration / views;
+    std::iota(permutation_.begin(), permutation_.end(), std::size_t{0});
+    CounterRng rng(seed_, kViewStream + static_cast<std::uint64_t>(epoch_));
+    for (std::size_t i = permutation_.size(); i > 1; --i)
+      std::swap(permutation_[i - 1], permutation_[rng.below(i)]);
+  }
+  position_ = static_cast<std::size_t>(iteration % views);
+  return permutation_[position_];
+}
+
+std::span<const std::size_t> ViewOrder::upcoming(std::size_t count) const {
+  const std::span<const std::size_t> all(permutation_);
+  return all.subspan(position_ + 1, std::min(count, all.size() - position_ - 1));
+}
+
+}  // namespace raysplats

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "raysplats/train_options.hpp"
+
+namespace raysplats {
+
+/// What changes with the iteration, as pure functions of it, so that a resumed run continues
+/// exactly. Iterations are counted from 0: the first step of a run is iteration 0.
+
+/// Learning rate of a group. With lr-decay = d > 0: initial * exp(-d * iteration) until it meets
+/// the final value; with 0: geometric interpolation that reaches the final value in the last
+/// iteration, as in 3DGS.
+double learning_rate(const LearningRate& rate, const TrainOptions& options, std::int64_t iteration);
+
+/// Degree of the SH bands that are switched on.
+int active_sh_degree(const TrainOptions& options, std::int64_t iteration);
+
+/// 2^k by which the image size is divided (resolution-schedule).
+int resolution_divisor(const TrainOptions& options, std::int64_t iteration);
+
+/// Background of a step: `constant` unless the option is "random" and the photos are cut out by
+/// their alpha.
+std::array<float, 3> step_background(const TrainOptions& options,
+                                     bool cut_out,
+                                     const std::array<float, 3>& constant,
+                                     std::int64_t iteration);
+
+/// Order in which views are trained: a new random permutation for every pass over them.
+class ViewOrder {
+ public:
+  ViewOrder(std::uint64_t seed, std::size_t views) : seed_(seed), permutation_(views) {}
+  /// Position in [0, views) of the view of an iteration.
+  std::size_t at(std::int64_t iteration);
+  /// The views of the iterations after the last one asked for, at most `count` and up to the end of
+  /// the pass.
+  std::span<const std::size_t> upcoming(std::size_t count) const;
+
+ private:
+  std::uint64_t seed_;
+  std::int64_t epoch_ = -1;
+  std::size_t position_ = 0;
+  std::vector<std::size_t> permutation_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+
+#include "raysplats/train_options.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace raysplats {
+
+/// Registers every key of TrainOptions as an option of `app` (a subcommand), and `--config FILE`.
+/// Values of the file count where the command line says nothing. `options` has to outlive the app's
+/// parse. Parsing throws UsageError for values and files that are wrong.
+void add_train_options(CLI::App& app, TrainOptions& options);
+
+/// Reads a TOML file of flat keys (a [train] table is allowed) into the options of an app parsed
+/// before, leaving those that were given on its command line. Throws UsageError for an unknown key,
+/// naming the nearest known one.
+void apply_config_file(CLI::App& app, TrainOptions& options, const std::filesystem::path& path);
+
+/// Reads a configuration file into `options`.
+void read_train_config(const std::filesystem::path& path, TrainOptions& options);
+
+/// The options as a configuration file with every key and what it means.
+std::string to_toml(const TrainOptions& options);
+
+/// Throws UsageError for combinations that cannot be trained.
+void validate(const TrainOptions& options);
+
+/// The constant colour behind the Gaussians in evaluations, and in training unless it is "random";
+/// `cut_out` says that the photos are composited by their alpha. Throws UsageError for a text that
+/// is no colour.
+std::array<float, 3> background_color(const TrainOptions& options, bool cut_out);
+
+}  // namespace raysplats

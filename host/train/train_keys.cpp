@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/train_keys.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <type_traits>
+#include <utility>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+using Values = std::vector<std::string>;
+
+constexpr double kHuge = 1e30;
+constexpr double kMaxCount = 1e15;
+
+template <class T>
+T parse_number(const std::string& key, const std::string& text, double low, double high) {
+  T value{};
+  const char* end = text.data() + text.size();
+  const auto [next, error] = std::from_chars(text.data(), end, value);
+  const auto number = static_cast<double>(value);
+  if (error != std::errc() || next != end || !std::isfinite(number) || number < low ||
+      number > high) {
+    throw UsageError(fmt::format("The option '{}' needs {} between {:g} and {:g}, not '{}'", key,
+                                 std::is_integral_v<T> ? "a whole number" : "a number", low, high,
+                                 text));
+  }
+  return value;
+}
+
+const std::string& single(const std::string& key, const Values& values) {
+  if (values.size() != 1) {
+    throw UsageError(fmt::format("The option '{}' takes one value, not {}", key, values.size()));
+  }
+  return values.front();
+}
+
+// Collects the table; every function adds one key.
+class Table {
+ public:
+  void section(std::string name) { section_ = std::move(name); }
+
+  template <class T>
+  void number(
+      const std::string& name, T& target, double low, double high, const std::string& help) {
+    add(
+        name, help, false,
+        [name, &target, low, high](const Values& values) {
+          target = parse_number<T>(name, single(name, values), low, high);
+        },
+        [&target] { return fmt::format("{}", target); });
+  }
+
+  void flag(const std::string& name, bool& target, const std::string& help) {
+    add(
+        name, help, true,
+        [name, &target](const Values& values) {
+          const std::string& text = single(name, values);
+          if (text != "true" && text != "false") {
+            throw UsageError(fmt::format("The option '{}' is true or false, not '{}'", name, text));
+          }
+          target = text == "true";
+        },
+        [&target] { return std::string(target ? "true" : "false"); });
+  }
+
+  template <class E>
+  void choice(const std::string& name,
+              E& target,
+              const std::vector<std::pair<std::string, E>>& names,
+              const std::string& help) {
+    add(
+        name, help, false,
+        [name, &target, names](const Values& values) {
+          const std::string& text = single(name, values);
+          std::vector<std::string> known;
+          for (const auto& [label, value] : names) {
+            if (label == text) {
+              target = value;
+              return;
+            }
+            known.push_back(label);
+          }
+          throw UsageError(
+              fmt::format("The option '{}' is {}, not '{}'", name, fmt::join(known, " or "), text));
+        },
+        [&target, names] {
+          for (const auto& [label, value] : names) {
+            if (value == target) return fmt::format("\"{}\"", label);
+          }
+          return std::string();
+        });
+  }
+
+  void text(const std::string& name, std::string& target, const std::string& help) {
+    // A list of numbers may arrive split at its commas.
+    add(
+        name, help, false,
+        [&target](const Values& values) { target = fmt::format("{}", fmt::join(values, ",")); },
+        [&target] { return fmt::format("\"{}\"", target); });
+  }
+
+  void iterations(const std::string& name,
+                  std::vector<std::int64_t>& target,
+                  const std::string& help) {
+    add(
+        name, help, false,
+        [name, &target](const Values& values) {
+          std::vector<std::int64_t> parsed;
+          for (const std::string& value : values) {
+            std::size_t begin = 0;
+            while (begin < value.size()) {
+              const std::size_t comma = std::min(value.find(',', begin), value.size());
+              parsed.push_back(parse_number<std::int64_t>(name, value.substr(begin, comma - begin),
+                                                          1, kMaxCount));
+              begin = comma + 1;
+            }
+          }
+          target = std::move(parsed);
+        },
+        [&target] { return fmt::format("[{}]", fmt::join(target, ", ")); });
+  }
+
+  void learning_rate(const std::string& name, LearningRate& rate, const std::string& help) {
+    number(name, rate.initial, 0, 1e3, "learning rate of " + help);
+    number(name + "-final", rate.final_value, 0, 1e3, "value that " + name + " decays to");
+  }
+
+  std::vector<TrainKey> take() { return std::move(keys_); }
+
+ private:
+  void add(const std::string& name,
+           const std::string& help,
+           bool flag,
+           std::function<void(const Values&)> set,
+           std::function<std::string()> text) {
+    keys_.push_back({name, section_, help, flag, std::move(set), std::move(text)});
+  }
+
+  std::string section_;
+  std::vector<TrainKey> keys_;
+};
+
+}  // namespace
+
+std::vector<TrainKey> train_keys(TrainOptions& o) {
+  Table t;
+  t.section("Run");
+  t.number("iterations", o.iterations, 0, kMaxCount, "training steps, one view each");
+  t.number("seed", o.seed, 0, 1.8e19,
+           "seed of view order, random start and splits; a run is a function of it");
+
+  t.section("Data");
+  t.number("downscale", o.downscale, 0.01, 1e4, "photos are reduced by this factor");
+  t.number("test-every", o.test_every, 0, 1e9,
+           "every n-th view is held out when the data set has no split of its own; 0 = none");
+  t.text("background", o.background,
+         "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
+         "alpha, else black) or "
+         "\"random\" (another colour per iteration for cut-out photos, else black)");
+  t.number("image-budget", o.image_budget, 1, 1e9,
+           "MiB of photos kept on the device; the others are decoded again when their turn comes");
+  t.iterations("resolution-schedule", o.resolution_schedule,
+               "iterations at which the image size doubles: n entries start at 1/2^n of the size; "
+               "[] = full size");
+
+  t.section("Start");
+  t.text("init", o.init,
+         "\"colmap\" (sparse points of the data set), \"random\" (the region that the cameras "
+         "see), the path of a "
+         "3DGS PLY, or \"auto\" (points when there are any, else random)");
+  t.number("init-count", o.init_count, 1, 1e9, "Gaussians of a random start");
+  t.number("init-opacity", o.init_opacity, 1e-4, 0.9999,
+           "opacity of the first Gaussians (not of a PLY)");
+
+  t.section("Model");
+  t.number("sh-degree", o.sh_degree, 0, 4,
+           "degree of the spherical harmonics of colour; 0 = plain RGB");
+  t.number("sh-degree-interval", o.sh_degree_interval, 0, kMaxCount,
+           "one more band is switched on every so many iterations; 0 = all from the start");
+  t.choice<ScaleActivation>(
+      "scale-activation", o.scale_activation,
+      {{"exp", ScaleActivation::kExp}, {"sigmoid", ScaleActivation::kSigmoid}},
+      "standard deviation from the trained number: exp (3DGS) or sigmoid (the paper; below 1)");
+
+  t.section("Loss");
+  t.choice<PixelLoss>("pixel-loss", o.pixel_loss, {{"l1", PixelLoss::kL1}, {"l2", PixelLoss::kL2}},
+                      "pixel term: l1 (mean absolute error) or l2 (mean squared error)");
+  t.number("ssim-weight", o.ssim_weight, 0, 1,
+           "lambda in (1 - lambda) pixel term + lambda (1 - SSIM)");
+
+  t.section("Optimiser (Adam)");
+  t.learning_rate("position-lr", o.position_lr, "the means, times the scene extent");
+  t.learning_rate("rotation-lr", o.rotation_lr, "the quaternions");
+  t.learning_rate("scale-lr", o.scale_lr, "the scale parameters");
+  t.learning_rate("opacity-lr", o.opacity_lr, "the opacity parameters");
+  t.learning_rate("sh-lr", o.sh_lr, "colour (SH band 0)");
+  t.learning_rate("sh-rest-lr", o.sh_rest_lr, "the SH bands above 0");
+  t.number("lr-decay", o.lr_decay, 0, 1,
+           "rates fall as exp(-lr-decay * iteration) until they meet their final value; 0 = they "
+           "reach it "
+           "exponentially in the last iteration");
+  t.flag("scale-lr-by-extent", o.scale_lr_by_extent,
+         "multiply scale-lr by the scene extent, as the paper's code");
+  t.number("adam-beta1", o.adam_beta1, 0, 0.999999, "decay of the first moment");
+  t.number("adam-beta2", o.adam_beta2, 0, 0.9999999, "decay of the second moment");
+  t.number("adam-epsilon", o.adam_epsilon, 1e-30, 1, "added to the root of the second moment");
+  t.flag("sparse-adam", o.sparse_adam, "leave Gaussians alone that no ray of the view met");
+
+  t.section("Ray tracing");
+  t.choice<HitOrder>("hit-order", o.hit_order,
+                     {{"entry", HitOrder::kEntry}, {"peak", HitOrder::kPeak}},
+                     "depth that orders a ray's hits: entry (near side of the ellipsoid, the "
+                     "paper) or peak (strongest "
+                     "response)");
+  t.number("quantile", o.quantile, 0.01, 100,
+           "squared radius of the ellipsoids in standard deviations (chi^2(3))");
+  t.number("min-transmittance", o.min_transmittance, 0, 0.5,
+           "a ray stops below this transmittance");
+  t.number("max-hits", o.max_hits, 1, 1e6,
+           "a ray stops after so many hits; rays that do are reported");
+  t.flag("adaptive-radius", o.adaptive_radius,
+         "shrink the ellipsoids to where they contribute at least 1/255");
+  t.number("near", o.near_depth, 0, kHuge,
+           "Gaussians nearer to the camera plane are skipped; 0 = off");
+  t.number("packet-width", o.packet_width, 0, 16,
+           "rays per work-item: 1, 2, 4, 8 or 16; 0 = fit to the device");
+  t.number("memory-budget", o.memory_budget, 1, 1e9,
+           "MiB for hit lists; above it they are computed again");
+  t.number("rebuild-every", o.rebuild_every, 1, 1e9,
+           "iterations between rebuilds of the tree; refits in between");
+
+  t.section("Density control");
+  t.number("densify-from", o.densify_from, 0, kMaxCount,
+           "first iteration that may add or remove Gaussians");
+  t.number("densify-until", o.densify_until, 0, kMaxCount, "last iteration that may; 0 = never");
+  t.number("densify-every", o.densify_every, 1, kMaxCount, "iterations between two passes");
+  t.number("densify-grad-threshold", o.densify_grad_threshold, 0, kHuge,
+           "mean screen-space gradient above which a Gaussian is cloned or split");
+  t.choice<DensifySignal>(
+      "densify-signal", o.densify_signal,
+      {{"screen", DensifySignal::kScreen}, {"absolute", DensifySignal::kAbsolute}},
+      "that gradient summed as it is (screen, 3DGS) or in absolute value per ray (absolute, AbsGS; "
+      "wants a threshold 2 to 4 times higher)");
+  t.number("densify-size", o.densify_size, 0, kHuge,
+           "larger ones (times the scene extent) are split, smaller ones cloned");
+  t.number("split-factor", o.split_factor, 1, 100,
+           "children of a split are smaller by this factor");
+  t.number("prune-opacity", o.prune_opacity, 0, 1, "Gaussians below this opacity are removed");
+  t.number("prune-scale", o.prune_scale, 0, kHuge,
+           "Gaussians with a larger axis (times the scene extent) are removed; 0 = none");
+  t.number(
+      "prune-scale-min", o.prune_scale_min, 0, kHuge,
+      "Gaussians whose longest axis is below this (times the scene extent) are removed; 0 = none");
+  t.number("max-gaussians", o.max_gaussians, 1, 2e9,
+           "hard limit of the count; the strongest candidates win");
+  t.number("opacity-reset-every", o.opacity_reset_every, 0, kMaxCount,
+           "opacities are lowered to opacity-reset-value every so many iterations until "
+           "densify-until; 0 = never");
+  t.number("opacity-reset-value", o.opacity_reset_value, 1e-4, 0.9999, "opacity after a reset");
+
+  t.section("Reports and files");
+  t.number("log-every", o.log_every, 1, kMaxCount,
+           "iterations between rows of metrics.csv and the progress line");
+  t.number("eval-every", o.eval_every, 0, kMaxCount,
+           "iterations between evaluations of the test views; 0 = none");
+  t.iterations("eval-at", o.eval_at, "further iterations to evaluate at; the last one always is");
+  t.number("eval-views", o.eval_views, 0, 1e9,
+           "test views of an evaluation before the last; 0 = all");
+  t.number("eval-renders", o.eval_renders, 0, 1e9,
+           "test views written as pictures beside the photo per evaluation");
+  t.iterations("save-at", o.save_at,
+               "iterations at which the PLY is written; after the last one it always is");
+  t.number("checkpoint-every", o.checkpoint_every, 0, kMaxCount,
+           "iterations between checkpoints; 0 = only the last");
+  t.number("keep-checkpoints", o.keep_checkpoints, 1, 1e9, "checkpoints kept in the run folder");
+  return t.take();
+}
+
+}  // namespace raysplats

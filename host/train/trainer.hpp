@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "device/context.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/train_options.hpp"
+#include "trace/device_gaussians.hpp"
+#include "train/run_folder.hpp"
+
+namespace raysplats {
+
+struct TrainSummary {
+  std::int64_t iterations = 0;
+  std::size_t gaussians = 0;
+  double loss = 0;              ///< of the last view trained
+  double training_seconds = 0;  ///< evaluation and files excluded
+  double evaluation_seconds = 0;
+  std::vector<EvaluationRow>
+      evaluations;  ///< the last one is that of the final model, when there are test views
+};
+
+/// Trains a model of a data set (docs/training.md) and writes a run folder. A run is a function of
+/// data set, options and device: resumed from a checkpoint it continues bit for bit.
+class Trainer {
+ public:
+  /// Throws UsageError for options that cannot be trained, ResourceError when the device has too
+  /// little memory, DataError when the run folder cannot be written to.
+  Trainer(Context& context,
+          Dataset dataset,
+          const TrainOptions& options,
+          std::filesystem::path run_folder);
+  ~Trainer();
+
+  /// Continues from the newest valid checkpoint of a run folder, or from a checkpoint file, instead
+  /// of starting anew. Throws UsageError when it does not fit the options, DataError when there is
+  /// none.
+  void resume(const std::filesystem::path& source);
+
+  /// Trains up to options.iterations. SIGINT and SIGTERM finish the iteration, save a checkpoint
+  /// and the model and throw Error(kInterrupted). A loss that is not finite throws Error(kRuntime)
+  /// naming the iteration.
+  TrainSummary run(bool show_progress = true);
+
+  /// The model as it is now; completed iterations.
+  const DeviceGaussians& gaussians() const;
+  std::int64_t iteration() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "raysplats/trace_options.hpp"
+
+namespace raysplats {
+
+/// Pixel term of the training loss.
+enum class PixelLoss {
+  kL1,  ///< mean absolute error (3DGS)
+  kL2,  ///< mean squared error (the paper)
+};
+
+/// Gradient statistic that decides which Gaussians are densified.
+enum class DensifySignal {
+  kScreen,    ///< norm of the summed screen-space gradient (3DGS)
+  kAbsolute,  ///< norm of the sum of absolute per-ray gradients (AbsGS, Ye et al. 2024)
+};
+
+/// Learning rate of one parameter group: `initial` decays exponentially to `final_value`.
+struct LearningRate {
+  double initial = 0;
+  double final_value = 0;
+};
+
+/// Everything that decides how a model is trained. The defaults are those of configs/default.toml;
+/// every member is a key of the configuration files and an option of `raysplats train` (the name
+/// with dashes).
+struct TrainOptions {
+  // Run
+  std::int64_t iterations = 30000;
+  std::uint64_t seed = 42;
+
+  // Data
+  double downscale = 1.0;
+  int test_every = 8;
+  std::string background = "auto";   ///< "auto", "random" or "r,g,b"
+  std::int64_t image_budget = 1024;  ///< MiB
+  std::vector<std::int64_t> resolution_schedule;
+
+  // Start
+  std::string init = "auto";  ///< "auto", "colmap", "random" or the path of a PLY
+  std::int64_t init_count = 50000;
+  double init_opacity = 0.1;
+
+  // Model
+  int sh_degree = 3;
+  std::int64_t sh_degree_interval = 1000;
+  ScaleActivation scale_activation = ScaleActivation::kExp;
+
+  // Loss
+  PixelLoss pixel_loss = PixelLoss::kL1;
+  double ssim_weight = 0.2;
+
+  // Optimiser
+  LearningRate position_lr{1.6e-4, 1.6e-6};  ///< times the scene extent
+  LearningRate rotation_lr{1e-3, 1e-3};
+  LearningRate scale_lr{5e-3, 5e-3};
+  LearningRate opacity_lr{5e-2, 5e-2};
+  LearningRate sh_lr{2.5e-3, 2.5e-3};
+  LearningRate sh_rest_lr{1.25e-4, 1.25e-4};
+  double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration
+  bool scale_lr_by_extent = false;
+  double adam_beta1 = 0.9;
+  double adam_beta2 = 0.999;
+  double adam_epsilon = 1e-15;
+  bool sparse_adam = false;
+
+  // Ray tracing
+  HitOrder hit_order = HitOrder::kEntry;
+  double quantile = 11.3449;
+  double min_transmittance = 1e-4;
+  int max_hits = 512;
+  bool adaptive_radius = true;
+  double near_depth = 0.0;
+  int packet_width = 0;
+  std::int64_t memory_budget = 1024;  ///< MiB
+  int rebuild_every = 1;
+
+  // Density control
+  std::int64_t densify_from = 500;
+  std::int64_t densify_until = 15000;
+  std::int64_t densify_every = 100;
+  double densify_grad_threshold = 2e-4;
+  DensifySignal densify_signal = DensifySignal::kScreen;
+  double densify_size = 0.01;  ///< times the scene extent
+  double split_factor = 1.6;
+  double prune_opacity = 0.005;
+  double prune_scale = 0.1;      ///< times the scene extent; 0 = off
+  double prune_scale_min = 0.0;  ///< times the scene extent; 0 = off
+  std::int64_t max_gaussians = 1000000;
+  std::int64_t opacity_reset_every = 3000;
+  double opacity_reset_value = 0.01;
+
+  // Reports and files
+  std::int64_t log_every = 10;
+  std::int64_t eval_every = 0;
+  std::vector<std::int64_t> eval_at{7000};
+  int eval_views = 0;  ///< 0 = all
+  int eval_renders = 4;
+  std::vector<std::int64_t> save_at{7000};
+  std::int64_t checkpoint_every = 1000;
+  int keep_checkpoints = 2;
+};
+
+}  // namespace raysplats

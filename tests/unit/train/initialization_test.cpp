@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/initialization.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "base/rng.hpp"
+#include "raysplats/error.hpp"
+#include "train/morton_order.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+std::vector<float> random_positions(std::size_t count, bool degenerate) {
+  CounterRng rng(7, 1);
+  std::vector<float> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    // Degenerate: many equal coordinates and coincident points.
+    for (int a = 0; a < 3; ++a) {
+      out.push_back(degenerate ? static_cast<float>(rng.below(4))
+                               : static_cast<float>(rng.normal()));
+    }
+  }
+  return out;
+}
+
+std::vector<float> brute_force_distances(const std::vector<float>& p) {
+  const std::size_t count = p.size() / 3;
+  std::vector<float> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::vector<double> distances;
+    for (std::size_t j = 0; j < count; ++j) {
+      if (i == j) continue;
+      double squared = 0;
+      for (std::size_t a = 0; a < 3; ++a)
+        squared += std::pow(static_cast<double>(p[3 * i + a]) - p[3 * j + a], 2);
+      distances.push_back(std::sqrt(squared));
+    }
+    std::sort(distances.begin(), distances.end());
+    const std::size_t k = std::min<std::size_t>(3, distances.size());
+    double sum = 0;
+    for (std::size_t n = 0; n < k; ++n) sum += distances[n];
+    out.push_back(k > 0 ? static_cast<float>(sum / static_cast<double>(k)) : 0.0f);
+  }
+  return out;
+}
+
+std::vector<Camera> ring(int count, double radius, const glm::dvec3& target) {
+  std::vector<Camera> cameras;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2 * 3.14159265358979 * i / count;
+    const glm::dvec3 eye = target + radius * glm::dvec3(std::cos(angle), std::sin(angle), 0.4);
+    cameras.push_back(look_at(eye, target, {0, 0, 1}, 80, 100, 160));
+  }
+  return cameras;
+}
+
+}  // namespace
+
+TEST_CASE("neighbour distances equal brute force") {
+  for (const bool degenerate : {false, true}) {
+    for (const std::size_t count : {0u, 1u, 2u, 3u, 4u, 5u, 300u}) {
+      const std::vector<float> positions = random_positions(count, degenerate);
+      const std::vector<float> expected = brute_force_distances(positions);
+      const std::vector<float> found = neighbour_distances(positions);
+      REQUIRE(found.size() == expected.size());
+      for (std::size_t i = 0; i < found.size(); ++i)
+        CHECK(found[i] == doctest::Approx(expected[i]).epsilon(1e-5));
+    }
+  }
+}
+
+TEST_CASE("points become Gaussians with their colour, clamped scales and the opacity asked for") {
+  PointCloud points;
+  points.positions = {
+      0, 0, 0, 1, 0, 0, 0, 2, 0, 50, 50, 50, std::numeric_limits<float>::quiet_NaN(), 0, 0};
+  points.colors = {1, 0.5f, 0, 0, 0, 0, 1, 1, 1, 0.2f, 0.4f, 0.6f, 0, 0, 0};
+  const Gaussians model = gaussians_from_points(points, 2, 0.1, 20.0);
+  REQUIRE(model.size() == 4);
+  CHECK(model.sh.size() == 4 * 27);
+  for (std::size_t i = 0; i < 4; ++i) {
+    CHECK(1.0 / (1.0 + std::exp(-model.opacities[i])) == doctest::Approx(0.1));
+    for (std::size_t c = 0; c < 3; ++c) {
+      CHECK(0.5 + 0.28209479177387814 * model.sh[27 * i + c] ==
+            doctest::Approx(points.colors[3 * i + c]));
+    }
+    CHECK(model.sh[27 * i + 3] == 0.0f);
+  }
+  // Far from everything: a tenth of the extent at most.
+  CHECK(std::exp(model.log_scales[9]) == doctest::Approx(2.0));
+  PointCloud pair;
+  pair.positions = {0, 0, 0, 0, 0, 0};
+  pair.colors.assign(6, 0.5f);
+  CHECK(std::exp(gaussians_from_points(pair, 0, 0.1, 20.0).log_scales[0]) ==
+        doctest::Approx(20.0 * 1e-4));
+}
+
+TEST_CASE(
+    "the region is the cube that inward cameras see, and surrounds cameras without a common "
+    "target") {
+  const glm::dvec3 target(3, -2, 1);
+  const Region inward = visible_region(ring(12, 4.0, target));
+  CHECK(glm::distance(inward.center, target) < 1e-6);
+  const double distance = 4.0 * std::sqrt(1 + 0.16);
+  CHECK(inward.half_side == doctest::Approx(distance * 40.0 / 160.0));
+
+  std::vector<Camera> parallel;
+  for (int i = 0; i < 5; ++i) {
+    parallel.push_back(look_at({i, 0, 0}, {static_cast<double>(i), 10, 0}, {0, 0, 1}, 80, 80, 80));
+  }
+  const Region along = visible_region(parallel);
+  CHECK(along.center.x == doctest::Approx(2.0));
+  CHECK(along.half_side == doctest::Approx(3.0 * 1.1 * 2.0));
+
+  std::vector<Camera> outward;
+  for (const Camera& camera : ring(8, 4.0, target)) {
+    outward.push_back(
+        look_at(camera.center(), 2.0 * camera.center() - target, {0, 0, 1}, 80, 80, 80));
+  }
+  CHECK(visible_region(outward).half_side == doctest::Approx(3.0 * scene_extent(outward)));
+  CHECK(scene_extent(ring(12, 4.0, target)) == doctest::Approx(4.4));
+  CHECK(scene_extent(std::vector<Camera>(1)) > 0);
+}
+
+TEST_CASE("a random start is a function of the seed and fills the region") {
+  const Region region{{1, 2, 3}, 0.5};
+  const PointCloud a = random_points(region, 1000, 3);
+  CHECK(a.positions == random_points(region, 1000, 3).positions);
+  CHECK(a.positions != random_points(region, 1000, 4).positions);
+  double low = 1e9, high = -1e9, mean = 0;
+  for (std::size_t i = 0; i < 1000; ++i) {
+    low = std::min<double>(low, a.positions[3 * i + 1]);
+    high = std::max<double>(high, a.positions[3 * i + 1]);
+    mean += a.positions[3 * i + 1] / 1000.0;
+  }
+  CHECK(low >= 1.5);
+  CHECK(high <= 2.5);
+  CHECK(low < 1.52);
+  CHECK(high > 2.48);
+  CHECK(mean == doctest::Approx(2.0).epsilon(0.02));
+}
+
+TEST_CASE("the first model follows the options") {
+  Dataset dataset;
+  dataset.root = "somewhere";
+  TrainOptions options;
+  options.init_count = 50;
+  options.sh_degree = 1;
+  const std::vector<Camera> cameras = ring(6, 2.0, {0, 0, 0});
+  CHECK(initial_model(dataset, cameras, options).size() == 50);
+  options.init = "colmap";
+  CHECK_THROWS_AS(initial_model(dataset, cameras, options), UsageError);
+  options.init = "auto";
+  for (int i = 0; i < 90; ++i) {
+    dataset.points.positions.push_back(static_cast<float>(i) * 0.01f);
+    dataset.points.colors.push_back(0.5f);
+  }
+  CHECK(initial_model(dataset, cameras, options).size() == 30);
+  options.max_gaussians = 7;
+  const Gaussians few = initial_model(dataset, cameras, options);
+  CHECK(few.size() == 7);
+  CHECK(few.sh.size() == 7 * 12);
+  options.init = "random";
+  CHECK(initial_model(dataset, cameras, options).size() == 7);
+  options.init = "/nowhere/model.ply";
+  CHECK_THROWS_AS(initial_model(dataset, cameras, options), DataError);
+}
+
+TEST_CASE("Morton order is a permutation that an outlier does not spoil") {
+  std::vector<float> positions = random_positions(2000, false);
+  positions[0] = 1e9f;
+  positions[4] = std::numeric_limits<float>::quiet_NaN();
+  std::vector<std::uint32_t> order = morton_order(positions);
+  double along = 0;
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    if (order[i] < 2 || order[i - 1] < 2) continue;
+    double squared = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      squared += std::pow(positions[3 * order[i] + a] - positions[3 * order[i - 1] + a], 2);
+    }
+    along += std::sqrt(squared) / static_cast<double>(order.size());
+  }
+  // Two random points of a unit normal distribution are 2.3 apart on average.
+  CHECK(along < 0.6);
+  std::sort(order.begin(), order.end());
+  for (std::size_t i = 0; i < order.size(); ++i) REQUIRE(order[i] == i);
+  CHECK(morton_order({}).empty());
+}

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/schedule.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <set>
+
+using namespace raysplats;
+
+TEST_CASE("learning rates decay to their final value") {
+  TrainOptions options;
+  options.iterations = 101;
+  const LearningRate rate{1e-2, 1e-4};
+  CHECK(learning_rate(rate, options, 0) == doctest::Approx(1e-2));
+  CHECK(learning_rate(rate, options, 50) == doctest::Approx(1e-3));
+  CHECK(learning_rate(rate, options, 100) == doctest::Approx(1e-4));
+  CHECK(learning_rate(rate, options, 500) == doctest::Approx(1e-4));
+  CHECK(learning_rate({0, 0}, options, 3) == 0.0);
+  options.lr_decay = 8.6643e-5;
+  CHECK(learning_rate({5e-3, 1e-3}, options, 10000) == doctest::Approx(5e-3 * std::exp(-0.86643)));
+  CHECK(learning_rate({5e-3, 1e-3}, options, 30000) == doctest::Approx(1e-3));
+  CHECK(learning_rate({5e-2, 5e-2}, options, 30000) == doctest::Approx(5e-2));
+}
+
+TEST_CASE("bands and resolution are switched on over time") {
+  TrainOptions options;
+  options.sh_degree = 2;
+  options.sh_degree_interval = 10;
+  CHECK(active_sh_degree(options, 9) == 0);
+  CHECK(active_sh_degree(options, 10) == 1);
+  CHECK(active_sh_degree(options, 500) == 2);
+  options.sh_degree_interval = 0;
+  CHECK(active_sh_degree(options, 0) == 2);
+  CHECK(resolution_divisor(options, 0) == 1);
+  options.resolution_schedule = {100, 300};
+  CHECK(resolution_divisor(options, 0) == 4);
+  CHECK(resolution_divisor(options, 99) == 4);
+  CHECK(resolution_divisor(options, 100) == 2);
+  CHECK(resolution_divisor(options, 300) == 1);
+}
+
+TEST_CASE("every pass sees every view once, in another order, and a new object continues it") {
+  ViewOrder order(1, 20);
+  std::vector<std::size_t> first, second;
+  for (int i = 0; i < 20; ++i) first.push_back(order.at(i));
+  for (int i = 20; i < 40; ++i) second.push_back(order.at(i));
+  CHECK(std::set<std::size_t>(first.begin(), first.end()).size() == 20);
+  CHECK(std::set<std::size_t>(second.begin(), second.end()).size() == 20);
+  CHECK(first != second);
+  ViewOrder resumed(1, 20);
+  CHECK(resumed.at(27) == second[7]);
+  ViewOrder other(2, 20);
+  std::vector<std::size_t> seeded;
+  for (int i = 0; i < 20; ++i) seeded.push_back(other.at(i));
+  CHECK(seeded != first);
+}
+
+TEST_CASE("a random background is a function of seed and iteration, for cut-out photos only") {
+  TrainOptions options;
+  const std::array<float, 3> white{1, 1, 1};
+  CHECK(step_background(options, true, white, 5) == white);
+  options.background = "random";
+  const auto color = step_background(options, true, white, 5);
+  CHECK(color == step_background(options, true, white, 5));
+  CHECK(color != step_background(options, true, white, 6));
+  for (const float c : color) CHECK((c >= 0.0f && c < 1.0f));
+  CHECK(step_background(options, false, white, 5) == std::array<float, 3>{0, 0, 0});
+}

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/train_config.hpp"
+
+#include <doctest/doctest.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+
+#include "base/atomic_file.hpp"
+#include "raysplats/error.hpp"
+#include "train/train_keys.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+std::filesystem::path temporary(const std::string& name) {
+  return std::filesystem::temp_directory_path() / ("raysplats_config_test_" + name);
+}
+
+std::string message_of(const std::filesystem::path& path) {
+  TrainOptions options;
+  try {
+    read_train_config(path, options);
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TrainOptions parse(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  CLI::App* train = app.add_subcommand("train");
+  TrainOptions options;
+  add_train_options(*train, options);
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  reversed.push_back("train");
+  app.parse(reversed);
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE("the configuration written is the configuration read") {
+  TrainOptions options;
+  options.iterations = 1234;
+  options.background = "0.25,0.5,1";
+  options.eval_at = {};
+  options.save_at = {10, 20};
+  options.position_lr = {3e-4, 7e-7};
+  options.scale_activation = ScaleActivation::kSigmoid;
+  options.hit_order = HitOrder::kPeak;
+  options.adaptive_radius = false;
+  options.adam_epsilon = 1e-15;
+  options.seed = 12345678901234567890ull;
+  const auto path = temporary("round.toml");
+  write_text_file(path, to_toml(options));
+  TrainOptions read;
+  read_train_config(path, read);
+  CHECK(to_toml(read) == to_toml(options));
+  CHECK(read.seed == options.seed);
+  CHECK(read.eval_at.empty());
+  CHECK(read.save_at == options.save_at);
+  CHECK(read.position_lr.final_value == options.position_lr.final_value);
+  CHECK(background_color(read, false) == std::array<float, 3>{0.25f, 0.5f, 1.0f});
+  std::filesystem::remove(path);
+}
+
+TEST_CASE("the configurations of the project are valid and the default one documents every key") {
+  const std::filesystem::path folder = std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "configs";
+  TrainOptions defaults;
+  TrainOptions read;
+  read.iterations = 1;
+  read_train_config(folder / "default.toml", read);
+  CHECK(to_toml(read) == to_toml(defaults));
+  std::ifstream stream(folder / "default.toml");
+  const std::string text((std::istreambuf_iterator<char>(stream)),
+                         std::istreambuf_iterator<char>());
+  for (const TrainKey& key : train_keys(defaults)) {
+    INFO(key.name);
+    CHECK(text.find("\n" + key.name + " = ") != std::string::npos);
+    CHECK(!key.help.empty());
+  }
+  TrainOptions paper;
+  read_train_config(folder / "paper.toml", paper);
+  CHECK(paper.hit_order == HitOrder::kEntry);
+  CHECK(paper.scale_activation == ScaleActivation::kSigmoid);
+  CHECK(paper.sh_degree == 0);
+  CHECK(paper.pixel_loss == PixelLoss::kL2);
+  TrainOptions quick;
+  read_train_config(folder / "quick.toml", quick);
+  CHECK(quick.iterations < defaults.iterations);
+}
+
+TEST_CASE("an unknown key is refused with the nearest one") {
+  const auto path = temporary("typo.toml");
+  write_text_file(path, "iteration = 5\n");
+  CHECK(message_of(path).find("'iterations'") != std::string::npos);
+  write_text_file(path, "[train]\nssim-wight = 0.1\n");
+  CHECK(message_of(path).find("'ssim-weight'") != std::string::npos);
+  write_text_file(path, "[render]\niterations = 5\n");
+  CHECK(message_of(path).find("render.iterations") != std::string::npos);
+  std::filesystem::remove(path);
+  CHECK(message_of(temporary("missing.toml")).find("cannot be read") != std::string::npos);
+}
+
+TEST_CASE("values out of range and of the wrong kind are refused by name") {
+  const auto path = temporary("range.toml");
+  for (const std::string line :
+       {"iterations = -1", "iterations = 1.5", "iterations = many", "ssim-weight = 1.5",
+        "ssim-weight = nan", "hit-order = \"depth\"", "adaptive-radius = 2", "background = \"red\"",
+        "background = \"1,1\"", "background = \"1,1,2\"", "packet-width = 3",
+        "resolution-schedule = [20, 10]", "eval-at = [0]", "position-lr = 0", "sh-degree = 5",
+        "iterations = [1, 2]"}) {
+    INFO(line);
+    write_text_file(path, line + "\n");
+    CHECK(message_of(path) != "");
+  }
+  write_text_file(
+      path, "position-lr = 0 # off\nposition-lr-final = 0\n\n# comment\neval-at = [1,\n 2]\n");
+  CHECK(message_of(path) == "");
+  std::filesystem::remove(path);
+}
+
+TEST_CASE("the command line beats the file, wherever --config stands") {
+  const auto path = temporary("beats.toml");
+  write_text_file(path, "iterations = 77\nseed = 5\nadaptive-radius = false\neval-at = [3, 4]\n");
+  for (const auto& arguments :
+       {std::vector<std::string>{"--config", path.string(), "-n", "9", "--eval-at", "1,2"},
+        std::vector<std::string>{"-n", "9", "--eval-at", "1,2", "--config", path.string()}}) {
+    const TrainOptions options = parse(arguments);
+    CHECK(options.iterations == 9);
+    CHECK(options.seed == 5);
+    CHECK(!options.adaptive_radius);
+    CHECK(options.eval_at == std::vector<std::int64_t>{1, 2});
+  }
+  CHECK(parse({"--config", path.string(), "--adaptive-radius"}).adaptive_radius);
+  CHECK(!parse({"--no-adaptive-radius"}).adaptive_radius);
+  CHECK(parse({"--background", "1,1,1"}).background == "1,1,1");
+  CHECK_THROWS_AS(parse({"--iterations", "x"}), UsageError);
+  std::filesystem::remove(path);
+}

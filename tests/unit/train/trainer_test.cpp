@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/trainer.hpp"
+
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+
+#include "base/rng.hpp"
+#include "raysplats/device.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "trace/camera_tracer.hpp"
+#include "train/checkpoint.hpp"
+#include "train/memory_estimate.hpp"
+#include "train/train_config.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+constexpr int kWidth = 40;
+constexpr int kHeight = 32;
+
+// Photos of a few coloured Gaussians from a ring of cameras, in a folder that goes with the object.
+struct Scene {
+  std::filesystem::path folder = std::filesystem::temp_directory_path() /
+                                 ("raysplats_trainer_test_" + std::to_string(::getpid()));
+  Context context{select_device("")};
+  Dataset dataset;
+
+  Scene() {
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directories(folder / "images");
+    CounterRng rng(11, 3);
+    Gaussians truth;
+    truth.resize(60);
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        truth.means[3 * i + a] = static_cast<float>(1.2 * rng.uniform() - 0.6);
+        truth.log_scales[3 * i + a] = static_cast<float>(std::log(0.05 + 0.15 * rng.uniform()));
+        truth.sh[3 * i + a] = static_cast<float>(3.0 * rng.uniform() - 1.5);
+      }
+      truth.opacities[i] = 2.0f;
+    }
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, truth, ScaleActivation::kExp);
+    CameraTracer tracer(context, TraceOptions{});
+    tracer.update(gaussians);
+    for (int i = 0; i < 10; ++i) {
+      const double angle = 0.628 * i;
+      View view;
+      view.camera = look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0 + 0.1 * i}, {0, 0, 0},
+                            {0, 0, 1}, kWidth, kHeight, 48);
+      view.camera.name = "view_" + std::to_string(i) + ".png";
+      view.source_camera = view.camera;
+      view.image_path = folder / "images" / view.camera.name;
+      view.test = i % 5 == 0;
+      tracer.forward(gaussians, view.camera);
+      Image rgb(kWidth, kHeight, 3);
+      const Image traced = tracer.download_image();
+      for (std::size_t p = 0; p < rgb.pixels(); ++p) {
+        for (std::size_t c = 0; c < 3; ++c) rgb.data[3 * p + c] = traced.data[4 * p + c];
+      }
+      write_image(view.image_path, rgb);
+      dataset.views.push_back(view);
+    }
+    dataset.root = folder;
+  }
+  ~Scene() { std::filesystem::remove_all(folder); }
+};
+
+TrainOptions small_options() {
+  TrainOptions options;
+  options.iterations = 40;
+  options.init_count = 300;
+  options.max_gaussians = 500;
+  options.sh_degree = 1;
+  options.sh_degree_interval = 15;
+  options.densify_from = 10;
+  options.densify_until = 30;
+  options.densify_every = 10;
+  options.densify_grad_threshold = 1e-5;
+  options.prune_opacity = 0.05;
+  options.opacity_reset_every = 0;
+  options.resolution_schedule = {12};
+  options.log_every = 5;
+  options.eval_at = {};
+  options.save_at = {};
+  options.checkpoint_every = 0;
+  options.memory_budget = 64;
+  return options;
+}
+
+void check_equal(const Gaussians& a, const Gaussians& b) {
+  CHECK(a.means == b.means);
+  CHECK(a.quaternions == b.quaternions);
+  CHECK(a.log_scales == b.log_scales);
+  CHECK(a.opacities == b.opacities);
+  CHECK(a.sh == b.sh);
+}
+
+std::vector<std::string> lines_of(const std::filesystem::path& path) {
+  std::ifstream stream(path);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+}  // namespace
+
+TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
+  Scene scene;
+  const TrainOptions options = small_options();
+  Trainer straight(scene.context, scene.dataset, options, scene.folder / "straight");
+  const TrainSummary summary = straight.run(false);
+  CHECK(summary.iterations == 40);
+  CHECK(summary.gaussians != 300);
+  CHECK(summary.gaussians <= 500);
+  REQUIRE(summary.evaluations.size() == 1);
+  CHECK(summary.evaluations[0].views == 2);
+
+  // An interrupt after iteration 20 leaves exactly this checkpoint; density control took place in
+  // 10 and 20.
+  const auto broken = scene.folder / "broken";
+  {
+    TrainOptions checkpoints = options;
+    checkpoints.checkpoint_every = 20;
+    checkpoints.keep_checkpoints = 5;
+    Trainer first(scene.context, scene.dataset, checkpoints, broken);
+    first.run(false);
+    CHECK(list_checkpoints(broken).size() == 2);
+    std::filesystem::remove(checkpoint_path(broken, 40));
+  }
+  Trainer second(scene.context, scene.dataset, options, broken);
+  second.resume(broken);
+  CHECK(second.iteration() == 20);
+  second.run(false);
+  CHECK(second.iteration() == 40);
+  check_equal(straight.gaussians().download(), second.gaussians().download());
+  const Checkpoint a = load_latest_checkpoint(scene.folder / "straight");
+  const Checkpoint b = load_latest_checkpoint(broken);
+  CHECK(a.sections == b.sections);
+  CHECK(a.optimiser_steps == 40);
+
+  // One row per report, none twice.
+  CHECK(lines_of(broken / "metrics.csv").size() == 1 + 8);
+  CHECK(nlohmann::json::parse(std::ifstream(broken / "metrics.json")).at("evaluations").size() ==
+        1);
+  TrainOptions other = options;
+  other.sh_degree = 2;
+  Trainer misfit(scene.context, scene.dataset, other, broken);
+  CHECK_THROWS_AS(misfit.resume(broken), UsageError);
+}
+
+TEST_CASE("training improves held-out views and leaves the files of a run") {
+  Scene scene;
+  TrainOptions options = small_options();
+  options.iterations = 250;
+  options.densify_until = 150;
+  options.eval_at = {10};
+  options.eval_renders = 1;
+  options.save_at = {100};
+  options.position_lr = {2e-3, 2e-4};
+  options.sh_lr = {2e-2, 5e-3};
+  const auto folder = scene.folder / "run";
+  const TrainSummary summary = Trainer(scene.context, scene.dataset, options, folder).run(false);
+  REQUIRE(summary.evaluations.size() == 2);
+  MESSAGE("PSNR " << summary.evaluations[0].psnr << " -> " << summary.evaluations[1].psnr << " dB");
+  CHECK(summary.evaluations[1].psnr > summary.evaluations[0].psnr + 4.0);
+  CHECK(summary.evaluations[1].ssim > summary.evaluations[0].ssim);
+  CHECK(summary.training_seconds > 0);
+
+  TrainOptions read;
+  read_train_config(folder / "config.toml", read);
+  CHECK(to_toml(read) == to_toml(options));
+  CHECK(nlohmann::json::parse(std::ifstream(folder / "cameras.json")).size() == 8);
+  CHECK(read_ply(folder / "point_cloud" / "iteration_250" / "point_cloud.ply").size() ==
+        summary.gaussians);
+  CHECK(std::filesystem::exists(folder / "point_cloud" / "iteration_100" / "point_cloud.ply"));
+  const Image pictures = read_image(folder / "eval" / "iteration_250" / "view_0.png");
+  CHECK(pictures.width == 3 * kWidth);
+  CHECK(pictures.height == kHeight);
+  CHECK(!std::filesystem::exists(folder / "eval" / "iteration_250" / "view_5.png"));
+  const nlohmann::json metrics = nlohmann::json::parse(std::ifstream(folder / "metrics.json"));
+  CHECK(metrics.at("complete") == true);
+  CHECK(metrics.at("iteration") == 250);
+}
+
+TEST_CASE("a signal ends the run with everything saved") {
+  Scene scene;
+  TrainOptions options = small_options();
+  options.iterations = 1000000;
+  options.log_every = 1;
+  const auto folder = scene.folder / "run";
+  const std::jthread killer([&folder](const std::stop_token& token) {
+    while (!token.stop_requested() && lines_of(folder / "metrics.csv").size() < 3) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    if (!token.stop_requested()) std::raise(SIGTERM);
+  });
+  Trainer trainer(scene.context, scene.dataset, options, folder);
+  bool interrupted = false;
+  try {
+    trainer.run(false);
+  } catch (const Error& error) {
+    interrupted = error.code() == ErrorCode::kInterrupted;
+  }
+  CHECK(interrupted);
+  const std::int64_t done = trainer.iteration();
+  CHECK(load_latest_checkpoint(folder).iteration == done);
+  CHECK(std::filesystem::exists(folder / "point_cloud" / ("iteration_" + std::to_string(done)) /
+                                "point_cloud.ply"));
+}
+
+TEST_CASE("a loss that is not finite stops the run and names the iteration") {
+  Scene scene;
+  Gaussians model;
+  model.resize(1);
+  model.log_scales = {-1, -1, -1};
+  model.opacities = {3};
+  model.sh = {1e30f, 1e30f, 1e30f};
+  write_ply(scene.folder / "start.ply", model);
+  TrainOptions options = small_options();
+  options.init = (scene.folder / "start.ply").string();
+  options.pixel_loss = PixelLoss::kL2;
+  options.log_every = 1;
+  Trainer trainer(scene.context, scene.dataset, options, scene.folder / "run");
+  std::string message;
+  try {
+    trainer.run(false);
+  } catch (const Error& error) {
+    message = error.what();
+  }
+  CHECK(message.find("iteration 1") != std::string::npos);
+}
+
+TEST_CASE("a device with too little memory is refused with the figures") {
+  Scene scene;
+  TrainOptions options = small_options();
+  options.max_gaussians = 2000000000;
+  Trainer trainer(scene.context, scene.dataset, options, scene.folder / "run");
+  std::string message;
+  try {
+    trainer.run(false);
+  } catch (const ResourceError& error) {
+    message = error.what();
+  }
+  CHECK(message.find("MiB") != std::string::npos);
+  CHECK(message.find("--max-gaussians") != std::string::npos);
+  DeviceInfo small = scene.context.device();
+  small.global_memory = std::uint64_t{4} << 30;
+  small.max_allocation = 1 << 20;
+  CHECK_THROWS_AS(check_memory(estimate_memory(small_options(), 100000, 1000, 10), small),
+                  ResourceError);
+  Dataset empty = scene.dataset;
+  for (View& view : empty.views) view.test = true;
+  CHECK_THROWS_AS(Trainer(scene.context, empty, small_options(), scene.folder / "run"), UsageError);
+}
