@@ -50,7 +50,8 @@ if ((${#sources[@]} > 0)); then
   say "clang-tidy: ${#sources[@]} files"
   [[ -e build/release/compile_commands.json ]] || cmake --preset release >/dev/null
   printf '%s\0' "${sources[@]}" |
-    xargs -0 -n 1 -P "$(nproc)" clang-tidy -p build/release --quiet || failed+=(clang-tidy)
+    xargs -0 -n 1 -P "$(nproc)" clang-tidy -p build/release --quiet 2> >(grep -v 'warnings generated' >&2) ||
+    failed+=(clang-tidy)
 fi
 
 if ((${#failed[@]} > 0)); then

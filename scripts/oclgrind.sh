@@ -36,9 +36,7 @@ for program in "$build"/bin/test_*; do
   say "$name: $count test cases"
   log=$work/$name.log
   : >"$log"
-  # Unoptimised kernels keep reads that an optimiser would fold away.
-  if ! oclgrind --data-races --check-api --uninitialized --build-options -cl-opt-disable --log "$log" \
-    "$program" --test-case="$filter"; then
+  if ! oclgrind --data-races --check-api --log "$log" "$program" --test-case="$filter"; then
     failed+=("$name: a test failed")
   fi
   if [[ -s $log ]]; then

@@ -114,8 +114,9 @@ Image render(const Scene& scene, const Camera& camera) {
       glm::dvec3 color(0.0);
       double alpha = 0.0;
       for (int sample = 0; sample < kGrid * kGrid; ++sample) {
+        const int row_of_grid = sample / kGrid;
         const double column = x + (sample % kGrid + 0.5) / kGrid;
-        const double row = y + (sample / kGrid + 0.5) / kGrid;
+        const double row = y + (row_of_grid + 0.5) / kGrid;
         const glm::dvec3 direction((column - camera.cx) / camera.fx, (row - camera.cy) / camera.fy,
                                    1.0);
         // The stride (prime to the number of samples) mixes lamp points over the pixel.
