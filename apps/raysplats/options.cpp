@@ -96,8 +96,10 @@ void add_trace_flags(CLI::App& app, TraceFlags& flags) {
   app.add_option("--hit-order", flags.hit_order,
                  "Depth that orders hits: entry (the paper) or peak")
       ->check(one_of({"entry", "peak"}));
-  app.add_flag("--adaptive-radius,!--no-adaptive-radius", flags.adaptive_radius,
-               "Shrink the ellipsoids of faint Gaussians to where they reach 1/255");
+  app.add_flag_function(
+      "--adaptive-radius,!--no-adaptive-radius",
+      [&flags](std::int64_t count) { flags.adaptive_radius = count > 0; },
+      "Shrink the ellipsoids of faint Gaussians to where they reach 1/255");
   app.add_option("--near", flags.near_depth,
                  "Skip Gaussians whose mean is nearer than this; 0 = off")
       ->check(at_least(0.0));

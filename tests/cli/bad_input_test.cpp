@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+
+namespace {
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// The program refuses with one sentence that names `culprit` and leaves no output folder.
+void check_refused(std::vector<std::string> arguments, int code, const std::string& culprit) {
+  const TemporaryFolder folder;
+  for (const char* word : {"-q", "-o"}) arguments.emplace_back(word);
+  arguments.push_back(folder / "output");
+  const Outcome outcome = raysplats_program(arguments);
+  INFO(outcome.err);
+  CHECK(outcome.code == code);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.err, culprit));
+  CHECK(entries(folder.path()) == 0);
+}
+
+/// A COLMAP text model of one camera and two images; `images` of them exist on disk.
+void write_colmap(const std::filesystem::path& root) {
+  write_file(root / "sparse/0/cameras.txt", "1 PINHOLE 8 6 10 10 4 3\n");
+  write_file(root / "sparse/0/images.txt",
+             "1 1 0 0 0 0 0 4 1 missing_photo.png\n\n2 1 0 0 0 0.1 0 4 1 other_photo.png\n\n");
+  write_file(root / "sparse/0/points3D.txt", "1 0 0 0 255 0 0 0.5 1 0 2 0\n");
+  std::filesystem::create_directories(root / "images");
+}
+
+}  // namespace
+
+TEST_CASE("a model that cannot be read is exit code 3") {
+  const TemporaryFolder folder;
+  const std::string path = folder / "model.ply";
+  const auto refused = [&](const std::string& content) {
+    write_file(path, content);
+    check_refused({"render", path, "--orbit", "2"}, 3, path);
+    const Outcome info = raysplats_program({"info", path});
+    CHECK(info.code == 3);
+    CHECK(one_sentence(info));
+  };
+  check_refused({"render", folder / "none.ply", "--orbit", "2"}, 3, "none.ply");
+  check_refused({"eval", folder / "none.ply", "--data", folder / "none"}, 3, "none.ply");
+
+  const std::string good = ply_file(3);
+  refused("");
+  refused("this is no PLY");
+  refused(good.substr(0, good.size() - 5));
+  refused(ply_file(3, 4));
+  refused(ply_file(3, 4'000'000'000'000'000'000));
+  std::string without_opacity = good;
+  without_opacity.replace(without_opacity.find("opacity"), 7, "unknown");
+  refused(without_opacity);
+  std::string with_nan = good;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(with_nan.data() + with_nan.size() - 56, &nan, sizeof(nan));
+  refused(with_nan);
+}
+
+TEST_CASE("a data set that cannot be read is exit code 3") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  std::filesystem::create_directories(folder / "empty");
+  write_colmap(folder / "colmap");
+  for (const char* command : {"train", "eval", "render"}) {
+    const auto refused = [&](const std::string& data, const std::string& culprit) {
+      std::vector<std::string> arguments{command};
+      if (std::string(command) != "train") {
+        arguments.push_back(folder / "model.ply");
+        arguments.emplace_back("--data");
+      }
+      arguments.push_back(folder / data);
+      check_refused(arguments, 3, culprit);
+    };
+    refused("nowhere", "nowhere");
+    refused("empty", "empty");
+    refused("colmap", "missing_photo.png");
+  }
+}
+
+TEST_CASE("a broken photo stops training with its name") {
+  const TemporaryFolder folder;
+  write_colmap(folder / "data");
+  write_file(folder / "data/images/missing_photo.png", "");
+  write_file(folder / "data/images/other_photo.png", "\x89PNG\r\n\x1a\nbroken");
+  check_refused({"train", folder / "data", "-n", "2", "--test-every", "0"}, 3, "_photo.png");
+}
+
+TEST_CASE("cameras that cannot be read are exit code 3") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  write_file(folder / "cameras.json", "{\"w\": 8, ");
+  check_refused({"render", folder / "model.ply", "--cameras", folder / "cameras.json"}, 3,
+                "cameras.json");
+  check_refused({"render", folder / "model.ply", "--cameras", folder / "none.json"}, 3,
+                "none.json");
+}
+
+TEST_CASE("a wrong configuration is exit code 2 with the nearest key") {
+  const TemporaryFolder folder;
+  write_file(folder / "typo.toml", "iteratons = 5\n");
+  check_refused({"train", folder / "data", "--config", folder / "typo.toml"}, 2, "'iterations'");
+  write_file(folder / "value.toml", "ssim-weight = \"much\"\n");
+  check_refused({"train", folder / "data", "--config", folder / "value.toml"}, 2, "ssim-weight");
+  check_refused({"train", folder / "data", "--config", folder / "none.toml"}, 2, "none.toml");
+  check_refused({"train", folder / "data", "--ssim-weight", "2"}, 2, "ssim-weight");
+}
+
+TEST_CASE("an output that cannot be written is exit code 3") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  write_file(folder / "file", "in the way");
+  for (const std::string& output : {folder / "file", folder / "file/below"}) {
+    const Outcome render =
+        raysplats_program({"render", folder / "model.ply", "--orbit", "1", "--width", "16",
+                           "--height", "16", "-q", "-o", output});
+    INFO(render.err);
+    CHECK(render.code == 3);
+    CHECK(one_sentence(render));
+    CHECK(contains(render.err, output));
+    const Outcome generate = raysplats_program({"generate", output, "--size", "8", "-q"});
+    INFO(generate.err);
+    CHECK(generate.code == 3);
+    CHECK(one_sentence(generate));
+  }
+  CHECK(read_file(folder / "file") == "in the way");
+}
+
+TEST_CASE("a full disk is exit code 3 and leaves no half-written frame") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  // Warm the kernel cache first: under the limit its files could not be written either.
+  const std::vector<std::string> render{
+      "render", folder / "model.ply", "--orbit", "1",  "--width", "128", "--height",
+      "128",    "--format",           "exr",     "-q", "-o"};
+  std::vector<std::string> good = render;
+  good.push_back(folder / "good");
+  REQUIRE(raysplats_program(good).code == 0);
+  CHECK(entries(folder / "good") == 1);
+  std::vector<std::string> full = render;
+  full.push_back(folder / "full");
+  Surroundings limited;
+  limited.file_size_limit = 2048;
+  const Outcome outcome = raysplats_program(full, limited);
+  INFO(outcome.err);
+  CHECK(outcome.code == 3);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.err, "frame_0000.exr"));
+  CHECK(entries(folder / "full") == 0);
+}

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "program.hpp"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+
+namespace fs = std::filesystem;
+
+Outcome raysplats_program(const std::vector<std::string>& arguments,
+                          const Surroundings& surroundings) {
+  const TemporaryFolder folder;
+  const std::string out = folder / "out";
+  const std::string err = folder / "err";
+  std::vector<std::string> words{RAYSPLATS_PROGRAM};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+
+  const pid_t child = ::fork();
+  if (child < 0) throw std::system_error(errno, std::generic_category(), "fork");
+  if (child == 0) {
+    const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600);
+    const int err_file = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
+    if (::dup2(out_file, STDOUT_FILENO) < 0 || ::dup2(err_file, STDERR_FILENO) < 0) ::_exit(125);
+    for (const auto& [name, value] : surroundings.environment)
+      ::setenv(name.c_str(), value.c_str(), 1);
+    if (surroundings.file_size_limit != RLIM_INFINITY) {
+      const rlimit limit{surroundings.file_size_limit, surroundings.file_size_limit};
+      if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
+    }
+    ::execv(argv[0], argv.data());
+    ::_exit(127);
+  }
+  int status = 0;
+  if (::waitpid(child, &status, 0) != child)
+    throw std::system_error(errno, std::generic_category(), "waitpid");
+  Outcome outcome;
+  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  outcome.out = read_file(out);
+  outcome.err = read_file(err);
+  return outcome;
+}
+
+TemporaryFolder::TemporaryFolder() {
+  std::string name = (fs::temp_directory_path() / "raysplats_cli_XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr)
+    throw std::system_error(errno, std::generic_category(), "mkdtemp");
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code error;
+  fs::remove_all(path_, error);
+}
+
+void write_file(const fs::path& path, const std::string& content) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << content;
+}
+
+std::string read_file(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+std::size_t entries(const fs::path& path) {
+  std::error_code error;
+  const fs::recursive_directory_iterator all(path, error);
+  return error ? 0 : static_cast<std::size_t>(std::distance(begin(all), end(all)));
+}
+
+std::string ply_file(std::size_t count, std::int64_t declared) {
+  std::ostringstream out;
+  out << "ply\nformat binary_little_endian 1.0\nelement vertex "
+      << (declared >= 0 ? declared : static_cast<std::int64_t>(count)) << "\n";
+  for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0",
+                           "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"}) {
+    out << "property float " << name << "\n";
+  }
+  out << "end_header\n";
+  for (std::size_t i = 0; i < count; ++i) {
+    const float x = 0.5f * static_cast<float>(i);
+    const float values[14] = {x, 0, 0, 1, 0, -1, 4, -1.5f, -1.5f, -1.5f, 1, 0, 0, 0};
+    out.write(reinterpret_cast<const char*>(values), sizeof(values));
+  }
+  return out.str();
+}
+
+bool one_sentence(const Outcome& outcome) {
+  return outcome.err.starts_with("raysplats: ") && outcome.err.size() > 12 &&
+         outcome.err.back() == '\n' &&
+         std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1;
+}

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <sys/resource.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+/// What the program left behind.
+struct Outcome {
+  int code = -1;    ///< exit code; 128 + signal when a signal ended it
+  std::string out;  ///< standard output
+  std::string err;  ///< standard error
+};
+
+struct Surroundings {
+  std::vector<std::pair<std::string, std::string>> environment;  ///< added to the test's own
+  rlim_t file_size_limit = RLIM_INFINITY;  ///< bytes; beyond it writes fail, as on a full disk
+};
+
+/// Runs `raysplats` with `arguments` and waits for it.
+Outcome raysplats_program(const std::vector<std::string>& arguments,
+                          const Surroundings& surroundings = {});
+
+/// An empty folder that is removed with everything in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::filesystem::path path() const { return path_; }
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+void write_file(const std::filesystem::path& path, const std::string& content);
+std::string read_file(const std::filesystem::path& path);
+/// Number of files and folders below `path`, 0 when it does not exist.
+std::size_t entries(const std::filesystem::path& path);
+
+/// A binary 3DGS PLY of SH degree 0 with a few opaque balls; `declared` overrides the count in the
+/// header.
+std::string ply_file(std::size_t count, std::int64_t declared = -1);
+
+/// True when the outcome is one sentence on standard error, prefixed by the program's name.
+bool one_sentence(const Outcome& outcome);

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+
+namespace {
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+void check_refused(const std::vector<std::string>& arguments,
+                   int code,
+                   const std::string& message) {
+  const Outcome outcome = raysplats_program(arguments);
+  INFO(outcome.err);
+  CHECK(outcome.code == code);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.err, message));
+  CHECK(outcome.out.empty());
+}
+
+}  // namespace
+
+TEST_CASE("help and version") {
+  const Outcome help = raysplats_program({"--help"});
+  CHECK(help.code == 0);
+  for (const char* command : {"devices", "generate", "train", "render", "eval", "info"}) {
+    CHECK(contains(help.out, command));
+    const Outcome own = raysplats_program({command, "-h"});
+    CHECK(own.code == 0);
+    CHECK(contains(own.out, command));
+  }
+  const Outcome version = raysplats_program({"--version"});
+  CHECK(version.code == 0);
+  CHECK(version.out == "raysplats " RAYSPLATS_VERSION "\n");
+}
+
+TEST_CASE("help of train lists the configuration keys and hides foreign names") {
+  const Outcome help = raysplats_program({"train", "-h"});
+  for (const char* key :
+       {"--iterations", "--ssim-weight", "--densify-grad-threshold", "--config", "--resume"}) {
+    CHECK(contains(help.out, key));
+  }
+  CHECK_FALSE(contains(help.out, "--max_steps"));
+}
+
+TEST_CASE("a wrong command line is one sentence, exit code 2") {
+  check_refused({}, 2, "No command given");
+  check_refused({"rendr"}, 2, "did you mean 'render'");
+  check_refused({"render", "m.ply", "--backgroud", "1,1,1", "-o", "x", "--orbit", "3"}, 2,
+                "did you mean --background");
+  check_refused({"render", "m.ply", "--loglevel=info", "-o", "x"}, 2, "did you mean --log-level");
+  check_refused({"train", "data", "-o", "x", "--ssim-wieght", "0.1"}, 2,
+                "did you mean --ssim-weight");
+  check_refused({"info", "a", "b"}, 2, "Unexpected argument 'b'");
+  check_refused({"info"}, 2, "PATH");
+  check_refused({"render", "m.ply", "--orbit", "0", "-o", "x"}, 2, "--orbit");
+  check_refused({"render", "m.ply", "--orbit", "3"}, 2, "--output");
+  check_refused({"render", "m.ply", "-o", "x"}, 2, "no cameras");
+  check_refused({"render", "m.ply", "-o", "x", "--data", "d", "--cameras", "c"}, 2, "--cameras");
+  check_refused({"render", "m.ply", "-o", "x", "--data", "d", "--fov", "30"}, 2, "--orbit");
+  check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--hit-order", "far"}, 2,
+                "entry, peak");
+  check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--background", "1,1"}, 2,
+                "three numbers");
+  check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--max-hits", "nan"}, 2,
+                "--max-hits");
+}
+
+TEST_CASE("devices can be read by programs") {
+  const Outcome outcome = raysplats_program({"devices", "--json"});
+  REQUIRE(outcome.code == 0);
+  const nlohmann::json json = nlohmann::json::parse(outcome.out);
+  REQUIRE(!json.at("devices").empty());
+  for (const nlohmann::json& device : json["devices"]) {
+    CHECK(device.at("compute_units").get<int>() > 0);
+    CHECK(device.at("max_allocation").get<std::uint64_t>() > 0);
+    CHECK(device.at("usable").get<bool>() == device.at("problems").empty());
+  }
+  const Outcome text = raysplats_program({"devices"});
+  CHECK(text.code == 0);
+  CHECK(contains(text.out, json["devices"][0]["name"].get<std::string>()));
+}
+
+TEST_CASE("the kernel cache is cleared where it lies, and nothing else in it") {
+  const TemporaryFolder cache;
+  write_file(cache.path() / "raysplats" / "0123.bin", "program");
+  write_file(cache.path() / "raysplats" / "notes.txt", "mine");
+  const Outcome outcome = raysplats_program({"devices", "--clear-cache"},
+                                            {{{"XDG_CACHE_HOME", cache.path().string()}}});
+  CHECK(outcome.code == 0);
+  CHECK(contains(outcome.out, "1 compiled"));
+  CHECK(entries(cache.path() / "raysplats") == 1);
+}
+
+TEST_CASE("no OpenCL platform is exit code 4 with the remedy") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  const Surroundings bare{{{"OCL_ICD_VENDORS", folder.path().string()}}};
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"devices"},
+        {"-q", "render", folder / "model.ply", "--orbit", "1", "-o", folder / "frames"}}) {
+    const Outcome outcome = raysplats_program(arguments, bare);
+    INFO(outcome.err);
+    CHECK(outcome.code == 4);
+    CHECK(one_sentence(outcome));
+    CHECK(contains(outcome.err, "pocl-opencl-icd"));
+  }
+  CHECK(entries(folder / "frames") == 0);
+}
+
+TEST_CASE("an unknown device is exit code 2") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  for (const char* device : {"99", "no such device"}) {
+    const Outcome outcome = raysplats_program({"render", folder / "model.ply", "--orbit", "1", "-o",
+                                               folder / "frames", "--device", device, "-q"});
+    CHECK(outcome.code == 2);
+    CHECK(one_sentence(outcome));
+    CHECK(contains(outcome.err, "raysplats devices"));
+  }
+}
