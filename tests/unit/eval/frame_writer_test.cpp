@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "eval/frame_writer.hpp"
+
+#include <OpenImageIO/imageio.h>
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+using namespace raysplats;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct TemporaryFolder {
+  fs::path path =
+      fs::temp_directory_path() / ("raysplats_frame_writer_" + std::to_string(::getpid()));
+  TemporaryFolder() { fs::create_directories(path); }
+  ~TemporaryFolder() { fs::remove_all(path); }
+};
+
+std::vector<std::string> names_of(const std::vector<std::string>& images) {
+  std::vector<Camera> cameras(images.size());
+  for (std::size_t i = 0; i < images.size(); ++i) cameras[i].name = images[i];
+  return frame_names(cameras);
+}
+
+/// Two opaque red Gaussians, at the origin and further away beside it.
+Gaussians red_balls() {
+  Gaussians model;
+  model.resize(2);
+  for (float& scale : model.log_scales) scale = std::log(0.3f);
+  model.means = {0, 0, 0, 2, 0, 4};
+  model.opacities = {8.0f, 8.0f};
+  model.sh = {1.5f, -1.5f, -1.5f, 1.5f, -1.5f, -1.5f};
+  return model;
+}
+
+/// Channel `name` of an EXR, row-major.
+std::vector<float> exr_channel(const fs::path& path, const std::string& name) {
+  const auto file = OIIO::ImageInput::open(path.string());
+  REQUIRE(file);
+  const OIIO::ImageSpec& spec = file->spec();
+  const int channel = spec.channelindex(name);
+  REQUIRE(channel >= 0);
+  std::vector<float> values(static_cast<std::size_t>(spec.width) *
+                            static_cast<std::size_t>(spec.height));
+  REQUIRE(file->read_image(0, 0, channel, channel + 1, OIIO::TypeDesc::FLOAT, values.data()));
+  return values;
+}
+
+}  // namespace
+
+TEST_CASE("frames are named after the images") {
+  CHECK(names_of({"train/r_0.png", "train/r_1.png"}) == std::vector<std::string>{"r_0", "r_1"});
+  CHECK(names_of({"left/1.jpg", "right/1.jpg", "right/2.jpg"}) ==
+        std::vector<std::string>{"left_1", "right_1", "2"});
+  CHECK(names_of({"../../a/1.jpg", "/b/1.jpg"}) == std::vector<std::string>{"a_1", "b_1"});
+  CHECK(names_of({"1.jpg", "1.png"}) == std::vector<std::string>{"1", "1_2"});
+  CHECK(names_of({"", ""}) == std::vector<std::string>{"frame_0000", "frame_0001"});
+}
+
+TEST_CASE("supersampling averages blocks") {
+  Image image(4, 2, 2);
+  for (std::size_t i = 0; i < image.data.size(); ++i) image.data[i] = static_cast<float>(i);
+  const Image half = box_average(image, 2);
+  CHECK(half.width == 2);
+  CHECK(half.height == 1);
+  CHECK(half.at(0, 0, 0) == (0 + 2 + 8 + 10) / 4.0f);
+  CHECK(half.at(1, 0, 1) == (5 + 7 + 13 + 15) / 4.0f);
+}
+
+TEST_CASE("the depth preview is white near, black far and where nothing is") {
+  Image depth(4, 1, 1);
+  depth.data = {2.0f, 4.0f, 3.0f, 100.0f};
+  Image rgba(4, 1, 4);
+  for (std::size_t i = 0; i < 3; ++i) rgba.data[4 * i + 3] = 1.0f;
+  CHECK(depth_preview(depth, rgba).data == std::vector<float>{1.0f, 0.0f, 0.5f, 0.0f});
+}
+
+TEST_CASE("frames hold what the tracer saw") {
+  const TemporaryFolder folder;
+  Context context(select_device(""));
+  TraceOptions trace;
+  trace.background = {0.0f, 0.0f, 1.0f};
+  trace.depth = true;
+  CameraTracer tracer(context, trace);
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(context, red_balls(), ScaleActivation::kExp);
+  tracer.update(gaussians);
+  Camera camera = look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, 33, 21, 30.0);
+  camera.name = "views/ball.png";
+  const std::vector<Camera> cameras{camera};
+
+  FrameOptions options;
+  options.format = FrameFormat::kExr;
+  options.depth = true;
+  options.supersample = 2;
+  std::size_t heard = 0;
+  const FrameReport report =
+      write_frames(tracer, gaussians, cameras, folder.path, options, [&](std::size_t done) {
+        heard = done;
+        return true;
+      });
+  CHECK(heard == 1);
+  CHECK(report.frames == 1);
+  CHECK(report.rays == 4u * 33u * 21u);
+  CHECK(report.capped_rays == 0);
+
+  const std::vector<float> z = exr_channel(folder.path / "ball.exr", "Z");
+  CHECK(z[10 * 33 + 16] == doctest::Approx(4.0f).epsilon(0.01));
+  CHECK(z[10 * 33 + 24] == doctest::Approx(8.0f).epsilon(0.01));
+  CHECK(z[0] == 0.0f);
+
+  // The independent view of the same frame: four rays per pixel averaged from a picture of twice
+  // the size.
+  tracer.forward(gaussians, downscaled(camera, 0.5));
+  const Image expected = box_average(tracer.download_image(), 2);
+  options.depth = false;
+  write_frames(tracer, gaussians, cameras, folder.path, options);
+  const Image exr = read_image(folder.path / "ball.exr");
+  REQUIRE(exr.channels == 4);
+  double worst = 0.0;
+  for (std::size_t i = 0; i < exr.data.size(); ++i) {
+    worst = std::max(worst, static_cast<double>(std::abs(exr.data[i] - expected.data[i])));
+  }
+  CHECK(worst < 1e-6);
+  CHECK(exr.at(16, 10, 0) > 0.8f);
+  CHECK(exr.at(16, 10, 3) > 0.9f);
+  CHECK(exr.at(0, 0, 2) == doctest::Approx(1.0f));
+  CHECK(exr.at(0, 0, 3) == doctest::Approx(0.0f));
+
+  options.format = FrameFormat::kPng;
+  options.depth = true;
+  write_frames(tracer, gaussians, cameras, folder.path, options);
+  const Image png = read_image(folder.path / "ball.png");
+  REQUIRE(png.channels == 3);
+  CHECK(png.at(16, 10, 0) == doctest::Approx(exr.at(16, 10, 0)).epsilon(0.01));
+  CHECK(png.at(0, 0, 2) == 1.0f);
+  const Image depth = read_image(folder.path / "ball_depth.png");
+  CHECK(depth.channels == 1);
+  CHECK(depth.at(16, 10, 0) > 0.9f);
+  CHECK(depth.at(24, 10, 0) < 0.1f);
+  CHECK(depth.at(0, 0, 0) == 0.0f);
+
+  options.supersample = 0;
+  CHECK_THROWS_AS(write_frames(tracer, gaussians, cameras, folder.path, options), UsageError);
+}
