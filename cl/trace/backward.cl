@@ -56,7 +56,7 @@ float16 sum_lanes(const fv* v) {
 
 void add_line(volatile __global float* target, float16 value) {
 #if PRIVATE_COPIES
-  vstore16(vload16(0, (__global float*)target) + value, 0, (__global float*)target);
+  *(__global float16*)target += value;
 #else
   union {
     float16 v;

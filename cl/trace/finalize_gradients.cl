@@ -81,7 +81,7 @@ void general_gradient(const ViewGaussian* g, const float* v, ViewGradient* out) 
 
 __kernel void finalize_gradients(const uint count,
                                  const uint copies,
-                                 __global const float* restrict line_gradients,
+                                 __global const float16* restrict line_gradients,
                                  __global const RsViewBounds* restrict bounds,
                                  __global const RsLine* restrict lines,
                                  __global const float* restrict means,
@@ -108,7 +108,7 @@ __kernel void finalize_gradients(const uint count,
   float16 sum = (float16)(0.0f);
   const int kind = bounds[i].kind;
   if (kind != RS_LINE_HIDDEN) {
-    for (uint c = 0; c < copies; ++c) sum += vload16((size_t)c * count + i, line_gradients);
+    for (uint c = 0; c < copies; ++c) sum += line_gradients[(size_t)c * count + i];
   }
   float v[16];
   vstore16(sum, 0, v);

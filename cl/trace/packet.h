@@ -32,7 +32,7 @@ typedef int2 iv;
 #define RS_LANE_X ((fv)(0, 1))
 #define RS_LANE_Y ((fv)(0, 0))
 #define RS_LANE_INDEX ((iv)(0, 1))
-#define rs_load_float(p) vload2(0, p)
+#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int2(v)
 #define rs_as_float(v) as_float2(v)
 #elif PACKET == 4
@@ -43,7 +43,7 @@ typedef int4 iv;
 #define RS_LANE_X ((fv)(0, 1, 0, 1))
 #define RS_LANE_Y ((fv)(0, 0, 1, 1))
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3))
-#define rs_load_float(p) vload4(0, p)
+#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int4(v)
 #define rs_as_float(v) as_float4(v)
 #elif PACKET == 8
@@ -54,7 +54,7 @@ typedef int8 iv;
 #define RS_LANE_X ((fv)(0, 1, 2, 3, 0, 1, 2, 3))
 #define RS_LANE_Y ((fv)(0, 0, 0, 0, 1, 1, 1, 1))
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7))
-#define rs_load_float(p) vload8(0, p)
+#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int8(v)
 #define rs_as_float(v) as_float8(v)
 #elif PACKET == 16
@@ -65,10 +65,15 @@ typedef int16 iv;
 #define RS_LANE_X ((fv)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
 #define RS_LANE_Y ((fv)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
-#define rs_load_float(p) vload16(0, p)
+#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int16(v)
 #define rs_as_float(v) as_float16(v)
 #endif
+#endif
+
+#if PACKET > 1
+// Some implementations take vload apart into scalars; a vector type of float's alignment stays one load.
+typedef fv rs_unaligned __attribute__((aligned(4)));
 #endif
 
 // Masks hold 0 or -1 in every lane. Compilers with vector reductions turn these into mask registers; the plain
