@@ -346,27 +346,30 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   row_iteration = iteration;
   row_seconds = training.seconds();
   training.start();
+  const auto pause = [&](const auto& work) {
+    context.finish();
+    training.stop();
+    progress.suspend();
+    work();
+    progress.resume();
+    training.start();
+  };
   bool stop = false;
   while (iteration < options.iterations && !stop) {
     step();
     const bool last = iteration == options.iterations;
     if (last || every(options.log_every, iteration)) report(progress);
-    control_density();
     // Asked once: a signal that comes later is seen after the next step.
     stop = interrupt.requested();
-    const bool evaluates = !stop && (last || every(options.eval_every, iteration) ||
-                                     contains(options.eval_at, iteration));
+    const bool evaluates =
+        last || every(options.eval_every, iteration) || contains(options.eval_at, iteration);
     const bool saves = stop || last || contains(options.save_at, iteration);
-    const bool keeps = stop || last || every(options.checkpoint_every, iteration);
-    if (!evaluates && !saves && !keeps) continue;
-    context.finish();
-    training.stop();
-    progress.suspend();
-    if (keeps) save_checkpoint();
-    if (saves) save_model();
-    if (evaluates) evaluate_views(last);
-    progress.resume();
-    training.start();
+    // Before density control, as in 3DGS: fresh clones and children have not settled yet.
+    if (saves) pause([this] { save_model(); });
+    if (evaluates && (last || !stop)) pause([this, last] { evaluate_views(last); });
+    if (!last) control_density();
+    if (stop || last || every(options.checkpoint_every, iteration))
+      pause([this] { save_checkpoint(); });
   }
   context.finish();
   training.stop();
