@@ -48,6 +48,13 @@ void store_straight(const std::array<float, kChannels>& sum, float* out) {
   }
 }
 
+/// Colours times alpha, in place.
+void premultiply(Image& rgba) {
+  for (std::size_t i = 0; i < rgba.data.size(); i += kChannels) {
+    for (std::size_t c = 0; c < 3; ++c) rgba.data[i + c] *= rgba.data[i + 3];
+  }
+}
+
 /// Square of the normalised radius up to which the radial polynomial grows; infinity when it never
 /// stops within `limit`.
 double growing_radius2(const Distortion& d, double limit) {
@@ -103,16 +110,10 @@ Image area_resample(const Image& rgba, int width, int height) {
   return out;
 }
 
-void distort(const Distortion& d, double x, double y, double& distorted_x, double& distorted_y) {
-  const double r2 = x * x + y * y;
-  const double radial = 1 + r2 * (d.k1 + r2 * (d.k2 + r2 * d.k3));
-  distorted_x = x * radial + 2 * d.p1 * x * y + d.p2 * (r2 + 2 * x * x);
-  distorted_y = y * radial + d.p1 * (r2 + 2 * y * y) + 2 * d.p2 * x * y;
-}
-
-Image undistort(const Image& rgba, const Camera& camera, const Distortion& distortion) {
+Image undistort(Image rgba, const Camera& camera, const Distortion& distortion) {
   const int width = rgba.width;
   const int height = rgba.height;
+  premultiply(rgba);
   Image out(width, height, static_cast<int>(kChannels));
   const double far_x = std::max(camera.cx, width - camera.cx) / camera.fx;
   const double far_y = std::max(camera.cy, height - camera.cy) / camera.fy;
@@ -148,9 +149,7 @@ Image undistort(const Image& rgba, const Camera& camera, const Distortion& disto
                                          wx * wy};
       std::array<float, kChannels> sum{};
       for (std::size_t tap = 0; tap < 4; ++tap) {
-        const float weight = weights[tap] * taps[tap][3];
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * taps[tap][c];
-        sum[3] += weight;
+        for (std::size_t c = 0; c < kChannels; ++c) sum[c] += weights[tap] * taps[tap][c];
       }
       store_straight(sum, target);
     }

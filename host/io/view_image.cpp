@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "io/resample.hpp"
 #include "raysplats/dataset.hpp"
@@ -50,7 +51,8 @@ Image load_view_image(const View& view) {
                     view.source_camera.height));
   }
   if (!view.mask_path.empty()) apply_mask(rgba, read_image(view.mask_path));
-  if (view.distortion.any()) rgba = io::undistort(rgba, view.source_camera, view.distortion);
+  if (view.distortion.any())
+    rgba = io::undistort(std::move(rgba), view.source_camera, view.distortion);
   if (rgba.width == view.camera.width && rgba.height == view.camera.height) return rgba;
   return io::area_resample(rgba, view.camera.width, view.camera.height);
 }

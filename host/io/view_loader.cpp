@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "raysplats/error.hpp"
 
@@ -12,16 +11,16 @@ namespace raysplats::io {
 
 PackedImage pack(const Image& rgba) {
   PackedImage out{rgba.width, rgba.height, {}};
-  out.pixels.reserve(rgba.pixels());
+  out.pixels.resize(rgba.pixels());
   for (std::size_t i = 0; i < rgba.pixels(); ++i) {
     std::uint32_t word = 0;
     for (std::size_t c = 0; c < 4; ++c) {
       const float value = rgba.data[4 * i + c];
       // Written so that NaN becomes 0.
       const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;
-      word |= static_cast<std::uint32_t>(std::lround(clamped * 255.0f)) << (8 * c);
+      word |= static_cast<std::uint32_t>(clamped * 255.0f + 0.5f) << (8 * c);
     }
-    out.pixels.push_back(word);
+    out.pixels[i] = word;
   }
   return out;
 }

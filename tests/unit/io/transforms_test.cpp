@@ -204,8 +204,8 @@ TEST_CASE("nerfstudio scenes: distortion, masks, points, lists of names, scaled 
   for (int i = 0; i < 9; ++i) {
     const std::string name = "images/f" + std::to_string(i) + ".png";
     write_image(scratch / name, Image(20, 10, 3, 0.5f));
-    frames +=
-        (i > 0 ? "," : "") + frame(name, i, i == 2 ? "\"mask_path\": \"m.png\", \"k1\": 0, " : "");
+    if (i > 0) frames += ",";
+    frames += frame(name, i, i == 2 ? "\"mask_path\": \"m.png\", \"k1\": 0, " : "");
   }
   Image mask(10, 5, 1, 1.0f);
   mask.at(0, 0, 0) = 0.0f;
