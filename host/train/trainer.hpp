@@ -24,7 +24,7 @@ struct TrainSummary {
       evaluations;  ///< the last one is that of the final model, when there are test views
 };
 
-/// Trains a model of a data set (docs/training.md) and writes a run folder. A run is a function of
+/// Trains a model of a data set and writes a run folder. A run is a function of
 /// data set, options and device: resumed from a checkpoint it continues bit for bit.
 class Trainer {
  public:
