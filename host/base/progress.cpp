@@ -65,7 +65,8 @@ void Progress::update(std::int64_t done, const std::string& fields) {
 
 void Progress::finish() {
   if (finished_) return;
-  draw(true);
+  // A plain line for this state may have been printed already.
+  if (terminal_ || drawn_done_ != done_) draw(true);
   finished_ = true;
 }
 
@@ -113,6 +114,7 @@ void Progress::draw(bool last) {
   }
   std::fflush(stream_);
   drawn_ = true;
+  drawn_done_ = done_;
   last_draw_ = clock();
 }
 

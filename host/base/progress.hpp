@@ -50,6 +50,7 @@ class Progress {
   std::FILE* stream_;
   bool terminal_;
   bool drawn_ = false;
+  std::int64_t drawn_done_ = -1;
   bool finished_ = false;
   double rate_ = 0;
   double rate_time_ = 0;  ///< clock and steps at the last change of the rate
