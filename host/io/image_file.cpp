@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_file.hpp"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
@@ -266,10 +267,12 @@ void write_image(const std::filesystem::path& path,
     spec.attribute("compression", "zip");
     spec.channelnames = exr_channel_names(image, extra_channels);
   }
-  AtomicFile file(path);
+  // Encoded in memory: OpenImageIO's encoders miss a full disk, and libjpeg ends the process on
+  // one.
   const std::string format = exr ? "openexr" : (jpeg ? "jpeg" : "png");
   const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(format);
-  bool written = output && output->open(file.temporary().string(), spec);
+  OIIO::Filesystem::IOVecOutput encoded;
+  bool written = output && output->set_ioproxy(&encoded) && output->open(path.string(), spec);
   if (written && exr) {
     written = output->write_image(OIIO::TypeFloat, image.data.data());
   } else if (written) {
@@ -281,6 +284,8 @@ void write_image(const std::filesystem::path& path,
         fmt::format("The image {} cannot be written: {}", path.string(),
                     output ? reason(output->geterror()) : "OpenImageIO lacks the format"));
   }
+  AtomicFile file(path);
+  file.write(encoded.buffer().data(), encoded.buffer().size());
   file.commit();
 }
 

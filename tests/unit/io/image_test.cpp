@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <array>
 #include <cmath>
+#include <csignal>
 #include <string>
 #include <vector>
 
@@ -241,4 +243,26 @@ TEST_CASE("images that cannot be written leave nothing behind") {
     CHECK(contains(data_error([&] { write_image(scratch / "locked" / "a.png", image); }), "a.png"));
     fs::permissions(scratch / "locked", fs::perms::owner_all);
   }
+}
+
+TEST_CASE("a disk that runs full keeps the old file and leaves nothing half-written") {
+  const Scratch scratch;
+  Image image(100, 100, 3);
+  CounterRng rng(12, 13);
+  for (float& value : image.data) value = static_cast<float>(rng.uniform());
+  for (const char* name : {"a.png", "a.jpg", "a.exr"}) {
+    write_bytes(scratch / name, "old");
+    // Writing beyond the limit fails as on a full disk, once the signal is ignored.
+    rlimit old_limit{};
+    REQUIRE(::getrlimit(RLIMIT_FSIZE, &old_limit) == 0);
+    const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{4096, old_limit.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    const std::string message = data_error([&] { write_image(scratch / name, image); });
+    ::setrlimit(RLIMIT_FSIZE, &old_limit);
+    std::signal(SIGXFSZ, old_handler);
+    CHECK(contains(message, name));
+    CHECK(read_bytes(scratch / name) == "old");
+  }
+  CHECK(std::distance(fs::directory_iterator(scratch.path()), {}) == 3);
 }
