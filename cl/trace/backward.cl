@@ -21,31 +21,37 @@
 #define PRIVATE_COPIES 0
 #endif
 
-#if PACKET == 16 || PACKET == 8
-// Sums 8 vectors over their lanes at once: pairs of halves are added until one lane per vector is
-// left.
-float8 sum_rows8(float8 a, float8 b, float8 c, float8 d, float8 e, float8 f, float8 g, float8 h) {
-  const float8 ae = (float8)(a.lo + a.hi, e.lo + e.hi), bf = (float8)(b.lo + b.hi, f.lo + f.hi);
-  const float8 cg = (float8)(c.lo + c.hi, g.lo + g.hi), dh = (float8)(d.lo + d.hi, h.lo + h.hi);
-  // Quarters: a c e g and b d f h.
-  const float8 aceg = (float8)(ae.s01 + ae.s23, cg.s01 + cg.s23, ae.s45 + ae.s67, cg.s45 + cg.s67);
-  const float8 bdfh = (float8)(bf.s01 + bf.s23, dh.s01 + dh.s23, bf.s45 + bf.s67, dh.s45 + dh.s67);
-  const float4 even = aceg.s0246 + aceg.s1357;
-  const float4 odd = bdfh.s0246 + bdfh.s1357;
-  return (float8)(even.x, odd.x, even.y, odd.y, even.z, odd.z, even.w, odd.w);
-}
+// COMBINE entries of a packet's stream that name the same Gaussian are gathered before its line is
+// summed over the lanes: neighbouring rays often meet it at different places of their order.
+#ifndef COMBINE
+#if PACKET >= 4
+#define COMBINE 32
+#else
+#define COMBINE 1
+#endif
 #endif
 
+// Lane i of the result is the sum of v[i] over its lanes. With 16 lanes, pairs of vectors are
+// folded into one by adding halves, then quarters, and so on: 15 additions for all sums.
 float16 sum_lanes(const fv* v) {
 #if PACKET == 16
-#define H(i) (v[i].lo + v[i].hi)
-#elif PACKET == 8
-#define H(i) (v[i])
-#endif
-#if PACKET == 16 || PACKET == 8
-  return (float16)(sum_rows8(H(0), H(1), H(2), H(3), H(4), H(5), H(6), H(7)),
-                   sum_rows8(H(8), H(9), H(10), H(11), H(12), H(13), H(14), H(15)));
-#undef H
+  float16 a[8], b[4], c[2];
+  for (int i = 0; i < 8; ++i)
+    a[i] = (float16)(v[i].lo, v[i + 8].lo) + (float16)(v[i].hi, v[i + 8].hi);
+  for (int i = 0; i < 4; ++i) {
+    b[i] = (float16)(a[i].s0123, a[i + 4].s0123, a[i].s89ab, a[i + 4].s89ab) +
+           (float16)(a[i].s4567, a[i + 4].s4567, a[i].scdef, a[i + 4].scdef);
+  }
+  for (int i = 0; i < 2; ++i) {
+    const float16 x = b[i], y = b[i + 2];
+    c[i] = (float16)(x.s01, y.s01, x.s45, y.s45, x.s89, y.s89, x.scd, y.scd) +
+           (float16)(x.s23, y.s23, x.s67, y.s67, x.sab, y.sab, x.sef, y.sef);
+  }
+  const float16 x = c[0], y = c[1];
+  return (float16)(x.s0, y.s0, x.s2, y.s2, x.s4, y.s4, x.s6, y.s6, x.s8, y.s8, x.sa, y.sa, x.sc,
+                   y.sc, x.se, y.se) +
+         (float16)(x.s1, y.s1, x.s3, y.s3, x.s5, y.s5, x.s7, y.s7, x.s9, y.s9, x.sb, y.sb, x.sd,
+                   y.sd, x.sf, y.sf);
 #else
   return (float16)(rs_lane_sum(v[0]), rs_lane_sum(v[1]), rs_lane_sum(v[2]), rs_lane_sum(v[3]),
                    rs_lane_sum(v[4]), rs_lane_sum(v[5]), rs_lane_sum(v[6]), rs_lane_sum(v[7]),
@@ -76,6 +82,75 @@ void add_line(volatile __global float* target, float16 value) {
 #endif
 }
 
+// What the rays of a packet share, and the gradient of its pixels.
+typedef struct {
+  fv X, Y;
+  fv gR, gG, gB, gA;
+  float screen_x, screen_y;
+} Pixels;
+
+// Gathered entries, direct-mapped by Gaussian. scaled = response dL/dalpha and weight = T alpha, 0
+// in lanes that do not meet it.
+typedef struct {
+  uint reference[COMBINE];
+  fv scaled[COMBINE];
+  fv weight[COMBINE];
+} Gathered;
+
+#define RS_NO_REFERENCE 0xffffffffu
+
+// Sums one Gaussian's gradient line over the rays of the packet and adds it to memory.
+void add_gradient(const Pixels* p,
+                  const uint reference,
+                  const fv scaled,
+                  const fv weight,
+                  __global const RsLine* restrict lines,
+                  __global float* gradient) {
+  const bool general = reference & 1;
+  __global const float* v = lines[reference >> 1].v;
+  const PacketMeeting m = rs_meet(v, general, 0.0f, p->X, p->Y);
+  const fv inverse = 1.0f / m.direction2;
+  const fv g_distance2 = -0.5f * v[12] * scaled;
+  fv g[16];
+  g[12] = scaled;
+  g[13] = weight * p->gR;
+  g[14] = weight * p->gG;
+  g[15] = weight * p->gB;
+  if (!general) {
+    const fv dx = p->X - v[0];
+    const fv dy = p->Y - v[1];
+    const fv gN = g_distance2 * inverse;
+    const fv gD = -gN * m.numerator * inverse;
+    const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
+    g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
+    g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
+    g[2] =
+        sqrt(g[0] * g[0] * (p->screen_x * p->screen_x) + g[1] * g[1] * (p->screen_y * p->screen_y));
+    g[3] = gNx * dx;
+    g[4] = 2.0f * gNx * dy;
+    g[5] = gNy * dy;
+    g[6] = gD;
+    g[7] = 2.0f * gDx;
+    g[8] = 2.0f * gDy;
+    g[9] = gDx * dx;
+    g[10] = 2.0f * gDx * dy;
+    g[11] = gDy * dy;
+  } else {
+    // g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'.
+    const fv peak = m.along * inverse;
+    for (int k = 0; k < 3; ++k) {
+      const fv direction = v[3 * k] * p->X + v[3 * k + 1] * p->Y + v[3 * k + 2];
+      const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
+      const fv g_direction = peak * g_origin;
+      g[3 * k] = g_direction * p->X;
+      g[3 * k + 1] = g_direction * p->Y;
+      g[3 * k + 2] = g_direction;
+      g[9 + k] = g_origin;
+    }
+  }
+  add_line(gradient + (size_t)(reference >> 1) * 16, sum_lanes(g));
+}
+
 void packet_backward(const RsCamera* camera,
                      const int px,
                      const int py,
@@ -92,17 +167,22 @@ void packet_backward(const RsCamera* camera,
   const uint packets_x = (width + PACKET_WIDTH - 1) / PACKET_WIDTH;
   const uint2 tail = stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH];
   if (tail.x == RS_NO_CHUNK) return;
-  const fv X = ((float)px + RS_LANE_X + 0.5f - camera->cx) / camera->fx;
-  const fv Y = ((float)py + RS_LANE_Y + 0.5f - camera->cy) / camera->fy;
+  Pixels p;
+  p.X = ((float)px + RS_LANE_X + 0.5f - camera->cx) / camera->fx;
+  p.Y = ((float)py + RS_LANE_Y + 0.5f - camera->cy) / camera->fy;
+  p.screen_x = screen_x;
+  p.screen_y = screen_y;
   const size_t plane = (size_t)width * height;
-  const fv gR = rs_load_pixels(image_gradient, width, height, px, py);
-  const fv gG = rs_load_pixels(image_gradient + plane, width, height, px, py);
-  const fv gB = rs_load_pixels(image_gradient + 2 * plane, width, height, px, py);
-  const fv gA = rs_load_pixels(image_gradient + 3 * plane, width, height, px, py);
+  p.gR = rs_load_pixels(image_gradient, width, height, px, py);
+  p.gG = rs_load_pixels(image_gradient + plane, width, height, px, py);
+  p.gB = rs_load_pixels(image_gradient + 2 * plane, width, height, px, py);
+  p.gA = rs_load_pixels(image_gradient + 3 * plane, width, height, px, py);
+  Gathered gathered;
+  for (int i = 0; i < COMBINE; ++i) gathered.reference[i] = RS_NO_REFERENCE;
   fv T = rs_load_pixels(last_transmittance, width, height, px, py);
   // Everything behind the current hit, as seen from just behind it, projected on the pixel's
   // gradient; alpha is a fourth colour channel that is 1 in every Gaussian and 0 in the background.
-  fv suffix = background.x * gR + background.y * gG + background.z * gB;
+  fv suffix = background.x * p.gR + background.y * p.gG + background.z * p.gB;
   iv at_last = (iv)(-1);  // lanes that have not met their last hit yet
   uint chunk = tail.x;
   uint used = tail.y;
@@ -110,61 +190,40 @@ void packet_backward(const RsCamera* camera,
     __global const uint2* entries = pool + (size_t)chunk * CHUNK;
     for (uint n = used - 1; n > 0; --n) {
       const uint2 entry = entries[n];
-      const bool general = entry.x & 1;
       const iv mine = rs_lane_mask(entry.y);
       __global const float* v = lines[entry.x >> 1].v;
-      const PacketMeeting m = rs_meet(v, general, 0.0f, X, Y);
-      const fv inverse = 1.0f / m.direction2;
-      const fv distance2 = m.numerator * inverse;
-      const fv response = select((fv)(0.0f), rs_exp(-0.5f * distance2), mine);
+      const PacketMeeting m = rs_meet(v, entry.x & 1, 0.0f, p.X, p.Y);
+      const fv response = select((fv)(0.0f), rs_exp(-0.5f * m.numerator / m.direction2), mine);
       const fv alpha = v[12] * response;
       T = select(T / (1.0f - alpha), T, at_last | ~mine);
       at_last &= ~mine;
-      const fv color = v[13] * gR + v[14] * gG + v[15] * gB + gA;
+      const fv color = v[13] * p.gR + v[14] * p.gG + v[15] * p.gB + p.gA;
+      const fv behind = color - suffix;
+      const fv scaled = T * behind * response;
       const fv weight = T * alpha;
-      const fv g_alpha = select((fv)(0.0f), T * (color - suffix), mine);
-      suffix += alpha * (color - suffix);
-      const fv g_distance2 = -0.5f * alpha * g_alpha;
-      fv g[16];
-      g[12] = g_alpha * response;
-      g[13] = weight * gR;
-      g[14] = weight * gG;
-      g[15] = weight * gB;
-      if (!general) {
-        const fv dx = X - v[0];
-        const fv dy = Y - v[1];
-        const fv gN = g_distance2 * inverse;
-        const fv gD = -gN * distance2;
-        const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
-        g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
-        g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
-        g[2] = sqrt(g[0] * g[0] * (screen_x * screen_x) + g[1] * g[1] * (screen_y * screen_y));
-        g[3] = gNx * dx;
-        g[4] = 2.0f * gNx * dy;
-        g[5] = gNy * dy;
-        g[6] = gD;
-        g[7] = 2.0f * gDx;
-        g[8] = 2.0f * gDy;
-        g[9] = gDx * dx;
-        g[10] = 2.0f * gDx * dy;
-        g[11] = gDy * dy;
+      suffix += alpha * behind;
+      const uint slot = (entry.x >> 1) % COMBINE;
+      if (gathered.reference[slot] == entry.x) {
+        gathered.scaled[slot] += scaled;
+        gathered.weight[slot] += weight;
       } else {
-        // g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'.
-        const fv peak = m.along * inverse;
-        for (int k = 0; k < 3; ++k) {
-          const fv direction = v[3 * k] * X + v[3 * k + 1] * Y + v[3 * k + 2];
-          const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
-          const fv g_direction = peak * g_origin;
-          g[3 * k] = g_direction * X;
-          g[3 * k + 1] = g_direction * Y;
-          g[3 * k + 2] = g_direction;
-          g[9 + k] = g_origin;
+        if (gathered.reference[slot] != RS_NO_REFERENCE) {
+          add_gradient(&p, gathered.reference[slot], gathered.scaled[slot], gathered.weight[slot],
+                       lines, gradient);
         }
+        gathered.reference[slot] = entry.x;
+        gathered.scaled[slot] = scaled;
+        gathered.weight[slot] = weight;
       }
-      add_line(gradient + (size_t)(entry.x >> 1) * 16, sum_lanes(g));
     }
     chunk = entries[0].x;
     used = CHUNK;
+  }
+  for (int i = 0; i < COMBINE; ++i) {
+    if (gathered.reference[i] != RS_NO_REFERENCE) {
+      add_gradient(&p, gathered.reference[i], gathered.scaled[i], gathered.weight[i], lines,
+                   gradient);
+    }
   }
 }
 

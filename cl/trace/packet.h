@@ -72,12 +72,13 @@ typedef int16 iv;
 #endif
 
 #if PACKET > 1
-// Some implementations take vload apart into scalars; a vector type of float's alignment stays one load.
+// Some implementations take vload apart into scalars; a vector type of float's alignment stays one
+// load.
 typedef fv rs_unaligned __attribute__((aligned(4)));
 #endif
 
-// Masks hold 0 or -1 in every lane. Compilers with vector reductions turn these into mask registers; the plain
-// forms below them give the same answers.
+// Masks hold 0 or -1 in every lane. Compilers with vector reductions turn these into mask
+// registers; the plain forms below them give the same answers.
 #if PACKET > 1 && defined(__has_builtin)
 #if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_and)
 #define RS_VECTOR_REDUCTIONS 1
@@ -145,8 +146,9 @@ float rs_lane_sum(fv v) {
 #endif
 }
 
-// exp(x) for x <= 0 with a relative error below 2e-7 (arguments below -80 count as -80): some OpenCL
-// implementations evaluate the built-in lane by lane. 2^n by exponent arithmetic, 2^f by a polynomial on
+// exp(x) for x <= 0 with a relative error below 2e-7 (arguments below -80 count as -80): some
+// OpenCL implementations evaluate the built-in lane by lane. 2^n by exponent arithmetic, 2^f by a
+// polynomial on
 // [-1/2, 1/2] (Taylor of 2^f, degree 6).
 fv rs_exp(fv x) {
   const fv y = fmax(x, (fv)(-80.0f)) * 1.44269504f;
@@ -206,7 +208,8 @@ typedef struct {
   fv along;       // -<o', d'>
 } PacketMeeting;
 
-// v: the line; X, Y: tangent coordinates of the rays (d = (X, Y, 1) in camera axes, t is depth along z).
+// v: the line; X, Y: tangent coordinates of the rays (d = (X, Y, 1) in camera axes, t is depth
+// along z).
 PacketMeeting rs_meet_projective(__global const float* v, float quantile, fv X, fv Y) {
   PacketMeeting m;
   const fv dx = X - v[0];

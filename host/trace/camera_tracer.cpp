@@ -333,7 +333,7 @@ CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& ga
 CameraTracer::Statistics CameraTracer::statistics() const {
   if (impl_->statistics_saved) return impl_->saved;
   const std::vector<std::uint32_t> counters = impl_->counters.download();
-  return {counters[1], impl_->candidates, counters[2]};
+  return {counters[1], impl_->candidates, counters[2], counters[0] * kChunkBytes};
 }
 
 namespace {
