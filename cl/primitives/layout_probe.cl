@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the layout of every shared record as this device's compiler sees it: per record its size, then the
-// offset of each field in order of declaration. Launch: one work-item; returns how many words it wrote in
-// layout[0].
+// Writes the layout of every shared record as this device's compiler sees it: per record its size,
+// then the offset of each field in order of declaration. Launch: one work-item; returns how many
+// words it wrote in layout[0].
 #include "shared/layout.h"
 
 #define RS_PUT(value) layout[next++] = (uint)(value)

@@ -257,6 +257,10 @@ __kernel void trace_backward(const uint count,
     }
   }
 #else
+  (void)count;
+  (void)groups;
+  (void)tiles_x;
+  (void)tile_rows;
   const int x = get_global_id(0) * PACKET_WIDTH;
   const int y = get_global_id(1) * PACKET_HEIGHT + tile_row * TILE;
   if (x >= camera.width || y >= camera.height) return;

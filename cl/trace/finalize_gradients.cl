@@ -101,6 +101,9 @@ __kernel void finalize_gradients(const uint count,
                                  __global float* restrict g_sh,
                                  __global float* restrict screen,
                                  __global float* restrict pose) {
+#if !POSE
+  (void)pose;
+#endif
   const uint i = get_global_id(0);
   if (i >= count) return;
   const RsCamera camera = camera_argument;

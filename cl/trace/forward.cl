@@ -67,6 +67,15 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
                             __global uint2* restrict pool,
                             const uint pool_capacity,
                             volatile __global uint* restrict counters) {
+#if !WITH_DEPTH
+  (void)depth_image;
+#endif
+#if !KEEP_HITS
+  (void)last_transmittance;
+  (void)stream_ends;
+  (void)pool;
+  (void)pool_capacity;
+#endif
   const RsCamera camera = camera_argument;
   const int px = get_global_id(0) * PACKET_WIDTH;
   const int band_y = get_global_id(1) * PACKET_HEIGHT;

@@ -16,7 +16,8 @@ AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)
   const std::filesystem::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  temporary_ = folder / fmt::format(".{}.{}.tmp{}", target_.stem().string(), ::getpid(), target_.extension().string());
+  temporary_ = folder / fmt::format(".{}.{}.tmp{}", target_.stem().string(), ::getpid(),
+                                    target_.extension().string());
   descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (descriptor_ < 0) fail("be created");
 }
@@ -50,7 +51,8 @@ void AtomicFile::commit() {
   if (::close(descriptor) != 0) fail("be closed");
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("be renamed into place");
   committed_ = true;
-  // The rename itself is durable only once the folder is synced; a folder that cannot be opened is no error.
+  // The rename itself is durable only once the folder is synced; a folder that cannot be opened is
+  // no error.
   const std::filesystem::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
   const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (directory >= 0) {

@@ -8,9 +8,10 @@
 
 namespace raysplats {
 
-/// A file that appears whole or not at all: everything goes to a temporary name in the same folder, commit()
-/// syncs and renames it over the target. Without commit() the temporary file is removed and the target keeps
-/// its old content. Failures throw DataError with the path and the system's reason (disk full, permissions).
+/// A file that appears whole or not at all: everything goes to a temporary name in the same folder,
+/// commit() syncs and renames it over the target. Without commit() the temporary file is removed
+/// and the target keeps its old content. Failures throw DataError with the path and the system's
+/// reason (disk full, permissions).
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path target);

@@ -7,8 +7,8 @@
 
 namespace raysplats {
 
-/// Counter-based random numbers: the value depends on (seed, stream, counter) alone, so that a resumed run
-/// continues exactly. Mixing after SplitMix64 (Steele, Lea, Flood 2014).
+/// Counter-based random numbers: the value depends on (seed, stream, counter) alone, so that a
+/// resumed run continues exactly. Mixing after SplitMix64 (Steele, Lea, Flood 2014).
 class CounterRng {
  public:
   CounterRng(std::uint64_t seed, std::uint64_t stream, std::uint64_t counter = 0)

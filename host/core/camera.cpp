@@ -22,13 +22,18 @@ Camera downscaled(const Camera& camera, double factor) {
   return out;
 }
 
-Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, const glm::dvec3& up, int width, int height,
+Camera look_at(const glm::dvec3& eye,
+               const glm::dvec3& target,
+               const glm::dvec3& up,
+               int width,
+               int height,
                double focal) {
   const glm::dvec3 forward = glm::normalize(target - eye);
   glm::dvec3 right = glm::cross(forward, up);
   // Looking along `up` leaves the roll open: any perpendicular will do.
   if (glm::length(right) < 1e-9) {
-    right = glm::cross(forward, std::abs(forward.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
+    right =
+        glm::cross(forward, std::abs(forward.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
   }
   right = glm::normalize(right);
   const glm::dvec3 down = glm::cross(forward, right);

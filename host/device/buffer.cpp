@@ -16,18 +16,20 @@ RawBuffer::RawBuffer(Context& context, std::size_t bytes, const std::string& lab
     : bytes_(bytes) {
   Context::Impl& owner = context.impl();
   if (bytes > owner.info.max_allocation) {
-    throw ResourceError(fmt::format(
-        "The buffer '{}' needs {:.1f} MiB but {} allows {:.1f} MiB at once: use fewer Gaussians (--max-gaussians) "
-        "or a larger --downscale",
-        label, static_cast<double>(bytes) / (1 << 20), owner.info.name,
-        static_cast<double>(owner.info.max_allocation) / (1 << 20)));
+    throw ResourceError(
+        fmt::format("The buffer '{}' needs {:.1f} MiB but {} allows {:.1f} MiB at once: use fewer "
+                    "Gaussians (--max-gaussians) "
+                    "or a larger --downscale",
+                    label, static_cast<double>(bytes) / (1 << 20), owner.info.name,
+                    static_cast<double>(owner.info.max_allocation) / (1 << 20)));
   }
   try {
     cl::Buffer buffer(owner.context, CL_MEM_READ_WRITE, bytes);
     impl_ = std::shared_ptr<Impl>(new Impl{&owner, owner.memory, buffer, bytes, label});
   } catch (const cl::Error& error) {
-    throw_cl_error(error, fmt::format("Allocating {:.1f} MiB for '{}' on {}",
-                                      static_cast<double>(bytes) / (1 << 20), label, owner.info.name));
+    throw_cl_error(error,
+                   fmt::format("Allocating {:.1f} MiB for '{}' on {}",
+                               static_cast<double>(bytes) / (1 << 20), label, owner.info.name));
   }
   owner.memory->allocated += bytes;
   owner.memory->peak = std::max(owner.memory->peak, owner.memory->allocated);
@@ -65,14 +67,17 @@ void RawBuffer::fill(std::uint32_t pattern, std::size_t bytes, std::size_t offse
   }
 }
 
-void RawBuffer::copy_from(const RawBuffer& source, std::size_t bytes, std::size_t source_offset,
+void RawBuffer::copy_from(const RawBuffer& source,
+                          std::size_t bytes,
+                          std::size_t source_offset,
                           std::size_t offset) {
   Impl& impl = checked();
   const Impl& from = source.checked();
   try {
     impl.context->queue.enqueueCopyBuffer(from.buffer, impl.buffer, source_offset, offset, bytes);
   } catch (const cl::Error& error) {
-    throw_cl_error(error, fmt::format("Copying {} bytes from '{}' to '{}'", bytes, from.label, impl.label));
+    throw_cl_error(
+        error, fmt::format("Copying {} bytes from '{}' to '{}'", bytes, from.label, impl.label));
   }
 }
 

@@ -16,8 +16,9 @@ namespace raysplats {
 
 class Context;
 
-/// Untyped device memory; move-only. A size over the device's largest allocation throws ResourceError, access
-/// outside the memory DeviceError. It may outlive its context, but is of no use then.
+/// Untyped device memory; move-only. A size over the device's largest allocation throws
+/// ResourceError, access outside the memory DeviceError. It may outlive its context, but is of no
+/// use then.
 class RawBuffer {
  public:
   RawBuffer() = default;
@@ -32,7 +33,10 @@ class RawBuffer {
   void write(const void* source, std::size_t bytes, std::size_t offset);
   void read(void* target, std::size_t bytes, std::size_t offset) const;  ///< blocks
   void fill(std::uint32_t pattern, std::size_t bytes, std::size_t offset);
-  void copy_from(const RawBuffer& source, std::size_t bytes, std::size_t source_offset, std::size_t offset);
+  void copy_from(const RawBuffer& source,
+                 std::size_t bytes,
+                 std::size_t source_offset,
+                 std::size_t offset);
 
   struct Impl;
   const Impl* impl() const { return impl_.get(); }
@@ -84,8 +88,12 @@ class Buffer {
     static_assert(sizeof(T) % 4 == 0);
     if (size_ > 0) raw_.fill(0, size_ * sizeof(T), 0);
   }
-  void copy_from(const Buffer& source, std::size_t count, std::size_t source_offset = 0, std::size_t offset = 0) {
-    if (count > 0) raw_.copy_from(source.raw_, count * sizeof(T), source_offset * sizeof(T), offset * sizeof(T));
+  void copy_from(const Buffer& source,
+                 std::size_t count,
+                 std::size_t source_offset = 0,
+                 std::size_t offset = 0) {
+    if (count > 0)
+      raw_.copy_from(source.raw_, count * sizeof(T), source_offset * sizeof(T), offset * sizeof(T));
   }
   const RawBuffer& raw() const { return raw_; }
 
@@ -93,7 +101,8 @@ class Buffer {
   // A device buffer cannot be empty.
   static std::size_t bytes_for(std::size_t size, const std::string& label) {
     if (size > std::numeric_limits<std::size_t>::max() / sizeof(T)) {
-      throw ResourceError("The buffer '" + label + "' is larger than any memory: use fewer Gaussians");
+      throw ResourceError("The buffer '" + label +
+                          "' is larger than any memory: use fewer Gaussians");
     }
     return (size > 0 ? size : 1) * sizeof(T);
   }

@@ -7,7 +7,8 @@
 
 namespace raysplats {
 
-/// Preprocessor definitions a kernel is specialised by; their sorted text is part of every cache key.
+/// Preprocessor definitions a kernel is specialised by; their sorted text is part of every cache
+/// key.
 class BuildOptions {
  public:
   template <class T>

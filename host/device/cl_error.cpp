@@ -54,10 +54,12 @@ std::string cl_error_name(cl_int status) {
 
 void throw_cl_error(const cl::Error& error, const std::string& what) {
   const cl_int status = error.err();
-  const std::string message = fmt::format("{}: {} reported {}", what, error.what(), cl_error_name(status));
+  const std::string message =
+      fmt::format("{}: {} reported {}", what, error.what(), cl_error_name(status));
   if (status == CL_MEM_OBJECT_ALLOCATION_FAILURE || status == CL_OUT_OF_HOST_MEMORY ||
       status == CL_INVALID_BUFFER_SIZE) {
-    throw ResourceError(message + "; use fewer Gaussians, a larger --downscale or a device with more memory");
+    throw ResourceError(message +
+                        "; use fewer Gaussians, a larger --downscale or a device with more memory");
   }
   throw DeviceError(message);
 }

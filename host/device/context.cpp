@@ -30,7 +30,8 @@ cl::Program compile(Context::Impl& context,
   return program;
 }
 
-// Empty when the binary is not accepted, for example after a driver update with the same version string.
+// Empty when the binary is not accepted, for example after a driver update with the same version
+// string.
 std::optional<cl::Program> from_binary(Context::Impl& context,
                                        const std::vector<unsigned char>& binary,
                                        const std::string& options) {
@@ -45,7 +46,8 @@ std::optional<cl::Program> from_binary(Context::Impl& context,
 
 }  // namespace
 
-Context::Context(const DeviceInfo& device, const ContextOptions& options) : impl_(std::make_unique<Impl>()) {
+Context::Context(const DeviceInfo& device, const ContextOptions& options)
+    : impl_(std::make_unique<Impl>()) {
   impl_->options = options;
   const std::vector<PlatformDevice> devices = platform_devices();
   if (device.index >= devices.size() || devices[device.index].info.name != device.name) {
@@ -55,8 +57,9 @@ Context::Context(const DeviceInfo& device, const ContextOptions& options) : impl
   impl_->device = devices[device.index].device;
   try {
     impl_->context = cl::Context(impl_->device);
-    impl_->queue = cl::CommandQueue(impl_->context, impl_->device,
-                                    options.profile ? cl::QueueProperties::Profiling : cl::QueueProperties::None);
+    impl_->queue = cl::CommandQueue(
+        impl_->context, impl_->device,
+        options.profile ? cl::QueueProperties::Profiling : cl::QueueProperties::None);
   } catch (const cl::Error& error) {
     throw_cl_error(error, fmt::format("Opening the OpenCL device {}", device.name));
   }
@@ -72,7 +75,9 @@ Context::~Context() {
 
 const DeviceInfo& Context::device() const { return impl_->info; }
 
-Kernel Context::kernel(const std::string& program, const std::string& name, const BuildOptions& options) {
+Kernel Context::kernel(const std::string& program,
+                       const std::string& name,
+                       const BuildOptions& options) {
   cl::Program& built = impl_->program(program, options);
   auto kernel = std::make_shared<Kernel::Impl>();
   kernel->context = impl_.get();
@@ -106,7 +111,9 @@ cl::Program& Context::Impl::program(const std::string& path, const BuildOptions&
   const std::string key = path + " " + build.text();
   if (const auto found = programs.find(key); found != programs.end()) return found->second;
   const std::string source = resolve_kernel_source(path);
-  const std::string flags = build.text().empty() ? kCompilerOptions : fmt::format("{} {}", kCompilerOptions, build.text());
+  const std::string flags = build.text().empty()
+                                ? kCompilerOptions
+                                : fmt::format("{} {}", kCompilerOptions, build.text());
   if (!options.kernel_cache) return programs[key] = compile(*this, path, source, flags);
 
   const ProgramCache cache(options.cache_directory);

@@ -14,8 +14,8 @@ namespace raysplats {
 class Profiler;
 
 struct ContextOptions {
-  bool profile = false;       ///< time every launch by device events
-  bool kernel_cache = true;   ///< keep compiled programs in the user's cache directory
+  bool profile = false;         ///< time every launch by device events
+  bool kernel_cache = true;     ///< keep compiled programs in the user's cache directory
   std::string cache_directory;  ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
 };
 
@@ -30,9 +30,11 @@ class Context {
 
   const DeviceInfo& device() const;
 
-  /// The kernel `name` of the file `program` below cl/, built with `options` (memory, then disk cache, then
-  /// compiler). Throws DeviceError with the compiler's log when the build fails.
-  Kernel kernel(const std::string& program, const std::string& name, const BuildOptions& options = {});
+  /// The kernel `name` of the file `program` below cl/, built with `options` (memory, then disk
+  /// cache, then compiler). Throws DeviceError with the compiler's log when the build fails.
+  Kernel kernel(const std::string& program,
+                const std::string& name,
+                const BuildOptions& options = {});
 
   /// Blocks until everything enqueued has finished; errors of earlier launches surface here.
   void finish();

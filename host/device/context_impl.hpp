@@ -25,7 +25,7 @@ struct Context::Impl {
   cl::Context context;
   cl::CommandQueue queue;
   Profiler profiler;
-  std::map<std::string, cl::Program> programs;  // by program path and build options
+  std::map<std::string, cl::Program> programs;             // by program path and build options
   std::vector<std::pair<std::string, cl::Event>> pending;  // launches whose times are not read yet
   std::shared_ptr<MemoryCount> memory = std::make_shared<MemoryCount>();
 

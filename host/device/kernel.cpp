@@ -16,13 +16,15 @@ std::size_t Kernel::max_work_group_size() const {
 
 void Kernel::begin(std::size_t argument_count) {
   if (argument_count != impl_->argument_count) {
-    throw DeviceError(fmt::format("Kernel {} takes {} arguments, {} were given", impl_->name, impl_->argument_count,
-                                  argument_count));
+    throw DeviceError(fmt::format("Kernel {} takes {} arguments, {} were given", impl_->name,
+                                  impl_->argument_count, argument_count));
   }
 }
 
 void Kernel::set_buffer(unsigned index, const RawBuffer& buffer) {
-  if (buffer.empty()) throw DeviceError(fmt::format("Argument {} of kernel {} is an empty buffer", index, impl_->name));
+  if (buffer.empty())
+    throw DeviceError(
+        fmt::format("Argument {} of kernel {} is an empty buffer", index, impl_->name));
   try {
     impl_->kernel.setArg(index, buffer.impl()->buffer);
   } catch (const cl::Error& error) {
@@ -48,15 +50,18 @@ void Kernel::enqueue(const Range& range) {
   try {
     if (context.options.profile) {
       cl::Event event;
-      context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local, nullptr, &event);
+      context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local, nullptr,
+                                         &event);
       context.pending.emplace_back(impl_->name, event);
       if (context.pending.size() >= 4096) context.collect_profile();
     } else {
       context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local);
     }
   } catch (const cl::Error& error) {
-    throw_cl_error(error, fmt::format("Launching kernel {} with global size {}x{}x{} and local size {}x{}x{} on {}",
-                                      impl_->name, g[0], g[1], g[2], l[0], l[1], l[2], context.info.name));
+    throw_cl_error(
+        error,
+        fmt::format("Launching kernel {} with global size {}x{}x{} and local size {}x{}x{} on {}",
+                    impl_->name, g[0], g[1], g[2], l[0], l[1], l[2], context.info.name));
   }
 }
 

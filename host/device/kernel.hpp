@@ -21,15 +21,20 @@ struct Range {
   std::array<std::size_t, 3> global{1, 1, 1};
   std::array<std::size_t, 3> local{0, 0, 0};
 
-  /// One dimension of at least `count` work-items in groups of `group` (rounded up: kernels check their id).
+  /// One dimension of at least `count` work-items in groups of `group` (rounded up: kernels check
+  /// their id).
   static Range linear(std::size_t count, std::size_t group) {
     const std::size_t groups = (count + group - 1) / group;
     return Range{{groups * group, 1, 1}, {group, 1, 1}};
   }
   /// Two dimensions, rounded up likewise.
-  static Range plane(std::size_t width, std::size_t height, std::size_t group_width, std::size_t group_height) {
+  static Range plane(std::size_t width,
+                     std::size_t height,
+                     std::size_t group_width,
+                     std::size_t group_height) {
     const auto up = [](std::size_t n, std::size_t g) { return (n + g - 1) / g * g; };
-    return Range{{up(width, group_width), up(height, group_height), 1}, {group_width, group_height, 1}};
+    return Range{{up(width, group_width), up(height, group_height), 1},
+                 {group_width, group_height, 1}};
   }
 };
 
@@ -38,8 +43,8 @@ class Kernel {
  public:
   Kernel() = default;
 
-  /// Sets the arguments in order and enqueues. Arguments are Buffer<T>, LocalMemory or trivially copyable
-  /// values of exactly the kernel's parameter size. A global size of 0 enqueues nothing.
+  /// Sets the arguments in order and enqueues. Arguments are Buffer<T>, LocalMemory or trivially
+  /// copyable values of exactly the kernel's parameter size. A global size of 0 enqueues nothing.
   template <class... Arguments>
   void launch(const Range& range, const Arguments&... arguments) {
     begin(sizeof...(Arguments));

@@ -17,14 +17,16 @@ std::string load(const std::string& path) {
   if (const char* directory = std::getenv("RAYSPLATS_KERNEL_DIR")) {
     std::ifstream file(std::string(directory) + "/" + path, std::ios::binary);
     if (!file) {
-      throw DeviceError(fmt::format("Kernel file {}/{} (RAYSPLATS_KERNEL_DIR) cannot be read", directory, path));
+      throw DeviceError(
+          fmt::format("Kernel file {}/{} (RAYSPLATS_KERNEL_DIR) cannot be read", directory, path));
     }
     std::ostringstream text;
     text << file.rdbuf();
     return text.str();
   }
   const auto found = kernel_sources().find(path);
-  if (found == kernel_sources().end()) throw DeviceError(fmt::format("No kernel file '{}' is built in", path));
+  if (found == kernel_sources().end())
+    throw DeviceError(fmt::format("No kernel file '{}' is built in", path));
   return found->second;
 }
 

@@ -18,7 +18,8 @@ constexpr std::size_t kMinWorkGroup = 64;
 constexpr std::uint64_t kMinAllocation = 64ull << 20;
 
 std::string trimmed(std::string text) {
-  while (!text.empty() && (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back())))) {
+  while (!text.empty() &&
+         (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back())))) {
     text.pop_back();
   }
   return text;
@@ -39,12 +40,15 @@ DeviceType type_of(cl_device_type type) {
 
 std::vector<std::string> problems_of(const cl::Device& device, const DeviceInfo& info) {
   std::vector<std::string> problems;
-  if (!device.getInfo<CL_DEVICE_AVAILABLE>()) problems.emplace_back("the driver says it is not available");
-  if (!device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>()) problems.emplace_back("it has no OpenCL C compiler");
+  if (!device.getInfo<CL_DEVICE_AVAILABLE>())
+    problems.emplace_back("the driver says it is not available");
+  if (!device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>())
+    problems.emplace_back("it has no OpenCL C compiler");
   if (!device.getInfo<CL_DEVICE_ENDIAN_LITTLE>()) problems.emplace_back("it is big-endian");
   int major = 0;
   int minor = 0;
-  if (std::sscanf(info.version.c_str(), "OpenCL %d.%d", &major, &minor) == 2 && major * 10 + minor < 12) {
+  if (std::sscanf(info.version.c_str(), "OpenCL %d.%d", &major, &minor) == 2 &&
+      major * 10 + minor < 12) {
     problems.emplace_back("it offers less than OpenCL 1.2");
   }
   if (info.max_work_group_size < kMinWorkGroup) {
@@ -73,7 +77,8 @@ DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
   info.max_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
   info.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
   info.max_work_group_size = device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>();
-  info.float_vector_width = std::max<std::uint32_t>(1, device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>());
+  info.float_vector_width =
+      std::max<std::uint32_t>(1, device.getInfo<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>());
   const std::string extensions = device.getInfo<CL_DEVICE_EXTENSIONS>();
   const auto has = [&](const char* name) { return extensions.find(name) != std::string::npos; };
   info.has_fp64 = has("cl_khr_fp64");
@@ -119,7 +124,8 @@ DeviceInfo select_device(const std::string& selector) {
   const std::vector<DeviceInfo> devices = list_devices();
   if (devices.empty()) {
     throw DeviceError(
-        "No OpenCL platform is installed: install your GPU's OpenCL driver, or pocl-opencl-icd to run on the CPU");
+        "No OpenCL platform is installed: install your GPU's OpenCL driver, or pocl-opencl-icd to "
+        "run on the CPU");
   }
   if (selector.empty()) {
     for (const DeviceType wanted : {DeviceType::kGpu, DeviceType::kCpu}) {
@@ -134,24 +140,28 @@ DeviceInfo select_device(const std::string& selector) {
   }
   const auto checked = [](const DeviceInfo& info) {
     if (!info.usable()) {
-      throw DeviceError(fmt::format("Device {} ({}) is not usable: {}; choose another with --device",
-                                    info.index, info.name, fmt::join(info.problems, ", ")));
+      throw DeviceError(
+          fmt::format("Device {} ({}) is not usable: {}; choose another with --device", info.index,
+                      info.name, fmt::join(info.problems, ", ")));
     }
     return info;
   };
   std::size_t index = 0;
-  const auto [end, error] = std::from_chars(selector.data(), selector.data() + selector.size(), index);
+  const auto [end, error] =
+      std::from_chars(selector.data(), selector.data() + selector.size(), index);
   if (error == std::errc() && end == selector.data() + selector.size()) {
     if (index >= devices.size()) {
-      throw UsageError(fmt::format("--device {}: there are {} devices; 'raysplats devices' lists them",
-                                   selector, devices.size()));
+      throw UsageError(
+          fmt::format("--device {}: there are {} devices; 'raysplats devices' lists them", selector,
+                      devices.size()));
     }
     return checked(devices[index]);
   }
   for (const DeviceInfo& info : devices) {
     if (lower(info.name).find(lower(selector)) != std::string::npos) return checked(info);
   }
-  throw UsageError(fmt::format("--device {}: no device has that in its name; 'raysplats devices' lists them", selector));
+  throw UsageError(fmt::format(
+      "--device {}: no device has that in its name; 'raysplats devices' lists them", selector));
 }
 
 }  // namespace raysplats

@@ -22,7 +22,9 @@ struct Header {
   std::uint64_t checksum;
 };
 
-std::uint64_t checksum(const std::vector<unsigned char>& data) { return XXH3_64bits(data.data(), data.size()); }
+std::uint64_t checksum(const std::vector<unsigned char>& data) {
+  return XXH3_64bits(data.data(), data.size());
+}
 
 }  // namespace
 
@@ -42,14 +44,18 @@ ProgramCache::ProgramCache(const std::string& directory)
   std::error_code error;
   std::filesystem::create_directories(directory_, error);
   if (error) {
-    spdlog::debug("kernel cache off: {} cannot be created ({})", directory_.string(), error.message());
+    spdlog::debug("kernel cache off: {} cannot be created ({})", directory_.string(),
+                  error.message());
     directory_.clear();
   }
 }
 
-std::string ProgramCache::key(const std::string& source, const std::string& options, const DeviceInfo& device) {
-  const std::string text = fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", source, options, device.platform,
-                                       device.platform_version, device.name, device.version, device.driver_version);
+std::string ProgramCache::key(const std::string& source,
+                              const std::string& options,
+                              const DeviceInfo& device) {
+  const std::string text =
+      fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n", source, options, device.platform,
+                  device.platform_version, device.name, device.version, device.driver_version);
   const XXH128_hash_t hash = XXH3_128bits(text.data(), text.size());
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
@@ -61,10 +67,12 @@ std::optional<std::vector<unsigned char>> ProgramCache::load(const std::string& 
   const auto size = static_cast<std::uint64_t>(stream.tellg());
   stream.seekg(0);
   Header header{};
-  if (size < sizeof(header) || !stream.read(reinterpret_cast<char*>(&header), sizeof(header))) return std::nullopt;
+  if (size < sizeof(header) || !stream.read(reinterpret_cast<char*>(&header), sizeof(header)))
+    return std::nullopt;
   if (header.magic != kMagic || header.bytes != size - sizeof(header)) return std::nullopt;
   std::vector<unsigned char> binary(header.bytes);
-  if (!stream.read(reinterpret_cast<char*>(binary.data()), static_cast<std::streamsize>(binary.size()))) {
+  if (!stream.read(reinterpret_cast<char*>(binary.data()),
+                   static_cast<std::streamsize>(binary.size()))) {
     return std::nullopt;
   }
   if (checksum(binary) != header.checksum) return std::nullopt;
@@ -84,7 +92,8 @@ void ProgramCache::store(const std::string& key, const std::vector<unsigned char
   {
     std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
     stream.write(reinterpret_cast<const char*>(&header), sizeof(header));
-    stream.write(reinterpret_cast<const char*>(binary.data()), static_cast<std::streamsize>(binary.size()));
+    stream.write(reinterpret_cast<const char*>(binary.data()),
+                 static_cast<std::streamsize>(binary.size()));
     stream.close();
     if (!stream) {
       std::filesystem::remove(temporary, error);

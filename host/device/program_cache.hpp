@@ -11,16 +11,18 @@
 
 namespace raysplats {
 
-/// Compiled programs on disk, one file each: a header with a checksum, then the driver's binary. Files are
-/// written under a temporary name and renamed, so concurrent processes never see half a program; a file that
-/// does not check out is ignored and overwritten.
+/// Compiled programs on disk, one file each: a header with a checksum, then the driver's binary.
+/// Files are written under a temporary name and renamed, so concurrent processes never see half a
+/// program; a file that does not check out is ignored and overwritten.
 class ProgramCache {
  public:
   /// "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats. An unusable directory turns the cache off.
   explicit ProgramCache(const std::string& directory);
 
   /// Key of a program: source, options, platform, device and driver.
-  static std::string key(const std::string& source, const std::string& options, const DeviceInfo& device);
+  static std::string key(const std::string& source,
+                         const std::string& options,
+                         const DeviceInfo& device);
 
   std::optional<std::vector<unsigned char>> load(const std::string& key) const;
   void store(const std::string& key, const std::vector<unsigned char>& binary) const;
@@ -35,8 +37,8 @@ class ProgramCache {
 /// The directory used when none is named.
 std::filesystem::path default_cache_directory();
 
-/// Removes every compiled program from `directory` and returns how many there were. Programs that other
-/// processes store meanwhile may stay.
+/// Removes every compiled program from `directory` and returns how many there were. Programs that
+/// other processes store meanwhile may stay.
 std::size_t clear_program_cache(const std::filesystem::path& directory);
 
 }  // namespace raysplats

@@ -19,9 +19,9 @@ namespace raysplats {
 class CameraTracer {
  public:
   struct Statistics {
-    std::uint64_t capped_rays = 0;  ///< rays that stopped because of max_hits
-    std::uint64_t candidates = 0;   ///< (tile, Gaussian) pairs tested
-    std::uint64_t hits = 0;         ///< blended (ray, Gaussian) pairs
+    std::uint64_t capped_rays = 0;   ///< rays that stopped because of max_hits
+    std::uint64_t candidates = 0;    ///< (tile, Gaussian) pairs tested
+    std::uint64_t hits = 0;          ///< blended (ray, Gaussian) pairs
     std::uint64_t stream_bytes = 0;  ///< hit lists that keep_hits made or would have made
   };
   /// Gradient of the loss for the camera's pose: translation of the centre (world axes) and a small

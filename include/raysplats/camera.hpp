@@ -16,7 +16,8 @@ struct Distortion {
 /// A pinhole camera with a pose. Camera axes are OpenCV's and COLMAP's: x right, y down, z forward;
 /// the pixel (column i, row j) has its centre at (i + 0.5, j + 0.5).
 struct Camera {
-  std::string name;  ///< image name the view belongs to, with its folder, without meaning to the tracer
+  std::string
+      name;  ///< image name the view belongs to, with its folder, without meaning to the tracer
   int width = 0;
   int height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
@@ -26,11 +27,17 @@ struct Camera {
   glm::dvec3 center() const { return -(glm::transpose(rotation) * translation); }
 };
 
-/// The camera of the same view for an image reduced by `factor` (a positive number; sizes round to nearest).
+/// The camera of the same view for an image reduced by `factor` (a positive number; sizes round to
+/// nearest).
 Camera downscaled(const Camera& camera, double factor);
 
-/// A camera at `eye` that looks at `target`; `up` is the world direction that points up in the image.
-Camera look_at(const glm::dvec3& eye, const glm::dvec3& target, const glm::dvec3& up, int width,
-               int height, double focal);
+/// A camera at `eye` that looks at `target`; `up` is the world direction that points up in the
+/// image.
+Camera look_at(const glm::dvec3& eye,
+               const glm::dvec3& target,
+               const glm::dvec3& up,
+               int width,
+               int height,
+               double focal);
 
 }  // namespace raysplats

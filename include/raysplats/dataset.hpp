@@ -37,7 +37,8 @@ struct Dataset {
   std::filesystem::path root;
   std::vector<View> views;  ///< sorted by name within a split
   PointCloud points;
-  bool alpha_is_background = false;  ///< RGBA is composited over the background (Blender), else alpha is a mask
+  bool alpha_is_background =
+      false;  ///< RGBA is composited over the background (Blender), else alpha is a mask
 
   std::vector<std::size_t> indices(Split split) const;
 };
@@ -48,11 +49,13 @@ struct DatasetOptions {
 };
 
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender) and reads everything but the pixels.
-/// Throws DataError for a folder that is none, a missing image, an unsupported camera model, no views.
+/// Throws DataError for a folder that is none, a missing image, an unsupported camera model, no
+/// views.
 Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& options = {});
 
-/// The photo of a view as RGBA float at camera.width x camera.height: undistorted, resampled (area average).
-/// A is the mask or coverage: 1 where the photo is valid; RGB is straight (not premultiplied).
+/// The photo of a view as RGBA float at camera.width x camera.height: undistorted, resampled (area
+/// average). A is the mask or coverage: 1 where the photo is valid; RGB is straight (not
+/// premultiplied).
 Image load_view_image(const View& view);
 
 /// RGB of `rgba` over a constant background.

@@ -41,7 +41,8 @@ std::vector<DeviceInfo> list_devices();
 
 /// The device that `selector` names: an index, a part of its name (case is ignored), or "" for the
 /// first usable GPU, else the first usable CPU, else any usable device.
-/// Throws DeviceError with the remedy when there is none, UsageError when the selector fits no device.
+/// Throws DeviceError with the remedy when there is none, UsageError when the selector fits no
+/// device.
 DeviceInfo select_device(const std::string& selector);
 
 }  // namespace raysplats

@@ -16,7 +16,8 @@ enum class ErrorCode {
   kInterrupted = 130,
 };
 
-/// Base of everything this library throws. what() is one sentence: what failed, on what, what to do.
+/// Base of everything this library throws. what() is one sentence: what failed, on what, what to
+/// do.
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}

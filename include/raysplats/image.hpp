@@ -15,16 +15,24 @@ struct Image {
 
   Image() = default;
   Image(int w, int h, int c, float value = 0.0f)
-      : width(w), height(h), channels(c),
-        data(static_cast<std::size_t>(w) * static_cast<std::size_t>(h) * static_cast<std::size_t>(c), value) {}
+      : width(w),
+        height(h),
+        channels(c),
+        data(
+            static_cast<std::size_t>(w) * static_cast<std::size_t>(h) * static_cast<std::size_t>(c),
+            value) {}
   float& at(int x, int y, int c) { return data[index(x, y, c)]; }
   float at(int x, int y, int c) const { return data[index(x, y, c)]; }
-  std::size_t pixels() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
 
  private:
   std::size_t index(int x, int y, int c) const {
-    return (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) *
-               static_cast<std::size_t>(channels) + static_cast<std::size_t>(c);
+    return (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+            static_cast<std::size_t>(x)) *
+               static_cast<std::size_t>(channels) +
+           static_cast<std::size_t>(c);
   }
 };
 

@@ -11,22 +11,26 @@
 
 namespace raysplats {
 
-/// Reads a 3DGS PLY (binary of both byte orders or ASCII; SH degree 0..4; further properties are ignored).
-/// Throws DataError with the byte offset for anything malformed, truncated, non-finite or oversized.
+/// Reads a 3DGS PLY (binary of both byte orders or ASCII; SH degree 0..4; further properties are
+/// ignored). Throws DataError with the byte offset for anything malformed, truncated, non-finite or
+/// oversized.
 Gaussians read_ply(const std::filesystem::path& path);
 
 /// Writes an Inria-style binary little-endian 3DGS PLY atomically (temporary file, sync, rename).
 void write_ply(const std::filesystem::path& path, const Gaussians& model);
 
-/// Reads PNG, JPEG, EXR, TIFF or BMP as float; 1 to 4 channels as in the file (grey stays 1 channel).
+/// Reads PNG, JPEG, EXR, TIFF or BMP as float; 1 to 4 channels as in the file (grey stays 1
+/// channel).
 Image read_image(const std::filesystem::path& path);
 
 /// Writes .png, .jpg or .exr by the extension, atomically. 8-bit formats clamp to [0, 1] and round.
 /// An EXR with channels beyond RGBA takes their names from `extra_channels` (for example "Z").
-void write_image(const std::filesystem::path& path, const Image& image,
+void write_image(const std::filesystem::path& path,
+                 const Image& image,
                  const std::vector<std::string>& extra_channels = {});
 
-/// Cameras of a transforms.json (Blender or nerfstudio keys, file-level or per frame), OpenGL axes on disk.
+/// Cameras of a transforms.json (Blender or nerfstudio keys, file-level or per frame), OpenGL axes
+/// on disk.
 std::vector<Camera> read_cameras(const std::filesystem::path& path);
 
 /// Writes cameras as a nerfstudio transforms.json that read_cameras() reads back.

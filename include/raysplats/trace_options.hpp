@@ -8,7 +8,8 @@ namespace raysplats {
 
 /// Depth that orders the hits of a ray (docs/model.md).
 enum class HitOrder {
-  kEntry,  ///< near root of the confidence ellipsoid; an origin inside or past it misses (the paper)
+  kEntry,  ///< near root of the confidence ellipsoid; an origin inside or past it misses (the
+           ///< paper)
   kPeak,   ///< depth of the maximum response; an origin inside is allowed
 };
 
@@ -16,15 +17,17 @@ enum class HitOrder {
 enum class ScaleActivation { kExp, kSigmoid };
 
 struct TraceOptions {
-  float quantile = 11.3449f;          ///< Q: a ray meets a Gaussian when the squared whitened distance is <= Q
-  float min_transmittance = 1e-4f;    ///< a ray stops below this (epsilon_1)
-  int max_hits = 512;                 ///< a ray stops after this many hits (K)
+  float quantile =
+      11.3449f;  ///< Q: a ray meets a Gaussian when the squared whitened distance is <= Q
+  float min_transmittance = 1e-4f;  ///< a ray stops below this (epsilon_1)
+  int max_hits = 512;               ///< a ray stops after this many hits (K)
   HitOrder hit_order = HitOrder::kEntry;
-  bool adaptive_radius = false;       ///< Q shrinks where opacity * response would be below 1/255
-  float near_depth = 0.0f;            ///< Gaussians whose mean is nearer along the view axis are skipped; 0 = off
+  bool adaptive_radius = false;  ///< Q shrinks where opacity * response would be below 1/255
+  float near_depth =
+      0.0f;  ///< Gaussians whose mean is nearer along the view axis are skipped; 0 = off
   std::array<float, 3> background{0.0f, 0.0f, 0.0f};
-  bool depth = false;                 ///< camera rays also yield expected depth, median depth and hit count
-  int packet_width = 0;               ///< rays per work-item: 1, 2, 4, 8 or 16; 0 = the device's own
+  bool depth = false;    ///< camera rays also yield expected depth, median depth and hit count
+  int packet_width = 0;  ///< rays per work-item: 1, 2, 4, 8 or 16; 0 = the device's own
   std::size_t memory_budget = std::size_t{1} << 30;  ///< bytes for hit lists and private gradients
 };
 

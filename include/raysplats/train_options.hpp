@@ -32,7 +32,7 @@ struct LearningRate {
 /// with dashes).
 struct TrainOptions {
   // Run
-  std::int64_t iterations = 30000;
+  std::int64_t iterations = 10000;
   std::uint64_t seed = 42;
 
   // Data
@@ -40,7 +40,7 @@ struct TrainOptions {
   int test_every = 8;
   std::string background = "auto";   ///< "auto", "random" or "r,g,b"
   std::int64_t image_budget = 1024;  ///< MiB
-  std::vector<std::int64_t> resolution_schedule;
+  std::vector<std::int64_t> resolution_schedule{300, 1000};
 
   // Start
   std::string init = "auto";  ///< "auto", "colmap", "random" or the path of a PLY
@@ -49,7 +49,7 @@ struct TrainOptions {
 
   // Model
   int sh_degree = 3;
-  std::int64_t sh_degree_interval = 1000;
+  std::int64_t sh_degree_interval = 500;
   ScaleActivation scale_activation = ScaleActivation::kExp;
 
   // Loss
@@ -57,12 +57,12 @@ struct TrainOptions {
   double ssim_weight = 0.2;
 
   // Optimiser
-  LearningRate position_lr{1.6e-4, 1.6e-6};  ///< times the scene extent
-  LearningRate rotation_lr{1e-3, 1e-3};
-  LearningRate scale_lr{5e-3, 5e-3};
-  LearningRate opacity_lr{5e-2, 5e-2};
-  LearningRate sh_lr{2.5e-3, 2.5e-3};
-  LearningRate sh_rest_lr{1.25e-4, 1.25e-4};
+  LearningRate position_lr{5e-4, 5e-6};  ///< times the scene extent
+  LearningRate rotation_lr{3e-3, 1e-3};
+  LearningRate scale_lr{2e-2, 5e-3};
+  LearningRate opacity_lr{1e-1, 3e-2};
+  LearningRate sh_lr{1e-2, 2.5e-3};
+  LearningRate sh_rest_lr{5e-4, 1.25e-4};
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration
   bool scale_lr_by_extent = false;
   double adam_beta1 = 0.9;
@@ -71,7 +71,7 @@ struct TrainOptions {
   bool sparse_adam = false;
 
   // Ray tracing
-  HitOrder hit_order = HitOrder::kEntry;
+  HitOrder hit_order = HitOrder::kPeak;
   double quantile = 11.3449;
   double min_transmittance = 1e-4;
   int max_hits = 512;
@@ -82,24 +82,24 @@ struct TrainOptions {
   int rebuild_every = 1;
 
   // Density control
-  std::int64_t densify_from = 500;
-  std::int64_t densify_until = 15000;
+  std::int64_t densify_from = 300;
+  std::int64_t densify_until = 7000;
   std::int64_t densify_every = 100;
-  double densify_grad_threshold = 2e-4;
+  double densify_grad_threshold = 4e-4;
   DensifySignal densify_signal = DensifySignal::kScreen;
   double densify_size = 0.01;  ///< times the scene extent
   double split_factor = 1.6;
   double prune_opacity = 0.005;
   double prune_scale = 0.1;      ///< times the scene extent; 0 = off
   double prune_scale_min = 0.0;  ///< times the scene extent; 0 = off
-  std::int64_t max_gaussians = 1000000;
-  std::int64_t opacity_reset_every = 3000;
+  std::int64_t max_gaussians = 500000;
+  std::int64_t opacity_reset_every = 0;
   double opacity_reset_value = 0.01;
 
   // Reports and files
   std::int64_t log_every = 10;
   std::int64_t eval_every = 0;
-  std::vector<std::int64_t> eval_at{7000};
+  std::vector<std::int64_t> eval_at{1000, 3000, 7000};
   int eval_views = 0;  ///< 0 = all
   int eval_renders = 4;
   std::vector<std::int64_t> save_at{7000};

@@ -24,7 +24,7 @@ TEST_CASE("counter rng: the value depends on seed, stream and counter alone") {
   CHECK(CounterRng(0, 0).bits() != CounterRng(0, 0, 1).bits());
 }
 
-TEST_CASE("counter rng: uniform numbers fill [0, 1) evenly") {
+TEST_CASE("counter rng: uniform numbers fill the unit interval evenly") {
   CounterRng rng(7, 1);
   const int count = 100000;
   std::vector<int> bins(20, 0);

@@ -87,7 +87,7 @@ TEST_CASE("metrics: images of different size are refused") {
   CHECK_THROWS_AS(error_map(Image(3, 4, 1), Image(3, 4, 1)), UsageError);
 }
 
-TEST_CASE("error map: black, red, yellow, white; the picture shows photo, render and error") {
+TEST_CASE("error map: black, red, yellow, white, and the picture shows photo, render and error") {
   Image photo(4, 2, 3, 0.5f);
   Image render = photo;
   const float steps[] = {0.0f, 1.0f / 12, 1.0f / 6, 0.4f};

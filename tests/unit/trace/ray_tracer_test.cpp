@@ -85,7 +85,7 @@ void check_rays(Context& context,
 TEST_CASE("arbitrary rays equal the double reference [small]") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(300, 31, 2);
-  const std::vector<Ray> rays = random_rays(300, 1);
+  const std::vector<Ray> rays = random_rays(200, 1);
   for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
     for (const ColorDirection direction : {ColorDirection::kRay, ColorDirection::kFromOrigin}) {
       CAPTURE(static_cast<int>(order));

@@ -238,6 +238,7 @@ TEST_CASE("opacity reset lowers and never raises") {
       context, model_of({0.1, 0.1, 0.1}, {0.9, 0.005, 0.3}), ScaleActivation::kExp);
   TrainOptions options = rules();
   options.opacity_reset_every = 300;
+  options.densify_from = 500;
   options.densify_until = 700;
   DensityControl control(context, options, 1.0);
   control.reset_opacities(gaussians);

@@ -32,6 +32,7 @@ TEST_CASE("bands and resolution are switched on over time") {
   CHECK(active_sh_degree(options, 500) == 2);
   options.sh_degree_interval = 0;
   CHECK(active_sh_degree(options, 0) == 2);
+  options.resolution_schedule = {};
   CHECK(resolution_divisor(options, 0) == 1);
   options.resolution_schedule = {100, 300};
   CHECK(resolution_divisor(options, 0) == 4);
