@@ -47,15 +47,5 @@ __kernel void layout_probe(__global uint* layout) {
   RS_FIELD(RsCamera, height);
   RS_FIELD(RsCamera, near_depth);
   RS_FIELD(RsCamera, padding);
-
-  RS_PUT(sizeof(RsAdamGroup));
-  RS_FIELD(RsAdamGroup, learning_rate);
-  RS_FIELD(RsAdamGroup, beta1);
-  RS_FIELD(RsAdamGroup, beta2);
-  RS_FIELD(RsAdamGroup, epsilon);
-  RS_FIELD(RsAdamGroup, bias1);
-  RS_FIELD(RsAdamGroup, bias2);
-  RS_FIELD(RsAdamGroup, count);
-  RS_FIELD(RsAdamGroup, padding);
   layout[0] = next;
 }

@@ -62,14 +62,4 @@ typedef struct {
 } RsCamera;
 RS_STATIC_ASSERT_SIZE(RsCamera, 80);
 
-// Adam's constants for one parameter group in one step (Kingma and Ba 2015).
-typedef struct {
-  rs_float learning_rate;
-  rs_float beta1, beta2, epsilon;
-  rs_float bias1, bias2;  // 1 - beta^step
-  rs_uint count;          // number of scalars
-  rs_int padding;
-} RsAdamGroup;
-RS_STATIC_ASSERT_SIZE(RsAdamGroup, 32);
-
 #endif

@@ -36,7 +36,7 @@ struct CameraTracer::Impl {
         options(options_in),
         packet(packet_shape(context_in.device(), options_in.packet_width)),
         tree(context_in),
-        lists(context_in, options_in, packet.tile),
+        lists(context_in, packet.tile),
         counters(context_in, 3, "trace counters") {}
 
   void trace_rows(const DeviceGaussians& gaussians,

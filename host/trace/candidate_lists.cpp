@@ -41,7 +41,7 @@ RsCamera device_camera(const Camera& camera, float near_depth) {
   return out;
 }
 
-CandidateLists::CandidateLists(Context& context, const TraceOptions&, int tile_size)
+CandidateLists::CandidateLists(Context& context, int tile_size)
     : context_(&context), tile_size_(tile_size), sort_(context), scan_(context) {
   BuildOptions build;
   build.define("TILE", tile_size);

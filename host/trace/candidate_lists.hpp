@@ -24,7 +24,7 @@ RsCamera device_camera(const Camera& camera, float near_depth);
 /// hit depth.
 class CandidateLists {
  public:
-  CandidateLists(Context& context, const TraceOptions& options, int tile_size);
+  CandidateLists(Context& context, int tile_size);
 
   /// Lines and culling records of all Gaussians for a view.
   void prepare(const DeviceGaussians& gaussians,
