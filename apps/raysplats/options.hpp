@@ -38,6 +38,7 @@ Command add_train_command(CLI::App& app, const GlobalOptions& global);
 Command add_render_command(CLI::App& app, const GlobalOptions& global);
 Command add_eval_command(CLI::App& app, const GlobalOptions& global);
 Command add_info_command(CLI::App& app);
+Command add_bench_command(CLI::App& app);
 
 struct DeviceFlags {
   std::string device;

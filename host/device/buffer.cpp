@@ -61,7 +61,10 @@ void RawBuffer::read(void* target, std::size_t bytes, std::size_t offset) const 
 void RawBuffer::fill(std::uint32_t pattern, std::size_t bytes, std::size_t offset) {
   Impl& impl = checked();
   try {
-    impl.context->queue.enqueueFillBuffer(impl.buffer, pattern, offset, bytes);
+    cl::Event event;
+    impl.context->queue.enqueueFillBuffer(impl.buffer, pattern, offset, bytes, nullptr,
+                                          impl.context->next_event(event));
+    impl.context->timed("", "(fill)", event);
   } catch (const cl::Error& error) {
     throw_cl_error(error, fmt::format("Filling '{}'", impl.label));
   }
@@ -74,7 +77,10 @@ void RawBuffer::copy_from(const RawBuffer& source,
   Impl& impl = checked();
   const Impl& from = source.checked();
   try {
-    impl.context->queue.enqueueCopyBuffer(from.buffer, impl.buffer, source_offset, offset, bytes);
+    cl::Event event;
+    impl.context->queue.enqueueCopyBuffer(from.buffer, impl.buffer, source_offset, offset, bytes,
+                                          nullptr, impl.context->next_event(event));
+    impl.context->timed("", "(copy)", event);
   } catch (const cl::Error& error) {
     throw_cl_error(
         error, fmt::format("Copying {} bytes from '{}' to '{}'", bytes, from.label, impl.label));

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <utility>
+
 #include "device/context_impl.hpp"
 #include "device/platform.hpp"
 #include "device/program_cache.hpp"
@@ -81,6 +83,7 @@ Kernel Context::kernel(const std::string& program,
   cl::Program& built = impl_->program(program, options);
   auto kernel = std::make_shared<Kernel::Impl>();
   kernel->context = impl_.get();
+  kernel->program = program;
   kernel->name = name;
   try {
     kernel->kernel = cl::Kernel(built, name.c_str());
@@ -102,6 +105,11 @@ void Context::finish() {
 Profiler& Context::profiler() {
   impl_->collect_profile();
   return impl_->profiler;
+}
+
+std::vector<LaunchTime> Context::take_launches() {
+  impl_->collect_profile();
+  return std::exchange(impl_->launches, {});
 }
 
 std::size_t Context::allocated_bytes() const { return impl_->memory->allocated; }
@@ -128,12 +136,24 @@ cl::Program& Context::Impl::program(const std::string& path, const BuildOptions&
   return programs[key] = program;
 }
 
+void Context::Impl::timed(const std::string& path,
+                          const std::string& kernel,
+                          const cl::Event& event) {
+  if (!options.profile) return;
+  pending.push_back({path, kernel, event});
+  if (pending.size() >= 4096) collect_profile();
+}
+
 void Context::Impl::collect_profile() {
   if (pending.empty()) return;
   queue.finish();
-  for (const auto& [name, event] : pending) {
-    profiler.add(name, event.getProfilingInfo<CL_PROFILING_COMMAND_END>() -
-                           event.getProfilingInfo<CL_PROFILING_COMMAND_START>());
+  for (const PendingLaunch& launch : pending) {
+    const std::uint64_t nanoseconds = launch.event.getProfilingInfo<CL_PROFILING_COMMAND_END>() -
+                                      launch.event.getProfilingInfo<CL_PROFILING_COMMAND_START>();
+    profiler.add(launch.kernel, nanoseconds);
+    if (options.keep_launches) {
+      launches.push_back({launch.program, launch.kernel, 1e-9 * static_cast<double>(nanoseconds)});
+    }
   }
   pending.clear();
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "device/build_options.hpp"
 #include "device/kernel.hpp"
@@ -15,8 +16,18 @@ class Profiler;
 
 struct ContextOptions {
   bool profile = false;         ///< time every launch by device events
+  bool keep_launches = false;   ///< with profile: also keep each time for take_launches()
   bool kernel_cache = true;     ///< keep compiled programs in the user's cache directory
   std::string cache_directory;  ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
+};
+
+/// Device time of one launch. Fills and copies of buffers have no program and are named "(fill)"
+/// and
+/// "(copy)".
+struct LaunchTime {
+  std::string program;  ///< file below cl/
+  std::string kernel;
+  double seconds = 0;
 };
 
 /// One device with an in-order queue and its compiled programs. Everything enqueued runs in order;
@@ -40,6 +51,9 @@ class Context {
   void finish();
 
   Profiler& profiler();
+
+  /// With keep_launches: what has run since the last call, in order; blocks. Else nothing.
+  std::vector<LaunchTime> take_launches();
 
   /// Bytes in live buffers of this context, and the most there have been.
   std::size_t allocated_bytes() const;

@@ -18,6 +18,13 @@ struct MemoryCount {
   std::size_t peak = 0;
 };
 
+/// A launch whose time is not read yet.
+struct PendingLaunch {
+  std::string program;
+  std::string kernel;
+  cl::Event event;
+};
+
 struct Context::Impl {
   DeviceInfo info;
   ContextOptions options;
@@ -25,17 +32,22 @@ struct Context::Impl {
   cl::Context context;
   cl::CommandQueue queue;
   Profiler profiler;
-  std::map<std::string, cl::Program> programs;             // by program path and build options
-  std::vector<std::pair<std::string, cl::Event>> pending;  // launches whose times are not read yet
+  std::map<std::string, cl::Program> programs;  // by program path and build options
+  std::vector<PendingLaunch> pending;
+  std::vector<LaunchTime> launches;
   std::shared_ptr<MemoryCount> memory = std::make_shared<MemoryCount>();
 
   cl::Program& program(const std::string& path, const BuildOptions& build);
+  /// What an enqueue call takes for its event: null unless launches are timed.
+  cl::Event* next_event(cl::Event& event) { return options.profile ? &event : nullptr; }
+  void timed(const std::string& program, const std::string& kernel, const cl::Event& event);
   void collect_profile();
 };
 
 struct Kernel::Impl {
   Context::Impl* context = nullptr;
   cl::Kernel kernel;
+  std::string program;
   std::string name;
   unsigned argument_count = 0;
 };

@@ -48,15 +48,10 @@ void Kernel::enqueue(const Range& range) {
   const cl::NDRange local = l[0] == 0 ? cl::NullRange : cl::NDRange(l[0], l[1], l[2]);
   Context::Impl& context = *impl_->context;
   try {
-    if (context.options.profile) {
-      cl::Event event;
-      context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local, nullptr,
-                                         &event);
-      context.pending.emplace_back(impl_->name, event);
-      if (context.pending.size() >= 4096) context.collect_profile();
-    } else {
-      context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local);
-    }
+    cl::Event event;
+    context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local, nullptr,
+                                       context.next_event(event));
+    context.timed(impl_->program, impl_->name, event);
   } catch (const cl::Error& error) {
     throw_cl_error(
         error,

@@ -17,6 +17,7 @@ install(
           raysplats_eval
           raysplats_train
           raysplats_synth
+          raysplats_bench
   EXPORT raysplatsTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS raysplats_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

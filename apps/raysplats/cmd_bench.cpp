@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <memory>
+#include <tuple>
+
+#include "base/atomic_file.hpp"
+#include "bench/bench.hpp"
+#include "bench/compare.hpp"
+#include "device/profiler.hpp"
+#include "options.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "synth/bench_scenes.hpp"
+#include "train/model_source.hpp"
+
+namespace raysplats::cli {
+namespace {
+
+constexpr std::size_t kLargeSize = 3'000'000;
+
+struct Options {
+  std::string sizes = "10k,100k,1M";
+  bool large = false;
+  std::string scenes = "random";
+  std::string model;
+  std::string cameras;
+  std::size_t view = 0;
+  std::optional<std::string> resolution;
+  bool list = false;
+  std::string json;
+  std::string csv;
+  BenchOptions bench;
+  TraceFlags trace;
+  DeviceFlags device;
+};
+
+struct CompareOptions {
+  std::string before;
+  std::string after;
+};
+
+std::vector<std::string> parts_of(const std::string& text) {
+  std::vector<std::string> parts = CLI::detail::split(text, ',');
+  std::erase(parts, "");
+  return parts;
+}
+
+// "100k", "1.5M" or plain digits.
+std::size_t parse_size(const std::string& text) {
+  double factor = 1;
+  std::string digits = text;
+  if (!digits.empty() && (digits.back() == 'k' || digits.back() == 'M')) {
+    factor = digits.back() == 'k' ? 1e3 : 1e6;
+    digits.pop_back();
+  }
+  double value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error != std::errc() || end != digits.data() + digits.size() || !(value * factor >= 1) ||
+      value * factor > 1e9) {
+    throw UsageError(
+        fmt::format("--sizes '{}' is no number of Gaussians, as in 10000, 100k or 1M", text));
+  }
+  return static_cast<std::size_t>(value * factor);
+}
+
+std::pair<int, int> parse_resolution(const std::string& text) {
+  int width = 0, height = 0;
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, width);
+  if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') {
+    const auto second = std::from_chars(first.ptr + 1, end, height);
+    if (second.ec == std::errc() && second.ptr == end && width > 0 && height > 0 &&
+        width <= 65536 && height <= 65536) {
+      return {width, height};
+    }
+  }
+  throw UsageError(fmt::format("--resolution '{}' is not WIDTHxHEIGHT, as in 800x800", text));
+}
+
+std::vector<std::string> scenes_of(const std::string& text) {
+  const std::vector<std::string> known = bench_scene_names();
+  if (text == "all") return known;
+  std::vector<std::string> names = parts_of(text);
+  for (const std::string& name : names) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      throw UsageError(
+          fmt::format("--scene '{}' is none of {}, all", name, fmt::join(known, ", ")));
+    }
+  }
+  if (names.empty()) throw UsageError("--scene names no scene");
+  return names;
+}
+
+// The camera at another size, with the same field of view across.
+Camera resized(Camera camera, int width, int height) {
+  const double x = static_cast<double>(width) / camera.width;
+  const double y = static_cast<double>(height) / camera.height;
+  camera.fx *= x;
+  camera.fy *= x;
+  camera.cx *= x;
+  camera.cy *= y;
+  camera.width = width;
+  camera.height = height;
+  return camera;
+}
+
+std::vector<Camera> read_views(const std::string& path) {
+  if (!std::filesystem::is_directory(path)) return read_cameras(path);
+  std::vector<Camera> cameras;
+  for (const View& view : load_dataset(path).views) cameras.push_back(view.camera);
+  return cameras;
+}
+
+BenchModel load_model(const Options& options, const ModelSource& source) {
+  if (options.cameras.empty()) {
+    throw UsageError("--model needs --cameras: a transforms.json or the folder of a data set");
+  }
+  const std::vector<Camera> cameras = read_views(options.cameras);
+  if (options.view >= cameras.size()) {
+    throw UsageError(fmt::format("--view {} is beyond the {} views of {}", options.view,
+                                 cameras.size(), options.cameras));
+  }
+  BenchModel model{source.ply.stem().string(), read_ply(source.ply), cameras[options.view]};
+  if (options.resolution) {
+    const auto [width, height] = parse_resolution(*options.resolution);
+    model.camera = resized(model.camera, width, height);
+  }
+  return model;
+}
+
+void run(const Options& options) {
+  BenchOptions bench = options.bench;
+  bench.sizes.clear();
+  for (const std::string& text : parts_of(options.sizes)) bench.sizes.push_back(parse_size(text));
+  if (options.large) bench.sizes.push_back(kLargeSize);
+  bench.scenes = scenes_of(options.scenes);
+  if (options.resolution) {
+    std::tie(bench.width, bench.height) = parse_resolution(*options.resolution);
+  }
+  std::optional<BenchModel> model;
+  if (!options.model.empty()) {
+    const ModelSource source = find_model(options.model);
+    model = load_model(options, source);
+    bench.trace = trace_options(source, false);
+  } else if (!options.cameras.empty()) {
+    throw UsageError("--cameras goes with --model");
+  }
+  bench.trace = options.trace.over(bench.trace);
+  const BenchModel* chosen = model ? &*model : nullptr;
+  if (options.list) {
+    for (const std::string& id : bench_ids(bench, chosen)) fmt::print("{}\n", id);
+    return;
+  }
+  ContextOptions timed;
+  timed.profile = timed.keep_launches = true;
+  timed.kernel_cache = !options.device.no_kernel_cache;
+  Context context(select_device(options.device.device), timed);
+  const BenchReport report = run_bench(context, bench, chosen);
+  fmt::print("{}", bench_table(report));
+  if (!options.json.empty()) write_text_file(options.json, bench_json(report));
+  if (!options.csv.empty()) write_text_file(options.csv, bench_csv(report));
+  if (options.device.profile) fmt::print("{}", context.profiler().table());
+}
+
+void compare(const CompareOptions& options) {
+  const BenchReport before = read_bench_report(options.before);
+  const BenchReport after = read_bench_report(options.after);
+  fmt::print("{}", comparison_table(compare_reports(before, after)));
+}
+
+}  // namespace
+
+Command add_bench_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("bench", "Measure every kernel and stage on a device");
+  auto options = std::make_shared<Options>();
+  command->add_option("--sizes", options->sizes, "Numbers of Gaussians, for example 10k,100k,1M")
+      ->capture_default_str()
+      ->type_name("N,...");
+  command->add_flag("--large", options->large, "Also 3M Gaussians");
+  command
+      ->add_option(
+          "--scene", options->scenes,
+          fmt::format("{} or all, several with commas", fmt::join(bench_scene_names(), ", ")))
+      ->capture_default_str()
+      ->type_name("NAME,...");
+  command->add_option("--model", options->model, "Measure on a PLY or a run's newest model instead")
+      ->type_name("MODEL");
+  command
+      ->add_option("--cameras", options->cameras,
+                   "With --model: transforms.json or folder of a data set")
+      ->type_name("PATH");
+  command->add_option("--view", options->view, "With --model: which of the cameras, from 0")
+      ->capture_default_str();
+  command->add_option("--resolution", options->resolution, "Pixels (800x800, or the camera's)")
+      ->type_name("WxH");
+  command->add_option("--sh-degree", options->bench.sh_degree, "Of the generated scenes")
+      ->check(between(0, 4))
+      ->capture_default_str();
+  command->add_option("--rays", options->bench.rays, "Arbitrary rays, at most")
+      ->check(at_least(1))
+      ->capture_default_str();
+  command->add_option("--filter", options->bench.filter, "Only ids row/scene/size that match this")
+      ->type_name("REGEX");
+  command->add_flag("--list", options->list, "Print the ids and stop");
+  command->add_option("--repeat", options->bench.repeat, "Repetitions of every row")
+      ->check(between(1, 1000))
+      ->capture_default_str();
+  command->add_option("--json", options->json, "Also write the result as JSON")->type_name("FILE");
+  command->add_option("--csv", options->csv, "Also write the result as CSV")->type_name("FILE");
+  add_trace_flags(*command, options->trace);
+  add_device_flags(*command, options->device);
+
+  CLI::App* comparison =
+      command->add_subcommand("compare", "Ratios of two results that --json wrote");
+  auto files = std::make_shared<CompareOptions>();
+  comparison->add_option("A", files->before, "Result before")->required();
+  comparison->add_option("B", files->after, "Result after")->required();
+  return {command, [options, files, comparison] {
+            if (comparison->parsed()) {
+              compare(*files);
+            } else {
+              run(*options);
+            }
+          }};
+}
+
+}  // namespace raysplats::cli

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the device can do at best, for comparison with what the other kernels do: the rate of fused
+// multiply-adds in registers, and the bandwidth of copying large buffers.
+//   fma_chains   CHAINS independent float16 accumulators per work-item; `rounds` times CHAINS * 16
+//                multiply-adds each                             global: any number of work-items
+//   copy_runs    every work-item copies `run` consecutive float16s (suits CPUs)   global: runs
+//   copy_stride  neighbouring work-items copy neighbouring float4s (suits GPUs)   global: float4s
+// O(rounds) and O(1) per element. Copying as in McCalpin's STREAM (1995): read and write both
+// count.
+
+#ifndef CHAINS
+#define CHAINS 8
+#endif
+
+__kernel void fma_chains(__global float16* out, uint rounds, float factor, float term) {
+  const uint i = get_global_id(0);
+  const float16 a = (float16)(factor);
+  const float16 b = (float16)(term);
+  float16 x0 = (float16)((float)i), x1 = x0 + 1.0f, x2 = x0 + 2.0f, x3 = x0 + 3.0f;
+#if CHAINS >= 8
+  float16 x4 = x0 + 4.0f, x5 = x0 + 5.0f, x6 = x0 + 6.0f, x7 = x0 + 7.0f;
+#endif
+#if CHAINS >= 12
+  float16 x8 = x0 + 8.0f, x9 = x0 + 9.0f, xa = x0 + 10.0f, xb = x0 + 11.0f;
+#endif
+  for (uint k = 0; k < rounds; ++k) {
+    x0 = x0 * a + b;
+    x1 = x1 * a + b;
+    x2 = x2 * a + b;
+    x3 = x3 * a + b;
+#if CHAINS >= 8
+    x4 = x4 * a + b;
+    x5 = x5 * a + b;
+    x6 = x6 * a + b;
+    x7 = x7 * a + b;
+#endif
+#if CHAINS >= 12
+    x8 = x8 * a + b;
+    x9 = x9 * a + b;
+    xa = xa * a + b;
+    xb = xb * a + b;
+#endif
+  }
+  x0 += x1 + x2 + x3;
+#if CHAINS >= 8
+  x0 += x4 + x5 + x6 + x7;
+#endif
+#if CHAINS >= 12
+  x0 += x8 + x9 + xa + xb;
+#endif
+  out[i] = x0;
+}
+
+__kernel void copy_runs(__global const float16* restrict in,
+                        __global float16* restrict out,
+                        uint run) {
+  const size_t begin = get_global_id(0) * (size_t)run;
+  for (uint k = 0; k < run; ++k) out[begin + k] = in[begin + k];
+}
+
+__kernel void copy_stride(__global const float4* restrict in, __global float4* restrict out) {
+  const size_t i = get_global_id(0);
+  out[i] = in[i];
+}

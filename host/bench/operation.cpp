@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/operation.hpp"
+
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+
+namespace raysplats {
+namespace {
+
+constexpr const char* kWall = "wall";
+
+std::string counter_name(std::size_t stage) { return fmt::format("stage{}", stage); }
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+// Runs the operation once and returns the host's seconds; adds each stage's seconds to `sums`.
+double run_once(Context& context, const BenchOperation& operation, std::vector<double>& sums) {
+  if (operation.reset) operation.reset();
+  context.finish();
+  context.take_launches();
+  const auto begin = std::chrono::steady_clock::now();
+  operation.run();
+  context.finish();
+  const double wall = seconds_since(begin);
+  const std::vector<LaunchTime> launches = context.take_launches();
+  for (std::size_t i = 0; i < operation.stages.size(); ++i) {
+    const BenchStage& stage = operation.stages[i];
+    if (stage.wall) {
+      sums[i] += wall;
+      continue;
+    }
+    for (const LaunchTime& launch : launches) {
+      if (stage.takes(launch)) sums[i] += launch.seconds;
+    }
+  }
+  return wall;
+}
+
+// Keeps the samples and prints nothing: the report is made later and elsewhere.
+class Collector : public benchmark::BenchmarkReporter {
+ public:
+  Collector(const std::vector<BenchOperation>& operations) {
+    for (const BenchOperation& operation : operations)
+      samples.emplace_back(operation.stages.size());
+  }
+  bool ReportContext(const Context&) override { return true; }
+  void ReportRuns(const std::vector<Run>& runs) override {
+    for (const Run& run : runs) {
+      if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
+      std::vector<StageSamples>& stages = samples.at(std::stoul(run.run_name.function_name));
+      for (std::size_t i = 0; i < stages.size(); ++i) {
+        stages[i].seconds.push_back(run.counters.at(counter_name(i)).value);
+        stages[i].wall.push_back(run.counters.at(kWall).value);
+      }
+    }
+  }
+
+  std::vector<std::vector<StageSamples>> samples;
+};
+
+}  // namespace
+
+bool BenchStage::takes(const LaunchTime& launch) const {
+  const std::string name = launch.program + ":" + launch.kernel;
+  return launches.empty() ||
+         std::any_of(launches.begin(), launches.end(),
+                     [&](const std::string& start) { return name.starts_with(start); });
+}
+
+std::vector<std::vector<StageSamples>> run_operations(Context& context,
+                                                      const std::vector<BenchOperation>& operations,
+                                                      int repeat,
+                                                      double min_seconds) {
+  std::exception_ptr failure;
+  std::vector<bool> warm(operations.size(), false);
+  for (std::size_t n = 0; n < operations.size(); ++n) {
+    const auto body = [&, n](benchmark::State& state) {
+      const BenchOperation& operation = operations[n];
+      std::vector<double> sums(operation.stages.size());
+      double walls = 0;
+      try {
+        if (failure) {
+          state.SkipWithError("an earlier operation failed");
+          return;
+        }
+        if (!warm[n]) {
+          if (operation.prepare) operation.prepare();
+          run_once(context, operation, sums);
+          sums.assign(sums.size(), 0.0);
+          warm[n] = true;
+        }
+        while (state.KeepRunning()) {
+          const double wall = run_once(context, operation, sums);
+          walls += wall;
+          state.SetIterationTime(wall);
+        }
+      } catch (...) {
+        // The harness is no place to throw through.
+        failure = std::current_exception();
+        state.SkipWithError("failed");
+        return;
+      }
+      using benchmark::Counter;
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        state.counters[counter_name(i)] = Counter(sums[i], Counter::kAvgIterations);
+      }
+      state.counters[kWall] = Counter(walls, Counter::kAvgIterations);
+    };
+    benchmark::RegisterBenchmark(std::to_string(n).c_str(), body)
+        ->UseManualTime()
+        ->MinTime(min_seconds)
+        ->Repetitions(repeat);
+  }
+  Collector collector(operations);
+  benchmark::RunSpecifiedBenchmarks(&collector, "all");
+  benchmark::ClearRegisteredBenchmarks();
+  if (failure) std::rethrow_exception(failure);
+  return collector.samples;
+}
+
+}  // namespace raysplats

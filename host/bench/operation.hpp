@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bench/report.hpp"
+#include "device/context.hpp"
+
+namespace raysplats {
+
+/// One row that an operation yields.
+struct BenchStage {
+  std::string name;
+  /// Starts of "program:kernel" ("bvh/morton.cl", "train/loss_ssim.cl:loss_gradient", ":(fill)");
+  /// none means all launches, and the host's clock is reported beside the device's.
+  std::vector<std::string> launches;
+  bool wall = false;  ///< the host's clock counts: the host does part of the work
+  /// What one run did; asked after the runs.
+  std::function<BenchWork()> work;
+
+  bool takes(const LaunchTime& launch) const;
+};
+
+/// Something that is run as a whole and yields one or several rows.
+struct BenchOperation {
+  std::function<void()> prepare;  ///< once, untimed
+  std::function<void()> reset;    ///< before every run, untimed; may be empty
+  std::function<void()> run;
+  std::vector<BenchStage> stages;
+};
+
+struct StageSamples {
+  std::vector<double> seconds;  ///< one per repetition, by the stage's clock
+  std::vector<double> wall;     ///< of the whole operation
+};
+
+/// Runs every operation: once to warm up, then `repeat` times as often as Google Benchmark finds
+/// necessary for `min_seconds` each. The result is parallel to operations and their stages. Needs a
+/// context with keep_launches. What an operation throws ends the run and is thrown on.
+std::vector<std::vector<StageSamples>> run_operations(Context& context,
+                                                      const std::vector<BenchOperation>& operations,
+                                                      int repeat,
+                                                      double min_seconds);
+
+}  // namespace raysplats

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+namespace raysplats {
+namespace {
+
+// 12.3 k, 4.56 M and so on; three digits are more than repetitions agree on.
+std::string engineering(double value) {
+  constexpr std::array<const char*, 5> kPrefixes{"", "k", "M", "G", "T"};
+  std::size_t prefix = 0;
+  for (; value >= 999.5 && prefix + 1 < kPrefixes.size(); ++prefix) value /= 1000.0;
+  return fmt::format("{:.3g} {}", value, kPrefixes[prefix]);
+}
+
+std::string milliseconds(double seconds) {
+  const double ms = 1e3 * seconds;
+  return fmt::format("{:.{}f}", ms, ms < 1 ? 4 : ms < 100 ? 3 : 1);
+}
+
+std::string percent(double share) { return share > 0 ? fmt::format("{:.1f}", 100 * share) : "-"; }
+
+double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
+
+std::string rate(const BenchRow& row, std::size_t index) {
+  if (index >= row.work.items.size() || row.seconds.median <= 0) return "-";
+  const BenchWork::Items& items = row.work.items[index];
+  return fmt::format("{}{}/s", engineering(items.count / row.seconds.median), items.unit);
+}
+
+}  // namespace
+
+std::string BenchRow::id() const { return fmt::format("{}/{}/{}", name, scene, size); }
+
+BenchShare share_of(const BenchRow& row, const Ceilings& ceilings) {
+  BenchShare share;
+  const double seconds = row.seconds.median;
+  if (!(seconds > 0)) return share;
+  if (ceilings.copy_bytes_per_second > 0) {
+    share.copy = row.work.bytes / seconds / ceilings.copy_bytes_per_second;
+  }
+  if (ceilings.fma_flops_per_second > 0) {
+    share.fma = row.work.flops / seconds / ceilings.fma_flops_per_second;
+  }
+  if (share.copy > 0 || share.fma > 0) share.bound = share.copy >= share.fma ? "copy" : "fma";
+  return share;
+}
+
+std::string bench_table(const BenchReport& report) {
+  std::string out = fmt::format("{} ({}, driver {}), raysplats {}\n", report.device,
+                                report.platform, report.driver, report.version);
+  out += fmt::format("measured limits: copy {:.1f} GB/s, FMA {:.1f} GFLOP/s\n",
+                     1e-9 * report.ceilings.copy_bytes_per_second,
+                     1e-9 * report.ceilings.fma_flops_per_second);
+  std::size_t widest = 4;
+  for (const BenchRow& row : report.rows) widest = std::max(widest, row.id().size());
+  out +=
+      fmt::format("{:<{}} {:>10} {:>9} {:>10} {:>20} {:>18} {:>8} {:>6} {:>9} {:>6}\n", "row",
+                  widest, "ms", "+- ms", "wall ms", "rate", "", "GB/s", "copy%", "GFLOP/s", "FMA%");
+  for (const BenchRow& row : report.rows) {
+    const BenchShare share = share_of(row, report.ceilings);
+    const double seconds = std::max(row.seconds.median, 1e-12);
+    out += fmt::format("{:<{}} {:>10} {:>9} {:>10} {:>20} {:>18} {:>8.2f} {:>6} {:>9.2f} {:>6}\n",
+                       row.id(), widest, milliseconds(row.seconds.median),
+                       milliseconds(row.seconds.deviation), row.wall ? milliseconds(*row.wall) : "",
+                       rate(row, 0), row.work.items.size() > 1 ? rate(row, 1) : "",
+                       1e-9 * row.work.bytes / seconds, percent(share.copy),
+                       1e-9 * row.work.flops / seconds, percent(share.fma));
+  }
+  out += fmt::format("peak memory: process {:.1f} MiB, device buffers {:.1f} MiB\n",
+                     mebibytes(report.peak_process_bytes), mebibytes(report.peak_device_bytes));
+  return out;
+}
+
+std::string bench_csv(const BenchReport& report) {
+  std::string out =
+      "row,scene,size,clock,median_s,deviation_s,minimum_s,maximum_s,samples,wall_s,unit,items,"
+      "items_per_s,second_unit,second_items,bytes,flops,copy_share,fma_share,bound\n";
+  for (const BenchRow& row : report.rows) {
+    const BenchShare share = share_of(row, report.ceilings);
+    const auto& items = row.work.items;
+    const BenchWork::Items first = items.empty() ? BenchWork::Items{} : items[0];
+    const BenchWork::Items second = items.size() < 2 ? BenchWork::Items{} : items[1];
+    // A scene may be a file's name: quotes and commas are its own affair.
+    std::string scene;
+    for (const char c : row.scene) scene += c == '"' ? std::string("\"\"") : std::string(1, c);
+    out += fmt::format(
+        "{},\"{}\",{},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{},{},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g}"
+        ",{:.6g},{:.6g},{}\n",
+        row.name, scene, row.size, row.clock, row.seconds.median, row.seconds.deviation,
+        row.seconds.minimum, row.seconds.maximum, row.seconds.samples,
+        row.wall ? fmt::format("{:.9g}", *row.wall) : "", first.unit, first.count,
+        row.seconds.median > 0 ? first.count / row.seconds.median : 0.0, second.unit, second.count,
+        row.work.bytes, row.work.flops, share.copy, share.fma, share.bound);
+  }
+  return out;
+}
+
+}  // namespace raysplats

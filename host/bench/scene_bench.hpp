@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "bench/bench.hpp"
+#include "bench/operation.hpp"
+#include "device/context.hpp"
+
+namespace raysplats {
+
+/// Every operation on one model seen by one camera. Construction does not touch the device: what an
+/// operation needs is made when it is prepared, and kept.
+class SceneBench {
+ public:
+  SceneBench(Context& context, const BenchModel& model, const BenchOptions& options);
+  ~SceneBench();
+
+  /// They refer to this object.
+  std::vector<BenchOperation> operations();
+
+  struct Impl;
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/rng.hpp"
+#include "bench/scene_state.hpp"
+#include "bvh/work.h"
+#include "primitives/work.h"
+#include "trace/work.h"
+
+namespace raysplats {
+namespace {
+
+constexpr std::uint64_t kKeyStream = 4;
+constexpr int kSortPasses = 4;
+
+}  // namespace
+
+BenchOperation SceneBench::Impl::bounds() {
+  return {[this] { boxes(); },
+          {},
+          [this] {
+            const DeviceGaussians& g = gaussians();
+            bounds_kernel->compute(g.means, g.quaternions, g.scales, g.opacities, g.count,
+                                   options.trace.quantile, box_buffer);
+          },
+          {{"bounds", {}, false, [this] { return bounds_work(); }}}};
+}
+
+BenchOperation SceneBench::Impl::sort() {
+  return {[this] {
+            sorter.emplace(context);
+            CounterRng random(options.seed, kKeyStream);
+            std::vector<std::uint32_t> words(count());
+            for (std::uint32_t& word : words) word = static_cast<std::uint32_t>(random.bits());
+            for (Buffer<std::uint32_t>* buffer : {&unsorted, &keys, &values}) {
+              buffer->ensure(context, count(), "benchmark keys");
+            }
+            unsorted.upload(words);
+            values.clear();
+          },
+          [this] { keys.copy_from(unsorted, count()); },
+          [this] { sorter->sort(keys, values, count()); },
+          {{"sort", {}, false, [this] {
+              const double n = gaussians_count();
+              return BenchWork{{{"pairs", n}}, kSortPasses * RS_WORK_SORT_PASS_BYTES * n, 0};
+            }}}};
+}
+
+BenchOperation SceneBench::Impl::build() {
+  return {[this] {
+            boxes();
+            if (!tree) tree.emplace(context);
+          },
+          {},
+          [this] { tree->build(boxes(), count()); },
+          {{"morton",
+            {"bvh/morton.cl"},
+            false,
+            [this] {
+              const double n = gaussians_count();
+              return BenchWork{{{"boxes", n}}, RS_WORK_MORTON_BYTES * n, RS_WORK_MORTON_FLOPS * n};
+            }},
+           {"hierarchy",
+            {"bvh/hierarchy.cl"},
+            false,
+            [this] {
+              const double n = gaussians_count();
+              return BenchWork{
+                  {{"boxes", n}}, RS_WORK_HIERARCHY_BYTES * n, RS_WORK_HIERARCHY_FLOPS * n};
+            }},
+           {"build", {}, false, [this] { return build_work(); }}}};
+}
+
+BenchOperation SceneBench::Impl::refit() {
+  return {[this] {
+            if (!tree) tree.emplace(context);
+            tree->build(boxes(), count());
+          },
+          {},
+          [this] { tree->refit(boxes()); },
+          {{"refit", {}, false, [this] {
+              const double n = gaussians_count();
+              return BenchWork{{{"boxes", n}}, RS_WORK_REFIT_BYTES * n, RS_WORK_REFIT_FLOPS * n};
+            }}}};
+}
+
+BenchOperation SceneBench::Impl::view() {
+  return {[this] {
+            tracer().forward(gaussians(), model.camera);
+            view_statistics = tracer().statistics();
+          },
+          {},
+          [this] { tracer().forward(gaussians(), model.camera); },
+          {{"prepare-view", {"trace/prepare_view.cl"}, false, [this] { return prepare_work(); }},
+           {"tile-lists",
+            {"trace/tile_lists.cl", "primitives/"},
+            false,
+            [this] { return lists_work(); }},
+           {"forward", {"trace/forward.cl"}, false, [this] { return forward_work(); }},
+           {"view", {}, false, [this] {
+              return together(forward_work(), together(prepare_work(), lists_work()));
+            }}}};
+}
+
+BenchOperation SceneBench::Impl::backward() {
+  return {
+      [this] {
+        make_loss();
+        forward_with_hits();
+        image_loss->evaluate(picture, photo, false, {0, 0, 0}, model.camera.width,
+                             model.camera.height, image_gradient);
+      },
+      {},
+      [this] { tracer().backward(gaussians(), image_gradient, gradients); },
+      {{"backward", {"trace/backward.cl", ":(fill)"}, false, [this] { return backward_work(); }},
+       {"finalize", {"trace/finalize_gradients.cl"}, false, [this] { return finalize_work(); }}}};
+}
+
+BenchOperation SceneBench::Impl::rays_update() {
+  return {[this] {
+            if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, options.trace);
+            gaussians();
+          },
+          {},
+          [this] { ray_tracer->update(gaussians()); },
+          {{"rays-update", {}, false, [this] {
+              const double n = gaussians_count();
+              const BenchWork records{
+                  {{"Gaussians", n}}, RS_WORK_RECORD_BYTES * n, RS_WORK_RECORD_FLOPS * n};
+              return together(records, together(bounds_work(), build_work()));
+            }}}};
+}
+
+BenchOperation SceneBench::Impl::rays() {
+  return {[this] {
+            if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, options.trace);
+            ray_tracer->update(gaussians());
+            make_rays();
+          },
+          {},
+          [this] { ray_results = ray_tracer->trace(gaussians(), ray_list); },
+          {{"rays", {}, false, [this] { return rays_work(); }}}};
+}
+
+BenchOperation SceneBench::Impl::loss() {
+  return {[this] { make_loss(); },
+          {},
+          [this] {
+            image_loss->evaluate(picture, photo, false, {0, 0, 0}, model.camera.width,
+                                 model.camera.height, image_gradient);
+            image_loss->value();
+          },
+          {{"loss-value",
+            {"train/loss_prepare.cl", "train/loss_ssim.cl:ssim_slopes", "train/loss_reduce.cl"},
+            false,
+            [this] { return loss_value_work(); }},
+           {"loss-gradient", {"train/loss_ssim.cl:loss_gradient"}, false, [this] {
+              return loss_gradient_work();
+            }}}};
+}
+
+// Rates of zero leave the model as it is, so that every repetition does the same work.
+BenchOperation SceneBench::Impl::adam_step() {
+  return {[this] { make_gradients(); },
+          {},
+          [this] { adam->step(gaussians(), gradients, AdamRates{}); },
+          {{"adam", {}, false, [this] { return adam_work(); }}}};
+}
+
+BenchOperation SceneBench::Impl::density_statistics() {
+  return {[this] {
+            make_gradients();
+            make_density();
+          },
+          {},
+          [this] { density->accumulate(gaussians(), gradients); },
+          {{"density-sums", {}, false, [this] { return statistics_work(); }}}};
+}
+
+BenchOperation SceneBench::Impl::densify() {
+  return {[this] { make_density(); },
+          [this] {
+            densified = copy_of_gaussians();
+            density->restore_statistics(density_signal);
+          },
+          [this] {
+            density->refine(densified, 1);
+            densified_count = densified.count;
+          },
+          {{"densify", {}, true, [this] { return densify_work(); }}}};
+}
+
+BenchOperation SceneBench::Impl::iteration() {
+  return {[this] {
+            make_loss();
+            make_gradients();
+            make_density();
+            density->restore_statistics({});
+            forward_with_hits();
+          },
+          {},
+          [this] {
+            CameraTracer& rays = tracer();
+            DeviceGaussians& g = gaussians();
+            rays.update(g, true);
+            rays.forward(g, model.camera, true);
+            image_loss->evaluate(rays.image(), photo, false, {0, 0, 0}, model.camera.width,
+                                 model.camera.height, image_gradient);
+            rays.backward(g, image_gradient, gradients);
+            density->accumulate(g, gradients);
+            adam->step(g, gradients, AdamRates{});
+          },
+          {{"iteration", {}, true, [this] { return iteration_work(); }}}};
+}
+
+SceneBench::SceneBench(Context& context, const BenchModel& model, const BenchOptions& options)
+    : impl_(std::make_unique<Impl>(context, model, options)) {}
+SceneBench::~SceneBench() = default;
+
+std::vector<BenchOperation> SceneBench::operations() {
+  Impl& self = *impl_;
+  return {self.sort(),    self.bounds(),    self.build(),
+          self.refit(),   self.view(),      self.backward(),
+          self.loss(),    self.adam_step(), self.density_statistics(),
+          self.densify(), self.iteration(), self.rays_update(),
+          self.rays()};
+}
+
+}  // namespace raysplats

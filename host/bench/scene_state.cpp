@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/scene_state.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/rng.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::uint64_t kPictureStream = 1;
+constexpr std::uint64_t kGradientStream = 2;
+constexpr std::uint64_t kRayStream = 3;
+// Every so many Gaussians are densified.
+constexpr std::size_t kDensifyEvery = 10;
+
+std::vector<float> random_floats(std::size_t count,
+                                 double scale,
+                                 std::uint64_t seed,
+                                 std::uint64_t stream) {
+  CounterRng random(seed, stream);
+  std::vector<float> out(count);
+  for (float& value : out) value = static_cast<float>(scale * (2.0 * random.uniform() - 1.0));
+  return out;
+}
+
+void upload(Context& context,
+            Buffer<float>& buffer,
+            const std::vector<float>& values,
+            const char* label) {
+  buffer.ensure(context, values.size(), label);
+  buffer.upload(values);
+}
+
+}  // namespace
+
+DeviceGaussians& SceneBench::Impl::gaussians() {
+  if (!device_gaussians) {
+    device_gaussians = DeviceGaussians::upload(context, model.gaussians, ScaleActivation::kExp);
+  }
+  return *device_gaussians;
+}
+
+const Buffer<RsAabb>& SceneBench::Impl::boxes() {
+  if (!bounds_kernel) {
+    bounds_kernel.emplace(context, false, options.trace.adaptive_radius);
+    const DeviceGaussians& g = gaussians();
+    bounds_kernel->compute(g.means, g.quaternions, g.scales, g.opacities, g.count,
+                           options.trace.quantile, box_buffer);
+  }
+  return box_buffer;
+}
+
+CameraTracer& SceneBench::Impl::tracer() {
+  if (!camera_tracer) {
+    camera_tracer = std::make_unique<CameraTracer>(context, options.trace);
+    camera_tracer->update(gaussians(), true);
+  }
+  return *camera_tracer;
+}
+
+void SceneBench::Impl::forward_with_hits() {
+  tracer().forward(gaussians(), model.camera, true);
+  kept_statistics = view_statistics = tracer().statistics();
+}
+
+void SceneBench::Impl::make_loss() {
+  if (image_loss) return;
+  image_loss = std::make_unique<ImageLoss>(context, PixelLoss::kL1, 0.2f);
+  const auto size = static_cast<std::size_t>(pixels());
+  std::vector<float> image = random_floats(4 * size, 0.5, options.seed, kPictureStream);
+  for (float& value : image) value += 0.5f;
+  upload(context, picture, image, "picture");
+  CounterRng random(options.seed, kPictureStream + 100);
+  std::vector<std::uint32_t> packed(size);
+  for (std::uint32_t& pixel : packed) {
+    pixel = static_cast<std::uint32_t>(random.bits()) | 0xff000000u;
+  }
+  photo.ensure(context, size, "photo");
+  photo.upload(packed);
+}
+
+void SceneBench::Impl::make_gradients() {
+  if (!adam) adam.emplace(context, AdamOptions{});
+  if (gradients.means.size() > 0) return;
+  const auto sh = 3 * static_cast<std::size_t>(sh_count());
+  const auto make = [&](Buffer<float>& buffer, std::size_t width, const char* label) {
+    upload(context, buffer, random_floats(width * count(), 1e-3, options.seed, kGradientStream),
+           label);
+  };
+  make(gradients.means, 3, "mean gradients");
+  make(gradients.quaternions, 4, "quaternion gradients");
+  make(gradients.scales, 3, "scale gradients");
+  make(gradients.opacities, 1, "opacity gradients");
+  make(gradients.sh, sh, "SH gradients");
+  std::vector<float> screen(3 * count());
+  for (std::size_t i = 0; i < count(); ++i) {
+    screen[3 * i] = screen[3 * i + 1] = 1e-4f;
+    screen[3 * i + 2] = 1.0f;
+  }
+  upload(context, gradients.screen, screen, "screen gradients");
+}
+
+void SceneBench::Impl::make_density() {
+  if (density) return;
+  TrainOptions rules;
+  rules.densify_grad_threshold = 0.5;
+  rules.densify_size = 0.01;
+  rules.prune_scale = 0.0;
+  rules.max_gaussians = static_cast<std::int64_t>(2 * count());
+  density.emplace(context, rules, 1.0);
+  density_signal.resize(2 * count());
+  for (std::size_t i = 0; i < count(); ++i) {
+    density_signal[2 * i] = i % kDensifyEvery == 0 ? 1.0f : 0.0f;
+    density_signal[2 * i + 1] = 1.0f;
+  }
+}
+
+// Rays between two random points of the cube that the scenes fill, or of the middle of a model: no
+// two neighbours have anything in common.
+void SceneBench::Impl::make_rays() {
+  if (!ray_list.empty()) return;
+  std::array<double, 3> center{}, half{};
+  const std::vector<float>& means = model.gaussians.means;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<float> values;
+    for (std::size_t i = axis; i < means.size(); i += 3) values.push_back(means[i]);
+    std::sort(values.begin(), values.end());
+    // Outliers of trained models lie far away.
+    const double low = values[values.size() / 20];
+    const double high = values[values.size() - 1 - values.size() / 20];
+    center[axis] = 0.5 * (low + high);
+    half[axis] = std::max(0.5 * (high - low) / 0.9, 1e-6);
+  }
+  CounterRng random(options.seed, kRayStream);
+  ray_list.resize(std::min(options.rays, static_cast<std::size_t>(pixels())));
+  for (Ray& ray : ray_list) {
+    double length2 = 0;
+    std::array<double, 3> direction{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double from = center[axis] + half[axis] * (2.0 * random.uniform() - 1.0);
+      const double to = center[axis] + half[axis] * (2.0 * random.uniform() - 1.0);
+      ray.origin[axis] = static_cast<float>(from);
+      direction[axis] = to - from;
+      length2 += direction[axis] * direction[axis];
+    }
+    const double inverse = 1.0 / std::sqrt(std::max(length2, 1e-20));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      ray.direction[axis] = static_cast<float>(direction[axis] * inverse);
+    }
+    ray.t_min = 0.0f;
+    ray.t_max = 1e30f;
+  }
+}
+
+DeviceGaussians SceneBench::Impl::copy_of_gaussians() {
+  const DeviceGaussians& from = gaussians();
+  DeviceGaussians out;
+  out.count = from.count;
+  out.sh_degree = from.sh_degree;
+  out.active_sh_degree = from.active_sh_degree;
+  out.activation = from.activation;
+  const auto copy = [this](const Buffer<float>& source, const char* label) {
+    Buffer<float> target(context, source.size(), label);
+    target.copy_from(source, source.size());
+    return target;
+  };
+  out.means = copy(from.means, "means");
+  out.quaternions = copy(from.quaternions, "quaternions");
+  out.scales = copy(from.scales, "scales");
+  out.opacities = copy(from.opacities, "opacities");
+  out.sh = copy(from.sh, "sh");
+  return out;
+}
+
+}  // namespace raysplats

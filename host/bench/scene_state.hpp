@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "bench/scene_bench.hpp"
+#include "bvh/gaussian_bounds.hpp"
+#include "bvh/lbvh.hpp"
+#include "primitives/radix_sort.hpp"
+#include "trace/camera_tracer.hpp"
+#include "trace/ray_tracer.hpp"
+#include "train/adam.hpp"
+#include "train/density_control.hpp"
+#include "train/image_loss.hpp"
+
+namespace raysplats {
+
+/// What the operations of one scene share. Members are made when first needed.
+struct SceneBench::Impl {
+  Impl(Context& context_in, const BenchModel& model_in, const BenchOptions& options_in)
+      : context(context_in), model(model_in), options(options_in) {}
+
+  std::size_t count() const { return model.gaussians.size(); }
+  double gaussians_count() const { return static_cast<double>(count()); }
+  double pixels() const;
+  double sh_count() const;
+
+  DeviceGaussians& gaussians();
+  const Buffer<RsAabb>& boxes();  ///< of the Gaussians
+  CameraTracer& tracer();         ///< with an up-to-date tree
+  void forward_with_hits();
+  void make_loss();
+  void make_gradients();
+  void make_density();
+  void make_rays();
+  DeviceGaussians copy_of_gaussians();
+
+  BenchOperation bounds();
+  BenchOperation sort();
+  BenchOperation build();
+  BenchOperation refit();
+  BenchOperation view();
+  BenchOperation backward();
+  BenchOperation rays_update();
+  BenchOperation rays();
+  BenchOperation loss();
+  BenchOperation adam_step();
+  BenchOperation density_statistics();
+  BenchOperation densify();
+  BenchOperation iteration();
+
+  BenchWork bounds_work() const;
+  BenchWork build_work() const;
+  BenchWork prepare_work() const;
+  BenchWork lists_work() const;
+  BenchWork forward_work() const;
+  BenchWork backward_work() const;
+  BenchWork finalize_work() const;
+  BenchWork rays_work() const;
+  BenchWork loss_value_work() const;
+  BenchWork loss_gradient_work() const;
+  BenchWork adam_work() const;
+  BenchWork statistics_work() const;
+  BenchWork densify_work() const;
+  BenchWork iteration_work() const;
+
+  Context& context;
+  const BenchModel& model;
+  const BenchOptions& options;
+
+  std::optional<DeviceGaussians> device_gaussians;
+  std::optional<GaussianBounds> bounds_kernel;
+  Buffer<RsAabb> box_buffer;
+  std::optional<RadixSort> sorter;
+  Buffer<std::uint32_t> unsorted, keys, values;
+  std::optional<Lbvh> tree;
+  std::unique_ptr<CameraTracer> camera_tracer;
+  CameraTracer::Statistics view_statistics, kept_statistics;
+  std::unique_ptr<RayTracer> ray_tracer;
+  std::vector<Ray> ray_list;
+  std::vector<RayResult> ray_results;
+  std::unique_ptr<ImageLoss> image_loss;
+  Buffer<float> picture, image_gradient;
+  Buffer<std::uint32_t> photo;
+  std::optional<Adam> adam;
+  GaussianGradients gradients;
+  std::optional<DensityControl> density;
+  std::vector<float> density_signal;
+  DeviceGaussians densified;
+  std::size_t densified_count = 0;
+};
+
+/// Bytes and flops of both, items of the first.
+BenchWork together(const BenchWork& a, const BenchWork& b);
+
+}  // namespace raysplats

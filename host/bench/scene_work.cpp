@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <bit>
+
+#include "bench/scene_state.hpp"
+#include "bvh/work.h"
+#include "primitives/work.h"
+#include "trace/packet_shape.hpp"
+#include "trace/work.h"
+#include "train/work.h"
+
+namespace raysplats {
+
+BenchWork together(const BenchWork& a, const BenchWork& b) {
+  return {a.items, a.bytes + b.bytes, a.flops + b.flops};
+}
+
+double SceneBench::Impl::pixels() const {
+  return static_cast<double>(model.camera.width) * static_cast<double>(model.camera.height);
+}
+
+double SceneBench::Impl::sh_count() const { return sh_coefficients(model.gaussians.sh_degree); }
+
+BenchWork SceneBench::Impl::bounds_work() const {
+  const double n = gaussians_count();
+  return {{{"boxes", n}}, RS_WORK_BOUNDS_BYTES * n, RS_WORK_BOUNDS_FLOPS * n};
+}
+
+BenchWork SceneBench::Impl::build_work() const {
+  const double n = gaussians_count();
+  const double bytes = RS_WORK_MORTON_BYTES + RS_WORK_HIERARCHY_BYTES +
+                       RS_WORK_MORTON_SORT_PASSES * RS_WORK_SORT_PASS_BYTES;
+  return {{{"boxes", n}}, bytes * n, (RS_WORK_MORTON_FLOPS + RS_WORK_HIERARCHY_FLOPS) * n};
+}
+
+BenchWork SceneBench::Impl::prepare_work() const {
+  const double n = gaussians_count();
+  return {{{"Gaussians", n}},
+          (RS_WORK_PREPARE_BYTES + RS_WORK_SH_BYTES * sh_count()) * n,
+          (RS_WORK_PREPARE_FLOPS + RS_WORK_SH_FLOPS * sh_count()) * n};
+}
+
+BenchWork SceneBench::Impl::lists_work() const {
+  const auto candidates = static_cast<double>(view_statistics.candidates);
+  const int tile = packet_shape(context.device(), options.trace.packet_width).tile;
+  const auto across = [tile](int size) { return static_cast<unsigned>((size + tile - 1) / tile); };
+  const unsigned tiles = across(model.camera.width) * across(model.camera.height);
+  // Keys are a tile and 16 bits of depth.
+  const int passes = (16 + static_cast<int>(std::bit_width(tiles - 1)) + 7) / 8;
+  return {{{"candidates", candidates}},
+          (RS_WORK_LIST_BYTES + RS_WORK_SORT_PASS_BYTES * passes) * candidates,
+          RS_WORK_LIST_FLOPS * candidates};
+}
+
+BenchWork SceneBench::Impl::forward_work() const {
+  const auto hits = static_cast<double>(view_statistics.hits);
+  const auto candidates = static_cast<double>(view_statistics.candidates);
+  const bool entry = options.trace.hit_order == HitOrder::kEntry;
+  return {{{"rays", pixels()}, {"hits", hits}},
+          RS_WORK_FORWARD_CANDIDATE_BYTES * candidates + RS_WORK_FORWARD_PIXEL_BYTES * pixels(),
+          (RS_WORK_FORWARD_FLOPS + (entry ? RS_WORK_ENTRY_FLOPS : 0)) * hits};
+}
+
+BenchWork SceneBench::Impl::backward_work() const {
+  const auto hits = static_cast<double>(kept_statistics.hits);
+  return {{{"rays", pixels()}, {"hits", hits}},
+          RS_WORK_BACKWARD_GAUSSIAN_BYTES * gaussians_count() +
+              RS_WORK_BACKWARD_PIXEL_BYTES * pixels() +
+              static_cast<double>(kept_statistics.stream_bytes),
+          RS_WORK_BACKWARD_FLOPS * hits};
+}
+
+BenchWork SceneBench::Impl::finalize_work() const {
+  const double n = gaussians_count();
+  return {{{"Gaussians", n}},
+          (RS_WORK_FINALIZE_BYTES + 2 * RS_WORK_SH_BYTES * sh_count()) * n,
+          (RS_WORK_FINALIZE_FLOPS + RS_WORK_FINALIZE_SH_FLOPS * sh_count()) * n};
+}
+
+BenchWork SceneBench::Impl::rays_work() const {
+  double hits = 0;
+  for (const RayResult& result : ray_results) hits += result.hits;
+  const auto rays = static_cast<double>(ray_list.size());
+  return {{{"rays", rays}, {"hits", hits}},
+          RS_WORK_RAY_BYTES * rays + (RS_WORK_RAY_HIT_BYTES + RS_WORK_SH_BYTES * sh_count()) * hits,
+          (RS_WORK_RAY_HIT_FLOPS + RS_WORK_SH_FLOPS * sh_count()) * hits};
+}
+
+BenchWork SceneBench::Impl::loss_value_work() const {
+  return {{{"pixels", pixels()}},
+          RS_WORK_LOSS_VALUE_BYTES * pixels(),
+          RS_WORK_LOSS_VALUE_FLOPS * pixels()};
+}
+
+BenchWork SceneBench::Impl::loss_gradient_work() const {
+  return {{{"pixels", pixels()}},
+          RS_WORK_LOSS_GRADIENT_BYTES * pixels(),
+          RS_WORK_LOSS_GRADIENT_FLOPS * pixels()};
+}
+
+BenchWork SceneBench::Impl::adam_work() const {
+  const double parameters = (RS_WORK_PARAMETERS + 3 * sh_count()) * gaussians_count();
+  return {{{"Gaussians", gaussians_count()}, {"parameters", parameters}},
+          RS_WORK_ADAM_BYTES * parameters,
+          RS_WORK_ADAM_FLOPS * parameters};
+}
+
+BenchWork SceneBench::Impl::statistics_work() const {
+  const double n = gaussians_count();
+  return {{{"Gaussians", n}}, RS_WORK_STATISTICS_BYTES * n, 2 * n};
+}
+
+BenchWork SceneBench::Impl::densify_work() const {
+  const auto n = static_cast<double>(densified_count);
+  const double parameters = RS_WORK_PARAMETERS + 3 * sh_count();
+  return {
+      {{"Gaussians", n}}, (RS_WORK_DENSIFY_BYTES + RS_WORK_PARAMETER_BYTES * parameters) * n, 0};
+}
+
+// One pass over everything; refits or rebuilds as the operation does.
+BenchWork SceneBench::Impl::iteration_work() const {
+  BenchWork work{{{"iterations", 1.0}, {"rays", pixels()}}, 0, 0};
+  for (const BenchWork& part : {bounds_work(), build_work(), prepare_work(), lists_work(),
+                                forward_work(), loss_value_work(), loss_gradient_work(),
+                                backward_work(), finalize_work(), statistics_work(), adam_work()}) {
+    work = together(work, part);
+  }
+  return work;
+}
+
+}  // namespace raysplats
