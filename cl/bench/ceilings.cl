@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the device can do at best, for comparison with what the other kernels do: the rate of fused
-// multiply-adds in registers, and the bandwidth of copying large buffers.
+// multiply-adds in registers, and the bandwidth of reading and writing large buffers.
 //   fma_chains   CHAINS independent float16 accumulators per work-item; `rounds` times CHAINS * 16
 //                multiply-adds each                             global: any number of work-items
 //   copy_runs    every work-item copies `run` consecutive float16s (suits CPUs)   global: runs
 //   copy_stride  neighbouring work-items copy neighbouring float4s (suits GPUs)   global: float4s
+//   rewrite_runs as copy_runs, but in place: caches that fetch a line before it is written move
+//                half as much again for a copy             global: runs
 // O(rounds) and O(1) per element. Copying as in McCalpin's STREAM (1995): read and write both
 // count.
 
@@ -61,4 +63,9 @@ __kernel void copy_runs(__global const float16* restrict in,
 __kernel void copy_stride(__global const float4* restrict in, __global float4* restrict out) {
   const size_t i = get_global_id(0);
   out[i] = in[i];
+}
+
+__kernel void rewrite_runs(__global float16* data, uint run) {
+  const size_t begin = get_global_id(0) * (size_t)run;
+  for (uint k = 0; k < run; ++k) data[begin + k] = -data[begin + k];
 }

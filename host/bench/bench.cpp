@@ -185,7 +185,7 @@ BenchReport run_bench(Context& context, const BenchOptions& options, const Bench
       if (!wanted) continue;
       spdlog::info("{}: {} Gaussians", scene, size);
       const BenchModel generated{scene, bench_scene(scene, size, options.seed, options.sh_degree),
-                                 bench_camera(options.width, options.height)};
+                                 bench_camera(options.width, options.height), true};
       measure(context, generated, options, keep, report);
     }
   }

@@ -43,6 +43,7 @@ struct BenchModel {
   std::string name;
   Gaussians gaussians;
   Camera camera;
+  bool unit_cube = false;  ///< the scene is [-1, 1]^3; else arbitrary rays go where most means are
 };
 
 /// The ids ("row/scene/size") that options.filter leaves. Throws UsageError for a filter that is no

@@ -68,6 +68,7 @@ double measure_copy_bandwidth(Context& context, std::size_t wanted) {
   context.take_launches();
   Kernel by_runs = context.kernel(kProgram, "copy_runs");
   Kernel by_stride = context.kernel(kProgram, "copy_stride");
+  Kernel in_place = context.kernel(kProgram, "rewrite_runs");
   Range stride{{elements, 1, 1}, {0, 0, 0}};
   if (!cpu) stride.local = {kGroup, 1, 1};
   double best = std::numeric_limits<double>::infinity();
@@ -75,6 +76,8 @@ double measure_copy_bandwidth(Context& context, std::size_t wanted) {
     by_runs.launch(Range::linear(runs, 1), in, out, static_cast<std::uint32_t>(run));
     best = std::min(best, launch_seconds(context));
     by_stride.launch(stride, in, out);
+    best = std::min(best, launch_seconds(context));
+    in_place.launch(Range::linear(runs, 1), out, static_cast<std::uint32_t>(run));
     best = std::min(best, launch_seconds(context));
   }
   return 2.0 * sizeof(Float4) * static_cast<double>(elements) / best;

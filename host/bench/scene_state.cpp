@@ -2,18 +2,23 @@
 #include "bench/scene_state.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "base/rng.hpp"
+#include "core/statistics.hpp"
+#include "synth/bench_scenes.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr std::uint64_t kPictureStream = 1;
 constexpr std::uint64_t kGradientStream = 2;
-constexpr std::uint64_t kRayStream = 3;
 // Every so many Gaussians are densified.
 constexpr std::size_t kDensifyEvery = 10;
+// Share of the means beyond either end of what counts as the middle of a model.
+constexpr double kOutliers = 0.05;
 
 std::vector<float> random_floats(std::size_t count,
                                  double scale,
@@ -117,40 +122,37 @@ void SceneBench::Impl::make_density() {
   }
 }
 
-// Rays between two random points of the cube that the scenes fill, or of the middle of a model: no
-// two neighbours have anything in common.
+// The rays of the generated scenes, stretched to the middle of other models: outliers of trained
+// models lie far away.
 void SceneBench::Impl::make_rays() {
   if (!ray_list.empty()) return;
-  std::array<double, 3> center{}, half{};
-  const std::vector<float>& means = model.gaussians.means;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::vector<float> values;
-    for (std::size_t i = axis; i < means.size(); i += 3) values.push_back(means[i]);
-    std::sort(values.begin(), values.end());
-    // Outliers of trained models lie far away.
-    const double low = values[values.size() / 20];
-    const double high = values[values.size() - 1 - values.size() / 20];
-    center[axis] = 0.5 * (low + high);
-    half[axis] = std::max(0.5 * (high - low) / 0.9, 1e-6);
+  std::array<double, 3> center{}, half{1.0, 1.0, 1.0};
+  if (!model.unit_cube) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::vector<double> values;
+      for (std::size_t i = 0; i < count(); ++i) {
+        values.push_back(static_cast<double>(model.gaussians.means[3 * i + axis]));
+      }
+      const std::array<double, 2> ends{kOutliers, 1.0 - kOutliers};
+      const std::vector<double> range = quantiles(std::move(values), ends);
+      center[axis] = 0.5 * (range[0] + range[1]);
+      half[axis] = std::max(0.5 * (range[1] - range[0]), 1e-6);
+    }
   }
-  CounterRng random(options.seed, kRayStream);
-  ray_list.resize(std::min(options.rays, static_cast<std::size_t>(pixels())));
-  for (Ray& ray : ray_list) {
+  const std::size_t rays = std::min(options.rays, static_cast<std::size_t>(pixels()));
+  for (const BenchRay& unit : bench_rays(rays, options.seed)) {
+    Ray ray{};
+    ray.t_min = unit.t_min;
     double length2 = 0;
-    std::array<double, 3> direction{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double from = center[axis] + half[axis] * (2.0 * random.uniform() - 1.0);
-      const double to = center[axis] + half[axis] * (2.0 * random.uniform() - 1.0);
-      ray.origin[axis] = static_cast<float>(from);
-      direction[axis] = to - from;
-      length2 += direction[axis] * direction[axis];
+      ray.origin[axis] = static_cast<float>(center[axis] + half[axis] * unit.origin[axis]);
+      ray.direction[axis] = static_cast<float>(half[axis] * unit.direction[axis]);
+      length2 += static_cast<double>(ray.direction[axis]) * ray.direction[axis];
     }
-    const double inverse = 1.0 / std::sqrt(std::max(length2, 1e-20));
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      ray.direction[axis] = static_cast<float>(direction[axis] * inverse);
-    }
-    ray.t_min = 0.0f;
-    ray.t_max = 1e30f;
+    const auto length = static_cast<float>(std::sqrt(length2));
+    for (float& component : ray.direction) component /= length;
+    ray.t_max = unit.t_max * length;
+    ray_list.push_back(ray);
   }
 }
 
