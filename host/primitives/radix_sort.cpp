@@ -19,9 +19,16 @@ RadixSort::RadixSort(Context& context)
 
 RadixSort::RadixSort(Context& context, const ChunkShape& shape)
     : context_(&context), shape_(shape), scan_(context, shape) {
-  const BuildOptions options = BuildOptions().define("RS_GROUP", shape.group_size);
-  count_digits_ = context.kernel(kProgram, "count_digits", options);
-  scatter_pairs_ = context.kernel(kProgram, "scatter_pairs", options);
+  for (const bool from_pairs : {false, true}) {
+    for (const bool to_pairs : {false, true}) {
+      const BuildOptions options = BuildOptions()
+                                       .define("RS_GROUP", shape.group_size)
+                                       .define("RS_SOURCE_PAIRS", from_pairs ? 1 : 0)
+                                       .define("RS_TARGET_PAIRS", to_pairs ? 1 : 0);
+      scatter_[from_pairs][to_pairs] = context.kernel(kProgram, "scatter", options);
+      if (to_pairs) count_digits_[from_pairs] = context.kernel(kProgram, "count_digits", options);
+    }
+  }
 }
 
 void RadixSort::sort(Buffer<std::uint32_t>& keys,
@@ -34,39 +41,38 @@ void RadixSort::sort(Buffer<std::uint32_t>& keys,
                     "2^31 pairs and 32 bits",
                     count, bits, keys.size(), values.size()));
   }
-  if (count < 2) return;
-  keys_.ensure(*context_, count, "sort keys");
-  values_.ensure(*context_, count, "sort values");
-  bool in_scratch = false;
-  for (int bit = 0; bit < bits; bit += 8) {
-    const auto shift = static_cast<std::uint32_t>(bit);
-    if (in_scratch) {
-      pass(keys_, values_, keys, values, count, shift);
-    } else {
-      pass(keys, values, keys_, values_, count, shift);
-    }
-    in_scratch = !in_scratch;
-  }
-  if (in_scratch) {
+  if (count < 2 || bits == 0) return;
+  const int passes = (bits + 7) / 8;
+  // A kernel cannot take no buffer: those that a pass does not use are one element long.
+  pairs_[0].ensure(*context_, passes > 1 ? count : 1, "sort pairs");
+  pairs_[1].ensure(*context_, passes > 2 ? count : 1, "sort pairs");
+  if (passes == 1) {
+    keys_.ensure(*context_, count, "sort keys");
+    values_.ensure(*context_, count, "sort values");
+    pass({keys, values, pairs_[0], keys_, values_, pairs_[1]}, false, false, count, 0);
     keys.copy_from(keys_, count);
     values.copy_from(values_, count);
+    return;
+  }
+  for (int i = 0; i < passes; ++i) {
+    Buffer<Pair>& from = pairs_[(i + 1) % 2];
+    Buffer<Pair>& to = pairs_[i % 2];
+    pass({keys, values, from, keys, values, to}, i > 0, i + 1 < passes, count, 8 * i);
   }
 }
 
-void RadixSort::pass(const Buffer<std::uint32_t>& keys,
-                     const Buffer<std::uint32_t>& values,
-                     Buffer<std::uint32_t>& keys_out,
-                     Buffer<std::uint32_t>& values_out,
-                     std::size_t count,
-                     std::uint32_t shift) {
+void RadixSort::pass(const Ends& ends, bool from_pairs, bool to_pairs, std::size_t count, int bit) {
   const std::size_t groups = shape_.used_groups(count);
   const auto n = static_cast<std::uint32_t>(count);
   const auto chunk = static_cast<std::uint32_t>(shape_.chunk(count));
+  const auto shift = static_cast<std::uint32_t>(bit);
   const Range range = Range::linear(groups * shape_.group_size, shape_.group_size);
   table_.ensure(*context_, kDigits * groups + 1, "sort digit table");
-  count_digits_.launch(range, keys, table_, n, chunk, shift);
+  count_digits_[from_pairs].launch(range, ends.keys, ends.pairs, table_, n, chunk, shift);
   scan_.exclusive(table_, kDigits * groups);
-  scatter_pairs_.launch(range, keys, values, table_, keys_out, values_out, n, chunk, shift);
+  scatter_[from_pairs][to_pairs].launch(range, ends.keys, ends.values, ends.pairs, table_,
+                                        ends.keys_out, ends.values_out, ends.pairs_out, n, chunk,
+                                        shift);
 }
 
 }  // namespace raysplats

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -12,7 +13,7 @@
 namespace raysplats {
 
 /// Stable least-significant-digit radix sort of 32-bit keys with 32-bit values, 8 bits a pass; few
-/// large chunks on CPUs, many on GPUs. Scratch memory is kept between calls.
+/// large chunks on CPUs, many on GPUs. Scratch memory (16 bytes a pair) is kept between calls.
 class RadixSort {
  public:
   explicit RadixSort(Context& context);
@@ -27,18 +28,23 @@ class RadixSort {
             int bits = 32);
 
  private:
-  void pass(const Buffer<std::uint32_t>& keys,
-            const Buffer<std::uint32_t>& values,
-            Buffer<std::uint32_t>& keys_out,
-            Buffer<std::uint32_t>& values_out,
-            std::size_t count,
-            std::uint32_t shift);
+  using Pair = std::array<std::uint32_t, 2>;
+  struct Ends {
+    const Buffer<std::uint32_t>& keys;
+    const Buffer<std::uint32_t>& values;
+    const Buffer<Pair>& pairs;
+    Buffer<std::uint32_t>& keys_out;
+    Buffer<std::uint32_t>& values_out;
+    Buffer<Pair>& pairs_out;
+  };
+  void pass(const Ends& ends, bool from_pairs, bool to_pairs, std::size_t count, int bit);
 
   Context* context_;
   ChunkShape shape_;
   Scan scan_;
-  Kernel count_digits_;
-  Kernel scatter_pairs_;
+  Kernel count_digits_[2];  // of keys, of pairs
+  Kernel scatter_[2][2];    // from keys and values or from pairs, to the same
+  Buffer<Pair> pairs_[2];
   Buffer<std::uint32_t> keys_;
   Buffer<std::uint32_t> values_;
   Buffer<std::uint32_t> table_;

@@ -102,6 +102,21 @@ TEST_CASE("radix sort: every division of the work gives the same result") {
   }
 }
 
+TEST_CASE("radix sort: one to four passes, some with one digit, in both forms [small]") {
+  Context context(select_device(""));
+  for (const std::size_t size : {1u, 16u}) {
+    CAPTURE(size);
+    RadixSort sorter(context, ChunkShape{3, size, 1});
+    for (const int bits : {8, 16, 24, 32}) {
+      check_sort(context, sorter, random_keys(100, 1ull << 32, 3), 97, bits);
+      check_sort(context, sorter, random_keys(100, 1ull << 9, 4), 97, bits);
+      Words keys = random_keys(100, 1ull << 32, 5);
+      for (std::uint32_t& key : keys) key = (key & 0xff00ffu) | 0x7f003400u;
+      check_sort(context, sorter, keys, 97, bits);
+    }
+  }
+}
+
 TEST_CASE("radix sort: wrong sizes are refused") {
   Context context(select_device(""));
   RadixSort sorter(context);
