@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <memory>
 #include <tuple>
@@ -43,58 +42,6 @@ struct CompareOptions {
   std::string before;
   std::string after;
 };
-
-std::vector<std::string> parts_of(const std::string& text) {
-  std::vector<std::string> parts = CLI::detail::split(text, ',');
-  std::erase(parts, "");
-  return parts;
-}
-
-// "100k", "1.5M" or plain digits.
-std::size_t parse_size(const std::string& text) {
-  double factor = 1;
-  std::string digits = text;
-  if (!digits.empty() && (digits.back() == 'k' || digits.back() == 'M')) {
-    factor = digits.back() == 'k' ? 1e3 : 1e6;
-    digits.pop_back();
-  }
-  double value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc() || end != digits.data() + digits.size() || !(value * factor >= 1) ||
-      value * factor > 1e9) {
-    throw UsageError(
-        fmt::format("--sizes '{}' is no number of Gaussians, as in 10000, 100k or 1M", text));
-  }
-  return static_cast<std::size_t>(value * factor);
-}
-
-std::pair<int, int> parse_resolution(const std::string& text) {
-  int width = 0, height = 0;
-  const char* end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), end, width);
-  if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') {
-    const auto second = std::from_chars(first.ptr + 1, end, height);
-    if (second.ec == std::errc() && second.ptr == end && width > 0 && height > 0 &&
-        width <= 65536 && height <= 65536) {
-      return {width, height};
-    }
-  }
-  throw UsageError(fmt::format("--resolution '{}' is not WIDTHxHEIGHT, as in 800x800", text));
-}
-
-std::vector<std::string> scenes_of(const std::string& text) {
-  const std::vector<std::string> known = bench_scene_names();
-  if (text == "all") return known;
-  std::vector<std::string> names = parts_of(text);
-  for (const std::string& name : names) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      throw UsageError(
-          fmt::format("--scene '{}' is none of {}, all", name, fmt::join(known, ", ")));
-    }
-  }
-  if (names.empty()) throw UsageError("--scene names no scene");
-  return names;
-}
 
 // The camera at another size, with the same field of view across.
 Camera resized(Camera camera, int width, int height) {
@@ -136,9 +83,11 @@ BenchModel load_model(const Options& options, const ModelSource& source) {
 void run(const Options& options) {
   BenchOptions bench = options.bench;
   bench.sizes.clear();
-  for (const std::string& text : parts_of(options.sizes)) bench.sizes.push_back(parse_size(text));
+  for (const std::string& text : parts_of(options.sizes))
+    bench.sizes.push_back(parse_count("--sizes", text));
   if (options.large) bench.sizes.push_back(kLargeSize);
-  bench.scenes = scenes_of(options.scenes);
+  bench.scenes = options.scenes == "all" ? bench_scene_names()
+                                         : names_of("--scene", options.scenes, bench_scene_names());
   if (options.resolution) {
     std::tie(bench.width, bench.height) = parse_resolution(*options.resolution);
   }

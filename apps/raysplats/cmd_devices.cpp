@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "device/program_cache.hpp"
+#include "device/tuning.hpp"
 #include "options.hpp"
 
 namespace raysplats::cli {
@@ -30,6 +31,13 @@ const char* type_name(DeviceType type) {
 }
 
 nlohmann::ordered_json to_json(const DeviceInfo& device) {
+  nlohmann::ordered_json tuning;
+  if (device.tuning) {
+    tuning = {{"packet_width", device.tuning->packet_width},
+              {"tile", device.tuning->tile},
+              {"pending", device.tuning->pending},
+              {"group", device.tuning->group}};
+  }
   return {{"index", device.index},
           {"name", device.name},
           {"vendor", device.vendor},
@@ -48,6 +56,7 @@ nlohmann::ordered_json to_json(const DeviceInfo& device) {
           {"fp64", device.has_fp64},
           {"float_atomics", device.has_float_atomics},
           {"int64_atomics", device.has_int64_atomics},
+          {"tuning", tuning},
           {"usable", device.usable()},
           {"problems", device.problems}};
 }
@@ -66,6 +75,7 @@ void print(const DeviceInfo& device) {
   fmt::print("    fp64            {}\n", yes(device.has_fp64));
   fmt::print("    float atomics   {}\n", yes(device.has_float_atomics));
   fmt::print("    int64 atomics   {}\n", yes(device.has_int64_atomics));
+  fmt::print("    tuning          {}\n", device.tuning ? describe(*device.tuning) : "none");
   if (device.usable()) {
     fmt::print("    usable          yes\n");
   } else {
@@ -80,7 +90,9 @@ void run(const Options& options) {
                directory.string());
     return;
   }
-  const std::vector<DeviceInfo> devices = list_devices();
+  std::vector<DeviceInfo> devices = list_devices();
+  const TuningStore store;
+  for (DeviceInfo& device : devices) device.tuning = store.find(device);
   if (options.json) {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
     for (const DeviceInfo& device : devices) list.push_back(to_json(device));

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <string_view>
 #include <utility>
@@ -266,6 +267,64 @@ std::string explain(const CLI::ParseError& error, const CLI::App& app) {
                        fmt::join(command_names(app), ", "));
   }
   return fmt::format("{} ('{}' explains the options)", error.what(), help);
+}
+
+std::vector<std::string> parts_of(const std::string& text) {
+  std::vector<std::string> parts = CLI::detail::split(text, ',');
+  std::erase(parts, "");
+  return parts;
+}
+
+std::vector<std::string> names_of(const std::string& option,
+                                  const std::string& text,
+                                  const std::vector<std::string>& known) {
+  std::vector<std::string> names = parts_of(text);
+  for (const std::string& name : names) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      throw UsageError(fmt::format("{} '{}' is none of {}", option, name, fmt::join(known, ", ")));
+    }
+  }
+  if (names.empty()) {
+    throw UsageError(fmt::format("{} names nothing: choose of {}", option, fmt::join(known, ", ")));
+  }
+  return names;
+}
+
+std::size_t parse_count(const std::string& option, const std::string& text) {
+  double factor = 1;
+  std::string digits = text;
+  if (!digits.empty() && (digits.back() == 'k' || digits.back() == 'M')) {
+    factor = digits.back() == 'k' ? 1e3 : 1e6;
+    digits.pop_back();
+  }
+  double value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error != std::errc() || end != digits.data() + digits.size() || !(value * factor >= 1) ||
+      value * factor > 1e9) {
+    throw UsageError(
+        fmt::format("{} '{}' is no number of Gaussians, as in 10000, 100k or 1M", option, text));
+  }
+  return static_cast<std::size_t>(value * factor);
+}
+
+std::pair<int, int> parse_resolution(const std::string& text) {
+  int width = 0, height = 0;
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, width);
+  if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') {
+    const auto second = std::from_chars(first.ptr + 1, end, height);
+    if (second.ec == std::errc() && second.ptr == end && width > 0 && height > 0 &&
+        width <= 65536 && height <= 65536) {
+      return {width, height};
+    }
+  }
+  throw UsageError(fmt::format("--resolution '{}' is not WIDTHxHEIGHT, as in 800x800", text));
+}
+
+std::string describe(const DeviceTuning& tuning) {
+  const std::string group = tuning.group == 0 ? "whole tiles" : std::to_string(tuning.group);
+  return fmt::format("packet width {}, tiles of {}, pending {}, groups of {}", tuning.packet_width,
+                     tuning.tile, tuning.pending, group);
 }
 
 std::string readable_bytes(std::uint64_t bytes) {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "device/context.hpp"
@@ -39,6 +40,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global);
 Command add_eval_command(CLI::App& app, const GlobalOptions& global);
 Command add_info_command(CLI::App& app);
 Command add_bench_command(CLI::App& app);
+Command add_tune_command(CLI::App& app);
 
 struct DeviceFlags {
   std::string device;
@@ -97,6 +99,20 @@ std::vector<std::string> own_arguments(int argc, const char* const* argv);
 
 /// One sentence for a command line that does not parse, with the nearest known command or option.
 std::string explain(const CLI::ParseError& error, const CLI::App& app);
+
+/// The parts between commas, without empty ones.
+std::vector<std::string> parts_of(const std::string& text);
+/// The same, each of which must be one of `known`; UsageError for others and for none.
+std::vector<std::string> names_of(const std::string& option,
+                                  const std::string& text,
+                                  const std::vector<std::string>& known);
+/// A number of Gaussians: "100k", "1.5M" or plain digits.
+std::size_t parse_count(const std::string& option, const std::string& text);
+/// Width and height of "800x600".
+std::pair<int, int> parse_resolution(const std::string& text);
+
+/// "packet width 16, tiles of 32, pending 96, groups of whole tiles".
+std::string describe(const DeviceTuning& tuning);
 
 /// "1.5 GiB" and the like.
 std::string readable_bytes(std::uint64_t bytes);

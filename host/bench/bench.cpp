@@ -84,7 +84,15 @@ std::uint64_t peak_process_bytes() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
-std::map<std::string, std::string> option_texts(const BenchOptions& options,
+std::string tuning_text(const DeviceInfo& device) {
+  if (!device.tuning) return "none";
+  const DeviceTuning& tuning = *device.tuning;
+  return fmt::format("packet width {}, tile {}, pending {}, group {}", tuning.packet_width,
+                     tuning.tile, tuning.pending, tuning.group);
+}
+
+std::map<std::string, std::string> option_texts(const Context& context,
+                                                const BenchOptions& options,
                                                 const BenchModel* model) {
   const int width = model != nullptr ? model->camera.width : options.width;
   const int height = model != nullptr ? model->camera.height : options.height;
@@ -99,6 +107,7 @@ std::map<std::string, std::string> option_texts(const BenchOptions& options,
           {"min-transmittance", fmt::format("{:g}", options.trace.min_transmittance)},
           {"max-hits", std::to_string(options.trace.max_hits)},
           {"adaptive-radius", options.trace.adaptive_radius ? "on" : "off"},
+          {"tuning", tuning_text(context.device())},
           {"memory-budget", fmt::format("{} MiB", options.trace.memory_budget >> 20)}};
 }
 
@@ -172,7 +181,7 @@ BenchReport run_bench(Context& context, const BenchOptions& options, const Bench
   report.driver = context.device().driver_version;
   report.platform = context.device().platform;
   report.compute_units = context.device().compute_units;
-  report.options = option_texts(options, model);
+  report.options = option_texts(context, options, model);
   report.ceilings.fma_flops_per_second = measure_fma_rate(context);
   if (model != nullptr) {
     spdlog::info("{}: {} Gaussians", model->name, model->gaussians.size());

@@ -9,6 +9,7 @@
 #include "device/context_impl.hpp"
 #include "device/platform.hpp"
 #include "device/program_cache.hpp"
+#include "device/tuning.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
@@ -56,6 +57,8 @@ Context::Context(const DeviceInfo& device, const ContextOptions& options)
     throw DeviceError(fmt::format("OpenCL device {} ({}) is gone", device.index, device.name));
   }
   impl_->info = device;
+  impl_->info.tuning.reset();
+  if (options.tuning) impl_->info.tuning = TuningStore(options.cache_directory).find(device);
   impl_->device = devices[device.index].device;
   try {
     impl_->context = cl::Context(impl_->device);
@@ -76,6 +79,8 @@ Context::~Context() {
 }
 
 const DeviceInfo& Context::device() const { return impl_->info; }
+
+void Context::set_tuning(const std::optional<DeviceTuning>& tuning) { impl_->info.tuning = tuning; }
 
 Kernel Context::kernel(const std::string& program,
                        const std::string& name,

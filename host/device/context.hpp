@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct ContextOptions {
   bool profile = false;         ///< time every launch by device events
   bool keep_launches = false;   ///< with profile: also keep each time for take_launches()
   bool kernel_cache = true;     ///< keep compiled programs in the user's cache directory
+  bool tuning = true;           ///< use what `raysplats tune` stored for the device
   std::string cache_directory;  ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
 };
 
@@ -40,6 +42,8 @@ class Context {
   Context& operator=(const Context&) = delete;
 
   const DeviceInfo& device() const;
+  /// Replaces the tuning in use; tracers made later follow it.
+  void set_tuning(const std::optional<DeviceTuning>& tuning);
 
   /// The kernel `name` of the file `program` below cl/, built with `options` (memory, then disk
   /// cache, then compiler). Throws DeviceError with the compiler's log when the build fails.

@@ -11,7 +11,9 @@ namespace raysplats {
 
 PacketShape packet_shape(const DeviceInfo& device, int lanes) {
   const bool cpu = device.type == DeviceType::kCpu;
-  if (lanes == 0) {
+  if (lanes == 0 && device.tuning) {
+    lanes = device.tuning->packet_width;
+  } else if (lanes == 0) {
     lanes = 1;
     while (cpu && lanes < 16 && static_cast<std::uint32_t>(2 * lanes) <= device.float_vector_width)
       lanes *= 2;
@@ -40,12 +42,18 @@ PacketShape packet_shape(const DeviceInfo& device, int lanes) {
   // CPUs gain from shared lists of larger tiles; GPUs need many small groups.
   shape.tile = cpu ? 32 : 16;
   shape.pending = cpu ? 96 : 48;
+  if (device.tuning && device.tuning->packet_width == lanes) {
+    shape.tile = device.tuning->tile;
+    shape.pending = device.tuning->pending;
+    shape.group = device.tuning->group;
+  }
   return shape;
 }
 
 std::array<std::size_t, 2> packet_group(const PacketShape& packet, std::size_t limit) {
   std::array<std::size_t, 2> group{static_cast<std::size_t>(packet.tile / packet.width),
                                    static_cast<std::size_t>(packet.tile / packet.height)};
+  if (packet.group > 0) limit = std::min(limit, static_cast<std::size_t>(packet.group));
   while (group[0] * group[1] > std::max<std::size_t>(limit, 1)) {
     std::size_t& longer = group[0] >= group[1] ? group[0] : group[1];
     longer /= 2;

@@ -16,9 +16,11 @@ struct PacketShape {
   int height = 1;    ///< pixels
   int tile = 16;     ///< pixels
   int pending = 64;  ///< entries of the per-lane sorted list
+  int group = 0;     ///< most work-items of a work-group; 0 = all packets of a tile
 };
 
-/// `lanes` of 1, 2, 4, 8 or 16; 0 chooses the device's float vector width on CPUs and 1 elsewhere.
+/// `lanes` of 1, 2, 4, 8 or 16; 0 takes the device's tuning, or without one its float vector width
+/// on CPUs and 1 elsewhere. The rest follows the tuning when that has the same width.
 /// Throws UsageError for other widths.
 PacketShape packet_shape(const DeviceInfo& device, int lanes);
 

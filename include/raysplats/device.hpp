@@ -3,12 +3,23 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace raysplats {
 
 enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
+
+/// How camera rays are traced on a device: the choices that change the speed and nothing else.
+struct DeviceTuning {
+  int packet_width = 1;  ///< rays per work-item: 1, 2, 4, 8 or 16
+  int tile = 16;         ///< pixels along a side of the tiles that share a candidate list
+  int pending = 48;      ///< entries of a ray's sorted list
+  int group = 0;         ///< most work-items of a work-group; 0 = all packets of a tile
+
+  bool operator==(const DeviceTuning&) const = default;
+};
 
 /// What one OpenCL device offers, queried once.
 struct DeviceInfo {
@@ -30,7 +41,8 @@ struct DeviceInfo {
   bool has_fp64 = false;
   bool has_int64_atomics = false;
   bool has_float_atomics = false;
-  std::vector<std::string> problems;  ///< why the device cannot be used; empty when it can
+  std::optional<DeviceTuning> tuning;  ///< of Context::device(): what `raysplats tune` found
+  std::vector<std::string> problems;   ///< why the device cannot be used; empty when it can
 
   bool usable() const { return problems.empty(); }
 };

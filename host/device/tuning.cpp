@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/tuning.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "base/atomic_file.hpp"
+#include "device/program_cache.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr const char* kSchema = "raysplats-tuning";
+constexpr int kSchemaVersion = 1;
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{1} << 20;
+constexpr std::array<int, 5> kWidths{1, 2, 4, 8, 16};
+constexpr std::array<int, 4> kTiles{8, 16, 32, 64};
+constexpr int kMaxPending = 1024;
+
+using Entry = TuningStore::Entry;
+
+bool is_device(const Entry& entry, const DeviceInfo& device) {
+  return entry.device == device.name && entry.platform == device.platform;
+}
+
+bool is_current(const Entry& entry, const DeviceInfo& device) {
+  return is_device(entry, device) && entry.driver == device.driver_version &&
+         entry.version == RAYSPLATS_VERSION;
+}
+
+Entry entry_from(const nlohmann::json& json) {
+  Entry entry;
+  entry.device = json.at("device").get<std::string>();
+  entry.platform = json.at("platform").get<std::string>();
+  entry.driver = json.at("driver").get<std::string>();
+  entry.version = json.at("raysplats").get<std::string>();
+  entry.tuning.packet_width = json.at("packet_width").get<int>();
+  entry.tuning.tile = json.at("tile").get<int>();
+  entry.tuning.pending = json.at("pending").get<int>();
+  entry.tuning.group = json.at("group").get<int>();
+  if (!is_valid(entry.tuning)) throw DataError("a value is out of range");
+  return entry;
+}
+
+// Empty when there is no file. Throws std::exception.
+std::vector<Entry> parse_entries(const std::filesystem::path& path) {
+  std::error_code error;
+  if (path.empty() || !std::filesystem::exists(path, error)) return {};
+  if (std::filesystem::file_size(path) > kMaxBytes) throw DataError("it is too large");
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw DataError("it cannot be read");
+  const std::string text((std::istreambuf_iterator<char>(stream)), {});
+  const nlohmann::json json = nlohmann::json::parse(text);
+  if (json.at("schema") != kSchema || json.at("schema_version") != kSchemaVersion) {
+    throw DataError("it has another format");
+  }
+  std::vector<Entry> entries;
+  for (const nlohmann::json& entry : json.at("devices")) entries.push_back(entry_from(entry));
+  return entries;
+}
+
+std::vector<Entry> read_entries(const std::filesystem::path& path) {
+  try {
+    return parse_entries(path);
+  } catch (const std::exception& error) {
+    spdlog::warn("The tuning in {} is ignored ({}): 'raysplats tune' makes a new one",
+                 path.string(), error.what());
+    return {};
+  }
+}
+
+void write_entries(const std::filesystem::path& path, const std::vector<Entry>& entries) {
+  nlohmann::ordered_json devices = nlohmann::ordered_json::array();
+  for (const Entry& entry : entries) {
+    devices.push_back({{"device", entry.device},
+                       {"platform", entry.platform},
+                       {"driver", entry.driver},
+                       {"raysplats", entry.version},
+                       {"packet_width", entry.tuning.packet_width},
+                       {"tile", entry.tuning.tile},
+                       {"pending", entry.tuning.pending},
+                       {"group", entry.tuning.group}});
+  }
+  const nlohmann::ordered_json json{
+      {"schema", kSchema}, {"schema_version", kSchemaVersion}, {"devices", devices}};
+  write_text_file(path, json.dump(2) + "\n");
+}
+
+}  // namespace
+
+bool is_valid(const DeviceTuning& tuning) {
+  return std::find(kWidths.begin(), kWidths.end(), tuning.packet_width) != kWidths.end() &&
+         std::find(kTiles.begin(), kTiles.end(), tuning.tile) != kTiles.end() &&
+         tuning.pending >= 1 && tuning.pending <= kMaxPending && tuning.group >= 0;
+}
+
+TuningStore::TuningStore(const std::string& directory) {
+  const std::filesystem::path folder =
+      directory.empty() ? default_cache_directory() : std::filesystem::path(directory);
+  if (!folder.empty()) path_ = folder / "tuning.json";
+  entries_ = read_entries(path_);
+}
+
+std::optional<DeviceTuning> TuningStore::find(const DeviceInfo& device) const {
+  const auto found = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const Entry& entry) { return is_current(entry, device); });
+  return found == entries_.end() ? std::nullopt : std::optional(found->tuning);
+}
+
+void TuningStore::store(const DeviceInfo& device, const DeviceTuning& tuning) {
+  if (path_.empty()) {
+    throw DataError("There is no directory for the tuning: set HOME or XDG_CACHE_HOME");
+  }
+  std::erase_if(entries_, [&](const Entry& entry) { return is_current(entry, device); });
+  entries_.push_back(
+      {device.name, device.platform, device.driver_version, RAYSPLATS_VERSION, tuning});
+  std::error_code error;
+  std::filesystem::create_directories(path_.parent_path(), error);
+  write_entries(path_, entries_);
+}
+
+std::size_t TuningStore::remove(const DeviceInfo& device) {
+  const std::size_t removed =
+      std::erase_if(entries_, [&](const Entry& entry) { return is_device(entry, device); });
+  if (removed > 0) write_entries(path_, entries_);
+  return removed;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+
+namespace {
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+void check_refused(const std::vector<std::string>& arguments,
+                   int code,
+                   const std::string& message) {
+  const Outcome outcome = raysplats_program(arguments);
+  INFO(outcome.err);
+  CHECK(outcome.code == code);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.err, message));
+  CHECK(outcome.out.empty());
+}
+
+const std::vector<std::string> kTiny{"bench",        "--sizes",     "1k",   "--resolution",
+                                     "32x32",        "--repeat",    "2",    "--filter",
+                                     "adam|forward", "--log-level", "error"};
+
+std::vector<std::string> with(std::vector<std::string> arguments,
+                              const std::vector<std::string>& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+}  // namespace
+
+TEST_CASE("bench lists its rows without running") {
+  const Outcome outcome =
+      raysplats_program({"bench", "--list", "--sizes", "1k,1.5M", "--scene", "random,surface"});
+  CHECK(outcome.code == 0);
+  CHECK(contains(outcome.out, "backward/random/1000\n"));
+  CHECK(contains(outcome.out, "refit/surface/1500000\n"));
+  const Outcome large = raysplats_program({"bench", "--list", "--large", "--filter", "^sort/"});
+  CHECK(large.out ==
+        "sort/random/10000\nsort/random/100000\nsort/random/1000000\nsort/random/3000000\n");
+}
+
+TEST_CASE("bench writes JSON and CSV that compare reads") {
+  const TemporaryFolder folder;
+  const Outcome first = raysplats_program(
+      with(kTiny, {"--json", folder / "a.json", "--csv", folder / "a.csv", "--packet-width", "4"}));
+  INFO(first.err);
+  REQUIRE(first.code == 0);
+  CHECK(contains(first.out, "forward/random/1000"));
+  CHECK(contains(first.out, "adam/random/1000"));
+  CHECK_FALSE(contains(first.out, "refit"));
+  const nlohmann::json json = nlohmann::json::parse(read_file(folder / "a.json"));
+  CHECK(json.at("schema") == "raysplats-bench");
+  CHECK(json.at("options").at("packet-width") == "4");
+  CHECK(json.at("options").at("resolution") == "32x32");
+  REQUIRE(json.at("rows").size() == 2);
+  CHECK(json["rows"][0].at("seconds").at("median").get<double>() > 0);
+  CHECK(json.at("ceilings").at("fma_flops_per_second").get<double>() > 0);
+  CHECK(contains(read_file(folder / "a.csv"), "\nforward,"));
+
+  const Outcome same =
+      raysplats_program({"bench", "compare", folder / "a.json", folder / "a.json"});
+  CHECK(same.code == 0);
+  CHECK(contains(same.out, "1.000"));
+  CHECK_FALSE(contains(same.out, "1.000 *"));
+  write_file(folder / "none.json", "{}");
+  check_refused({"bench", "compare", folder / "a.json", folder / "none.json"}, 3, "no result");
+  check_refused({"bench", "compare", folder / "a.json", folder / "missing.json"}, 3, "missing");
+  check_refused({"bench", "compare", folder / "a.json"}, 2, "B is required");
+}
+
+TEST_CASE("bench measures a model seen by a camera") {
+  const TemporaryFolder folder;
+  write_file(folder / "balls.ply", ply_file(20));
+  write_file(folder / "cameras.json",
+             R"({"w":40,"h":30,"fl_x":40,"fl_y":40,"cx":20,"cy":15,"frames":[
+               {"file_path":"a.png","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,6],[0,0,0,1]]}]})");
+  const std::vector<std::string> model{
+      "bench",    "--model", folder / "balls.ply", "--cameras", folder / "cameras.json",
+      "--repeat", "1",       "--filter",           "view",      "-q"};
+  const Outcome outcome = raysplats_program(with(model, {"--json", folder / "m.json"}));
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(contains(outcome.out, "prepare-view/balls/20"));
+  const nlohmann::json json = nlohmann::json::parse(read_file(folder / "m.json"));
+  CHECK(json.at("options").at("resolution") == "40x30");
+  check_refused(with(model, {"--view", "1"}), 2, "--view 1 is beyond");
+}
+
+TEST_CASE("bench refuses what it cannot measure") {
+  const TemporaryFolder folder;
+  write_file(folder / "balls.ply", ply_file(2));
+  check_refused({"bench", "--sizes", "many"}, 2, "--sizes 'many'");
+  check_refused({"bench", "--sizes", "0"}, 2, "--sizes '0'");
+  check_refused({"bench", "--scene", "moon"}, 2, "--scene 'moon'");
+  check_refused({"bench", "--resolution", "800"}, 2, "--resolution '800'");
+  check_refused({"bench", "--resolution", "0x3"}, 2, "--resolution '0x3'");
+  check_refused({"bench", "--filter", "("}, 2, "no regular expression");
+  check_refused({"bench", "--filter", "nothing", "-q"}, 2, "leaves no row");
+  check_refused({"bench", "--cameras", "x.json"}, 2, "--model");
+  check_refused({"bench", "--model", folder / "balls.ply"}, 2, "--cameras");
+  check_refused({"bench", "--model", folder / "none.ply", "--cameras", "x"}, 3, "none.ply");
+  check_refused({"bench", "--repeat", "0"}, 2, "--repeat");
+  check_refused({"tune", "--axes", "colour"}, 2, "--axes 'colour'");
+}
+
+TEST_CASE("tune stores its result, devices shows it, and reset forgets it") {
+  const TemporaryFolder cache;
+  const Surroundings there{{{"XDG_CACHE_HOME", cache.path().string()}}};
+  const std::vector<std::string> tune{"tune",     "--size", "100",    "--resolution", "16x16",
+                                      "--repeat", "1",      "--axes", "group",        "-q"};
+  const std::string file = (cache.path() / "raysplats" / "tuning.json").string();
+  Outcome outcome = raysplats_program(with(tune, {"--dry-run"}), there);
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(contains(outcome.out, "best:"));
+  CHECK_FALSE(std::filesystem::exists(file));
+  CHECK(contains(raysplats_program({"devices"}, there).out, "tuning          none"));
+
+  outcome = raysplats_program(tune, there);
+  REQUIRE(outcome.code == 0);
+  const nlohmann::json stored = nlohmann::json::parse(read_file(file));
+  REQUIRE(stored.at("devices").size() == 1);
+  const nlohmann::json& entry = stored["devices"][0];
+  CHECK(entry.at("raysplats") == RAYSPLATS_VERSION);
+  const int width = entry.at("packet_width").get<int>();
+  CHECK(
+      contains(raysplats_program({"devices"}, there).out, "packet width " + std::to_string(width)));
+  const nlohmann::json devices =
+      nlohmann::json::parse(raysplats_program({"devices", "--json"}, there).out);
+  CHECK(devices.at("devices")[0].at("tuning").at("packet_width") == width);
+
+  outcome = raysplats_program({"tune", "--reset"}, there);
+  CHECK(outcome.code == 0);
+  CHECK(contains(outcome.out, "1 tuning"));
+  CHECK(contains(raysplats_program({"devices"}, there).out, "tuning          none"));
+
+  write_file(file, "{ broken");
+  outcome = raysplats_program({"devices"}, there);
+  CHECK(outcome.code == 0);
+  CHECK(contains(outcome.out, "tuning          none"));
+  CHECK(contains(outcome.err, "is ignored"));
+}

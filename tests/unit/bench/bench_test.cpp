@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/bench.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <set>
+
+#include "bench/operation.hpp"
+#include "raysplats/error.hpp"
+#include "synth/bench_scenes.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+BenchOptions tiny() {
+  BenchOptions options;
+  options.sizes = {1000};
+  options.width = options.height = 64;
+  options.repeat = 2;
+  options.min_seconds = 1e-4;
+  options.rays = 256;
+  return options;
+}
+
+Context timed_context() {
+  ContextOptions options;
+  options.profile = options.keep_launches = true;
+  options.tuning = false;
+  return Context(select_device(""), options);
+}
+
+void check_row(const BenchRow& row, const Ceilings& ceilings) {
+  INFO(row.id());
+  CHECK(row.seconds.samples == 2);
+  CHECK(row.seconds.minimum > 0);
+  CHECK(row.seconds.median > 0);
+  CHECK(row.seconds.median <= row.seconds.maximum);
+  if (row.wall) CHECK(*row.wall >= 0.5 * row.seconds.median);
+  REQUIRE(!row.work.items.empty());
+  for (const BenchWork::Items& items : row.work.items) {
+    CHECK(items.count > 0);
+    CHECK(!items.unit.empty());
+  }
+  CHECK(row.work.bytes > 0);
+  const BenchShare share = share_of(row, ceilings);
+  CHECK(std::isfinite(share.copy));
+  CHECK(std::isfinite(share.fma));
+  CHECK(share.copy > 0);
+  CHECK(!share.bound.empty());
+}
+
+}  // namespace
+
+TEST_CASE("bench: ids follow scenes, sizes and the filter") {
+  BenchOptions options = tiny();
+  options.scenes = {"random", "surface"};
+  options.sizes = {10, 20};
+  const std::vector<std::string> all = bench_ids(options);
+  CHECK(all.size() == 4 * bench_rows().size());
+  CHECK(all.front() == "sort/random/10");
+  CHECK(std::set<std::string>(all.begin(), all.end()).size() == all.size());
+  options.filter = "^(refit|adam)/.*/20$";
+  CHECK(bench_ids(options) == std::vector<std::string>{"refit/random/20", "adam/random/20",
+                                                       "refit/surface/20", "adam/surface/20"});
+  options.filter = "(";
+  CHECK_THROWS_AS(bench_ids(options), UsageError);
+}
+
+TEST_CASE("bench: every row has a time, work and a share of the limits") {
+  Context context = timed_context();
+  const BenchOptions options = tiny();
+  const BenchReport report = run_bench(context, options);
+  CHECK(report.device == context.device().name);
+  CHECK(report.ceilings.copy_bytes_per_second > 1e8);
+  CHECK(report.ceilings.fma_flops_per_second > 1e8);
+  CHECK(report.peak_process_bytes > 0);
+  CHECK(report.peak_device_bytes > 0);
+  std::set<std::string> ids;
+  for (const BenchRow& row : report.rows) {
+    ids.insert(row.id());
+    check_row(row, report.ceilings);
+    for (const BenchRowInfo& info : bench_rows()) {
+      if (info.name == row.name) CHECK(info.unit == row.work.items.front().unit);
+    }
+  }
+  const std::vector<std::string> wanted = bench_ids(options);
+  CHECK(ids == std::set<std::string>(wanted.begin(), wanted.end()));
+  CHECK(report.rows.size() == wanted.size());
+}
+
+TEST_CASE("bench: a model and a filter") {
+  Context context = timed_context();
+  BenchOptions options = tiny();
+  options.filter = "forward|rays/";
+  const BenchModel model{"my model", bench_scene("surface", 500, 3, 1), bench_camera(32, 48)};
+  const BenchReport report = run_bench(context, options, &model);
+  REQUIRE(report.rows.size() == 2);
+  CHECK(report.rows[0].id() == "forward/my model/500");
+  CHECK(report.rows[0].work.items.front().count == 32 * 48);
+  CHECK(report.rows[1].id() == "rays/my model/500");
+  CHECK(report.rows[1].work.items.front().count == 256);
+  CHECK(report.options.at("resolution") == "32x48");
+  CHECK(report.options.at("sh-degree") == "1");
+  options.filter = "nothing";
+  CHECK_THROWS_AS(run_bench(context, options, &model), UsageError);
+}
+
+TEST_CASE("operations: launches go to their stages and failures come out") {
+  Context context = timed_context();
+  Buffer<std::uint32_t> layout(context, 256, "layout");
+  Kernel kernel = context.kernel("primitives/layout_probe.cl", "layout_probe");
+  int prepared = 0, reset = 0, run = 0;
+  const BenchOperation operation{[&] { ++prepared; },
+                                 [&] { ++reset; },
+                                 [&] {
+                                   ++run;
+                                   kernel.launch(Range{}, layout);
+                                   layout.clear();
+                                 },
+                                 {{"all", {}, false, {}},
+                                  {"probe", {"primitives/layout_probe.cl:lay"}, false, {}},
+                                  {"fill", {":(fill)"}, false, {}},
+                                  {"none", {"primitives/scan.cl"}, false, {}},
+                                  {"host", {}, true, {}}}};
+  const auto samples = run_operations(context, {operation}, 3, 1e-4);
+  REQUIRE(samples.size() == 1);
+  REQUIRE(samples[0].size() == 5);
+  CHECK(prepared == 1);
+  CHECK(run == reset);
+  CHECK(run >= 4);
+  for (std::size_t i = 0; i < 3; ++i) {
+    REQUIRE(samples[0][0].seconds.size() == 3);
+    const double all = samples[0][0].seconds[i];
+    CHECK(all > 0);
+    CHECK(samples[0][1].seconds[i] + samples[0][2].seconds[i] == doctest::Approx(all));
+    CHECK(samples[0][3].seconds[i] == 0);
+    CHECK(samples[0][4].seconds[i] == doctest::Approx(samples[0][0].wall[i]));
+  }
+  const BenchOperation broken{{}, {}, [] { throw DataError("broken on purpose"); }, {}};
+  CHECK_THROWS_WITH_AS(run_operations(context, {broken, operation}, 2, 1e-4), "broken on purpose",
+                       DataError);
+  CHECK(run_operations(context, {operation}, 1, 1e-4).size() == 1);
+}

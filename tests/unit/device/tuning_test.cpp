@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/tuning.hpp"
+
+#include <doctest/doctest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <sstream>
+
+#include "device/context.hpp"
+#include "raysplats/error.hpp"
+#include "temporary_directory.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+DeviceInfo device(const std::string& name, const std::string& driver = "1.0") {
+  DeviceInfo out;
+  out.name = name;
+  out.platform = "Platform";
+  out.driver_version = driver;
+  return out;
+}
+
+const DeviceTuning kTuning{8, 16, 64, 32};
+
+std::string text_of(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// What is logged while it lives.
+class LogCapture {
+ public:
+  LogCapture() : before_(spdlog::default_logger()) {
+    auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_);
+    spdlog::set_default_logger(std::make_shared<spdlog::logger>("capture", sink));
+  }
+  ~LogCapture() { spdlog::set_default_logger(before_); }
+  std::size_t lines() const {
+    const std::string text = text_.str();
+    return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  }
+  bool contains(const std::string& part) const {
+    return text_.str().find(part) != std::string::npos;
+  }
+
+ private:
+  std::ostringstream text_;
+  std::shared_ptr<spdlog::logger> before_;
+};
+
+}  // namespace
+
+TEST_CASE("tuning: stored per device, driver and version, and found again") {
+  const TemporaryDirectory folder;
+  const std::string directory = (folder.path() / "cache").string();
+  CHECK_FALSE(TuningStore(directory).find(device("A")));
+
+  TuningStore store(directory);
+  store.store(device("A"), kTuning);
+  store.store(device("B"), {1, 32, 48, 0});
+  CHECK(store.path() == folder.path() / "cache" / "tuning.json");
+  CHECK(TuningStore(directory).find(device("A")) == kTuning);
+  CHECK(TuningStore(directory).find(device("B")) == DeviceTuning{1, 32, 48, 0});
+  CHECK_FALSE(TuningStore(directory).find(device("A", "2.0")));
+  CHECK_FALSE(TuningStore(directory).find(device("C")));
+  DeviceInfo elsewhere = device("A");
+  elsewhere.platform = "Other";
+  CHECK_FALSE(TuningStore(directory).find(elsewhere));
+
+  TuningStore(directory).store(device("A"), {16, 64, 96, 0});
+  CHECK(TuningStore(directory).find(device("A")) == DeviceTuning{16, 64, 96, 0});
+
+  // An entry of another version of the program is left alone and not used.
+  std::string text = text_of(store.path());
+  const std::string version = std::string("\"raysplats\": \"");
+  for (std::size_t at = text.find(version); at != std::string::npos;
+       at = text.find(version, at + 1)) {
+    text.insert(at + version.size(), "9");
+  }
+  folder.write("cache/tuning.json", text);
+  CHECK_FALSE(TuningStore(directory).find(device("A")));
+  TuningStore(directory).store(device("A"), kTuning);
+  CHECK(TuningStore(directory).find(device("A")) == kTuning);
+  CHECK(TuningStore(directory).remove(device("A")) == 2);
+  CHECK_FALSE(TuningStore(directory).find(device("A")));
+  CHECK(TuningStore(directory).remove(device("A")) == 0);
+  CHECK(TuningStore(directory).remove(device("B")) == 1);
+}
+
+TEST_CASE("tuning: a broken file is ignored with one line, and replaced") {
+  const TemporaryDirectory folder;
+  const std::string directory = folder.path().string();
+  TuningStore(directory).store(device("A"), kTuning);
+  const std::string good = text_of(folder.path() / "tuning.json");
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    const std::size_t at = text.find(from);
+    REQUIRE(at != std::string::npos);
+    return text.replace(at, from.size(), to);
+  };
+  for (const std::string& text :
+       {std::string(), std::string("{"), std::string("[]"), std::string("null"),
+        good.substr(0, good.size() / 2), replaced("raysplats-tuning", "other"),
+        replaced("\"schema_version\": 1", "\"schema_version\": 2"),
+        replaced("\"packet_width\": 8", "\"packet_width\": 3"),
+        replaced("\"packet_width\": 8", "\"packet_width\": \"8\""),
+        replaced("\"tile\": 16", "\"tile\": 17"), replaced("\"pending\": 64", "\"pending\": 0"),
+        replaced("\"group\": 32", "\"group\": -1"), replaced("\"driver\"", "\"drver\"")}) {
+    INFO(text);
+    folder.write("tuning.json", text);
+    const LogCapture log;
+    CHECK_FALSE(TuningStore(directory).find(device("A")));
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("tuning.json"));
+  }
+  {
+    const LogCapture log;
+    TuningStore(directory).store(device("A"), kTuning);
+  }
+  const LogCapture log;
+  CHECK(TuningStore(directory).find(device("A")) == kTuning);
+  CHECK(log.lines() == 0);
+}
+
+TEST_CASE("tuning: a directory that cannot be made is a DataError") {
+  const TemporaryDirectory folder;
+  folder.write("file", "");
+  TuningStore store((folder.path() / "file" / "below").string());
+  CHECK_THROWS_AS(store.store(device("A"), kTuning), DataError);
+}
+
+TEST_CASE("tuning: a context has that of its device unless told otherwise") {
+  const TemporaryDirectory folder;
+  const DeviceInfo chosen = select_device("");
+  CHECK_FALSE(chosen.tuning);
+  ContextOptions options;
+  options.cache_directory = folder.path().string();
+  CHECK_FALSE(Context(chosen, options).device().tuning);
+  TuningStore(options.cache_directory).store(chosen, kTuning);
+  Context context(chosen, options);
+  CHECK(context.device().tuning == kTuning);
+  context.set_tuning(std::nullopt);
+  CHECK_FALSE(context.device().tuning);
+  options.tuning = false;
+  CHECK_FALSE(Context(chosen, options).device().tuning);
+}
+
+TEST_CASE("launches are kept on request, with their programs") {
+  ContextOptions options;
+  options.profile = options.keep_launches = true;
+  Context context(select_device(""), options);
+  Buffer<std::uint32_t> a(context, 256, "a"), b(context, 256, "b");
+  CHECK(context.take_launches().empty());
+  context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, a);
+  b.clear();
+  b.copy_from(a, 256);
+  const std::vector<LaunchTime> launches = context.take_launches();
+  REQUIRE(launches.size() == 3);
+  CHECK(launches[0].program == "primitives/layout_probe.cl");
+  CHECK(launches[0].kernel == "layout_probe");
+  CHECK(launches[0].seconds > 0);
+  CHECK(launches[1].program.empty());
+  CHECK(launches[1].kernel == "(fill)");
+  CHECK(launches[2].kernel == "(copy)");
+  CHECK(context.take_launches().empty());
+}
