@@ -63,6 +63,16 @@ std::vector<Camera> read_views(const std::string& path) {
   return cameras;
 }
 
+// Most models are called point_cloud; their folders tell them apart.
+std::string name_of(const std::filesystem::path& model) {
+  std::filesystem::path path = std::filesystem::absolute(model).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  if (path.stem() == "point_cloud" && path.extension() == ".ply") {
+    return path.parent_path().filename().string();
+  }
+  return path.extension() == ".ply" ? path.stem().string() : path.filename().string();
+}
+
 BenchModel load_model(const Options& options, const ModelSource& source) {
   if (options.cameras.empty()) {
     throw UsageError("--model needs --cameras: a transforms.json or the folder of a data set");
@@ -72,7 +82,7 @@ BenchModel load_model(const Options& options, const ModelSource& source) {
     throw UsageError(fmt::format("--view {} is beyond the {} views of {}", options.view,
                                  cameras.size(), options.cameras));
   }
-  BenchModel model{source.ply.stem().string(), read_ply(source.ply), cameras[options.view], false};
+  BenchModel model{name_of(options.model), read_ply(source.ply), cameras[options.view], false};
   if (options.resolution) {
     const auto [width, height] = parse_resolution(*options.resolution);
     model.camera = resized(model.camera, width, height);

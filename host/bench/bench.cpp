@@ -38,13 +38,16 @@ std::string id_of(const std::string& row, const std::string& scene, std::size_t 
   return fmt::format("{}/{}/{}", row, scene, size);
 }
 
-// Names of the scenes and sizes, in order.
-std::vector<std::pair<std::string, std::size_t>> cases_of(const BenchOptions& options,
-                                                          const BenchModel* model) {
+struct BenchCase {
+  std::string scene;
+  std::size_t size;
+};
+
+std::vector<BenchCase> cases_of(const BenchOptions& options, const BenchModel* model) {
   if (model != nullptr) return {{model->name, model->gaussians.size()}};
-  std::vector<std::pair<std::string, std::size_t>> out;
+  std::vector<BenchCase> out;
   for (const std::string& scene : options.scenes) {
-    for (const std::size_t size : options.sizes) out.emplace_back(scene, size);
+    for (const std::size_t size : options.sizes) out.push_back({scene, size});
   }
   return out;
 }
@@ -187,13 +190,14 @@ BenchReport run_bench(Context& context, const BenchOptions& options, const Bench
     spdlog::info("{}: {} Gaussians", model->name, model->gaussians.size());
     measure(context, *model, options, keep, report);
   } else {
-    for (const auto& [scene, size] : cases_of(options, nullptr)) {
-      const bool wanted =
-          std::any_of(bench_rows().begin(), bench_rows().end(),
-                      [&](const BenchRowInfo& row) { return keep(id_of(row.name, scene, size)); });
+    for (const BenchCase& one : cases_of(options, nullptr)) {
+      const bool wanted = std::any_of(
+          bench_rows().begin(), bench_rows().end(),
+          [&](const BenchRowInfo& row) { return keep(id_of(row.name, one.scene, one.size)); });
       if (!wanted) continue;
-      spdlog::info("{}: {} Gaussians", scene, size);
-      const BenchModel generated{scene, bench_scene(scene, size, options.seed, options.sh_degree),
+      spdlog::info("{}: {} Gaussians", one.scene, one.size);
+      const BenchModel generated{one.scene,
+                                 bench_scene(one.scene, one.size, options.seed, options.sh_degree),
                                  bench_camera(options.width, options.height), true};
       measure(context, generated, options, keep, report);
     }

@@ -11,7 +11,7 @@ namespace {
 
 constexpr const char* kProgram = "bench/ceilings.cl";
 constexpr int kRepetitions = 5;
-constexpr int kCopies = 10;
+constexpr int kCopies = 25;
 constexpr double kFmaSeconds = 0.01;
 constexpr std::uint32_t kFirstRounds = 1u << 12;
 constexpr std::uint32_t kMostRounds = 1u << 24;

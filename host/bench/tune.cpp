@@ -169,7 +169,7 @@ TuneResult tune_device(Context& context,
   TuneResult result;
   result.start = result.best = default_tuning(context.device());
   const auto measure = [&](const std::string& axis, const std::vector<DeviceTuning>& candidates) {
-    const std::vector<TuneTrial> trials = race(course, axis, candidates, options.repeat);
+    std::vector<TuneTrial> trials = race(course, axis, candidates, options.repeat);
     for (const TuneTrial& trial : trials) {
       if (report) report(trial);
       result.trials.push_back(trial);
