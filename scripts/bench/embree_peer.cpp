@@ -31,11 +31,28 @@ struct Options {
   float min_transmittance = 1e-3f;
   std::string device;
   std::vector<std::string> work{"camera", "rays", "build", "refit"};
+  std::vector<std::string> programs;
   bool header = true;
 };
 
+struct Variant {
+  const char* name;
+  EmbreeTraceOptions options;
+};
+constexpr Variant kVariants[] = {
+    {"embree-packets-k64", {EmbreeRays::kPackets, 64}},
+    {"embree-packets-k16", {EmbreeRays::kPackets, 16}},
+    {"embree-single-k64", {EmbreeRays::kSingle, 64}},
+    {"embree-single-k16", {EmbreeRays::kSingle, 16}},
+};
+
+bool contains(const std::vector<std::string>& names, const char* name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 Options parse(int argc, char** argv) {
   Options o;
+  for (const Variant& variant : kVariants) o.programs.emplace_back(variant.name);
   CLI::App app{
       "Runs Embree 3 and RaySplats-CL in turn on the same Gaussians and prints one CSV row per "
       "program and kind of work. The difference columns compare a program's colours with those of "
@@ -61,6 +78,10 @@ Options parse(int argc, char** argv) {
       ->delimiter(',')
       ->capture_default_str()
       ->check(CLI::IsMember({"camera", "rays", "build", "refit"}));
+  app.add_option("--programs", o.programs, "variants of Embree that trace rays")
+      ->delimiter(',')
+      ->capture_default_str()
+      ->check(CLI::IsMember(o.programs));
   app.add_flag("!--no-header", o.header, "leave out the line with the names of the columns");
   try {
     app.parse(argc, argv);
@@ -109,17 +130,6 @@ Outcome embree_outcome(const EmbreeTracer& embree,
   return outcome;
 }
 
-struct Variant {
-  const char* name;
-  EmbreeTraceOptions options;
-};
-constexpr Variant kVariants[] = {
-    {"embree-packets-k64", {EmbreeRays::kPackets, 64}},
-    {"embree-packets-k16", {EmbreeRays::kPackets, 16}},
-    {"embree-single-k64", {EmbreeRays::kSingle, 64}},
-    {"embree-single-k16", {EmbreeRays::kSingle, 16}},
-};
-
 void run(const Options& options) {
   const Gaussians model = options.model.empty()
                               ? bench_scene(options.scene, options.count, options.seed)
@@ -138,9 +148,7 @@ void run(const Options& options) {
   trace.memory_budget = std::size_t{4} << 30;
   OurTracer ours(options.device, model, trace);
   EmbreeTracer embree(model, trace.quantile, trace.min_transmittance, options.threads);
-  const auto wants = [&](const char* work) {
-    return std::find(options.work.begin(), options.work.end(), work) != options.work.end();
-  };
+  const auto wants = [&](const char* work) { return contains(options.work, work); };
   fmt::print(stderr, "{} Gaussians; ours on {}, Embree on {} threads\n", model.size(),
              ours.device_name(), options.threads);
   if (options.header) {
@@ -180,6 +188,7 @@ void run(const Options& options) {
                               const std::vector<std::size_t>& targets, std::size_t target_count) {
     std::vector<Contestant> contestants{our_side};
     for (const Variant& variant : kVariants) {
+      if (!contains(options.programs, variant.name)) continue;
       contestants.push_back({variant.name, [&, variant] {
                                return embree_outcome(embree, rays, targets, target_count,
                                                      variant.options);
