@@ -13,12 +13,15 @@
 // (bound_blocks instead of build_chunks) every node takes the second way, which suits GPUs. The
 // result is the same.
 #include "bvh/box.h"
+#include "primitives/prefetch.h"
 
 #ifndef RS_BLOCK
 #define RS_BLOCK 16
 #endif
-// 63 prefix lengths of codes and 31 of positions: no stack of increasing deltas is longer.
+// 64 prefix lengths of codes and 31 of positions: no stack of increasing deltas is longer.
 #define RS_STACK 96
+// Leaves between a box's use and its fetch.
+#define RS_AHEAD (2 * RS_BLOCK)
 // States of spanning[i]: to be found, made by build_chunks, else node number + 1.
 #define RS_PENDING 0u
 #define RS_DONE 0xffffffffu
@@ -96,7 +99,14 @@ __kernel void build_chunks(__global const RsAabb* boxes,
   int depth = 0;
   for (uint block = begin; block < end; block += RS_BLOCK) {
     const uint size = min((uint)RS_BLOCK, end - block);
-    // Loads of a block first: they miss the cache, and nothing here waits for them.
+    // The boxes lie anywhere: those of a later block are fetched now, with the nodes that will be
+    // written near their leaves, and the loads of a block come before what waits for them.
+    const uint ahead = block + RS_AHEAD;
+    for (uint i = ahead; i < min(ahead + RS_BLOCK, end); ++i) {
+      RS_PREFETCH_READ(boxes[leaves[i]].lo);
+      RS_PREFETCH_READ(boxes[leaves[i]].hi + 2);
+      RS_PREFETCH_WRITE(nodes + i);
+    }
     RsBox leaf[RS_BLOCK];
     RsBox sum = box_empty();
     for (uint k = 0; k < size; ++k) {
