@@ -28,7 +28,7 @@ Lbvh::Lbvh(Context& context, const ChunkShape& shape)
     : context_(&context), shape_(shape), sort_(context, shape) {
   const BuildOptions morton = BuildOptions().define("RS_GROUP", shape.group_size);
   center_bounds_ = context.kernel(kMortonProgram, "center_bounds", morton);
-  finish_center_bounds_ = context.kernel(kMortonProgram, "finish_center_bounds", morton);
+  choose_grid_ = context.kernel(kMortonProgram, "choose_grid", morton);
   morton_codes_ = context.kernel(kMortonProgram, "morton_codes", morton);
   sort_runs_ = context.kernel(kMortonProgram, "sort_runs", morton);
   gather_words_ = context.kernel(kMortonProgram, "gather_words", morton);
@@ -39,7 +39,7 @@ Lbvh::Lbvh(Context& context, const ChunkShape& shape)
   merge_blocks_ = context.kernel(kHierarchyProgram, "merge_blocks", hierarchy);
   find_spanning_ = context.kernel(kHierarchyProgram, "find_spanning", hierarchy);
   bound_spanning_ = context.kernel(kHierarchyProgram, "bound_spanning", hierarchy);
-  grid_ = Buffer<float>(context, 4, "bvh grid");
+  grid_ = Buffer<float>(context, 14, "bvh grid");
   too_long_ = Buffer<std::uint32_t>(context, 1, "bvh flag");
 }
 
@@ -95,8 +95,9 @@ void Lbvh::sort_by_code(const Buffer<RsAabb>& boxes) {
   partials_.ensure(*context_, groups, "bvh partial bounds");
   center_bounds_.launch(Range::linear(groups * shape_.group_size, shape_.group_size), boxes,
                         partials_, u32(count_), u32(shape_.chunk(count_)));
-  finish_center_bounds_.launch(Range{}, partials_, u32(groups), grid_);
-  morton_codes_.launch(all, boxes, grid_, high_, low_, leaves_, u32(count_));
+  choose_grid_.launch(Range::linear(shape_.group_size, shape_.group_size), boxes, partials_,
+                      u32(count_), u32(groups), grid_);
+  morton_codes_.launch(spread(), boxes, grid_, high_, low_, leaves_, u32(count_), u32(chunk()));
   // Low words matter only where high words are equal, and there are few of those: half the passes.
   sort_.sort(high_, leaves_, count_);
   too_long_.clear();
@@ -104,7 +105,7 @@ void Lbvh::sort_by_code(const Buffer<RsAabb>& boxes) {
   if (too_long_.read(0) == 0) return;
   // Many centres in one cell of the high words: sort by both words, the low one first.
   Buffer<std::uint32_t>& scratch = spanning_;
-  morton_codes_.launch(all, boxes, grid_, scratch, high_, leaves_, u32(count_));
+  morton_codes_.launch(spread(), boxes, grid_, scratch, high_, leaves_, u32(count_), u32(chunk()));
   sort_.sort(high_, leaves_, count_);
   gather_words_.launch(all, scratch, leaves_, high_, u32(count_));
   sort_.sort(high_, leaves_, count_);

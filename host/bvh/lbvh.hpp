@@ -12,8 +12,9 @@
 
 namespace raysplats {
 
-/// Linear bounding volume hierarchy over boxes, built and refitted on the device: 63-bit Morton
-/// codes of the box centres (ties broken by index), stable radix sort, hierarchy after Karras 2012
+/// Linear bounding volume hierarchy over boxes, built and refitted on the device: 64-bit Morton
+/// codes of the box centres (ties broken by index; a few boxes far from the others do not coarsen
+/// the others' grid), stable radix sort, hierarchy after Karras 2012
 /// with its node numbers. No atomics: the result does not depend on scheduling, on the device or on
 /// how the work is divided.
 class Lbvh {
@@ -51,7 +52,7 @@ class Lbvh {
   ChunkShape shape_;
   RadixSort sort_;
   Kernel center_bounds_;
-  Kernel finish_center_bounds_;
+  Kernel choose_grid_;
   Kernel morton_codes_;
   Kernel sort_runs_;
   Kernel gather_words_;

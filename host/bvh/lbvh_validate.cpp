@@ -13,7 +13,7 @@ namespace raysplats {
 namespace {
 
 constexpr RsAabb kEmpty{{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
-constexpr std::uint64_t kLastCode = 0x7fffffffffffffffull;
+constexpr std::uint64_t kLastCode = ~std::uint64_t{0};
 
 bool valid(const RsAabb& box) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -54,6 +54,68 @@ std::uint64_t spread_bits(std::uint32_t x) {
   std::uint64_t out = 0;
   for (int bit = 0; bit < 21; ++bit) out |= static_cast<std::uint64_t>(x >> bit & 1u) << (3 * bit);
   return out;
+}
+
+// Halves of the centres' range, as all lengths of the grid.
+struct Window {
+  std::array<float, 3> lo;
+  std::array<float, 3> hi;
+  float longest() const { return std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]}); }
+};
+
+// The power of two that brings `longest` below 2^bits; 0 where there is nothing to divide.
+float power_scale(float longest, int bits) {
+  if (!(longest > 0x1p-100f)) return 0.0f;
+  int exponent = 0;
+  std::frexp(longest, &exponent);
+  return std::ldexp(1.0f, bits - exponent);
+}
+
+// One step towards the window that holds all but 1/256 of the sample on every side.
+Window narrowed(const std::vector<std::array<float, 3>>& sample, const Window& window) {
+  constexpr std::size_t kBins = 64;
+  const float scale = power_scale(window.longest(), 6);
+  Window next = window;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::array<std::size_t, kBins> bins{};
+    for (const std::array<float, 3>& c : sample) {
+      ++bins[static_cast<std::size_t>(
+          std::clamp((0.5f * c[axis] - window.lo[axis]) * scale, 0.0f, 63.0f))];
+    }
+    const std::size_t tail = sample.size() / 256;
+    std::size_t first = 0;
+    for (std::size_t below = bins[0]; below <= tail && first < kBins - 1;) below += bins[++first];
+    std::size_t last = kBins - 1;
+    for (std::size_t above = bins[last]; above <= tail && last > first;) above += bins[--last];
+    if (first > 0) --first;
+    next.lo[axis] = window.lo[axis] + static_cast<float>(first) / scale;
+    next.hi[axis] = std::min(
+        window.hi[axis], window.lo[axis] + static_cast<float>(std::min(last + 2, kBins)) / scale);
+  }
+  return next;
+}
+
+// Where nearly all centres are, or `whole` when that is not much smaller.
+Window main_window(std::span<const RsAabb> boxes, const Window& whole) {
+  const std::size_t size = std::min<std::size_t>(boxes.size(), 2048);
+  std::vector<std::array<float, 3>> sample;
+  for (std::size_t i = 0; i < size; ++i) {
+    const RsAabb& box = boxes[i * boxes.size() / size];
+    if (valid(box)) sample.push_back(center(box));
+  }
+  Window window = whole;
+  for (int round = 0; round < 32; ++round) {
+    const float before = window.longest();
+    if (!(power_scale(before, 6) > 0)) break;
+    window = narrowed(sample, window);
+    if (2 * window.longest() > before) break;
+  }
+  const float margin = 0.5f * window.longest();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    window.lo[axis] = std::max(whole.lo[axis], window.lo[axis] - margin);
+    window.hi[axis] = std::min(whole.hi[axis], window.hi[axis] + margin);
+  }
+  return 16 * window.longest() < whole.longest() ? window : whole;
 }
 
 double area(const RsAabb& box) {
@@ -99,32 +161,39 @@ struct Visit {
 }  // namespace
 
 std::vector<std::uint64_t> morton_codes(std::span<const RsAabb> boxes) {
-  std::array<float, 3> lo{FLT_MAX, FLT_MAX, FLT_MAX};
-  std::array<float, 3> hi{-FLT_MAX, -FLT_MAX, -FLT_MAX};
+  Window whole{{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
   for (const RsAabb& box : boxes) {
     if (!valid(box)) continue;
     const std::array<float, 3> c = center(box);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      lo[axis] = std::min(lo[axis], c[axis]);
-      hi[axis] = std::max(hi[axis], c[axis]);
+      whole.lo[axis] = std::min(whole.lo[axis], 0.5f * c[axis]);
+      whole.hi[axis] = std::max(whole.hi[axis], 0.5f * c[axis]);
     }
   }
-  float longest = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    longest = std::max(longest, 0.5f * hi[axis] - 0.5f * lo[axis]);
-  int exponent = 0;
-  std::frexp(longest, &exponent);
-  const bool flat = !(longest > 0x1p-100f);
-  const float scale = flat ? 0.0f : std::ldexp(1.0f, 21 - exponent);
+  const Window window = main_window(boxes, whole);
+  std::array<float, 3> middle{};
+  float reach = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    middle[axis] = 0.5f * window.lo[axis] + 0.5f * window.hi[axis];
+    reach = std::max({reach, middle[axis] - whole.lo[axis], whole.hi[axis] - middle[axis]});
+  }
+  const float fine = power_scale(window.longest(), 21);
+  const float coarse = power_scale(reach, 20);
   std::vector<std::uint64_t> codes(boxes.size(), kLastCode);
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     if (!valid(boxes[i])) continue;
     const std::array<float, 3> c = center(boxes[i]);
-    codes[i] = 0;
+    bool inside = true;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float cell = (0.5f * c[axis] - (flat ? 0.0f : 0.5f * lo[axis])) * scale;
-      codes[i] |= spread_bits(static_cast<std::uint32_t>(std::clamp(cell, 0.0f, 2097151.0f)))
-                  << (2 - axis);
+      inside = inside && 0.5f * c[axis] >= window.lo[axis] && 0.5f * c[axis] <= window.hi[axis];
+    }
+    codes[i] = inside ? 0 : std::uint64_t{1} << 63;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float cell = inside ? (0.5f * c[axis] - window.lo[axis]) * fine
+                                : (0.5f * c[axis] - middle[axis]) * coarse + 1048576.0f;
+      const float last = inside ? 2097151.0f : 2097150.0f;
+      const auto number = static_cast<std::uint32_t>(std::clamp(cell, 0.0f, last));
+      codes[i] |= spread_bits(inside && fine == 0 ? 0 : number) << (2 - axis);
     }
   }
   return codes;

@@ -11,8 +11,11 @@
 
 namespace raysplats {
 
-/// 63-bit Morton codes of the box centres as Lbvh computes them: one power-of-two grid for all axes
-/// over the centres of the valid boxes; boxes that are empty or not finite get the largest code.
+/// Morton codes of the box centres as Lbvh computes them: 63 bits on a power-of-two grid for all
+/// axes over the centres of the valid boxes. Where all but the tails of a sample fit a window of
+/// less than a sixteenth of that, the grid covers the window, and the boxes outside get bit 63 and
+/// a code on a coarse grid around its middle. Boxes that are empty or not finite get the largest
+/// code.
 std::vector<std::uint64_t> morton_codes(std::span<const RsAabb> boxes);
 
 /// What validate_lbvh() compares the order of the leaves with.

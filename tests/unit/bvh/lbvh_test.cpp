@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cfloat>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <limits>
 #include <numeric>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "base/rng.hpp"
@@ -161,6 +163,41 @@ std::set<std::uint32_t> brute_force(const Boxes& boxes, const Test& test) {
   return found;
 }
 
+// Boxes in dense clumps of [-1, 1]^3, the last `far` of them at distances up to `distance`.
+Boxes clumps(std::size_t count, std::size_t far, double distance) {
+  CounterRng rng(17, 6);
+  Boxes boxes(count);
+  std::vector<std::array<double, 3>> centers(40);
+  for (auto& c : centers) c = {rng.uniform() * 2 - 1, rng.uniform() * 2 - 1, rng.uniform() * 2 - 1};
+  for (RsAabb& box : boxes) {
+    const auto& c = centers[rng.below(centers.size())];
+    const double h = 0.002 + 0.004 * rng.uniform();
+    box = box_at(c[0] + 0.05 * rng.normal(), c[1] + 0.05 * rng.normal(), c[2] + 0.05 * rng.normal(),
+                 h, h, h);
+  }
+  for (std::size_t i = 0; i < far; ++i) {
+    const double r = distance / static_cast<double>(1 + i * i);
+    boxes[(i + 1) * (count / (far + 1))] =
+        box_at(r * rng.normal(), r * rng.normal(), r * rng.normal(), 0.01, 0.01, 0.01);
+  }
+  return boxes;
+}
+
+// Area of all boxes of the tree inside [-1, 1]^3 over the cube's: boxes that a line through the
+// cube meets there.
+double inner_cost(const Lbvh& tree) {
+  double sum = 0;
+  for (const RsBvhNode& node : tree.nodes().download()) {
+    for (const auto& [lo, hi] :
+         {std::pair(node.left_lo, node.left_hi), std::pair(node.right_lo, node.right_hi)}) {
+      double e[3];
+      for (int a = 0; a < 3; ++a) e[a] = std::min(hi[a], 1.0f) - std::max(lo[a], -1.0f);
+      if (e[0] >= 0 && e[1] >= 0 && e[2] >= 0) sum += e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
+    }
+  }
+  return sum / 12;
+}
+
 struct RayTest {
   double origin[3];
   double direction[3];
@@ -287,6 +324,36 @@ TEST_CASE("lbvh: empty, non-finite, huge and tiny boxes") {
     check_tree(
         context, tree,
         {box_at(1e-20, 0, 0, 0, 0, 0), box_at(2e-20, 1e-20, 0, 0, 0, 0), box_at(0, 0, 0, 1, 1, 1)});
+  }
+}
+
+TEST_CASE("lbvh: a few boxes far away leave the order of the others as fine as it was") {
+  Context context(select_device(""));
+  Lbvh tree(context);
+  const std::size_t count = 20000;
+  check_tree(context, tree, clumps(count, 0, 0));
+  const double alone = inner_cost(tree);
+  for (const double distance : {1e2, 1e4, 1e7, 1e20}) {
+    CAPTURE(distance);
+    const Boxes boxes = clumps(count, 20, distance);
+    check_tree(context, tree, boxes);
+    CHECK(inner_cost(tree) < 1.3 * alone);
+    // Nearly all boxes have a high word of their own: sorting by it is enough.
+    std::set<std::uint64_t> words;
+    for (const std::uint64_t code : morton_codes(boxes)) words.insert(code >> 32);
+    CHECK(words.size() > count / 2);
+  }
+}
+
+TEST_CASE("lbvh: far boxes in every division of the work [small]") {
+  Context context(select_device(""));
+  for (const ChunkShape& shape : {ChunkShape{3, 1, 16}, ChunkShape{2, 16, 16}}) {
+    Lbvh tree(context, shape);
+    Boxes boxes = clumps(600, 2, 1e5);
+    check_tree(context, tree, boxes);
+    check_tree(context, tree, clumps(70, 0, 0));
+    tree.refit(uploaded(context, clumps(70, 1, 10)));
+    CHECK(validate_lbvh(tree, clumps(70, 1, 10), LeafOrder::kAny) == "");
   }
 }
 
