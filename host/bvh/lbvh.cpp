@@ -12,6 +12,7 @@ namespace {
 
 constexpr const char* kMortonProgram = "bvh/morton.cl";
 constexpr const char* kHierarchyProgram = "bvh/hierarchy.cl";
+constexpr const char* kCostProgram = "bvh/tree_cost.cl";
 // Leaves per block of the box tree; chunks are multiples of it.
 constexpr std::size_t kSequentialBlock = 16;
 constexpr std::size_t kParallelBlock = 8;
@@ -26,12 +27,12 @@ Lbvh::Lbvh(Context& context) : Lbvh(context, ChunkShape::for_device(context.devi
 
 Lbvh::Lbvh(Context& context, const ChunkShape& shape)
     : context_(&context), shape_(shape), sort_(context, shape) {
-  const BuildOptions morton = BuildOptions().define("RS_GROUP", shape.group_size);
-  center_bounds_ = context.kernel(kMortonProgram, "center_bounds", morton);
-  choose_grid_ = context.kernel(kMortonProgram, "choose_grid", morton);
-  morton_codes_ = context.kernel(kMortonProgram, "morton_codes", morton);
-  sort_runs_ = context.kernel(kMortonProgram, "sort_runs", morton);
-  gather_words_ = context.kernel(kMortonProgram, "gather_words", morton);
+  const BuildOptions grouped = BuildOptions().define("RS_GROUP", shape.group_size);
+  center_bounds_ = context.kernel(kMortonProgram, "center_bounds", grouped);
+  choose_grid_ = context.kernel(kMortonProgram, "choose_grid", grouped);
+  morton_codes_ = context.kernel(kMortonProgram, "morton_codes", grouped);
+  sort_runs_ = context.kernel(kMortonProgram, "sort_runs", grouped);
+  gather_words_ = context.kernel(kMortonProgram, "gather_words", grouped);
   const BuildOptions hierarchy = BuildOptions().define("RS_BLOCK", block());
   compute_deltas_ = context.kernel(kHierarchyProgram, "compute_deltas", hierarchy);
   build_chunks_ = context.kernel(kHierarchyProgram, "build_chunks", hierarchy);
@@ -39,6 +40,7 @@ Lbvh::Lbvh(Context& context, const ChunkShape& shape)
   merge_blocks_ = context.kernel(kHierarchyProgram, "merge_blocks", hierarchy);
   find_spanning_ = context.kernel(kHierarchyProgram, "find_spanning", hierarchy);
   bound_spanning_ = context.kernel(kHierarchyProgram, "bound_spanning", hierarchy);
+  sum_areas_ = context.kernel(kCostProgram, "sum_areas", grouped);
   grid_ = Buffer<float>(context, 14, "bvh grid");
   too_long_ = Buffer<std::uint32_t>(context, 1, "bvh flag");
 }
@@ -84,6 +86,22 @@ void Lbvh::refit(const Buffer<RsAabb>& boxes) {
   if (count_ < 2) return;
   bound_leaves(boxes, true);
   bound_spanning(boxes);
+}
+
+double Lbvh::cost() {
+  if (count_ < 2) return 0;
+  const std::size_t count = count_ - 1;
+  const std::size_t groups = shape_.used_groups(count);
+  areas_.ensure(*context_, groups, "bvh areas");
+  sum_areas_.launch(Range::linear(groups * shape_.group_size, shape_.group_size), nodes_, areas_,
+                    u32(count), u32(shape_.chunk(count)));
+  double inner = 0;
+  double leaves = 0;
+  for (const std::array<float, 2>& part : areas_.download()) {
+    inner += static_cast<double>(part[0]);
+    leaves += static_cast<double>(part[1]);
+  }
+  return leaves > 0 ? inner / leaves : 0;
 }
 
 void Lbvh::sort_by_code(const Buffer<RsAabb>& boxes) {

@@ -384,6 +384,39 @@ TEST_CASE("lbvh: refit") {
   }
 }
 
+TEST_CASE("lbvh: cost equals the sum over the nodes and tells an outdated order [small]") {
+  Context context(select_device(""));
+  for (const ChunkShape& shape : {ChunkShape{3, 1, 16}, ChunkShape{2, 16, 16}}) {
+    Lbvh tree(context, shape);
+    CHECK(tree.cost() == 0);
+    Boxes boxes = random_boxes(700, 0.1, 41);
+    boxes[5] = {{1, 1, 1}, {-1, -1, -1}};
+    tree.build(uploaded(context, boxes), boxes.size());
+    double inner = 0;
+    double leaves = 0;
+    const auto add = [&](const float* lo, const float* hi, std::int32_t reference) {
+      double e[3];
+      for (int a = 0; a < 3; ++a) e[a] = static_cast<double>(hi[a]) - static_cast<double>(lo[a]);
+      if (e[0] < 0) return;
+      (reference < 0 ? leaves : inner) += e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
+    };
+    for (const RsBvhNode& node : tree.nodes().download()) {
+      add(node.left_lo, node.left_hi, node.left);
+      add(node.right_lo, node.right_hi, node.right);
+    }
+    const double built = tree.cost();
+    CHECK(built == doctest::Approx(inner / leaves).epsilon(1e-5));
+    // The same boxes in another order: refitted, the tree is far worse than built anew.
+    const Boxes moved(boxes.rbegin(), boxes.rend());
+    tree.refit(uploaded(context, moved));
+    CHECK(tree.cost() > 2 * built);
+    tree.build(uploaded(context, moved), moved.size());
+    CHECK(tree.cost() == doctest::Approx(built).epsilon(0.05));
+    tree.build(uploaded(context, Boxes(3, boxes[5])), 3);
+    CHECK(tree.cost() == 0);
+  }
+}
+
 TEST_CASE("lbvh: sizes that do not fit are refused") {
   Context context(select_device(""));
   Lbvh tree(context);
