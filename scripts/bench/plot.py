@@ -3,7 +3,7 @@
 """Plots of what growth.sh and ablation.sh measured.
 
 usage: plot.py growth DIR      DIR/*.json of `raysplats bench --json` -> growth.csv, growth_*.png
-       plot.py ablation DIR    DIR/ablation.csv -> ablation_*.png
+       plot.py ablation DIR    the runs of ablation.sh in DIR -> ablation.csv, ablation_*.png
 Needs matplotlib (Debian package python3-matplotlib).
 """
 
@@ -140,12 +140,41 @@ def axis_values(rows: list[dict[str, str]]) -> tuple[list[float], list[str], boo
     return numbers, labels, max(numbers) > 5.0 * min(numbers)
 
 
+def read_runs(folder: Path) -> list[dict[str, str]]:
+    """One row per planned run of ablation.sh; runs without an evaluation count as failed."""
+    rows = []
+    with (folder / "plan.csv").open() as file:
+        plan = list(csv.DictReader(file))
+    for planned in plan:
+        run = folder / planned["folder"]
+        row = {"axis": planned["axis"], "value": planned["value"], "status": "failed"}
+        if (run / "eval/metrics.json").exists():
+            quality = json.loads((run / "eval/metrics.json").read_text())
+            training = json.loads((run / "run/metrics.json").read_text())
+            row |= {
+                "status": "ok",
+                "iterations": str(training["iterations"]),
+                "psnr": f"{quality['psnr']:.4f}",
+                "ssim": f"{quality['ssim']:.5f}",
+                "gaussians": str(training["gaussians"]),
+                "train_seconds": f"{training['training_seconds']:.2f}",
+                "capped_rays": str(training["capped_rays"]),
+            }
+        rows.append(row)
+    return rows
+
+
 def ablation(folder: Path) -> None:
-    table = folder / "ablation.csv"
-    if not table.exists():
-        sys.exit(f"plot.py: {table} does not exist, run ablation.sh first.")
-    with table.open() as file:
-        rows = [r for r in csv.DictReader(file) if r["status"] == "ok"]
+    if not (folder / "plan.csv").exists():
+        sys.exit(f"plot.py: {folder} holds no runs, run ablation.sh first.")
+    runs = read_runs(folder)
+    fields = ["axis", "value", "status", "iterations", "psnr", "ssim", "gaussians", "train_seconds", "capped_rays"]
+    with (folder / "ablation.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, fields, restval="")
+        writer.writeheader()
+        writer.writerows(runs)
+    print(folder / "ablation.csv")
+    rows = [r for r in runs if r["status"] == "ok"]
     columns = (("psnr", "PSNR [dB]"), ("ssim", "SSIM"), ("gaussians", "Gaussians"),
                ("train_seconds", "training [s]"))
     for axis in dict.fromkeys(r["axis"] for r in rows):
@@ -156,12 +185,12 @@ def ablation(folder: Path) -> None:
             axes.plot(xs, [float(r[column]) for r in chosen], "o-")
             if logarithmic:
                 axes.set_xscale("log")
+                axes.minorticks_off()
             axes.set_xticks(xs, labels, rotation=30)
-            axes.minorticks_off()
             axes.set_xlabel(axis)
             axes.set_ylabel(y_label)
             axes.grid(True, linewidth=0.3)
-        figure.suptitle(f"{axis}: {chosen[0]['iterations']} iterations")
+        figure.suptitle(f"{axis}, {chosen[0]['iterations']} iterations each")
         figure.tight_layout()
         path = folder / f"ablation_{axis}.png"
         figure.savefig(path, dpi=120)
