@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Box of every Gaussian's confidence ellipsoid: half-width sqrt(Q Sigma_jj) along axis j, Sigma = R
-// S S R^T (Byrski et al. 2025, eq. 2), grown by what float rounding can lose. Launch: at least
-// count work-items; O(1) each.
+// S S R^T (Byrski et al. 2025, eq. 2), grown by what float rounding can lose. Launch: work-items of
+// `chunk` consecutive Gaussians each; O(1) per Gaussian. Scalars without branches, so that
+// compilers make vectors of a long loop (one work-item per Gaussian suits GPUs).
 #include "shared/layout.h"
 
 // S = sigmoid(s) instead of exp(s).
@@ -19,57 +20,88 @@
 #define RS_GROWTH 1.00001f
 #define RS_CENTER_SLACK 2.4e-7f
 
-__kernel void gaussian_bounds(__global const float* means,
-                              __global const float* quaternions,
-                              __global const float* scales,
-                              __global const float* opacities,
-                              __global RsAabb* boxes,
-                              float quantile,
-                              uint count) {
-  const uint i = get_global_id(0);
-  if (i >= count) return;
-  const float3 mean = vload3(i, means);
-  const float4 raw = vload4(i, quaternions);  // r, i, j, k
-  float3 scale = vload3(i, scales);
-  const float opacity = opacities[i];
+inline float activated_scale(float parameter) {
 #if RS_SIGMOID_SCALE
-  scale = 1.0f / (1.0f + exp(-scale));
+  return 1.0f / (1.0f + exp(-parameter));
 #else
-  scale = exp(scale);
+  return exp(parameter);
 #endif
+}
 
-  // Divided by the largest entry first: squares neither overflow nor vanish.
-  const float largest = fmax(fmax(fabs(raw.x), fabs(raw.y)), fmax(fabs(raw.z), fabs(raw.w)));
-  float4 q = raw / largest;
-  q /= sqrt(dot(q, q));
-  const float3 row_x = (float3)(1.0f - 2.0f * (q.z * q.z + q.w * q.w),
-                                2.0f * (q.y * q.z - q.x * q.w), 2.0f * (q.y * q.w + q.x * q.z));
-  const float3 row_y =
-      (float3)(2.0f * (q.y * q.z + q.x * q.w), 1.0f - 2.0f * (q.y * q.y + q.w * q.w),
-               2.0f * (q.z * q.w - q.x * q.y));
-  const float3 row_z = (float3)(2.0f * (q.y * q.w - q.x * q.z), 2.0f * (q.z * q.w + q.x * q.y),
-                                1.0f - 2.0f * (q.y * q.y + q.z * q.z));
-  const float longest = fmax(scale.x, fmax(scale.y, scale.z));
-  const float3 relative = longest > 0.0f ? scale / longest : (float3)(0.0f);
-  const float3 x = row_x * relative;
-  const float3 y = row_y * relative;
-  const float3 z = row_z * relative;
+inline float larger(float a, float b) { return a > b ? a : b; }
 
-  float squared_radius = quantile;
-  bool visible = isfinite(opacity);
+inline bool finite(float x) { return fabs(x) <= FLT_MAX; }
+
+__kernel void gaussian_bounds(__global const float* restrict means,
+                              __global const float* restrict quaternions,
+                              __global const float* restrict scales,
+                              __global const float* restrict opacities,
+                              __global float* restrict boxes,
+                              float quantile,
+                              uint count,
+                              uint chunk) {
+  const uint begin = min((uint)get_global_id(0) * chunk, count);
+  const uint end = min(begin + chunk, count);
+  for (uint i = begin; i < end; ++i) {
+    // r, i, j, k, divided by the largest entry first: squares neither overflow nor vanish.
+    __global const float* raw = quaternions + 4 * (size_t)i;
+    const float largest =
+        larger(larger(fabs(raw[0]), fabs(raw[1])), larger(fabs(raw[2]), fabs(raw[3])));
+    float qr = raw[0] / largest;
+    float qx = raw[1] / largest;
+    float qy = raw[2] / largest;
+    float qz = raw[3] / largest;
+    const float shrink = 1.0f / sqrt(qr * qr + qx * qx + qy * qy + qz * qz);
+    qr *= shrink;
+    qx *= shrink;
+    qy *= shrink;
+    qz *= shrink;
+    __global const float* parameter = scales + 3 * (size_t)i;
+    const float sx = activated_scale(parameter[0]);
+    const float sy = activated_scale(parameter[1]);
+    const float sz = activated_scale(parameter[2]);
+    const float longest = larger(sx, larger(sy, sz));
+    const float inverse = longest > 0.0f ? longest : 1.0f;
+    const float rx = sx / inverse;
+    const float ry = sy / inverse;
+    const float rz = sz / inverse;
+    // Rows of R S / longest.
+    const float xx = (1.0f - 2.0f * (qy * qy + qz * qz)) * rx;
+    const float xy = 2.0f * (qx * qy - qr * qz) * ry;
+    const float xz = 2.0f * (qx * qz + qr * qy) * rz;
+    const float yx = 2.0f * (qx * qy + qr * qz) * rx;
+    const float yy = (1.0f - 2.0f * (qx * qx + qz * qz)) * ry;
+    const float yz = 2.0f * (qy * qz - qr * qx) * rz;
+    const float zx = 2.0f * (qx * qz - qr * qy) * rx;
+    const float zy = 2.0f * (qy * qz + qr * qx) * ry;
+    const float zz = (1.0f - 2.0f * (qx * qx + qy * qy)) * rz;
+
+    float squared_radius = quantile;
+    bool good = finite(opacities[i]) & finite(sx) & finite(sy) & finite(sz);
 #if RS_ADAPTIVE_RADIUS
-  // The limits give way by what rounding does to a logarithm near zero.
-  const float alpha = 1.0f / (1.0f + exp(-opacity));
-  visible = visible && alpha >= RS_MIN_ALPHA * 0.99999f;
-  squared_radius = fmin(quantile, 2.0f * fmax(log(255.0f * alpha), 0.0f) + 1e-5f);
+    // The limits give way by what rounding does to a logarithm near zero.
+    const float alpha = 1.0f / (1.0f + exp(-opacities[i]));
+    good = good & (alpha >= RS_MIN_ALPHA * 0.99999f);
+    const float reach = 2.0f * larger(log(255.0f * alpha), 0.0f) + 1e-5f;
+    squared_radius = reach < quantile ? reach : quantile;
 #endif
-  const float3 deviation = sqrt((float3)(dot(x, x), dot(y, y), dot(z, z)));
-  const float3 half_width = deviation * (sqrt(squared_radius) * longest * RS_GROWTH) +
-                            fabs(mean) * RS_CENTER_SLACK + FLT_MIN;
-  const float3 lo = mean - half_width;
-  const float3 hi = mean + half_width;
-  // NaN and infinity in the mean or the rotation arrive in the corners.
-  const bool good = visible && all(isfinite(lo)) && all(isfinite(hi)) && all(isfinite(scale));
-  vstore3(good ? lo : (float3)(FLT_MAX), 0, (__global float*)(boxes + i));
-  vstore3(good ? hi : (float3)(-FLT_MAX), 1, (__global float*)(boxes + i));
+    const float radius = sqrt(squared_radius) * longest * RS_GROWTH;
+    __global const float* mean = means + 3 * (size_t)i;
+    const float hx =
+        sqrt(xx * xx + xy * xy + xz * xz) * radius + fabs(mean[0]) * RS_CENTER_SLACK + FLT_MIN;
+    const float hy =
+        sqrt(yx * yx + yy * yy + yz * yz) * radius + fabs(mean[1]) * RS_CENTER_SLACK + FLT_MIN;
+    const float hz =
+        sqrt(zx * zx + zy * zy + zz * zz) * radius + fabs(mean[2]) * RS_CENTER_SLACK + FLT_MIN;
+    // NaN and infinity in the mean or the rotation arrive in the corners.
+    good = good & finite(mean[0] - hx) & finite(mean[1] - hy) & finite(mean[2] - hz) &
+           finite(mean[0] + hx) & finite(mean[1] + hy) & finite(mean[2] + hz);
+    __global float* box = boxes + 6 * (size_t)i;
+    box[0] = good ? mean[0] - hx : FLT_MAX;
+    box[1] = good ? mean[1] - hy : FLT_MAX;
+    box[2] = good ? mean[2] - hz : FLT_MAX;
+    box[3] = good ? mean[0] + hx : -FLT_MAX;
+    box[4] = good ? mean[1] + hy : -FLT_MAX;
+    box[5] = good ? mean[2] + hz : -FLT_MAX;
+  }
 }

@@ -11,12 +11,14 @@ namespace raysplats {
 namespace {
 
 constexpr std::size_t kGroup = 64;
+constexpr std::size_t kCpuChunk = 1024;
 constexpr std::size_t kMaxCount = std::size_t{1} << 31;
 
 }  // namespace
 
 GaussianBounds::GaussianBounds(Context& context, bool sigmoid_scale, bool adaptive_radius)
     : context_(&context),
+      chunk_(context.device().type == DeviceType::kCpu ? kCpuChunk : 1),
       kernel_(context.kernel("bvh/gaussian_bounds.cl",
                              "gaussian_bounds",
                              BuildOptions()
@@ -36,8 +38,10 @@ void GaussianBounds::compute(const Buffer<float>& means,
         fmt::format("Bounds of {} Gaussians need buffers of as many and at most 2^31", count));
   }
   boxes.ensure(*context_, count, "Gaussian bounds");
-  kernel_.launch(Range::linear(count, kGroup), means, quaternions, scales, opacities, boxes,
-                 quantile, static_cast<std::uint32_t>(count));
+  const std::size_t items = (count + chunk_ - 1) / chunk_;
+  kernel_.launch(Range::linear(items, chunk_ > 1 ? 1 : kGroup), means, quaternions, scales,
+                 opacities, boxes, quantile, static_cast<std::uint32_t>(count),
+                 static_cast<std::uint32_t>(chunk_));
 }
 
 }  // namespace raysplats

@@ -32,6 +32,7 @@ class GaussianBounds {
 
  private:
   Context* context_;
+  std::size_t chunk_;  // Gaussians per work-item
   Kernel kernel_;
 };
 
