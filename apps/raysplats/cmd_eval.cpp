@@ -9,6 +9,7 @@
 #include "base/interrupt.hpp"
 #include "base/output_directory.hpp"
 #include "base/progress.hpp"
+#include "core/morton_order.hpp"
 #include "device/profiler.hpp"
 #include "eval/evaluator.hpp"
 #include "options.hpp"
@@ -31,7 +32,7 @@ struct Options {
 
 void run(const Options& options, const GlobalOptions& global) {
   const ModelSource source = find_model(options.model);
-  const Gaussians model = read_ply(source.ply);
+  const Gaussians model = in_morton_order(read_ply(source.ply));
   const Dataset dataset =
       load_dataset(options.data.data, options.data.over(dataset_options(source)));
   const Split split = parse_split(options.data.split);

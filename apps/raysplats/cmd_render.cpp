@@ -9,6 +9,7 @@
 #include "base/interrupt.hpp"
 #include "base/output_directory.hpp"
 #include "base/progress.hpp"
+#include "core/morton_order.hpp"
 #include "core/orbit.hpp"
 #include "device/profiler.hpp"
 #include "eval/frame_writer.hpp"
@@ -102,7 +103,7 @@ std::vector<Camera> orbit(const Options& options,
 void run(const Options& options, const GlobalOptions& global) {
   check(options);
   const ModelSource source = find_model(options.model);
-  const Gaussians model = read_ply(source.ply);
+  const Gaussians model = in_morton_order(read_ply(source.ply));
   Dataset dataset;
   if (!options.data.data.empty()) {
     dataset = load_dataset(options.data.data, options.data.over(dataset_options(source)));

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // trace_backward: gradient of the loss for the line of every Gaussian of the view, from the hit
-// streams that trace_forward kept. A packet walks its stream last to first with the suffix colour
-// (linear in the hits, no division where alpha = 1: only the last hit of a ray can be opaque, and
-// its transmittance is stored), sums the 16 components of a Gaussian's line over its rays, and adds
-// them to memory once.
+// streams that trace_forward kept. A packet walks its stream last to first. The gradient of a hit's
+// alpha needs its colour and what lies behind it: the sum of T alpha colour over farther hits,
+// which is gathered pairwise among rows whose windows overlap (lanes may meet them in either order)
+// and in one sum beyond. Nothing is subtracted, and nothing divided where alpha = 1: only the last
+// hit of a ray can be opaque. The 16 components of a Gaussian's line are summed over the rays of
+// the packet and added to memory once.
 //   PRIVATE_COPIES 1: work-item g of `groups` takes every groups-th tile and adds to its own copy
 //   of the gradient
 //                     lines: no atomics, the same sum every time.    global: groups
@@ -19,16 +21,6 @@
 #endif
 #ifndef PRIVATE_COPIES
 #define PRIVATE_COPIES 0
-#endif
-
-// COMBINE entries of a packet's stream that name the same Gaussian are gathered before its line is
-// summed over the lanes: neighbouring rays often meet it at different places of their order.
-#ifndef COMBINE
-#if PACKET >= 4
-#define COMBINE 32
-#else
-#define COMBINE 1
-#endif
 #endif
 
 // Lane i of the result is the sum of v[i] over its lanes. With 16 lanes, pairs of vectors are
@@ -89,20 +81,24 @@ typedef struct {
   float screen_x, screen_y;
 } Pixels;
 
-// Gathered entries, direct-mapped by Gaussian. scaled = response dL/dalpha and weight = T alpha, 0
-// in lanes that do not meet it.
+// Rows whose place among the others is still open, in order of walking: slots head .. head + size -
+// 1 of a ring. behind sums T alpha (colour . gradient) over the hits known to be farther.
 typedef struct {
-  uint reference[COMBINE];
-  fv scaled[COMBINE];
-  fv weight[COMBINE];
-} Gathered;
-
-#define RS_NO_REFERENCE 0xffffffffu
+  uint reference[WINDOW];
+  uint oldest[WINDOW];  // number of the nearest row that it may change places with
+  fv alpha[WINDOW];
+  fv before[WINDOW];     // transmittance in front, 0 in lanes that do not blend it
+  fv projected[WINDOW];  // colour . gradient
+  fv blended[WINDOW];    // T alpha (colour . gradient)
+  fv behind[WINDOW];
+  uint head, size;
+} OpenRows;
 
 // Sums one Gaussian's gradient line over the rays of the packet and adds it to memory.
 void add_gradient(const Pixels* p,
                   const uint reference,
-                  const fv scaled,
+                  const fv g_alpha,
+                  const fv alpha,
                   const fv weight,
                   __global const RsLine* restrict lines,
                   __global float* gradient) {
@@ -110,9 +106,9 @@ void add_gradient(const Pixels* p,
   __global const float* v = lines[reference >> 1].v;
   const PacketMeeting m = rs_meet(v, general, 0.0f, p->X, p->Y);
   const fv inverse = 1.0f / m.direction2;
-  const fv g_distance2 = -0.5f * v[12] * scaled;
+  const fv g_distance2 = -0.5f * alpha * g_alpha;
   fv g[16];
-  g[12] = scaled;
+  g[12] = g_alpha * (alpha / v[12]);  // the response is alpha / opacity
   g[13] = weight * p->gR;
   g[14] = weight * p->gG;
   g[15] = weight * p->gB;
@@ -151,14 +147,41 @@ void add_gradient(const Pixels* p,
   add_line(gradient + (size_t)(reference >> 1) * 16, sum_lanes(g));
 }
 
+// The oldest open row has met all rows that it may change places with: its gradient is complete.
+// Returns its T alpha (colour . gradient), which lies behind everything still to come.
+fv close_row(OpenRows* rows,
+             const Pixels* p,
+             const fv T,
+             const fv T_last,
+             const float4 background,
+             __global const RsLine* restrict lines,
+             __global float* gradient) {
+  const uint slot = rows->head;
+  rows->head = (rows->head + 1) % WINDOW;
+  --rows->size;
+  const fv alpha = rows->alpha[slot];
+  const fv before = rows->before[slot];
+  const fv weight = before * alpha;
+  const fv sky = background.x * p->gR + background.y * p->gG + background.z * p->gB;
+  // Only the last hit of a ray can be opaque, and only the background is behind that.
+  const fv passed = 1.0f / (1.0f - alpha);
+  const fv behind =
+      select((rows->behind[slot] + T * sky) * passed, before * sky, RS_MASK(before <= T_last));
+  const iv mine = RS_MASK(before > 0.0f);
+  const fv g_alpha = select((fv)(0.0f), before * rows->projected[slot] - behind, mine);
+  add_gradient(p, rows->reference[slot], g_alpha, alpha, weight, lines, gradient);
+  return rows->blended[slot];
+}
+
 void packet_backward(const RsCamera* camera,
                      const int px,
                      const int py,
                      __global const RsLine* restrict lines,
                      __global const float* restrict image_gradient,
-                     __global const float* restrict last_transmittance,
+                     __global const float* restrict transmittances,
                      __global const uint2* restrict stream_ends,
                      __global const uint2* restrict pool,
+                     __global const float* restrict pool_transmittance,
                      const float4 background,
                      const float screen_x,
                      const float screen_y,
@@ -176,64 +199,60 @@ void packet_backward(const RsCamera* camera,
   p.gR = rs_load_pixels(image_gradient, width, height, px, py);
   p.gG = rs_load_pixels(image_gradient + plane, width, height, px, py);
   p.gB = rs_load_pixels(image_gradient + 2 * plane, width, height, px, py);
+  // Alpha is a fourth colour channel that is 1 in every Gaussian and 0 in the background.
   p.gA = rs_load_pixels(image_gradient + 3 * plane, width, height, px, py);
-  Gathered gathered;
-  for (int i = 0; i < COMBINE; ++i) gathered.reference[i] = RS_NO_REFERENCE;
-  fv T = rs_load_pixels(last_transmittance, width, height, px, py);
-  // Everything behind the current hit, as seen from just behind it, projected on the pixel's
-  // gradient; alpha is a fourth colour channel that is 1 in every Gaussian and 0 in the background.
-  fv suffix = background.x * p.gR + background.y * p.gG + background.z * p.gB;
-  iv at_last = (iv)(-1);  // lanes that have not met their last hit yet
+  const fv T = rs_load_pixels(transmittances, width, height, px, py);
+  const fv T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
+  OpenRows rows;
+  rows.head = rows.size = 0;
+  fv behind = (fv)(0.0f);  // of closed rows: farther than all that are open or still to come
+  // Rows are numbered downwards from a number that no window reaches below.
+  uint number = 0x80000000u;
   uint chunk = tail.x;
   uint used = tail.y;
   while (chunk != RS_NO_CHUNK) {
-    __global const uint2* entries = pool + (size_t)chunk * CHUNK;
-    for (uint n = used - 1; n > 0; --n) {
-      const uint2 entry = entries[n];
-      const iv mine = rs_lane_mask(entry.y);
-      __global const float* v = lines[entry.x >> 1].v;
-      const PacketMeeting m = rs_meet(v, entry.x & 1, 0.0f, p.X, p.Y);
-      const fv response = select((fv)(0.0f), rs_exp(-0.5f * m.numerator / m.direction2), mine);
-      const fv alpha = v[12] * response;
-      T = select(T / (1.0f - alpha), T, at_last | ~mine);
-      at_last &= ~mine;
-      const fv color = v[13] * p.gR + v[14] * p.gG + v[15] * p.gB + p.gA;
-      const fv behind = color - suffix;
-      const fv scaled = T * behind * response;
-      const fv weight = T * alpha;
-      suffix += alpha * behind;
-      const uint slot = (entry.x >> 1) % COMBINE;
-      if (gathered.reference[slot] == entry.x) {
-        gathered.scaled[slot] += scaled;
-        gathered.weight[slot] += weight;
-      } else {
-        if (gathered.reference[slot] != RS_NO_REFERENCE) {
-          add_gradient(&p, gathered.reference[slot], gathered.scaled[slot], gathered.weight[slot],
-                       lines, gradient);
-        }
-        gathered.reference[slot] = entry.x;
-        gathered.scaled[slot] = scaled;
-        gathered.weight[slot] = weight;
+    const size_t first = (size_t)chunk * CHUNK;
+    for (uint n = used - 1; n > 0; --n, --number) {
+      while (rows.size > 0 && rows.oldest[rows.head] > number) {
+        behind += close_row(&rows, &p, T, T_last, background, lines, gradient);
       }
+      const fv before = rs_load_float(pool_transmittance + (first + n) * PACKET);
+      if (!rs_any(RS_MASK(before > 0.0f))) continue;
+      const uint2 row = pool[first + n];
+      __global const float* v = lines[row.x >> 1].v;
+      const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
+      const fv alpha = v[12] * rs_exp(-0.5f * m.numerator / m.direction2);
+      const fv projected = v[13] * p.gR + v[14] * p.gG + v[15] * p.gB + p.gA;
+      const fv mine = before * alpha * projected;
+      fv farther = behind;
+      for (uint i = 0, slot = rows.head; i < rows.size; ++i, slot = (slot + 1) % WINDOW) {
+        const iv is_behind = RS_MASK(rows.before[slot] < before);
+        farther += select((fv)(0.0f), rows.blended[slot], is_behind);
+        rows.behind[slot] += select(mine, (fv)(0.0f), is_behind);
+      }
+      const uint slot = (rows.head + rows.size++) % WINDOW;
+      rows.reference[slot] = row.x;
+      rows.oldest[slot] = number - row.y;
+      rows.alpha[slot] = alpha;
+      rows.before[slot] = before;
+      rows.projected[slot] = projected;
+      rows.blended[slot] = mine;
+      rows.behind[slot] = farther;
     }
-    chunk = entries[0].x;
+    chunk = pool[first].x;
     used = CHUNK;
   }
-  for (int i = 0; i < COMBINE; ++i) {
-    if (gathered.reference[i] != RS_NO_REFERENCE) {
-      add_gradient(&p, gathered.reference[i], gathered.scaled[i], gathered.weight[i], lines,
-                   gradient);
-    }
-  }
+  while (rows.size > 0) close_row(&rows, &p, T, T_last, background, lines, gradient);
 }
 
 __kernel void trace_backward(const uint count,
                              const uint groups,
                              __global const RsLine* restrict lines,
                              __global const float* restrict image_gradient,
-                             __global const float* restrict last_transmittance,
+                             __global const float* restrict transmittances,
                              __global const uint2* restrict stream_ends,
                              __global const uint2* restrict pool,
+                             __global const float* restrict pool_transmittance,
                              const RsCamera camera_argument,
                              const uint tiles_x,
                              const uint tile_row,
@@ -251,8 +270,8 @@ __kernel void trace_backward(const uint count,
     const int y0 = (tile_row + tile / tiles_x) * TILE;
     for (int y = y0; y < min(y0 + TILE, camera.height); y += PACKET_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += PACKET_WIDTH) {
-        packet_backward(&camera, x, y, lines, image_gradient, last_transmittance, stream_ends, pool,
-                        background, screen_x, screen_y, gradient);
+        packet_backward(&camera, x, y, lines, image_gradient, transmittances, stream_ends, pool,
+                        pool_transmittance, background, screen_x, screen_y, gradient);
       }
     }
   }
@@ -264,7 +283,7 @@ __kernel void trace_backward(const uint count,
   const int x = get_global_id(0) * PACKET_WIDTH;
   const int y = get_global_id(1) * PACKET_HEIGHT + tile_row * TILE;
   if (x >= camera.width || y >= camera.height) return;
-  packet_backward(&camera, x, y, lines, image_gradient, last_transmittance, stream_ends, pool,
-                  background, screen_x, screen_y, gradients);
+  packet_backward(&camera, x, y, lines, image_gradient, transmittances, stream_ends, pool,
+                  pool_transmittance, background, screen_x, screen_y, gradients);
 #endif
 }

@@ -1,38 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hits of a packet in blending order, packed: a stream of (Gaussian, lane mask) entries such
-// that every lane meets its own hits in its own exact order. Chunks of a shared pool are linked
-// backwards, because the backward pass reads last to first. Memory follows the number of hits,
-// never a worst case per pixel.
+// The hits of a packet, packed for the backward pass: rows of (Gaussian, window) and, beside them,
+// the transmittance in front of the Gaussian per lane, 0 in lanes that do not blend it. Two rows of
+// a stream may be met in different orders by different lanes, but only if the later one's window
+// reaches the earlier: rows r - window .. r - 1 were not settled when row r was found. Chunks of a
+// shared pool are linked backwards, because the backward pass reads last to first. Memory follows
+// the number of hits, never a worst case per pixel.
 #ifndef RS_TRACE_HIT_STREAM_H
 #define RS_TRACE_HIT_STREAM_H
 
-// Entries per chunk; entry 0 links to the previous chunk.
+#include "trace/packet.h"
+
+// Rows per chunk; row 0 links to the previous chunk.
 #ifndef CHUNK
-#define CHUNK 32
+#define CHUNK 16
+#endif
+// Largest window a stream may hold; the backward pass keeps as many rows open.
+#ifndef WINDOW
+#define WINDOW 128
 #endif
 #define RS_NO_CHUNK 0xffffffffu
+#define RS_NO_ROW 0xffffffffu
 
 typedef struct {
-  uint chunk;  // last chunk, RS_NO_CHUNK when empty
-  uint used;   // entries used in it, the link included
-} StreamEnd;
+  __global uint2* pool;            // (Gaussian reference, window)
+  __global float* transmittance;   // PACKET floats per row of the pool
+  uint capacity;                   // chunks
+  volatile __global uint* cursor;  // chunks taken, of which those past the capacity do not exist
+  uint chunk;                      // last chunk, RS_NO_CHUNK when empty
+  uint used;                       // rows used in it, the link included
+} HitStream;
 
-void stream_push(__private StreamEnd* end,
-                 __global uint2* pool,
-                 const uint capacity,
-                 volatile __global uint* cursor,
-                 uint reference,
-                 uint lanes) {
-  if (end->chunk == RS_NO_CHUNK || end->used == CHUNK) {
-    const uint next = atomic_inc(cursor);
-    if (next < capacity) pool[(size_t)next * CHUNK] = (uint2)(end->chunk, 0);
-    end->chunk = next;
-    end->used = 1;
+// Returns the row of the pool, or RS_NO_ROW past the capacity: then only the demand is counted, and
+// the host retries with less work or more memory.
+uint stream_push(HitStream* stream, uint reference, uint window) {
+  if (stream->chunk == RS_NO_CHUNK || stream->used == CHUNK) {
+    const uint next = atomic_inc(stream->cursor);
+    if (next < stream->capacity) stream->pool[(size_t)next * CHUNK] = (uint2)(stream->chunk, 0);
+    stream->chunk = next;
+    stream->used = 1;
   }
-  // Past the capacity only the demand is counted; the host retries with less work or more memory.
-  if (end->chunk < capacity)
-    pool[(size_t)end->chunk * CHUNK + end->used] = (uint2)(reference, lanes);
-  ++end->used;
+  const uint row =
+      stream->chunk < stream->capacity ? stream->chunk * CHUNK + stream->used : RS_NO_ROW;
+  if (row != RS_NO_ROW) stream->pool[row] = (uint2)(reference, window);
+  ++stream->used;
+  return row;
+}
+
+void stream_set(HitStream* stream, uint row, fv transmittance) {
+  if (row != RS_NO_ROW) rs_store_float(stream->transmittance + (size_t)row * PACKET, transmittance);
+}
+
+// Takes everything back but the chunks.
+void stream_restart(HitStream* stream) {
+  stream->chunk = RS_NO_CHUNK;
+  stream->used = CHUNK;
 }
 
 #endif

@@ -22,6 +22,8 @@ typedef int iv;
 #define rs_load_float(p) (*(p))
 #define rs_as_int(v) as_int(v)
 #define rs_as_float(v) as_float(v)
+#define rs_to_float(v) ((float)(v))
+#define rs_store_float(p, v) (*(p) = (v))
 #else
 #define RS_MASK(comparison) (comparison)
 #if PACKET == 2
@@ -35,6 +37,7 @@ typedef int2 iv;
 #define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int2(v)
 #define rs_as_float(v) as_float2(v)
+#define rs_to_float(v) convert_float2(v)
 #elif PACKET == 4
 typedef float4 fv;
 typedef int4 iv;
@@ -46,6 +49,7 @@ typedef int4 iv;
 #define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int4(v)
 #define rs_as_float(v) as_float4(v)
+#define rs_to_float(v) convert_float4(v)
 #elif PACKET == 8
 typedef float8 fv;
 typedef int8 iv;
@@ -57,6 +61,7 @@ typedef int8 iv;
 #define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int8(v)
 #define rs_as_float(v) as_float8(v)
+#define rs_to_float(v) convert_float8(v)
 #elif PACKET == 16
 typedef float16 fv;
 typedef int16 iv;
@@ -68,6 +73,7 @@ typedef int16 iv;
 #define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int16(v)
 #define rs_as_float(v) as_float16(v)
+#define rs_to_float(v) convert_float16(v)
 #endif
 #endif
 
@@ -75,6 +81,7 @@ typedef int16 iv;
 // Some implementations take vload apart into scalars; a vector type of float's alignment stays one
 // load.
 typedef fv rs_unaligned __attribute__((aligned(4)));
+#define rs_store_float(p, v) (*(__global rs_unaligned*)(p) = (v))
 #endif
 
 // Masks hold 0 or -1 in every lane. Compilers with vector reductions turn these into mask
@@ -126,25 +133,42 @@ iv rs_lane_mask(uint bits) {
 
 uint rs_lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 
-// Sum over the lanes.
-float rs_lane_sum(fv v) {
+// Sum, least and greatest value over the lanes.
 #if PACKET == 1
-  return v;
+float rs_lane_sum(fv v) { return v; }
+float rs_lane_min(fv v) { return v; }
+float rs_lane_max(fv v) { return v; }
 #elif PACKET == 2
-  return v.x + v.y;
+float rs_lane_sum(fv v) { return v.x + v.y; }
+float rs_lane_min(fv v) { return fmin(v.x, v.y); }
+float rs_lane_max(fv v) { return fmax(v.x, v.y); }
 #else
 #if PACKET == 16
-  const float8 v8 = v.lo + v.hi;
-  const float4 v4 = v8.lo + v8.hi;
+#define RS_FOLD(v, op)                  \
+  const float8 v8 = op((v).lo, (v).hi); \
+  const float4 v4 = op(v8.lo, v8.hi);
 #elif PACKET == 8
-  const float4 v4 = v.lo + v.hi;
+#define RS_FOLD(v, op) const float4 v4 = op((v).lo, (v).hi);
 #else
-  const float4 v4 = v;
+#define RS_FOLD(v, op) const float4 v4 = (v);
 #endif
+#define RS_PLUS(a, b) ((a) + (b))
+float rs_lane_sum(fv v) {
+  RS_FOLD(v, RS_PLUS)
   const float2 v2 = v4.lo + v4.hi;
   return v2.x + v2.y;
-#endif
 }
+float rs_lane_min(fv v) {
+  RS_FOLD(v, fmin)
+  const float2 v2 = fmin(v4.lo, v4.hi);
+  return fmin(v2.x, v2.y);
+}
+float rs_lane_max(fv v) {
+  RS_FOLD(v, fmax)
+  const float2 v2 = fmax(v4.lo, v4.hi);
+  return fmax(v2.x, v2.y);
+}
+#endif
 
 // exp(x) for x <= 0 with a relative error below 2e-7 (arguments below -80 count as -80): some
 // OpenCL implementations evaluate the built-in lane by lane. 2^n by exponent arithmetic, 2^f by a

@@ -79,6 +79,17 @@ float2 outline_interval(const ViewGaussian* g, int axis, float Q) {
   return (float2)(x0 + (-Q * q - root) / lead - slack, x0 + (-Q * q + root) / lead + slack);
 }
 
+// Lower bound of the depth at which a ray passes its peak inside the ellipsoid. In whitened
+// coordinates about the mean, peaks lie on the sphere over [mean, camera] (Thales), so their part
+// along the direction to the camera is in [0, Q / |o'|]; depth falls by m_z / |o'| per unit of it,
+// and by the root of what is left of S_zz per unit across.
+float least_peak(const ViewGaussian* g, float Q, float szz, float whitened) {
+  const float along2 = g->m[2] * g->m[2] / whitened;
+  const float across2 = fmax(szz - along2, 0.0f) + 1e-5f * szz;
+  const float nearer = fmax(g->m[2], 0.0f) * fmin(Q / whitened, sqrt(Q / whitened));
+  return g->m[2] - nearer - sqrt(Q * across2);
+}
+
 __kernel void prepare_view(const uint count,
                            __global const float* restrict means,
                            __global const float* restrict quaternions,
@@ -121,7 +132,11 @@ __kernel void prepare_view(const uint count,
 #endif
   if (visible) {
     box.quantile = Q;
-    box.depth = fmax((g.m[2] - reach) * 0.99999f, 0.0f);
+    float least = g.m[2] - reach;
+#if PEAK_ORDER
+    least = fmax(least, least_peak(&g, Q, szz, whitened));
+#endif
+    box.depth = fmax(least * 0.99999f, 0.0f);
     box.kind = is_projective(&g) ? RS_LINE_PROJECTIVE : RS_LINE_GENERAL;
     if (g.m[2] > reach * 1.0001f) {
       const float2 x = outline_interval(&g, 0, Q);

@@ -16,13 +16,15 @@
 #define RS_WORK_SH_FLOPS 6
 #define RS_WORK_SH_BYTES 12
 
-// Tile lists, per (tile, Gaussian) candidate: k leaves of a tile hang below at least k - 1 nodes,
-// so a node 64, leaf index 4 and bounds 32, once to count and once to fill (200); pair written (8);
-// gathered in order: pair 8 and bounds 32 read, box 16 and limits 8 written (64). The sort comes on
-// top, RS_WORK_SORT_PASS_BYTES per pass.
-#define RS_WORK_LIST_BYTES 272
-// Twice two boxes against five planes (6 each) and their corners (12).
-#define RS_WORK_LIST_FLOPS 144
+// Tile lists, per Gaussian: bounds 32 read twice, count written, scanned and read (16), line 64.
+#define RS_WORK_LIST_GAUSSIAN_BYTES 144
+// Twice the range of tiles.
+#define RS_WORK_LIST_GAUSSIAN_FLOPS 48
+// Per (tile, Gaussian) candidate: pair written (8); gathered in order: pair 8 and bounds 32 read,
+// box 16 and limits 8 written (64). The sort comes on top, RS_WORK_SORT_PASS_BYTES per pass.
+#define RS_WORK_LIST_BYTES 72
+// Corner of the tile, depth of the plane and its key.
+#define RS_WORK_LIST_FLOPS 24
 
 // trace_forward, per candidate: box 16, limits 8, index 4, line 64.
 #define RS_WORK_FORWARD_CANDIDATE_BYTES 92
@@ -36,8 +38,8 @@
 
 // trace_backward, per Gaussian: line 64 read, its gradient 64 read and written.
 #define RS_WORK_BACKWARD_GAUSSIAN_BYTES 192
-// Per pixel: gradient of R, G, B, A and the last transmittance. Streams come on top.
-#define RS_WORK_BACKWARD_PIXEL_BYTES 20
+// Per pixel: gradient of R, G, B, A and two transmittances. Streams come on top.
+#define RS_WORK_BACKWARD_PIXEL_BYTES 24
 // Per hit: geometry 28, response 19, transmittance 2, colour and suffix 12; the line's gradient:
 // geometry 28, chain 50, sum over rays 16.
 #define RS_WORK_BACKWARD_FLOPS 155

@@ -153,7 +153,7 @@ const std::vector<BenchRowInfo>& bench_rows() {
       {"adam", "Gaussians", "one step of the optimiser"},
       {"density-sums", "Gaussians", "statistics of density control"},
       {"densify", "Gaussians", "density control of every tenth Gaussian, planned on the host"},
-      {"iteration", "iterations", "training: rebuild, forward, loss, backward, sums, Adam"},
+      {"iteration", "iterations", "training: bounds, forward, loss, backward, sums, Adam"},
       {"rays-update", "Gaussians", "records and tree for arbitrary rays"},
       {"rays", "rays", "incoherent rays between random points"}};
   return rows;

@@ -200,7 +200,7 @@ BenchOperation SceneBench::Impl::iteration() {
           [this] {
             CameraTracer& rays = tracer();
             DeviceGaussians& g = gaussians();
-            rays.update(g, true);
+            rays.update(g);
             rays.forward(g, model.camera, true);
             image_loss->evaluate(rays.image(), photo, false, {0, 0, 0}, model.camera.width,
                                  model.camera.height, image_gradient);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/rng.hpp"
+#include "core/morton_order.hpp"
 #include "core/statistics.hpp"
 #include "synth/bench_scenes.hpp"
 
@@ -42,7 +43,8 @@ void upload(Context& context,
 
 DeviceGaussians& SceneBench::Impl::gaussians() {
   if (!device_gaussians) {
-    device_gaussians = DeviceGaussians::upload(context, model.gaussians, ScaleActivation::kExp);
+    device_gaussians =
+        DeviceGaussians::upload(context, in_morton_order(model.gaussians), ScaleActivation::kExp);
   }
   return *device_gaussians;
 }
@@ -50,7 +52,9 @@ DeviceGaussians& SceneBench::Impl::gaussians() {
 const Buffer<RsAabb>& SceneBench::Impl::boxes() {
   if (!bounds_kernel) {
     bounds_kernel.emplace(context, false, options.trace.adaptive_radius);
-    const DeviceGaussians& g = gaussians();
+    // In the order of the model: a builder must not be given its work done.
+    const DeviceGaussians g =
+        DeviceGaussians::upload(context, model.gaussians, ScaleActivation::kExp);
     bounds_kernel->compute(g.means, g.quaternions, g.scales, g.opacities, g.count,
                            options.trace.quantile, box_buffer);
   }
@@ -60,7 +64,7 @@ const Buffer<RsAabb>& SceneBench::Impl::boxes() {
 CameraTracer& SceneBench::Impl::tracer() {
   if (!camera_tracer) {
     camera_tracer = std::make_unique<CameraTracer>(context, options.trace);
-    camera_tracer->update(gaussians(), true);
+    camera_tracer->update(gaussians());
   }
   return *camera_tracer;
 }

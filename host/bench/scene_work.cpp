@@ -47,8 +47,9 @@ BenchWork SceneBench::Impl::lists_work() const {
   // Keys are a tile and 16 bits of depth.
   const int passes = (16 + static_cast<int>(std::bit_width(tiles - 1)) + 7) / 8;
   return {{{"candidates", candidates}},
-          (RS_WORK_LIST_BYTES + RS_WORK_SORT_PASS_BYTES * passes) * candidates,
-          RS_WORK_LIST_FLOPS * candidates};
+          RS_WORK_LIST_GAUSSIAN_BYTES * gaussians_count() +
+              (RS_WORK_LIST_BYTES + RS_WORK_SORT_PASS_BYTES * passes) * candidates,
+          RS_WORK_LIST_GAUSSIAN_FLOPS * gaussians_count() + RS_WORK_LIST_FLOPS * candidates};
 }
 
 BenchWork SceneBench::Impl::forward_work() const {
@@ -116,12 +117,12 @@ BenchWork SceneBench::Impl::densify_work() const {
       {{"Gaussians", n}}, (RS_WORK_DENSIFY_BYTES + RS_WORK_PARAMETER_BYTES * parameters) * n, 0};
 }
 
-// One pass over everything; refits or rebuilds as the operation does.
+// One pass over everything.
 BenchWork SceneBench::Impl::iteration_work() const {
   BenchWork work{{{"iterations", 1.0}, {"rays", pixels()}}, 0, 0};
-  for (const BenchWork& part : {bounds_work(), build_work(), prepare_work(), lists_work(),
-                                forward_work(), loss_value_work(), loss_gradient_work(),
-                                backward_work(), finalize_work(), statistics_work(), adam_work()}) {
+  for (const BenchWork& part :
+       {bounds_work(), prepare_work(), lists_work(), forward_work(), loss_value_work(),
+        loss_gradient_work(), backward_work(), finalize_work(), statistics_work(), adam_work()}) {
     work = together(work, part);
   }
   return work;

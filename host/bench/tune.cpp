@@ -46,7 +46,7 @@ class Course {
   std::unique_ptr<CameraTracer> tracer(const DeviceTuning& tuning) {
     context_.set_tuning(tuning);
     auto out = std::make_unique<CameraTracer>(context_, options_);
-    out->update(gaussians_, true);
+    out->update(gaussians_);
     run(*out);  // compiles and allocates
     return out;
   }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
@@ -20,8 +21,7 @@ using Stream = std::array<std::uint32_t, 2>;
 
 constexpr std::size_t kLineGradientBytes = 64;
 constexpr std::uint32_t kChunkEntries =
-    32;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
-constexpr std::size_t kChunkBytes = kChunkEntries * sizeof(Stream);
+    16;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
 constexpr std::size_t kFinalizeGroup = 64;
 
 std::array<float, 4> background_of(const TraceOptions& options) {
@@ -35,7 +35,6 @@ struct CameraTracer::Impl {
       : context(context_in),
         options(options_in),
         packet(packet_shape(context_in.device(), options_in.packet_width)),
-        tree(context_in),
         lists(context_in, packet.tile),
         counters(context_in, 3, "trace counters") {}
 
@@ -63,15 +62,19 @@ struct CameraTracer::Impl {
     return static_cast<std::size_t>((camera.width + packet.width - 1) / packet.width) *
            static_cast<std::size_t>((camera.height + packet.height - 1) / packet.height);
   }
+  std::size_t row_bytes() const { return sizeof(float) * static_cast<std::size_t>(packet.lanes); }
+  std::size_t chunk_bytes() const { return kChunkEntries * (sizeof(Stream) + row_bytes()); }
   std::size_t pool_limit() const {
-    return std::min<std::size_t>(options.memory_budget / 2, context.device().max_allocation) /
-           kChunkBytes;
+    return std::min<std::size_t>(
+        {options.memory_budget / 2 / chunk_bytes(),
+         context.device().max_allocation / (kChunkEntries * std::max(sizeof(Stream), row_bytes())),
+         std::numeric_limits<std::uint32_t>::max() / kChunkEntries});
   }
 
   Context& context;
   TraceOptions options;
   PacketShape packet;
-  Lbvh tree;
+  std::size_t count = 0;  // Gaussians of the last update()
   Buffer<RsAabb> boxes;
   CandidateLists lists;
   RsCamera camera{};
@@ -79,9 +82,10 @@ struct CameraTracer::Impl {
   int forward_variant = -1;
   Buffer<float> image;
   Buffer<float> depth;
-  Buffer<float> last_transmittance;
+  Buffer<float> transmittances;  // behind the last hit, before it
   Buffer<Stream> stream_ends;
   Buffer<Stream> pool;
+  Buffer<float> pool_transmittance;
   Buffer<std::uint32_t> counters;  // chunks wanted, capped rays, hits
   std::uint64_t candidates = 0;
   Statistics saved;
@@ -109,20 +113,15 @@ CameraTracer::~CameraTracer() = default;
 
 const Buffer<float>& CameraTracer::image() const { return impl_->image; }
 const Buffer<float>& CameraTracer::depth() const { return impl_->depth; }
-const Lbvh& CameraTracer::tree() const { return impl_->tree; }
 TraceOptions& CameraTracer::options() { return impl_->options; }
 
-void CameraTracer::update(const DeviceGaussians& gaussians, bool rebuild) {
+void CameraTracer::update(const DeviceGaussians& gaussians) {
   Impl& self = *impl_;
   GaussianBounds bounds(self.context, gaussians.activation == ScaleActivation::kSigmoid,
                         self.options.adaptive_radius);
   bounds.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
                  gaussians.count, self.options.quantile, self.boxes);
-  if (rebuild || gaussians.count != self.tree.size()) {
-    self.tree.build(self.boxes, gaussians.count);
-  } else {
-    self.tree.refit(self.boxes);
-  }
+  self.count = gaussians.count;
 }
 
 void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits) {
@@ -130,13 +129,13 @@ void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camer
   if (camera.width < 1 || camera.height < 1 || !(camera.fx > 0) || !(camera.fy > 0)) {
     throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
   }
-  if (self.tree.size() != gaussians.count) {
+  if (self.count != gaussians.count) {
     throw UsageError("CameraTracer::update() must follow every change of the Gaussians");
   }
   self.camera = device_camera(camera, self.options.near_depth);
   self.image.ensure(self.context, 4 * self.pixels(), "image");
   self.depth.ensure(self.context, self.options.depth ? 3 * self.pixels() : 1, "depth");
-  self.last_transmittance.ensure(self.context, keep_hits ? self.pixels() : 1, "last transmittance");
+  self.transmittances.ensure(self.context, keep_hits ? 2 * self.pixels() : 1, "transmittances");
   self.stream_ends.ensure(self.context, keep_hits ? self.packet_count() : 1, "hit streams");
   if (self.pool.size() == 0) self.grow_pool(keep_hits ? 2 * self.packet_count() : 1);
   self.hits_kept = keep_hits;
@@ -162,7 +161,8 @@ void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
                                     std::uint32_t row,
                                     std::uint32_t rows,
                                     bool keep) {
-  if (rows > lists.max_rows() || !lists.build(tree, camera, row, rows, options.memory_budget / 4)) {
+  if (rows > lists.max_rows() ||
+      !lists.build(boxes, camera, row, rows, options.memory_budget / 4)) {
     trace_rows(gaussians, row, rows / 2, keep);
     trace_rows(gaussians, row + rows / 2, rows - rows / 2, keep);
     return;
@@ -203,13 +203,15 @@ void CameraTracer::Impl::launch_forward(std::uint32_t row, std::uint32_t rows, b
   kernel.launch(range, lists.lines(), lists.references(), lists.boxes(), lists.box_stride(),
                 lists.limits(), lists.offsets(), camera, lists.tiles_x(), row,
                 options.min_transmittance, options.max_hits, background_of(options), image, depth,
-                last_transmittance, stream_ends, pool,
+                transmittances, stream_ends, pool, pool_transmittance,
                 static_cast<std::uint32_t>(keep ? pool_capacity() : 0), counters);
 }
 
 void CameraTracer::Impl::grow_pool(std::size_t chunks) {
   const std::size_t room = std::max<std::size_t>(1, std::min(chunks + chunks / 4, pool_limit()));
   pool.ensure(context, room * kChunkEntries, "hit pool");
+  pool_transmittance.ensure(context, pool.size() * static_cast<std::size_t>(packet.lanes),
+                            "hit transmittances");
 }
 
 void CameraTracer::Impl::choose_gradient_copies(std::size_t count) {
@@ -242,10 +244,10 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
         static_cast<std::size_t>(rows) * static_cast<std::size_t>(packet.tile / packet.height),
         group[0], group[1]);
   }
-  kernel.launch(range, static_cast<std::uint32_t>(tree.size()), static_cast<std::uint32_t>(copies),
-                lists.lines(), image_gradient, last_transmittance, stream_ends, pool, camera,
-                lists.tiles_x(), row, rows, background_of(options), screen_x(), screen_y(),
-                line_gradients);
+  kernel.launch(range, static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(copies),
+                lists.lines(), image_gradient, transmittances, stream_ends, pool,
+                pool_transmittance, camera, lists.tiles_x(), row, rows, background_of(options),
+                screen_x(), screen_y(), line_gradients);
 }
 
 // Traces rows again with the pool to themselves, then runs them backwards; halves them until their
@@ -266,8 +268,8 @@ void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
     throw ResourceError(fmt::format(
         "The hits of one row of tiles need {:.1f} MiB, the memory budget leaves {:.1f} MiB: "
         "raise --memory-budget or --downscale",
-        static_cast<double>(wanted * kChunkBytes) / (1 << 20),
-        static_cast<double>(pool_capacity() * kChunkBytes) / (1 << 20)));
+        static_cast<double>(wanted * chunk_bytes()) / (1 << 20),
+        static_cast<double>(pool_capacity() * chunk_bytes()) / (1 << 20)));
   }
   launch_backward(image_gradient, row, rows);
 }
@@ -299,7 +301,7 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
                             const Buffer<float>& image_gradient,
                             GaussianGradients& gradients) {
   Impl& self = *impl_;
-  if (!self.hits_kept || self.tree.size() != gaussians.count) {
+  if (!self.hits_kept || self.count != gaussians.count) {
     throw UsageError(
         "CameraTracer::backward() must follow forward(keep_hits = true) of the same Gaussians");
   }
@@ -333,7 +335,7 @@ CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& ga
 CameraTracer::Statistics CameraTracer::statistics() const {
   if (impl_->statistics_saved) return impl_->saved;
   const std::vector<std::uint32_t> counters = impl_->counters.download();
-  return {counters[1], impl_->candidates, counters[2], counters[0] * kChunkBytes};
+  return {counters[1], impl_->candidates, counters[2], counters[0] * impl_->chunk_bytes()};
 }
 
 namespace {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <memory>
 
-#include "bvh/lbvh.hpp"
 #include "device/context.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
@@ -34,10 +33,8 @@ class CameraTracer {
   CameraTracer(Context& context, const TraceOptions& options);
   ~CameraTracer();
 
-  /// Brings the tree up to date with the Gaussians: rebuilds it when the count changed, every
-  /// `rebuild_every` calls, or when `rebuild` is set; refits it otherwise. forward() needs it after
-  /// every parameter change.
-  void update(const DeviceGaussians& gaussians, bool rebuild = false);
+  /// Boxes of the Gaussians as they are now. forward() needs it after every parameter change.
+  void update(const DeviceGaussians& gaussians);
 
   /// Traces one view. With `keep_hits` the hit lists stay for backward() when they fit the memory
   /// budget and are recomputed there when they do not.
@@ -62,7 +59,6 @@ class CameraTracer {
   PoseGradient pose_gradient(const DeviceGaussians& gaussians);
 
   Statistics statistics() const;
-  const Lbvh& tree() const;
   TraceOptions& options();
 
  private:

@@ -45,8 +45,7 @@ CandidateLists::CandidateLists(Context& context, int tile_size)
     : context_(&context), tile_size_(tile_size), sort_(context), scan_(context) {
   BuildOptions build;
   build.define("TILE", tile_size);
-  count_kernel_ = context.kernel("trace/tile_lists.cl", "count_tile_candidates", build);
-  fill_kernel_ = context.kernel("trace/tile_lists.cl", "fill_tile_candidates", build);
+  count_kernel_ = context.kernel("trace/tile_lists.cl", "count_tiles", build);
   gather_kernel_ = context.kernel("trace/tile_lists.cl", "gather_candidates", build);
 }
 
@@ -61,6 +60,9 @@ void CandidateLists::require_prepare_kernel(const DeviceGaussians& gaussians,
       .define("PEAK_ORDER", peak ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0);
   prepare_kernel_ = context_->kernel("trace/prepare_view.cl", "prepare_view", build);
+  BuildOptions lists;
+  lists.define("TILE", tile_size_).define("PEAK_ORDER", peak ? 1 : 0);
+  fill_kernel_ = context_->kernel("trace/tile_lists.cl", "fill_tiles", lists);
   prepared_variant_ = variant;
 }
 
@@ -87,22 +89,21 @@ void CandidateLists::prepare(const DeviceGaussians& gaussians,
                          bounds_);
 }
 
-bool CandidateLists::build(const Lbvh& tree,
+bool CandidateLists::build(const Buffer<RsAabb>& boxes,
                            const RsCamera& camera,
                            std::uint32_t row,
                            std::uint32_t rows,
                            std::size_t budget) {
   const std::uint32_t tiles = tiles_x_ * rows;
-  offsets_.ensure(*context_, tiles + 1, "tile offsets");
+  const auto count = static_cast<std::uint32_t>(count_);
+  tile_offsets_.ensure(*context_, tiles + 1, "tile offsets");
+  offsets_.ensure(*context_, count_ + 1, "candidate offsets");
   candidates_ = 0;
-  const std::size_t group = context_->device().type == DeviceType::kCpu ? 1 : 32;
-  if (tree.size() > 0) {
-    count_kernel_.launch(Range::linear(tiles, group), tree.root(), tree.nodes(), tree.leaves(),
-                         bounds_, camera, tiles_x_, row, tiles, offsets_);
-    scan_.exclusive(offsets_, tiles);
-    candidates_ = offsets_.read(tiles);
-  } else {
-    offsets_.clear();
+  if (count > 0) {
+    count_kernel_.launch(Range::linear(count_, kPrepareGroup), count, bounds_, boxes, camera,
+                         static_cast<std::int32_t>(row), static_cast<std::int32_t>(rows), offsets_);
+    scan_.exclusive(offsets_, count_);
+    candidates_ = offsets_.read(count_);
   }
   const std::size_t allowed =
       std::min<std::size_t>(budget / kBytesPerCandidate, context_->device().max_allocation / 16);
@@ -115,13 +116,17 @@ bool CandidateLists::build(const Lbvh& tree,
     limits_.ensure(*context_, room, "candidate limits");
     boxes_.ensure(*context_, 4 * (room + kBoxPadding), "candidate boxes");
   }
-  if (candidates_ == 0) return true;
-  fill_kernel_.launch(Range::linear(tiles, group), tree.root(), tree.nodes(), tree.leaves(),
-                      bounds_, camera, tiles_x_, row, tiles, offsets_, keys_, values_);
+  if (candidates_ == 0) {
+    tile_offsets_.clear();
+    return true;
+  }
+  fill_kernel_.launch(Range::linear(count_, kPrepareGroup), count, bounds_, boxes, lines_, camera,
+                      static_cast<std::int32_t>(row), static_cast<std::int32_t>(rows), offsets_,
+                      keys_, values_);
   sort_.sort(keys_, values_, candidates_, 16 + std::bit_width(tiles - 1));
   gather_kernel_.launch(Range::linear(candidates_, kPrepareGroup),
-                        static_cast<std::uint32_t>(candidates_), stride_, keys_, values_, bounds_,
-                        boxes_, limits_);
+                        static_cast<std::uint32_t>(candidates_), stride_, tiles, keys_, values_,
+                        bounds_, boxes_, limits_, tile_offsets_);
   return true;
 }
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "bvh/lbvh.hpp"
+#include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "primitives/radix_sort.hpp"
 #include "primitives/scan.hpp"
@@ -20,8 +20,7 @@ namespace raysplats {
 RsCamera device_camera(const Camera& camera, float near_depth);
 
 /// What the tiles of one view may hit: the line of every visible Gaussian and, per tile, the list
-/// of candidates found by walking the LBVH with the tile's frustum, sorted by a lower bound of the
-/// hit depth.
+/// of candidates whose outline meets the tile, sorted by a lower bound of the hit depth.
 class CandidateLists {
  public:
   CandidateLists(Context& context, int tile_size);
@@ -31,9 +30,10 @@ class CandidateLists {
                const RsCamera& camera,
                const TraceOptions& options);
 
-  /// Lists of the tile rows [row, row + rows). Returns false, having made nothing, when they would
-  /// take more than `budget` bytes and there is more than one row.
-  bool build(const Lbvh& tree,
+  /// Lists of the tile rows [row, row + rows). `boxes` are the world boxes of the confidence
+  /// ellipsoids, for those that the camera plane cuts. Returns false, having made nothing, when
+  /// they would take more than `budget` bytes and there is more than one row.
+  bool build(const Buffer<RsAabb>& boxes,
              const RsCamera& camera,
              std::uint32_t row,
              std::uint32_t rows,
@@ -48,7 +48,7 @@ class CandidateLists {
   const Buffer<RsLine>& lines() const { return lines_; }
   const Buffer<RsViewBounds>& bounds() const { return bounds_; }
   const Buffer<std::uint32_t>& references() const { return values_; }
-  const Buffer<std::uint32_t>& offsets() const { return offsets_; }
+  const Buffer<std::uint32_t>& offsets() const { return tile_offsets_; }
   const Buffer<float>& boxes() const { return boxes_; }
   std::uint32_t box_stride() const { return stride_; }
   const Buffer<std::array<float, 2>>& limits() const { return limits_; }
@@ -72,7 +72,8 @@ class CandidateLists {
   std::uint32_t stride_ = 0;
   Buffer<RsLine> lines_;
   Buffer<RsViewBounds> bounds_;
-  Buffer<std::uint32_t> offsets_;
+  Buffer<std::uint32_t> offsets_;  // first candidate per Gaussian
+  Buffer<std::uint32_t> tile_offsets_;
   Buffer<std::uint32_t> keys_;
   Buffer<std::uint32_t> values_;
   Buffer<float> boxes_;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "train/morton_order.hpp"
+#include "core/morton_order.hpp"
 
 namespace raysplats {
 namespace {

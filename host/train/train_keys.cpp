@@ -234,8 +234,6 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
            "rays per work-item: 1, 2, 4, 8 or 16; 0 = fit to the device");
   t.number("memory-budget", o.memory_budget, 1, 1e9,
            "MiB for hit lists; above it they are computed again");
-  t.number("rebuild-every", o.rebuild_every, 1, 1e9,
-           "iterations between rebuilds of the tree; refits in between");
 
   t.section("Density control");
   t.number("densify-from", o.densify_from, 0, kMaxCount,

@@ -13,6 +13,7 @@
 
 #include "base/interrupt.hpp"
 #include "base/progress.hpp"
+#include "core/morton_order.hpp"
 #include "eval/evaluator.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_tracer.hpp"
@@ -22,7 +23,6 @@
 #include "train/image_loss.hpp"
 #include "train/initialization.hpp"
 #include "train/memory_estimate.hpp"
-#include "train/morton_order.hpp"
 #include "train/run_state.hpp"
 #include "train/schedule.hpp"
 #include "train/target_cache.hpp"
@@ -161,7 +161,6 @@ struct Trainer::Impl {
   Buffer<float> image_gradient;
   std::int64_t iteration = 0;  // completed
   bool started = false;
-  bool rebuild = true;  // the Gaussians are not those that the tree was built for
   Stopwatch training;
   Stopwatch evaluating;
   double last_loss = 0;
@@ -233,8 +232,7 @@ void Trainer::Impl::step() {
   const std::array<float, 3> behind = step_background(options, cut_out, background, iteration);
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
   tracer.options().background = behind;
-  tracer.update(gaussians, rebuild || every(options.rebuild_every, iteration));
-  rebuild = false;
+  tracer.update(gaussians);
   tracer.forward(gaussians, camera, true);
   loss.evaluate(tracer.image(), targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
@@ -275,7 +273,6 @@ void Trainer::Impl::control_density() {
       Buffer<std::uint32_t> device_source(context, source.size(), "state sources");
       device_source.upload(source);
       adam.remap(device_source, gaussians.count);
-      rebuild = true;
     }
     spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",
                   iteration, plan.cloned, plan.split, plan.pruned, plan.refused, gaussians.count);
@@ -291,7 +288,7 @@ void Trainer::Impl::evaluate_views(bool last) {
   if (test_views.empty()) return;
   evaluating.start();
   tracer.options().background = background;
-  tracer.update(gaussians, true);
+  tracer.update(gaussians);
   const auto render = [this](const Camera& camera) {
     tracer.forward(gaussians, camera);
     return tracer.download_image();

@@ -79,7 +79,6 @@ struct TrainOptions {
   double near_depth = 0.0;
   int packet_width = 0;
   std::int64_t memory_budget = 1024;  ///< MiB
-  int rebuild_every = 1;
 
   // Density control
   std::int64_t densify_from = 300;

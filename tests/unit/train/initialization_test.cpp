@@ -10,7 +10,6 @@
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
-#include "train/morton_order.hpp"
 
 using namespace raysplats;
 
@@ -169,25 +168,4 @@ TEST_CASE("the first model follows the options") {
   CHECK(initial_model(dataset, cameras, options).size() == 7);
   options.init = "/nowhere/model.ply";
   CHECK_THROWS_AS(initial_model(dataset, cameras, options), DataError);
-}
-
-TEST_CASE("Morton order is a permutation that an outlier does not spoil") {
-  std::vector<float> positions = random_positions(2000, false);
-  positions[0] = 1e9f;
-  positions[4] = std::numeric_limits<float>::quiet_NaN();
-  std::vector<std::uint32_t> order = morton_order(positions);
-  double along = 0;
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    if (order[i] < 2 || order[i - 1] < 2) continue;
-    double squared = 0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      squared += std::pow(positions[3 * order[i] + a] - positions[3 * order[i - 1] + a], 2);
-    }
-    along += std::sqrt(squared) / static_cast<double>(order.size());
-  }
-  // Two random points of a unit normal distribution are 2.3 apart on average.
-  CHECK(along < 0.6);
-  std::sort(order.begin(), order.end());
-  for (std::size_t i = 0; i < order.size(); ++i) REQUIRE(order[i] == i);
-  CHECK(morton_order({}).empty());
 }

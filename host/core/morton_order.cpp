@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/morton_order.hpp"
+#include "core/morton_order.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -61,6 +61,26 @@ std::vector<std::uint32_t> morton_order(std::span<const float> positions) {
     return codes[a] != codes[b] ? codes[a] < codes[b] : a < b;
   });
   return order;
+}
+
+Gaussians in_morton_order(const Gaussians& model) {
+  const std::vector<std::uint32_t> order = morton_order(model.means);
+  Gaussians out;
+  out.sh_degree = model.sh_degree;
+  out.resize(order.size());
+  const auto permute = [&](const std::vector<float>& from, std::vector<float>& to) {
+    const std::size_t width = order.empty() ? 0 : from.size() / order.size();
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(order[i] * width), width,
+                  to.begin() + static_cast<std::ptrdiff_t>(i * width));
+    }
+  };
+  permute(model.means, out.means);
+  permute(model.quaternions, out.quaternions);
+  permute(model.log_scales, out.log_scales);
+  permute(model.opacities, out.opacities);
+  permute(model.sh, out.sh);
+  return out;
 }
 
 }  // namespace raysplats

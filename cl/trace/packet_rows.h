@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// Blending a packet without sorting its rays: one row per Gaussian. The transmittance in front of a
+// hit is the product of 1 - alpha over the nearer hits of its ray, in any order, so a row keeps
+// that product per lane, and rows that some lanes meet in one order and some in the other are
+// compared once, lane by lane. Rows are opened by their nearest key (over the lanes), as soon as
+// nothing that comes later in the list can be nearer; a row is settled when its farthest key lies
+// before the nearest of a new one. Cost: candidates + pairs of rows that overlap in depth, a few
+// vector operations each; exact.
+#ifndef RS_TRACE_PACKET_ROWS_H
+#define RS_TRACE_PACKET_ROWS_H
+
+#include "trace/candidates.h"
+#include "trace/hit_stream.h"
+#include "trace/packet_state.h"
+
+// Rows waiting or open at once.
+#ifndef PENDING
+#define PENDING 96
+#endif
+
+typedef struct {
+  fv key[PENDING];
+  fv alpha[PENDING];        // 0 in lanes that miss
+  fv before[PENDING];       // product over the nearer hits so far
+  float last_key[PENDING];  // farthest key of the lanes that hit
+  uint reference[PENDING];
+  uint number[PENDING];  // in order of opening
+  uint stream_row[PENDING];
+} Rows;
+
+// Slots of rows: a stack of free ones, the waiting ones by nearest key, farthest first, and the
+// open ones in no order.
+typedef struct {
+  ushort free[PENDING];
+  ushort waiting[PENDING];
+  float first_key[PENDING];  // of waiting[i]
+  ushort open[PENDING];
+  int free_count, waiting_count, open_count;
+} Slots;
+
+void row_wait(Slots* slots, const ushort slot, const float first_key) {
+  int i = slots->waiting_count++;
+  for (; i > 0 && slots->first_key[i - 1] < first_key; --i) {
+    slots->first_key[i] = slots->first_key[i - 1];
+    slots->waiting[i] = slots->waiting[i - 1];
+  }
+  slots->first_key[i] = first_key;
+  slots->waiting[i] = slot;
+}
+
+// Blends an open row whose place is known; `settled` is the product over such rows per lane.
+void row_settle(const Rows* rows,
+                const ushort slot,
+                __global const RsLine* restrict lines,
+                const float min_transmittance,
+                PacketState* p,
+                fv* settled,
+                HitStream* stream) {
+  const uint reference = rows->reference[slot];
+  const fv alpha = rows->alpha[slot];
+  const fv before = rows->before[slot];
+  const iv mine = RS_MASK(alpha > 0.0f) & RS_MASK(before >= min_transmittance);
+  packet_blend(p, lines[reference >> 1].v, reference & 1, mine, before, alpha);
+  *settled -= *settled * alpha;
+#if KEEP_HITS
+  stream_set(stream, rows->stream_row[slot], select((fv)(0.0f), before, mine));
+#else
+  (void)stream;
+#endif
+}
+
+// False when the packet needs more rows at once or a wider window than there is room for, or a ray
+// has more than max_hits hits: packet_sorted.h has no such limits.
+bool trace_in_rows(Candidates* candidates,
+                   __global const RsLine* restrict lines,
+                   __global const uint* restrict references,
+                   __global const float2* restrict limits,
+                   const float min_transmittance,
+                   const int max_hits,
+                   PacketState* p,
+                   HitStream* stream) {
+  Rows rows;
+  Slots slots;
+  slots.waiting_count = slots.open_count = 0;
+  slots.free_count = PENDING;
+  for (int i = 0; i < PENDING; ++i) slots.free[i] = i;
+  fv settled = (fv)(1.0f);
+  uint opened = 0;
+  iv alive = p->valid;
+  candidates_restart(candidates);
+  while (rs_any(alive)) {
+    const uint k = candidates_next(candidates);
+    const bool draining = k == candidates->end;
+    const float bound = draining ? INFINITY : limits[k].x;
+    while (slots.waiting_count > 0 && slots.first_key[slots.waiting_count - 1] <= bound) {
+      const float first_key = slots.first_key[--slots.waiting_count];
+      const ushort slot = slots.waiting[slots.waiting_count];
+      const uint reference = rows.reference[slot];
+      const fv alpha = rows.alpha[slot];
+      // Compared as integers (keys are not negative), less one where an equal key of a Gaussian
+      // with a higher index counts as farther.
+      const iv order = rs_as_int(rows.key[slot]);
+      fv before = (fv)(1.0f);
+      uint oldest = opened;
+      int left = 0;
+      const int open_count = slots.open_count;
+      for (int i = 0; i < open_count; ++i) {
+        const ushort other = slots.open[i];
+        if (rows.last_key[other] < first_key) {
+          row_settle(&rows, other, lines, min_transmittance, p, &settled, stream);
+          slots.free[slots.free_count++] = other;
+          continue;
+        }
+        slots.open[left++] = other;
+        const fv other_before = rows.before[other];
+        const iv nearer = RS_MASK(order - (iv)(reference < rows.reference[other] ? 1 : 0) <
+                                  rs_as_int(rows.key[other]));
+        rows.before[other] = other_before - select((fv)(0.0f), other_before * alpha, nearer);
+        before -= select(before * rows.alpha[other], (fv)(0.0f), nearer);
+        oldest = min(oldest, rows.number[other]);
+      }
+      if (left < open_count) {
+        alive = p->valid & RS_MASK(p->T >= min_transmittance);
+        slots.open_count = left;
+        if (!rs_any(alive)) break;
+      }
+      rows.before[slot] = before * settled;
+      rows.number[slot] = opened;
+      slots.open[left] = slot;
+      slots.open_count = left + 1;
+#if KEEP_HITS
+      if (opened - oldest > WINDOW - 1) return false;
+      rows.stream_row[slot] = stream_push(stream, reference, opened - oldest);
+#endif
+      ++opened;
+    }
+    if (draining) break;
+
+    const uint reference = references[k];
+    fv key, alpha;
+    const iv hit =
+        packet_hit(p, lines[reference >> 1].v, reference & 1, limits[k].y, alive, &key, &alpha);
+    if (!rs_any(hit)) continue;
+    if (slots.free_count == 0) return false;
+    const ushort slot = slots.free[--slots.free_count];
+    rows.key[slot] = rs_as_float(rs_as_int(key) & 0x7fffffff);
+    rows.alpha[slot] = alpha;
+    rows.last_key[slot] = rs_lane_max(select((fv)(0.0f), key, hit));
+    rows.reference[slot] = reference;
+    row_wait(&slots, slot, rs_lane_min(select((fv)(INFINITY), key, hit)));
+  }
+  for (int i = 0; i < slots.open_count; ++i)
+    row_settle(&rows, slots.open[i], lines, min_transmittance, p, &settled, stream);
+  return !rs_any(RS_MASK(p->hits > max_hits));
+}
+
+#endif
