@@ -28,7 +28,7 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   out.gaussians = max_gaussians * (floats * 4 + sh * 2 + 5) * sizeof(float);
   // Line, gradient line, bounds, box, node, sort keys and values with their second copies.
   out.tracing = max_gaussians * (2 * sizeof(RsLine) + sizeof(RsViewBounds) + sizeof(RsAabb) +
-                                 sizeof(RsBvhNode) + 32);
+                                 sizeof(RsBvhNode) + 40);
   // Image, gradient, depth and about 12 planes of the loss.
   out.images = std::min(static_cast<std::size_t>(options.image_budget) * kMiB, views * pixels * 4) +
                pixels * 24 * sizeof(float);
