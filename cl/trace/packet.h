@@ -84,22 +84,31 @@ typedef fv rs_unaligned __attribute__((aligned(4)));
 #define rs_store_float(p, v) (*(__global rs_unaligned*)(p) = (v))
 #endif
 
-// Masks hold 0 or -1 in every lane. Compilers with vector reductions turn these into mask
-// registers; the plain forms below them give the same answers.
-#if PACKET > 1 && defined(__has_builtin)
-#if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_and)
-#define RS_VECTOR_REDUCTIONS 1
-#endif
-#endif
-#ifdef RS_VECTOR_REDUCTIONS
-#define rs_any(mask) (__builtin_reduce_or(mask) != 0)
-#define rs_all(mask) (__builtin_reduce_and(mask) != 0)
+// Masks hold 0 or -1 in every lane. rs_lane_bits: one bit per lane whose mask is set, lane 0
+// lowest. Compilers with vectors of booleans keep them in mask registers; the plain form gives the
+// same.
+#if PACKET >= 8 && defined(__has_feature)
+#if __has_feature(ext_vector_type_boolean)
+#define RS_BOOLEAN_VECTORS 1
+typedef bool rs_booleans __attribute__((ext_vector_type(PACKET)));
+#if PACKET == 16
+typedef ushort rs_bits;
 #else
-#define rs_any(mask) any(mask)
-#define rs_all(mask) all(mask)
+typedef uchar rs_bits;
+#endif
+#endif
 #endif
 
-// One bit per lane whose mask is set, lane 0 lowest.
+#ifdef RS_BOOLEAN_VECTORS
+uint rs_lane_bits(iv mask) {
+  union {
+    rs_booleans lanes;
+    rs_bits bits;
+  } view;
+  view.lanes = __builtin_convertvector(mask, rs_booleans);
+  return view.bits;
+}
+#else
 uint rs_lane_bits(iv mask) {
 #if PACKET == 1
   return mask & 1;
@@ -121,15 +130,15 @@ uint rs_lane_bits(iv mask) {
 #endif
 #endif
 }
-
-// Lanes whose bit is set.
-iv rs_lane_mask(uint bits) {
-#if PACKET == 1
-  return -(int)(bits & 1);
-#else
-  return ((iv)(bits) & ((iv)(1) << RS_LANE_INDEX)) != 0;
 #endif
-}
+
+#ifdef RS_BOOLEAN_VECTORS
+#define rs_any(mask) (rs_lane_bits(mask) != 0)
+#define rs_all(mask) (rs_lane_bits(mask) == (1u << PACKET) - 1u)
+#else
+#define rs_any(mask) any(mask)
+#define rs_all(mask) all(mask)
+#endif
 
 uint rs_lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 
@@ -153,20 +162,23 @@ float rs_lane_max(fv v) { return fmax(v.x, v.y); }
 #define RS_FOLD(v, op) const float4 v4 = (v);
 #endif
 #define RS_PLUS(a, b) ((a) + (b))
+// Not fmin and fmax, whose rule for NaN costs more than the comparison.
+#define RS_LESSER(a, b) ((a) < (b) ? (a) : (b))
+#define RS_GREATER(a, b) ((a) > (b) ? (a) : (b))
 float rs_lane_sum(fv v) {
   RS_FOLD(v, RS_PLUS)
   const float2 v2 = v4.lo + v4.hi;
   return v2.x + v2.y;
 }
 float rs_lane_min(fv v) {
-  RS_FOLD(v, fmin)
-  const float2 v2 = fmin(v4.lo, v4.hi);
-  return fmin(v2.x, v2.y);
+  RS_FOLD(v, RS_LESSER)
+  const float2 v2 = RS_LESSER(v4.lo, v4.hi);
+  return RS_LESSER(v2.x, v2.y);
 }
 float rs_lane_max(fv v) {
-  RS_FOLD(v, fmax)
-  const float2 v2 = fmax(v4.lo, v4.hi);
-  return fmax(v2.x, v2.y);
+  RS_FOLD(v, RS_GREATER)
+  const float2 v2 = RS_GREATER(v4.lo, v4.hi);
+  return RS_GREATER(v2.x, v2.y);
 }
 #endif
 
@@ -175,7 +187,7 @@ float rs_lane_max(fv v) {
 // polynomial on
 // [-1/2, 1/2] (Taylor of 2^f, degree 6).
 fv rs_exp(fv x) {
-  const fv y = fmax(x, (fv)(-80.0f)) * 1.44269504f;
+  const fv y = (x > -80.0f ? x : (fv)(-80.0f)) * 1.44269504f;
   const fv shifted = y + 12582912.0f;  // 1.5 * 2^23: rounds y to an integer in the low bits
   const fv f = y - (shifted - 12582912.0f);
   fv p = 1.54035304e-4f * f + 1.33335581e-3f;

@@ -47,8 +47,10 @@ void packet_blend(PacketState* p,
   p->G += w * v[14];
   p->B += w * v[15];
   const fv after = before * (1.0f - a);
-  p->T = select(p->T, fmin(p->T, after), mine);
-  p->T_last = select(p->T_last, fmin(p->T_last, before), mine);
+  p->T = select(p->T, after, mine & RS_MASK(after < p->T));
+#if KEEP_HITS
+  p->T_last = select(p->T_last, before, mine & RS_MASK(before < p->T_last));
+#endif
   p->hits -= mine;
 #if WITH_DEPTH
   const PacketMeeting m = rs_meet(v, general, 0.0f, p->X, p->Y);
@@ -73,15 +75,16 @@ iv packet_hit(const PacketState* p,
   if (!rs_any(hit)) return hit;
   const fv inverse = 1.0f / m.direction2;
   const fv distance2 = m.numerator * inverse;
-  const fv peak = m.along * inverse;
 #if PEAK_ORDER
-  *key = peak;
-  hit &= RS_MASK(peak >= 0.0f);
+  *key = m.along * inverse;
+  hit &= RS_MASK(*key >= 0.0f);
 #else
-  // Near root by Viete's formula from the far one: no difference of near equals.
-  const fv far_root = peak + sqrt(fmax(quantile - distance2, (fv)(0.0f)) * inverse);
-  *key = (rs_origin_distance2(v, general) - quantile) * inverse / far_root;
-  hit &= RS_MASK(*key >= 0.0f) & RS_MASK(far_root > 0.0f);
+  // Near root by Viete's formula from the far one: no difference of near equals. The far root times
+  // <d', d'> is `far`.
+  const fv discriminant = quantile * m.direction2 - m.numerator;
+  const fv far = m.along + sqrt(discriminant > 0.0f ? discriminant : (fv)(0.0f));
+  *key = (rs_origin_distance2(v, general) - quantile) / far;
+  hit &= RS_MASK(*key >= 0.0f) & RS_MASK(far > 0.0f);
 #endif
   *alpha = select((fv)(0.0f), v[12] * rs_exp(-0.5f * distance2), hit);
   return hit;
