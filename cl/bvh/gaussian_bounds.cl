@@ -30,7 +30,7 @@ inline float activated_scale(float parameter) {
 
 inline float larger(float a, float b) { return a > b ? a : b; }
 
-inline bool finite(float x) { return fabs(x) <= FLT_MAX; }
+inline int finite(float x) { return fabs(x) <= FLT_MAX; }
 
 __kernel void gaussian_bounds(__global const float* restrict means,
                               __global const float* restrict quaternions,
@@ -77,7 +77,7 @@ __kernel void gaussian_bounds(__global const float* restrict means,
     const float zz = (1.0f - 2.0f * (qx * qx + qy * qy)) * rz;
 
     float squared_radius = quantile;
-    bool good = finite(opacities[i]) & finite(sx) & finite(sy) & finite(sz);
+    int good = finite(opacities[i]) & finite(sx) & finite(sy) & finite(sz);
 #if RS_ADAPTIVE_RADIUS
     // The limits give way by what rounding does to a logarithm near zero.
     const float alpha = 1.0f / (1.0f + exp(-opacities[i]));

@@ -181,7 +181,7 @@ inline uint grid_cell(float half_center, float origin, float scale, float first,
 
 inline float half_center(float lo, float hi) { return 0.5f * (0.5f * lo + 0.5f * hi); }
 
-inline bool finite_interval(float lo, float hi) {
+inline int finite_interval(float lo, float hi) {
   return (lo <= hi) & (lo >= -FLT_MAX) & (hi <= FLT_MAX);
 }
 
@@ -203,8 +203,8 @@ __kernel void morton_codes(__global const float* restrict boxes,
   const float3 hi = vload3(0, grid + 11);
   for (uint i = begin; i < end; ++i) {
     __global const float* box = boxes + 6 * (size_t)i;
-    const bool valid = finite_interval(box[0], box[3]) & finite_interval(box[1], box[4]) &
-                       finite_interval(box[2], box[5]);
+    const int valid = finite_interval(box[0], box[3]) & finite_interval(box[1], box[4]) &
+                      finite_interval(box[2], box[5]);
     const float cx = half_center(box[0], box[3]);
     const float cy = half_center(box[1], box[4]);
     const float cz = half_center(box[2], box[5]);

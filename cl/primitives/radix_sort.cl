@@ -22,6 +22,9 @@
 #define RS_DIGITS 256
 #define RS_DIGIT(key, shift) (((key) >> (shift)) & (RS_DIGITS - 1))
 
+// On the arguments of both forms.
+#define RS_EITHER __attribute__((unused))
+
 #if RS_SOURCE_PAIRS
 #define RS_KEY(i) pairs[i].x
 #define RS_ELEMENT(i) pairs[i]
@@ -45,8 +48,8 @@
 
 // counts[digit * groups + group] = how often the chunk of `group` has the digit.
 __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void count_digits(
-    __global const uint* keys,
-    __global const uint2* pairs,
+    RS_EITHER __global const uint* keys,
+    RS_EITHER __global const uint2* pairs,
     __global uint* counts,
     uint count,
     uint chunk,
@@ -89,13 +92,13 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void count_digits
 // `offsets` is the scanned table of count_digits, launched with the same groups and chunk, with the
 // total behind it.
 __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
-    __global const uint* keys,
-    __global const uint* values,
-    __global const uint2* pairs,
+    RS_EITHER __global const uint* keys,
+    RS_EITHER __global const uint* values,
+    RS_EITHER __global const uint2* pairs,
     __global const uint* offsets,
-    __global uint* keys_out,
-    __global uint* values_out,
-    __global uint2* pairs_out,
+    RS_EITHER __global uint* keys_out,
+    RS_EITHER __global uint* values_out,
+    RS_EITHER __global uint2* pairs_out,
     uint count,
     uint chunk,
     uint shift) {
