@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/morton_order.hpp"
 #include "embree_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -131,9 +132,10 @@ Outcome embree_outcome(const EmbreeTracer& embree,
 }
 
 void run(const Options& options) {
-  const Gaussians model = options.model.empty()
-                              ? bench_scene(options.scene, options.count, options.seed)
-                              : with_sh_degree(read_ply(options.model), 0);
+  // Both sides read their records in the order in which our programs keep models.
+  const Gaussians model = in_morton_order(
+      options.model.empty() ? bench_scene(options.scene, options.count, options.seed)
+                            : with_sh_degree(read_ply(options.model), 0));
   Camera camera = bench_camera(options.size, options.size);
   if (!options.cameras.empty()) {
     const std::vector<Camera> cameras = read_cameras(options.cameras);

@@ -58,13 +58,21 @@ if ! echo '#include <embree3/rtcore.h>' | "${CXX:-c++}" -E - >/dev/null 2>&1; th
   embree=OFF
   say "Embree 3 is not installed (Debian package libembree-dev): the peers are skipped, only ours is measured"
 fi
+mkdir -p "$out"
 say "Building in $build"
-cmake -S "$root" --preset release -B "$build" -DRAYSPLATS_BUILD_PEERS=$embree >/dev/null
+# logged COMMAND...: silent unless it fails.
+logged() {
+  if ! "$@" >"$out/build.log" 2>&1; then
+    tail -n 20 "$out/build.log" >&2
+    say "Failed: $*"
+    exit 1
+  fi
+}
+logged cmake -S "$root" --preset release -B "$build" -DRAYSPLATS_BUILD_PEERS=$embree
 targets=(raysplats_cli)
 [[ $embree == OFF ]] || targets+=(embree_peer)
-cmake --build "$build" --target "${targets[@]}" >/dev/null
+logged cmake --build "$build" --target "${targets[@]}"
 
-mkdir -p "$out"
 rows=$out/peers.csv
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
@@ -73,14 +81,14 @@ echo "round,$header,mean_color,max_difference,mean_difference" >"$rows"
 
 # measure ARGUMENTS...: embree_peer's rows, marked with the round.
 measure() {
-  "${prefix[@]}" "$build/bin/embree_peer" --no-header --repeat "$repeat" "${device[@]}" "$@" 2>/dev/null |
+  "${prefix[@]}" "$build/bin/embree_peer" --no-header --repeat "$repeat" "${device[@]}" "$@" |
     sed "s/^/$round,/" >>"$rows"
 }
 
 # measure_ours ARGUMENTS...: the same for our side alone, through raysplats bench.
 measure_ours() {
   "${prefix[@]}" "$build/bin/raysplats" --quiet bench --repeat "$repeat" "${device[@]}" \
-    --min-transmittance 0.001 --json "$scratch/bench.json" "$@" >/dev/null 2>&1
+    --min-transmittance 0.001 --json "$scratch/bench.json" "$@" >/dev/null
   python3 "$root/scripts/bench/peer_table.py" rows "$scratch/bench.json" | sed "s/^/$round,/" >>"$rows"
 }
 
@@ -89,7 +97,7 @@ measure_ours() {
 measure_fox() {
   rm -rf "$scratch/fox"
   "${prefix[@]}" "$build/bin/raysplats" --quiet train "$fox" -o "$scratch/fox" -n 60 --resolution-schedule 1 \
-    --densify-until 0 --eval-at 60 --eval-views 1 --eval-renders 0 "${device[@]}" >/dev/null 2>&1
+    --densify-until 0 --eval-at 60 --eval-views 1 --eval-renders 0 "${device[@]}" >/dev/null
   awk -F, -v round="$round" '
     $1 == 10 { start = $2 }
     $1 == 60 { ms = 20 * ($2 - start); printf "%s,train,ours,fox,%s,1,%.3f,%.3f,,,,,,\n", round, $5, ms, ms }

@@ -130,7 +130,7 @@ std::string OurTracer::device_name() const { return impl_->context.device().name
 
 Outcome OurTracer::camera(const Camera& camera) {
   Impl& my = *impl_;
-  if (!my.camera_ready) my.camera_tracer.update(my.gaussians, true);
+  if (!my.camera_ready) my.camera_tracer.update(my.gaussians);
   my.camera_ready = true;
   my.context.finish();
   Outcome outcome;
