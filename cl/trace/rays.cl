@@ -1,221 +1,275 @@
 // SPDX-License-Identifier: Apache-2.0
 // Arbitrary rays: any origins and directions, each with its own [t_min, t_max].
-//   prepare_rays  one record per Gaussian: whitening matrix, mean, opacity, Q.    global: Gaussians
-//   trace_rays    one work-item per ray.                                          global: rays
-// A ray walks the LBVH near child first with a k-buffer: the BUFFER nearest hits so far, sorted.
-// Once it is full, the farthest of them bounds the walk. If hits were dropped, the next pass
-// continues behind the last blended (t, index), so the order is exact for any BUFFER >= 1. Cost per
-// pass is O(depth + boxes met); passes = ceil(hits / BUFFER).
+// Launch of trace_rays: one work-item per `rays_per_item` neighbours (1 on GPUs; on CPUs more, in
+// groups of one, so that all rays share one piece of private memory). Cost per ray: nodes and
+// blocks met / PACKET lanes, plus hits^2 / PACKET for the order.
+//
+// A ray walks the tree of ray_block.h near child first and collects hits in no order. Once the
+// product of all 1 - alpha collected falls below the least transmittance, the hits found so far are
+// enough to stop the ray: they are sorted, and the key at which they do becomes the end of the ray.
+// What is found later can only move that end nearer. So opaque scenes cost little more than a
+// nearest-hit search and the order stays exact. At the end of the walk the hits are sorted and
+// blended. A full list blends what no unvisited box can precede; if that frees too little, the
+// farthest hits are dropped, and another walk continues behind the last blended (key, index).
+#include "primitives/prefetch.h"
 #include "shared/layout.h"
 #include "shared/sh.h"
-#include "trace/gaussian.h"
+#include "trace/ray_block.h"
+#include "trace/ray_pending.h"
 
-#ifndef BUFFER
-#define BUFFER 64
-#endif
-#ifndef PEAK_ORDER
-#define PEAK_ORDER 0
-#endif
+// A child of every level stays behind: PACKET - 1 per level, and 2^31 Gaussians have 15 levels of 4
+// or 7 of 16.
 #define RS_STACK 128
+// Slack that keeps a hit from being taken for nearer than an unvisited box by rounding.
+#define RS_BOUND_SLACK 0.999999f
 
-// v: rows of M (9), mean (3), opacity, Q (negative: never met), two spare.
-__kernel void prepare_rays(const uint count,
-                           __global const float* restrict means,
-                           __global const float* restrict quaternions,
-                           __global const float* restrict scales,
-                           __global const float* restrict opacities,
-                           const float quantile,
-                           __global RsLine* restrict records) {
-  const uint i = get_global_id(0);
-  if (i >= count) return;
-  const float4 q = vload4(i, quaternions);
-  const float norm = sqrt(dot(q, q));
-  float R[9], v[16];
-  rotation_of(q / norm, R);
-  const float opacity = sigmoid(opacities[i]);
-  float sum = norm + opacity;
-  for (int k = 0; k < 3; ++k) {
-    // Thinner than this, 1 / scale^2 leaves float's range.
-    const float scale = fmax(activated_scale(scales[3 * i + k]), 1e-12f);
-    for (int j = 0; j < 3; ++j) v[3 * k + j] = R[3 * j + k] / scale;
-    v[9 + k] = means[3 * i + k];
-    sum += scale + fabs(v[9 + k]);
+typedef struct {
+  __global const fv* blocks;
+  __global const float* sh;
+  int sh_coefficients;
+  int active_degree;
+  int color_from_origin;
+  float min_transmittance;
+  int max_hits;
+} RayScene;
+
+typedef struct {
+  float4 color;  // the fourth lane is zero
+  float transmittance, depth_sum, median;
+  int hits;
+  bool capped, stopped;
+  float last_key;  // of the last blended hit
+  uint last_index;
+} RayState;
+
+float4 hit_color(const RayScene* scene,
+                 const RayData* ray,
+                 const float* ray_basis,
+                 const Pending* pending,
+                 int entry) {
+  const int degree = scene->active_degree;
+  if (degree == 0) return pending->color[entry];
+  const uint slot = pending->slot[entry];
+  float own_basis[25];
+  const float* basis = ray_basis;
+  if (scene->color_from_origin) {
+    __global const float* mean =
+        (__global const float*)(scene->blocks + slot / PACKET * RS_BLOCK_VECTORS) + 6 * PACKET +
+        slot % PACKET;
+    const float3 v = (float3)(mean[0], mean[PACKET], mean[2 * PACKET]) - ray->o;
+    const float3 n = v * rsqrt(fmax(dot(v, v), 1e-30f));
+    rs_sh_basis(degree, n.x, n.y, n.z, own_basis);
+    basis = own_basis;
   }
-  const float Q = effective_quantile(quantile, opacity);
-  v[12] = opacity;
-  v[13] = isfinite(sum) && norm > 0.0f && opacity > 0.0f ? Q : -1.0f;
-  v[14] = v[15] = 0.0f;
-  for (int k = 0; k < 16; ++k) records[i].v[k] = v[k];
-}
-
-typedef struct {
-  float key, alpha, peak;
-  uint index;
-} RayHit;
-
-typedef struct {
-  float3 o, d, inverse;
-  float t_min, t_max;
-} RayData;
-
-// Entry of the ray into a box, or INFINITY when it misses [t_min, t_max].
-float enter_box(const RayData* ray,
-                const __global float* lo,
-                const __global float* hi,
-                float t_max) {
-  const float3 a = ((float3)(lo[0], lo[1], lo[2]) - ray->o) * ray->inverse;
-  const float3 b = ((float3)(hi[0], hi[1], hi[2]) - ray->o) * ray->inverse;
-  // fmin and fmax drop the NaN of 0 * infinity (an origin on the slab of a zero direction
-  // component).
-  const float3 near3 = fmin(a, b), far3 = fmax(a, b);
-  const float near = fmax(fmax(near3.x, near3.y), fmax(near3.z, ray->t_min));
-  // Rounding must not lose a grazing box (Ize 2013).
-  const float far = fmin(fmin(far3.x, far3.y), fmin(far3.z * 1.0000004f, t_max)) * 1.0000004f;
-  return near <= far && lo[0] <= hi[0] ? near : INFINITY;
-}
-
-bool meet(const RayData* ray, __global const float* v, RayHit* hit) {
-  const float3 m0 = vload3(0, v), m1 = vload3(1, v), m2 = vload3(2, v);
-  const float3 r = ray->o - vload3(3, v);
-  const float Q = v[13];
-  const float3 o = (float3)(dot(m0, r), dot(m1, r), dot(m2, r));
-  const float3 d = (float3)(dot(m0, ray->d), dot(m1, ray->d), dot(m2, ray->d));
-  const float dd = dot(d, d);
-  const float peak = -dot(o, d) / dd;
-  const float3 residual = o + peak * d;
-  const float distance2 = dot(residual, residual);
-  if (!(distance2 <= Q)) return false;
-#if PEAK_ORDER
-  const float key = peak;
-#else
-  const float far_root = peak + sqrt(fmax(Q - distance2, 0.0f) / dd);
-  if (!(far_root > 0.0f)) return false;
-  const float key = (dot(o, o) - Q) / (dd * far_root);
-#endif
-  if (!(key >= 0.0f && key >= ray->t_min && key <= ray->t_max)) return false;
-  hit->key = key;
-  hit->peak = peak;
-  hit->alpha = v[12] * native_exp(-0.5f * distance2);
-  return true;
-}
-
-float3 evaluate_color(__global const float* c, int degree, float3 n) {
-  float basis[25];
-  rs_sh_basis(degree, n.x, n.y, n.z, basis);
+  __global const float* c = scene->sh + (size_t)pending->index[entry] * 3 * scene->sh_coefficients;
   const int active = (degree + 1) * (degree + 1);
-  float3 color = (float3)(0.5f);
-  for (int k = 0; k < active; ++k) color += basis[k] * vload3(k, c);
-  return fmax(color, (float3)(0.0f));
+  float3 even = (float3)(0.5f), odd = (float3)(0.0f);
+  even += basis[0] * vload3(0, c);
+  for (int k = 1; k < active; k += 2) odd += basis[k] * vload3(k, c);
+  for (int k = 2; k < active; k += 2) even += basis[k] * vload3(k, c);
+  return (float4)(fmax(even + odd, (float3)(0.0f)), 0.0f);
+}
+
+// Blending reads a Gaussian's coefficients long after its hit is found: time to fetch them.
+void prefetch_color(const RayScene* scene, uint index) {
+  if (scene->active_degree == 0) return;
+  __global const float* c = scene->sh + (size_t)index * 3 * scene->sh_coefficients;
+  const int active = 3 * (scene->active_degree + 1) * (scene->active_degree + 1);
+  for (int k = 0; k < active; k += 16) RS_PREFETCH_READ(c + k);
+  (void)c;
+}
+
+// Blends the first `count` sorted hits; ends early, with `stopped`, where the ray does.
+void blend_hits(const RayScene* scene,
+                const RayData* ray,
+                const float* ray_basis,
+                const Pending* pending,
+                int count,
+                RayState* state) {
+  for (int k = 0; k < count; ++k) {
+    if (state->hits == scene->max_hits) {
+      state->capped = state->stopped = true;
+      return;
+    }
+    const int i = pending->order[k];
+    const float alpha = pending->alpha[i], peak = pending->peak[i];
+    const float before = state->transmittance;
+    const float weight = before * alpha;
+    state->color += weight * hit_color(scene, ray, ray_basis, pending, i);
+    state->depth_sum += weight * peak;
+    state->transmittance = before * (1.0f - alpha);
+    if (before >= 0.5f && state->transmittance < 0.5f) state->median = peak;
+    ++state->hits;
+    state->last_key = pending->key.s[i];
+    state->last_index = pending->index[i];
+    if (state->transmittance < scene->min_transmittance) {
+      state->stopped = true;
+      return;
+    }
+  }
+}
+
+// Sorts, and returns the number of leading hits that are enough to end the ray (the one after
+// max_hits among them: it tells that the ray was capped), or -1 when they are not. *remaining
+// becomes the transmittance behind them.
+int sort_to_end(const RayScene* scene, const RayState* state, Pending* pending, float* remaining) {
+  pending_sort(pending);
+  const int room = scene->max_hits - state->hits;
+  float transmittance = state->transmittance;
+  for (int k = 0; k < pending->size; ++k) {
+    transmittance *= 1.0f - pending->alpha[pending->order[k]];
+    if (transmittance < scene->min_transmittance || k == room) {
+      *remaining = transmittance;
+      return k + 1;
+    }
+  }
+  *remaining = transmittance;
+  return -1;
 }
 
 // rays: 8 floats each (origin, t_min, direction, t_max). results: 8 words each (colour, alpha,
-// expected depth, median depth, hits, capped).
+// expected depth, median depth, hits, capped). level_begin[l]: first node of level l, from 1;
+// ray_order: which ray a work-item traces, read when `ordered`.
 __kernel void trace_rays(const uint ray_count,
-                         const int root,
-                         const uint gaussian_count,
-                         __global const RsBvhNode* restrict nodes,
-                         __global const uint* restrict leaves,
-                         __global const RsLine* restrict records,
+                         const uint rays_per_item,
+                         const int levels,
+                         __global const uint* restrict level_begin,
+                         __global const fv* restrict nodes,
+                         __global const fv* restrict blocks,
                          __global const float* restrict sh,
                          const int sh_coefficients,
                          const int active_degree,
                          const int color_from_origin,
+                         const float quantile,
                          const float min_transmittance,
                          const int max_hits,
                          const float4 background,
                          __global const float8* restrict rays,
+                         const int ordered,
+                         __global const uint* restrict ray_order,
                          __global float8* restrict results) {
-  const uint id = get_global_id(0);
-  if (id >= ray_count) return;
-  RayData ray;
-  ray.o = rays[id].s012;
-  ray.t_min = fmax(rays[id].s3, 0.0f);
-  ray.d = rays[id].s456;
-  ray.t_max = rays[id].s7;
-  ray.inverse = 1.0f / ray.d;
-  const float3 direction = ray.d * rsqrt(fmax(dot(ray.d, ray.d), 1e-38f));
-
-  float T = 1.0f, depth_sum = 0.0f, median = 0.0f;
-  float3 color = (float3)(0.0f);
-  int hits = 0;
-  uint capped = 0;
-  float floor_key = -1.0f;
-  uint floor_index = 0;
-  bool again = gaussian_count > 0;
-  RayHit buffer[BUFFER];
-  while (again) {
-    int size = 0;
-    bool dropped = false;
-    int stack[RS_STACK];
-    int top = 0;
-    stack[top++] = root;
-    while (top > 0) {
-      const int reference = stack[--top];
-      const bool full = size == BUFFER;
-      const float limit = full ? buffer[BUFFER - 1].key : ray.t_max;
-      if (reference >= 0) {
-        __global const RsBvhNode* node = nodes + reference;
-        const float left = enter_box(&ray, node->left_lo, node->left_hi, ray.t_max);
-        const float right = enter_box(&ray, node->right_lo, node->right_hi, ray.t_max);
-        const bool take_left = left < INFINITY && left <= limit;
-        const bool take_right = right < INFINITY && right <= limit;
-        // A box beyond the buffer's last hit may hold hits that this pass has no room for.
-        dropped = dropped || (left < INFINITY && !take_left) || (right < INFINITY && !take_right);
-        const bool left_first = left <= right;
-        if (take_left && !left_first) stack[top++] = node->left;
-        if (take_right) stack[top++] = node->right;
-        if (take_left && left_first) stack[top++] = node->left;
-        continue;
-      }
-      const uint index = leaves[~reference];
-      RayHit hit;
-      if (!meet(&ray, records[index].v, &hit)) continue;
-      hit.index = index;
-      if (hit.key < floor_key || (hit.key == floor_key && index <= floor_index && hits > 0))
-        continue;
-      if (full) {
-        dropped = true;
-        const RayHit last = buffer[BUFFER - 1];
-        if (hit.key > last.key || (hit.key == last.key && index > last.index)) continue;
-        --size;
-      }
-      int j = size++;
-      while (j > 0 && (buffer[j - 1].key > hit.key ||
-                       (buffer[j - 1].key == hit.key && buffer[j - 1].index > index))) {
-        buffer[j] = buffer[j - 1];
-        --j;
-      }
-      buffer[j] = hit;
+  const uint first = (uint)get_global_id(0) * rays_per_item;
+  const uint last = min(first + rays_per_item, ray_count);
+  for (uint position = first; position < last; ++position) {
+    const size_t id = ordered ? ray_order[position] : position;
+    const float8 raw = rays[id];
+    RayData ray = ray_data(raw);
+    const RayScene scene = {
+        blocks, sh, sh_coefficients, active_degree, color_from_origin, min_transmittance, max_hits};
+    float basis[25];
+    if (active_degree > 0 && !color_from_origin) {
+      const float3 n = ray.d * rsqrt(fmax(dot(ray.d, ray.d), 1e-38f));
+      rs_sh_basis(active_degree, n.x, n.y, n.z, basis);
     }
 
-    again = dropped && size > 0;
-    for (int k = 0; k < size; ++k) {
-      if (hits == max_hits) {
-        capped = 1;
-        again = false;
-        break;
+    RayState state = {(float4)(0.0f), 1.0f, 0.0f, 0.0f, 0, false, false, -1.0f, 0};
+    const float half_quantile = 0.5f * quantile;
+    Pending pending;
+    PendingRange range = {ray.t_min, raw.s7, 0, 0xffffffffu, false};
+    bool again = levels > 0;
+    while (again) {
+      again = false;
+      pending.size = pending.evaluated = 0;
+      float remaining = state.transmittance;  // behind all evaluated hits
+      float hopeful = remaining;              // no more than is left behind all hits
+      int sorted = 0;                         // size after the last sort
+      float stack_entry[RS_STACK];
+      uint stack_node[RS_STACK];  // level in the lowest four bits
+      int top = 1;
+      stack_entry[0] = ray.t_min;
+      stack_node[0] = (uint)levels;
+      while (top > 0 && !state.stopped) {
+        const float node_entry = stack_entry[--top];
+        if (!(node_entry <= range.end)) continue;
+        const uint level = stack_node[top] & 15;
+        const uint number = stack_node[top] >> 4;
+        RayLanes entry;
+        uint bits =
+            ray_meets_boxes(&ray, nodes + (size_t)(level_begin[level] + number) * RS_NODE_VECTORS,
+                            range.end, &entry.v);
+        if (level > 1) {
+          const int bottom = top;
+          for (; bits != 0; bits &= bits - 1) {
+            const uint lane = rs_lowest_bit(bits);
+            const float t = entry.s[lane];
+            int j = top++;
+            for (; j > bottom && stack_entry[j - 1] < t; --j) {
+              stack_entry[j] = stack_entry[j - 1];
+              stack_node[j] = stack_node[j - 1];
+            }
+            stack_entry[j] = t;
+            stack_node[j] = (number * PACKET + lane) << 4 | (level - 1);
+          }
+          continue;
+        }
+        for (; bits != 0; bits &= bits - 1) {
+          const uint number_of_block = number * PACKET + rs_lowest_bit(bits);
+          __global const fv* block = blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
+          BlockMeeting meeting;
+          for (uint hits = ray_meets_block(&ray, block, &meeting); hits != 0; hits &= hits - 1) {
+            const uint lane = rs_lowest_bit(hits);
+            pending_append(&pending, &meeting, block, number_of_block * PACKET + lane, lane);
+            prefetch_color(&scene, pending.index[pending.size - 1]);
+            hopeful *= 1.0f - block_opacity(block, lane);
+          }
+          const int room = max_hits - state.hits;
+          if (!(hopeful < min_transmittance) && pending.size <= min(room, PENDING - PACKET))
+            continue;
+          remaining = hopeful = pending_evaluate(&pending, &range, half_quantile, remaining);
+          const bool full = pending.size > PENDING - PACKET;
+          const bool enough = remaining < min_transmittance || pending.size > room;
+          if (!full && !(enough && 4 * (pending.size - sorted) > pending.size)) continue;
+          const int end = sort_to_end(&scene, &state, &pending, &remaining);
+          int count = pending.size;
+          if (end > 0) {
+            const float key = pending.key.s[pending.order[end - 1]];
+            if (key < range.end) range.end_index = 0xffffffffu;
+            range.end = key;
+            // Equal keys stay together.
+            for (count = end; count < pending.size; ++count) {
+              if (pending.key.s[pending.order[count]] > key) break;
+            }
+          }
+          if (count <= PENDING - PACKET) {
+            if (end > 0) pending_cut(&pending, range.end);
+          } else {
+            // Boxes on the stack and in this node begin behind `bound`.
+            float bound = node_entry;
+            for (int k = 0; k < top; ++k) bound = fmin(bound, stack_entry[k]);
+            bound *= RS_BOUND_SLACK;
+            int ready = 0;
+            while (ready < count && pending.key.s[pending.order[ready]] < bound) ++ready;
+            blend_hits(&scene, &ray, basis, &pending, ready, &state);
+            if (state.stopped) break;
+            int kept = count - ready;
+            if (kept > PENDING / 2) {
+              kept = PENDING / 2;
+              const int last = pending.order[ready + kept - 1];
+              range.end = pending.key.s[last];
+              range.end_index = pending.index[last];
+              range.ties = again = true;
+            }
+            remaining = state.transmittance * pending_keep(&pending, ready, kept);
+          }
+          hopeful = remaining;
+          sorted = pending.size;
+        }
       }
-      const RayHit hit = buffer[k];
-      const float3 to_mean = vload3(3, records[hit.index].v) - ray.o;
-      const float3 n =
-          color_from_origin ? to_mean * rsqrt(fmax(dot(to_mean, to_mean), 1e-30f)) : direction;
-      const float w = T * hit.alpha;
-      color += w * evaluate_color(sh + (size_t)hit.index * 3 * sh_coefficients, active_degree, n);
-      depth_sum += w * hit.peak;
-      const float after = T * (1.0f - hit.alpha);
-      if (T >= 0.5f && after < 0.5f) median = hit.peak;
-      T = after;
-      ++hits;
-      floor_key = hit.key;
-      floor_index = hit.index;
-      if (T < min_transmittance) {
-        again = false;
-        break;
-      }
+      if (state.stopped) break;
+      pending_evaluate(&pending, &range, half_quantile, remaining);
+      pending_sort(&pending);
+      blend_hits(&scene, &ray, basis, &pending, pending.size, &state);
+      if (state.stopped) break;
+      // The next walk begins behind the last blended hit.
+      ray.t_min = range.begin = fmax(ray.t_min, state.last_key);
+      range.begin_index = state.last_index + 1;
+      range.end = raw.s7;
+      range.end_index = 0xffffffffu;
     }
+    const float3 color = state.color.xyz + state.transmittance * background.xyz;
+    const float weight = 1.0f - state.transmittance;
+    results[id] =
+        (float8)(color, weight, weight > 0.0f ? state.depth_sum / weight : 0.0f, state.median,
+                 as_float((uint)state.hits), as_float((uint)(state.capped ? 1 : 0)));
   }
-  color += T * background.xyz;
-  const float weight = 1.0f - T;
-  results[id] = (float8)(color, weight, weight > 0.0f ? depth_sum / weight : 0.0f, median,
-                         as_float((uint)hits), as_float(capped));
 }

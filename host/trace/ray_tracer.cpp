@@ -1,69 +1,108 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "trace/ray_tracer.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 
-#include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
+#include "trace/ray_tree.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kRayBytes = sizeof(Ray) + sizeof(RayResult);
+// Hits that a ray keeps before it blends; private memory is dear on GPUs.
+constexpr int kCpuPending = 256;
+constexpr int kPending = 64;
+// On CPUs a work-item traces several rays one after the other: OpenCL implementations there give
+// every work-item of a group its own private memory, which would not stay in the cache.
+constexpr std::size_t kCpuRaysPerItem = 64;
+// Fewer rays than this share too little for a sort to pay.
+constexpr std::size_t kOrderedRays = 4096;
 static_assert(sizeof(Ray) == 32 && sizeof(RayResult) == 32,
               "kernels read and write eight words a ray");
+
+std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 }  // namespace
 
 struct RayTracer::Impl {
-  Impl(Context& context_in, const TraceOptions& options_in)
-      : context(context_in), options(options_in), tree(context_in) {}
+  Impl(Context& context_in, const TraceOptions& options_in, int lanes)
+      : context(context_in),
+        options(options_in),
+        tree(context_in, options_in, lanes),
+        sort(context_in) {
+    order = Buffer<std::uint32_t>(context, 1, "ray order");
+  }
 
   Context& context;
   TraceOptions options;
-  Lbvh tree;
-  Buffer<RsAabb> boxes;
-  Buffer<RsLine> records;
+  RayTree tree;
+  RadixSort sort;
+  Buffer<std::uint32_t> keys;
+  Buffer<std::uint32_t> order;
   Buffer<Ray> rays;
   Buffer<RayResult> results;
 };
 
-RayTracer::RayTracer(Context& context, const TraceOptions& options)
-    : impl_(std::make_unique<Impl>(context, options)) {}
+RayTracer::RayTracer(Context& context, const TraceOptions& options, int lanes)
+    : impl_(std::make_unique<Impl>(context, options, lanes)) {}
 RayTracer::~RayTracer() = default;
 
-void RayTracer::update(const DeviceGaussians& gaussians) {
+void RayTracer::update(const DeviceGaussians& gaussians) { impl_->tree.build(gaussians); }
+
+void RayTracer::refit(const DeviceGaussians& gaussians) { impl_->tree.refit(gaussians); }
+
+void RayTracer::trace(const DeviceGaussians& gaussians,
+                      const Buffer<Ray>& rays,
+                      std::size_t count,
+                      Buffer<RayResult>& results,
+                      ColorDirection color_direction) {
   Impl& self = *impl_;
-  const bool sigmoid = gaussians.activation == ScaleActivation::kSigmoid;
-  GaussianBounds bounds(self.context, sigmoid, self.options.adaptive_radius);
-  bounds.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
-                 gaussians.count, self.options.quantile, self.boxes);
-  self.tree.build(self.boxes, gaussians.count);
-  self.records.ensure(self.context, gaussians.count, "ray records");
-  BuildOptions build;
-  build.define("SIGMOID_SCALE", sigmoid ? 1 : 0)
-      .define("ADAPTIVE_RADIUS", self.options.adaptive_radius ? 1 : 0);
-  Kernel prepare = self.context.kernel("trace/rays.cl", "prepare_rays", build);
-  prepare.launch(Range::linear(gaussians.count, kGroup),
-                 static_cast<std::uint32_t>(gaussians.count), gaussians.means,
-                 gaussians.quaternions, gaussians.scales, gaussians.opacities,
-                 self.options.quantile, self.records);
+  if (self.tree.size() != gaussians.count) {
+    throw UsageError("RayTracer::update() must follow every change of the Gaussians");
+  }
+  if (rays.size() < count) {
+    throw UsageError(fmt::format("{} rays cannot be traced from a buffer of {}: pass a larger one",
+                                 count, rays.size()));
+  }
+  if (results.size() < count) results.ensure(self.context, count, "ray results");
+  const TraceOptions& options = self.options;
+  const bool cpu = self.context.device().type == DeviceType::kCpu;
+  const RayTree& tree = self.tree;
+  const BuildOptions lanes = BuildOptions().define("PACKET", tree.lanes());
+  BuildOptions build = lanes;
+  build.define("PENDING", cpu ? kCpuPending : kPending)
+      .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
+      .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
+  const bool ordered = count >= kOrderedRays && tree.levels() > 0;
+  if (ordered) {
+    self.order.ensure(self.context, count, "ray order");
+    self.keys.ensure(self.context, count, "ray keys");
+    self.context.kernel("trace/ray_order.cl", "ray_keys", lanes)
+        .launch(Range::linear(count, kGroup), rays, u32(count), tree.nodes(), tree.scene_node(),
+                self.keys, self.order);
+    self.sort.sort(self.keys, self.order, count);
+  }
+  const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
+  const std::array<float, 4> background{options.background[0], options.background[1],
+                                        options.background[2], 0.0f};
+  self.context.kernel("trace/rays.cl", "trace_rays", build)
+      .launch(Range::linear((count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup),
+              u32(count), u32(rays_per_item), tree.levels(), tree.level_begin(), tree.nodes(),
+              tree.blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
+              gaussians.active_sh_degree, color_direction == ColorDirection::kFromOrigin ? 1 : 0,
+              options.quantile, options.min_transmittance, options.max_hits, background, rays,
+              ordered ? 1 : 0, self.order, results);
 }
 
 std::vector<RayResult> RayTracer::trace(const DeviceGaussians& gaussians,
                                         std::span<const Ray> rays,
                                         ColorDirection color_direction) {
   Impl& self = *impl_;
-  if (self.tree.size() != gaussians.count) {
-    throw UsageError("RayTracer::update() must follow every change of the Gaussians");
-  }
-  BuildOptions build;
-  build.define("PEAK_ORDER", self.options.hit_order == HitOrder::kPeak ? 1 : 0);
-  Kernel kernel = self.context.kernel("trace/rays.cl", "trace_rays", build);
-  const std::array<float, 4> background{self.options.background[0], self.options.background[1],
-                                        self.options.background[2], 0.0f};
   const std::size_t batch = std::max<std::size_t>(
       kGroup, std::min<std::size_t>(self.options.memory_budget / 2 / kRayBytes,
                                     self.context.device().max_allocation / sizeof(Ray)));
@@ -71,14 +110,8 @@ std::vector<RayResult> RayTracer::trace(const DeviceGaussians& gaussians,
   for (std::size_t begin = 0; begin < rays.size(); begin += batch) {
     const std::size_t count = std::min(batch, rays.size() - begin);
     self.rays.ensure(self.context, count, "rays");
-    self.results.ensure(self.context, count, "ray results");
     self.rays.upload(rays.subspan(begin, count));
-    kernel.launch(
-        Range::linear(count, kGroup), static_cast<std::uint32_t>(count), self.tree.root(),
-        static_cast<std::uint32_t>(gaussians.count), self.tree.nodes(), self.tree.leaves(),
-        self.records, gaussians.sh, sh_coefficients(gaussians.sh_degree),
-        gaussians.active_sh_degree, color_direction == ColorDirection::kFromOrigin ? 1 : 0,
-        self.options.min_transmittance, self.options.max_hits, background, self.rays, self.results);
+    trace(gaussians, self.rays, count, self.results, color_direction);
     self.results.download(std::span<RayResult>(out).subspan(begin, count));
   }
   return out;

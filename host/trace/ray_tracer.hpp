@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "bvh/lbvh.hpp"
+#include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "raysplats/trace_options.hpp"
 #include "trace/device_gaussians.hpp"
@@ -36,15 +36,30 @@ struct RayResult {
   std::uint32_t capped;  ///< 1 when the ray stopped because of max_hits
 };
 
-/// Traces arbitrary rays: any origins and directions, without coherence.
+/// Traces arbitrary rays: any origins and directions, without coherence. The order of hits is exact
+/// per ray; near_depth and depth of the options have no meaning here.
 class RayTracer {
  public:
-  RayTracer(Context& context, const TraceOptions& options);
+  /// `lanes` of 4, 8 or 16 vectors' lanes; 0 chooses by the device (ray_lanes()).
+  RayTracer(Context& context, const TraceOptions& options, int lanes = 0);
   ~RayTracer();
+
+  /// Builds the tree. It or refit() must follow every change of the Gaussians.
   void update(const DeviceGaussians& gaussians);
+  /// Cheaper than update() for Gaussians that moved little; the results are the same, rays are
+  /// slower the farther they moved. Throws UsageError when their number changed.
+  void refit(const DeviceGaussians& gaussians);
+
   std::vector<RayResult> trace(const DeviceGaussians& gaussians,
                                std::span<const Ray> rays,
                                ColorDirection color_direction = ColorDirection::kRay);
+  /// The first `count` of `rays`, already on the device, into the first of `results`, which grows
+  /// when it is smaller. Enqueues and returns.
+  void trace(const DeviceGaussians& gaussians,
+             const Buffer<Ray>& rays,
+             std::size_t count,
+             Buffer<RayResult>& results,
+             ColorDirection color_direction = ColorDirection::kRay);
 
  private:
   struct Impl;

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cstring>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -39,15 +40,11 @@ std::vector<Ray> random_rays(std::size_t count, std::uint64_t seed) {
   return rays;
 }
 
-void check_rays(Context& context,
-                const Gaussians& model,
-                const TraceOptions& options,
-                const std::vector<Ray>& rays,
-                ColorDirection direction) {
-  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  RayTracer tracer(context, options);
-  tracer.update(gaussians);
-  const std::vector<RayResult> results = tracer.trace(gaussians, rays, direction);
+void check_results(const Gaussians& model,
+                   const TraceOptions& options,
+                   const std::vector<Ray>& rays,
+                   ColorDirection direction,
+                   const std::vector<RayResult>& results) {
   const reference::Parameters parameters(model);
   REQUIRE(results.size() == rays.size());
   double mean = 0;
@@ -78,6 +75,18 @@ void check_rays(Context& context,
   }
   CHECK(mean < 1e-4);
   CHECK(ties * 10 < rays.size() + 10);
+}
+
+void check_rays(Context& context,
+                const Gaussians& model,
+                const TraceOptions& options,
+                const std::vector<Ray>& rays,
+                ColorDirection direction,
+                int lanes = 0) {
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  RayTracer tracer(context, options, lanes);
+  tracer.update(gaussians);
+  check_results(model, options, rays, direction, tracer.trace(gaussians, rays, direction));
 }
 
 }  // namespace
@@ -223,4 +232,239 @@ TEST_CASE("a scene a million units from the origin still equals the reference") 
       reference::render(reference::Parameters(model), options, camera);
   CHECK(compare(image, expected, 1e-4).mean < 1e-4);
   CHECK(compare(image, expected, 1e-4).maximum < 5e-3);
+}
+
+TEST_CASE("every vector width traces the same") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(700, 51, 1);
+  const std::vector<Ray> rays = random_rays(120, 11);
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    for (const int lanes : {4, 8, 16}) {
+      CAPTURE(static_cast<int>(order));
+      CAPTURE(lanes);
+      TraceOptions options;
+      options.hit_order = order;
+      options.background = {0.3f, 0.1f, 0.2f};
+      check_rays(context, model, options, rays, ColorDirection::kRay, lanes);
+      options.adaptive_radius = true;
+      check_rays(context, model, options, rays, ColorDirection::kFromOrigin, lanes);
+    }
+  }
+  for (const int lanes : {1, 2, 3, 32, -4}) {
+    CHECK_THROWS_AS(RayTracer(context, TraceOptions{}, lanes), UsageError);
+  }
+}
+
+TEST_CASE("counts around full blocks and full nodes") {
+  Context context = make_test_context();
+  for (const int lanes : {4, 8, 16}) {
+    for (const std::size_t count : {1, 2, 3, 4, 5, 15, 16, 17, 31, 63, 65, 255, 256, 257, 1000}) {
+      CAPTURE(lanes);
+      CAPTURE(count);
+      Gaussians model = reference::random_scene(count, 60 + count, 0);
+      // Small counts get large Gaussians, which few rays would find.
+      for (float& scale : model.log_scales) scale = std::min(scale, std::log(0.4f));
+      check_rays(context, model, TraceOptions{}, random_rays(40, count), ColorDirection::kRay,
+                 lanes);
+    }
+  }
+}
+
+TEST_CASE("opaque Gaussians stop rays where the reference stops them") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(3000, 52, 0);
+  for (float& opacity : model.opacities) opacity += 4.0f;
+  for (const float stop : {1e-4f, 0.05f, 0.5f}) {
+    CAPTURE(stop);
+    TraceOptions options;
+    options.min_transmittance = stop;
+    check_rays(context, model, options, random_rays(150, 12), ColorDirection::kRay);
+  }
+}
+
+TEST_CASE("a few hits at most") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(1500, 53, 0);
+  for (const int most : {0, 1, 2, 17}) {
+    CAPTURE(most);
+    TraceOptions options;
+    options.max_hits = most;
+    check_rays(context, model, options, random_rays(100, 13), ColorDirection::kRay);
+  }
+}
+
+TEST_CASE("rays with many times more hits than there is room for") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(1500, 54, 0);
+  for (float& opacity : model.opacities) opacity = -6.0f;
+  // Boxes that all overlap: little can be blended before a walk ends.
+  for (float& scale : model.log_scales) scale = std::log(1.2f);
+  TraceOptions options;
+  options.min_transmittance = 1e-6f;
+  options.max_hits = 2000;
+  std::vector<Ray> rays = random_rays(24, 14);
+  for (Ray& ray : rays) ray.t_max = kFar;
+  std::vector<Ray> outside = rays;
+  for (Ray& ray : outside) {
+    const double length =
+        glm::length(glm::dvec3(ray.direction[0], ray.direction[1], ray.direction[2]));
+    for (int k = 0; k < 3; ++k)
+      ray.origin[k] -= static_cast<float>(15.0 / length) * ray.direction[k];
+  }
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const reference::Parameters parameters(model);
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    options.hit_order = order;
+    const std::vector<Ray>& all = order == HitOrder::kPeak ? rays : outside;
+    for (const int lanes : {4, 16}) {
+      RayTracer tracer(context, options, lanes);
+      tracer.update(gaussians);
+      const std::vector<RayResult> results = tracer.trace(gaussians, all);
+      std::size_t crowded = 0;
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        CAPTURE(i);
+        CAPTURE(lanes);
+        const Ray& r = all[i];
+        const reference::RayTrace expected =
+            reference::trace_ray(parameters, options, {r.origin[0], r.origin[1], r.origin[2]},
+                                 {r.direction[0], r.direction[1], r.direction[2]}, r.t_min, r.t_max,
+                                 reference::ColorMode::kAlongRay);
+        // Among so many hits some neighbours, each of little weight, are within rounding.
+        CHECK(std::abs(static_cast<double>(results[i].hits) -
+                       static_cast<double>(expected.hits.size())) <= 2);
+        crowded += expected.hits.size() > 600 ? 1 : 0;
+        for (int c = 0; c < 3; ++c)
+          CHECK(results[i].color[c] == doctest::Approx(expected.color[c]).epsilon(1e-3));
+        CHECK(results[i].expected_depth == doctest::Approx(expected.expected_depth).epsilon(1e-3));
+        CHECK(results[i].median_depth == doctest::Approx(expected.median_depth).epsilon(5e-3));
+      }
+      CHECK(crowded >= 8);
+    }
+  }
+}
+
+TEST_CASE("equal depths are blended by index, also across the room for hits") {
+  Context context = make_test_context();
+  // The same ellipsoid 600 times; colours tell them apart.
+  Gaussians model = reference::random_scene(600, 55, 0);
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      model.means[3 * i + k] = 0.25f * static_cast<float>(k);
+      model.log_scales[3 * i + k] = std::log(0.2f + 0.1f * static_cast<float>(k));
+    }
+    for (std::size_t k = 0; k < 4; ++k) model.quaternions[4 * i + k] = model.quaternions[k];
+    model.opacities[i] = -4.5f;
+  }
+  TraceOptions options;
+  options.min_transmittance = 1e-9f;
+  options.max_hits = 550;
+  const std::vector<Ray> rays{make_ray({-3, 0.2, 0.4}, {1, 0.01, 0.02}),
+                              make_ray({2, 2, 2}, {-1, -0.9, -0.8})};
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const reference::Parameters parameters(model);
+  for (const int lanes : {4, 8, 16}) {
+    CAPTURE(lanes);
+    RayTracer tracer(context, options, lanes);
+    tracer.update(gaussians);
+    const std::vector<RayResult> results = tracer.trace(gaussians, rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const Ray& r = rays[i];
+      const reference::RayTrace expected =
+          reference::trace_ray(parameters, options, {r.origin[0], r.origin[1], r.origin[2]},
+                               {r.direction[0], r.direction[1], r.direction[2]}, r.t_min, r.t_max,
+                               reference::ColorMode::kAlongRay);
+      CHECK(expected.hits.size() == 550);
+      CHECK(results[i].hits == 550);
+      CHECK(results[i].capped == 1);
+      for (int c = 0; c < 3; ++c)
+        CHECK(results[i].color[c] == doctest::Approx(expected.color[c]).epsilon(1e-4));
+    }
+  }
+}
+
+TEST_CASE("Gaussians with NaN or infinity are never met") {
+  Context context = make_test_context();
+  const Gaussians good = reference::random_scene(200, 56, 0);
+  Gaussians mixed = good;
+  mixed.resize(260);
+  for (std::size_t i = 200; i < mixed.size(); ++i) {
+    const float bad = i % 2 == 0 ? std::numeric_limits<float>::quiet_NaN()
+                                 : std::numeric_limits<float>::infinity();
+    mixed.opacities[i] = 3.0f;
+    switch (i % 5) {
+      case 0:
+        mixed.means[3 * i] = bad;
+        break;
+      case 1:
+        mixed.log_scales[3 * i + 1] = bad;
+        break;
+      case 2:
+        mixed.quaternions[4 * i + 2] = bad;
+        break;
+      case 3:
+        for (std::size_t k = 0; k < 4; ++k) mixed.quaternions[4 * i + k] = 0.0f;
+        break;
+      default:
+        mixed.opacities[i] = std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+  const std::vector<Ray> rays = random_rays(100, 15);
+  for (const int lanes : {4, 8, 16}) {
+    RayTracer tracer(context, TraceOptions{}, lanes);
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, mixed, ScaleActivation::kExp);
+    tracer.update(gaussians);
+    check_results(good, TraceOptions{}, rays, ColorDirection::kRay, tracer.trace(gaussians, rays));
+  }
+}
+
+TEST_CASE("a refitted tree gives what a built one gives") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(900, 57, 0);
+  DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const std::vector<Ray> rays = random_rays(150, 16);
+  for (const int lanes : {4, 16}) {
+    RayTracer tracer(context, TraceOptions{}, lanes);
+    tracer.update(gaussians);
+    Gaussians moved = model;
+    CounterRng rng(58, 2);
+    for (float& x : moved.means) x += static_cast<float>(0.2 * rng.normal());
+    for (float& x : moved.log_scales) x += static_cast<float>(0.3 * rng.normal());
+    for (float& x : moved.opacities) x += static_cast<float>(rng.normal());
+    for (float& x : moved.quaternions) x += static_cast<float>(0.3 * rng.normal());
+    for (float& x : moved.sh) x += static_cast<float>(rng.normal());
+    const DeviceGaussians after = DeviceGaussians::upload(context, moved, ScaleActivation::kExp);
+    tracer.refit(after);
+    check_results(moved, TraceOptions{}, rays, ColorDirection::kRay, tracer.trace(after, rays));
+    const DeviceGaussians fewer = DeviceGaussians::upload(
+        context, reference::random_scene(899, 57, 0), ScaleActivation::kExp);
+    CHECK_THROWS_AS(tracer.refit(fewer), UsageError);
+    CHECK_THROWS_AS(tracer.trace(fewer, rays), UsageError);
+  }
+}
+
+TEST_CASE("rays on the device, in batches of any size, give the same bits") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(2000, 59, 0);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  RayTracer tracer(context, TraceOptions{});
+  tracer.update(gaussians);
+  // Large batches are traced in another order than small ones.
+  const std::vector<Ray> rays = random_rays(6000, 17);
+  Buffer<Ray> buffer(context, rays.size() + 5, "rays");
+  buffer.upload(rays);
+  Buffer<RayResult> results;
+  tracer.trace(gaussians, buffer, rays.size(), results);
+  REQUIRE(results.size() == rays.size());
+  const std::vector<RayResult> all = results.download();
+  double hits = 0;
+  for (std::size_t begin = 0; begin < rays.size(); begin += 1000) {
+    const std::vector<RayResult> part =
+        tracer.trace(gaussians, std::span<const Ray>(rays).subspan(begin, 1000));
+    CHECK(std::memcmp(part.data(), all.data() + begin, part.size() * sizeof(RayResult)) == 0);
+    for (const RayResult& result : part) hits += result.hits;
+  }
+  CHECK(hits > 10000);
+  tracer.trace(gaussians, buffer, 0, results);
+  CHECK_THROWS_AS(tracer.trace(gaussians, buffer, rays.size() + 6, results), UsageError);
 }
