@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Real spherical harmonics of degree 0 to 4 with the signs and constants of the 3DGS family (Sloan
-// 2008): value and derivative of every basis function for a unit direction.
+// 2008): value and derivative of every basis function for a unit direction. RS_SH_REAL is a float
+// or a vector with one direction per lane.
 #ifndef RS_SHARED_SH_H
 #define RS_SHARED_SH_H
 
 #include "shared/compat.h"
+
+#ifndef RS_SH_REAL
+#define RS_SH_REAL rs_float
+#endif
 
 #ifndef __OPENCL_C_VERSION__
 #define RS_SH_FUNCTION inline void
@@ -13,8 +18,9 @@
 #endif
 
 // basis[(degree + 1)^2]
-RS_SH_FUNCTION rs_sh_basis(int degree, rs_float x, rs_float y, rs_float z, rs_float* basis) {
-  const rs_float xx = x * x, yy = y * y, zz = z * z;
+RS_SH_FUNCTION rs_sh_basis(
+    int degree, RS_SH_REAL x, RS_SH_REAL y, RS_SH_REAL z, RS_SH_REAL* basis) {
+  const RS_SH_REAL xx = x * x, yy = y * y, zz = z * z;
   basis[0] = 0.28209479177387814f;
   if (degree < 1) return;
   basis[1] = -0.4886025119029199f * y;
@@ -46,121 +52,62 @@ RS_SH_FUNCTION rs_sh_basis(int degree, rs_float x, rs_float y, rs_float z, rs_fl
   basis[24] = 0.6258357354491761f * (xx * (xx - 3.0f * yy) - yy * (3.0f * xx - yy));
 }
 
-// Adds coefficient * d(basis_i)/d(x, y, z) of function i to gradient[3]; x, y, z as three free
-// variables.
-RS_SH_FUNCTION rs_sh_gradient(
-    int i, rs_float x, rs_float y, rs_float z, rs_float coefficient, rs_float* gradient) {
-  const rs_float xx = x * x, yy = y * y, zz = z * z;
-  rs_float gx = 0.0f, gy = 0.0f, gz = 0.0f;
-  switch (i) {
-    case 1:
-      gy = -0.4886025119029199f;
-      break;
-    case 2:
-      gz = 0.4886025119029199f;
-      break;
-    case 3:
-      gx = -0.4886025119029199f;
-      break;
-    case 4:
-      gx = 1.0925484305920792f * y;
-      gy = 1.0925484305920792f * x;
-      break;
-    case 5:
-      gy = -1.0925484305920792f * z;
-      gz = -1.0925484305920792f * y;
-      break;
-    case 6:
-      gx = -0.6307831305050401f * x;
-      gy = -0.6307831305050401f * y;
-      gz = 1.2615662610100802f * z;
-      break;
-    case 7:
-      gx = -1.0925484305920792f * z;
-      gz = -1.0925484305920792f * x;
-      break;
-    case 8:
-      gx = 1.0925484305920792f * x;
-      gy = -1.0925484305920792f * y;
-      break;
-    case 9:
-      gx = -0.5900435899266435f * 6.0f * x * y;
-      gy = -0.5900435899266435f * 3.0f * (xx - yy);
-      break;
-    case 10:
-      gx = 2.890611442640554f * y * z;
-      gy = 2.890611442640554f * x * z;
-      gz = 2.890611442640554f * x * y;
-      break;
-    case 11:
-      gx = 0.4570457994644658f * 2.0f * x * y;
-      gy = -0.4570457994644658f * (4.0f * zz - xx - 3.0f * yy);
-      gz = -0.4570457994644658f * 8.0f * y * z;
-      break;
-    case 12:
-      gx = -0.3731763325901154f * 6.0f * x * z;
-      gy = -0.3731763325901154f * 6.0f * y * z;
-      gz = 0.3731763325901154f * (6.0f * zz - 3.0f * xx - 3.0f * yy);
-      break;
-    case 13:
-      gx = -0.4570457994644658f * (4.0f * zz - 3.0f * xx - yy);
-      gy = 0.4570457994644658f * 2.0f * x * y;
-      gz = -0.4570457994644658f * 8.0f * x * z;
-      break;
-    case 14:
-      gx = 1.445305721320277f * 2.0f * x * z;
-      gy = -1.445305721320277f * 2.0f * y * z;
-      gz = 1.445305721320277f * (xx - yy);
-      break;
-    case 15:
-      gx = -0.5900435899266435f * 3.0f * (xx - yy);
-      gy = 0.5900435899266435f * 6.0f * x * y;
-      break;
-    case 16:
-      gx = 2.5033429417967046f * y * (3.0f * xx - yy);
-      gy = 2.5033429417967046f * x * (xx - 3.0f * yy);
-      break;
-    case 17:
-      gx = -1.7701307697799304f * 6.0f * x * y * z;
-      gy = -1.7701307697799304f * 3.0f * z * (xx - yy);
-      gz = -1.7701307697799304f * y * (3.0f * xx - yy);
-      break;
-    case 18:
-      gx = 0.9461746957575601f * y * (7.0f * zz - 1.0f);
-      gy = 0.9461746957575601f * x * (7.0f * zz - 1.0f);
-      gz = 0.9461746957575601f * 14.0f * x * y * z;
-      break;
-    case 19:
-      gy = -0.6690465435572892f * z * (7.0f * zz - 3.0f);
-      gz = -0.6690465435572892f * y * (21.0f * zz - 3.0f);
-      break;
-    case 20:
-      gz = 0.10578554691520431f * z * (140.0f * zz - 60.0f);
-      break;
-    case 21:
-      gx = -0.6690465435572892f * z * (7.0f * zz - 3.0f);
-      gz = -0.6690465435572892f * x * (21.0f * zz - 3.0f);
-      break;
-    case 22:
-      gx = 0.47308734787878004f * 2.0f * x * (7.0f * zz - 1.0f);
-      gy = -0.47308734787878004f * 2.0f * y * (7.0f * zz - 1.0f);
-      gz = 0.47308734787878004f * 14.0f * z * (xx - yy);
-      break;
-    case 23:
-      gx = -1.7701307697799304f * 3.0f * z * (xx - yy);
-      gy = 1.7701307697799304f * 6.0f * x * y * z;
-      gz = -1.7701307697799304f * x * (xx - 3.0f * yy);
-      break;
-    case 24:
-      gx = 0.6258357354491761f * 4.0f * x * (xx - 3.0f * yy);
-      gy = 0.6258357354491761f * 4.0f * y * (yy - 3.0f * xx);
-      break;
-    default:
-      break;
-  }
-  gradient[0] += coefficient * gx;
-  gradient[1] += coefficient * gy;
-  gradient[2] += coefficient * gz;
+// gradient[3] = sum over the functions i > 0 of coefficient[i] * d(basis_i)/d(x, y, z); x, y, z as
+// three free variables.
+RS_SH_FUNCTION rs_sh_gradient(int degree,
+                              RS_SH_REAL x,
+                              RS_SH_REAL y,
+                              RS_SH_REAL z,
+                              const RS_SH_REAL* coefficient,
+                              RS_SH_REAL* gradient) {
+  const RS_SH_REAL xx = x * x, yy = y * y, zz = z * z;
+  const RS_SH_REAL* c = coefficient;
+  gradient[0] = gradient[1] = gradient[2] = 0.0f;
+  if (degree < 1) return;
+  gradient[0] = -0.4886025119029199f * c[3];
+  gradient[1] = -0.4886025119029199f * c[1];
+  gradient[2] = 0.4886025119029199f * c[2];
+  if (degree < 2) return;
+  gradient[0] +=
+      1.0925484305920792f * (y * c[4] - z * c[7] + x * c[8]) - 0.6307831305050401f * x * c[6];
+  gradient[1] +=
+      1.0925484305920792f * (x * c[4] - z * c[5] - y * c[8]) - 0.6307831305050401f * y * c[6];
+  gradient[2] += 1.2615662610100802f * z * c[6] - 1.0925484305920792f * (y * c[5] + x * c[7]);
+  if (degree < 3) return;
+  gradient[0] += -3.5402615395598613f * x * y * c[9] + 2.890611442640554f * y * z * c[10] +
+                 0.9140915989289316f * x * y * c[11] - 2.2390579957406924f * x * z * c[12] -
+                 0.4570457994644658f * (4.0f * zz - 3.0f * xx - yy) * c[13] +
+                 2.890611442640554f * x * z * c[14] - 1.7701307697799304f * (xx - yy) * c[15];
+  gradient[1] += -1.7701307697799304f * (xx - yy) * c[9] + 2.890611442640554f * x * z * c[10] -
+                 0.4570457994644658f * (4.0f * zz - xx - 3.0f * yy) * c[11] -
+                 2.2390579957406924f * y * z * c[12] + 0.9140915989289316f * x * y * c[13] -
+                 2.890611442640554f * y * z * c[14] + 3.5402615395598613f * x * y * c[15];
+  gradient[2] += 2.890611442640554f * x * y * c[10] -
+                 3.6563663957157262f * z * (y * c[11] + x * c[13]) +
+                 0.3731763325901154f * (6.0f * zz - 3.0f * xx - 3.0f * yy) * c[12] +
+                 1.445305721320277f * (xx - yy) * c[14];
+  if (degree < 4) return;
+  gradient[0] += 2.5033429417967046f * y * (3.0f * xx - yy) * c[16] -
+                 10.6207846186795823f * x * y * z * c[17] +
+                 0.9461746957575601f * y * (7.0f * zz - 1.0f) * c[18] -
+                 0.6690465435572892f * z * (7.0f * zz - 3.0f) * c[21] +
+                 0.9461746957575601f * x * (7.0f * zz - 1.0f) * c[22] -
+                 5.3103923093397911f * z * (xx - yy) * c[23] +
+                 2.5033429417967046f * x * (xx - 3.0f * yy) * c[24];
+  gradient[1] += 2.5033429417967046f * x * (xx - 3.0f * yy) * c[16] -
+                 5.3103923093397911f * z * (xx - yy) * c[17] +
+                 0.9461746957575601f * x * (7.0f * zz - 1.0f) * c[18] -
+                 0.6690465435572892f * z * (7.0f * zz - 3.0f) * c[19] -
+                 0.9461746957575601f * y * (7.0f * zz - 1.0f) * c[22] +
+                 10.6207846186795823f * x * y * z * c[23] +
+                 2.5033429417967046f * y * (yy - 3.0f * xx) * c[24];
+  gradient[2] += -1.7701307697799304f * y * (3.0f * xx - yy) * c[17] +
+                 13.2464457670080411f * x * y * z * c[18] -
+                 0.6690465435572892f * y * (21.0f * zz - 3.0f) * c[19] +
+                 0.1057855469152043f * z * (140.0f * zz - 60.0f) * c[20] -
+                 0.6690465435572892f * x * (21.0f * zz - 3.0f) * c[21] +
+                 6.6232228835040206f * z * (xx - yy) * c[22] -
+                 1.7701307697799304f * x * (xx - 3.0f * yy) * c[23];
 }
 
 #endif

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// finalize_gradients: carries the gradient of a Gaussian's line on to its parameters, once per
+// finalize_gradients: carries the gradients of Gaussians' lines on to their parameters, once per
 // Gaussian and view after all rays are summed: mean, unnormalised quaternion, scale parameter under
 // either activation, opacity logit, SH coefficients (with the direction's dependence on the mean),
 // and the screen statistics that density control reads. Sums the private copies of the line
-// gradients in a fixed order. One work-item per Gaussian. With POSE, per-Gaussian contributions to
-// the camera's gradient are written too (6 floats each: centre in world axes, left rotation vector
-// in camera axes).
-#include "shared/sh.h"
+// gradients in a fixed order, leaves the sum in the first copy and zeros in the others. One
+// work-item per VECTOR Gaussians from number `begin` on, any local size; end - begin is a multiple
+// of VECTOR. With POSE, per-Gaussian contributions to the camera's gradient are written too (6
+// floats each: centre in world axes, left rotation vector in camera axes).
 #include "trace/view.h"
 
 #ifndef POSE
@@ -14,33 +14,36 @@
 #endif
 
 typedef struct {
-  float m[3];
-  float axis[9];
-  float w[3];
+  gv m[3];
+  gv axis[9];
+  gv w[3];
 } ViewGradient;
 
-void projective_gradient(const ViewGaussian* g, const float* v, ViewGradient* out) {
-  const float mx = g->m[0], my = g->m[1], mz = g->m[2];
-  const float iz = 1.0f / mz;
-  const float x0 = mx * iz, y0 = my * iz;
-  float ex = 0, ey = 0, d0 = 0;
-  float P[3], gP[3];
-  for (int k = 0; k < 3; ++k) P[k] = g->w[(k + 1) % 3] * g->w[(k + 2) % 3];
+void projective_gradient(const ViewGaussian* g, const gv* v, ViewGradient* out) {
+  const gv mx = g->m[0], my = g->m[1], mz = g->m[2];
+  const gv iz = 1.0f / mz;
+  const gv x0 = mx * iz, y0 = my * iz;
+  gv ex = 0, ey = 0, d0 = 0;
+  gv P[3], gP[3];
   for (int k = 0; k < 3; ++k) {
-    const float rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
-    const float w = g->w[k];
-    const float A = ry * mz - rz * my;
-    const float B = rz * mx - rx * mz;
-    const float gA = P[k] * P[k] * (2.0f * v[3] * A + v[4] * B);
-    const float gB = P[k] * P[k] * (2.0f * v[5] * B + v[4] * A);
+    P[k] = g->w[(k + 1) % 3] * g->w[(k + 2) % 3];
+    out->m[k] = 0;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const gv rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
+    const gv w = g->w[k];
+    const gv A = ry * mz - rz * my;
+    const gv B = rz * mx - rx * mz;
+    const gv gA = P[k] * P[k] * (2.0f * v[3] * A + v[4] * B);
+    const gv gB = P[k] * P[k] * (2.0f * v[5] * B + v[4] * A);
     gP[k] = 2.0f * P[k] * (v[3] * A * A + v[4] * A * B + v[5] * B * B);
-    const float along = rx * mx + ry * my + rz * mz;
-    const float q = along * w;
+    const gv along = rx * mx + ry * my + rz * mz;
+    const gv q = along * w;
     d0 += q * q;
     ex += q * rx * w;
     ey += q * ry * w;
-    const float ge = v[7] * rx + v[8] * ry;
-    const float gq = 2.0f * v[6] * q * iz * iz + ge * w * iz;
+    const gv ge = v[7] * rx + v[8] * ry;
+    const gv gq = 2.0f * v[6] * q * iz * iz + ge * w * iz;
     out->w[k] =
         ge * q * iz + 2.0f * w * (v[9] * rx * rx + v[10] * rx * ry + v[11] * ry * ry) + gq * along;
     out->axis[3 * k] =
@@ -63,25 +66,61 @@ void projective_gradient(const ViewGaussian* g, const float* v, ViewGradient* ou
                (v[7] * ex + v[8] * ey) * iz * iz;
 }
 
-void general_gradient(const ViewGaussian* g, const float* v, ViewGradient* out) {
+// In place of the projective gradient in the lanes where `general` holds.
+void general_gradient(const ViewGaussian* g, const gv* v, const gi general, ViewGradient* out) {
+  gv m[3] = {0, 0, 0};
   for (int k = 0; k < 3; ++k) {
-    const float w = g->w[k];
-    const float go = v[9 + k];
-    float along = 0, gw = 0;
+    const gv w = g->w[k];
+    const gv go = v[9 + k];
+    gv along = 0, gw = 0;
     for (int j = 0; j < 3; ++j) {
-      const float r = g->axis[3 * k + j];
+      const gv r = g->axis[3 * k + j];
       along += r * g->m[j];
       gw += v[3 * k + j] * r;
-      out->axis[3 * k + j] = (v[3 * k + j] - go * g->m[j]) * w;
-      out->m[j] -= go * w * r;
+      out->axis[3 * k + j] = general ? (v[3 * k + j] - go * g->m[j]) * w : out->axis[3 * k + j];
+      m[j] -= go * w * r;
     }
-    out->w[k] = gw - go * along;
+    out->w[k] = general ? gw - go * along : out->w[k];
   }
+  for (int j = 0; j < 3; ++j) out->m[j] = general ? m[j] : out->m[j];
 }
 
-__kernel void finalize_gradients(const uint count,
+// Sums the copies of the line gradients of VECTOR Gaussians into columns; true in lanes that a ray
+// touched.
+gi sum_copies(__global float* gradients, const size_t copy_floats, const uint copies, gv* v) {
+  gv touched = 0;
+  for (uint c = 0; c < 16; c += VECTOR) {
+    gv rows[VECTOR];
+#pragma unroll
+    for (uint i = 0; i < VECTOR; ++i) rows[i] = *(__global const gv*)(gradients + 16 * i + c);
+    for (uint copy = 1; copy < copies; ++copy) {
+      __global const float* p = gradients + copy * copy_floats + c;
+#pragma unroll
+      for (uint i = 0; i < VECTOR; ++i) rows[i] += *(__global const gv*)(p + 16 * i);
+    }
+    gv any_lane = 0;
+#pragma unroll
+    for (uint i = 0; i < VECTOR; ++i) any_lane += fabs(rows[i]);
+    if (copies > 1 && RS_ANY_GAUSSIAN(any_lane != 0.0f)) {
+#pragma unroll
+      for (uint i = 0; i < VECTOR; ++i) *(__global gv*)(gradients + 16 * i + c) = rows[i];
+      for (uint copy = 1; copy < copies; ++copy) {
+        __global float* p = gradients + copy * copy_floats + c;
+#pragma unroll
+        for (uint i = 0; i < VECTOR; ++i) *(__global gv*)(p + 16 * i) = (gv)(0.0f);
+      }
+    }
+    transpose(rows, v + c);
+  }
+  for (int k = 0; k < 16; ++k) touched += fabs(v[k]);
+  return touched != 0.0f;
+}
+
+__kernel void finalize_gradients(const uint begin,
+                                 const uint end,
+                                 const uint count,
                                  const uint copies,
-                                 __global const float16* restrict line_gradients,
+                                 __global float* restrict line_gradients,
                                  __global const RsViewBounds* restrict bounds,
                                  __global const RsLine* restrict lines,
                                  __global const float* restrict means,
@@ -89,8 +128,6 @@ __kernel void finalize_gradients(const uint count,
                                  __global const float* restrict scales,
                                  __global const float* restrict opacities,
                                  __global const float* restrict sh,
-                                 const int sh_coefficients,
-                                 const int active_degree,
                                  const RsCamera camera_argument,
                                  const float screen_x,
                                  const float screen_y,
@@ -104,48 +141,44 @@ __kernel void finalize_gradients(const uint count,
 #if !POSE
   (void)pose;
 #endif
-  const uint i = get_global_id(0);
-  if (i >= count) return;
+  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  if (i >= end) return;
   const RsCamera camera = camera_argument;
-  __global float* gsh = g_sh + (size_t)i * 3 * sh_coefficients;
-  float16 sum = (float16)(0.0f);
-  const int kind = bounds[i].kind;
-  if (kind != RS_LINE_HIDDEN) {
-    for (uint c = 0; c < copies; ++c) sum += line_gradients[(size_t)c * count + i];
+  const gi kind = RS_COLUMN(gi, &bounds[i].kind, 8);
+  gv v[16];
+  gi touched = kind != RS_LINE_HIDDEN;
+  if (RS_ANY_GAUSSIAN(touched)) {
+    touched = sum_copies(line_gradients + 16 * i, (size_t)count * 16, copies, v);
   }
-  float v[16];
-  vstore16(sum, 0, v);
-  float touched = 0.0f;
-  for (int k = 0; k < 16; ++k) touched += fabs(v[k]);
-  if (touched == 0.0f) {
-    vstore3((float3)(0.0f), i, g_means);
-    vstore4((float4)(0.0f), i, g_quaternions);
-    vstore3((float3)(0.0f), i, g_scales);
-    g_opacities[i] = 0.0f;
-    for (int k = 0; k < 3 * sh_coefficients; ++k) gsh[k] = 0.0f;
-    vstore3((float3)(0.0f), i, screen);
+  if (!RS_ANY_GAUSSIAN(touched)) {
+    clear_columns(g_means + 3 * i, 3);
+    clear_columns(g_quaternions + 4 * i, 4);
+    clear_columns(g_scales + 3 * i, 3);
+    clear_columns(g_opacities + i, 1);
+    clear_columns(g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
+    clear_columns(screen + 3 * i, 3);
 #if POSE
-    for (int k = 0; k < 6; ++k) pose[6 * (size_t)i + k] = 0.0f;
+    clear_columns(pose + 6 * i, 6);
 #endif
     return;
   }
 
+  // Lanes that nothing touched may hold anything; they are cleared last.
+  const gv zero = (gv)(0.0f);
   ViewGaussian g;
   load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
   ViewGradient view;
-  for (int k = 0; k < 3; ++k) view.m[k] = 0.0f;
-  if (kind == RS_LINE_PROJECTIVE) {
-    projective_gradient(&g, v, &view);
-    vstore3((float3)(sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y),
-                     v[2], 1.0f),
-            i, screen);
-  } else {
-    general_gradient(&g, v, &view);
-    vstore3((float3)(0.0f, 0.0f, 1.0f), i, screen);
-  }
+  projective_gradient(&g, v, &view);
+  const gi projective = kind == RS_LINE_PROJECTIVE;
+  const gi general = kind == RS_LINE_GENERAL;
+  if (RS_ANY_GAUSSIAN(touched & general)) general_gradient(&g, v, general, &view);
+  const gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
+  store_column(touched & projective ? slope : zero, screen + 3 * i, 3);
+  store_column(touched & projective ? v[2] : zero, screen + 3 * i + 1, 3);
+  store_column(touched ? (gv)(1.0f) : zero, screen + 3 * i + 2, 3);
 
   const float* V = camera.rotation;
-  float mean[3], gR[9];
+  gv mean[3], gR[9];
   for (int j = 0; j < 3; ++j) {
     mean[j] = V[j] * view.m[0] + V[3 + j] * view.m[1] + V[6 + j] * view.m[2];
     for (int k = 0; k < 3; ++k) {
@@ -153,63 +186,67 @@ __kernel void finalize_gradients(const uint count,
                       V[6 + j] * view.axis[3 * k + 2];
     }
   }
+
+  // Colour: max(0, .) passes nothing where it clamps. Direction n = (m - c) / |m - c|.
+  const gv* d = g.offset;
+  const gv inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
+  gv n[3];
+  for (int j = 0; j < 3; ++j) n[j] = d[j] * inverse;
+  gv colour[3];
+  for (int j = 0; j < 3; ++j) {
+    const gv value = load_column(lines[i].v + 13 + j, 16);
+    colour[j] = touched & (value > 0.0f) ? v[13 + j] : zero;
+  }
+  gv basis[RS_SH_FUNCTIONS];
+  rs_sh_basis(SH_DEGREE, n[0], n[1], n[2], basis);
+  gv c[3 * SH_COEFFICIENTS];
+#if SH_DEGREE > 0
+  load_columns(sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS, 3 * RS_SH_FUNCTIONS, c);
+  gv along[RS_SH_FUNCTIONS];
+  for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
+    along[k] = c[3 * k] * colour[0] + c[3 * k + 1] * colour[1] + c[3 * k + 2] * colour[2];
+  }
+  gv gn[3];
+  rs_sh_gradient(SH_DEGREE, n[0], n[1], n[2], along, gn);
+  const gv radial = gn[0] * n[0] + gn[1] * n[1] + gn[2] * n[2];
+  for (int j = 0; j < 3; ++j) mean[j] += (gn[j] - radial * n[j]) * inverse;
+#endif
+  for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
+    for (int j = 0; j < 3; ++j) c[3 * k + j] = touched ? basis[k] * colour[j] : zero;
+  }
+  for (int k = 3 * RS_SH_FUNCTIONS; k < 3 * SH_COEFFICIENTS; ++k) c[k] = zero;
+  store_columns(c, 3 * SH_COEFFICIENTS, g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
+  for (int j = 0; j < 3; ++j) store_column(touched ? mean[j] : zero, g_means + 3 * i + j, 3);
 #if POSE
-  float rotation[3];
+  gv rotation[3];
   rotation[0] = g.m[1] * view.m[2] - g.m[2] * view.m[1];
   rotation[1] = g.m[2] * view.m[0] - g.m[0] * view.m[2];
   rotation[2] = g.m[0] * view.m[1] - g.m[1] * view.m[0];
   for (int k = 0; k < 3; ++k) {
-    const float* r = g.axis + 3 * k;
-    const float* gr = view.axis + 3 * k;
+    const gv* r = g.axis + 3 * k;
+    const gv* gr = view.axis + 3 * k;
     rotation[0] += r[1] * gr[2] - r[2] * gr[1];
     rotation[1] += r[2] * gr[0] - r[0] * gr[2];
     rotation[2] += r[0] * gr[1] - r[1] * gr[0];
   }
-#endif
-
-  // Colour: max(0, .) passes nothing where it clamps. Direction n = (m - c) / |m - c|.
-  const float dx = means[3 * i] - camera.center[0];
-  const float dy = means[3 * i + 1] - camera.center[1];
-  const float dz = means[3 * i + 2] - camera.center[2];
-  const float inverse = rsqrt(fmax(dx * dx + dy * dy + dz * dz, 1e-30f));
-  const float nx = dx * inverse, ny = dy * inverse, nz = dz * inverse;
-  const float cr = lines[i].v[13] > 0.0f ? v[13] : 0.0f;
-  const float cg = lines[i].v[14] > 0.0f ? v[14] : 0.0f;
-  const float cb = lines[i].v[15] > 0.0f ? v[15] : 0.0f;
-  float basis[25];
-  rs_sh_basis(active_degree, nx, ny, nz, basis);
-  const int active = (active_degree + 1) * (active_degree + 1);
-  __global const float* coefficient = sh + (size_t)i * 3 * sh_coefficients;
-  float gn[3] = {0.0f, 0.0f, 0.0f};
-  for (int k = 0; k < active; ++k) {
-    gsh[3 * k] = basis[k] * cr;
-    gsh[3 * k + 1] = basis[k] * cg;
-    gsh[3 * k + 2] = basis[k] * cb;
-    const float along =
-        coefficient[3 * k] * cr + coefficient[3 * k + 1] * cg + coefficient[3 * k + 2] * cb;
-    if (k > 0) rs_sh_gradient(k, nx, ny, nz, along, gn);
-  }
-  for (int k = 3 * active; k < 3 * sh_coefficients; ++k) gsh[k] = 0.0f;
-  const float radial = gn[0] * nx + gn[1] * ny + gn[2] * nz;
-  mean[0] += (gn[0] - radial * nx) * inverse;
-  mean[1] += (gn[1] - radial * ny) * inverse;
-  mean[2] += (gn[2] - radial * nz) * inverse;
-  vstore3((float3)(mean[0], mean[1], mean[2]), i, g_means);
-#if POSE
   // The mean enters only through m - c, so the centre takes the opposite.
   for (int j = 0; j < 3; ++j) {
-    pose[6 * (size_t)i + j] = -mean[j];
-    pose[6 * (size_t)i + 3 + j] = rotation[j];
+    store_column(touched ? -mean[j] : zero, pose + 6 * i + j, 6);
+    store_column(touched ? rotation[j] : zero, pose + 6 * i + 3 + j, 6);
   }
 #endif
 
-  const float4 gq = rotation_gradient(g.q, gR);
-  vstore4((gq - g.q * dot(gq, g.q)) / g.q_norm, i, g_quaternions);
-  float gs[3];
-  for (int k = 0; k < 3; ++k) {
-    const bool floored = g.raw_scale[k] < g.scale[k];
-    gs[k] = floored ? 0.0f : -view.w[k] * g.w[k] * scale_log_derivative(g.scale[k]);
+  gv gq[4];
+  rotation_gradient(g.q, gR, gq);
+  const gv along_q = gq[0] * g.q[0] + gq[1] * g.q[1] + gq[2] * g.q[2] + gq[3] * g.q[3];
+  for (int j = 0; j < 4; ++j) {
+    const gv value = (gq[j] - g.q[j] * along_q) / g.q_norm;
+    store_column(touched ? value : zero, g_quaternions + 4 * i + j, 4);
   }
-  vstore3((float3)(gs[0], gs[1], gs[2]), i, g_scales);
-  g_opacities[i] = v[12] * g.opacity * (1.0f - g.opacity);
+  for (int k = 0; k < 3; ++k) {
+    const gi moves = touched & (g.raw_scale[k] >= g.scale[k]);
+    const gv value = -view.w[k] * g.w[k] * scale_log_derivative(g.scale[k]);
+    store_column(moves ? value : zero, g_scales + 3 * i + k, 3);
+  }
+  store_column(touched ? v[12] * g.opacity * (1.0f - g.opacity) : zero, g_opacities + i, 1);
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// One Gaussian from its trained parameters: activations, rotation, effective quantile.
+// Gaussians from their trained parameters, one per lane: activations, rotation, effective quantile.
 #ifndef RS_TRACE_GAUSSIAN_H
 #define RS_TRACE_GAUSSIAN_H
+
+#include "trace/gaussian_lanes.h"
 
 #ifndef SIGMOID_SCALE
 #define SIGMOID_SCALE 0  // 1: S = sigmoid(s) (the paper), 0: S = exp(s)
@@ -12,47 +14,62 @@
 
 #define RS_ALPHA_MIN (1.0f / 255.0f)
 
-float sigmoid(float x) { return 1.0f / (1.0f + exp(-x)); }
+gv sigmoid(gv x) { return 1.0f / (1.0f + exp(-x)); }
 
-float activated_scale(float s) { return SIGMOID_SCALE ? sigmoid(s) : exp(s); }
-
-// dS/ds divided by S.
-float scale_log_derivative(float scale) { return SIGMOID_SCALE ? 1.0f - scale : 1.0f; }
-
-// Q of a Gaussian; negative when no ray can meet it.
-float effective_quantile(float quantile, float opacity) {
-  (void)opacity;
-#if ADAPTIVE_RADIUS
-  return fmin(quantile, 2.0f * log(opacity / RS_ALPHA_MIN));
+gv activated_scale(gv s) {
+#if SIGMOID_SCALE
+  return sigmoid(s);
 #else
-  return quantile;
+  return exp(s);
 #endif
 }
 
-// Rotation matrix (row-major) of a unit quaternion (real part first).
-void rotation_of(float4 q, float* R) {
-  R[0] = 1.0f - 2.0f * (q.z * q.z + q.w * q.w);
-  R[1] = 2.0f * (q.y * q.z - q.x * q.w);
-  R[2] = 2.0f * (q.y * q.w + q.x * q.z);
-  R[3] = 2.0f * (q.y * q.z + q.x * q.w);
-  R[4] = 1.0f - 2.0f * (q.y * q.y + q.w * q.w);
-  R[5] = 2.0f * (q.z * q.w - q.x * q.y);
-  R[6] = 2.0f * (q.y * q.w - q.x * q.z);
-  R[7] = 2.0f * (q.z * q.w + q.x * q.y);
-  R[8] = 1.0f - 2.0f * (q.y * q.y + q.z * q.z);
+// dS/ds divided by S.
+gv scale_log_derivative(gv scale) {
+#if SIGMOID_SCALE
+  return 1.0f - scale;
+#else
+  (void)scale;
+  return (gv)(1.0f);
+#endif
 }
 
-// dL/dq of the unit quaternion q from dL/dR (row-major).
-float4 rotation_gradient(float4 q, const float* g) {
-  float4 out;
-  out.x = 2.0f * (q.y * (g[7] - g[5]) + q.z * (g[2] - g[6]) + q.w * (g[3] - g[1]));
-  out.y = 2.0f * (q.z * (g[1] + g[3]) + q.w * (g[2] + g[6]) + q.x * (g[7] - g[5])) -
-          4.0f * q.y * (g[4] + g[8]);
-  out.z = 2.0f * (q.y * (g[1] + g[3]) + q.w * (g[5] + g[7]) + q.x * (g[2] - g[6])) -
-          4.0f * q.z * (g[0] + g[8]);
-  out.w = 2.0f * (q.y * (g[2] + g[6]) + q.z * (g[5] + g[7]) + q.x * (g[3] - g[1])) -
-          4.0f * q.w * (g[0] + g[4]);
-  return out;
+// Q of a Gaussian; negative when no ray can meet it.
+gv effective_quantile(float quantile, gv opacity) {
+  (void)opacity;
+#if ADAPTIVE_RADIUS
+  return smaller(2.0f * log(opacity / RS_ALPHA_MIN), (gv)(quantile));
+#else
+  return (gv)(quantile);
+#endif
+}
+
+// Rotation matrix (row-major) of a unit quaternion, real part r.
+void rotation_matrix(gv r, gv x, gv y, gv z, gv* R) {
+  R[0] = 1.0f - 2.0f * (y * y + z * z);
+  R[1] = 2.0f * (x * y - r * z);
+  R[2] = 2.0f * (x * z + r * y);
+  R[3] = 2.0f * (x * y + r * z);
+  R[4] = 1.0f - 2.0f * (x * x + z * z);
+  R[5] = 2.0f * (y * z - r * x);
+  R[6] = 2.0f * (x * z - r * y);
+  R[7] = 2.0f * (y * z + r * x);
+  R[8] = 1.0f - 2.0f * (x * x + y * y);
+}
+
+#if VECTOR == 1
+void rotation_of(float4 q, float* R) { rotation_matrix(q.x, q.y, q.z, q.w, R); }
+#endif
+
+// dL/dq of the unit quaternion q (real part first) from dL/dR (row-major).
+void rotation_gradient(const gv* q, const gv* g, gv* out) {
+  out[0] = 2.0f * (q[1] * (g[7] - g[5]) + q[2] * (g[2] - g[6]) + q[3] * (g[3] - g[1]));
+  out[1] = 2.0f * (q[2] * (g[1] + g[3]) + q[3] * (g[2] + g[6]) + q[0] * (g[7] - g[5])) -
+           4.0f * q[1] * (g[4] + g[8]);
+  out[2] = 2.0f * (q[1] * (g[1] + g[3]) + q[3] * (g[5] + g[7]) + q[0] * (g[2] - g[6])) -
+           4.0f * q[2] * (g[0] + g[8]);
+  out[3] = 2.0f * (q[1] * (g[2] + g[6]) + q[2] * (g[5] + g[7]) + q[0] * (g[3] - g[1])) -
+           4.0f * q[3] * (g[0] + g[4]);
 }
 
 #endif

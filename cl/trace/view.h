@@ -1,11 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Gaussian in the axes of one camera: what prepare_view writes into its line and
+// Gaussians in the axes of one camera, one per lane: what prepare_view writes into their lines and
 // finalize_gradients differentiates.
 #ifndef RS_TRACE_VIEW_H
 #define RS_TRACE_VIEW_H
 
 #include "shared/layout.h"
 #include "trace/gaussian.h"
+
+// Evaluated spherical harmonics, and floats kept per Gaussian: constants, so that their loops
+// unroll and the functions above the degree fall away.
+#ifndef SH_DEGREE
+#define SH_DEGREE 0
+#endif
+#ifndef SH_COEFFICIENTS
+#define SH_COEFFICIENTS ((SH_DEGREE + 1) * (SH_DEGREE + 1))
+#endif
+#define RS_SH_FUNCTIONS ((SH_DEGREE + 1) * (SH_DEGREE + 1))
+#define RS_SH_REAL gv
+#include "shared/sh.h"
 
 // Beyond this slope of the mean's direction the projective form loses digits to cancellation; the
 // general form takes over (docs/model.md).
@@ -15,55 +27,56 @@
 #define RS_MIN_RELATIVE_SCALE 1e-7f
 
 typedef struct {
-  float m[3];      // mean, camera axes
-  float axis[9];   // columns r_k of the rotation in camera axes, axis[3 k + j]
-  float scale[3];  // standard deviations, floored
-  float w[3];      // 1 / scale
-  float raw_scale[3];
-  float4 q;  // unit quaternion
-  float q_norm;
-  float opacity;
+  gv m[3];       // mean, camera axes
+  gv offset[3];  // mean minus camera centre, world axes
+  gv axis[9];    // columns r_k of the rotation in camera axes, axis[3 k + j]
+  gv scale[3];   // standard deviations, floored
+  gv w[3];       // 1 / scale
+  gv raw_scale[3];
+  gv q[4];  // unit quaternion
+  gv q_norm;
+  gv opacity;
 } ViewGaussian;
 
-// False when a parameter is not finite.
-bool load_view_gaussian(const uint i,
-                        __global const float* means,
-                        __global const float* quaternions,
-                        __global const float* scales,
-                        __global const float* opacities,
-                        const RsCamera* camera,
-                        ViewGaussian* g) {
-  const float d0 = means[3 * i] - camera->center[0];
-  const float d1 = means[3 * i + 1] - camera->center[1];
-  const float d2 = means[3 * i + 2] - camera->center[2];
+// Loads the Gaussians from number i on; false in lanes where a parameter is not finite.
+gi load_view_gaussian(const size_t i,
+                      __global const float* means,
+                      __global const float* quaternions,
+                      __global const float* scales,
+                      __global const float* opacities,
+                      const RsCamera* camera,
+                      ViewGaussian* g) {
   const float* V = camera->rotation;
-  for (int j = 0; j < 3; ++j) g->m[j] = V[3 * j] * d0 + V[3 * j + 1] * d1 + V[3 * j + 2] * d2;
-  const float4 q = vload4(i, quaternions);
-  g->q_norm = sqrt(dot(q, q));
-  g->q = q / g->q_norm;
-  float R[9];
-  rotation_of(g->q, R);
+  for (int j = 0; j < 3; ++j) g->offset[j] = load_column(means + 3 * i + j, 3) - camera->center[j];
+  for (int j = 0; j < 3; ++j) {
+    g->m[j] = V[3 * j] * g->offset[0] + V[3 * j + 1] * g->offset[1] + V[3 * j + 2] * g->offset[2];
+  }
+  for (int j = 0; j < 4; ++j) g->q[j] = load_column(quaternions + 4 * i + j, 4);
+  g->q_norm = sqrt(g->q[0] * g->q[0] + g->q[1] * g->q[1] + g->q[2] * g->q[2] + g->q[3] * g->q[3]);
+  for (int j = 0; j < 4; ++j) g->q[j] = g->q[j] / g->q_norm;
+  gv R[9];
+  rotation_matrix(g->q[0], g->q[1], g->q[2], g->q[3], R);
   for (int k = 0; k < 3; ++k) {
     for (int j = 0; j < 3; ++j) {
       g->axis[3 * k + j] = V[3 * j] * R[k] + V[3 * j + 1] * R[3 + k] + V[3 * j + 2] * R[6 + k];
     }
   }
-  const float distance = sqrt(g->m[0] * g->m[0] + g->m[1] * g->m[1] + g->m[2] * g->m[2]);
-  const float floor_scale = fmax(RS_MIN_RELATIVE_SCALE * distance, 1e-12f);
-  float sum = distance + g->q_norm;
+  const gv distance = sqrt(g->m[0] * g->m[0] + g->m[1] * g->m[1] + g->m[2] * g->m[2]);
+  const gv floor_scale = larger(RS_MIN_RELATIVE_SCALE * distance, (gv)(1e-12f));
+  gv sum = distance + g->q_norm;
   for (int k = 0; k < 3; ++k) {
-    g->raw_scale[k] = activated_scale(scales[3 * i + k]);
-    g->scale[k] = fmax(g->raw_scale[k], floor_scale);
+    g->raw_scale[k] = activated_scale(load_column(scales + 3 * i + k, 3));
+    g->scale[k] = larger(g->raw_scale[k], floor_scale);
     g->w[k] = 1.0f / g->scale[k];
     sum += g->raw_scale[k];
   }
-  g->opacity = sigmoid(opacities[i]);
-  return isfinite(sum + g->opacity) && g->q_norm > 0.0f;
+  g->opacity = sigmoid(load_column(opacities + i, 1));
+  return (fabs(sum + g->opacity) <= FLT_MAX) & (g->q_norm > 0.0f);
 }
 
-bool is_projective(const ViewGaussian* g) {
-  return g->m[2] > 0.0f && fabs(g->m[0]) <= RS_MAX_SLOPE * g->m[2] &&
-         fabs(g->m[1]) <= RS_MAX_SLOPE * g->m[2];
+gi is_projective(const ViewGaussian* g) {
+  const gv reach = RS_MAX_SLOPE * g->m[2];
+  return (g->m[2] > 0.0f) & (fabs(g->m[0]) <= reach) & (fabs(g->m[1]) <= reach);
 }
 
 #endif

@@ -12,6 +12,7 @@
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
 #include "trace/candidate_lists.hpp"
+#include "trace/gaussian_kernel.hpp"
 #include "trace/packet_shape.hpp"
 
 namespace raysplats {
@@ -22,7 +23,6 @@ using Stream = std::array<std::uint32_t, 2>;
 constexpr std::size_t kLineGradientBytes = 64;
 constexpr std::uint32_t kChunkEntries =
     16;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
-constexpr std::size_t kFinalizeGroup = 64;
 
 std::array<float, 4> background_of(const TraceOptions& options) {
   return {options.background[0], options.background[1], options.background[2], 0.0f};
@@ -287,14 +287,15 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
   pose.ensure(context, with_pose ? 6 * n : 1, "pose gradients");
   BuildOptions build;
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
-      .define("POSE", with_pose ? 1 : 0);
-  Kernel kernel = context.kernel("trace/finalize_gradients.cl", "finalize_gradients", build);
-  kernel.launch(Range::linear(n, kFinalizeGroup), static_cast<std::uint32_t>(n),
-                static_cast<std::uint32_t>(copies), line_gradients, lists.bounds(), lists.lines(),
-                gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
-                gaussians.sh, sh_coefficients(gaussians.sh_degree), gaussians.active_sh_degree,
-                camera, screen_x(), screen_y(), gradients.means, gradients.quaternions,
-                gradients.scales, gradients.opacities, gradients.sh, gradients.screen, pose);
+      .define("POSE", with_pose ? 1 : 0)
+      .define("SH_DEGREE", gaussians.active_sh_degree)
+      .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
+  GaussianKernel kernel(context, "trace/finalize_gradients.cl", "finalize_gradients", build);
+  kernel.launch(n, static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(copies),
+                line_gradients, lists.bounds(), lists.lines(), gaussians.means,
+                gaussians.quaternions, gaussians.scales, gaussians.opacities, gaussians.sh, camera,
+                screen_x(), screen_y(), gradients.means, gradients.quaternions, gradients.scales,
+                gradients.opacities, gradients.sh, gradients.screen, pose);
 }
 
 void CameraTracer::backward(const DeviceGaussians& gaussians,

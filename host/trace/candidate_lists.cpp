@@ -53,13 +53,17 @@ void CandidateLists::require_prepare_kernel(const DeviceGaussians& gaussians,
                                             const TraceOptions& options) {
   const bool sigmoid = gaussians.activation == ScaleActivation::kSigmoid;
   const bool peak = options.hit_order == HitOrder::kPeak;
-  const int variant = (sigmoid ? 1 : 0) | (peak ? 2 : 0) | (options.adaptive_radius ? 4 : 0);
+  const int coefficients = sh_coefficients(gaussians.sh_degree);
+  const int variant = (sigmoid ? 1 : 0) | (peak ? 2 : 0) | (options.adaptive_radius ? 4 : 0) |
+                      gaussians.active_sh_degree << 3 | coefficients << 8;
   if (variant == prepared_variant_) return;
   BuildOptions build;
   build.define("SIGMOID_SCALE", sigmoid ? 1 : 0)
       .define("PEAK_ORDER", peak ? 1 : 0)
-      .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0);
-  prepare_kernel_ = context_->kernel("trace/prepare_view.cl", "prepare_view", build);
+      .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
+      .define("SH_DEGREE", gaussians.active_sh_degree)
+      .define("SH_COEFFICIENTS", coefficients);
+  prepare_kernel_ = GaussianKernel(*context_, "trace/prepare_view.cl", "prepare_view", build);
   BuildOptions lists;
   lists.define("TILE", tile_size_).define("PEAK_ORDER", peak ? 1 : 0);
   fill_kernel_ = context_->kernel("trace/tile_lists.cl", "fill_tiles", lists);
@@ -82,11 +86,9 @@ void CandidateLists::prepare(const DeviceGaussians& gaussians,
   const std::array<float, 4> window{-camera.cx / camera.fx, -camera.cy / camera.fy,
                                     (static_cast<float>(camera.width) - camera.cx) / camera.fx,
                                     (static_cast<float>(camera.height) - camera.cy) / camera.fy};
-  prepare_kernel_.launch(Range::linear(count_, kPrepareGroup), static_cast<std::uint32_t>(count_),
-                         gaussians.means, gaussians.quaternions, gaussians.scales,
-                         gaussians.opacities, gaussians.sh, sh_coefficients(gaussians.sh_degree),
-                         gaussians.active_sh_degree, camera, options.quantile, window, lines_,
-                         bounds_);
+  prepare_kernel_.launch(count_, gaussians.means, gaussians.quaternions, gaussians.scales,
+                         gaussians.opacities, gaussians.sh, camera, options.quantile, window,
+                         lines_, bounds_);
 }
 
 bool CandidateLists::build(const Buffer<RsAabb>& boxes,

@@ -13,6 +13,7 @@
 #include "raysplats/trace_options.hpp"
 #include "shared/layout.h"
 #include "trace/device_gaussians.hpp"
+#include "trace/gaussian_kernel.hpp"
 
 namespace raysplats {
 
@@ -58,7 +59,7 @@ class CandidateLists {
 
   Context* context_;
   int tile_size_;
-  Kernel prepare_kernel_;
+  GaussianKernel prepare_kernel_;
   int prepared_variant_ = -1;
   Kernel count_kernel_;
   Kernel fill_kernel_;

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "trace/gaussian_kernel.hpp"
+
+namespace raysplats {
+namespace {
+
+std::size_t gaussians_per_item(const DeviceInfo& device) {
+  // GPUs run one Gaussian per lane of their own accord.
+  if (device.type != DeviceType::kCpu) return 1;
+  if (device.float_vector_width >= 16) return 16;
+  return device.float_vector_width >= 8 ? 8 : 4;
+}
+
+}  // namespace
+
+GaussianKernel::GaussianKernel(Context& context,
+                               const std::string& file,
+                               const std::string& name,
+                               const BuildOptions& build)
+    : context_(&context),
+      file_(file),
+      name_(name),
+      build_(build),
+      width_(gaussians_per_item(context.device())) {
+  BuildOptions wide = build;
+  wide_ = context.kernel(file, name, wide.define("VECTOR", width_));
+}
+
+Kernel& GaussianKernel::single() {
+  if (width_ == 1) return wide_;
+  if (!single_) {
+    BuildOptions build = build_;
+    single_ = context_->kernel(file_, name_, build.define("VECTOR", 1));
+  }
+  return single_;
+}
+
+}  // namespace raysplats
