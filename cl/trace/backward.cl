@@ -27,19 +27,20 @@
 // folded into one by adding halves, then quarters, and so on: 15 additions for all sums.
 float16 sum_lanes(const fv* v) {
 #if PACKET == 16
-  float16 a[8], b[4], c[2];
-  for (int i = 0; i < 8; ++i)
-    a[i] = (float16)(v[i].lo, v[i + 8].lo) + (float16)(v[i].hi, v[i + 8].hi);
-  for (int i = 0; i < 4; ++i) {
-    b[i] = (float16)(a[i].s0123, a[i + 4].s0123, a[i].s89ab, a[i + 4].s89ab) +
-           (float16)(a[i].s4567, a[i + 4].s4567, a[i].scdef, a[i + 4].scdef);
-  }
-  for (int i = 0; i < 2; ++i) {
-    const float16 x = b[i], y = b[i + 2];
-    c[i] = (float16)(x.s01, y.s01, x.s45, y.s45, x.s89, y.s89, x.scd, y.scd) +
-           (float16)(x.s23, y.s23, x.s67, y.s67, x.sab, y.sab, x.sef, y.sef);
-  }
-  const float16 x = c[0], y = c[1];
+#define RS_HALVES(x, y) ((float16)((x).lo, (y).lo) + (float16)((x).hi, (y).hi))
+#define RS_QUARTERS(x, y)                                  \
+  ((float16)((x).s0123, (y).s0123, (x).s89ab, (y).s89ab) + \
+   (float16)((x).s4567, (y).s4567, (x).scdef, (y).scdef))
+#define RS_PAIRS(x, y)                                                                 \
+  ((float16)((x).s01, (y).s01, (x).s45, (y).s45, (x).s89, (y).s89, (x).scd, (y).scd) + \
+   (float16)((x).s23, (y).s23, (x).s67, (y).s67, (x).sab, (y).sab, (x).sef, (y).sef))
+  const float16 a0 = RS_HALVES(v[0], v[8]), a1 = RS_HALVES(v[1], v[9]);
+  const float16 a2 = RS_HALVES(v[2], v[10]), a3 = RS_HALVES(v[3], v[11]);
+  const float16 a4 = RS_HALVES(v[4], v[12]), a5 = RS_HALVES(v[5], v[13]);
+  const float16 a6 = RS_HALVES(v[6], v[14]), a7 = RS_HALVES(v[7], v[15]);
+  const float16 b0 = RS_QUARTERS(a0, a4), b1 = RS_QUARTERS(a1, a5);
+  const float16 b2 = RS_QUARTERS(a2, a6), b3 = RS_QUARTERS(a3, a7);
+  const float16 x = RS_PAIRS(b0, b2), y = RS_PAIRS(b1, b3);
   return (float16)(x.s0, y.s0, x.s2, y.s2, x.s4, y.s4, x.s6, y.s6, x.s8, y.s8, x.sa, y.sa, x.sc,
                    y.sc, x.se, y.se) +
          (float16)(x.s1, y.s1, x.s3, y.s3, x.s5, y.s5, x.s7, y.s7, x.s9, y.s9, x.sb, y.sb, x.sd,
@@ -225,7 +226,9 @@ void packet_backward(const RsCamera* camera,
       const fv projected = v[13] * p.gR + v[14] * p.gG + v[15] * p.gB + p.gA;
       const fv mine = before * alpha * projected;
       fv farther = behind;
-      for (uint i = 0, slot = rows.head; i < rows.size; ++i, slot = (slot + 1) % WINDOW) {
+      const uint open_end = rows.head + rows.size;
+      for (uint i = rows.head; i < open_end; ++i) {
+        const uint slot = i % WINDOW;
         const iv is_behind = RS_MASK(rows.before[slot] < before);
         farther += select((fv)(0.0f), rows.blended[slot], is_behind);
         rows.behind[slot] += select(mine, (fv)(0.0f), is_behind);

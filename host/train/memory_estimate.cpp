@@ -26,14 +26,13 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   // Parameters, gradients and two moments; while the set changes, one more copy of the moments or
   // the parameters.
   out.gaussians = max_gaussians * (floats * 4 + sh * 2 + 5) * sizeof(float);
-  // Line, gradient line, bounds, box, node, sort keys and values with their second copies.
-  out.tracing = max_gaussians * (2 * sizeof(RsLine) + sizeof(RsViewBounds) + sizeof(RsAabb) +
-                                 sizeof(RsBvhNode) + 40);
+  // Line, gradient line, bounds, box, candidate keys and values with their second copies.
+  out.tracing = max_gaussians * (2 * sizeof(RsLine) + sizeof(RsViewBounds) + sizeof(RsAabb) + 44);
   // Image, gradient, depth and about 12 planes of the loss.
   out.images = std::min(static_cast<std::size_t>(options.image_budget) * kMiB, views * pixels * 4) +
                pixels * 24 * sizeof(float);
   out.hits = std::min(static_cast<std::size_t>(options.memory_budget) * kMiB,
-                      pixels * static_cast<std::size_t>(options.max_hits) * 8);
+                      pixels * static_cast<std::size_t>(options.max_hits) * 12);
   out.largest_buffer = std::max(max_gaussians * sh * sizeof(float), max_gaussians * sizeof(RsLine));
   return out;
 }
