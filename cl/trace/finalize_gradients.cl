@@ -93,15 +93,17 @@ gi sum_copies(__global float* gradients, const size_t copy_floats, const uint co
     gv rows[VECTOR];
 #pragma unroll
     for (uint i = 0; i < VECTOR; ++i) rows[i] = *(__global const gv*)(gradients + 16 * i + c);
+    gv any_lane = 0;  // of single copies: their sum may cancel
     for (uint copy = 1; copy < copies; ++copy) {
       __global const float* p = gradients + copy * copy_floats + c;
 #pragma unroll
-      for (uint i = 0; i < VECTOR; ++i) rows[i] += *(__global const gv*)(p + 16 * i);
+      for (uint i = 0; i < VECTOR; ++i) {
+        const gv part = *(__global const gv*)(p + 16 * i);
+        rows[i] += part;
+        any_lane += fabs(part);
+      }
     }
-    gv any_lane = 0;
-#pragma unroll
-    for (uint i = 0; i < VECTOR; ++i) any_lane += fabs(rows[i]);
-    if (copies > 1 && RS_ANY_GAUSSIAN(any_lane != 0.0f)) {
+    if (RS_ANY_GAUSSIAN(any_lane != 0.0f)) {
 #pragma unroll
       for (uint i = 0; i < VECTOR; ++i) *(__global gv*)(gradients + 16 * i + c) = rows[i];
       for (uint copy = 1; copy < copies; ++copy) {
@@ -173,8 +175,8 @@ __kernel void finalize_gradients(const uint begin,
   const gi general = kind == RS_LINE_GENERAL;
   if (RS_ANY_GAUSSIAN(touched & general)) general_gradient(&g, v, general, &view);
   const gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
-  store_column(touched & projective ? slope : zero, screen + 3 * i, 3);
-  store_column(touched & projective ? v[2] : zero, screen + 3 * i + 1, 3);
+  store_column((touched & projective) ? slope : zero, screen + 3 * i, 3);
+  store_column((touched & projective) ? v[2] : zero, screen + 3 * i + 1, 3);
   store_column(touched ? (gv)(1.0f) : zero, screen + 3 * i + 2, 3);
 
   const float* V = camera.rotation;
@@ -195,7 +197,7 @@ __kernel void finalize_gradients(const uint begin,
   gv colour[3];
   for (int j = 0; j < 3; ++j) {
     const gv value = load_column(lines[i].v + 13 + j, 16);
-    colour[j] = touched & (value > 0.0f) ? v[13 + j] : zero;
+    colour[j] = (touched & (value > 0.0f)) ? v[13 + j] : zero;
   }
   gv basis[RS_SH_FUNCTIONS];
   rs_sh_basis(SH_DEGREE, n[0], n[1], n[2], basis);

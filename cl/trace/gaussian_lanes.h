@@ -17,7 +17,7 @@ typedef int gi;
 typedef gv gv_unaligned;
 #define RS_ANY_GAUSSIAN(mask) ((mask) != 0)
 #define RS_AS_FLOAT(v) as_float(v)
-#define RS_COLUMN(type, p, s) (*(p))
+#define RS_COLUMN(type, p, s) ((p)[0 * (s)])
 #else
 #if VECTOR == 4
 typedef float4 gv;
@@ -55,9 +55,6 @@ gv smaller(gv a, gv b) { return a < b ? a : b; }
 gv load_column(__global const float* p, const uint stride) { return RS_COLUMN(gv, p, stride); }
 
 void store_column(gv value, __global float* p, const uint stride) {
-#if VECTOR == 1
-  *p = value;
-#else
   union {
     gv v;
     float s[VECTOR];
@@ -65,7 +62,6 @@ void store_column(gv value, __global float* p, const uint stride) {
   lanes.v = value;
 #pragma unroll
   for (uint i = 0; i < VECTOR; ++i) p[i * stride] = lanes.s[i];
-#endif
 }
 
 #if VECTOR > 1

@@ -84,9 +84,11 @@ class Buffer {
     return value;
   }
   /// Sets every 32-bit word of all elements to zero.
-  void clear() {
+  void clear() { clear(size_); }
+  /// Of the first `count` elements.
+  void clear(std::size_t count) {
     static_assert(sizeof(T) % 4 == 0);
-    if (size_ > 0) raw_.fill(0, size_ * sizeof(T), 0);
+    if (count > 0) raw_.fill(0, count * sizeof(T), 0);
   }
   void copy_from(const Buffer& source,
                  std::size_t count,

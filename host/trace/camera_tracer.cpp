@@ -95,6 +95,8 @@ struct CameraTracer::Impl {
   std::size_t copies = 1;
   bool private_copies = false;
   Buffer<std::array<float, 16>> line_gradients;
+  // Gaussians and copies of line_gradients when all copies but the first hold zeros.
+  std::array<std::size_t, 2> tidy_copies{};
   Buffer<float> pose;
   GaussianGradients pose_scratch;
 };
@@ -309,14 +311,18 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
   self.saved = statistics();
   self.statistics_saved = true;
   self.choose_gradient_copies(gaussians.count);
-  self.line_gradients.ensure(self.context, self.copies * gaussians.count, "line gradients");
-  self.line_gradients.clear();
+  const std::array<std::size_t, 2> shape{gaussians.count, self.copies};
+  const bool tidy = self.tidy_copies == shape;
+  self.tidy_copies = {};
+  self.line_gradients.ensure(self.context, shape[0] * shape[1], "line gradients");
+  self.line_gradients.clear(tidy ? shape[0] : shape[0] * shape[1]);
   if (self.hits_complete) {
     self.launch_backward(image_gradient, 0, self.lists.tile_rows());
   } else {
     self.backward_rows(gaussians, image_gradient, 0, self.lists.tile_rows());
   }
   self.finalize(gaussians, gradients, false);
+  self.tidy_copies = shape;
 }
 
 CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& gaussians) {

@@ -220,3 +220,34 @@ TEST_CASE("the backward pass gives the same bits every time on a CPU") {
   CHECK(a.sh == b.sh);
   CHECK(a.screen == b.screen);
 }
+
+TEST_CASE("a tracer used again for other views and other counts keeps no gradients of before") {
+  Context context = make_test_context();
+  CameraTracer tracer(context, {});
+  GaussianGradients out;
+  for (const std::size_t count : {300, 300, 90, 700, 90}) {
+    CAPTURE(count);
+    const Gaussians model = reference::random_scene(count, 28, 1);
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+    tracer.update(gaussians);
+    for (const double side : {-3.5, 3.5, -3.0}) {
+      const Camera camera = look_at({0.5, -1.0, side}, {0, 0, 0}, {0, 1, 0}, 70, 60, 80);
+      const std::vector<float> image_gradient = random_image_gradient(70 * 60, 8);
+      Buffer<float> gradient(context, image_gradient.size(), "image gradient");
+      gradient.upload(image_gradient);
+      tracer.forward(gaussians, camera, true);
+      tracer.backward(gaussians, gradient, out);
+      const Host fresh =
+          gradients_on_device(context, model, {}, camera, ScaleActivation::kExp, image_gradient);
+      const auto error = [](const Buffer<float>& got, const std::vector<float>& expected) {
+        return relative_error(got.download(),
+                              std::vector<double>(expected.begin(), expected.end()));
+      };
+      CHECK(error(out.means, fresh.means) < 1e-5);
+      CHECK(error(out.scales, fresh.scales) < 1e-5);
+      CHECK(error(out.opacities, fresh.opacities) < 1e-5);
+      CHECK(error(out.sh, fresh.sh) < 1e-5);
+    }
+  }
+}
