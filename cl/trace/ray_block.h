@@ -60,7 +60,7 @@ RayData ray_data(float8 ray) {
   out.d = ray.s456;
   out.t_min = fmax(ray.s3, 0.0f);
   // Finite, so that an origin on a slab of a zero component gives about 0 and never NaN.
-  out.inverse = clamp(1.0f / out.d, -1e30f, 1e30f);
+  out.inverse = clamp(1.0f / out.d, -1e24f, 1e24f);
   out.shift = out.o * out.inverse;
   out.side[0] = out.inverse.x < 0.0f ? 3 : 0;
   out.side[1] = out.inverse.y < 0.0f ? 4 : 1;

@@ -9,6 +9,7 @@
 // A refit repeats the last two. Hilbert codes by transposed axes: Skilling 2004. Splits by the
 // surface area heuristic: Goldsmith and Salmon 1987, MacDonald and Booth 1990.
 #include "bvh/box.h"
+#include "primitives/prefetch.h"
 #include "trace/gaussian.h"
 #include "trace/ray_block.h"
 
@@ -307,6 +308,17 @@ __kernel void fill_blocks(const uint count,
                           __global float* restrict nodes) {
   const uint block = get_global_id(0);
   if (block >= padded_blocks) return;
+  // The parameters lie anywhere: all are on their way before the first is used.
+  for (uint lane = 0; lane < PACKET && (size_t)block * PACKET + lane < count; ++lane) {
+    const size_t index = order[(size_t)block * PACKET + lane];
+    RS_PREFETCH_READ(boxes + index);
+    RS_PREFETCH_READ(quaternions + 4 * index);
+    RS_PREFETCH_READ(scales + 3 * index);
+    RS_PREFETCH_READ(means + 3 * index);
+    RS_PREFETCH_READ(opacities + index);
+    RS_PREFETCH_READ(sh + index * 3 * sh_coefficients);
+    (void)index;
+  }
   RsBox sum = box_empty();
   for (uint lane = 0; lane < PACKET && (size_t)block * PACKET < count; ++lane) {
     const size_t slot = (size_t)block * PACKET + lane;
