@@ -319,7 +319,15 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
   if (self.hits_complete) {
     self.launch_backward(image_gradient, 0, self.lists.tile_rows());
   } else {
-    self.backward_rows(gaussians, image_gradient, 0, self.lists.tile_rows());
+    // Bands whose hits should fit, so that few are traced only to find that they do not.
+    const std::size_t wanted = self.saved.stream_bytes / self.chunk_bytes();
+    const std::size_t all = self.lists.tile_rows();
+    const auto band = static_cast<std::uint32_t>(
+        std::max<std::size_t>(1, all * self.pool_capacity() * 3 / 4 / wanted));
+    for (std::uint32_t row = 0; row < all; row += band) {
+      self.backward_rows(gaussians, image_gradient, row,
+                         std::min(band, static_cast<std::uint32_t>(all) - row));
+    }
   }
   self.finalize(gaussians, gradients, false);
   self.tidy_copies = shape;
