@@ -7,13 +7,23 @@
 
 namespace raysplats {
 
-/// OpenCV lens distortion, r² = x² + y² in normalised image coordinates.
+/// OpenCV lens distortion. For kOpenCv: r² = x² + y² in normalised image coordinates, k4 unused.
+/// For kFisheye: polynomial k1..k4 of the angle (Kannala and Brandt 2006), p1 and p2 unused.
 struct Distortion {
-  double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0;
-  bool any() const { return k1 != 0 || k2 != 0 || k3 != 0 || p1 != 0 || p2 != 0; }
+  double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0, k4 = 0;
+  bool any() const { return k1 != 0 || k2 != 0 || k3 != 0 || k4 != 0 || p1 != 0 || p2 != 0; }
 };
 
-/// A pinhole camera with a pose. Camera axes are OpenCV's and COLMAP's: x right, y down, z forward;
+/// How pixels become rays. The packet tracer (CameraTracer) knows kPinhole alone.
+enum class CameraModel {
+  kPinhole,
+  kOpenCv,           ///< pinhole with radial and tangential distortion
+  kFisheye,          ///< equidistant with a polynomial of the angle (KB4, OPENCV_FISHEYE)
+  kEquirectangular,  ///< 360 degrees across, 180 down; fx, fy, cx, cy unused
+  kOrthographic,     ///< parallel rays; fx and fy are pixels per world unit
+};
+
+/// A camera with a pose. Camera axes are OpenCV's and COLMAP's: x right, y down, z forward;
 /// the pixel (column i, row j) has its centre at (i + 0.5, j + 0.5).
 struct Camera {
   std::string
@@ -23,6 +33,8 @@ struct Camera {
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
   glm::dmat3 rotation{1.0};               ///< world to camera
   glm::dvec3 translation{0.0};            ///< world to camera: x_cam = rotation * x + translation
+  CameraModel model = CameraModel::kPinhole;
+  Distortion distortion;  ///< of kOpenCv and kFisheye
 
   glm::dvec3 center() const { return -(glm::transpose(rotation) * translation); }
 };

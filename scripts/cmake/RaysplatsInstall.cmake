@@ -13,6 +13,7 @@ install(
           raysplats_primitives
           raysplats_bvh
           raysplats_trace
+          raysplats_light
           raysplats_io
           raysplats_eval
           raysplats_train
