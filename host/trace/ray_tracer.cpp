@@ -7,6 +7,7 @@
 #include <array>
 
 #include "raysplats/error.hpp"
+#include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
 
 namespace raysplats {
@@ -14,14 +15,9 @@ namespace {
 
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kRayBytes = sizeof(Ray) + sizeof(RayResult);
-// Hits that a ray keeps before it blends; private memory is dear on GPUs.
-constexpr int kCpuPending = 256;
-constexpr int kPending = 64;
 // On CPUs a work-item traces several rays one after the other: OpenCL implementations there give
 // every work-item of a group its own private memory, which would not stay in the cache.
 constexpr std::size_t kCpuRaysPerItem = 64;
-// Fewer rays than this share too little for a sort to pay.
-constexpr std::size_t kOrderedRays = 4096;
 static_assert(sizeof(Ray) == 32 && sizeof(RayResult) == 32,
               "kernels read and write eight words a ray");
 
@@ -34,16 +30,12 @@ struct RayTracer::Impl {
       : context(context_in),
         options(options_in),
         tree(context_in, options_in, lanes),
-        sort(context_in) {
-    order = Buffer<std::uint32_t>(context, 1, "ray order");
-  }
+        order(context_in) {}
 
   Context& context;
   TraceOptions options;
   RayTree tree;
-  RadixSort sort;
-  Buffer<std::uint32_t> keys;
-  Buffer<std::uint32_t> order;
+  RayOrder order;
   Buffer<Ray> rays;
   Buffer<RayResult> results;
 };
@@ -62,7 +54,7 @@ void RayTracer::trace(const DeviceGaussians& gaussians,
                       Buffer<RayResult>& results,
                       ColorDirection color_direction) {
   Impl& self = *impl_;
-  if (self.tree.size() != gaussians.count) {
+  if (self.tree.tree().size() != gaussians.count) {
     throw UsageError("RayTracer::update() must follow every change of the Gaussians");
   }
   if (rays.size() < count) {
@@ -72,32 +64,29 @@ void RayTracer::trace(const DeviceGaussians& gaussians,
   if (results.size() < count) results.ensure(self.context, count, "ray results");
   const TraceOptions& options = self.options;
   const bool cpu = self.context.device().type == DeviceType::kCpu;
-  const RayTree& tree = self.tree;
-  const BuildOptions lanes = BuildOptions().define("PACKET", tree.lanes());
-  BuildOptions build = lanes;
-  build.define("PENDING", cpu ? kCpuPending : kPending)
-      .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
-      .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
-  const bool ordered = count >= kOrderedRays && tree.levels() > 0;
-  if (ordered) {
-    self.order.ensure(self.context, count, "ray order");
-    self.keys.ensure(self.context, count, "ray keys");
-    self.context.kernel("trace/ray_order.cl", "ray_keys", lanes)
-        .launch(Range::linear(count, kGroup), rays, u32(count), tree.nodes(), tree.scene_node(),
-                self.keys, self.order);
-    self.sort.sort(self.keys, self.order, count);
-  }
+  const WideTree& tree = self.tree.tree();
+  const bool ordered = self.order.compute(tree, rays, count);
   const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
   const std::array<float, 4> background{options.background[0], options.background[1],
                                         options.background[2], 0.0f};
-  self.context.kernel("trace/rays.cl", "trace_rays", build)
+  self.context
+      .kernel("trace/rays.cl", "trace_rays",
+              ray_walk_build(self.context.device(), options, tree.lanes()))
       .launch(Range::linear((count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup),
               u32(count), u32(rays_per_item), tree.levels(), tree.level_begin(), tree.nodes(),
-              tree.blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
+              self.tree.blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
               gaussians.active_sh_degree, color_direction == ColorDirection::kFromOrigin ? 1 : 0,
               options.quantile, options.min_transmittance, options.max_hits, background, rays,
-              ordered ? 1 : 0, self.order, results);
+              ordered ? 1 : 0, self.order.indices(), results);
 }
+
+void RayTracer::set_background(const std::array<float, 3>& background) {
+  impl_->options.background = background;
+}
+
+const TraceOptions& RayTracer::options() const { return impl_->options; }
+
+const RayTree& RayTracer::tree() const { return impl_->tree; }
 
 std::vector<RayResult> RayTracer::trace(const DeviceGaussians& gaussians,
                                         std::span<const Ray> rays,

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <cstdint>
 
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
@@ -11,80 +11,31 @@
 namespace raysplats {
 namespace {
 
-constexpr const char* kProgram = "trace/ray_tree.cl";
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kNodeVectors = 6;    // RS_NODE_VECTORS
 constexpr std::size_t kBlockVectors = 15;  // RS_BLOCK_VECTORS without ADAPTIVE_RADIUS
-// Gaussians ordered together by the surface area heuristic. Larger groups make a better tree but
-// need more private memory.
-constexpr std::size_t kCpuOrderGroup = 256;
-constexpr std::size_t kOrderGroup = 64;
-constexpr std::size_t kMaxPartials = 512;
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
-std::size_t ceil_div(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
-
 }  // namespace
 
-int ray_lanes(const DeviceInfo& device, int lanes) {
-  if (lanes == 0) {
-    lanes = 4;
-    while (device.type == DeviceType::kCpu && lanes < 16 &&
-           static_cast<std::uint32_t>(2 * lanes) <= device.float_vector_width)
-      lanes *= 2;
-  }
-  if (lanes != 4 && lanes != 8 && lanes != 16) {
-    throw UsageError(
-        fmt::format("Arbitrary rays cannot be traced with {} lanes: choose 4, 8 or 16", lanes));
-  }
-  return lanes;
-}
-
 RayTree::RayTree(Context& context, const TraceOptions& options, int lanes)
-    : context_(&context),
-      options_(options),
-      lanes_(ray_lanes(context.device(), lanes)),
-      sort_(context) {
-  grid_ = Buffer<float>(context, 4, "ray tree grid");
-}
-
-std::size_t RayTree::block_count() const {
-  return ceil_div(count_, static_cast<std::size_t>(lanes_));
-}
+    : context_(&context), options_(options), tree_(context, lanes) {}
 
 void RayTree::build(const DeviceGaussians& gaussians) {
-  count_ = gaussians.count;
-  const auto lanes = static_cast<std::size_t>(lanes_);
-  level_sizes_.clear();
-  std::vector<std::uint32_t> begin{0};
-  std::size_t nodes = 0;
-  for (std::size_t size = block_count(); count_ > 0;) {
-    size = ceil_div(size, lanes);
-    level_sizes_.push_back(size);
-    begin.push_back(u32(nodes));
-    nodes += size;
-    if (size == 1) break;
-  }
-  level_begin_.ensure(*context_, begin.size(), "ray tree levels");
-  level_begin_.upload(begin);
-  scene_node_ = u32(nodes);
-  nodes_.ensure(*context_, (nodes + 1) * kNodeVectors * lanes, "ray tree nodes");
+  if (gaussians.count > 0) compute_boxes(gaussians);
+  tree_.order(boxes_, gaussians.count);
   const std::size_t vectors = kBlockVectors + (options_.adaptive_radius ? 1 : 0);
-  blocks_.ensure(*context_, block_count() * vectors * lanes, "ray blocks");
-  if (count_ == 0) return;
-  compute_boxes(gaussians);
-  sort_along_curve();
+  blocks_.ensure(*context_, tree_.block_count() * vectors * static_cast<std::size_t>(tree_.lanes()),
+                 "ray blocks");
   fill(gaussians);
 }
 
 void RayTree::refit(const DeviceGaussians& gaussians) {
-  if (gaussians.count != count_) {
+  if (gaussians.count != tree_.size()) {
     throw UsageError(fmt::format("A ray tree over {} Gaussians cannot be refitted to {}: build it",
-                                 count_, gaussians.count));
+                                 tree_.size(), gaussians.count));
   }
-  if (count_ == 0) return;
-  compute_boxes(gaussians);
+  if (gaussians.count > 0) compute_boxes(gaussians);
   fill(gaussians);
 }
 
@@ -92,55 +43,22 @@ void RayTree::compute_boxes(const DeviceGaussians& gaussians) {
   GaussianBounds bounds(*context_, gaussians.activation == ScaleActivation::kSigmoid,
                         options_.adaptive_radius);
   bounds.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
-                 count_, options_.quantile, boxes_);
-}
-
-void RayTree::sort_along_curve() {
-  const auto lanes = static_cast<std::size_t>(lanes_);
-  high_.ensure(*context_, count_, "ray tree codes, high words");
-  low_.ensure(*context_, count_, "ray tree codes, low words");
-  order_.ensure(*context_, count_, "ray tree order");
-  const bool cpu = context_->device().type == DeviceType::kCpu;
-  const std::size_t order_group = cpu ? kCpuOrderGroup : kOrderGroup;
-  const BuildOptions build = BuildOptions().define("PACKET", lanes_).define("GROUP", order_group);
-  const std::size_t chunk = std::max<std::size_t>(1, ceil_div(count_, kMaxPartials));
-  const std::size_t chunks = ceil_div(count_, chunk);
-  partials_.ensure(*context_, chunks, "ray tree partial bounds");
-  context_->kernel(kProgram, "bound_centers", build)
-      .launch(Range::linear(chunks, 1), boxes_, partials_, u32(count_), u32(chunk));
-  context_->kernel(kProgram, "finish_grid", build).launch(Range{}, partials_, u32(chunks), grid_);
-  const Range curve = Range::linear(ceil_div(count_, lanes), kGroup);
-  context_->kernel(kProgram, "hilbert_codes", build)
-      .launch(curve, boxes_, grid_, high_, low_, order_, u32(count_));
-  // By both words, the low one first.
-  sort_.sort(low_, order_, count_);
-  context_->kernel(kProgram, "gather_codes", build)
-      .launch(Range::linear(count_, kGroup), high_, order_, low_, u32(count_));
-  sort_.sort(low_, order_, count_);
-  context_->kernel(kProgram, "order_groups", build)
-      .launch(Range::linear(ceil_div(count_, order_group), cpu ? 1 : kGroup), boxes_, order_,
-              u32(count_));
+                 gaussians.count, options_.quantile, boxes_);
 }
 
 void RayTree::fill(const DeviceGaussians& gaussians) {
-  const auto lanes = static_cast<std::size_t>(lanes_);
+  if (gaussians.count == 0) return;
   BuildOptions build;
-  build.define("PACKET", lanes_)
+  build.define("PACKET", tree_.lanes())
       .define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options_.adaptive_radius ? 1 : 0);
-  const std::size_t padded = ceil_div(block_count(), lanes) * lanes;
-  context_->kernel(kProgram, "fill_blocks", build)
-      .launch(Range::linear(padded, kGroup), u32(count_), u32(padded), order_, boxes_,
-              gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
+  const std::size_t padded = tree_.padded_blocks();
+  context_->kernel("trace/gaussian_blocks.cl", "fill_blocks", build)
+      .launch(Range::linear(padded, kGroup), u32(gaussians.count), u32(padded), tree_.slots(),
+              boxes_, gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
               gaussians.sh, sh_coefficients(gaussians.sh_degree), options_.quantile, blocks_,
-              nodes_);
-  Kernel merge = context_->kernel(kProgram, "merge_nodes", build);
-  std::size_t source = 0;
-  for (const std::size_t size : level_sizes_) {
-    merge.launch(Range::linear(ceil_div(size, lanes) * lanes, kGroup), nodes_, u32(source),
-                 u32(size), u32(source + size));
-    source += size;
-  }
+              tree_.nodes());
+  tree_.merge();
 }
 
 }  // namespace raysplats

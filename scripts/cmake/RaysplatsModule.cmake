@@ -22,7 +22,10 @@ function(raysplats_module name)
   set(target raysplats_${name})
   if(NOT sources)
     add_library(${target} INTERFACE)
-    target_include_directories(${target} INTERFACE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/host ${PROJECT_SOURCE_DIR}/cl)
+    set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+    target_include_directories(
+      ${target} INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/host>
+                          $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/cl>)
     target_link_libraries(${target} INTERFACE ${ARG_DEPENDS})
     return()
   endif()

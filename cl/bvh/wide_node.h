@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// The tree that arbitrary rays walk, and one ray against one of its nodes. Vectors run across the
+// PACKET children of a node, not across rays: rays without coherence share no boxes. The tree is
+// implicit: things in `order`, blocks of PACKET consecutive ones, level-1 nodes over PACKET
+// consecutive blocks, and so on up to one root. Wide nodes as slabs per lane: Dammertz et al. 2008,
+// Wald et al. 2008.
+#ifndef RS_BVH_WIDE_NODE_H
+#define RS_BVH_WIDE_NODE_H
+
+#include "bvh/box.h"
+#include "primitives/vector_lanes.h"
+
+// A node: lo.x lo.y lo.z hi.x hi.y hi.z of its children, one vector each. Missing children are
+// empty boxes (lo > hi).
+#define RS_NODE_VECTORS 6
+// A child of every level stays behind: PACKET - 1 per level, and 2^31 things have 15 levels of 4 or
+// 7 of 16.
+#define RS_WIDE_STACK 128
+
+// rs_lane_bits, by the mask registers where the compiler has a word for them.
+#if PACKET == 16 && defined(__AVX512DQ__) && defined(__has_builtin)
+#if __has_builtin(__builtin_ia32_cvtd2mask512)
+#define RS_MASK_REGISTERS 1
+#endif
+#endif
+#ifdef RS_MASK_REGISTERS
+typedef int rs_mask_lanes __attribute__((vector_size(64)));
+#define ray_lane_bits(mask) ((uint)(ushort)__builtin_ia32_cvtd2mask512((rs_mask_lanes)(mask)))
+#else
+#define ray_lane_bits(mask) rs_lane_bits(mask)
+#endif
+
+typedef union {
+  fv v;
+  float s[PACKET];
+} RayLanes;
+
+typedef struct {
+  float3 o, d, inverse;
+  float3 shift;  // o / d
+  float t_min;
+  int side[3];  // vector of the near slab along each axis; the far one is 3 further or 3 before
+} RayData;
+
+RayData ray_data(float8 ray) {
+  RayData out;
+  out.o = ray.s012;
+  out.d = ray.s456;
+  out.t_min = fmax(ray.s3, 0.0f);
+  // Finite, so that an origin on a slab of a zero component gives about 0 and never NaN.
+  out.inverse = clamp(1.0f / out.d, -1e24f, 1e24f);
+  out.shift = out.o * out.inverse;
+  out.side[0] = out.inverse.x < 0.0f ? 3 : 0;
+  out.side[1] = out.inverse.y < 0.0f ? 4 : 1;
+  out.side[2] = out.inverse.z < 0.0f ? 5 : 2;
+  return out;
+}
+
+// Depth of a slab. With RS_EXACT_SLABS it is good to a few units in the last place even far from
+// the world's origin, so that no ray slips between boxes that touch (surfaces need that); the plain
+// form is one operation.
+#ifdef RS_EXACT_SLABS
+#define RS_SLAB(plane, axis) (((plane)-ray->o.axis) * ray->inverse.axis)
+#else
+#define RS_SLAB(plane, axis) ((plane)*ray->inverse.axis - ray->shift.axis)
+#endif
+
+// Children of a node whose boxes the ray crosses within [t_min, t_end], one bit each; *entry their
+// entry depths.
+uint ray_meets_boxes(const RayData* ray, __global const fv* node, float t_end, fv* entry) {
+  const int sx = ray->side[0], sy = ray->side[1], sz = ray->side[2];
+  const fv nx = RS_SLAB(node[sx], x);
+  const fv fx = RS_SLAB(node[3 - sx], x);
+  const fv ny = RS_SLAB(node[sy], y);
+  const fv fy = RS_SLAB(node[5 - sy], y);
+  const fv nz = RS_SLAB(node[sz], z);
+  const fv fz = RS_SLAB(node[7 - sz], z);
+  // Rounding must not lose a grazing box (Ize 2013).
+  const fv near = max(max(nx, ny), max(nz, (fv)(ray->t_min * 0.999999f)));
+  const fv far = min(min(fx, fy), min(fz, (fv)(t_end))) * 1.0000004f;
+  *entry = near;
+  return ray_lane_bits(RS_MASK(near <= far));
+}
+
+// Writes box `lane` of a node.
+void store_child(__global float* nodes, size_t node, uint lane, RsBox box) {
+  __global float* to = nodes + node * (RS_NODE_VECTORS * PACKET) + lane;
+  to[0] = box.lo.x;
+  to[PACKET] = box.lo.y;
+  to[2 * PACKET] = box.lo.z;
+  to[3 * PACKET] = box.hi.x;
+  to[4 * PACKET] = box.hi.y;
+  to[5 * PACKET] = box.hi.z;
+}
+
+#endif

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vectors of PACKET lanes, written once for every width (1 suits GPUs). OpenCL's comparisons yield
+// -1 in vectors and 1 in scalars, hence RS_MASK.
+#ifndef RS_PRIMITIVES_VECTOR_LANES_H
+#define RS_PRIMITIVES_VECTOR_LANES_H
+
+#ifndef PACKET
+#define PACKET 4
+#endif
+
+#if PACKET == 1
+typedef float fv;
+typedef int iv;
+#define RS_MASK(comparison) (-(comparison))
+#define RS_LANE_INDEX (0)
+#define rs_load_float(p) (*(p))
+#define rs_as_int(v) as_int(v)
+#define rs_as_float(v) as_float(v)
+#define rs_to_float(v) ((float)(v))
+#define rs_store_float(p, v) (*(p) = (v))
+#else
+#define RS_MASK(comparison) (comparison)
+#if PACKET == 2
+typedef float2 fv;
+typedef int2 iv;
+#define RS_LANE_INDEX ((iv)(0, 1))
+#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
+#define rs_as_int(v) as_int2(v)
+#define rs_as_float(v) as_float2(v)
+#define rs_to_float(v) convert_float2(v)
+#elif PACKET == 4
+typedef float4 fv;
+typedef int4 iv;
+#define RS_LANE_INDEX ((iv)(0, 1, 2, 3))
+#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
+#define rs_as_int(v) as_int4(v)
+#define rs_as_float(v) as_float4(v)
+#define rs_to_float(v) convert_float4(v)
+#elif PACKET == 8
+typedef float8 fv;
+typedef int8 iv;
+#define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7))
+#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
+#define rs_as_int(v) as_int8(v)
+#define rs_as_float(v) as_float8(v)
+#define rs_to_float(v) convert_float8(v)
+#elif PACKET == 16
+typedef float16 fv;
+typedef int16 iv;
+#define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
+#define rs_as_int(v) as_int16(v)
+#define rs_as_float(v) as_float16(v)
+#define rs_to_float(v) convert_float16(v)
+#endif
+#endif
+
+#if PACKET > 1
+// Some implementations take vload apart into scalars; a vector type of float's alignment stays one
+// load.
+typedef fv rs_unaligned __attribute__((aligned(4)));
+#define rs_store_float(p, v) (*(__global rs_unaligned*)(p) = (v))
+#endif
+
+// Masks hold 0 or -1 in every lane. rs_lane_bits: one bit per lane whose mask is set, lane 0
+// lowest. Compilers with vectors of booleans keep them in mask registers; the plain form gives the
+// same.
+#if PACKET >= 8 && defined(__has_feature)
+#if __has_feature(ext_vector_type_boolean)
+#define RS_BOOLEAN_VECTORS 1
+typedef bool rs_booleans __attribute__((ext_vector_type(PACKET)));
+#if PACKET == 16
+typedef ushort rs_bits;
+#else
+typedef uchar rs_bits;
+#endif
+#endif
+#endif
+
+#ifdef RS_BOOLEAN_VECTORS
+uint rs_lane_bits(iv mask) {
+  union {
+    rs_booleans lanes;
+    rs_bits bits;
+  } view;
+  view.lanes = __builtin_convertvector(mask, rs_booleans);
+  return view.bits;
+}
+#else
+uint rs_lane_bits(iv mask) {
+#if PACKET == 1
+  return mask & 1;
+#else
+  const iv bit = mask & ((iv)(1) << RS_LANE_INDEX);
+#if PACKET == 16
+  const int8 b8 = bit.lo | bit.hi;
+  const int4 b4 = b8.lo | b8.hi;
+#elif PACKET == 8
+  const int4 b4 = bit.lo | bit.hi;
+#elif PACKET == 4
+  const int4 b4 = bit;
+#endif
+#if PACKET == 2
+  return bit.x | bit.y;
+#else
+  const int2 b2 = b4.lo | b4.hi;
+  return b2.x | b2.y;
+#endif
+#endif
+}
+#endif
+
+#ifdef RS_BOOLEAN_VECTORS
+#define rs_any(mask) (rs_lane_bits(mask) != 0)
+#define rs_all(mask) (rs_lane_bits(mask) == (1u << PACKET) - 1u)
+#else
+#define rs_any(mask) any(mask)
+#define rs_all(mask) all(mask)
+#endif
+
+uint rs_lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
+
+// Sum, least and greatest value over the lanes.
+#if PACKET == 1
+float rs_lane_sum(fv v) { return v; }
+float rs_lane_min(fv v) { return v; }
+float rs_lane_max(fv v) { return v; }
+#elif PACKET == 2
+float rs_lane_sum(fv v) { return v.x + v.y; }
+float rs_lane_min(fv v) { return fmin(v.x, v.y); }
+float rs_lane_max(fv v) { return fmax(v.x, v.y); }
+#else
+#if PACKET == 16
+#define RS_FOLD(v, op)                  \
+  const float8 v8 = op((v).lo, (v).hi); \
+  const float4 v4 = op(v8.lo, v8.hi);
+#elif PACKET == 8
+#define RS_FOLD(v, op) const float4 v4 = op((v).lo, (v).hi);
+#else
+#define RS_FOLD(v, op) const float4 v4 = (v);
+#endif
+#define RS_PLUS(a, b) ((a) + (b))
+// Not fmin and fmax, whose rule for NaN costs more than the comparison.
+#define RS_LESSER(a, b) ((a) < (b) ? (a) : (b))
+#define RS_GREATER(a, b) ((a) > (b) ? (a) : (b))
+float rs_lane_sum(fv v) {
+  RS_FOLD(v, RS_PLUS)
+  const float2 v2 = v4.lo + v4.hi;
+  return v2.x + v2.y;
+}
+float rs_lane_min(fv v) {
+  RS_FOLD(v, RS_LESSER)
+  const float2 v2 = RS_LESSER(v4.lo, v4.hi);
+  return RS_LESSER(v2.x, v2.y);
+}
+float rs_lane_max(fv v) {
+  RS_FOLD(v, RS_GREATER)
+  const float2 v2 = RS_GREATER(v4.lo, v4.hi);
+  return RS_GREATER(v2.x, v2.y);
+}
+#endif
+
+// exp(x) for x <= 0 with a relative error below 2e-7 (arguments below -80 count as -80): some
+// OpenCL implementations evaluate the built-in lane by lane. 2^n by exponent arithmetic, 2^f by a
+// polynomial on
+// [-1/2, 1/2] (Taylor of 2^f, degree 6).
+fv rs_exp(fv x) {
+  const fv y = (x > -80.0f ? x : (fv)(-80.0f)) * 1.44269504f;
+  const fv shifted = y + 12582912.0f;  // 1.5 * 2^23: rounds y to an integer in the low bits
+  const fv f = y - (shifted - 12582912.0f);
+  fv p = 1.54035304e-4f * f + 1.33335581e-3f;
+  p = p * f + 9.61812911e-3f;
+  p = p * f + 5.55041087e-2f;
+  p = p * f + 0.240226507f;
+  p = p * f + 0.693147181f;
+  p = p * f + 1.0f;
+  return rs_as_float(rs_as_int(p) + (rs_as_int(shifted) << 23));
+}
+
+#endif
