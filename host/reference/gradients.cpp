@@ -55,7 +55,7 @@ void backward_ray(const RayTrace& ray,
   }
 }
 
-/// dL/dsh of Gaussian i from dL/dcolour; returns dL/d(mean - centre).
+/// Adds dL/dsh of Gaussian i from dL/dcolour; returns dL/d(mean - centre).
 glm::dvec3 color_backward(const Parameters& p,
                           std::size_t i,
                           const glm::dvec3& offset,
@@ -76,7 +76,7 @@ glm::dvec3 color_backward(const Parameters& p,
   for (std::size_t b = 0; b < static_cast<std::size_t>(sh_coefficients(degree)); ++b) {
     for (std::size_t k = 0; k < 3; ++k) {
       const double g = color_gradient[static_cast<int>(k)];
-      out.sh[3 * (i * stride + b) + k] = g * basis[b];
+      out.sh[3 * (i * stride + b) + k] += g * basis[b];
       by_direction += g * p.sh[3 * (i * stride + b) + k] * slopes[b];
     }
   }
@@ -173,6 +173,46 @@ Gradient render_gradient(const Parameters& parameters,
       out.parameters.means[3 * i + static_cast<std::size_t>(k)] = by_mean[k];
     out.parameters.opacities[i] = sums[i].opacity;
     out.center -= by_offset;
+  }
+  return out;
+}
+
+Parameters ray_gradient(const Parameters& parameters,
+                        const TraceOptions& options,
+                        std::span<const RayQuery> rays,
+                        std::span<const double> gradients,
+                        ColorMode color_mode) {
+  if (gradients.size() != 4 * rays.size()) {
+    throw UsageError("the gradients of the rays are not 4 numbers each, pass 4 x rays numbers");
+  }
+  const auto prepared = prepare(parameters, options);
+  Parameters out = parameters.zeros();
+  std::vector<Sums> sums(parameters.size());
+  for (std::size_t n = 0; n < rays.size(); ++n) {
+    const RayQuery& query = rays[n];
+    const RayTrace ray = trace_ray(parameters, prepared, options, query.origin, query.direction,
+                                   query.t_min, query.t_max, color_mode);
+    const double* g = &gradients[4 * n];
+    glm::dvec3 by_origin(0.0);
+    glm::dvec3 by_direction(0.0);
+    backward_ray(ray, prepared, options, query.origin, query.direction,
+                 glm::dvec3(g[0], g[1], g[2]), g[3], sums, by_origin, by_direction);
+    // Every ray sees another colour.
+    const bool from_origin = color_mode == ColorMode::kFromOrigin;
+    for (const Hit& hit : ray.hits) {
+      const std::size_t i = hit.index;
+      const glm::dvec3 towards = from_origin ? prepared[i].mean - query.origin : query.direction;
+      const glm::dvec3 by_offset = color_backward(parameters, i, towards, sums[i].color, out);
+      for (int k = 0; from_origin && k < 3; ++k)
+        out.means[3 * i + static_cast<std::size_t>(k)] += by_offset[k];
+      sums[i].color = glm::dvec3(0.0);
+    }
+  }
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    whitening_backward(parameters, i, prepared[i].whitening, sums[i].whitening, out);
+    const glm::dvec3 by_mean = -glm::transpose(prepared[i].whitening) * sums[i].whitened;
+    for (int k = 0; k < 3; ++k) out.means[3 * i + static_cast<std::size_t>(k)] += by_mean[k];
+    out.opacities[i] = sums[i].opacity;
   }
   return out;
 }

@@ -24,6 +24,22 @@ Gradient render_gradient(const Parameters& parameters,
                          const Camera& camera,
                          std::span<const double> image_gradient);
 
+struct RayQuery {
+  glm::dvec3 origin{0.0};
+  glm::dvec3 direction{0.0, 0.0, 1.0};
+  double t_min = 0.0;
+  double t_max = 0.0;
+};
+
+/// Analytic gradient of a loss over trace_ray() of any rays: `gradients` holds dL/dR, dL/dG, dL/dB,
+/// dL/dalpha of every ray, 4 x rays. A colour's dependence on the direction origin - mean is
+/// included.
+Parameters ray_gradient(const Parameters& parameters,
+                        const TraceOptions& options,
+                        std::span<const RayQuery> rays,
+                        std::span<const double> gradients,
+                        ColorMode color_mode);
+
 /// dL/dq of a quaternion of any positive length from dL/dR of rotation_matrix(q).
 std::array<double, 4> quaternion_gradient(const std::array<double, 4>& quaternion,
                                           const glm::dmat3& rotation_gradient);

@@ -133,7 +133,78 @@ Check scene(std::size_t count, std::uint64_t seed, int degree, ScaleActivation a
   return check;
 }
 
+/// ray_gradient() against central differences over rays of any origins and directions.
+void check_rays(const Check& check, ColorMode mode) {
+  const Parameters& parameters = check.parameters;
+  CounterRng rng(41, 8);
+  std::vector<RayQuery> rays;
+  for (int i = 0; i < 50; ++i) {
+    RayQuery ray;
+    ray.origin = glm::dvec3(rng.normal(), rng.normal(), rng.normal());
+    const glm::dvec3 target = 0.5 * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
+    ray.direction = (target - ray.origin) * std::exp(rng.normal());
+    ray.t_min = i % 3 == 0 ? 0.2 : 0.0;
+    ray.t_max = i % 4 == 0 ? ray.t_min + 1.0 : 1e30;
+    rays.push_back(ray);
+  }
+  struct Traced {
+    std::vector<double> values;       // as a Loss takes them
+    std::vector<std::uint32_t> hits;  // of all rays, which must not change
+  };
+  const auto trace = [&](const Parameters& p) {
+    Traced out;
+    for (const RayQuery& ray : rays) {
+      const RayTrace traced =
+          trace_ray(p, check.options, ray.origin, ray.direction, ray.t_min, ray.t_max, mode);
+      for (int k = 0; k < 3; ++k) out.values.push_back(traced.color[k]);
+      out.values.push_back(traced.alpha);
+      for (const Hit& hit : traced.hits) out.hits.push_back(hit.index);
+      out.hits.push_back(0xffffffffu);
+    }
+    return out;
+  };
+  const Traced at = trace(parameters);
+  REQUIRE(at.hits.size() > rays.size() + 60);
+  const Loss loss(at.values.size(), 18);
+  const Parameters g =
+      ray_gradient(parameters, check.options, rays, loss.gradient(at.values), mode);
+  std::size_t crossed = 0;
+  for (std::size_t i = 0; i < parameters.scalar_count(); ++i) {
+    Parameters plus = parameters, minus = parameters;
+    plus.at(i) += kStep;
+    minus.at(i) -= kStep;
+    const Traced above = trace(plus), below = trace(minus);
+    if (above.hits != at.hits || below.hits != at.hits) {
+      ++crossed;
+      continue;
+    }
+    const double numeric = (loss.value(above.values) - loss.value(below.values)) / (2.0 * kStep);
+    INFO("scalar ", i, ": analytic ", g.at(i), " numeric ", numeric);
+    CHECK(std::abs(g.at(i) - numeric) <= 2e-6 * (std::abs(numeric) + 0.01));
+  }
+  CHECK(crossed == 0);
+}
+
 }  // namespace
+
+TEST_CASE("gradients of arbitrary rays equal finite differences") {
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    for (const ColorMode mode : {ColorMode::kFromOrigin, ColorMode::kAlongRay}) {
+      CAPTURE(static_cast<int>(order));
+      CAPTURE(static_cast<int>(mode));
+      Check check = scene(30, 6, 2, ScaleActivation::kExp);
+      check.options.hit_order = order;
+      check.options.adaptive_radius = order == HitOrder::kPeak;
+      check_rays(check, mode);
+    }
+  }
+  Check check = scene(40, 21, 1, ScaleActivation::kSigmoid);
+  check.options.max_hits = 3;
+  check_rays(check, ColorMode::kAlongRay);
+  CHECK_THROWS_AS(ray_gradient(check.parameters, check.options, std::vector<RayQuery>(2),
+                               std::vector<double>(7), ColorMode::kAlongRay),
+                  UsageError);
+}
 
 TEST_CASE("gradients equal finite differences for both orders, activations and radii") {
   for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
