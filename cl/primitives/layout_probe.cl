@@ -47,5 +47,29 @@ __kernel void layout_probe(__global uint* layout) {
   RS_FIELD(RsCamera, height);
   RS_FIELD(RsCamera, near_depth);
   RS_FIELD(RsCamera, padding);
+
+  RS_PUT(sizeof(RsLensCamera));
+  RS_FIELD(RsLensCamera, rotation);
+  RS_FIELD(RsLensCamera, center);
+  RS_FIELD(RsLensCamera, fx);
+  RS_FIELD(RsLensCamera, fy);
+  RS_FIELD(RsLensCamera, cx);
+  RS_FIELD(RsLensCamera, cy);
+  RS_FIELD(RsLensCamera, k1);
+  RS_FIELD(RsLensCamera, k2);
+  RS_FIELD(RsLensCamera, k3);
+  RS_FIELD(RsLensCamera, k4);
+  RS_FIELD(RsLensCamera, p1);
+  RS_FIELD(RsLensCamera, p2);
+  RS_FIELD(RsLensCamera, limit);
+  RS_FIELD(RsLensCamera, image_limit);
+  RS_FIELD(RsLensCamera, aperture);
+  RS_FIELD(RsLensCamera, focus_distance);
+  RS_FIELD(RsLensCamera, width);
+  RS_FIELD(RsLensCamera, height);
+  RS_FIELD(RsLensCamera, jitter);
+  RS_FIELD(RsLensCamera, sample);
+  RS_FIELD(RsLensCamera, seed_lo);
+  RS_FIELD(RsLensCamera, seed_hi);
   layout[0] = next;
 }

@@ -62,4 +62,27 @@ typedef struct {
 } RsCamera;
 RS_STATIC_ASSERT_SIZE(RsCamera, 80);
 
+// Camera of any model with a lens, and the sample that is taken of each pixel.
+typedef struct {
+  rs_float rotation[9];  // world to camera, row-major
+  rs_float center[3];    // world
+  rs_float fx, fy, cx, cy;
+  rs_float k1, k2, k3, k4, p1, p2;
+  rs_float limit;        // radius (OpenCV) or angle (fisheye) up to which the lens is defined
+  rs_float image_limit;  // its image, in normalised image coordinates
+  rs_float aperture;     // radius of the lens, 0 = none
+  rs_float focus_distance;
+  rs_int width, height;
+  rs_uint jitter;  // 0: the ray goes through the centres of pixel and lens
+  rs_uint sample;
+  rs_uint seed_lo, seed_hi;
+} RsLensCamera;
+RS_STATIC_ASSERT_SIZE(RsLensCamera, 128);
+
+#define RS_CAMERA_PINHOLE 0
+#define RS_CAMERA_OPENCV 1
+#define RS_CAMERA_FISHEYE 2
+#define RS_CAMERA_EQUIRECTANGULAR 3
+#define RS_CAMERA_ORTHOGRAPHIC 4
+
 #endif

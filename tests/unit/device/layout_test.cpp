@@ -46,7 +46,30 @@ TEST_CASE("shared records: sizes and offsets agree between the compilers") {
                                           offsetof(RsCamera, width),
                                           offsetof(RsCamera, height),
                                           offsetof(RsCamera, near_depth),
-                                          offsetof(RsCamera, padding)};
+                                          offsetof(RsCamera, padding),
+                                          sizeof(RsLensCamera),
+                                          offsetof(RsLensCamera, rotation),
+                                          offsetof(RsLensCamera, center),
+                                          offsetof(RsLensCamera, fx),
+                                          offsetof(RsLensCamera, fy),
+                                          offsetof(RsLensCamera, cx),
+                                          offsetof(RsLensCamera, cy),
+                                          offsetof(RsLensCamera, k1),
+                                          offsetof(RsLensCamera, k2),
+                                          offsetof(RsLensCamera, k3),
+                                          offsetof(RsLensCamera, k4),
+                                          offsetof(RsLensCamera, p1),
+                                          offsetof(RsLensCamera, p2),
+                                          offsetof(RsLensCamera, limit),
+                                          offsetof(RsLensCamera, image_limit),
+                                          offsetof(RsLensCamera, aperture),
+                                          offsetof(RsLensCamera, focus_distance),
+                                          offsetof(RsLensCamera, width),
+                                          offsetof(RsLensCamera, height),
+                                          offsetof(RsLensCamera, jitter),
+                                          offsetof(RsLensCamera, sample),
+                                          offsetof(RsLensCamera, seed_lo),
+                                          offsetof(RsLensCamera, seed_hi)};
   Context context(select_device(""));
   Buffer<std::uint32_t> layout(context, 256, "layout");
   layout.clear();

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "trace/camera_rays.hpp"
+
+#include <fmt/format.h>
+
+#include "core/camera_model.hpp"
+#include "raysplats/error.hpp"
+#include "shared/layout.h"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kGroup = 64;
+
+int model_number(CameraModel model) {
+  switch (model) {
+    case CameraModel::kPinhole:
+      return RS_CAMERA_PINHOLE;
+    case CameraModel::kOpenCv:
+      return RS_CAMERA_OPENCV;
+    case CameraModel::kFisheye:
+      return RS_CAMERA_FISHEYE;
+    case CameraModel::kEquirectangular:
+      return RS_CAMERA_EQUIRECTANGULAR;
+    case CameraModel::kOrthographic:
+      return RS_CAMERA_ORTHOGRAPHIC;
+  }
+  return RS_CAMERA_PINHOLE;
+}
+
+RsLensCamera lens_camera(const Camera& camera, const Lens& lens) {
+  RsLensCamera out{};
+  const glm::dvec3 center = camera.center();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      out.rotation[3 * row + column] = static_cast<float>(camera.rotation[column][row]);
+    }
+    out.center[row] = static_cast<float>(center[row]);
+  }
+  const Distortion& d = camera.distortion;
+  out.fx = static_cast<float>(camera.fx);
+  out.fy = static_cast<float>(camera.fy);
+  out.cx = static_cast<float>(camera.cx);
+  out.cy = static_cast<float>(camera.cy);
+  out.k1 = static_cast<float>(d.k1);
+  out.k2 = static_cast<float>(d.k2);
+  out.k3 = static_cast<float>(d.k3);
+  if (camera.model == CameraModel::kFisheye) {
+    out.k4 = static_cast<float>(d.k4);
+  } else {
+    out.p1 = static_cast<float>(d.p1);
+    out.p2 = static_cast<float>(d.p2);
+  }
+  const double limit = lens_limit(camera.model, d);
+  out.limit = static_cast<float>(limit);
+  out.image_limit = static_cast<float>(radial_image(camera.model, d, limit));
+  out.aperture = lens.aperture;
+  out.focus_distance = lens.focus_distance;
+  out.width = camera.width;
+  out.height = camera.height;
+  out.jitter = lens.jitter ? 1 : 0;
+  out.sample = lens.sample;
+  out.seed_lo = static_cast<std::uint32_t>(lens.seed);
+  out.seed_hi = static_cast<std::uint32_t>(lens.seed >> 32);
+  return out;
+}
+
+}  // namespace
+
+void CameraRays::generate(const Camera& camera,
+                          const Lens& lens,
+                          std::size_t first_pixel,
+                          std::size_t count,
+                          Buffer<Ray>& rays) {
+  const std::size_t pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  if (first_pixel > pixels || count > pixels - first_pixel || pixels > UINT32_MAX) {
+    throw UsageError(
+        fmt::format("Rays of the pixels {} to {} cannot be made of a picture of {} x {}: ask for "
+                    "pixels inside of it",
+                    first_pixel, first_pixel + count, camera.width, camera.height));
+  }
+  if (rays.size() < count) rays.ensure(context_, count, "camera rays");
+  context_
+      .kernel("trace/camera_rays.cl", "camera_rays",
+              BuildOptions().define("CAMERA_MODEL", model_number(camera.model)))
+      .launch(Range::linear(count, kGroup), lens_camera(camera, lens),
+              static_cast<std::uint32_t>(first_pixel), static_cast<std::uint32_t>(count), rays);
+}
+
+}  // namespace raysplats

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "device/buffer.hpp"
+#include "device/context.hpp"
+#include "raysplats/camera.hpp"
+#include "trace/ray_tracer.hpp"
+
+namespace raysplats {
+
+/// Which of the rays through a pixel is made.
+struct Lens {
+  std::uint32_t sample = 0;  ///< number of the sample: another one has other random numbers
+  bool jitter = false;       ///< uniform over pixel and lens; false = their centres
+  std::uint64_t seed = 0;
+  float aperture = 0;        ///< radius of the lens, world units; orthographic cameras have none
+  float focus_distance = 1;  ///< depth of what is sharp: along z for kPinhole and kOpenCv, else
+                             ///< along the ray
+};
+
+/// Makes rays of pixels on the device, for every camera model (core/camera_model.hpp has the same
+/// in double precision). Random numbers are functions of (seed, pixel, sample): dimensions 0 and 1
+/// place the ray in its pixel, 2 and 3 on the lens (cl/shared/random.h).
+class CameraRays {
+ public:
+  explicit CameraRays(Context& context) : context_(context) {}
+
+  /// Writes the rays of the pixels [first_pixel, first_pixel + count), numbered row by row, into
+  /// the first of `rays`, which grows when it is smaller: unit directions, t in [0, FLT_MAX]. A
+  /// pixel that sees nothing gets an empty ray (t_max = -1), which RayTracer answers with the
+  /// background. Enqueues and returns. Throws UsageError for pixels outside the picture.
+  void generate(const Camera& camera,
+                const Lens& lens,
+                std::size_t first_pixel,
+                std::size_t count,
+                Buffer<Ray>& rays);
+
+ private:
+  Context& context_;
+};
+
+}  // namespace raysplats
