@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// One ray against a leaf block of the tree over triangles (bvh/wide_node.h): PACKET triangles at
+// once. Watertight: Woop, Benthin and Wald 2013, with edge functions whose signs are right in
+// single precision by the difference of products of Kahan (Jeannerod, Louvet and Muller 2013), so
+// that neighbours always agree about a shared edge.
+#ifndef RS_LIGHT_TRIANGLE_BLOCK_H
+#define RS_LIGHT_TRIANGLE_BLOCK_H
+
+#define RS_EXACT_SLABS
+#include "bvh/wide_node.h"
+#include "shared/light_layout.h"
+
+// A block: x y z of the first, second and third corners, one vector each (NaN in lanes without a
+// triangle), then the indices of the triangles as bits.
+#define RS_TRIANGLE_INDEX 9
+#define RS_TRIANGLE_VECTORS 10
+
+// The ray's axes permuted so that z is the longest, and the shear that makes it (0, 0, 1).
+typedef struct {
+  int x, y, z;
+  float ox, oy, oz;
+  float sx, sy, sz;
+} ShearedRay;
+
+ShearedRay sheared_ray(const RayData* ray) {
+  const float o[3] = {ray->o.x, ray->o.y, ray->o.z};
+  const float d[3] = {ray->d.x, ray->d.y, ray->d.z};
+  ShearedRay out;
+  out.z = fabs(d[0]) > fabs(d[1]) ? (fabs(d[0]) > fabs(d[2]) ? 0 : 2)
+                                  : (fabs(d[1]) > fabs(d[2]) ? 1 : 2);
+  out.x = out.z == 2 ? 0 : out.z + 1;
+  out.y = out.x == 2 ? 0 : out.x + 1;
+  out.ox = o[out.x];
+  out.oy = o[out.y];
+  out.oz = o[out.z];
+  out.sx = d[out.x] / d[out.z];
+  out.sy = d[out.y] / d[out.z];
+  out.sz = 1.0f / d[out.z];
+  return out;
+}
+
+// a b - c d, whose sign is exact.
+fv difference_of_products(fv a, fv b, fv c, fv d) {
+  const fv product = c * d;
+  const fv error = fma(-c, d, product);
+  return fma(a, b, -product) + error;
+}
+
+typedef struct {
+  RayLanes t, u, v;
+} TriangleMeeting;
+
+// Triangles whose plane the ray crosses inside, in (t_min, t_max], one bit each.
+uint ray_meets_triangles(const ShearedRay* ray,
+                         __global const fv* block,
+                         float t_min,
+                         float t_max,
+                         TriangleMeeting* meeting) {
+  const fv az = block[ray->z] - ray->oz;
+  const fv bz = block[3 + ray->z] - ray->oz;
+  const fv cz = block[6 + ray->z] - ray->oz;
+  const fv ax = fma((fv)(-ray->sx), az, block[ray->x] - ray->ox);
+  const fv bx = fma((fv)(-ray->sx), bz, block[3 + ray->x] - ray->ox);
+  const fv cx = fma((fv)(-ray->sx), cz, block[6 + ray->x] - ray->ox);
+  const fv ay = fma((fv)(-ray->sy), az, block[ray->y] - ray->oy);
+  const fv by = fma((fv)(-ray->sy), bz, block[3 + ray->y] - ray->oy);
+  const fv cy = fma((fv)(-ray->sy), cz, block[6 + ray->y] - ray->oy);
+  const fv a = difference_of_products(cx, by, cy, bx);
+  const fv b = difference_of_products(ax, cy, ay, cx);
+  const fv c = difference_of_products(bx, ay, by, ax);
+  const iv front = RS_MASK(a >= 0.0f) & RS_MASK(b >= 0.0f) & RS_MASK(c >= 0.0f);
+  const iv back = RS_MASK(a <= 0.0f) & RS_MASK(b <= 0.0f) & RS_MASK(c <= 0.0f);
+  const iv inside = front | back;
+  if (!rs_any(inside)) return 0;
+  const fv sum = a + b + c;
+  const fv reciprocal = 1.0f / sum;
+  meeting->t.v = (a * az + b * bz + c * cz) * ray->sz * reciprocal;
+  meeting->u.v = b * reciprocal;
+  meeting->v.v = c * reciprocal;
+  return ray_lane_bits(inside & RS_MASK(sum != 0.0f) & RS_MASK(meeting->t.v > t_min) &
+                       RS_MASK(meeting->t.v <= t_max));
+}
+
+int triangle_index(__global const fv* block, uint lane) {
+  return ((__global const int*)(block + RS_TRIANGLE_INDEX))[lane];
+}
+
+#endif

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bvh/wide_tree.hpp"
+#include "device/buffer.hpp"
+#include "device/context.hpp"
+#include "raysplats/scene.hpp"
+#include "shared/light_layout.h"
+#include "trace/ray_tracer.hpp"
+
+namespace raysplats {
+
+/// Traces rays against the triangles of meshes. Triangles are numbered through all meshes in order.
+/// Watertight: a ray through an edge or corner that triangles share meets at least one of them.
+class TriangleTracer {
+ public:
+  /// `lanes` of 4, 8 or 16; 0 chooses by the device (ray_lanes()).
+  explicit TriangleTracer(Context& context, int lanes = 0);
+
+  /// Builds the tree. Degenerate triangles are never met. Throws DataError for a position that is
+  /// not finite and an index out of range.
+  void build(std::span<const Mesh> meshes);
+  std::size_t size() const { return tree_.size(); }
+
+  /// The first triangle of each of the first `count` rays with t in (t_min, t_max], either side; of
+  /// several at the same t the one with the lowest number. Enqueues and returns.
+  void nearest(const Buffer<Ray>& rays, std::size_t count, Buffer<RsSurfaceHit>& hits);
+  /// The same; ray i does not meet the triangle paths[i].skip.
+  void nearest(const Buffer<Ray>& rays,
+               const Buffer<RsPath>& paths,
+               std::size_t count,
+               Buffer<RsSurfaceHit>& hits);
+
+  /// passes[i] = product over the triangles that ray i crosses of 1 - shadow[triangle], without the
+  /// triangle skip[i]; 1 for rays with t_max < t_min. Enqueues and returns.
+  void light_through(const Buffer<Ray>& rays,
+                     const Buffer<std::int32_t>& skip,
+                     const Buffer<float>& shadow,
+                     std::size_t count,
+                     Buffer<float>& passes);
+
+ private:
+  template <class Skip>
+  void launch_nearest(const Buffer<Ray>& rays,
+                      const Skip& skip,
+                      std::uint32_t skip_stride,
+                      std::size_t count,
+                      Buffer<RsSurfaceHit>& hits);
+  Range spread(std::size_t count, std::uint32_t* rays_per_item) const;
+
+  Context* context_;
+  WideTree tree_;
+  Buffer<float> corners_;
+  Buffer<RsAabb> boxes_;
+  Buffer<float> blocks_;
+  Buffer<std::int32_t> no_skip_;
+};
+
+}  // namespace raysplats
