@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/scene_camera.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "core/camera_model.hpp"
+#include "io/toml_table.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+using Source = SceneCamera::Source;
+
+constexpr int kSide = 800;
+constexpr double kFov = 45.0;
+constexpr int kMaxSide = 65536;
+constexpr double kHuge = 1e30;
+constexpr double kMaxFrames = 1e6;
+
+bool is_wide(CameraModel model) { return model == CameraModel::kFisheye; }
+
+void read_lens(io::TomlTable& table, SceneCamera& camera) {
+  table.choice<CameraModel>("model", camera.model,
+                            {{"pinhole", CameraModel::kPinhole},
+                             {"opencv", CameraModel::kOpenCv},
+                             {"fisheye", CameraModel::kFisheye},
+                             {"equirectangular", CameraModel::kEquirectangular},
+                             {"orthographic", CameraModel::kOrthographic}});
+  if (camera.model == CameraModel::kOrthographic) {
+    camera.extent = table.number("extent", 1e-9, kHuge);
+  } else if (camera.model != CameraModel::kEquirectangular) {
+    camera.fov = table.number("fov", 0.1, is_wide(camera.model) ? 359.0 : 179.0);
+    camera.focal = table.number("focal", 1e-3, 1e9);
+    if (camera.fov && camera.focal) {
+      table.fail("focal", "'fov' and 'focal' in [camera] say the same: leave one out");
+    }
+  }
+  if (camera.model != CameraModel::kEquirectangular) {
+    if (const auto point = table.numbers("principal-point", 2)) {
+      camera.principal_point = glm::dvec2((*point)[0], (*point)[1]);
+    }
+  }
+  Distortion& d = camera.distortion;
+  const bool brown = camera.model == CameraModel::kOpenCv;
+  if (!brown && !is_wide(camera.model)) return;
+  for (const auto& [key, target] :
+       {std::pair{"k1", &d.k1}, std::pair{"k2", &d.k2}, std::pair{"k3", &d.k3}}) {
+    table.number(key, *target, -100.0, 100.0);
+  }
+  if (brown) {
+    table.number("p1", d.p1, -100.0, 100.0);
+    table.number("p2", d.p2, -100.0, 100.0);
+  } else {
+    table.number("k4", d.k4, -100.0, 100.0);
+  }
+}
+
+void read_orbit(io::TomlTable table, SceneCamera& camera) {
+  if (const auto frames = table.number("frames", 1, kMaxFrames)) {
+    camera.frames = static_cast<int>(*frames);
+  }
+  camera.elevation = table.number("elevation", -89.9, 89.9);
+  camera.distance = table.number("distance", 1e-9, kHuge);
+  camera.target = table.vector("target");
+  table.finish();
+}
+
+void read_views(io::TomlTable& table, SceneCamera& camera) {
+  table.number("downscale", camera.data_options.downscale, 0.01, 1e4);
+  const auto views = table.numbers("views", 0);
+  if (!views) return;
+  for (const double view : *views) {
+    if (view < 0 || view != std::floor(view) || view > kMaxFrames) {
+      table.fail("views",
+                 fmt::format("'views' in [camera] are numbers of views from 0 on, not {:g}", view));
+    }
+    camera.views.push_back(static_cast<std::size_t>(view));
+  }
+}
+
+void set_lens(Camera& out, const SceneCamera& camera) {
+  out.model = camera.model;
+  out.distortion = camera.distortion;
+  const double half = 0.5 * std::min(out.width, out.height);
+  const double half_angle = 0.5 * camera.fov.value_or(kFov) * std::numbers::pi / 180.0;
+  switch (camera.model) {
+    case CameraModel::kPinhole:
+      out.fx = half / std::tan(half_angle);
+      break;
+    case CameraModel::kOpenCv:
+    case CameraModel::kFisheye: {
+      const double r = is_wide(camera.model) ? half_angle : std::tan(half_angle);
+      if (!camera.focal && r > lens_limit(camera.model, camera.distortion)) {
+        throw UsageError(fmt::format(
+            "{}: the lens of [camera] does not reach a field of view of {:g} degrees, because its "
+            "distortion folds back before: give a smaller 'fov', or 'focal'",
+            camera.place, camera.fov.value_or(kFov)));
+      }
+      out.fx = half / radial_image(camera.model, camera.distortion, r);
+      break;
+    }
+    case CameraModel::kOrthographic:
+      out.fx = 2.0 * half / camera.extent.value_or(1.0);
+      break;
+    case CameraModel::kEquirectangular:
+      out.fx = out.width / (2.0 * std::numbers::pi);
+      break;
+  }
+  if (camera.focal) out.fx = *camera.focal;
+  out.fy = out.fx;
+  if (camera.principal_point) {
+    out.cx = camera.principal_point->x;
+    out.cy = camera.principal_point->y;
+  }
+}
+
+std::vector<Camera> placed(const SceneCamera& camera) {
+  const glm::dvec3 eye = camera.position.value_or(glm::dvec3(0.0));
+  const glm::dvec3 target = camera.target.value_or(glm::dvec3(0.0));
+  const glm::dvec3 up = camera.up.value_or(glm::dvec3(0.0, -1.0, 0.0));
+  const int width = camera.width.value_or(kSide);
+  const int height = camera.height.value_or(kSide);
+  Camera out = look_at(eye, target, glm::normalize(up), width, height, 1.0);
+  set_lens(out, camera);
+  return {out};
+}
+
+std::vector<Camera> views_of(const Dataset& dataset, Split split) {
+  std::vector<Camera> cameras;
+  for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
+  return cameras;
+}
+
+std::vector<Camera> chosen(const SceneCamera& camera, std::vector<Camera> cameras) {
+  if (cameras.empty()) {
+    throw DataError(
+        fmt::format("{}: {} has no views of the chosen split", camera.place, camera.file.string()));
+  }
+  if (!camera.views.empty()) {
+    std::vector<Camera> some;
+    for (const std::size_t view : camera.views) {
+      if (view >= cameras.size()) {
+        throw UsageError(fmt::format("{}: there is no view {} among the {} of {}", camera.place,
+                                     view, cameras.size(), camera.file.string()));
+      }
+      some.push_back(cameras[view]);
+    }
+    cameras = std::move(some);
+  }
+  return cameras;
+}
+
+std::vector<Camera> on_orbit(const SceneCamera& camera, const SceneExtent& extent, int frames) {
+  SceneExtent around = extent;
+  if (camera.target) around.center = *camera.target;
+  OrbitOptions shape;
+  shape.frames = camera.frames.value_or(frames);
+  if (!camera.file.empty()) {
+    const std::vector<Camera> photos =
+        views_of(load_dataset(camera.file, camera.data_options), Split::kAll);
+    shape.up = camera.up.value_or(estimate_up(photos));
+    shape = orbit_like(photos, around.center, shape);
+    shape.width = photos.front().width;
+    shape.height = photos.front().height;
+    shape.fov_degrees = field_of_view(photos.front());
+  }
+  if (camera.up) shape.up = *camera.up;
+  if (camera.width) shape.width = *camera.width;
+  if (camera.height) shape.height = *camera.height;
+  if (camera.elevation) shape.elevation_degrees = *camera.elevation;
+  if (camera.distance) shape.distance = *camera.distance;
+  // The angle places the eye where no distance is given; beyond a pinhole's it would be inside.
+  SceneCamera lens = camera;
+  lens.fov = camera.fov.value_or(shape.fov_degrees);
+  if (camera.focal) {
+    lens.fov = 2.0 * std::atan(0.5 * std::min(shape.width, shape.height) / *camera.focal) * 180.0 /
+               std::numbers::pi;
+  }
+  shape.fov_degrees = std::min(*lens.fov, 90.0);
+  if (camera.model == CameraModel::kOrthographic && !lens.extent) lens.extent = 2.0 * around.radius;
+  std::vector<Camera> cameras = orbit_cameras(around, shape);
+  for (Camera& each : cameras) set_lens(each, lens);
+  return cameras;
+}
+
+}  // namespace
+
+SceneCamera read_scene_camera(io::TomlTable& table) {
+  SceneCamera camera;
+  camera.place = table.place();
+  camera.position = table.vector("position");
+  const auto file = table.existing("file");
+  const auto data = table.existing("data");
+  const bool orbit = table.has("orbit");
+  const int sources = (camera.position ? 1 : 0) + (file ? 1 : 0) + (data || orbit ? 1 : 0);
+  if (sources != 1) {
+    table.fail("",
+               "[camera] has to be one of 'position' with 'target', 'file', 'data' and 'orbit' "
+               "('data' goes with 'orbit')");
+  }
+  if (file) {
+    camera.source = Source::kFile;
+    camera.file = *file;
+    read_views(table, camera);
+  } else if (data && !orbit) {
+    camera.source = Source::kData;
+    camera.file = *data;
+    read_views(table, camera);
+    table.choice<Split>("split", camera.split,
+                        {{"test", Split::kTest}, {"train", Split::kTrain}, {"all", Split::kAll}});
+    table.number("test-every", camera.data_options.test_every, 0, 1e9);
+  } else {
+    if (data) {
+      camera.file = *data;
+      table.number("downscale", camera.data_options.downscale, 0.01, 1e4);
+    }
+    camera.up = table.direction("up");
+    for (auto [key, side] :
+         {std::pair{"width", &camera.width}, std::pair{"height", &camera.height}}) {
+      int value = 0;
+      table.number(key, value, 1, kMaxSide);
+      if (value > 0) *side = value;
+    }
+    read_lens(table, camera);
+    if (orbit) {
+      camera.source = Source::kOrbit;
+      read_orbit(*table.table("orbit"), camera);
+    } else {
+      camera.source = Source::kPlaced;
+      camera.target = table.vector("target");
+      if (!camera.target) table.fail("position", "[camera] has a 'position' but no 'target'");
+      if (*camera.target == *camera.position) {
+        table.fail("target", "'position' and 'target' in [camera] are the same point");
+      }
+      if (camera.model == CameraModel::kOrthographic && !camera.extent) {
+        table.fail("model",
+                   "an orthographic [camera] needs 'extent', the world units along the picture's "
+                   "smaller side");
+      }
+    }
+  }
+  table.finish();
+  return camera;
+}
+
+std::vector<Camera> scene_cameras(const SceneCamera& camera,
+                                  const SceneExtent& extent,
+                                  int frames) {
+  switch (camera.source) {
+    case Source::kPlaced:
+      return placed(camera);
+    case Source::kFile: {
+      std::vector<Camera> cameras = chosen(camera, read_cameras(camera.file));
+      for (Camera& each : cameras) each = downscaled(each, camera.data_options.downscale);
+      return cameras;
+    }
+    case Source::kData:
+      return chosen(camera, views_of(load_dataset(camera.file, camera.data_options), camera.split));
+    case Source::kOrbit:
+      return on_orbit(camera, extent, frames);
+    case Source::kNone:
+      break;
+  }
+  throw UsageError(
+      fmt::format("{} has no camera: add a table [camera], or give --orbit N, --cameras FILE or "
+                  "--data DATASET",
+                  camera.place));
+}
+
+Camera resized(const Camera& camera, std::optional<int> width, std::optional<int> height) {
+  Camera out = camera;
+  const auto matching = [](int side, int from, int to) {
+    return std::max(1, static_cast<int>(std::lround(static_cast<double>(side) * to / from)));
+  };
+  if (!width && !height) return out;
+  out.width = width ? *width : matching(camera.width, camera.height, *height);
+  out.height = height ? *height : matching(camera.height, camera.width, *width);
+  const double scale =
+      static_cast<double>(std::min(out.width, out.height)) / std::min(camera.width, camera.height);
+  out.fx *= scale;
+  out.fy *= scale;
+  out.cx *= static_cast<double>(out.width) / camera.width;
+  out.cy *= static_cast<double>(out.height) / camera.height;
+  return out;
+}
+
+}  // namespace raysplats

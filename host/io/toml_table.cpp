@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/toml_table.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/nearest_name.hpp"
+#include "io/byte_reader.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+constexpr std::uint64_t kMaxBytes = std::uint64_t{16} << 20;
+constexpr double kMaxInt = std::numeric_limits<int>::max();
+
+std::string dashed(std::string_view key) {
+  std::string out(key);
+  std::replace(out.begin(), out.end(), '_', '-');
+  return out;
+}
+
+std::string type_name(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::table:
+      return "a table";
+    case toml::node_type::array:
+      return "a list";
+    case toml::node_type::string:
+      return "a text";
+    case toml::node_type::integer:
+    case toml::node_type::floating_point:
+      return "a number";
+    case toml::node_type::boolean:
+      return "true or false";
+    default:
+      return "a date";
+  }
+}
+
+std::string range(double low, double high) {
+  constexpr double kHuge = 1e30;
+  if (high >= kHuge) return low <= -kHuge ? "" : fmt::format(" of at least {:g}", low);
+  return fmt::format(" from {:g} to {:g}", low, high);
+}
+
+}  // namespace
+
+toml::table read_toml(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_file(path, kMaxBytes);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  try {
+    return toml::parse(text, path.string());
+  } catch (const toml::parse_error& error) {
+    std::string reason(error.description());
+    std::replace(reason.begin(), reason.end(), '\n', ' ');
+    throw UsageError(
+        fmt::format("{}, line {}: {}", path.string(), error.source().begin.line, reason));
+  }
+}
+
+TomlTable::TomlTable(const toml::table& table, const std::filesystem::path& file, std::string name)
+    : table_(&table), file_(&file), name_(std::move(name)) {}
+
+const toml::node* TomlTable::find(std::string_view key) const {
+  const toml::node* found = nullptr;
+  for (const auto& [name, node] : *table_) {
+    if (dashed(name.str()) != key) continue;
+    if (found != nullptr) fail(key, fmt::format("'{}' is there twice, with - and with _", key));
+    found = &node;
+  }
+  return found;
+}
+
+const toml::node* TomlTable::take(std::string_view key) {
+  known_.emplace(key);
+  return find(key);
+}
+
+std::string TomlTable::place(std::string_view key) const {
+  const toml::node* node = nullptr;
+  for (const auto& [name, value] : *table_) {
+    if (node == nullptr && dashed(name.str()) == key) node = &value;
+  }
+  const auto line = (node != nullptr ? node : table_)->source().begin.line;
+  return line == 0 ? file_->string() : fmt::format("{}, line {}", file_->string(), line);
+}
+
+void TomlTable::fail(std::string_view key, const std::string& message) const {
+  throw UsageError(fmt::format("{}: {}", place(key), message));
+}
+
+void TomlTable::not_one_of(std::string_view key,
+                           const std::string& value,
+                           const std::vector<std::string>& names) const {
+  fail(key, fmt::format("'{}' in {} is {}, not '{}'", key, name_, fmt::join(names, " or "), value));
+}
+
+bool TomlTable::has(std::string_view key) { return take(key) != nullptr; }
+
+double TomlTable::finite(const toml::node& node,
+                         std::string_view key,
+                         std::string_view wanted) const {
+  const std::optional<double> value =
+      node.is_number() ? node.value<double>() : std::optional<double>();
+  if (!value) {
+    fail(key, fmt::format("'{}' in {} has to be {}, not {}", key, name_, wanted, type_name(node)));
+  }
+  if (!std::isfinite(*value)) {
+    fail(key, fmt::format("'{}' in {} is not a finite number", key, name_));
+  }
+  return *value;
+}
+
+std::optional<double> TomlTable::number(std::string_view key, double low, double high) {
+  const toml::node* node = take(key);
+  if (node == nullptr) return std::nullopt;
+  const double value = finite(*node, key, "a number");
+  if (value < low || value > high) {
+    fail(key, fmt::format("'{}' in {} has to be a number{}, not {:g}", key, name_, range(low, high),
+                          value));
+  }
+  return value;
+}
+
+void TomlTable::number(std::string_view key, double& target, double low, double high) {
+  target = number(key, low, high).value_or(target);
+}
+
+void TomlTable::number(std::string_view key, float& target, double low, double high) {
+  const std::optional<double> value = number(key, low, high);
+  if (value) target = static_cast<float>(*value);
+}
+
+void TomlTable::number(std::string_view key, int& target, double low, double high) {
+  const std::optional<double> value = number(key, low, std::min(high, kMaxInt));
+  if (!value) return;
+  if (*value != std::floor(*value)) {
+    fail(key, fmt::format("'{}' in {} has to be a whole number, not {:g}", key, name_, *value));
+  }
+  target = static_cast<int>(*value);
+}
+
+void TomlTable::seed(std::string_view key, std::uint64_t& target) {
+  const toml::node* node = take(key);
+  if (node == nullptr) return;
+  const std::optional<std::int64_t> value =
+      node->is_integer() ? node->value<std::int64_t>() : std::optional<std::int64_t>();
+  if (!value || *value < 0) {
+    fail(key, fmt::format("'{}' in {} has to be a whole number of at least 0", key, name_));
+  }
+  target = static_cast<std::uint64_t>(*value);
+}
+
+void TomlTable::flag(std::string_view key, bool& target) {
+  const toml::node* node = take(key);
+  if (node == nullptr) return;
+  if (!node->is_boolean()) {
+    fail(key,
+         fmt::format("'{}' in {} has to be true or false, not {}", key, name_, type_name(*node)));
+  }
+  target = node->value<bool>().value_or(target);
+}
+
+std::optional<std::string> TomlTable::text(std::string_view key) {
+  const toml::node* node = take(key);
+  if (node == nullptr) return std::nullopt;
+  if (!node->is_string()) {
+    fail(key, fmt::format("'{}' in {} has to be a text in quotes, not {}", key, name_,
+                          type_name(*node)));
+  }
+  return node->value<std::string>();
+}
+
+std::optional<std::vector<double>> TomlTable::numbers(std::string_view key, std::size_t count) {
+  const toml::node* node = take(key);
+  if (node == nullptr) return std::nullopt;
+  const std::string wanted =
+      count == 0 ? "a list of numbers" : fmt::format("a list of {} numbers", count);
+  const toml::array* list = node->as_array();
+  if (list == nullptr) {
+    fail(key, fmt::format("'{}' in {} has to be {}, not {}", key, name_, wanted, type_name(*node)));
+  }
+  if (count != 0 && list->size() != count) {
+    fail(key, fmt::format("'{}' in {} has to be {}, not of {}", key, name_, wanted, list->size()));
+  }
+  std::vector<double> out;
+  for (const toml::node& item : *list) out.push_back(finite(item, key, wanted));
+  return out;
+}
+
+std::optional<glm::dvec3> TomlTable::vector(std::string_view key) {
+  const auto values = numbers(key, 3);
+  if (!values) return std::nullopt;
+  return glm::dvec3((*values)[0], (*values)[1], (*values)[2]);
+}
+
+std::optional<glm::dvec3> TomlTable::direction(std::string_view key) {
+  const std::optional<glm::dvec3> value = vector(key);
+  if (value && *value == glm::dvec3(0.0)) {
+    fail(key,
+         fmt::format("'{}' in {} is no direction: one of its numbers must not be 0", key, name_));
+  }
+  return value;
+}
+
+void TomlTable::vector(std::string_view key,
+                       std::array<float, 3>& target,
+                       double low,
+                       double high) {
+  const std::optional<glm::dvec3> value = vector(key);
+  if (!value) return;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double number = (*value)[static_cast<int>(k)];
+    if (number < low || number > high) {
+      fail(key, fmt::format("'{}' in {} has to be three numbers{}, not {:g}", key, name_,
+                            range(low, high), number));
+    }
+    target[k] = static_cast<float>(number);
+  }
+}
+
+std::optional<std::filesystem::path> TomlTable::existing(std::string_view key) {
+  const std::optional<std::string> value = text(key);
+  if (!value) return std::nullopt;
+  if (value->empty()) fail(key, fmt::format("'{}' in {} is empty: name a file", key, name_));
+  const std::filesystem::path path = file_->parent_path() / *value;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    throw DataError(fmt::format("{}: {} does not exist: paths are relative to the scene file",
+                                place(key), path.string()));
+  }
+  return path;
+}
+
+bool TomlTable::is_table(std::string_view key) {
+  const toml::node* node = take(key);
+  return node != nullptr && node->is_table();
+}
+
+bool TomlTable::is_text(std::string_view key) {
+  const toml::node* node = take(key);
+  return node != nullptr && node->is_string();
+}
+
+bool TomlTable::is_number(std::string_view key) {
+  const toml::node* node = take(key);
+  return node != nullptr && node->is_number();
+}
+
+std::optional<TomlTable> TomlTable::table(std::string_view key) {
+  const toml::node* node = take(key);
+  if (node == nullptr) return std::nullopt;
+  if (!node->is_table()) {
+    fail(key, fmt::format("'{}' in {} has to be a table, not {}", key, name_, type_name(*node)));
+  }
+  return TomlTable(*node->as_table(), *file_, fmt::format("[{}]", key));
+}
+
+std::vector<TomlTable> TomlTable::list(std::string_view key) {
+  const toml::node* node = take(key);
+  std::vector<TomlTable> out;
+  if (node == nullptr) return out;
+  const std::string name = fmt::format("[[{}]]", key);
+  const toml::array* items = node->as_array();
+  if (items == nullptr) {
+    fail(key, fmt::format("'{}' has to be written {}, once per {}", key, name, key));
+  }
+  for (const toml::node& item : *items) {
+    if (!item.is_table()) fail(key, fmt::format("{} holds {}", name, type_name(item)));
+    out.emplace_back(*item.as_table(), *file_, name);
+  }
+  return out;
+}
+
+std::vector<std::pair<std::string, std::string>> TomlTable::texts() {
+  std::vector<std::pair<std::string, std::string>> out;
+  for (const auto& [name, node] : *table_) {
+    if (!node.is_string()) {
+      throw UsageError(fmt::format("{}, line {}: '{}' in {} has to be a text in quotes, not {}",
+                                   file_->string(), node.source().begin.line, name.str(), name_,
+                                   type_name(node)));
+    }
+    out.emplace_back(std::string(name.str()), node.value<std::string>().value_or(""));
+  }
+  return out;
+}
+
+void TomlTable::finish() const {
+  for (const auto& [name, node] : *table_) {
+    const std::string key = dashed(name.str());
+    if (known_.contains(key)) continue;
+    throw UsageError(fmt::format("{}, line {}: unknown key '{}' in {}: did you mean '{}'?",
+                                 file_->string(), node.source().begin.line, name.str(), name_,
+                                 nearest_name(key, {known_.begin(), known_.end()})));
+  }
+}
+
+}  // namespace raysplats::io
