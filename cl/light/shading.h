@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// What surfaces do with light, as functions of directions and numbers (docs/light.md).
+#ifndef RS_LIGHT_SHADING_H
+#define RS_LIGHT_SHADING_H
+
+#include "shared/light_layout.h"
+#include "shared/random.h"
+
+#define RS_PI 3.14159265358979f
+
+float3 load3(const float* p) { return (float3)(p[0], p[1], p[2]); }
+
+float max3(float3 v) { return fmax(v.x, fmax(v.y, v.z)); }
+
+float3 reflected(float3 d, float3 n) { return d - 2.0f * dot(d, n) * n; }
+
+// Two unit vectors that make a frame with n (Duff et al. 2017).
+void frame_of(float3 n, float3* a, float3* b) {
+  const float sign = n.z >= 0.0f ? 1.0f : -1.0f;
+  const float s = -1.0f / (sign + n.z);
+  const float t = n.x * n.y * s;
+  *a = (float3)(1.0f + sign * n.x * n.x * s, sign * t, -sign * n.x);
+  *b = (float3)(t, sign + n.y * n.y * s, -n.y);
+}
+
+// Unpolarised reflectance of a dielectric; cosine of the incoming side, ratio = n_in / n_out.
+// *cosine_out belongs to the refracted ray. 1 beyond the critical angle.
+float fresnel(float cosine, float ratio, float* cosine_out) {
+  const float sine2 = ratio * ratio * fmax(1.0f - cosine * cosine, 0.0f);
+  *cosine_out = 0.0f;
+  if (sine2 >= 1.0f) return 1.0f;
+  const float out = sqrt(1.0f - sine2);
+  *cosine_out = out;
+  const float s = (ratio * cosine - out) / (ratio * cosine + out);
+  const float p = (cosine - ratio * out) / (cosine + ratio * out);
+  return 0.5f * (s * s + p * p);
+}
+
+// Exponent of the specular lobe of a roughness.
+float lobe_exponent(float roughness) {
+  const float r = fmax(roughness, 0.02f);
+  return clamp(2.0f / (r * r * r * r) - 2.0f, 1.0f, 1e4f);
+}
+
+// Normal of a microfacet about n, after the GGX distribution of width roughness^2 (Walter et al.
+// 2007).
+float3 ggx_normal(float3 n, float roughness, float u, float v) {
+  const float width = roughness * roughness;
+  const float tangent2 = width * width * u / fmax(1.0f - u, 1e-7f);
+  const float cosine = 1.0f / sqrt(1.0f + tangent2);
+  const float sine = sqrt(fmax(1.0f - cosine * cosine, 0.0f));
+  float3 a, b;
+  frame_of(n, &a, &b);
+  return normalize(sine * cos(2.0f * RS_PI * v) * a + sine * sin(2.0f * RS_PI * v) * b +
+                   cosine * n);
+}
+
+// A direction about n with a density proportional to the cosine.
+float3 cosine_direction(float3 n, float u, float v) {
+  float3 a, b;
+  frame_of(n, &a, &b);
+  const float r = sqrt(u);
+  return normalize(r * cos(2.0f * RS_PI * v) * a + r * sin(2.0f * RS_PI * v) * b +
+                   sqrt(fmax(1.0f - u, 0.0f)) * n);
+}
+
+// The glass bodies that a path is in, the innermost first; entries are material + 1.
+typedef struct {
+  uint body[4];
+} Media;
+
+Media media_of(const RsPath* path) {
+  Media out;
+  out.body[0] = path->media[0] & 0xffffu;
+  out.body[1] = path->media[0] >> 16;
+  out.body[2] = path->media[1] & 0xffffu;
+  out.body[3] = path->media[1] >> 16;
+  return out;
+}
+
+void store_media(const Media* media, RsPath* path) {
+  path->media[0] = media->body[0] | media->body[1] << 16;
+  path->media[1] = media->body[2] | media->body[3] << 16;
+}
+
+// False when four bodies are nested already.
+bool media_enter(Media* media, uint body) {
+  if (media->body[3] != 0) return false;
+  for (int i = 3; i > 0; --i) media->body[i] = media->body[i - 1];
+  media->body[0] = body;
+  return true;
+}
+
+// Takes the innermost entry of `body` out; false when there is none.
+bool media_leave(Media* media, uint body) {
+  int i = 0;
+  while (i < 4 && media->body[i] != body) ++i;
+  if (i == 4) return false;
+  for (; i < 3; ++i) media->body[i] = media->body[i + 1];
+  media->body[3] = 0;
+  return true;
+}
+
+float innermost_ior(const Media* media, __global const RsMaterial* materials) {
+  return media->body[0] != 0 ? materials[media->body[0] - 1].ior : 1.0f;
+}
+
+// A point moved off a surface towards the side of n, so that rays from it do not meet that surface
+// again: by a few units in the last place of the coordinates (after Waechter and Binder 2019).
+float3 off_surface(float3 p, float3 n) {
+  const float reach = fmax(fmax(fabs(p.x), fabs(p.y)), fmax(fabs(p.z), 1e-3f));
+  return p + n * (reach * 1.5e-6f);
+}
+
+float3 environment_light(__global const RsEnvironment* environment, float3 n) {
+  const float basis[9] = {0.282094792f,
+                          0.488602512f * n.y,
+                          0.488602512f * n.z,
+                          0.488602512f * n.x,
+                          1.092548431f * n.x * n.y,
+                          1.092548431f * n.y * n.z,
+                          0.315391565f * (3.0f * n.z * n.z - 1.0f),
+                          1.092548431f * n.x * n.z,
+                          0.546274215f * (n.x * n.x - n.y * n.y)};
+  float3 sum = (float3)(0.0f);
+  for (int k = 0; k < 9; ++k) sum += basis[k] * vload3(k, environment->light);
+  return fmax(sum, (float3)(0.0f));
+}
+
+// Bilinear between texel centres; x repeats, y is held at the borders unless it repeats too.
+float3 bilinear(
+    __global const float* texels, int width, int height, float x, float y, bool repeat_y) {
+  x -= 0.5f;
+  y -= 0.5f;
+  const float fx = floor(x), fy = floor(y);
+  const float ax = x - fx, ay = y - fy;
+  int x0 = (int)fx % width, y0 = (int)fy;
+  if (x0 < 0) x0 += width;
+  const int x1 = x0 + 1 == width ? 0 : x0 + 1;
+  int y1 = y0 + 1;
+  if (repeat_y) {
+    y0 = y0 % height + (y0 % height < 0 ? height : 0);
+    y1 = y0 + 1 == height ? 0 : y0 + 1;
+  } else {
+    y0 = clamp(y0, 0, height - 1);
+    y1 = clamp(y1, 0, height - 1);
+  }
+  const size_t upper = (size_t)y0 * width, lower = (size_t)y1 * width;
+  const float3 a = mix(vload3(upper + x0, texels), vload3(upper + x1, texels), ax);
+  const float3 b = mix(vload3(lower + x0, texels), vload3(lower + x1, texels), ax);
+  return mix(a, b, ay);
+}
+
+float3 environment_color(__global const RsEnvironment* environment,
+                         __global const float* picture,
+                         float3 d) {
+  const float3 color = vload3(0, environment->color);
+  if (environment->width == 0) return color;
+  const float x = dot(d, vload3(0, environment->right));
+  const float y = dot(d, vload3(0, environment->up));
+  const float z = dot(d, vload3(0, environment->forward));
+  const float u = 0.5f + atan2(x, z) * (0.5f / RS_PI);
+  const float v = acos(clamp(y, -1.0f, 1.0f)) / RS_PI;
+  return color * bilinear(picture, environment->width, environment->height, u * environment->width,
+                          v * environment->height, false);
+}
+
+#endif

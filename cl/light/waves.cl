@@ -1,0 +1,483 @@
+// SPDX-License-Identifier: Apache-2.0
+// Paths advance one surface at a time, all of a batch of pixels together. A wave is
+//   begin_paths        once: a path for every camera ray
+//   (nearest_surface)  the next triangle of each ray
+//   load_surfaces      its position, normals, colour; the ray ends there
+//   (trace_rays)       the Gaussians in front of it
+//   shadow_rays, (light_through), (trace_rays), add_light
+//                      per light and sample, for Gaussians and for surfaces
+//   advance            what the path has gained, and the rays that go on: two slots a path
+//   gather_paths       the rays that go on, without gaps
+//   accumulate         what the paths of a pixel have gained
+// Paths of a pixel are neighbours in every wave, so that one work-item can add them in their order:
+// no atomics, the same picture every time. Launch: one work-item per path.
+// Wavefront path tracing: Laine, Karras and Aila 2013.
+#include "light/shading.h"
+
+// Records of eight words as RayTracer defines them.
+#define RS_RESULT_ALPHA s3
+#define RS_RESULT_EXPECTED s4
+#define RS_RESULT_MEDIAN s5
+
+#define RS_FAR 3.402823466e+38f
+
+__kernel void begin_paths(const uint count,
+                          __global const float8* restrict rays,
+                          __global RsPath* restrict paths) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  RsPath path;
+  path.skip = -1;
+  path.pixel = i;
+  path.begin = 0.0f;
+  path.blind = rays[i].s7 < 0.0f;
+  for (int k = 0; k < 3; ++k) path.throughput[k] = 1.0f;
+  path.media[0] = path.media[1] = 0;
+  path.splits = path.lineage = 0;
+  path.padding = 0;
+  paths[i] = path;
+}
+
+// vertices: per triangle three corners of eight floats (position, normal, uv); a flat triangle has
+// zero normals. materials_of: one per triangle.
+__kernel void load_surfaces(const uint count,
+                            __global const RsSurfaceHit* restrict hits,
+                            __global const float* restrict vertices,
+                            __global const uint* restrict materials_of,
+                            __global const RsMaterial* restrict materials,
+                            __global const RsTexture* restrict textures,
+                            __global const float* restrict texels,
+                            __global const RsPath* restrict paths,
+                            __global float8* restrict rays,
+                            __global RsSurface* restrict surfaces) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  const RsSurfaceHit hit = hits[i];
+  float8 ray = rays[i];
+  ray.s3 = paths[i].begin;
+  ray.s7 = paths[i].blind ? -1.0f : (hit.triangle < 0 ? RS_FAR : hit.t);
+  rays[i] = ray;
+  RsSurface s;
+  s.t = hit.t;
+  s.triangle = hit.triangle;
+  s.material = -1;
+  s.entering = 0;
+  for (int k = 0; k < 3; ++k) s.position[k] = s.shading[k] = s.normal[k] = s.color[k] = 0.0f;
+  if (hit.triangle >= 0 && !paths[i].blind) {
+    __global const float* v = vertices + (size_t)hit.triangle * 24;
+    const float3 a = vload3(0, v), b = vload3(0, v + 8), c = vload3(0, v + 16);
+    const float w = 1.0f - hit.u - hit.v;
+    const float3 d = ray.s456;
+    float3 normal = normalize(cross(b - a, c - a));
+    s.entering = dot(d, normal) < 0.0f;
+    if (!s.entering) normal = -normal;
+    float3 shading = w * vload3(0, v + 3) + hit.u * vload3(0, v + 11) + hit.v * vload3(0, v + 19);
+    const float length2 = dot(shading, shading);
+    shading = length2 > 1e-12f ? shading * rsqrt(length2) : normal;
+    if (dot(shading, normal) < 0.0f) shading = -shading;
+    const float3 p = w * a + hit.u * b + hit.v * c;
+    s.material = (int)materials_of[hit.triangle];
+    float3 color = vload3(0, materials[s.material].color);
+    const int texture = materials[s.material].texture;
+    if (texture >= 0) {
+      const RsTexture t = textures[texture];
+      const float x = w * v[6] + hit.u * v[14] + hit.v * v[22];
+      const float y = w * v[7] + hit.u * v[15] + hit.v * v[23];
+      color *= bilinear(texels + 3 * (size_t)t.offset, t.width, t.height, (x - floor(x)) * t.width,
+                        (y - floor(y)) * t.height, true);
+    }
+    vstore3(p, 0, s.position);
+    vstore3(shading, 0, s.shading);
+    vstore3(normal, 0, s.normal);
+    vstore3(color, 0, s.color);
+  }
+  surfaces[i] = s;
+}
+
+// What one light sends to a point: direction and distance to its centre, and its strength there.
+float3 light_at(__global const RsLight* light, float3 p, float3* direction, float* distance) {
+  const float3 color = vload3(0, light->color);
+  if (light->kind == RS_LIGHT_DIRECTIONAL) {
+    *direction = -vload3(0, light->direction);
+    *distance = RS_FAR;
+    return color;
+  }
+  const float3 v = vload3(0, light->position) - p;
+  const float length2 = fmax(dot(v, v), 1e-20f);
+  *distance = sqrt(length2);
+  *direction = v / *distance;
+  return color / length2;
+}
+
+// Depth at which a ray's Gaussians stand for shadows and absorption.
+float gaussian_depth(float8 result, float begin, float end) {
+  const float depth =
+      result.RS_RESULT_ALPHA > 0.5f ? result.RS_RESULT_MEDIAN : result.RS_RESULT_EXPECTED;
+  return clamp(depth, begin, end);
+}
+
+// Rays from what a path meets to sample `light_sample` of light `number`: from its Gaussians
+// (`gaussians` 1) or its surface. Where no light can come, and where no answer matters, the ray is
+// empty (t_max < t_min).
+__kernel void shadow_rays(const uint count,
+                          const RsWave wave,
+                          const int number,
+                          const int light_sample,
+                          const int gaussians,
+                          __global const RsLight* restrict lights,
+                          __global const RsMaterial* restrict materials,
+                          __global const RsPath* restrict paths,
+                          __global const float8* restrict rays,
+                          __global const float8* restrict results,
+                          __global const RsSurface* restrict surfaces,
+                          __global float8* restrict out,
+                          __global int* restrict skip) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  float8 ray = (float8)(0.0f);
+  ray.s5 = 1.0f;
+  ray.s7 = -1.0f;
+  int skipped = -1;
+  float3 p = (float3)(0.0f), direction;
+  float distance, begin = 0.0f;
+  bool wanted = false;
+  if (gaussians) {
+    const float8 result = results[i];
+    const float8 own = rays[i];
+    if (result.RS_RESULT_ALPHA > 1e-3f) {
+      p = own.s012 + gaussian_depth(result, own.s3, own.s7) * own.s456;
+      begin = wave.bias;
+      wanted = max3(light_at(lights + number, p, &direction, &distance)) > 0.0f;
+    }
+  } else {
+    const RsSurface s = surfaces[i];
+    const int kind = s.material >= 0 ? materials[s.material].kind : RS_EMISSIVE;
+    if (kind == RS_DIFFUSE || kind == RS_TRANSPARENT) {
+      p = load3(s.position);
+      const float3 e = light_at(lights + number, p, &direction, &distance);
+      wanted = max3(e) > 0.0f && dot(load3(s.shading), direction) > 0.0f;
+      const float3 normal = load3(s.normal);
+      p = off_surface(p, dot(normal, direction) >= 0.0f ? normal : -normal);
+      skipped = s.triangle;
+    }
+  }
+  if (wanted) {
+    if (lights[number].kind == RS_LIGHT_DIRECTIONAL) {
+      distance = RS_FAR;
+    } else {
+      float3 to = vload3(0, lights[number].position);
+      const float radius = lights[number].radius;
+      if (lights[number].kind == RS_LIGHT_SPHERE && radius > 0.0f) {
+        const uint block = 2 + 2 * wave.light_samples * number + 2 * light_sample + gaussians;
+        const uint lane = (uint)(wave.bounce * 4 + paths[i].lineage) << 16;
+        const RsRandom4 r =
+            rs_random4(wave.seed_lo, wave.seed_hi, wave.first_pixel + paths[i].pixel, wave.sample,
+                       lane + block);
+        float3 a, b;
+        frame_of(direction, &a, &b);
+        const float reach = radius * sqrt(r.x);
+        to += reach * cos(2.0f * RS_PI * r.y) * a + reach * sin(2.0f * RS_PI * r.y) * b;
+      }
+      const float3 v = to - p;
+      distance = length(v);
+      direction = v / fmax(distance, 1e-20f);
+    }
+    ray = (float8)(p, begin, direction, distance);
+  }
+  out[i] = ray;
+  skip[i] = skipped;
+}
+
+// Adds a light sample to gaussian_light (sum of weight V, sum of weights, number of rays) or to
+// surface_light (diffuse rgb, number of rays, specular rgb). passes: light that passes the
+// triangles; blocked: results of the Gaussians on the way; either counts only where its flag is
+// set.
+__kernel void add_light(const uint count,
+                        const RsWave wave,
+                        const int number,
+                        const float share,
+                        const int gaussians,
+                        const int use_triangles,
+                        const int use_gaussians,
+                        __global const RsLight* restrict lights,
+                        __global const RsMaterial* restrict materials,
+                        __global const float8* restrict rays,
+                        __global const float8* restrict results,
+                        __global const RsSurface* restrict surfaces,
+                        __global const float8* restrict shadow,
+                        __global const float* restrict passes,
+                        __global const float8* restrict blocked,
+                        __global float4* restrict gaussian_light,
+                        __global float8* restrict surface_light) {
+  const uint i = get_global_id(0);
+  if (i >= count || shadow[i].s7 < 0.0f) return;
+  float visible = 1.0f;
+  if (use_triangles) visible *= passes[i];
+  if (use_gaussians) visible *= 1.0f - blocked[i].RS_RESULT_ALPHA;
+  visible = 1.0f - wave.strength * (1.0f - visible);
+  float3 direction;
+  float distance;
+  if (gaussians) {
+    const float8 own = rays[i];
+    const float3 p = own.s012 + gaussian_depth(results[i], own.s3, own.s7) * own.s456;
+    const float weight = share * max3(light_at(lights + number, p, &direction, &distance));
+    gaussian_light[i] += (float4)(weight * visible, weight, 1.0f, 0.0f);
+    return;
+  }
+  const RsSurface s = surfaces[i];
+  const float3 e =
+      visible * share * light_at(lights + number, load3(s.position), &direction, &distance);
+  const float3 n = load3(s.shading);
+  const float3 half_vector = normalize(direction - rays[i].s456);
+  const float lobe =
+      pow(fmax(dot(n, half_vector), 0.0f), lobe_exponent(materials[s.material].roughness));
+  const float3 diffuse = e * fmax(dot(n, direction), 0.0f);
+  const float3 specular = e * (materials[s.material].specular * lobe);
+  surface_light[i] += (float8)(diffuse, 1.0f, specular, 0.0f);
+}
+
+// A path behind a surface, with the ray it takes.
+typedef struct {
+  RsPath path;
+  float8 ray;
+} Continuation;
+
+// On in the same direction: the ray keeps its origin and looks behind the surface.
+Continuation straight_on(const RsPath* path, float8 ray, const RsSurface* s, float3 throughput) {
+  Continuation out;
+  out.path = *path;
+  out.path.begin = as_float(as_uint(s->t) + 1u);
+  out.path.skip = s->triangle;
+  vstore3(throughput, 0, out.path.throughput);
+  ray.s3 = s->t;
+  ray.s7 = RS_FAR;
+  out.ray = ray;
+  return out;
+}
+
+Continuation new_direction(const RsPath* path,
+                           const RsSurface* s,
+                           float3 throughput,
+                           float3 direction) {
+  Continuation out;
+  out.path = *path;
+  out.path.begin = 0.0f;
+  out.path.skip = s->triangle;
+  vstore3(throughput, 0, out.path.throughput);
+  const float3 normal = load3(s->normal);
+  const float3 p =
+      off_surface(load3(s->position), dot(direction, normal) >= 0.0f ? normal : -normal);
+  out.ray = (float8)(p, 0.0f, normalize(direction), RS_FAR);
+  return out;
+}
+
+// Both rays of a glass surface, or the one that is left of them; returns how many.
+int pass_glass(const RsPath* path,
+               float8 ray,
+               const RsSurface* s,
+               float3 throughput,
+               __global const RsMaterial* materials,
+               float choice,
+               Continuation* out) {
+  const uint body = (uint)s->material + 1;
+  const float own = materials[s->material].ior;
+  Media after = media_of(path);
+  float before_ior = innermost_ior(&after, materials), after_ior;
+  if (s->entering) {
+    after_ior = own;
+    media_enter(&after, body);
+  } else {
+    if (!media_leave(&after, body)) before_ior = own;
+    after_ior = innermost_ior(&after, materials);
+  }
+  RsPath inside = *path;
+  store_media(&after, &inside);
+  const float3 color = load3(s->color);
+  if (before_ior == after_ior) {
+    out[0] = straight_on(&inside, ray, s, throughput * color);
+    return 1;
+  }
+  const float3 d = ray.s456, normal = load3(s->normal);
+  const float ratio = before_ior / after_ior;
+  float3 n = load3(s->shading);
+  float cosine = -dot(d, n), cosine_out = 0.0f, F = 1.0f;
+  float3 reflection = d, refraction = d;
+  bool sound = false;
+  for (int attempt = 0; attempt < 2 && !sound; ++attempt) {
+    if (attempt == 1) {
+      n = normal;
+      cosine = -dot(d, n);
+    }
+    if (attempt == 0 && cosine <= 0.0f) continue;
+    cosine = clamp(cosine, 0.0f, 1.0f);
+    F = fresnel(cosine, ratio, &cosine_out);
+    reflection = reflected(d, n);
+    refraction = ratio * d + (ratio * cosine - cosine_out) * n;
+    sound = dot(reflection, normal) > 0.0f && (F >= 1.0f || dot(refraction, normal) < 0.0f);
+  }
+  const float3 into = throughput * color;
+  if (F >= 1.0f) {
+    out[0] = new_direction(path, s, throughput, reflection);
+    return 1;
+  }
+  if (path->splits >= 2) {
+    out[0] = choice < F ? new_direction(path, s, throughput, reflection)
+                        : new_direction(&inside, s, into, refraction);
+    return 1;
+  }
+  out[0] = new_direction(path, s, throughput * F, reflection);
+  out[1] = new_direction(&inside, s, into * (1.0f - F), refraction);
+  for (int k = 0; k < 2; ++k) {
+    out[k].path.splits = path->splits + 1;
+    out[k].path.lineage = 2 * path->lineage + (uint)k;
+  }
+  return 2;
+}
+
+// gained[i]: colour that path i has gained, and the share of its light that left the scene.
+// tallies[i]: shadow rays, whether max_hits stopped the ray, rays that max_bounces ended.
+// counts[i]: rays that go on, in the slots 2 i and 2 i + 1.
+__kernel void advance(const uint count,
+                      const RsWave wave,
+                      __global const RsMaterial* restrict materials,
+                      __global const RsEnvironment* restrict environment,
+                      __global const float* restrict picture,
+                      __global const RsPath* restrict paths,
+                      __global const float8* restrict rays,
+                      __global const float8* restrict results,
+                      __global const RsSurface* restrict surfaces,
+                      __global const float4* restrict gaussian_light,
+                      __global const float8* restrict surface_light,
+                      __global float4* restrict gained,
+                      __global uint* restrict counts,
+                      __global RsPath* restrict next_paths,
+                      __global float8* restrict next_rays,
+                      __global uint4* restrict tallies) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  const RsPath path = paths[i];
+  counts[i] = 0;
+  tallies[i] = (uint4)(0);
+  if (path.blind) {
+    gained[i] = (float4)(0.0f, 0.0f, 0.0f, 1.0f);
+    return;
+  }
+  const float8 ray = rays[i];
+  const float8 result = results[i];
+  const RsSurface s = surfaces[i];
+  const float4 light = gaussian_light[i];
+  const float8 direct = surface_light[i];
+  uint4 tally = (uint4)((uint)light.z + (uint)direct.s3, as_uint(result.s7), 0, 0);
+  float3 throughput = load3(path.throughput);
+  float3 to_gaussians = throughput;
+  if (path.media[0] & 0xffffu) {
+    const float3 sigma = vload3(0, materials[(path.media[0] & 0xffffu) - 1].absorption);
+    const float depth = gaussian_depth(result, ray.s3, ray.s7);
+    // Nothing is left after an infinite way, but clear glass stays clear.
+    const float3 way = fmin((float3)(ray.s7 - ray.s3), (float3)(1e30f));
+    to_gaussians *= exp(-sigma * (depth - ray.s3));
+    throughput *= exp(-sigma * way);
+  }
+  const float shade = light.y > 0.0f ? light.x / light.y : 1.0f;
+  float3 sum = to_gaussians * shade * result.s012;
+  throughput *= 1.0f - result.RS_RESULT_ALPHA;
+  if (s.material < 0) {
+    sum += throughput * environment_color(environment, picture, ray.s456);
+    gained[i] = (float4)(sum, (throughput.x + throughput.y + throughput.z) / 3.0f);
+    tallies[i] = tally;
+    return;
+  }
+  __global const RsMaterial* material = materials + s.material;
+  const int kind = material->kind;
+  const float3 color = load3(s.color), n = load3(s.shading), normal = load3(s.normal);
+  sum += throughput * vload3(0, material->emission);
+  const uint block = (uint)(wave.bounce * 4 + path.lineage) << 16 | 1u;
+  const RsRandom4 random =
+      rs_random4(wave.seed_lo, wave.seed_hi, wave.first_pixel + path.pixel, wave.sample, block);
+  Continuation on[2];
+  int ways = 0;
+  if (kind == RS_DIFFUSE || kind == RS_TRANSPARENT) {
+    float3 around = direct.s012;
+    if (!wave.indirect || kind == RS_TRANSPARENT) {
+      around += load3(wave.ambient) + environment_light(environment, n);
+    }
+    const float weight = kind == RS_TRANSPARENT ? material->opacity : 1.0f;
+    sum += throughput * weight * (color * around + direct.s456);
+    if (kind == RS_TRANSPARENT) {
+      on[0] = straight_on(&path, ray, &s, throughput * (1.0f - weight));
+      ways = 1;
+    } else if (wave.indirect) {
+      const float3 direction = cosine_direction(n, random.x, random.y);
+      on[0] = new_direction(&path, &s, throughput * color, direction);
+      ways = dot(direction, normal) > 0.0f ? 1 : 0;
+    }
+  } else if (kind == RS_MIRROR) {
+    float3 facet = n;
+    if (material->roughness > 0.0f && wave.samples > 1) {
+      facet = ggx_normal(n, material->roughness, random.x, random.y);
+    }
+    float3 direction = reflected(ray.s456, facet);
+    if (dot(direction, normal) <= 0.0f) direction = reflected(ray.s456, normal);
+    on[0] = new_direction(&path, &s, throughput * color, direction);
+    ways = 1;
+  } else if (kind == RS_GLASS) {
+    ways = pass_glass(&path, ray, &s, throughput, materials, random.z, on);
+  }
+  uint kept = 0;
+  for (int k = 0; k < ways; ++k) {
+    if (max3(load3(on[k].path.throughput)) < wave.min_throughput) continue;
+    if (wave.bounce + 1 >= wave.max_bounces) {
+      ++tally.z;
+      continue;
+    }
+    next_paths[2 * (size_t)i + kept] = on[k].path;
+    next_rays[2 * (size_t)i + kept] = on[k].ray;
+    ++kept;
+  }
+  counts[i] = kept;
+  gained[i] = (float4)(sum, 0.0f);
+  tallies[i] = tally;
+}
+
+// offsets: exclusive sums of the counts, and their total behind them.
+__kernel void gather_paths(const uint count,
+                           __global const uint* restrict offsets,
+                           __global const RsPath* restrict next_paths,
+                           __global const float8* restrict next_rays,
+                           __global RsPath* restrict paths,
+                           __global float8* restrict rays) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  const uint first = offsets[i], last = offsets[i + 1];
+  for (uint k = first; k < last; ++k) {
+    paths[k] = next_paths[2 * (size_t)i + (k - first)];
+    rays[k] = next_rays[2 * (size_t)i + (k - first)];
+  }
+}
+
+// The first path of every pixel adds what all paths of the pixel gained to sums (rgb, share that
+// left the scene).
+__kernel void accumulate(const uint count,
+                         __global const RsPath* restrict paths,
+                         __global const float4* restrict gained,
+                         __global float4* restrict sums) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  const uint pixel = paths[i].pixel;
+  if (i > 0 && paths[i - 1].pixel == pixel) return;
+  float4 sum = sums[pixel];
+  for (uint k = i; k < count && paths[k].pixel == pixel; ++k) sum += gained[k];
+  sums[pixel] = sum;
+}
+
+// partials[g] = sum of chunk g of the tallies. Launch: one work-item per chunk.
+__kernel void sum_tallies(const uint count,
+                          const uint chunk,
+                          __global const uint4* restrict tallies,
+                          __global uint4* restrict partials) {
+  const uint begin = min((uint)get_global_id(0) * chunk, count);
+  const uint end = min(begin + chunk, count);
+  uint4 sum = (uint4)(0);
+  for (uint i = begin; i < end; ++i) sum += tallies[i];
+  partials[get_global_id(0)] = sum;
+}

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "light/environment.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+#include <numbers>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+struct Frame {
+  glm::dvec3 right, up, forward;
+};
+
+Frame frame_of(const Environment& environment) {
+  Frame frame;
+  frame.up = {environment.up[0], environment.up[1], environment.up[2]};
+  if (!(glm::length(frame.up) > 0)) {
+    throw UsageError("The environment's up direction is zero: give another");
+  }
+  frame.up = glm::normalize(frame.up);
+  glm::dvec3 forward{0, 0, 1};
+  if (std::abs(frame.up.z) > 1 - 1e-6) forward = {1, 0, 0};
+  forward = glm::normalize(forward - frame.up * glm::dot(frame.up, forward));
+  const double angle = static_cast<double>(environment.rotation) * kPi / 180;
+  frame.forward = forward * std::cos(angle) + glm::cross(frame.up, forward) * std::sin(angle);
+  frame.right = glm::cross(frame.forward, frame.up);
+  return frame;
+}
+
+std::array<double, 9> basis(const glm::dvec3& n) {
+  return {0.282094792,
+          0.488602512 * n.y,
+          0.488602512 * n.z,
+          0.488602512 * n.x,
+          1.092548431 * n.x * n.y,
+          1.092548431 * n.y * n.z,
+          0.315391565 * (3 * n.z * n.z - 1),
+          1.092548431 * n.x * n.z,
+          0.546274215 * (n.x * n.x - n.y * n.y)};
+}
+
+// Coefficients of the cosine-weighted mean over the hemisphere: those of the radiance times 1, 2/3
+// and 1/4 by band.
+std::array<double, 27> light_coefficients(const Environment& environment, const Frame& frame) {
+  std::array<double, 27> sums{};
+  const auto add = [&](const glm::dvec3& direction, const glm::dvec3& color, double solid_angle) {
+    const std::array<double, 9> b = basis(direction);
+    for (std::size_t k = 0; k < 9; ++k) {
+      const double band = k == 0 ? 1.0 : (k < 4 ? 2.0 / 3.0 : 0.25);
+      for (std::size_t c = 0; c < 3; ++c) {
+        sums[3 * k + c] += band * b[k] * color[static_cast<int>(c)] * solid_angle *
+                           static_cast<double>(environment.color[c]);
+      }
+    }
+  };
+  const Image& image = environment.equirect;
+  if (image.pixels() == 0) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      sums[c] = static_cast<double>(environment.color[c]) / 0.282094792;
+    }
+    return sums;
+  }
+  for (int y = 0; y < image.height; ++y) {
+    const double top = kPi * y / image.height, bottom = kPi * (y + 1) / image.height;
+    const double solid_angle = 2 * kPi / image.width * (std::cos(top) - std::cos(bottom));
+    const double polar = 0.5 * (top + bottom);
+    for (int x = 0; x < image.width; ++x) {
+      const double around = 2 * kPi * ((x + 0.5) / image.width - 0.5);
+      const glm::dvec3 direction =
+          std::sin(polar) * (std::sin(around) * frame.right + std::cos(around) * frame.forward) +
+          std::cos(polar) * frame.up;
+      add(direction, {image.at(x, y, 0), image.at(x, y, 1), image.at(x, y, 2)}, solid_angle);
+    }
+  }
+  return sums;
+}
+
+}  // namespace
+
+RsEnvironment environment_record(const Environment& environment) {
+  const Image& image = environment.equirect;
+  if (image.pixels() > 0 && image.channels != 3) {
+    throw UsageError("The environment's picture must have three channels");
+  }
+  const Frame frame = frame_of(environment);
+  RsEnvironment out{};
+  out.width = image.pixels() > 0 ? image.width : 0;
+  out.height = image.pixels() > 0 ? image.height : 0;
+  for (int k = 0; k < 3; ++k) {
+    out.color[k] = environment.color[static_cast<std::size_t>(k)];
+    out.right[k] = static_cast<float>(frame.right[k]);
+    out.up[k] = static_cast<float>(frame.up[k]);
+    out.forward[k] = static_cast<float>(frame.forward[k]);
+  }
+  const std::array<double, 27> light = light_coefficients(environment, frame);
+  for (std::size_t k = 0; k < light.size(); ++k) out.light[k] = static_cast<float>(light[k]);
+  return out;
+}
+
+}  // namespace raysplats

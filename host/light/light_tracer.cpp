@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "light/light_tracer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "light/surface_store.hpp"
+#include "primitives/scan.hpp"
+#include "raysplats/error.hpp"
+#include "trace/camera_rays.hpp"
+#include "trace/ray_tracer.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr const char* kProgram = "light/waves.cl";
+constexpr std::size_t kGroup = 64;
+constexpr std::size_t kTallyChunk = 1024;
+// What a path takes on the device, and how many a pixel can have at once: two glass surfaces that
+// both reflect and refract.
+constexpr std::size_t kPathBytes = 512;
+constexpr std::size_t kPathsPerPixel = 4;
+constexpr std::size_t kMaxBatch = std::size_t{1} << 20;
+
+std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
+
+TraceOptions without_background(TraceOptions options) {
+  options.background = {0, 0, 0};
+  return options;
+}
+
+void check(const RenderSettings& s) {
+  const bool sound = s.samples >= 1 && s.max_bounces >= 1 && s.min_throughput >= 0 &&
+                     s.light_samples >= 1 && s.light_samples <= 1024 && s.aperture >= 0 &&
+                     s.bias >= 0 && s.shadows.strength >= 0 && s.shadows.strength <= 1 &&
+                     (s.aperture == 0 || s.focus_distance > 0);
+  if (!sound) {
+    throw UsageError(
+        "Render settings out of range: samples, max-bounces and light-samples (to 1024) are at "
+        "least 1, aperture, bias and min-throughput not negative, the focus distance positive and "
+        "the shadows' strength in [0, 1]");
+  }
+}
+
+// A thousandth of the diagonal of the box around means and vertices.
+float default_bias(const Gaussians& gaussians, const std::vector<Mesh>& meshes) {
+  std::array<float, 3> lo, hi;
+  lo.fill(std::numeric_limits<float>::max());
+  hi.fill(std::numeric_limits<float>::lowest());
+  const auto add = [&](const std::vector<float>& points) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      lo[i % 3] = std::min(lo[i % 3], points[i]);
+      hi[i % 3] = std::max(hi[i % 3], points[i]);
+    }
+  };
+  add(gaussians.means);
+  for (const Mesh& mesh : meshes) add(mesh.positions);
+  double sum = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double extent = std::max(0.0, static_cast<double>(hi[k]) - static_cast<double>(lo[k]));
+    sum += extent * extent;
+  }
+  return static_cast<float>(1e-3 * std::sqrt(sum));
+}
+
+}  // namespace
+
+struct LightTracer::Impl {
+  Impl(Context& context_in, const Scene& scene)
+      : context(context_in),
+        settings((check(scene.render), scene.render)),
+        options(without_background(scene.trace)),
+        gaussians(DeviceGaussians::upload(context_in, scene.gaussians, ScaleActivation::kExp)),
+        tracer(context_in, options),
+        surfaces(context_in, scene),
+        lights(scene.lights),
+        camera_rays(context_in),
+        scan(context_in) {
+    if (settings.bias == 0) settings.bias = default_bias(scene.gaussians, scene.meshes);
+    tracer.update(gaussians);
+  }
+
+  Kernel kernel(const char* name) { return context.kernel(kProgram, name); }
+  std::size_t batch_size() const;
+  RsWave wave_record(std::uint32_t sample, std::size_t first_pixel) const;
+  void trace_sample(const Camera& camera,
+                    std::uint32_t sample,
+                    std::size_t first,
+                    std::size_t count);
+  std::size_t trace_wave(const RsWave& wave, std::size_t count);
+  void gather_light(const RsWave& wave, std::size_t count, bool from_gaussians);
+  void add_tallies(std::size_t count);
+
+  Context& context;
+  RenderSettings settings;
+  TraceOptions options;
+  DeviceGaussians gaussians;
+  RayTracer tracer;
+  SurfaceStore surfaces;
+  std::vector<Light> lights;
+  CameraRays camera_rays;
+  Scan scan;
+  Statistics statistics;
+
+  Buffer<Ray> rays, next_rays, shadow_rays;
+  Buffer<RsPath> paths, next_paths;
+  Buffer<RsSurfaceHit> hits;
+  Buffer<RsSurface> met;
+  Buffer<RayResult> results, blocked;
+  Buffer<std::int32_t> skip;
+  Buffer<float> passes;
+  Buffer<std::array<float, 4>> gaussian_light;
+  Buffer<std::array<float, 8>> surface_light;
+  Buffer<std::array<float, 4>> gained, sums;
+  Buffer<std::uint32_t> offsets;
+  Buffer<std::array<std::uint32_t, 4>> tallies, partials;
+};
+
+std::size_t LightTracer::Impl::batch_size() const {
+  const std::size_t room = std::min(options.memory_budget / 2 / kPathBytes,
+                                    context.device().max_allocation / sizeof(RsSurface) / 2);
+  return std::clamp<std::size_t>(room / kPathsPerPixel, kGroup, kMaxBatch);
+}
+
+RsWave LightTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pixel) const {
+  RsWave wave{};
+  wave.seed_lo = static_cast<std::uint32_t>(settings.seed);
+  wave.seed_hi = static_cast<std::uint32_t>(settings.seed >> 32);
+  wave.sample = sample;
+  wave.samples = static_cast<std::uint32_t>(settings.samples);
+  wave.max_bounces = settings.max_bounces;
+  wave.min_throughput = settings.min_throughput;
+  wave.indirect = settings.indirect ? 1 : 0;
+  std::copy(settings.ambient.begin(), settings.ambient.end(), wave.ambient);
+  wave.strength = settings.shadows.strength;
+  wave.bias = settings.bias;
+  wave.lights = static_cast<std::int32_t>(lights.size());
+  wave.light_samples = settings.light_samples;
+  wave.first_pixel = u32(first_pixel);
+  return wave;
+}
+
+void LightTracer::Impl::trace_sample(const Camera& camera,
+                                     std::uint32_t sample,
+                                     std::size_t first,
+                                     std::size_t count) {
+  Lens lens;
+  lens.sample = sample;
+  lens.jitter = settings.samples > 1;
+  lens.seed = settings.seed;
+  lens.aperture = settings.aperture;
+  lens.focus_distance = settings.focus_distance;
+  camera_rays.generate(camera, lens, first, count, rays);
+  paths.ensure(context, count, "paths");
+  kernel("begin_paths").launch(Range::linear(count, kGroup), u32(count), rays, paths);
+  RsWave wave = wave_record(sample, first);
+  statistics.camera_rays += count;
+  for (std::size_t live = count; live > 0; ++wave.bounce) {
+    live = trace_wave(wave, live);
+    statistics.continued_rays += live;
+  }
+}
+
+std::size_t LightTracer::Impl::trace_wave(const RsWave& wave, std::size_t count) {
+  const Range each = Range::linear(count, kGroup);
+  hits.ensure(context, count, "surface hits");
+  met.ensure(context, count, "surfaces");
+  gaussian_light.ensure(context, count, "light on Gaussians");
+  surface_light.ensure(context, count, "light on surfaces");
+  gained.ensure(context, count, "light of paths");
+  tallies.ensure(context, count, "tallies");
+  offsets.ensure(context, count + 1, "path offsets");
+  next_paths.ensure(context, 2 * count, "paths that go on");
+  next_rays.ensure(context, 2 * count, "rays that go on");
+
+  surfaces.triangles().nearest(rays, paths, count, hits);
+  kernel("load_surfaces")
+      .launch(each, u32(count), hits, surfaces.vertices(), surfaces.triangle_materials(),
+              surfaces.materials(), surfaces.textures(), surfaces.texels(), paths, rays, met);
+  tracer.trace(gaussians, rays, count, results, ColorDirection::kRay);
+  gaussian_light.clear(count);
+  surface_light.clear(count);
+  const ShadowSettings& shadows = settings.shadows;
+  const bool on_gaussians = (shadows.mesh_on_gaussians && surfaces.triangles().size() > 0) ||
+                            shadows.gaussians_on_gaussians;
+  if (on_gaussians && shadows.strength > 0 && gaussians.count > 0) gather_light(wave, count, true);
+  if (surfaces.lit()) gather_light(wave, count, false);
+  kernel("advance").launch(each, u32(count), wave, surfaces.materials(), surfaces.environment(),
+                           surfaces.environment_picture(), paths, rays, results, met,
+                           gaussian_light, surface_light, gained, offsets, next_paths, next_rays,
+                           tallies);
+  kernel("accumulate").launch(each, u32(count), paths, gained, sums);
+  add_tallies(count);
+  scan.exclusive(offsets, count);
+  const std::size_t live = offsets.read(count);
+  paths.ensure(context, live, "paths");
+  rays.ensure(context, live, "rays");
+  if (live > 0) {
+    kernel("gather_paths").launch(each, u32(count), offsets, next_paths, next_rays, paths, rays);
+  }
+  return live;
+}
+
+void LightTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool from_gaussians) {
+  const Range each = Range::linear(count, kGroup);
+  const ShadowSettings& shadows = settings.shadows;
+  const bool use_triangles = shadows.strength > 0 && surfaces.triangles().size() > 0 &&
+                             (from_gaussians ? shadows.mesh_on_gaussians : shadows.mesh_on_mesh);
+  const bool use_gaussians =
+      shadows.strength > 0 && gaussians.count > 0 &&
+      (from_gaussians ? shadows.gaussians_on_gaussians : shadows.gaussians_on_mesh);
+  shadow_rays.ensure(context, count, "shadow rays");
+  skip.ensure(context, count, "triangles to skip");
+  passes.ensure(context, count, "light that passes");
+  blocked.ensure(context, count, "light that Gaussians take");
+  const int kind = from_gaussians ? 1 : 0;
+  for (std::size_t number = 0; number < lights.size(); ++number) {
+    const bool soft = lights[number].kind == Light::Kind::kSphere && lights[number].radius > 0;
+    const int samples = soft && (use_triangles || use_gaussians) ? settings.light_samples : 1;
+    const int light = static_cast<int>(number);
+    for (int k = 0; k < samples; ++k) {
+      kernel("shadow_rays")
+          .launch(each, u32(count), wave, light, k, kind, surfaces.lights(), surfaces.materials(),
+                  paths, rays, results, met, shadow_rays, skip);
+      if (use_triangles) {
+        surfaces.triangles().light_through(shadow_rays, skip, surfaces.triangle_shadows(), count,
+                                           passes);
+      }
+      if (use_gaussians) tracer.trace(gaussians, shadow_rays, count, blocked);
+      kernel("add_light")
+          .launch(each, u32(count), wave, light, 1.0f / static_cast<float>(samples), kind,
+                  use_triangles ? 1 : 0, use_gaussians ? 1 : 0, surfaces.lights(),
+                  surfaces.materials(), rays, results, met, shadow_rays, passes, blocked,
+                  gaussian_light, surface_light);
+    }
+  }
+}
+
+void LightTracer::Impl::add_tallies(std::size_t count) {
+  const std::size_t chunks = (count + kTallyChunk - 1) / kTallyChunk;
+  partials.ensure(context, chunks, "tally sums");
+  kernel("sum_tallies")
+      .launch(Range::linear(chunks, 1), u32(count), u32(kTallyChunk), tallies, partials);
+  for (const std::array<std::uint32_t, 4>& part : partials.download()) {
+    statistics.shadow_rays += part[0];
+    statistics.capped_rays += part[1];
+    statistics.ended_by_bounces += part[2];
+  }
+}
+
+LightTracer::LightTracer(Context& context, const Scene& scene)
+    : impl_(std::make_unique<Impl>(context, scene)) {}
+LightTracer::~LightTracer() = default;
+
+void LightTracer::set_meshes(const std::vector<Mesh>& meshes) {
+  impl_->surfaces.set_meshes(meshes);
+}
+
+Image LightTracer::render(const Camera& camera) {
+  Impl& self = *impl_;
+  if (camera.width < 1 || camera.height < 1) {
+    throw UsageError(fmt::format("Camera '{}' has no pixels", camera.name));
+  }
+  self.statistics = {};
+  Image out(camera.width, camera.height, 4);
+  const std::size_t batch = self.batch_size();
+  const auto samples = static_cast<float>(self.settings.samples);
+  for (std::size_t first = 0; first < out.pixels(); first += batch) {
+    const std::size_t count = std::min(batch, out.pixels() - first);
+    self.sums.ensure(self.context, count, "pixel sums");
+    self.sums.clear(count);
+    for (int sample = 0; sample < self.settings.samples; ++sample) {
+      self.trace_sample(camera, static_cast<std::uint32_t>(sample), first, count);
+    }
+    const std::vector<std::array<float, 4>> sums = self.sums.download();
+    for (std::size_t i = 0; i < count; ++i) {
+      float* pixel = out.data.data() + 4 * (first + i);
+      for (std::size_t c = 0; c < 3; ++c) pixel[c] = sums[i][c] / samples;
+      pixel[3] = 1.0f - sums[i][3] / samples;
+    }
+  }
+  return out;
+}
+
+LightTracer::Statistics LightTracer::statistics() const { return impl_->statistics; }
+
+}  // namespace raysplats
