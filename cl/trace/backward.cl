@@ -65,7 +65,8 @@ void add_line(volatile __global float* target, float16 value) {
   for (int i = 0; i < 16; ++i) {
     if (part.s[i] == 0.0f) continue;
     volatile __global uint* word = (volatile __global uint*)(target + i);
-    uint old = *word;
+    // A plain first read would race with the others' writes; 0 is what most first writers find.
+    uint old = 0;
     for (;;) {
       const uint seen = atomic_cmpxchg(word, old, as_uint(as_float(old) + part.s[i]));
       if (seen == old) break;
