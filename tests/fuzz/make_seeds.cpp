@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes the seed corpora of the fuzz targets: small sound files of every format and dialect.
+// usage: fuzz_seeds DIRECTORY      (tests/fuzz/corpus in the source tree)
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "bench/report.hpp"
+#include "raysplats/io.hpp"
+#include "train/checkpoint.hpp"
+#include "train/train_config.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A corpus: a folder of inputs.
+class Corpus {
+ public:
+  Corpus(const fs::path& root, const char* target) : folder_(root / target) {
+    fs::create_directories(folder_);
+  }
+  void add(const std::string& name, std::string_view bytes) const {
+    std::ofstream stream(folder_ / name, std::ios::binary | std::ios::trunc);
+    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  }
+  /// The file with a choice in front, as take_choice() reads it; the file itself goes.
+  void add_chosen(const std::string& name, char choice, const fs::path& file) const {
+    std::ifstream stream(file, std::ios::binary);
+    const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+    add(name, std::string(1, choice).append(bytes));
+    stream.close();
+    fs::remove(file);
+  }
+  const fs::path& folder() const { return folder_; }
+
+ private:
+  fs::path folder_;
+};
+
+/// Little-endian binary file under construction.
+class Bytes {
+ public:
+  template <class T>
+  Bytes& add(T value) {
+    const std::size_t at = text_.size();
+    text_.resize(at + sizeof(T));
+    std::memcpy(text_.data() + at, &value, sizeof(T));
+    return *this;
+  }
+  Bytes& add_text(std::string_view text) {
+    text_ += text;
+    return *this;
+  }
+  std::string take(char choice) const { return std::string(1, choice).append(text_); }
+
+ private:
+  std::string text_;
+};
+
+Gaussians small_model(int degree, std::size_t count) {
+  Gaussians model;
+  model.sh_degree = degree;
+  model.resize(count);
+  for (std::size_t i = 0; i < model.means.size(); ++i)
+    model.means[i] = 0.25f * static_cast<float>(i);
+  for (float& value : model.log_scales) value = -2.0f;
+  for (std::size_t i = 0; i < count; ++i) model.quaternions[4 * i] = 1.0f;
+  for (float& value : model.sh) value = 0.1f;
+  return model;
+}
+
+void make_ply(const fs::path& root) {
+  const Corpus corpus(root, "ply");
+  write_ply(corpus.folder() / "degree0.ply", small_model(0, 2));
+  write_ply(corpus.folder() / "degree1.ply", small_model(1, 1));
+  const std::string model_properties =
+      "property float x\nproperty float y\nproperty float z\nproperty float f_dc_0\n"
+      "property float f_dc_1\nproperty float f_dc_2\nproperty float opacity\n"
+      "property float scale_0\nproperty float scale_1\nproperty float scale_2\n"
+      "property float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float rot_3\n";
+  corpus.add("ascii_model.ply", "ply\nformat ascii 1.0\nelement vertex 1\n" + model_properties +
+                                    "end_header\n0 1 2 .1 .2 .3 0 -1 -1 -1 1 0 0 0\n");
+  corpus.add(
+      "ascii_points.ply",
+      "ply\nformat ascii 1.0\nelement camera 1\nproperty int id\nelement vertex 2\n"
+      "property float x\nproperty float y\nproperty float z\nproperty uchar red\n"
+      "property uchar green\nproperty uchar blue\nelement face 0\n"
+      "property list uchar int vertex_index\nend_header\n7\n0 0 0 255 0 0\n1 1e0 -1 0 9 8\n");
+  corpus.add("big_endian.ply",
+             std::string("ply\r\nformat binary_big_endian 1.0\r\ncomment c\r\nelement vertex 1\r\n"
+                         "property double x\r\nproperty short y\r\nproperty uint z\r\n"
+                         "end_header\r\n") +
+                 std::string("\x3f\xf0\0\0\0\0\0\0\xff\xfe\0\0\0\x07", 14));
+}
+
+void make_colmap(const fs::path& root) {
+  const Corpus corpus(root, "colmap");
+  const auto camera = [](Bytes& bytes, std::uint32_t id, std::int32_t model, int parameters) {
+    bytes.add(id).add(model).add(std::uint64_t{8}).add(std::uint64_t{6});
+    for (int i = 0; i < parameters; ++i) bytes.add(3.5);
+  };
+  Bytes cameras;
+  cameras.add(std::uint64_t{3});
+  camera(cameras, 1, 1, 4);
+  camera(cameras, 2, 4, 8);
+  camera(cameras, 3, 2, 4);
+  corpus.add("cameras_bin", cameras.take(0));
+  Bytes images;
+  images.add(std::uint64_t{2});
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    images.add(i).add(1.0).add(0.0).add(0.0).add(0.0).add(0.5).add(0.0).add(2.0).add(1u);
+    images.add_text(fmt::format("{}.png", i)).add('\0').add(std::uint64_t{i});
+    for (std::uint32_t k = 0; k < i; ++k) images.add(1.0).add(2.0).add(std::uint64_t{7});
+  }
+  corpus.add("images_bin", images.take(1));
+  Bytes points;
+  points.add(std::uint64_t{2});
+  for (std::uint64_t i = 0; i < 2; ++i) {
+    points.add(i).add(0.5).add(1.0).add(-2.0).add('a').add('b').add('c').add(0.1).add(i);
+    for (std::uint64_t k = 0; k < i; ++k) points.add(1u).add(2u);
+  }
+  corpus.add("points_bin", points.take(2));
+  corpus.add("cameras_txt",
+             "\3# cameras\n1 PINHOLE 8 6 7 7 4 3\n2 SIMPLE_RADIAL 8 6 7 4 3 0.01\n"
+             "3 OPENCV 8 6 7 7 4 3 .1 .01 .001 -.001\n4 SIMPLE_PINHOLE 8 6 7 4 3\n"
+             "5 RADIAL 8 6 7 4 3 .1 .2\n");
+  corpus.add("images_txt",
+             "\4# images\n1 1 0 0 0 0 0 2 1 a b.png\n1.5 2.5 -1\n2 .7 .7 0 0 1 2 3 1 b.png\n\n");
+  corpus.add("points_txt", "\5# points\n1 0 0 1 255 128 0 0.5 1 0\n2 1e0 -2 3.5 0 0 0 1\n");
+}
+
+void make_transforms(const fs::path& root) {
+  const Corpus corpus(root, "transforms");
+  const std::string matrix = R"("transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]])";
+  corpus.add("blender.json", R"({"camera_angle_x":0.69,"frames":[{"file_path":"./train/r_0",)" +
+                                 matrix + R"(}],"w":8,"h":6})");
+  corpus.add("nerfstudio.json",
+             R"({"camera_model":"OPENCV","fl_x":7,"fl_y":7.5,"cx":4,"cy":3,"w":8,"h":6,"k1":0.01,)"
+             R"("p1":1e-3,"ply_file_path":"points.ply","train_filenames":["a.png"],)"
+             R"("val_filenames":[],"test_filenames":["b.png"],"frames":[{"file_path":"a.png",)"
+             R"("mask_path":"m.png",)" +
+                 matrix + R"(},{"file_path":"b.png","fl_x":9,"w":4,"h":3,)" + matrix + "}]}");
+}
+
+void make_config(const fs::path& root) {
+  const Corpus corpus(root, "config");
+  corpus.add("default.toml", to_toml({}));
+  corpus.add("table.toml",
+             "# comment\n[train]\niterations = 10 # end\nresolution-schedule = [5, 7]\n"
+             "background = \"0.5,0,1\"\nsparse-adam = false\nsave-at = 3,4\npixel-loss = 'l2'\n");
+}
+
+void make_device_files(const fs::path& root) {
+  const Corpus tuning(root, "tuning");
+  tuning.add("one.json",
+             R"({"schema":"raysplats-tuning","schema_version":1,"devices":[{"device":"device",)"
+             R"("platform":"platform","driver":"1","raysplats":"0.1.0","packet_width":8,)"
+             R"("tile":16,"pending":32,"group":0}]})");
+  const Corpus cache(root, "kernel_cache");
+  Bytes bytes;
+  bytes.add_text("RSKERN01").add(std::uint64_t{6}).add(std::uint64_t{0}).add_text("binary");
+  cache.add("sound", bytes.take(1));
+  cache.add("wrong_checksum", bytes.take(0));
+}
+
+void make_images(const fs::path& root) {
+  const Corpus corpus(root, "image");
+  Image color(5, 3, 3);
+  for (std::size_t i = 0; i < color.data.size(); ++i) {
+    color.data[i] = static_cast<float>(i) / static_cast<float>(color.data.size());
+  }
+  const auto temporary = [&](const char* name) {
+    return corpus.folder() / (std::string("temporary_") + name);
+  };
+  for (const char* name : {"rgb.png", "rgb.jpg", "rgb.exr"}) {
+    write_image(temporary(name), color);
+    corpus.add_chosen(name, 1, temporary(name));
+  }
+  write_image(temporary("rgba.png"), Image(4, 4, 4, 0.5f));
+  corpus.add_chosen("rgba.png", 1, temporary("rgba.png"));
+  const std::vector<std::uint8_t> grey{0, 60, 120, 255};
+  for (const char* name : {"grey.tif", "grey.bmp"}) {
+    const fs::path path = temporary(name);
+    const auto output = OIIO::ImageOutput::create(path.string());
+    const OIIO::ImageSpec spec(2, 2, 1, OIIO::TypeUInt8);
+    if (output && output->open(path.string(), spec)) {
+      output->write_image(OIIO::TypeUInt8, grey.data());
+      output->close();
+    }
+    corpus.add_chosen(name, 1, path);
+  }
+}
+
+void make_reports(const fs::path& root) {
+  BenchReport report;
+  report.version = "0.1.0";
+  report.device = "device";
+  report.options["scene"] = "spheres";
+  report.rows.resize(1);
+  Corpus(root, "report").add("one.json", bench_json(report));
+}
+
+void make_checkpoints(const fs::path& root) {
+  const Corpus corpus(root, "checkpoint");
+  Checkpoint checkpoint;
+  checkpoint.iteration = 7;
+  checkpoint.count = 1;
+  checkpoint.scale_activation = "exp";
+  checkpoint.config = "iterations = 7\n";
+  checkpoint.sections["means"] = {1.0f, 2.0f, 3.0f};
+  checkpoint.sections["opacities"] = {0.5f};
+  checkpoint.sections["density"] = {};
+  for (const char choice : {'\0', '\1'}) {
+    const fs::path path = corpus.folder() / "temporary.rsck";
+    write_checkpoint(path, checkpoint);
+    corpus.add_chosen(choice == 0 ? "checked.rsck" : "repaired.rsck", choice, path);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    fmt::print(stderr, "usage: fuzz_seeds DIRECTORY\n");
+    return 2;
+  }
+  const fs::path root = argv[1];
+  make_ply(root);
+  make_colmap(root);
+  make_transforms(root);
+  make_config(root);
+  make_device_files(root);
+  make_images(root);
+  make_reports(root);
+  make_checkpoints(root);
+  return 0;
+}
