@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "light/light_tracer.hpp"
+
+#include "light_fixture.hpp"
+
+using namespace raysplats;
+using reference::ball;
+using reference::box;
+using reference::cube_camera;
+using reference::rectangle;
+using reference::white;
+
+namespace {
+
+Material glass(float ior) {
+  Material out = white(Material::Kind::kGlass);
+  out.ior = ior;
+  return out;
+}
+
+Material diffuse(const Rgb& color) {
+  Material out;
+  out.color = color;
+  return out;
+}
+
+/// A floor under the cloud (y points down).
+void add_floor(Scene& scene) {
+  add_mesh(scene, rectangle({0, 1.1, 0}, {3, 0, 0}, {0, 0.1, 3}, 0), diffuse({0.8f, 0.7f, 0.5f}));
+}
+
+Image waves(int width, int height) {
+  Image out(width, height, 3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double u = 6.2831853 * (x + 0.5) / width, v = 3.1415926 * (y + 0.5) / height;
+      out.at(x, y, 0) = static_cast<float>(0.6 + 0.4 * std::sin(u) * std::sin(v));
+      out.at(x, y, 1) = static_cast<float>(0.5 + 0.4 * std::cos(v));
+      out.at(x, y, 2) = static_cast<float>(0.5 + 0.3 * std::cos(2 * u) * std::sin(v) * std::sin(v));
+    }
+  }
+  return out;
+}
+
+const Camera kCamera = cube_camera(24, 24);
+
+}  // namespace
+
+TEST_CASE("Gaussians alone are drawn along their rays before the environment [small]") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene(2);
+  scene.trace.background = {3, 3, 3};  // has no meaning here
+  check_picture(context, scene, kCamera, "entry order");
+  scene.trace.hit_order = HitOrder::kPeak;
+  check_picture(context, scene, kCamera, "peak order");
+  scene.lights = {lamp()};
+  check_picture(context, scene, kCamera, "a lamp without shadows");
+  scene.gaussians = Gaussians{};
+  check_picture(context, scene, kCamera, "nothing at all");
+}
+
+TEST_CASE("an opaque mesh is drawn within the cloud") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene();
+  Material lit = diffuse({0.7f, 0.2f, 0.4f});
+  lit.emission = {0.0f, 0.05f, 0.1f};
+  add_mesh(scene, ball({0.2, 0.1, 0}, 0.7, 8, 0, true), lit);
+  add_floor(scene);
+  check_picture(context, scene, kCamera, "ambient alone");
+  scene.lights = {lamp()};
+  scene.render.shadows.strength = 0.0f;
+  check_picture(context, scene, kCamera, "a lamp");
+  Light sun;
+  sun.kind = Light::Kind::kDirectional;
+  sun.direction = {-1, 2, 0.5};
+  sun.color = {0.3f, 0.4f, 0.5f};
+  scene.lights.push_back(sun);
+  scene.materials[0].specular = 0.6f;
+  scene.materials[0].roughness = 0.4f;
+  check_picture(context, scene, kCamera, "two lights and a highlight");
+  scene.trace.hit_order = HitOrder::kPeak;
+  check_picture(context, scene, kCamera, "peak order");
+}
+
+TEST_CASE("a glowing mesh without Gaussians is exact") {
+  Context context = make_test_context();
+  Scene scene;
+  Material glow = white(Material::Kind::kEmissive);
+  glow.emission = {0.5f, 1.0f, 2.0f};
+  add_mesh(scene, box({-0.6, -0.5, -0.4}, {0.5, 0.7, 0.6}, 0), glow);
+  check_picture(context, scene, kCamera, "box", 1e-6, 0.02);
+}
+
+TEST_CASE("shadows of all four kinds") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene();
+  add_mesh(scene, ball({0.2, -0.2, -0.1}, 0.5, 6, 0, true), diffuse({0.7f, 0.2f, 0.4f}));
+  add_floor(scene);
+  Material veil = diffuse({0.2f, 0.9f, 0.3f});
+  veil.kind = Material::Kind::kTransparent;
+  veil.opacity = 0.4f;
+  add_mesh(scene, rectangle({0.6, -1.3, -1}, {0.5, 0, 0.1}, {0, 0.1, 0.6}, 0), veil);
+  scene.lights = {lamp()};
+  Light sun;
+  sun.kind = Light::Kind::kDirectional;
+  sun.direction = {-0.5f, 1.0f, 0.3f};
+  scene.lights.push_back(sun);
+  scene.render.bias = 0.02f;
+  scene.render.shadows = {false, false, false, false, 0.8f};
+  const auto check = [&](const char* what) { check_picture(context, scene, kCamera, what); };
+  check("none");
+  scene.render.shadows = {true, false, false, false, 0.8f};
+  check("mesh on mesh");
+  scene.render.shadows = {false, true, false, false, 0.8f};
+  check("mesh on Gaussians");
+  scene.render.shadows = {false, false, true, false, 0.8f};
+  check_picture(context, scene, kCamera, "Gaussians on mesh", 2e-3, 0.15);
+  scene.render.shadows = {false, false, false, true, 0.8f};
+  check_picture(context, scene, kCamera, "Gaussians on Gaussians", 2e-3, 0.15);
+  scene.render.shadows = {true, true, true, true, 1.0f};
+  check_picture(context, scene, kCamera, "all", 2e-3, 0.25);
+  scene.trace.hit_order = HitOrder::kPeak;
+  scene.render.bias = 0.0f;
+  check_picture(context, scene, kCamera, "all in peak order", 2e-3, 0.25);
+}
+
+TEST_CASE("mirrors") {
+  Context context = make_test_context();
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    Scene scene = cloud_scene(2);
+    scene.trace.hit_order = order;
+    scene.lights = {lamp()};
+    Material tinted = white(Material::Kind::kMirror);
+    tinted.color = {0.9f, 0.8f, 0.5f};
+    add_mesh(scene, rectangle({0.2, 0, 0.8}, {1.2, 0, 0.6}, {0.1, 1.1, 0}, 0), tinted);
+    check_picture(context, scene, kCamera, "plane");
+    tinted.emission = {0.1f, 0, 0};
+    add_mesh(scene, ball({-0.4, 0.3, -0.3}, 0.5, 8, 0, true), tinted);
+    check_picture(context, scene, kCamera, "ball before the plane", 3e-3, 0.25);
+    scene.render.max_bounces = 1;
+    check_picture(context, scene, kCamera, "one bounce: black mirrors");
+    scene.render.max_bounces = 2;
+    check_picture(context, scene, kCamera, "two bounces", 3e-3, 0.25);
+    scene.render.max_bounces = 8;
+    scene.render.min_throughput = 0.7f;
+    check_picture(context, scene, kCamera, "ended by throughput", 3e-3, 0.25);
+  }
+}
+
+TEST_CASE("glass") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene();
+  add_floor(scene);
+  // Two surfaces split, the third shows what it is: nothing is left to chance.
+  scene.render.max_bounces = 3;
+  Material tinted = glass(1.5f);
+  tinted.color = {0.9f, 1.0f, 0.8f};
+  tinted.absorption = {0.2f, 0.05f, 0.6f};
+  add_mesh(scene, box({-0.7, -0.6, -0.5}, {0.4, 0.6, 0.5}, 0), tinted);
+  check_picture(context, scene, kCamera, "box", 2e-3, 0.2);
+  scene.lights = {lamp()};
+  check_picture(context, scene, kCamera, "box with shadows", 2e-3, 0.35);
+  scene.trace.hit_order = HitOrder::kPeak;
+  scene.meshes[1] = ball({0, 0, 0}, 0.8, 10, 1, true);
+  check_picture(context, scene, kCamera, "ball in peak order", 3e-3, 0.35);
+  scene.trace.hit_order = HitOrder::kEntry;
+  scene.lights.clear();
+  check_picture(context, scene, kCamera, "ball", 3e-3, 0.35);
+  scene.gaussians = Gaussians{};
+  check_picture(context, scene, kCamera, "ball alone", 2e-3, 0.1);
+  // More surfaces: the rays that leave the box stay few, and few pixels have a chance left.
+  scene.meshes[1] = box({-0.7, -0.6, -0.5}, {0.4, 0.6, 0.5}, 1);
+  scene.render.max_bounces = 2;
+  check_picture(context, scene, kCamera, "two bounces", 2e-3, 0.1);
+}
+
+TEST_CASE("nested and overlapping bodies of glass") {
+  Context context = make_test_context();
+  Scene scene;
+  scene.environment.equirect = waves(32, 16);
+  scene.environment.color = {1, 1, 1};
+  scene.environment.up = {0, -1, 0};
+  scene.render.max_bounces = 8;
+  // The indices are close, so that one way through carries nearly all and the rest ends early.
+  scene.render.min_throughput = 0.05f;
+  Material outer = glass(1.20f), inner = glass(1.25f);
+  outer.absorption = {0.1f, 0.3f, 0.0f};
+  inner.absorption = {0.4f, 0.0f, 0.2f};
+  const auto check = [&](const char* what) {
+    check_picture(context, scene, kCamera, what, 2e-3, 1.0);
+  };
+  // Surfaces behind the second choose by chance; where they reflect less than the tolerance a
+  // picture of all pixels still tells whether indices and absorption are right.
+  add_mesh(scene, box({-0.9, -0.9, -0.9}, {0.9, 0.9, 0.9}, 0), outer);
+  add_mesh(scene, box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}, 0), inner);
+  scene.render.max_bounces = 3;
+  check("nested, up to the inner body's back");
+  scene.render.max_bounces = 8;
+  // From within: the camera stands in no body's stack, the first surface it meets is left.
+  scene.meshes[0] = box({-9, -9, -9}, {9, 9, 0.8}, 0);
+  scene.meshes[1] = box({-0.5, -0.5, 0.0}, {0.5, 0.5, 2}, 1);
+  scene.render.max_bounces = 3;
+  check("camera in a body, overlapping another");
+  // Equal indices let rays pass straight on without a choice.
+  scene.materials[1].ior = scene.materials[0].ior;
+  scene.meshes[0] = box({-0.9, -0.9, -0.9}, {0.9, 0.9, 0.9}, 0);
+  scene.meshes[1] = box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}, 1);
+  scene.render.max_bounces = 5;
+  check("an inner body of the same index");
+  scene.materials[0].ior = scene.materials[1].ior = 1.0f;
+  scene.render.max_bounces = 8;
+  check_picture(context, scene, kCamera, "absorption alone", 1e-4, 0.05);
+}
+
+TEST_CASE("transparent surfaces") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene(1);
+  Material veil = diffuse({0.9f, 0.5f, 0.2f});
+  veil.kind = Material::Kind::kTransparent;
+  veil.opacity = 0.35f;
+  veil.specular = 0.5f;
+  veil.roughness = 0.5f;
+  scene.lights = {lamp()};
+  scene.render.shadows.mesh_on_gaussians = false;
+  add_mesh(scene, rectangle({0, 0, -0.7}, {0.9, 0.1, 0}, {0, 0.8, 0.2}, 0), veil);
+  veil.opacity = 0.8f;
+  add_mesh(scene, ball({0.3, 0.2, 0.3}, 0.6, 7, 0, true), veil);
+  check_picture(context, scene, kCamera, "veils", 2e-3, 0.3);
+  scene.render.max_bounces = 2;
+  check_picture(context, scene, kCamera, "two bounces", 2e-3, 0.3);
+}
+
+TEST_CASE("environment pictures and textures") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene();
+  scene.environment.equirect = waves(64, 32);
+  scene.environment.color = {1.0f, 0.8f, 1.2f};
+  check_picture(context, scene, kCamera, "seen");
+  scene.environment.up = {0.3f, -1.0f, 0.2f};
+  scene.environment.rotation = 70.0f;
+  check_picture(context, scene, kCamera, "turned");
+  scene.environment.up = {0, 0, 1};
+  check_picture(context, scene, kCamera, "up along z");
+  scene.environment.up = {0, -1, 0};
+  add_mesh(scene, ball({0.3, 0.1, 0}, 0.7, 8, 0, true), diffuse({0.7f, 0.9f, 0.4f}));
+  check_picture(context, scene, kCamera, "lights a ball");
+  add_mesh(scene, ball({-0.7, 0.1, 0}, 0.4, 8, 0, true), white(Material::Kind::kMirror));
+  check_picture(context, scene, kCamera, "in a mirror", 3e-3, 0.2);
+
+  Material painted = white(Material::Kind::kDiffuse);
+  painted.texture = 1;
+  scene.textures = {Image(1, 1, 3, 0.5f), waves(7, 5)};
+  Mesh wall = rectangle({0, 0.3, -0.9}, {0.9, 0, 0}, {0.3, 0.4, 0}, 0);
+  for (float& x : wall.uvs) x = 2.5f * x - 0.7f;  // repeats
+  add_mesh(scene, wall, painted);
+  check_picture(context, scene, kCamera, "a texture", 3e-3, 0.2);
+}
+
+TEST_CASE("other cameras and sizes of picture") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene(1);
+  add_mesh(scene, ball({0.2, 0.1, 0}, 0.7, 8, 0, true), white(Material::Kind::kMirror));
+  add_floor(scene);
+  check_picture(context, scene, cube_camera(33, 7), "wide");
+  check_picture(context, scene, cube_camera(1, 1), "one pixel", 2e-3, 1.0);
+  check_picture(context, scene, look_at({2, -1.5, 2}, {0, 0, 0}, {0, -1, 0}, 20, 16, 18.0),
+                "from behind", 2e-3, 0.2);
+  check_picture(context, scene, look_at({0.9, 0.0, 0.2}, {-1, 0, 0}, {0, -1, 0}, 20, 16, 10.0),
+                "amid the cloud", 2e-3, 0.2);
+}
