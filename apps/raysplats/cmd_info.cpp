@@ -54,8 +54,9 @@ Json describe(const Dataset& dataset) {
   for (const auto& [size, count] : sizes) {
     size_list.push_back({{"width", size.first}, {"height", size.second}, {"views", count}});
   }
-  const bool distorted = std::any_of(dataset.views.begin(), dataset.views.end(),
-                                     [](const View& view) { return view.distortion.any(); });
+  const bool distorted =
+      std::any_of(dataset.views.begin(), dataset.views.end(),
+                  [](const View& view) { return view.source_camera.distortion.any(); });
   return {{"kind", kind_name(dataset.kind)},
           {"views", dataset.views.size()},
           {"train_views", dataset.indices(Split::kTrain).size()},

@@ -35,7 +35,8 @@ void keep_run_options(CLI::App& command, Options& options) {
 
 void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   keep_run_options(command, options);
-  Dataset dataset = load_dataset(options.data, {options.train.downscale, options.train.test_every});
+  Dataset dataset = load_dataset(
+      options.data, {options.train.downscale, options.train.test_every, options.train.undistort});
   const std::unique_ptr<Context> context = open_context(options.device);
   Trainer trainer(*context, std::move(dataset), options.train, options.output);
   if (!options.resume.empty()) trainer.resume(options.resume);

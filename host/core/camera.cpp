@@ -13,6 +13,7 @@ Camera downscaled(const Camera& camera, double factor) {
   out.width = std::max(1, static_cast<int>(std::lround(camera.width / factor)));
   out.height = std::max(1, static_cast<int>(std::lround(camera.height / factor)));
   // Rounded sizes change the two axes by slightly different factors; the field of view stays.
+  // Distortion acts on normalised coordinates, which do not change.
   const double sx = static_cast<double>(out.width) / camera.width;
   const double sy = static_cast<double>(out.height) / camera.height;
   out.fx *= sx;

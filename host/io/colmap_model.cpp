@@ -35,17 +35,17 @@ constexpr std::array<ModelType, 18> kModels{{{"SIMPLE_PINHOLE", 3, true},
                                              {"SIMPLE_RADIAL", 4, true},
                                              {"RADIAL", 5, true},
                                              {"OPENCV", 8, true},
-                                             {"OPENCV_FISHEYE", 8, false},
-                                             {"FULL_OPENCV", 12, false},
+                                             {"OPENCV_FISHEYE", 8, true},
+                                             {"FULL_OPENCV", 12, true},
                                              {"FOV", 5, false},
-                                             {"SIMPLE_RADIAL_FISHEYE", 4, false},
-                                             {"RADIAL_FISHEYE", 5, false},
+                                             {"SIMPLE_RADIAL_FISHEYE", 4, true},
+                                             {"RADIAL_FISHEYE", 5, true},
                                              {"THIN_PRISM_FISHEYE", 12, false},
                                              {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false},
                                              {"SIMPLE_DIVISION", 4, false},
                                              {"DIVISION", 5, false},
-                                             {"SIMPLE_FISHEYE", 3, false},
-                                             {"FISHEYE", 4, false},
+                                             {"SIMPLE_FISHEYE", 3, true},
+                                             {"FISHEYE", 4, true},
                                              {"EUCM", 6, false},
                                              {"EQUIRECTANGULAR", 2, false}}};
 constexpr std::size_t kMaxParameters = 16;
@@ -64,14 +64,37 @@ const ModelType& checked_model(const ModelType* model, const std::string& name, 
   return *model;
 }
 
-ColmapCamera make_camera(const ModelType& model,
-                         std::uint64_t width,
-                         std::uint64_t height,
-                         std::span<const double> p,
-                         const Fail& fail) {
-  ColmapCamera out;
-  Camera& camera = out.camera;
-  Distortion& d = out.distortion;
+/// The distortion in COLMAP's order of parameters `p`, which are those behind the principal point.
+Distortion make_distortion(std::string_view name, std::span<const double> p, const Fail& fail) {
+  Distortion d;
+  if (name == "OPENCV" || name == "FULL_OPENCV") {
+    d = {p[0], p[1], 0.0, p[2], p[3]};
+    if (name == "FULL_OPENCV") {
+      d.k3 = p[4];
+      if (p[5] != 0 || p[6] != 0 || p[7] != 0) {
+        fail(
+            "a FULL_OPENCV camera has the rational terms k4, k5 or k6, which are not supported, "
+            "undistort the images to PINHOLE first: found");
+      }
+    }
+  } else if (name == "OPENCV_FISHEYE") {
+    d.k1 = p[0];
+    d.k2 = p[1];
+    d.k3 = p[2];
+    d.k4 = p[3];
+  } else {
+    if (!p.empty()) d.k1 = p[0];
+    if (p.size() > 1) d.k2 = p[1];
+  }
+  return d;
+}
+
+Camera make_camera(const ModelType& model,
+                   std::uint64_t width,
+                   std::uint64_t height,
+                   std::span<const double> p,
+                   const Fail& fail) {
+  Camera camera;
   if (width < 1 || height < 1 || width > kMaxCameraSide || height > kMaxCameraSide) {
     fail(fmt::format("a camera has the impossible size {} x {}", width, height));
   }
@@ -81,17 +104,21 @@ ColmapCamera make_camera(const ModelType& model,
   camera.width = static_cast<int>(width);
   camera.height = static_cast<int>(height);
   const std::string_view name = model.name;
-  const bool two_focal_lengths = name == "PINHOLE" || name == "OPENCV";
+  const bool two_focal_lengths = name == "PINHOLE" || name == "OPENCV" || name == "FULL_OPENCV" ||
+                                 name == "FISHEYE" || name == "OPENCV_FISHEYE";
   const std::size_t center = two_focal_lengths ? 2 : 1;
   camera.fx = p[0];
   camera.fy = p[center - 1];
   camera.cx = p[center];
   camera.cy = p[center + 1];
-  if (name == "SIMPLE_RADIAL" || name == "RADIAL") d.k1 = p[3];
-  if (name == "RADIAL") d.k2 = p[4];
-  if (name == "OPENCV") d = {p[4], p[5], 0.0, p[6], p[7]};
+  camera.distortion = make_distortion(name, p.subspan(center + 2), fail);
+  if (name.ends_with("FISHEYE")) {
+    camera.model = CameraModel::kFisheye;
+  } else if (camera.distortion.any()) {
+    camera.model = CameraModel::kOpenCv;
+  }
   if (!(camera.fx > 0 && camera.fy > 0)) fail("a camera has a focal length that is not positive");
-  return out;
+  return camera;
 }
 
 ColmapImage make_image(std::string name,
@@ -127,7 +154,7 @@ void add_point(PointCloud& points,
   }
 }
 
-void add_camera(ColmapModel& model, std::uint64_t id, ColmapCamera camera, const Fail& fail) {
+void add_camera(ColmapModel& model, std::uint64_t id, Camera camera, const Fail& fail) {
   if (id > UINT32_MAX) fail(fmt::format("the camera number {} is too large", id));
   if (!model.cameras.emplace(static_cast<std::uint32_t>(id), std::move(camera)).second) {
     fail(fmt::format("the camera {} appears twice", id));

@@ -15,12 +15,6 @@
 
 namespace raysplats::io {
 
-/// Intrinsics of a COLMAP model; only sizes, focal lengths and principal point of `camera` are set.
-struct ColmapCamera {
-  Camera camera;
-  Distortion distortion;
-};
-
 struct ColmapImage {
   std::string name;
   std::uint32_t camera_id = 0;
@@ -30,8 +24,8 @@ struct ColmapImage {
 
 /// What this program uses of a COLMAP sparse model.
 struct ColmapModel {
-  std::map<std::uint32_t, ColmapCamera> cameras;
-  std::vector<ColmapImage> images;  ///< sorted by name
+  std::map<std::uint32_t, Camera> cameras;  ///< without name and pose
+  std::vector<ColmapImage> images;          ///< sorted by name
   PointCloud points;
 };
 
@@ -42,7 +36,9 @@ std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::pa
 
 /// Reads cameras, images and points3D (.bin, else .txt) of a folder. Points are optional. Throws
 /// DataError with byte offset or line for malformed files, and for camera models other than
-/// SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL and OPENCV.
+/// SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV without its rational terms
+/// (these become kOpenCv, or kPinhole where nothing is distorted), SIMPLE_FISHEYE, FISHEYE,
+/// SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (kFisheye).
 ColmapModel read_colmap_model(const std::filesystem::path& folder);
 
 }  // namespace raysplats::io

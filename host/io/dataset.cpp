@@ -50,7 +50,8 @@ fs::path find_mask(const fs::path& root, const fs::path& name) {
 
 /// Sets the cameras of a view: `nominal` is the camera at the size that its model states, the photo
 /// may have another (reduced copies, rounding by a pixel), and is used reduced by `factor`.
-void set_cameras(View& view, const Camera& nominal, const io::ImageSize& photo, double factor) {
+void set_cameras(
+    View& view, const Camera& nominal, const io::ImageSize& photo, double factor, bool undistort) {
   const double scale_x = static_cast<double>(photo.width) / nominal.width;
   const double scale_y = static_cast<double>(photo.height) / nominal.height;
   const double expected_height = nominal.height * scale_x;
@@ -69,6 +70,10 @@ void set_cameras(View& view, const Camera& nominal, const io::ImageSize& photo, 
   view.source_camera.fy *= scale_y;
   view.source_camera.cy *= scale_y;
   view.camera = downscaled(view.source_camera, factor);
+  if (undistort && view.camera.model == CameraModel::kOpenCv) {
+    view.camera.model = CameraModel::kPinhole;
+    view.camera.distortion = {};
+  }
 }
 
 void mark_every(std::vector<View>& views, int test_every) {
@@ -138,7 +143,6 @@ Dataset load_colmap(const fs::path& root,
   const PhotoFolder folder = choose_photo_folder(root, options.downscale);
   const double rest = std::max(1.0, options.downscale / folder.factor);
   for (const io::ColmapImage& image : model.images) {
-    const io::ColmapCamera& intrinsics = model.cameras.at(image.camera_id);
     View view;
     const auto photo = find_photo(folder.path, image.name);
     if (!photo) {
@@ -147,12 +151,11 @@ Dataset load_colmap(const fs::path& root,
     }
     view.image_path = *photo;
     view.mask_path = find_mask(root, image.name);
-    view.distortion = intrinsics.distortion;
-    Camera nominal = intrinsics.camera;
+    Camera nominal = model.cameras.at(image.camera_id);
     nominal.name = io::inner_name(image.name);
     nominal.rotation = image.rotation;
     nominal.translation = image.translation;
-    set_cameras(view, nominal, io::image_size(view.image_path), rest);
+    set_cameras(view, nominal, io::image_size(view.image_path), rest, options.undistort);
     dataset.views.push_back(std::move(view));
   }
   sort_by_name(dataset.views);
@@ -176,7 +179,6 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
     }
     View view;
     view.image_path = *photo;
-    view.distortion = frame.distortion;
     fs::path name = frame.file_path;
     if (name.filename() != photo->filename()) name += photo->extension();
     if (!frame.mask_path.empty()) {
@@ -192,7 +194,7 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
     Camera nominal = io::frame_camera(file, i, frame.width.value_or(size.width),
                                       frame.height.value_or(size.height));
     nominal.name = io::inner_name(name);
-    set_cameras(view, nominal, size, options.downscale);
+    set_cameras(view, nominal, size, options.downscale, options.undistort);
     views.push_back(std::move(view));
   }
   return views;

@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
+
+#include "core/camera_model.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -55,24 +56,6 @@ void premultiply(Image& rgba) {
   }
 }
 
-/// Square of the normalised radius up to which the radial polynomial grows; infinity when it never
-/// stops within `limit`.
-double growing_radius2(const Distortion& d, double limit) {
-  const auto slope = [&](double s) { return 1 + s * (3 * d.k1 + s * (5 * d.k2 + s * 7 * d.k3)); };
-  constexpr int kSteps = 4096;
-  for (int i = 1; i <= kSteps; ++i) {
-    if (slope(limit * i / kSteps) > 0) continue;
-    double low = limit * (i - 1) / kSteps;
-    double high = limit * i / kSteps;
-    for (int bisection = 0; bisection < 50; ++bisection) {
-      const double middle = 0.5 * (low + high);
-      (slope(middle) > 0 ? low : high) = middle;
-    }
-    return low;
-  }
-  return std::numeric_limits<double>::infinity();
-}
-
 }  // namespace
 
 Image area_resample(const Image& rgba, int width, int height) {
@@ -110,25 +93,20 @@ Image area_resample(const Image& rgba, int width, int height) {
   return out;
 }
 
-Image undistort(Image rgba, const Camera& camera, const Distortion& distortion) {
+Image undistort(Image rgba, const Camera& camera) {
   const int width = rgba.width;
   const int height = rgba.height;
   premultiply(rgba);
   Image out(width, height, static_cast<int>(kChannels));
-  const double far_x = std::max(camera.cx, width - camera.cx) / camera.fx;
-  const double far_y = std::max(camera.cy, height - camera.cy) / camera.fy;
-  const double limit = growing_radius2(distortion, far_x * far_x + far_y * far_y);
+  const double limit = lens_limit(CameraModel::kOpenCv, camera.distortion);
   float* target = out.data.data();
   for (int j = 0; j < height; ++j) {
     for (int i = 0; i < width; ++i, target += kChannels) {
-      const double x = (i + 0.5 - camera.cx) / camera.fx;
-      const double y = (j + 0.5 - camera.cy) / camera.fy;
-      if (x * x + y * y > limit) continue;
-      double dx = 0;
-      double dy = 0;
-      distort(distortion, x, y, dx, dy);
-      const double u = dx * camera.fx + camera.cx;
-      const double v = dy * camera.fy + camera.cy;
+      const glm::dvec2 p((i + 0.5 - camera.cx) / camera.fx, (j + 0.5 - camera.cy) / camera.fy);
+      if (p.x * p.x + p.y * p.y > limit * limit) continue;
+      const glm::dvec2 seen = distort(camera.distortion, p);
+      const double u = seen.x * camera.fx + camera.cx;
+      const double v = seen.y * camera.fy + camera.cy;
       if (!(u >= 0 && u <= width && v >= 0 && v <= height)) continue;
       // Between the outermost pixel centres and the border the border pixel goes on.
       const double px = std::clamp(u - 0.5, 0.0, width - 1.0);
@@ -155,6 +133,20 @@ Image undistort(Image rgba, const Camera& camera, const Distortion& distortion) 
     }
   }
   return out;
+}
+
+void mask_unseen(Image& rgba, const Camera& camera) {
+  if (camera.model != CameraModel::kOpenCv && camera.model != CameraModel::kFisheye) return;
+  const double limit =
+      radial_image(camera.model, camera.distortion, lens_limit(camera.model, camera.distortion));
+  float* alpha = rgba.data.data() + 3;
+  for (int j = 0; j < rgba.height; ++j) {
+    for (int i = 0; i < rgba.width; ++i, alpha += kChannels) {
+      const double x = (i + 0.5 - camera.cx) / camera.fx;
+      const double y = (j + 0.5 - camera.cy) / camera.fy;
+      if (x * x + y * y > limit * limit) *alpha = 0.0f;
+    }
+  }
 }
 
 }  // namespace raysplats::io

@@ -2,7 +2,6 @@
 #include "io/transforms.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -75,24 +74,55 @@ struct Scope {
   }
 };
 
-/// Overrides what is known by the keys of a scope.
-void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
-  const std::string model = scope.text("camera_model");
-  const std::array<const char*, 6> supported{"",       "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL",
-                                             "RADIAL", "OPENCV"};
-  if (std::find(supported.begin(), supported.end(), model) == supported.end()) {
-    scope.fail(
-        fmt::format("the camera_model '{}' is not supported (PINHOLE and OPENCV are), undistort "
-                    "the images first",
-                    model));
+/// Names of nerfstudio; what a lens distorts decides between kPinhole and kOpenCv.
+struct ModelName {
+  const char* name;
+  CameraModel model;
+};
+constexpr std::array<ModelName, 8> kModelNames{{{"PINHOLE", CameraModel::kPinhole},
+                                                {"SIMPLE_PINHOLE", CameraModel::kPinhole},
+                                                {"SIMPLE_RADIAL", CameraModel::kPinhole},
+                                                {"RADIAL", CameraModel::kPinhole},
+                                                {"OPENCV", CameraModel::kPinhole},
+                                                {"OPENCV_FISHEYE", CameraModel::kFisheye},
+                                                {"EQUIRECTANGULAR", CameraModel::kEquirectangular},
+                                                {"ORTHOPHOTO", CameraModel::kOrthographic}}};
+
+const char* model_name(CameraModel model) {
+  if (model == CameraModel::kOpenCv) return "OPENCV";
+  return std::find_if(kModelNames.begin(), kModelNames.end(),
+                      [&](const ModelName& known) { return known.model == model; })
+      ->name;
+}
+
+/// The intrinsics that nerfstudio gives a whole panorama.
+void set_equirectangular(Camera& camera) {
+  camera.fx = 0.5 * camera.width;
+  camera.fy = camera.height;
+  camera.cx = 0.5 * camera.width;
+  camera.cy = 0.5 * camera.height;
+}
+
+void read_model(const Scope& scope, TransformsFrame& frame) {
+  const std::string name = scope.text("camera_model");
+  if (!name.empty()) {
+    const auto* found = std::find_if(kModelNames.begin(), kModelNames.end(),
+                                     [&](const ModelName& known) { return known.name == name; });
+    if (found == kModelNames.end()) {
+      scope.fail(
+          fmt::format("the camera_model '{}' is not supported (PINHOLE, OPENCV, OPENCV_FISHEYE, "
+                      "EQUIRECTANGULAR and ORTHOPHOTO are), undistort the images first",
+                      name));
+    }
+    frame.model = found->model;
   }
   const auto fisheye = scope.object.find("is_fisheye");
-  if (fisheye != scope.object.end() && *fisheye == true) {
-    scope.fail("the fisheye lens is not supported, undistort the images first");
-  }
-  if (scope.number("k4").value_or(0) != 0) {
-    scope.fail("'k4' is not supported, undistort the images first");
-  }
+  if (fisheye != scope.object.end() && *fisheye == true) frame.model = CameraModel::kFisheye;
+}
+
+/// Overrides what is known by the keys of a scope.
+void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
+  read_model(scope, frame);
   if (const auto width = scope.side("w")) frame.width = width;
   if (const auto height = scope.side("h")) frame.height = height;
   const auto fx = scope.positive("fl_x");
@@ -112,6 +142,7 @@ void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
   d.k1 = scope.number("k1").value_or(d.k1);
   d.k2 = scope.number("k2").value_or(d.k2);
   d.k3 = scope.number("k3").value_or(d.k3);
+  d.k4 = scope.number("k4").value_or(d.k4);
   d.p1 = scope.number("p1").value_or(d.p1);
   d.p2 = scope.number("p2").value_or(d.p2);
 }
@@ -201,6 +232,9 @@ TransformsFile read_transforms(const fs::path& path) {
     if (!object.is_object()) frame_scope.fail("it is no JSON object");
     TransformsFrame frame = common;
     read_intrinsics(frame_scope, frame);
+    if (frame.model == CameraModel::kPinhole && frame.distortion.k4 != 0) {
+      frame_scope.fail("'k4' is supported for OPENCV_FISHEYE only, undistort the images first");
+    }
     read_pose(frame_scope, frame);
     frame.file_path = frame_scope.text("file_path");
     frame.mask_path = frame_scope.text("mask_path");
@@ -214,16 +248,26 @@ Camera frame_camera(const TransformsFile& file, std::size_t index, int width, in
   const double nominal_width = frame.width.value_or(width);
   const double nominal_height = frame.height.value_or(height);
   Camera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.rotation = frame.rotation;
+  camera.translation = frame.translation;
+  camera.model = frame.model;
+  if (frame.model == CameraModel::kEquirectangular) {
+    set_equirectangular(camera);
+    return camera;
+  }
   if (frame.fx) {
     camera.fx = *frame.fx;
     camera.fy = frame.fy.value_or(camera.fx);
-  } else if (frame.angle_x) {
+  } else if (frame.angle_x && frame.model == CameraModel::kPinhole) {
     camera.fx = 0.5 * nominal_width / std::tan(0.5 * *frame.angle_x);
     camera.fy = frame.angle_y ? 0.5 * nominal_height / std::tan(0.5 * *frame.angle_y) : camera.fx;
   } else {
-    throw DataError(
-        fmt::format("{}: frame {} has neither fl_x nor camera_angle_x, in it or in the file",
-                    file.path.string(), index));
+    throw DataError(fmt::format(
+        "{}: frame {} has {}, in it or in the file", file.path.string(), index,
+        frame.model == CameraModel::kPinhole ? "neither fl_x nor camera_angle_x"
+                                             : "no fl_x, which its camera model needs"));
   }
   const double scale_x = width / nominal_width;
   const double scale_y = height / nominal_height;
@@ -231,10 +275,9 @@ Camera frame_camera(const TransformsFile& file, std::size_t index, int width, in
   camera.cy = frame.cy.value_or(0.5 * nominal_height) * scale_y;
   camera.fx *= scale_x;
   camera.fy *= scale_y;
-  camera.width = width;
-  camera.height = height;
-  camera.rotation = frame.rotation;
-  camera.translation = frame.translation;
+  if (frame.model != CameraModel::kOrthographic) camera.distortion = frame.distortion;
+  if (frame.model == CameraModel::kPinhole && frame.distortion.any())
+    camera.model = CameraModel::kOpenCv;
   return camera;
 }
 
@@ -264,7 +307,6 @@ std::vector<Camera> read_cameras(const std::filesystem::path& path) {
   const io::TransformsFile file = io::read_transforms(path);
   if (file.frames.empty()) throw DataError(fmt::format("{} has no frames", path.string()));
   std::vector<Camera> cameras;
-  bool distorted = false;
   for (std::size_t i = 0; i < file.frames.size(); ++i) {
     const io::TransformsFrame& frame = file.frames[i];
     io::ImageSize size{frame.width.value_or(0), frame.height.value_or(0)};
@@ -285,24 +327,40 @@ std::vector<Camera> read_cameras(const std::filesystem::path& path) {
     cameras.push_back(io::frame_camera(file, i, size.width, size.height));
     cameras.back().name =
         frame.file_path.empty() ? fmt::format("frame_{:04d}", i) : io::inner_name(frame.file_path);
-    distorted = distorted || frame.distortion.any();
   }
-  if (distorted)
-    spdlog::info("{}: the lens distortion is left out, the cameras are pinholes", path.string());
   return cameras;
 }
 
 void write_cameras(const std::filesystem::path& path, const std::vector<Camera>& cameras) {
-  const auto intrinsics = [](const Camera& camera) {
-    return nlohmann::json{{"w", camera.width}, {"h", camera.height}, {"fl_x", camera.fx},
-                          {"fl_y", camera.fy}, {"cx", camera.cx},    {"cy", camera.cy}};
+  const auto intrinsics = [](Camera camera) {
+    if (camera.model == CameraModel::kEquirectangular) io::set_equirectangular(camera);
+    nlohmann::json out{{"camera_model", io::model_name(camera.model)},
+                       {"w", camera.width},
+                       {"h", camera.height},
+                       {"fl_x", camera.fx},
+                       {"fl_y", camera.fy},
+                       {"cx", camera.cx},
+                       {"cy", camera.cy}};
+    const Distortion& d = camera.distortion;
+    const bool fisheye = camera.model == CameraModel::kFisheye;
+    if (fisheye || camera.model == CameraModel::kOpenCv) {
+      out.update({{"k1", d.k1}, {"k2", d.k2}, {"k3", d.k3}});
+      out.update(fisheye ? nlohmann::json{{"k4", d.k4}}
+                         : nlohmann::json{{"p1", d.p1}, {"p2", d.p2}});
+    }
+    return out;
   };
-  nlohmann::json root{{"camera_model", "PINHOLE"}, {"frames", nlohmann::json::array()}};
+  nlohmann::json root{{"frames", nlohmann::json::array()}};
   // Readers of instant-ngp's dialect know intrinsics of the file only.
   const bool shared = std::all_of(cameras.begin(), cameras.end(), [&](const Camera& camera) {
     return intrinsics(camera) == intrinsics(cameras.front());
   });
+  const bool one_model = std::all_of(cameras.begin(), cameras.end(), [&](const Camera& camera) {
+    return camera.model == cameras.front().model;
+  });
   if (shared && !cameras.empty()) root.update(intrinsics(cameras.front()));
+  // nerfstudio reads the model of the file only.
+  if (!shared && one_model) root["camera_model"] = io::model_name(cameras.front().model);
   for (const Camera& camera : cameras) {
     nlohmann::json frame = shared ? nlohmann::json::object() : intrinsics(camera);
     const glm::dmat3 to_world = glm::transpose(camera.rotation);

@@ -17,8 +17,9 @@ struct TransformsFrame {
   std::string file_path;  ///< as in the file; may be empty
   std::string mask_path;  ///< as in the file; usually empty
   std::optional<int> width, height;
-  std::optional<double> fx, fy, cx, cy;    ///< pixels
-  std::optional<double> angle_x, angle_y;  ///< field of view, radians
+  std::optional<double> fx, fy, cx, cy;       ///< pixels
+  std::optional<double> angle_x, angle_y;     ///< field of view, radians
+  CameraModel model = CameraModel::kPinhole;  ///< kPinhole with distortion is kOpenCv
   Distortion distortion;
   glm::dmat3 rotation{1.0};     ///< world to camera, OpenCV axes
   glm::dvec3 translation{0.0};  ///< world to camera, OpenCV axes
@@ -32,13 +33,13 @@ struct TransformsFile {
   std::optional<std::vector<std::string>> train_filenames, val_filenames, test_filenames;
 };
 
-/// Throws DataError for malformed JSON, camera models that are neither pinhole nor OPENCV (named)
-/// and matrices that are not finite or no rigid motion to 1e-3; smaller deviations are
-/// orthonormalised.
+/// Throws DataError for malformed JSON, camera models other than pinholes, OPENCV, OPENCV_FISHEYE
+/// (instant-ngp: is_fisheye), EQUIRECTANGULAR and ORTHOPHOTO (named), and matrices that are not
+/// finite or no rigid motion to 1e-3; smaller deviations are orthonormalised.
 TransformsFile read_transforms(const std::filesystem::path& path);
 
 /// The camera of a frame whose photo has the given size; the file's own size scales its intrinsics.
-/// Throws DataError when the frame has no focal length or angle.
+/// Throws DataError when the frame has no focal length or angle (equirectangular frames need none).
 Camera frame_camera(const TransformsFile& file, std::size_t frame, int width, int height);
 
 /// A name without root, "." and ".." components, so that files named after it stay inside their

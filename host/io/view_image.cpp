@@ -51,8 +51,12 @@ Image load_view_image(const View& view) {
                     view.source_camera.height));
   }
   if (!view.mask_path.empty()) apply_mask(rgba, read_image(view.mask_path));
-  if (view.distortion.any())
-    rgba = io::undistort(std::move(rgba), view.source_camera, view.distortion);
+  if (view.source_camera.model == CameraModel::kOpenCv &&
+      view.camera.model == CameraModel::kPinhole) {
+    rgba = io::undistort(std::move(rgba), view.source_camera);
+  } else {
+    io::mask_unseen(rgba, view.source_camera);
+  }
   if (rgba.width == view.camera.width && rgba.height == view.camera.height) return rgba;
   return io::area_resample(rgba, view.camera.width, view.camera.height);
 }

@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
+#include <iterator>
 
 #include "raysplats/error.hpp"
 
@@ -17,12 +20,40 @@ constexpr std::size_t kBoxPadding = 16;
 constexpr std::size_t kBytesPerCandidate =
     2 * 2 * 4 + 4 * 4 + 8;  // keys and values twice (sort), box, limits
 constexpr std::size_t kPrepareGroup = 64;
+constexpr int kMaxSide = 1 << 20;
 
 std::size_t with_headroom(std::size_t count) { return count + count / 4 + 1024; }
+
+// What the kernels divide by or turn into whole numbers.
+void check_camera(const Camera& camera, const RsCamera& converted) {
+  const std::array<float, 4> intrinsics{converted.fx, converted.fy, converted.cx, converted.cy};
+  const auto finite = [](float value) { return std::isfinite(value); };
+  if (!std::all_of(intrinsics.begin(), intrinsics.end(), finite) ||
+      !std::all_of(std::begin(converted.rotation), std::end(converted.rotation), finite) ||
+      !std::all_of(std::begin(converted.center), std::end(converted.center), finite)) {
+    throw UsageError(fmt::format(
+        "The camera '{}' has a number that is not finite or beyond single precision: correct it",
+        camera.name));
+  }
+  if (!(converted.fx > 0) || !(converted.fy > 0)) {
+    throw UsageError(fmt::format("The camera '{}' has no positive focal length", camera.name));
+  }
+  if (camera.width < 1 || camera.height < 1 || camera.width > kMaxSide ||
+      camera.height > kMaxSide) {
+    throw UsageError(fmt::format("The camera '{}' has {} x {} pixels: 1 to {} a side are possible",
+                                 camera.name, camera.width, camera.height, kMaxSide));
+  }
+}
 
 }  // namespace
 
 RsCamera device_camera(const Camera& camera, float near_depth) {
+  if (camera.model != CameraModel::kPinhole) {
+    throw UsageError(
+        fmt::format("The camera '{}' is no pinhole, and packets of rays are made for pinholes "
+                    "only: trace its rays one by one (ViewTracer), or undistort it",
+                    camera.name));
+  }
   RsCamera out{};
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
@@ -38,6 +69,7 @@ RsCamera device_camera(const Camera& camera, float near_depth) {
   out.width = camera.width;
   out.height = camera.height;
   out.near_depth = near_depth;
+  check_camera(camera, out);
   return out;
 }
 

@@ -83,6 +83,7 @@ DatasetOptions dataset_options(const ModelSource& source) {
   if (source.trained) {
     out.downscale = source.trained->downscale;
     out.test_every = source.trained->test_every;
+    out.undistort = source.trained->undistort;
   }
   return out;
 }

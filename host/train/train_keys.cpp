@@ -161,6 +161,9 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.number("downscale", o.downscale, 0.01, 1e4, "photos are reduced by this factor");
   t.number("test-every", o.test_every, 0, 1e9,
            "every n-th view is held out when the data set has no split of its own; 0 = none");
+  t.flag("undistort", o.undistort,
+         "turn photos through lenses with OpenCV distortion into pinhole pictures; false = their "
+         "own pixels and rays");
   t.text("background", o.background,
          "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
          "alpha, else black) or "

@@ -40,7 +40,7 @@ struct Camera {
 };
 
 /// The camera of the same view for an image reduced by `factor` (a positive number; sizes round to
-/// nearest).
+/// nearest). For every model: the field of view stays.
 Camera downscaled(const Camera& camera, double factor);
 
 /// A camera at `eye` that looks at `target`; `up` is the world direction that points up in the

@@ -16,11 +16,10 @@ enum class Split { kTrain, kTest, kAll };
 
 /// One photo and the camera that took it, at the size it is used (after --downscale).
 struct View {
-  Camera camera;                     ///< undistorted pinhole
+  Camera camera;                     ///< of the picture that load_view_image() gives
   std::filesystem::path image_path;  ///< the photo on disk, possibly distorted and larger
   std::filesystem::path mask_path;   ///< optional mask (black = ignore); empty when there is none
-  Camera source_camera;              ///< intrinsics of the photo on disk
-  Distortion distortion;             ///< of the photo on disk
+  Camera source_camera;              ///< of the photo on disk, with its lens
   bool test = false;
 };
 
@@ -46,6 +45,10 @@ struct Dataset {
 struct DatasetOptions {
   double downscale = 1.0;  ///< COLMAP: images_N is used when it exists, the rest is resampled
   int test_every = 8;      ///< every n-th view of a data set without a split of its own; 0 = none
+  /// true: photos through lenses with distortion (kOpenCv) become pinhole pictures; false: they
+  /// keep their pixels and their model. Other models cannot become pinholes without loss and keep
+  /// theirs either way.
+  bool undistort = true;
 };
 
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender) and reads everything but the pixels.
@@ -53,8 +56,9 @@ struct DatasetOptions {
 /// views.
 Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& options = {});
 
-/// The photo of a view as RGBA float at camera.width x camera.height: undistorted, resampled (area
-/// average). A is the mask or coverage: 1 where the photo is valid; RGB is straight (not
+/// The photo of a view as RGBA float at camera.width x camera.height: undistorted where
+/// view.camera is a pinhole and the photo's lens is none, resampled (area average). A is the mask
+/// or coverage: 1 where the photo is valid, 0 beyond the limit of a lens; RGB is straight (not
 /// premultiplied).
 Image load_view_image(const View& view);
 

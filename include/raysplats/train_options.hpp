@@ -38,6 +38,7 @@ struct TrainOptions {
   // Data
   double downscale = 1.0;
   int test_every = 8;
+  bool undistort = true;
   std::string background = "auto";   ///< "auto", "random" or "r,g,b"
   std::int64_t image_budget = 1024;  ///< MiB
   std::vector<std::int64_t> resolution_schedule{300, 1000};

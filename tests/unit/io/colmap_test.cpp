@@ -66,8 +66,11 @@ TEST_CASE("binary and text COLMAP models of the same scene give the same data se
     CHECK(x.cy == y.cy);
     CHECK(x.rotation == y.rotation);
     CHECK(x.translation == y.translation);
-    CHECK(a.views[i].distortion.k1 == b.views[i].distortion.k1);
-    CHECK(a.views[i].distortion.p2 == b.views[i].distortion.p2);
+    CHECK(x.model == CameraModel::kPinhole);
+    CHECK(!x.distortion.any());
+    CHECK(a.views[i].source_camera.model == b.views[i].source_camera.model);
+    CHECK(a.views[i].source_camera.distortion.k1 == b.views[i].source_camera.distortion.k1);
+    CHECK(a.views[i].source_camera.distortion.p2 == b.views[i].source_camera.distortion.p2);
     CHECK(a.views[i].test == (i % 8 == 0));
     if (i > 0) CHECK(a.views[i - 1].camera.name < x.name);
   }
@@ -95,12 +98,54 @@ TEST_CASE("COLMAP poses and lens parameters mean what COLMAP documents") {
     std::vector<double> parameters;
     double fx, fy, cx, cy;
     Distortion d;
+    CameraModel lens = CameraModel::kPinhole;
   };
+  constexpr CameraModel kOpenCv = CameraModel::kOpenCv;
+  constexpr CameraModel kFisheye = CameraModel::kFisheye;
   for (const Case& c :
        {Case{0, "SIMPLE_PINHOLE", {50, 21, 16}, 50, 50, 21, 16, {}},
         Case{1, "PINHOLE", {50, 51, 21, 16}, 50, 51, 21, 16, {}},
-        Case{2, "SIMPLE_RADIAL", {50, 21, 16, 0.1}, 50, 50, 21, 16, {0.1, 0, 0, 0, 0}},
-        Case{3, "RADIAL", {50, 21, 16, 0.1, 0.2}, 50, 50, 21, 16, {0.1, 0.2, 0, 0, 0}},
+        Case{2, "SIMPLE_RADIAL", {50, 21, 16, 0}, 50, 50, 21, 16, {}},
+        Case{2, "SIMPLE_RADIAL", {50, 21, 16, 0.1}, 50, 50, 21, 16, {0.1, 0, 0, 0, 0}, kOpenCv},
+        Case{3, "RADIAL", {50, 21, 16, 0.1, 0.2}, 50, 50, 21, 16, {0.1, 0.2, 0, 0, 0}, kOpenCv},
+        Case{5,
+             "OPENCV_FISHEYE",
+             {50, 51, 21, 16, 0.1, 0.2, 0.3, 0.4},
+             50,
+             51,
+             21,
+             16,
+             {0.1, 0.2, 0.3, 0, 0, 0.4},
+             kFisheye},
+        Case{6,
+             "FULL_OPENCV",
+             {50, 51, 21, 16, 0.1, 0.2, 0.3, 0.4, 0.5, 0, 0, 0},
+             50,
+             51,
+             21,
+             16,
+             {0.1, 0.2, 0.5, 0.3, 0.4},
+             kOpenCv},
+        Case{8,
+             "SIMPLE_RADIAL_FISHEYE",
+             {50, 21, 16, 0.1},
+             50,
+             50,
+             21,
+             16,
+             {0.1, 0, 0, 0, 0},
+             kFisheye},
+        Case{9,
+             "RADIAL_FISHEYE",
+             {50, 21, 16, 0.1, 0.2},
+             50,
+             50,
+             21,
+             16,
+             {0.1, 0.2, 0, 0, 0},
+             kFisheye},
+        Case{14, "SIMPLE_FISHEYE", {50, 21, 16}, 50, 50, 21, 16, {}, kFisheye},
+        Case{15, "FISHEYE", {50, 51, 21, 16}, 50, 51, 21, 16, {}, kFisheye},
         Case{4,
              "OPENCV",
              {50, 51, 21, 16, 0.1, 0.2, 0.3, 0.4},
@@ -108,15 +153,20 @@ TEST_CASE("COLMAP poses and lens parameters mean what COLMAP documents") {
              51,
              21,
              16,
-             {0.1, 0.2, 0, 0.3, 0.4}}}) {
+             {0.1, 0.2, 0, 0.3, 0.4},
+             kOpenCv}}) {
+    CAPTURE(c.name);
     fixture.cameras = {{1, c.model, c.name, 40, 30, c.parameters}};
     fixture.write_binary(scratch / c.name);
     const io::ColmapModel model = io::read_colmap_model(scratch / c.name);
-    const io::ColmapCamera& camera = model.cameras.at(1);
-    CHECK(camera.camera.fx == c.fx);
-    CHECK(camera.camera.fy == c.fy);
-    CHECK(camera.camera.cx == c.cx);
-    CHECK(camera.camera.cy == c.cy);
+    const Camera& camera = model.cameras.at(1);
+    CHECK(camera.model == c.lens);
+    CHECK(camera.fx == c.fx);
+    CHECK(camera.fy == c.fy);
+    CHECK(camera.cx == c.cx);
+    CHECK(camera.cy == c.cy);
+    CHECK(camera.distortion.k3 == c.d.k3);
+    CHECK(camera.distortion.k4 == c.d.k4);
     CHECK(camera.distortion.k1 == c.d.k1);
     CHECK(camera.distortion.k2 == c.d.k2);
     CHECK(camera.distortion.p1 == c.d.p1);
@@ -125,6 +175,40 @@ TEST_CASE("COLMAP poses and lens parameters mean what COLMAP documents") {
     CHECK(glm::length(image.rotation * glm::dvec3(1, 0, 0) - glm::dvec3(0, 1, 0)) < 1e-12);
     CHECK(glm::length(image.rotation * glm::dvec3(0, 1, 0) - glm::dvec3(-1, 0, 0)) < 1e-12);
     CHECK(image.translation == glm::dvec3(10, 20, 30));
+  }
+}
+
+TEST_CASE("cameras stay what they are where photos are not undistorted, and fisheyes always") {
+  const Scratch scratch;
+  ColmapFixture fixture = small_colmap();
+  fixture.cameras[0] = {7, 5, "OPENCV_FISHEYE", 40, 30, {18, 19, 20, 15, 0.05, -0.01, 0, 0.001}};
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  DatasetOptions options;
+  options.downscale = 2;
+  const auto count = [](const Dataset& dataset, CameraModel model) {
+    return std::count_if(dataset.views.begin(), dataset.views.end(),
+                         [&](const View& view) { return view.camera.model == model; });
+  };
+  const Dataset undistorted = load_dataset(scratch.path(), options);
+  CHECK(count(undistorted, CameraModel::kPinhole) == 6);
+  CHECK(count(undistorted, CameraModel::kFisheye) == 4);
+  options.undistort = false;
+  const Dataset kept = load_dataset(scratch.path(), options);
+  CHECK(count(kept, CameraModel::kOpenCv) == 6);
+  CHECK(count(kept, CameraModel::kFisheye) == 4);
+  for (std::size_t i = 0; i < kept.views.size(); ++i) {
+    const View& view = kept.views[i];
+    CHECK(view.camera.distortion.k1 == view.source_camera.distortion.k1);
+    CHECK(view.camera.distortion.any());
+    CHECK(view.camera.width == 20);
+    CHECK(view.camera.fx == view.source_camera.fx / 2);
+    const Image image = load_view_image(view);
+    CHECK(image.width == 20);
+    // A grey photo stays grey to its corners, which an undistorted one does not reach.
+    CHECK(image.at(0, 0, 3) == 1.0f);
+    CHECK(image.at(0, 0, 0) == doctest::Approx(0.2).epsilon(0.01));
+    CHECK(undistorted.views[i].source_camera.model == view.source_camera.model);
   }
 }
 
@@ -199,7 +283,7 @@ TEST_CASE("masks beside the photos and test_every are honoured") {
   const View& masked = dataset.views[9];
   REQUIRE(!masked.mask_path.empty());
   CHECK(dataset.views[8].mask_path.empty());
-  if (!masked.distortion.any()) CHECK(load_view_image(masked).at(3, 4, 3) == 0.0f);
+  if (!masked.source_camera.distortion.any()) CHECK(load_view_image(masked).at(3, 4, 3) == 0.0f);
   options.test_every = 0;
   CHECK(load_dataset(scratch.path(), options).indices(Split::kTest).empty());
   options.test_every = -1;
@@ -242,11 +326,15 @@ TEST_CASE("a photo that changed after the data set was opened is refused") {
 
 TEST_CASE("malformed COLMAP models are refused with the place of the fault") {
   ColmapFixture fixture = small_colmap();
-  fixture.cameras[0].model = 5;
+  fixture.cameras[0].model = 10;
   CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()),
-                 "OPENCV_FISHEYE is not supported"));
+                 "THIN_PRISM_FISHEYE is not supported"));
   fixture.cameras[0].model = 77;
   CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()), "number 77"));
+  fixture = small_colmap();
+  fixture.cameras[0] = {7, 6, "FULL_OPENCV", 40, 30, {50, 51, 20, 15, 1, 0, 0, 0, 0, 0, 0.5, 0}};
+  CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()), "rational terms"));
+  CHECK(contains(text_error_with("cameras.txt", fixture.cameras_text()), "rational terms"));
   fixture = small_colmap();
   fixture.cameras[1].model_name = "FOV";
   CHECK(contains(text_error_with("cameras.txt", fixture.cameras_text()), "'FOV' is not supported"));

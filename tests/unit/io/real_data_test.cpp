@@ -92,6 +92,38 @@ TEST_CASE("real data sets have the views, points and sizes that their descriptio
   }
 }
 
+TEST_CASE("a real distorted photo keeps its pixels and its lens when it is not undistorted") {
+  const auto data = test_data();
+  if (!data) return;
+  DatasetOptions options;
+  options.undistort = false;
+  const Dataset dataset = load_dataset(*data / "nerfstudio/fox", options);
+  const View& view = dataset.views.front();
+  CHECK(view.camera.model == CameraModel::kOpenCv);
+  CHECK(view.camera.distortion.k1 == 0.0578421);
+  CHECK(view.camera.distortion.k2 == -0.0805099);
+  CHECK(view.camera.distortion.p1 == -0.000980296);
+  CHECK(view.camera.distortion.p2 == 0.00015575);
+  CHECK(view.camera.width == view.source_camera.width);
+  const Image photo = read_image(view.image_path);
+  const Image kept = load_view_image(view);
+  REQUIRE(kept.width == photo.width);
+  REQUIRE(kept.height == photo.height);
+  const auto channels = static_cast<std::size_t>(photo.channels);
+  std::size_t other = 0;
+  for (std::size_t i = 0; i < photo.pixels(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c)
+      other += kept.data[4 * i + c] == photo.data[channels * i + c] ? 0 : 1;
+    other += kept.data[4 * i + 3] == 1.0f ? 0 : 1;
+  }
+  CHECK(other == 0);
+  const Dataset undistorted = load_dataset(*data / "nerfstudio/fox");
+  CHECK(undistorted.views.front().camera.model == CameraModel::kPinhole);
+  CHECK(!undistorted.views.front().camera.distortion.any());
+  CHECK(undistorted.views.front().source_camera.model == CameraModel::kOpenCv);
+  CHECK(load_view_image(undistorted.views.front()).data != kept.data);
+}
+
 TEST_CASE("a real COLMAP model reads the same from text and from binary files") {
   const auto data = test_data();
   if (!data) return;
@@ -107,7 +139,9 @@ TEST_CASE("a real COLMAP model reads the same from text and from binary files") 
     const View& b = text.views[i];
     CHECK(a.camera.name == b.camera.name);
     CHECK(a.camera.fx == doctest::Approx(b.camera.fx).epsilon(1e-12));
-    CHECK(a.distortion.k1 == doctest::Approx(b.distortion.k1).epsilon(1e-12));
+    CHECK(a.source_camera.model == b.source_camera.model);
+    CHECK(a.source_camera.distortion.k1 ==
+          doctest::Approx(b.source_camera.distortion.k1).epsilon(1e-12));
     CHECK(glm::length(a.camera.center() - b.camera.center()) < 1e-9);
     CHECK(a.test == b.test);
   }

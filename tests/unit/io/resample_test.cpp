@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "base/rng.hpp"
+#include "core/camera_model.hpp"
 #include "raysplats/dataset.hpp"
 
 using namespace raysplats;
@@ -48,11 +49,9 @@ void undistorted_point(const Distortion& d, double dx, double dy, double& x, dou
   x = dx;
   y = dy;
   for (int i = 0; i < 200; ++i) {
-    double px = 0;
-    double py = 0;
-    io::distort(d, x, y, px, py);
-    x += dx - px;
-    y += dy - py;
+    const glm::dvec2 p = distort(d, {x, y});
+    x += dx - p.x;
+    y += dy - p.y;
   }
 }
 
@@ -96,6 +95,7 @@ TEST_CASE("undistortion recovers an analytic pattern seen through a lens") {
   camera.fy = 155;
   camera.cx = 86.5;
   camera.cy = 71.25;
+  camera.model = CameraModel::kOpenCv;
   for (const Distortion& d :
        {Distortion{0.12, -0.05, 0.0, 0.002, -0.003}, Distortion{-0.15, 0.03, 0.01, 0.0, 0.0}}) {
     // The photo: each pixel shows the pattern where the undistorted ray of its distorted position
@@ -113,7 +113,8 @@ TEST_CASE("undistortion recovers an analytic pattern seen through a lens") {
         }
       }
     }
-    const Image out = io::undistort(photo, camera, d);
+    camera.distortion = d;
+    const Image out = io::undistort(photo, camera);
     double worst = 0;
     double worst_unchanged = 0;
     std::size_t inside = 0;
@@ -121,11 +122,10 @@ TEST_CASE("undistortion recovers an analytic pattern seen through a lens") {
     std::size_t wrong_alpha = 0;
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
-        double u = 0;
-        double v = 0;
-        io::distort(d, (x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, u, v);
-        u = u * camera.fx + camera.cx;
-        v = v * camera.fy + camera.cy;
+        const glm::dvec2 seen =
+            distort(d, {(x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy});
+        const double u = seen.x * camera.fx + camera.cx;
+        const double v = seen.y * camera.fy + camera.cy;
         const bool in_photo = u >= 0 && u <= camera.width && v >= 0 && v <= camera.height;
         wrong_alpha += std::abs(out.at(x, y, 3) - (in_photo ? 1.0f : 0.0f)) > 1e-6f ? 1 : 0;
         masked += in_photo ? 0 : 1;
@@ -154,8 +154,9 @@ TEST_CASE("rays beyond the angle where the lens folds over are masked") {
   camera.fx = camera.fy = 40;
   camera.cx = camera.cy = 50;
   // r (1 - r^2 / 3) grows up to r = 1 and comes back into the photo beyond.
-  const Distortion d{-1.0 / 3.0, 0, 0, 0, 0};
-  const Image out = io::undistort(Image(100, 100, 4, 1.0f), camera, d);
+  camera.model = CameraModel::kOpenCv;
+  camera.distortion = {-1.0 / 3.0, 0, 0, 0, 0};
+  const Image out = io::undistort(Image(100, 100, 4, 1.0f), camera);
   std::size_t wrong = 0;
   for (int y = 0; y < 100; ++y) {
     for (int x = 0; x < 100; ++x) {
@@ -165,6 +166,35 @@ TEST_CASE("rays beyond the angle where the lens folds over are masked") {
     }
   }
   CHECK(wrong == 0);
+}
+
+TEST_CASE("pixels that a lens does not see are masked in photos that keep their model") {
+  Camera camera;
+  camera.width = camera.height = 100;
+  camera.fx = camera.fy = 15;
+  camera.cx = 48;
+  camera.cy = 50;
+  camera.model = CameraModel::kFisheye;
+  for (const double k4 : {0.0, -0.001}) {
+    camera.distortion.k4 = k4;
+    Image photo(100, 100, 4, 0.75f);
+    io::mask_unseen(photo, camera);
+    std::size_t wrong = 0, masked = 0;
+    for (int y = 0; y < 100; ++y) {
+      for (int x = 0; x < 100; ++x) {
+        const bool seen = camera_ray(camera, x + 0.5, y + 0.5).valid;
+        masked += seen ? 0 : 1;
+        wrong += photo.at(x, y, 3) == (seen ? 0.75f : 0.0f) && photo.at(x, y, 0) == 0.75f ? 0 : 1;
+      }
+    }
+    CHECK(wrong == 0);
+    CHECK(masked > 1000);
+  }
+  camera.model = CameraModel::kPinhole;
+  Image photo(100, 100, 4, 0.75f);
+  const std::vector<float> before = photo.data;
+  io::mask_unseen(photo, camera);
+  CHECK(photo.data == before);
 }
 
 TEST_CASE("compositing blends by alpha and repeats grey") {

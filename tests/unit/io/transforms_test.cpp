@@ -105,6 +105,74 @@ TEST_CASE("written cameras read back, with shared and with own intrinsics") {
   }
 }
 
+TEST_CASE("cameras of every model are written and read back, together and one by one") {
+  const Scratch scratch;
+  std::vector<Camera> cameras;
+  for (const CameraModel model :
+       {CameraModel::kPinhole, CameraModel::kOpenCv, CameraModel::kFisheye,
+        CameraModel::kEquirectangular, CameraModel::kOrthographic}) {
+    Camera camera = look_at({3, 2, 0.1}, {0, 0.5, 0}, {0, 0, 1}, 64, 48, 70.123456789);
+    camera.name = "a.png";
+    camera.model = model;
+    if (model == CameraModel::kOpenCv) camera.distortion = {0.1, 0.02, 0.003, 0.004, 0.005, 0};
+    if (model == CameraModel::kFisheye) camera.distortion = {0.1, 0.02, 0.003, 0, 0, 0.0006};
+    if (model == CameraModel::kEquirectangular) {
+      camera.fx = 32;
+      camera.fy = 48;
+    }
+    cameras.push_back(camera);
+  }
+  const auto check = [](const Camera& a, const Camera& b) {
+    CHECK(a.model == b.model);
+    CHECK(a.fx == b.fx);
+    CHECK(a.fy == b.fy);
+    CHECK(a.cx == b.cx);
+    CHECK(a.cy == b.cy);
+    CHECK(a.distortion.k1 == b.distortion.k1);
+    CHECK(a.distortion.k2 == b.distortion.k2);
+    CHECK(a.distortion.k3 == b.distortion.k3);
+    CHECK(a.distortion.k4 == b.distortion.k4);
+    CHECK(a.distortion.p1 == b.distortion.p1);
+    CHECK(a.distortion.p2 == b.distortion.p2);
+    CHECK(glm::length(a.center() - b.center()) < 1e-12);
+  };
+  write_cameras(scratch / "all.json", cameras);
+  const std::vector<Camera> all = read_cameras(scratch / "all.json");
+  REQUIRE(all.size() == cameras.size());
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    CAPTURE(i);
+    check(all[i], cameras[i]);
+    write_cameras(scratch / "one.json", {cameras[i], cameras[i]});
+    check(read_cameras(scratch / "one.json").back(), cameras[i]);
+    Camera wide = cameras[i];
+    wide.width = 65;
+    if (wide.model == CameraModel::kEquirectangular) wide.fx = wide.cx = 32.5;
+    write_cameras(scratch / "two.json", {cameras[i], wide});
+    check(read_cameras(scratch / "two.json").front(), cameras[i]);
+    check(read_cameras(scratch / "two.json").back(), wide);
+  }
+}
+
+TEST_CASE("names of camera models: nerfstudio's, and instant-ngp's flag") {
+  const std::string size = "\"w\": 40, \"h\": 20, ";
+  const auto model = [&](const std::string& keys) {
+    return cameras_of(file_of(size + keys, frame("a", 1))).front();
+  };
+  CHECK(model("\"fl_x\": 9, \"camera_model\": \"OPENCV\", ").model == CameraModel::kPinhole);
+  CHECK(model("\"fl_x\": 9, \"k1\": 0.1, ").model == CameraModel::kOpenCv);
+  CHECK(model("\"fl_x\": 9, \"k1\": 0.1, \"is_fisheye\": true, ").model == CameraModel::kFisheye);
+  const Camera fisheye =
+      model("\"fl_x\": 9, \"k1\": 0.1, \"k4\": 0.4, \"camera_model\": \"OPENCV_FISHEYE\", ");
+  CHECK(fisheye.model == CameraModel::kFisheye);
+  CHECK(fisheye.distortion.k4 == 0.4);
+  const Camera panorama = model("\"camera_model\": \"EQUIRECTANGULAR\", ");
+  CHECK(panorama.model == CameraModel::kEquirectangular);
+  CHECK(panorama.fx == 20);
+  CHECK(panorama.fy == 20);
+  CHECK(model("\"fl_x\": 9, \"camera_model\": \"ORTHOPHOTO\", ").model ==
+        CameraModel::kOrthographic);
+}
+
 TEST_CASE("small deviations from a rotation are removed, larger ones refused") {
   const auto with_matrix = [](const std::string& matrix) {
     return "{\"w\": 4, \"h\": 4, \"fl_x\": 5, \"frames\": [{\"transform_matrix\": " + matrix +
@@ -151,12 +219,14 @@ TEST_CASE("malformed camera files are refused with the frame or the byte") {
   CHECK(
       contains(cameras_error(file_of("\"w\": 1e30, \"h\": 4, ", frame("a", 1))), "no image size"));
   CHECK(contains(cameras_error(file_of("\"camera_angle_x\": 4, ", frame("a", 1))), "no angle"));
-  CHECK(contains(cameras_error(file_of("\"camera_model\": \"OPENCV_FISHEYE\", ", frame("a", 1))),
-                 "'OPENCV_FISHEYE'"));
-  CHECK(
-      contains(cameras_error(file_of("", frame("a", 1, "\"camera_model\": \"EQUIRECTANGULAR\", "))),
-               "frame 0"));
-  CHECK(contains(cameras_error(file_of("\"is_fisheye\": true, ", frame("a", 1))), "fisheye"));
+  CHECK(contains(cameras_error(file_of("\"camera_model\": \"FISHEYE624\", ", frame("a", 1))),
+                 "'FISHEYE624'"));
+  CHECK(contains(cameras_error(file_of("", frame("a", 1, "\"camera_model\": \"VR180_L\", "))),
+                 "frame 0"));
+  CHECK(contains(cameras_error(file_of("\"w\": 4, \"h\": 4, \"is_fisheye\": true, "
+                                       "\"camera_angle_x\": 1, ",
+                                       frame("a", 1))),
+                 "no fl_x"));
   CHECK(contains(cameras_error(file_of("\"k4\": 0.1, ", frame("a", 1))), "'k4'"));
   CHECK(contains(data_error([] { read_cameras("/nonexistent.json"); }), "does not exist"));
 }
@@ -227,18 +297,20 @@ TEST_CASE("nerfstudio scenes: distortion, masks, points, lists of names, scaled 
   CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{0, 8});
   CHECK(dataset.points.positions == std::vector<float>{1, 2, 3});
   const View& view = dataset.views[1];
-  CHECK(view.distortion.k1 == 0.1);
-  CHECK(view.distortion.k3 == 0.3);
-  CHECK(view.distortion.p2 == 0.02);
+  CHECK(view.source_camera.model == CameraModel::kOpenCv);
+  CHECK(view.source_camera.distortion.k1 == 0.1);
+  CHECK(view.source_camera.distortion.k3 == 0.3);
+  CHECK(view.source_camera.distortion.p2 == 0.02);
+  CHECK(view.camera.model == CameraModel::kPinhole);
   CHECK(view.camera.width == 20);
   CHECK(view.camera.fx == 25);
   CHECK(view.camera.fy == 26);
   CHECK(view.camera.cx == 10.5);
   CHECK(view.camera.cy == 4.5);
-  CHECK(dataset.views[2].distortion.k1 == 0);
+  CHECK(dataset.views[2].source_camera.distortion.k1 == 0);
   CHECK(!dataset.views[2].mask_path.empty());
   View plain = dataset.views[2];
-  plain.distortion = {};
+  plain.source_camera.model = CameraModel::kPinhole;
   const Image masked = load_view_image(plain);
   CHECK(masked.at(1, 1, 3) == 0.0f);
   CHECK(masked.at(2, 1, 3) == 1.0f);
