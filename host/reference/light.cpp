@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNegligible = 1e-4;
+constexpr double kFaint = 1e-3;  ///< Gaussians up to this alpha have no shadow
 constexpr std::size_t kNestedBodies = 4;
 constexpr int kSplits = 2;
 
@@ -79,7 +80,9 @@ RayTrace Walk::gaussians(const State& state, double t_end, double& margin) {
   const glm::dvec3 sigma = state.bodies.empty()
                                ? glm::dvec3(0.0)
                                : vector(scene_.scene.materials[state.bodies.back()].absorption);
-  const bool shaded = !scene_.scene.lights.empty();
+  const bool lit = !scene_.scene.lights.empty();
+  const bool shaded = lit && ray.alpha > kFaint;
+  if (lit) margin = std::min(margin, std::abs(ray.alpha - kFaint));
   if (shaded || largest(sigma) > 0.0) {
     // The median moves from Gaussian to Gaussian.
     for (const Hit& hit : ray.hits) {

@@ -122,7 +122,7 @@ SurfacePoint surface_point(const LightScene& scene,
   if (lean < 0.0) out.shading_normal = -out.shading_normal;
   margin = std::min({margin, std::abs(slope), std::abs(lean)});
   out.color = vector(material.color);
-  if (material.texture >= 0 && triangle.has_uvs) {
+  if (material.texture >= 0) {
     out.color *=
         sampled(scene.scene.textures[static_cast<std::size_t>(material.texture)], uv.x, uv.y, true);
   }

@@ -18,7 +18,6 @@ std::vector<Triangle> triangles_of(const std::vector<Mesh>& meshes) {
     for (std::size_t i = 0; i < mesh.triangle_count(); ++i) {
       Triangle triangle;
       triangle.material = mesh.materials[i];
-      triangle.has_uvs = !mesh.uvs.empty();
       for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t v = mesh.triangles[3 * i + k];
         const float* p = &mesh.positions[3 * v];

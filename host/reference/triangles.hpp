@@ -18,7 +18,6 @@ struct Triangle {
   std::array<glm::dvec2, 3> uvs{};
   glm::dvec3 normal{0.0};  ///< unit, by the right hand; zero when the triangle has no area
   std::size_t material = 0;
-  bool has_uvs = false;
 };
 
 /// The triangles of all meshes in order.
