@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,6 +11,7 @@
 #include "device/context.hpp"
 #include "raysplats/trace_options.hpp"
 #include "trace/device_gaussians.hpp"
+#include "trace/ray_tree.hpp"
 
 namespace raysplats {
 
@@ -60,6 +62,12 @@ class RayTracer {
              std::size_t count,
              Buffer<RayResult>& results,
              ColorDirection color_direction = ColorDirection::kRay);
+
+  /// Colour behind the Gaussians from the next trace() on.
+  void set_background(const std::array<float, 3>& background);
+  const TraceOptions& options() const;
+  /// The tree of the last update() or refit().
+  const RayTree& tree() const;
 
  private:
   struct Impl;

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gradients of a loss over arbitrary rays: walks the rays again (ray_walk.h) and sums per Gaussian
+// (ray_sums.h); ray_gradients.cl carries the sums to the parameters.
+//
+// A batch of hits is taken from its last hit to its first. With P_i = colour_i . g + g_alpha, what
+// a hit of ray gradient (g, g_alpha) adds, and S_i, the same for everything behind it as if seen
+// with full light (the background at the end of the ray): dL/dalpha_i = T_i (P_i - S_i) and
+// S_(i-1) = alpha_i P_i + (1 - alpha_i) S_i. Nothing is divided, so alpha = 1 is no special case.
+// Where a ray has more hits than there is room for, what lies behind an early batch is the ray's
+// known result minus what is blended so far, divided by the transmittance there (at least
+// min_transmittance): that difference costs up to eps / T of relative accuracy. Cost: that of
+// trace_rays plus O(1) per hit.
+//
+// Launch: `items` work-items; each takes every items-th chunk of `chunk` rays in the order given.
+//   PRIVATE_COPIES 1: work-item i adds to copy i of `sums`: no atomics, the same sum every time
+//   PRIVATE_COPIES 0: one copy, compare-and-swap adds
+#include "trace/ray_color.h"
+#include "trace/ray_sums.h"
+
+#ifndef PRIVATE_COPIES
+#define PRIVATE_COPIES 0
+#endif
+
+typedef struct {
+  // Read only.
+  __global const float* records;
+  __global float* sums;
+  float16 screen;   // as the kernel's argument
+  float4 gradient;  // of the ray's colour and alpha
+  float sky;        // background . gradient
+  float total;      // final colour . gradient + final alpha * gradient of alpha
+  int total_hits;   // of the ray
+  // What a walk needs, and the part of `total` that is blended.
+  float transmittance;
+  int hits;
+  bool stopped;
+  float last_key;
+  uint last_index;
+  float blended;
+} RayState;
+
+void add_sum(__global float* target, float value) {
+#if PRIVATE_COPIES
+  *target += value;
+#else
+  if (value == 0.0f) return;
+  volatile __global uint* word = (volatile __global uint*)target;
+  // A plain first read would race with the others' writes; 0 is what most first writers find.
+  uint old = 0;
+  for (;;) {
+    const uint seen = atomic_cmpxchg(word, old, as_uint(as_float(old) + value));
+    if (seen == old) break;
+    old = seen;
+  }
+#endif
+}
+
+void add_sums(__global float* target, float16 value) {
+#if PRIVATE_COPIES
+  *(__global float16*)target += value;
+#else
+  union {
+    float16 v;
+    float s[16];
+  } part;
+  part.v = value;
+  for (int i = 0; i < 16; ++i) add_sum(target + i, part.s[i]);
+#endif
+}
+
+// Adds what one hit contributes: `by_alpha` = dL/dalpha, `by_color` = dL/dcolour, zero where the
+// colour is clamped.
+void add_hit(const RayScene* scene,
+             const RayData* ray,
+             const float* basis_of_ray,
+             const uint index,
+             const float alpha,
+             const float by_alpha,
+             const float3 by_color,
+             const RayState* state) {
+  const float16 record = *(__global const float16*)(state->records + (size_t)index * 16);
+  const float3 x = record.s012, y = record.s345, z = record.s678;  // rows of M = S^-1 R^T
+  const float3 offset = ray->o - record.s9ab;
+  const float3 o = (float3)(dot(x, offset), dot(y, offset), dot(z, offset));
+  const float3 d = (float3)(dot(x, ray->d), dot(y, ray->d), dot(z, ray->d));
+  // The residual by cross products: o - d <o, d> / <d, d> loses the small component along the
+  // short axis of a thin Gaussian, which counts for its mean and its rotation.
+  const float3 v = cross(d, cross(o, d)) / dot(d, d);
+  // delta^2 = |v|^2, and v is perpendicular to d'.
+  const float g = -0.5f * alpha * by_alpha;
+  const float3 by_v = 2.0f * g * v;
+  const float3 by_mean = -(by_v.x * x + by_v.y * y + by_v.z * z);
+  const float16 s = state->screen;
+  const float3 on_screen =
+      (float3)(dot(s.s012, by_mean), dot(s.s345, by_mean), dot(s.s678, by_mean));
+  float16 sum;
+  sum.s012 = by_v;
+  sum.s345 = g * v.x * v;
+  sum.s67 = g * v.y * v.yz;
+  sum.s8 = g * v.z * v.z;
+  sum.s9 = alpha * by_alpha;
+  sum.sa = sqrt(dot(on_screen, on_screen));
+  sum.sef = (float2)(0.0f);
+  __global float* target = state->sums + (size_t)index * RS_RAY_SUMS;
+#if SH_DEGREE == 0
+  (void)scene;
+  (void)basis_of_ray;
+  sum.sbcd = by_color;
+#else
+  sum.sbcd = (float3)(0.0f);
+  float own_basis[RS_RAY_FUNCTIONS];
+  const float* basis = basis_of_ray;
+  if (scene->color_from_origin) {
+    const float inverse = rsqrt(fmax(dot(offset, offset), 1e-30f));
+    const float3 n = -inverse * offset;
+    rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, own_basis);
+    basis = own_basis;
+    float along[RS_RAY_FUNCTIONS];
+    __global const float* c = scene->sh + (size_t)index * 3 * scene->sh_coefficients;
+    for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) along[k] = dot(vload3(k, c), by_color);
+    float slope[3];
+    rs_sh_gradient(SH_DEGREE, n.x, n.y, n.z, along, slope);
+    const float3 by_n = (float3)(slope[0], slope[1], slope[2]);
+    sum.sbcd = (by_n - n * dot(by_n, n)) * inverse;
+  }
+  for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) {
+    add_sum(target + RS_RAY_SH + k, basis[k] * by_color.x);
+    add_sum(target + RS_RAY_SH + RS_RAY_FUNCTIONS + k, basis[k] * by_color.y);
+    add_sum(target + RS_RAY_SH + 2 * RS_RAY_FUNCTIONS + k, basis[k] * by_color.z);
+  }
+#endif
+  add_sums(target, sum);
+}
+
+void blend_hits(const RayScene* scene,
+                const RayData* ray,
+                const float* basis,
+                Pending* pending,
+                int count,
+                RayState* state) {
+  // Of evaluated entries the opacity is no longer needed: it makes room for the transmittance.
+  float* before = pending->opacity;
+  int blended = 0;
+  while (blended < count && !state->stopped) {
+    if (state->hits == scene->max_hits) {
+      state->stopped = true;
+      break;
+    }
+    const int i = pending->order[blended++];
+    pending->color[i] = hit_color(scene, ray, basis, pending, i);
+    before[i] = state->transmittance;
+    state->transmittance *= 1.0f - pending->alpha[i];
+    ++state->hits;
+    state->last_key = pending->key.s[i];
+    state->last_index = pending->index[i];
+    state->stopped = state->transmittance < scene->min_transmittance;
+    RS_PREFETCH_READ(state->records + (size_t)pending->index[i] * 16);
+    for (int k = 0; k < RS_RAY_SUMS; k += 16) {
+      RS_PREFETCH_WRITE(state->sums + (size_t)pending->index[i] * RS_RAY_SUMS + k);
+    }
+  }
+  const float3 gradient = state->gradient.xyz;
+  float behind = state->sky;
+  if (!state->stopped && state->hits < state->total_hits) {
+    for (int k = 0; k < blended; ++k) {
+      const int i = pending->order[k];
+      const float projected = dot(pending->color[i].xyz, gradient) + state->gradient.w;
+      state->blended += before[i] * pending->alpha[i] * projected;
+    }
+    behind = (state->total - state->blended) / state->transmittance;
+  }
+  for (int k = blended - 1; k >= 0; --k) {
+    const int i = pending->order[k];
+    const float alpha = pending->alpha[i];
+    const float3 color = pending->color[i].xyz;
+    const float projected = dot(color, gradient) + state->gradient.w;
+    const float3 by_color = color > 0.0f ? before[i] * alpha * gradient : (float3)(0.0f);
+    add_hit(scene, ray, basis, pending->index[i], alpha, before[i] * (projected - behind), by_color,
+            state);
+    behind = alpha * projected + (1.0f - alpha) * behind;
+  }
+}
+
+#include "trace/ray_walk.h"
+
+// rays, results, tree and order as in rays.cl; gradients: dL/d(R, G, B, alpha) per ray; records:
+// whitening matrix and mean of every Gaussian (ray_gradients.cl); screen: a 3 x 3 matrix in 0..8,
+// row-major, from the gradient of a mean to its share on the screen for a mean at distance 1.
+__kernel void ray_backward(const uint ray_count,
+                           const uint chunk,
+                           const uint items,
+                           const uint gaussians,
+                           const int levels,
+                           __global const uint* restrict level_begin,
+                           __global const fv* restrict nodes,
+                           __global const fv* restrict blocks,
+                           __global const float* restrict sh,
+                           const int sh_coefficients,
+                           const int color_from_origin,
+                           const float quantile,
+                           const float min_transmittance,
+                           const int max_hits,
+                           const float4 background,
+                           const float16 screen,
+                           __global const float8* restrict rays,
+                           const int ordered,
+                           __global const uint* restrict ray_order,
+                           __global const float8* restrict results,
+                           __global const float4* restrict gradients,
+                           __global const float* restrict records,
+                           __global float* restrict sums) {
+  const uint item = get_global_id(0);
+  if (item >= items) return;
+  const RayScene scene = {level_begin, nodes,
+                          blocks,      sh,
+                          levels,      sh_coefficients,
+                          SH_DEGREE,   color_from_origin,
+                          quantile,    min_transmittance,
+                          max_hits};
+  RayState state;
+  state.records = records;
+#if PRIVATE_COPIES
+  state.sums = sums + (size_t)item * gaussians * RS_RAY_SUMS;
+#else
+  (void)gaussians;
+  state.sums = sums;
+#endif
+  state.screen = screen;
+  for (size_t begin = (size_t)item * chunk; begin < ray_count; begin += (size_t)items * chunk) {
+    const size_t end = min(begin + chunk, (size_t)ray_count);
+    for (size_t position = begin; position < end; ++position) {
+      const size_t id = ordered ? ray_order[position] : position;
+      const float4 gradient = gradients[id];
+      const float8 result = results[id];
+      const int hits = as_int(result.s6);
+      if (hits == 0 || !any(gradient != 0.0f)) continue;
+      const float8 raw = rays[id];
+      RayData ray = ray_data(raw);
+      float basis[25];
+      basis_along_ray(&scene, &ray, basis);
+      state.gradient = gradient;
+      state.sky = dot(background.xyz, gradient.xyz);
+      state.total = dot(result.s012, gradient.xyz) + result.s3 * gradient.w;
+      state.total_hits = hits;
+      state.transmittance = 1.0f;
+      state.hits = 0;
+      state.stopped = false;
+      state.last_key = -1.0f;
+      state.last_index = 0;
+      state.blended = 0.0f;
+      walk_ray(&scene, raw.s7, basis, &ray, &state);
+    }
+  }
+}

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// Before and after ray_backward, one work-item per VECTOR Gaussians from number `begin` on, any
+// local size; end - begin is a multiple of VECTOR. O(1) per Gaussian.
+//   ray_gradient_records  what a hit's gradient needs of a Gaussian, 16 floats: the rows of
+//                         M = S^-1 R^T (9), the mean (3), zeros
+//   finish_ray_gradients  adds the private copies of the sums (ray_sums.h) in a fixed order, leaves
+//                         zeros in the copies behind the first, and carries the sums to the
+//                         parameters and to the screen statistics that density control reads
+#include "trace/gaussian.h"
+#include "trace/ray_sums.h"
+
+// Floats of SH kept per Gaussian, divided by 3.
+#ifndef SH_COEFFICIENTS
+#define SH_COEFFICIENTS RS_RAY_FUNCTIONS
+#endif
+
+typedef struct {
+  gv q[4];  // unit quaternion
+  gv q_norm;
+  gv scale[3];  // standard deviations, floored as those that rays are traced with
+  gv raw_scale[3];
+} RayGaussian;
+
+void load_ray_gaussian(const size_t i,
+                       __global const float* quaternions,
+                       __global const float* scales,
+                       RayGaussian* g) {
+  for (int j = 0; j < 4; ++j) g->q[j] = load_column(quaternions + 4 * i + j, 4);
+  g->q_norm = sqrt(g->q[0] * g->q[0] + g->q[1] * g->q[1] + g->q[2] * g->q[2] + g->q[3] * g->q[3]);
+  for (int j = 0; j < 4; ++j) g->q[j] = g->q[j] / g->q_norm;
+  gv longest = 0;
+  for (int k = 0; k < 3; ++k) {
+    g->raw_scale[k] = activated_scale(load_column(scales + 3 * i + k, 3));
+    longest = larger(g->raw_scale[k], longest);
+  }
+  const gv floor_scale = larger(longest * 1e-7f, (gv)(1e-12f));
+  for (int k = 0; k < 3; ++k) g->scale[k] = larger(g->raw_scale[k], floor_scale);
+}
+
+__kernel void ray_gradient_records(const uint begin,
+                                   const uint end,
+                                   __global const float* restrict means,
+                                   __global const float* restrict quaternions,
+                                   __global const float* restrict scales,
+                                   __global float* restrict records) {
+  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  if (i >= end) return;
+  RayGaussian g;
+  load_ray_gaussian(i, quaternions, scales, &g);
+  gv R[9], record[16];
+  rotation_matrix(g.q[0], g.q[1], g.q[2], g.q[3], R);
+  for (int k = 0; k < 3; ++k) {
+    for (int j = 0; j < 3; ++j) record[3 * k + j] = R[3 * j + k] / g.scale[k];
+    record[9 + k] = load_column(means + 3 * i + k, 3);
+  }
+  for (int k = 12; k < 16; ++k) record[k] = 0;
+  store_columns(record, 16, records + 16 * i, 16);
+}
+
+// Sums of VECTOR Gaussians as columns; true in lanes that a ray touched.
+gi load_sums(__global float* sums, const size_t copy_floats, const uint copies, gv* v) {
+  // VECTOR Gaussians lie side by side.
+  for (uint copy = 1; copy < copies; ++copy) {
+    __global float* p = sums + copy * copy_floats;
+    for (uint k = 0; k < RS_RAY_SUMS * VECTOR; k += VECTOR) {
+      const gv part = *(__global const gv_unaligned*)(p + k);
+      if (!RS_ANY_GAUSSIAN(part != 0.0f)) continue;
+      *(__global gv_unaligned*)(sums + k) += part;
+      *(__global gv_unaligned*)(p + k) = (gv)(0.0f);
+    }
+  }
+  load_columns(sums, RS_RAY_SUMS, RS_RAY_SUMS, v);
+  gv touched = 0;
+  for (int k = 0; k < RS_RAY_SUMS; ++k) touched += fabs(v[k]);
+  return touched != 0.0f;
+}
+
+// screen: 0..8 as for ray_backward, 9..11 the camera's centre, 12 the distance that counts: 0
+// straight from there, 1 along the axis 13..15, 2 none.
+__kernel void finish_ray_gradients(const uint begin,
+                                   const uint end,
+                                   const uint count,
+                                   const uint copies,
+                                   __global float* restrict sums,
+                                   __global const float* restrict records,
+                                   __global const float* restrict quaternions,
+                                   __global const float* restrict scales,
+                                   __global const float* restrict opacities,
+                                   const float16 screen_argument,
+                                   __global float* restrict g_means,
+                                   __global float* restrict g_quaternions,
+                                   __global float* restrict g_scales,
+                                   __global float* restrict g_opacities,
+                                   __global float* restrict g_sh,
+                                   __global float* restrict g_screen) {
+  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  if (i >= end) return;
+  gv v[RS_RAY_SUMS];
+  const gi touched = load_sums(sums + i * RS_RAY_SUMS, (size_t)count * RS_RAY_SUMS, copies, v);
+  if (!RS_ANY_GAUSSIAN(touched)) {
+    clear_columns(g_means + 3 * i, 3);
+    clear_columns(g_quaternions + 4 * i, 4);
+    clear_columns(g_scales + 3 * i, 3);
+    clear_columns(g_opacities + i, 1);
+    clear_columns(g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
+    clear_columns(g_screen + 3 * i, 3);
+    return;
+  }
+
+  // Lanes that nothing touched may hold anything; they are cleared last.
+  const gv zero = (gv)(0.0f);
+  RayGaussian g;
+  load_ray_gaussian(i, quaternions, scales, &g);
+  gv record[16];
+  load_columns(records + 16 * i, 16, 16, record);
+
+  gv mean[3];
+  for (int j = 0; j < 3; ++j) {
+    mean[j] = -(record[j] * v[0] + record[3 + j] * v[1] + record[6 + j] * v[2]);
+  }
+  union {
+    float16 v;
+    float s[16];
+  } screen;
+  screen.v = screen_argument;
+  gv length2 = 0, along = 0, distance2 = 0;
+  for (int k = 0; k < 3; ++k) {
+    const float* row = screen.s + 3 * k;
+    const gv part = row[0] * mean[0] + row[1] * mean[1] + row[2] * mean[2];
+    length2 += part * part;
+    const gv offset = record[9 + k] - screen.s[9 + k];
+    along += screen.s[13 + k] * offset;
+    distance2 += offset * offset;
+  }
+  gv distance = 1.0f;
+  if (screen.s[12] == 0.0f) distance = sqrt(distance2);
+  if (screen.s[12] == 1.0f) distance = larger(along, zero);
+  store_column(touched ? sqrt(length2) * distance : zero, g_screen + 3 * i, 3);
+  store_column(touched ? v[10] * distance : zero, g_screen + 3 * i + 1, 3);
+  store_column(touched ? (gv)(1.0f) : zero, g_screen + 3 * i + 2, 3);
+
+  gv c[3 * SH_COEFFICIENTS];
+#if SH_DEGREE == 0
+  for (int j = 0; j < 3; ++j) c[j] = touched ? 0.28209479177387814f * v[11 + j] : zero;
+#else
+  for (int j = 0; j < 3; ++j) mean[j] += v[11 + j];
+  for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) {
+    for (int j = 0; j < 3; ++j) {
+      c[3 * k + j] = touched ? v[RS_RAY_SH + j * RS_RAY_FUNCTIONS + k] : zero;
+    }
+  }
+#endif
+  for (int k = 3 * RS_RAY_FUNCTIONS; k < 3 * SH_COEFFICIENTS; ++k) c[k] = zero;
+  store_columns(c, 3 * SH_COEFFICIENTS, g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
+  for (int j = 0; j < 3; ++j) store_column(touched ? mean[j] : zero, g_means + 3 * i + j, 3);
+
+  // delta^2 = x^T R S^-2 R^T x. With G = sum of g v v^T: d(log S_k) receives -2 G_kk; a rotation
+  // R exp([w]x) receives 2 G_ij (S_j / S_i - S_i / S_j) about the third axis.
+  gv turn[3];
+  for (int k = 0; k < 3; ++k) {
+    const gv diagonal = k == 0 ? v[3] : k == 1 ? v[6] : v[8];
+    const gi moves = touched & (g.raw_scale[k] >= g.scale[k]);
+    const gv value = -2.0f * diagonal * scale_log_derivative(g.scale[k]);
+    store_column(moves ? value : zero, g_scales + 3 * i + k, 3);
+    const gv mixed = k == 0 ? v[7] : k == 1 ? v[5] : v[4];
+    const gv a = g.scale[(k + 1) % 3], b = g.scale[(k + 2) % 3];
+    turn[k] = 2.0f * mixed * (b / a - a / b);
+  }
+  // q exp(w / 2) turns R by w.
+  gv gq[4];
+  gq[0] = -(g.q[1] * turn[0] + g.q[2] * turn[1] + g.q[3] * turn[2]);
+  gq[1] = g.q[0] * turn[0] + g.q[2] * turn[2] - g.q[3] * turn[1];
+  gq[2] = g.q[0] * turn[1] + g.q[3] * turn[0] - g.q[1] * turn[2];
+  gq[3] = g.q[0] * turn[2] + g.q[1] * turn[1] - g.q[2] * turn[0];
+  for (int j = 0; j < 4; ++j) {
+    store_column(touched ? 2.0f * gq[j] / g.q_norm : zero, g_quaternions + 4 * i + j, 4);
+  }
+  const gv opacity = sigmoid(load_column(opacities + i, 1));
+  store_column(touched ? v[9] * (1.0f - opacity) : zero, g_opacities + i, 1);
+}

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// The walk of one arbitrary ray: finds its hits and hands them over in order, in batches.
+//
+// A ray walks the tree of bvh/wide_node.h near child first and collects hits in no order. Once the
+// product of all 1 - alpha collected falls below the least transmittance, the hits found so far are
+// enough to stop the ray: they are sorted, and the key at which they do becomes the end of the ray.
+// What is found later can only move that end nearer. So opaque scenes cost little more than a
+// nearest-hit search and the order stays exact. At the end of the walk the hits are sorted and
+// blended. A full list blends what no unvisited box can precede; if that frees too little, the
+// farthest hits are dropped, and another walk continues behind the last blended (key, index).
+//
+// Who includes this defines RayState, with at least the members
+//   float transmittance; int hits; bool stopped; float last_key; uint last_index;
+// (1, 0, false, -1, 0 before the walk) and
+//   void blend_hits(scene, ray, basis, pending, count, state),
+// which takes the first `count` sorted hits, keeps those members up to date, and ends early, with
+// `stopped`, where the ray does.
+#ifndef RS_TRACE_RAY_WALK_H
+#define RS_TRACE_RAY_WALK_H
+
+#include "trace/ray_color.h"
+
+// Slack that keeps a hit from being taken for nearer than an unvisited box by rounding.
+#define RS_BOUND_SLACK 0.999999f
+
+// Sorts, and returns the number of leading hits that are enough to end the ray (the one after
+// max_hits among them: it tells that the ray was capped), or -1 when they are not. *remaining
+// becomes the transmittance behind them.
+int sort_to_end(const RayScene* scene, const RayState* state, Pending* pending, float* remaining) {
+  pending_sort(pending);
+  const int room = scene->max_hits - state->hits;
+  float transmittance = state->transmittance;
+  for (int k = 0; k < pending->size; ++k) {
+    transmittance *= 1.0f - pending->alpha[pending->order[k]];
+    if (transmittance < scene->min_transmittance || k == room) {
+      *remaining = transmittance;
+      return k + 1;
+    }
+  }
+  *remaining = transmittance;
+  return -1;
+}
+
+// The hits of a ray with keys up to t_max, from ray->t_min on, which moves with every further walk.
+void walk_ray(
+    const RayScene* scene, const float t_max, const float* basis, RayData* ray, RayState* state) {
+  const float half_quantile = 0.5f * scene->quantile;
+  Pending pending;
+  PendingRange range = {ray->t_min, t_max, 0, 0xffffffffu, false};
+  bool again = scene->levels > 0;
+  while (again) {
+    again = false;
+    pending.size = pending.evaluated = 0;
+    float remaining = state->transmittance;  // behind all evaluated hits
+    float hopeful = remaining;               // no more than is left behind all hits
+    int sorted = 0;                          // size after the last sort
+    float stack_entry[RS_WIDE_STACK];
+    uint stack_node[RS_WIDE_STACK];  // level in the lowest four bits
+    int top = 1;
+    stack_entry[0] = ray->t_min;
+    stack_node[0] = (uint)scene->levels;
+    while (top > 0 && !state->stopped) {
+      const float node_entry = stack_entry[--top];
+      if (!(node_entry <= range.end)) continue;
+      const uint level = stack_node[top] & 15;
+      const uint number = stack_node[top] >> 4;
+      RayLanes entry;
+      uint bits = ray_meets_boxes(
+          ray, scene->nodes + (size_t)(scene->level_begin[level] + number) * RS_NODE_VECTORS,
+          range.end, &entry.v);
+      if (level > 1) {
+        const int bottom = top;
+        for (; bits != 0; bits &= bits - 1) {
+          const uint lane = rs_lowest_bit(bits);
+          const float t = entry.s[lane];
+          int j = top++;
+          for (; j > bottom && stack_entry[j - 1] < t; --j) {
+            stack_entry[j] = stack_entry[j - 1];
+            stack_node[j] = stack_node[j - 1];
+          }
+          stack_entry[j] = t;
+          stack_node[j] = (number * PACKET + lane) << 4 | (level - 1);
+        }
+        continue;
+      }
+      for (; bits != 0; bits &= bits - 1) {
+        const uint number_of_block = number * PACKET + rs_lowest_bit(bits);
+        __global const fv* block = scene->blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
+        BlockMeeting meeting;
+        for (uint hits = ray_meets_block(ray, block, &meeting); hits != 0; hits &= hits - 1) {
+          const uint lane = rs_lowest_bit(hits);
+          pending_append(&pending, &meeting, block, number_of_block * PACKET + lane, lane);
+          prefetch_color(scene, pending.index[pending.size - 1]);
+          hopeful *= 1.0f - block_opacity(block, lane);
+        }
+        const int room = scene->max_hits - state->hits;
+        if (!(hopeful < scene->min_transmittance) && pending.size <= min(room, PENDING - PACKET))
+          continue;
+        remaining = hopeful = pending_evaluate(&pending, &range, half_quantile, remaining);
+        const bool full = pending.size > PENDING - PACKET;
+        const bool enough = remaining < scene->min_transmittance || pending.size > room;
+        if (!full && !(enough && 4 * (pending.size - sorted) > pending.size)) continue;
+        const int end = sort_to_end(scene, state, &pending, &remaining);
+        int count = pending.size;
+        if (end > 0) {
+          const float key = pending.key.s[pending.order[end - 1]];
+          if (key < range.end) range.end_index = 0xffffffffu;
+          range.end = key;
+          // Equal keys stay together.
+          for (count = end; count < pending.size; ++count) {
+            if (pending.key.s[pending.order[count]] > key) break;
+          }
+        }
+        if (count <= PENDING - PACKET) {
+          if (end > 0) pending_cut(&pending, range.end);
+        } else {
+          // Boxes on the stack and in this node begin behind `bound`.
+          float bound = node_entry;
+          for (int k = 0; k < top; ++k) bound = fmin(bound, stack_entry[k]);
+          bound *= RS_BOUND_SLACK;
+          int ready = 0;
+          while (ready < count && pending.key.s[pending.order[ready]] < bound) ++ready;
+          blend_hits(scene, ray, basis, &pending, ready, state);
+          if (state->stopped) break;
+          int kept = count - ready;
+          if (kept > PENDING / 2) {
+            kept = PENDING / 2;
+            const int last = pending.order[ready + kept - 1];
+            range.end = pending.key.s[last];
+            range.end_index = pending.index[last];
+            range.ties = again = true;
+          }
+          remaining = state->transmittance * pending_keep(&pending, ready, kept);
+        }
+        hopeful = remaining;
+        sorted = pending.size;
+      }
+    }
+    if (state->stopped) break;
+    pending_evaluate(&pending, &range, half_quantile, remaining);
+    pending_sort(&pending);
+    blend_hits(scene, ray, basis, &pending, pending.size, state);
+    if (state->stopped) break;
+    // The next walk begins behind the last blended hit.
+    ray->t_min = range.begin = fmax(ray->t_min, state->last_key);
+    range.begin_index = state->last_index + 1;
+    range.end = t_max;
+    range.end_index = 0xffffffffu;
+  }
+}
+
+#endif

@@ -1,0 +1,439 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "trace/ray_backward.hpp"
+
+#include <doctest/doctest.h>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "raysplats/error.hpp"
+#include "trace_fixture.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+constexpr float kFar = std::numeric_limits<float>::max();
+
+struct Errors {
+  double means, quaternions, scales, opacities, sh;
+  double worst() const { return std::max({means, quaternions, scales, opacities, sh}); }
+};
+
+#define CHECK_ERRORS(errors, limit)                                                  \
+  do {                                                                               \
+    const Errors e_ = errors;                                                        \
+    INFO("means ", e_.means, " quaternions ", e_.quaternions, " scales ", e_.scales, \
+         " opacities ", e_.opacities, " sh ", e_.sh);                                \
+    CHECK(e_.worst() < (limit));                                                     \
+  } while (false)
+
+struct Host {
+  std::vector<float> means, quaternions, scales, opacities, sh, screen;
+
+  explicit Host(const GaussianGradients& g)
+      : means(g.means.download()),
+        quaternions(g.quaternions.download()),
+        scales(g.scales.download()),
+        opacities(g.opacities.download()),
+        sh(g.sh.download()),
+        screen(g.screen.download()) {}
+};
+
+template <class Expected>
+Errors errors_of(const Host& got, const Expected& expected) {
+  const auto error = [](const std::vector<float>& a, const auto& b) {
+    return relative_error(a, std::vector<double>(b.begin(), b.end()));
+  };
+  return {error(got.means, expected.means), error(got.quaternions, expected.quaternions),
+          error(got.scales, expected.scales), error(got.opacities, expected.opacities),
+          error(got.sh, expected.sh)};
+}
+
+using Gradients = std::vector<RayBackward::Gradient>;
+
+Gradients random_gradients(std::size_t count, std::uint64_t seed) {
+  CounterRng rng(seed, 78);
+  Gradients out(count);
+  for (RayBackward::Gradient& g : out) {
+    for (float& value : g) value = static_cast<float>(rng.normal());
+  }
+  return out;
+}
+
+// Rays from in and around the cube towards its inside, some of them short.
+std::vector<Ray> random_rays(std::size_t count, std::uint64_t seed, double spread = 1.0) {
+  CounterRng rng(seed, 6);
+  std::vector<Ray> rays(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 o = spread * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
+    const glm::dvec3 target = 0.6 * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
+    const glm::dvec3 d = (target - o) * std::exp(rng.normal());
+    for (int k = 0; k < 3; ++k) {
+      rays[i].origin[k] = static_cast<float>(o[k]);
+      rays[i].direction[k] = static_cast<float>(d[k]);
+    }
+    rays[i].t_min = i % 3 == 0 ? 0.2f : 0.0f;
+    rays[i].t_max = i % 4 == 0 ? rays[i].t_min + 1.0f : kFar;
+  }
+  return rays;
+}
+
+reference::RayQuery query_of(const Ray& ray) {
+  return {{ray.origin[0], ray.origin[1], ray.origin[2]},
+          {ray.direction[0], ray.direction[1], ray.direction[2]},
+          ray.t_min,
+          ray.t_max};
+}
+
+reference::ColorMode mode_of(ColorDirection direction) {
+  return direction == ColorDirection::kRay ? reference::ColorMode::kAlongRay
+                                           : reference::ColorMode::kFromOrigin;
+}
+
+// One traced batch on the device with its gradients.
+struct Batch {
+  Batch(Context& context, const std::vector<Ray>& host_rays, const Gradients& host_gradients)
+      : rays(context, host_rays.size(), "rays"),
+        gradients(context, host_rays.size(), "ray gradients") {
+    rays.upload(host_rays);
+    gradients.upload(host_gradients);
+  }
+  Buffer<Ray> rays;
+  Buffer<RayBackward::Gradient> gradients;
+  Buffer<RayResult> results;
+};
+
+Host gradients_on_device(Context& context,
+                         const DeviceGaussians& gaussians,
+                         const TraceOptions& options,
+                         const std::vector<Ray>& rays,
+                         const Gradients& gradients,
+                         ColorDirection direction,
+                         int lanes = 0) {
+  RayTracer tracer(context, options, lanes);
+  tracer.update(gaussians);
+  Batch batch(context, rays, gradients);
+  tracer.trace(gaussians, batch.rays, rays.size(), batch.results, direction);
+  RayBackward backward(context, tracer);
+  backward.begin(gaussians);
+  backward.add(gaussians, batch.rays, rays.size(), batch.results, batch.gradients, direction);
+  GaussianGradients out;
+  backward.finish(gaussians, out);
+  return Host(out);
+}
+
+// Random gradients, zero where single precision may order or cut hits otherwise than double.
+Gradients gradients_without_ties(const reference::Parameters& parameters,
+                                 const TraceOptions& options,
+                                 const std::vector<Ray>& rays,
+                                 ColorDirection direction) {
+  Gradients gradients = random_gradients(rays.size(), 3);
+  const auto prepared = reference::prepare(parameters, options);
+  std::size_t hits = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const reference::RayQuery q = query_of(rays[i]);
+    const reference::RayTrace ray = reference::trace_ray(
+        parameters, prepared, options, q.origin, q.direction, q.t_min, q.t_max, mode_of(direction));
+    hits += ray.hits.size();
+    if (ray.margin < 1e-4) gradients[i] = {};
+  }
+  CHECK(2 * hits > rays.size());
+  return gradients;
+}
+
+Errors compare_gradients(Context& context,
+                         const Gaussians& model,
+                         const TraceOptions& options,
+                         const std::vector<Ray>& rays,
+                         ColorDirection direction,
+                         ScaleActivation activation = ScaleActivation::kExp,
+                         int lanes = 0) {
+  const reference::Parameters parameters(model, activation);
+  const Gradients gradients = gradients_without_ties(parameters, options, rays, direction);
+  std::vector<reference::RayQuery> queries;
+  std::vector<double> wide;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    queries.push_back(query_of(rays[i]));
+    wide.insert(wide.end(), gradients[i].begin(), gradients[i].end());
+  }
+  const reference::Parameters expected =
+      reference::ray_gradient(parameters, options, queries, wide, mode_of(direction));
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
+  return errors_of(
+      gradients_on_device(context, gaussians, options, rays, gradients, direction, lanes),
+      expected);
+}
+
+void check_every_variant(Gaussians model, const std::vector<Ray>& rays) {
+  Context context = make_test_context();
+  // Sigmoid scales stay below 1.
+  for (float& scale : model.log_scales) scale = std::min(scale, -0.2f);
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    for (const ColorDirection direction : {ColorDirection::kRay, ColorDirection::kFromOrigin}) {
+      for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
+        CAPTURE(static_cast<int>(order));
+        CAPTURE(static_cast<int>(direction));
+        CAPTURE(static_cast<int>(activation));
+        TraceOptions options;
+        options.hit_order = order;
+        options.adaptive_radius = activation == ScaleActivation::kSigmoid;
+        options.background = {0.25f, 0.5f, 1.0f};
+        CHECK_ERRORS(compare_gradients(context, model, options, rays, direction, activation), 1e-3);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("gradients of arbitrary rays equal the double reference in every variant") {
+  check_every_variant(reference::random_scene(300, 71, 2), random_rays(300, 21));
+}
+
+TEST_CASE("gradients of a few arbitrary rays equal the double reference [small]") {
+  check_every_variant(reference::random_scene(24, 72, 1), random_rays(30, 22));
+}
+
+TEST_CASE("gradients of arbitrary rays for every SH degree and vector width") {
+  Context context = make_test_context();
+  for (int degree = 0; degree <= 4; ++degree) {
+    for (const ColorDirection direction : {ColorDirection::kRay, ColorDirection::kFromOrigin}) {
+      CAPTURE(degree);
+      CAPTURE(static_cast<int>(direction));
+      CHECK_ERRORS(compare_gradients(context, reference::random_scene(203, 73, degree), {},
+                                     random_rays(300, 23), direction),
+                   1e-3);
+    }
+  }
+  for (const int lanes : {4, 8, 16}) {
+    CAPTURE(lanes);
+    CHECK_ERRORS(
+        compare_gradients(context, reference::random_scene(203, 73, 1), {}, random_rays(300, 23),
+                          ColorDirection::kRay, ScaleActivation::kExp, lanes),
+        1e-3);
+  }
+}
+
+TEST_CASE("gradients of arbitrary rays where Gaussians are opaque, vanish or are thin") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(250, 74, 0);
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    if (i % 3 == 0) model.opacities[i] = 40.0f;  // the sigmoid is exactly 1 in float
+    if (i % 3 == 1) model.opacities[i] = -12.0f;
+  }
+  CHECK_ERRORS(compare_gradients(context, model, {}, random_rays(400, 24), ColorDirection::kRay),
+               1e-3);
+  // Discs a thousand times wider than thick.
+  Gaussians discs = reference::random_scene(250, 75, 0);
+  for (std::size_t i = 0; i < discs.size(); ++i) discs.log_scales[3 * i + i % 3] -= 7.0f;
+  CHECK_ERRORS(compare_gradients(context, discs, {}, random_rays(400, 25), ColorDirection::kRay),
+               1e-3);
+  // A ray through the middle of an opaque Gaussian: alpha is exactly 1.
+  for (std::size_t k = 0; k < 3; ++k) model.means[k] = 0.0f;
+  Ray ray{{0.0f, 0.0f, -4.0f}, 0.0f, {0.0f, 0.0f, 1.0f}, kFar};
+  TraceOptions options;
+  options.background = {0.5f, 0.25f, 1.0f};
+  CHECK_ERRORS(
+      compare_gradients(context, model, options, std::vector<Ray>(1, ray), ColorDirection::kRay),
+      1e-3);
+}
+
+TEST_CASE("gradients of rays that stop early, at the cap on hits, or have more hits than room") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(400, 76, 1);
+  for (const int cap : {1, 5, 9}) {
+    CAPTURE(cap);
+    TraceOptions options;
+    options.max_hits = cap;
+    options.background = {0.1f, 0.7f, 0.2f};
+    CHECK_ERRORS(compare_gradients(context, model, options, random_rays(300, 26),
+                                   ColorDirection::kFromOrigin),
+                 1e-3);
+  }
+  for (const float stop : {0.5f, 0.05f}) {
+    CAPTURE(stop);
+    TraceOptions options;
+    options.min_transmittance = stop;
+    CHECK_ERRORS(
+        compare_gradients(context, model, options, random_rays(300, 27), ColorDirection::kRay),
+        1e-3);
+  }
+  // Hundreds of faint, wide ones along every ray.
+  Gaussians crowd = reference::random_scene(900, 77, 0);
+  for (std::size_t i = 0; i < crowd.log_scales.size(); ++i) {
+    crowd.log_scales[i] = std::log(0.6f + 0.1f * static_cast<float>(i % 3));
+  }
+  for (float& opacity : crowd.opacities) opacity = -5.0f;
+  TraceOptions options;
+  options.hit_order = HitOrder::kPeak;
+  options.max_hits = 800;
+  options.background = {0.1f, 0.7f, 0.2f};
+  const reference::Parameters parameters(crowd);
+  const reference::RayTrace middle = reference::trace_ray(
+      parameters, options, {-3, 0.1, 0.2}, {1, 0, 0}, 0, 1e30, reference::ColorMode::kAlongRay);
+  CHECK(middle.hits.size() > 600);
+  std::vector<Ray> rays = random_rays(60, 28, 3.0);
+  for (Ray& ray : rays) ray.t_max = kFar;
+  // Among so many hits some are always near ties, each of little weight: no ray is left out.
+  Gradients gradients = random_gradients(rays.size(), 4);
+  std::vector<reference::RayQuery> queries;
+  std::vector<double> wide;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    queries.push_back(query_of(rays[i]));
+    wide.insert(wide.end(), gradients[i].begin(), gradients[i].end());
+  }
+  const reference::Parameters expected =
+      reference::ray_gradient(parameters, options, queries, wide, reference::ColorMode::kAlongRay);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, crowd, ScaleActivation::kExp);
+  CHECK_ERRORS(errors_of(gradients_on_device(context, gaussians, options, rays, gradients,
+                                             ColorDirection::kRay),
+                         expected),
+               1e-3);
+}
+
+TEST_CASE("the gradients of camera rays are those of the camera tracer") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(1500, 78, 2);
+  const Camera camera = look_at({0.4, -0.6, -4.0}, {0, 0, 0}, {0, 1, 0}, 60, 52, 80);
+  TraceOptions options;
+  options.background = {0.3f, 0.2f, 0.1f};
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  std::vector<Ray> rays;
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const glm::dvec3 d =
+          glm::transpose(camera.rotation) * reference::pixel_direction(camera, x, y);
+      Ray ray{};
+      for (int k = 0; k < 3; ++k) {
+        ray.origin[k] = static_cast<float>(camera.center()[k]);
+        ray.direction[k] = static_cast<float>(d[k]);
+      }
+      ray.t_max = kFar;
+      rays.push_back(ray);
+    }
+  }
+  const Gradients gradients = gradients_without_ties(reference::Parameters(model), options, rays,
+                                                     ColorDirection::kFromOrigin);
+  const std::size_t pixels = rays.size();
+  std::vector<float> planar(4 * pixels);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    for (std::size_t c = 0; c < 4; ++c) planar[c * pixels + i] = gradients[i][c];
+  }
+  CameraTracer tracer(context, options);
+  tracer.update(gaussians);
+  tracer.forward(gaussians, camera, true);
+  Buffer<float> image_gradient(context, planar.size(), "image gradient");
+  image_gradient.upload(planar);
+  GaussianGradients out;
+  tracer.backward(gaussians, image_gradient, out);
+  const Host expected(out);
+
+  RayTracer ray_tracer(context, options);
+  ray_tracer.update(gaussians);
+  Batch batch(context, rays, gradients);
+  ray_tracer.trace(gaussians, batch.rays, pixels, batch.results, ColorDirection::kFromOrigin);
+  RayBackward backward(context, ray_tracer);
+  backward.begin(gaussians, RayScreen::of(camera));
+  backward.add(gaussians, batch.rays, pixels, batch.results, batch.gradients,
+               ColorDirection::kFromOrigin);
+  backward.finish(gaussians, out);
+  const Host got(out);
+  CHECK_ERRORS(errors_of(got, expected), 1e-3);
+  // What the camera tracer leaves out of the mean's screen gradient, the change of the outline's
+  // shape, is of the order of size over distance.
+  std::vector<float> screen, absolute;
+  std::vector<double> expected_screen, expected_absolute;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    CHECK(got.screen[3 * i + 2] == expected.screen[3 * i + 2]);
+    screen.push_back(got.screen[3 * i]);
+    absolute.push_back(got.screen[3 * i + 1]);
+    expected_screen.push_back(expected.screen[3 * i]);
+    expected_absolute.push_back(expected.screen[3 * i + 1]);
+  }
+  CHECK(relative_error(screen, expected_screen) < 0.05);
+  CHECK(relative_error(absolute, expected_absolute) < 0.05);
+}
+
+TEST_CASE("several batches of rays add up, and a new begin starts from zero") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(500, 79, 1);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const std::vector<Ray> rays = random_rays(9000, 29);  // enough to be ordered
+  const Gradients gradients = random_gradients(rays.size(), 5);
+  const Host whole =
+      gradients_on_device(context, gaussians, {}, rays, gradients, ColorDirection::kRay);
+  RayTracer tracer(context, {});
+  tracer.update(gaussians);
+  RayBackward backward(context, tracer);
+  GaussianGradients out;
+  CHECK_THROWS_AS(backward.finish(gaussians, out), UsageError);
+  for (int pass = 0; pass < 2; ++pass) {
+    backward.begin(gaussians);
+    for (std::size_t begin = 0; begin < rays.size(); begin += 3000) {
+      const auto from = static_cast<std::ptrdiff_t>(begin);
+      Batch batch(context, {rays.begin() + from, rays.begin() + from + 3000},
+                  {gradients.begin() + from, gradients.begin() + from + 3000});
+      tracer.trace(gaussians, batch.rays, 3000, batch.results);
+      CHECK_THROWS_AS(backward.add(gaussians, batch.rays, 3001, batch.results, batch.gradients,
+                                   ColorDirection::kRay),
+                      UsageError);
+      backward.add(gaussians, batch.rays, 3000, batch.results, batch.gradients,
+                   ColorDirection::kRay);
+    }
+    backward.finish(gaussians, out);
+    CHECK_ERRORS(errors_of(Host(out), whole), 1e-5);
+  }
+  // Abandoned sums do not reach the next gradients.
+  Batch batch(context, rays, gradients);
+  tracer.trace(gaussians, batch.rays, rays.size(), batch.results);
+  for (int pass = 0; pass < 2; ++pass) {
+    backward.begin(gaussians);
+    backward.add(gaussians, batch.rays, rays.size(), batch.results, batch.gradients,
+                 ColorDirection::kRay);
+  }
+  backward.finish(gaussians, out);
+  CHECK_ERRORS(errors_of(Host(out), whole), 1e-5);
+}
+
+TEST_CASE("private copies and atomic adds give the same gradients, private ones the same bits") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(3000, 80, 1);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const std::vector<Ray> rays = random_rays(5000, 30);
+  const Gradients gradients = random_gradients(rays.size(), 6);
+  TraceOptions options;
+  const auto run = [&] {
+    return gradients_on_device(context, gaussians, options, rays, gradients, ColorDirection::kRay);
+  };
+  const Host a = run(), b = run();
+  if (context.device().type == DeviceType::kCpu) {
+    CHECK(a.means == b.means);
+    CHECK(a.quaternions == b.quaternions);
+    CHECK(a.scales == b.scales);
+    CHECK(a.opacities == b.opacities);
+    CHECK(a.sh == b.sh);
+    CHECK(a.screen == b.screen);
+  }
+  options.memory_budget = 100000;  // too little for copies
+  CHECK_ERRORS(errors_of(run(), a), 1e-5);
+}
+
+TEST_CASE("no Gaussians and no rays have no gradients") {
+  Context context = make_test_context();
+  const std::vector<Ray> rays = random_rays(3, 31);
+  const DeviceGaussians none = DeviceGaussians::upload(context, Gaussians{}, ScaleActivation::kExp);
+  CHECK(gradients_on_device(context, none, {}, rays, random_gradients(3, 7), ColorDirection::kRay)
+            .means.empty());
+  const DeviceGaussians some =
+      DeviceGaussians::upload(context, reference::random_scene(20, 81, 1), ScaleActivation::kExp);
+  RayTracer tracer(context, {});
+  tracer.update(some);
+  RayBackward backward(context, tracer);
+  backward.begin(some);
+  GaussianGradients out;
+  backward.finish(some, out);
+  for (const float value : out.means.download()) CHECK(value == 0.0f);
+  for (const float value : out.screen.download()) CHECK(value == 0.0f);
+}
