@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <fstream>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -56,7 +57,7 @@ std::string reason(std::string text) {
 
 /// The end-of-image marker ends every whole JPEG. The decoder fills the rest of a truncated one
 /// with grey instead of failing, so the segments are walked here (ITU-T T.81, annex B).
-bool is_whole_jpeg(const std::vector<std::byte>& bytes) {
+bool is_whole_jpeg(std::span<const std::byte> bytes) {
   const auto byte_at = [&](std::size_t i) { return std::to_integer<unsigned>(bytes[i]); };
   std::size_t i = 2;
   while (i + 1 < bytes.size()) {
@@ -119,6 +120,41 @@ bool has_whole_png_chunks(std::string_view bytes, bool header_only) {
   return false;
 }
 
+[[noreturn]] void fail_damaged(const std::string& name) {
+  throw DataError(fmt::format("The image {} is truncated or damaged: copy it again", name));
+}
+
+/// Opens the decoder of a format and checks the picture's size. `name` is the path, or stands for
+/// it where the content comes from `memory`, which has to outlive the decoder.
+std::unique_ptr<OIIO::ImageInput> open_decoder(std::string_view format,
+                                               const std::string& name,
+                                               OIIO::Filesystem::IOProxy* memory) {
+  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(std::string(format));
+  if (!input || (memory != nullptr && !input->set_ioproxy(memory))) {
+    throw DataError(
+        fmt::format("The image {} cannot be read: OpenImageIO is built without {}", name, format));
+  }
+  // Straight alpha as in the file: OpenImageIO multiplies it into PNG and TIFF colours otherwise.
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  OIIO::ImageSpec spec;
+  if (!input->open(name, spec, config)) {
+    throw DataError(
+        fmt::format("The image {} cannot be read: {}", name, reason(input->geterror())));
+  }
+  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep) {
+    throw DataError(fmt::format("The image {} is not a flat picture with pixels", name));
+  }
+  if (spec.width > kMaxSide || spec.height > kMaxSide ||
+      static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height) >
+          kMaxPixels) {
+    throw DataError(fmt::format(
+        "The image {} has {} x {} pixels, more than {} a side or {} million: make it smaller", name,
+        spec.width, spec.height, kMaxSide, kMaxPixels >> 20));
+  }
+  return input;
+}
+
 /// Opens an image, its size checked before anything is decoded. `for_pixels`: checks that the file
 /// is whole.
 std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, bool for_pixels) {
@@ -152,34 +188,18 @@ std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, 
   } else if (format == "png") {
     whole = has_whole_png_chunks(start, true);
   }
-  if (!whole) {
+  if (!whole) fail_damaged(path.string());
+  return open_decoder(format, path.string(), nullptr);
+}
+
+Image decode(OIIO::ImageInput& input, const std::string& name) {
+  const OIIO::ImageSpec& spec = input.spec();
+  Image image(spec.width, spec.height, std::min(spec.nchannels, 4));
+  if (!input.read_image(0, 0, 0, image.channels, OIIO::TypeFloat, image.data.data())) {
     throw DataError(
-        fmt::format("The image {} is truncated or damaged: copy it again", path.string()));
+        fmt::format("The image {} cannot be decoded: {}", name, reason(input.geterror())));
   }
-  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(std::string(format));
-  if (!input) {
-    throw DataError(fmt::format("The image {} cannot be read: OpenImageIO is built without {}",
-                                path.string(), format));
-  }
-  // Straight alpha as in the file: OpenImageIO multiplies it into PNG and TIFF colours otherwise.
-  OIIO::ImageSpec config;
-  config.attribute("oiio:UnassociatedAlpha", 1);
-  OIIO::ImageSpec spec;
-  if (!input->open(path.string(), spec, config)) {
-    throw DataError(
-        fmt::format("The image {} cannot be read: {}", path.string(), reason(input->geterror())));
-  }
-  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep) {
-    throw DataError(fmt::format("The image {} is not a flat picture with pixels", path.string()));
-  }
-  if (spec.width > kMaxSide || spec.height > kMaxSide ||
-      static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height) >
-          kMaxPixels) {
-    throw DataError(fmt::format(
-        "The image {} has {} x {} pixels, more than {} a side or {} million: make it smaller",
-        path.string(), spec.width, spec.height, kMaxSide, kMaxPixels >> 20));
-  }
-  return input;
+  return image;
 }
 
 std::vector<std::uint8_t> to_bytes(const Image& image, int channels) {
@@ -222,17 +242,25 @@ ImageSize image_size(const std::filesystem::path& path) {
   return {input->spec().width, input->spec().height};
 }
 
+Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string_view format = format_of(text);
+  if (format != "png" && format != "jpeg") {
+    throw DataError(fmt::format("The image {} is neither a PNG nor a JPEG file", name));
+  }
+  if (format == "png" ? !has_whole_png_chunks(text, false) : !is_whole_jpeg(bytes)) {
+    fail_damaged(name);
+  }
+  OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
+  const auto input = open_decoder(format, name, &memory);
+  return decode(*input, name);
+}
+
 }  // namespace io
 
 Image read_image(const std::filesystem::path& path) {
   const auto input = open_image(path, true);
-  const OIIO::ImageSpec& spec = input->spec();
-  Image image(spec.width, spec.height, std::min(spec.nchannels, 4));
-  if (!input->read_image(0, 0, 0, image.channels, OIIO::TypeFloat, image.data.data())) {
-    throw DataError(fmt::format("The image {} cannot be decoded: {}", path.string(),
-                                reason(input->geterror())));
-  }
-  return image;
+  return decode(*input, path.string());
 }
 
 void write_image(const std::filesystem::path& path,

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "raysplats/error.hpp"
 
@@ -41,6 +42,28 @@ std::size_t size_of(PlyType type) {
       break;
   }
   return 8;
+}
+
+double read_number(ByteReader& reader, PlyType type, std::endian order, const char* name) {
+  switch (type) {
+    case PlyType::kInt8:
+      return reader.read<std::int8_t>(name);
+    case PlyType::kUint8:
+      return reader.read<std::uint8_t>(name);
+    case PlyType::kInt16:
+      return reader.read<std::int16_t>(name, order);
+    case PlyType::kUint16:
+      return reader.read<std::uint16_t>(name, order);
+    case PlyType::kInt32:
+      return reader.read<std::int32_t>(name, order);
+    case PlyType::kUint32:
+      return reader.read<std::uint32_t>(name, order);
+    case PlyType::kFloat:
+      return static_cast<double>(reader.read<float>(name, order));
+    case PlyType::kDouble:
+      break;
+  }
+  return reader.read<double>(name, order);
 }
 
 }  // namespace
@@ -95,15 +118,30 @@ void PlyFile::parse_header() {
     } else if (key == "element") {
       close_element();
       if (at == At::kVertex) at = At::kAfter;
-      const bool vertex = reader.word() == "vertex";
+      const std::string name(reader.word());
+      const bool vertex = name == "vertex";
       element_rows = reader.unsigned_integer("the element count");
       if (vertex) {
         if (at == At::kAfter) reader.fail("there is a second vertex element");
         at = At::kVertex;
         rows_ = static_cast<std::size_t>(element_rows);
+      } else if (at == At::kAfter) {
+        later_.push_back({name, element_rows, {}});
       }
     } else if (key == "property") {
-      if (at == At::kAfter) continue;
+      if (at == At::kAfter) {
+        LaterProperty property;
+        std::string_view type = reader.word();
+        property.list = type == "list";
+        if (property.list) {
+          property.count_type = type_named(reader.word());
+          type = reader.word();
+        }
+        property.type = type_named(type);
+        property.name = reader.word();
+        later_.back().properties.push_back(std::move(property));
+        continue;
+      }
       const std::string_view type_name = reader.word();
       if (type_name == "list") {
         reader.fail(at == At::kVertex
@@ -174,34 +212,75 @@ void PlyFile::read_text_row(TextReader& reader, std::span<double> values) const 
 
 void PlyFile::read_binary_row(ByteReader& reader, std::span<double> values) const {
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const char* name = properties_[i].name.c_str();
-    switch (properties_[i].type) {
-      case PlyType::kInt8:
-        values[i] = reader.read<std::int8_t>(name);
-        break;
-      case PlyType::kUint8:
-        values[i] = reader.read<std::uint8_t>(name);
-        break;
-      case PlyType::kInt16:
-        values[i] = reader.read<std::int16_t>(name, order_);
-        break;
-      case PlyType::kUint16:
-        values[i] = reader.read<std::uint16_t>(name, order_);
-        break;
-      case PlyType::kInt32:
-        values[i] = reader.read<std::int32_t>(name, order_);
-        break;
-      case PlyType::kUint32:
-        values[i] = reader.read<std::uint32_t>(name, order_);
-        break;
-      case PlyType::kFloat:
-        values[i] = static_cast<double>(reader.read<float>(name, order_));
-        break;
-      case PlyType::kDouble:
-        values[i] = reader.read<double>(name, order_);
-        break;
-    }
+    values[i] = read_number(reader, properties_[i].type, order_, properties_[i].name.c_str());
   }
+}
+
+void PlyFile::check_types(const LaterElement& element) const {
+  for (const LaterProperty& property : element.properties) {
+    const bool counted = !property.list || property.count_type;
+    if (property.type && counted && !property.name.empty()) continue;
+    throw DataError(fmt::format("{}: the property '{}' of the element '{}' has an unknown type",
+                                path_.string(), property.name, element.name));
+  }
+}
+
+bool PlyFile::for_each_list(
+    std::string_view element,
+    std::span<const std::string_view> names,
+    const std::function<void(std::size_t row, std::span<const double> values)>& visit) const {
+  const auto target = std::find_if(later_.begin(), later_.end(),
+                                   [&](const LaterElement& e) { return e.name == element; });
+  if (target == later_.end()) return false;
+  const auto chosen = std::find_if(
+      target->properties.begin(), target->properties.end(), [&](const LaterProperty& p) {
+        return p.list && std::find(names.begin(), names.end(), p.name) != names.end();
+      });
+  if (chosen == target->properties.end()) return false;
+  // Every row of the elements up to the target takes bytes, so that wrong counts end with the file.
+  std::vector<double> values;
+  const auto read_rows = [&](const auto& start_row, const auto& number, const auto& fail) {
+    for (auto current = later_.begin(); current <= target; ++current) {
+      check_types(*current);
+      if (current->properties.empty()) continue;
+      for (std::uint64_t row = 0; row < current->rows; ++row) {
+        start_row();
+        for (auto property = current->properties.begin(); property != current->properties.end();
+             ++property) {
+          double count = 1.0;
+          if (property->list) {
+            count = number(*property->count_type, "the length of a list");
+            if (!(count >= 0.0) || count != std::floor(count)) {
+              fail(fmt::format("the length of a list is {}", count));
+            }
+          }
+          values.clear();
+          for (double i = 0; i < count; ++i) {
+            values.push_back(number(*property->type, property->name.c_str()));
+          }
+          if (property == chosen) visit(static_cast<std::size_t>(row), values);
+        }
+      }
+    }
+  };
+  if (ascii_) {
+    TextReader reader = text_rows();
+    const auto start_row = [&] {
+      if (!reader.next_line()) reader.fail("the file is truncated, rows are missing");
+    };
+    for (std::size_t row = 0; row < rows_; ++row) start_row();
+    read_rows(
+        start_row, [&](PlyType, const char* what) { return reader.number(what); },
+        [&](const std::string& message) { reader.fail(message); });
+  } else {
+    ByteReader reader = binary_rows();
+    reader.skip(saturating_product(rows_, row_bytes_), "the vertex element");
+    read_rows(
+        [] {},
+        [&](PlyType type, const char* what) { return read_number(reader, type, order_, what); },
+        [&](const std::string& message) { reader.fail(message); });
+  }
+  return true;
 }
 
 }  // namespace raysplats::io

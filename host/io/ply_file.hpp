@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -24,8 +25,9 @@ struct PlyProperty {
 };
 
 /// The vertex element of a PLY file (Turk 1994) as a table of numbers: ASCII or binary of both byte
-/// orders, scalar properties of every type. Elements with lists may follow it, but not precede it.
-/// Throws DataError for anything malformed or truncated, and for a count that the file cannot hold.
+/// orders, scalar properties of every type. Elements with lists may follow it, but not precede it;
+/// their lists can be read too. Throws DataError for anything malformed or truncated, and for a
+/// count that the file cannot hold.
 class PlyFile {
  public:
   explicit PlyFile(const std::filesystem::path& path);
@@ -54,9 +56,29 @@ class PlyFile {
     }
   }
 
+  /// Calls visit(row, values) with a list of every row of an element behind the vertices, the
+  /// property being the first one among `names`. False when there is no such element or property.
+  bool for_each_list(
+      std::string_view element,
+      std::span<const std::string_view> names,
+      const std::function<void(std::size_t row, std::span<const double> values)>& visit) const;
+
  private:
+  /// A property of an element behind the vertices. Types that are unknown matter once it is read.
+  struct LaterProperty {
+    std::string name;
+    std::optional<PlyType> type;
+    bool list = false;
+    std::optional<PlyType> count_type;
+  };
+  struct LaterElement {
+    std::string name;
+    std::uint64_t rows = 0;
+    std::vector<LaterProperty> properties;
+  };
   void parse_header();
   void locate_rows();
+  void check_types(const LaterElement& element) const;
   TextReader text_rows() const;
   ByteReader binary_rows() const;
   void read_text_row(TextReader& reader, std::span<double> values) const;
@@ -72,6 +94,7 @@ class PlyFile {
   std::size_t data_offset_ = 0;     ///< end of the header
   std::uint64_t rows_before_ = 0;   ///< rows of the elements before the vertices
   std::uint64_t bytes_before_ = 0;  ///< their size in a binary file
+  std::vector<LaterElement> later_;
 };
 
 }  // namespace raysplats::io

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/gltf_materials.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "io/image_file.hpp"
+#include "io/mesh_file.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+/// A number of an extension's object.
+double number(const tinygltf::Value& object, const std::string& key, double fallback) {
+  if (!object.Has(key)) return fallback;
+  const tinygltf::Value& value = object.Get(key);
+  const double found = value.IsNumber() ? value.GetNumberAsDouble() : fallback;
+  return std::isfinite(found) ? found : fallback;
+}
+
+double number(const tinygltf::ExtensionMap& extensions,
+              const std::string& extension,
+              const std::string& key,
+              double fallback) {
+  const auto found = extensions.find(extension);
+  return found == extensions.end() ? fallback : number(found->second, key, fallback);
+}
+
+template <std::size_t N>
+void numbers(const tinygltf::Value& object, const std::string& key, double (&values)[N]) {
+  if (!object.Has(key)) return;
+  const tinygltf::Value& list = object.Get(key);
+  for (std::size_t i = 0; i < N && i < list.ArrayLen(); ++i) {
+    const tinygltf::Value& value = list.Get(static_cast<int>(i));
+    if (value.IsNumber() && std::isfinite(value.GetNumberAsDouble())) {
+      values[i] = value.GetNumberAsDouble();
+    }
+  }
+}
+
+double unit(double value) { return std::clamp(value, 0.0, 1.0); }
+
+/// A display value from linear light; the curve goes on above 1.
+float encoded(double linear) {
+  const double value =
+      linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
+  return static_cast<float>(std::min(std::max(value, 0.0), 1e6));
+}
+
+/// Strength of the lobe max(0, <n,h>)^k that stands for a dielectric of this index: its reflectance
+/// straight on times (k + 8) / 8, the lobe's normalization (Akenine-Moeller et al. 2008, Real-Time
+/// Rendering, 3rd edition, section 7.5.7) in units in which a diffuse surface shows its colour.
+float specular_strength(double roughness, double ior) {
+  const double width = std::pow(std::max(roughness, 0.02), 4.0);
+  const double exponent = std::clamp(2.0 / width - 2.0, 1.0, 1e4);
+  const double f0 = std::pow((ior - 1.0) / (ior + 1.0), 2.0);
+  return static_cast<float>(std::min(1.0, f0 * (exponent + 8.0) / 8.0));
+}
+
+/// Per unit of length from the colour that is left of white after a distance (Beer's law).
+Rgb absorption(const tinygltf::ExtensionMap& extensions) {
+  const auto found = extensions.find("KHR_materials_volume");
+  Rgb result{0, 0, 0};
+  if (found == extensions.end()) return result;
+  const double distance = number(found->second, "attenuationDistance", 0.0);
+  double color[3] = {1, 1, 1};
+  numbers(found->second, "attenuationColor", color);
+  if (!(distance > 0.0)) return result;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double left = std::clamp(static_cast<double>(encoded(color[c])), 1e-4, 1.0);
+    result[c] = static_cast<float>(std::min(-std::log(left) / distance, 1e30));
+  }
+  return result;
+}
+
+}  // namespace
+
+const tinygltf::Material& GltfMaterials::source(int material) const {
+  const auto& all = reader_.model().materials;
+  if (material < 0 || static_cast<std::size_t>(material) >= all.size()) {
+    reader_.fail(fmt::format("there is no material {}", material));
+  }
+  return all[static_cast<std::size_t>(material)];
+}
+
+std::uint32_t GltfMaterials::index(int material) {
+  const auto [entry, added] = used_.emplace(material, static_cast<std::uint32_t>(materials.size()));
+  if (!added) return entry->second;
+  if (material == -1) {
+    materials.emplace_back().name = "default";
+  } else {
+    materials.push_back(map_material(source(material), material));
+  }
+  return entry->second;
+}
+
+GltfTextureUse GltfMaterials::texture_use(int material) const {
+  GltfTextureUse use;
+  if (material == -1) return use;
+  const tinygltf::TextureInfo& info = source(material).pbrMetallicRoughness.baseColorTexture;
+  if (info.index < 0) return use;
+  int set = info.texCoord;
+  const auto extension = info.extensions.find("KHR_texture_transform");
+  if (extension != info.extensions.end()) {
+    numbers(extension->second, "offset", use.offset);
+    numbers(extension->second, "scale", use.scale);
+    use.rotation = number(extension->second, "rotation", 0.0);
+    set = static_cast<int>(std::clamp(number(extension->second, "texCoord", set), -1.0, 1e6));
+  }
+  use.attribute = fmt::format("TEXCOORD_{}", set);
+  return use;
+}
+
+Image GltfMaterials::decode(int texture) const {
+  const auto& all = reader_.model().textures;
+  if (texture < 0 || static_cast<std::size_t>(texture) >= all.size()) {
+    reader_.fail(fmt::format("there is no texture {}", texture));
+  }
+  const int image = all[static_cast<std::size_t>(texture)].source;
+  const std::span<const std::byte> bytes = reader_.image(image);
+  const std::string& uri = reader_.model().images[static_cast<std::size_t>(image)].uri;
+  return to_texture(
+      decode_image(bytes, uri.empty() ? fmt::format("{} of {}", image, reader_.path().string())
+                                      : (reader_.path().parent_path() / uri).string()));
+}
+
+int GltfMaterials::texture(int texture) {
+  if (texture < 0) return -1;
+  const auto [entry, added] = loaded_.emplace(texture, static_cast<int>(textures.size()));
+  if (added) textures.push_back(decode(texture));
+  return entry->second;
+}
+
+double GltfMaterials::mean(int texture, int channel) {
+  if (texture < 0) return 1.0;
+  const auto [entry, added] = means_.emplace(texture, std::array<double, 3>{});
+  if (added) {
+    const Image image = decode(texture);
+    for (std::size_t i = 0; i < image.data.size(); ++i) {
+      entry->second[i % 3] += static_cast<double>(image.data[i]);
+    }
+    for (double& sum : entry->second) sum /= static_cast<double>(image.pixels());
+  }
+  return entry->second[static_cast<std::size_t>(channel)];
+}
+
+Material GltfMaterials::map_material(const tinygltf::Material& from, int number_in_file) {
+  Material material;
+  material.name = from.name.empty() ? fmt::format("material {}", number_in_file) : from.name;
+  const tinygltf::PbrMetallicRoughness& pbr = from.pbrMetallicRoughness;
+  for (std::size_t c = 0; c < 3; ++c) material.color[c] = encoded(unit(pbr.baseColorFactor[c]));
+  material.texture = texture(pbr.baseColorTexture.index);
+  const double alpha = from.alphaMode == "BLEND" ? unit(pbr.baseColorFactor[3]) : 1.0;
+  const int rough_texture = pbr.metallicRoughnessTexture.index;
+  const double metallic = unit(pbr.metallicFactor) * mean(rough_texture, 2);
+  const double roughness = unit(pbr.roughnessFactor) * mean(rough_texture, 1);
+  const double ior =
+      std::clamp(number(from.extensions, "KHR_materials_ior", "ior", 1.5), 1.0, 100.0);
+  const double strength = std::max(
+      number(from.extensions, "KHR_materials_emissive_strength", "emissiveStrength", 1.0), 0.0);
+  for (std::size_t c = 0; c < 3; ++c) {
+    // The texture's mean is a display value already.
+    material.emission[c] =
+        encoded(std::max(from.emissiveFactor[c], 0.0) * strength) *
+        static_cast<float>(mean(from.emissiveTexture.index, static_cast<int>(c)));
+  }
+  const Rgb black{0, 0, 0};
+  if (number(from.extensions, "KHR_materials_transmission", "transmissionFactor", 0.0) >= 0.5) {
+    material.kind = Material::Kind::kGlass;
+    material.ior = static_cast<float>(ior);
+    material.absorption = absorption(from.extensions);
+    return material;
+  }
+  material.roughness = static_cast<float>(roughness);
+  if (alpha == 1.0 && metallic >= 0.5 && roughness <= 0.5) {
+    material.kind = Material::Kind::kMirror;
+    return material;
+  }
+  if (alpha < 1.0) {
+    material.kind = Material::Kind::kTransparent;
+    material.opacity = static_cast<float>(alpha);
+  } else if (material.emission != black && material.color == black) {
+    material.kind = Material::Kind::kEmissive;
+    return material;
+  }
+  material.specular = specular_strength(roughness, ior);
+  return material;
+}
+
+}  // namespace raysplats::io

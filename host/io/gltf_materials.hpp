@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "io/gltf_model.hpp"
+#include "raysplats/image.hpp"
+#include "raysplats/scene.hpp"
+
+namespace raysplats::io {
+
+/// How the base colour texture of a glTF material is laid on a primitive.
+struct GltfTextureUse {
+  std::string attribute;  ///< "TEXCOORD_0" and so on
+  /// uv' = offset + R(rotation) scale uv (KHR_texture_transform)
+  double offset[2] = {0, 0};
+  double scale[2] = {1, 1};
+  double rotation = 0;
+};
+
+/// The materials of a glTF file, mapped when a primitive first uses them; the first row that
+/// applies decides:
+///
+/// | glTF | Material |
+/// | --- | --- |
+/// | KHR_materials_transmission >= 0.5 | glass; KHR_materials_ior, attenuation as absorption |
+/// | alphaMode BLEND, alpha < 1 | transparent of opacity alpha |
+/// | metallic >= 0.5 and roughness <= 0.5 | mirror of that roughness |
+/// | emissive factor > 0, base colour black | emissive |
+/// | else | diffuse with a specular lobe after the roughness and the index of refraction |
+///
+/// The colour is the base colour factor, the texture its texture. glTF's factors are linear light,
+/// whereas colours here are display values, so factors are encoded as sRGB (IEC 61966-2-1);
+/// textures are encoded already. Textures of other properties count with their mean.
+class GltfMaterials {
+ public:
+  explicit GltfMaterials(const GltfReader& reader) : reader_(reader) {}
+
+  /// Index in `materials` of a material of the file; -1 is the default one. Throws DataError for
+  /// references to what the file lacks and for textures that cannot be decoded.
+  std::uint32_t index(int material);
+  /// Of a material's base colour texture; an empty attribute when it has none.
+  GltfTextureUse texture_use(int material) const;
+
+  std::vector<Material> materials;
+  std::vector<Image> textures;
+
+ private:
+  const tinygltf::Material& source(int material) const;
+  Material map_material(const tinygltf::Material& from, int number);
+  Image decode(int texture) const;
+  int texture(int texture);
+  /// Mean of a channel of a texture; 1 without one.
+  double mean(int texture, int channel);
+  const GltfReader& reader_;
+  std::map<int, std::uint32_t> used_;
+  std::map<int, int> loaded_;
+  std::map<int, std::array<double, 3>> means_;
+};
+
+}  // namespace raysplats::io

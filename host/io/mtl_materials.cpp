@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/mtl_materials.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <tiny_obj_loader.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "io/byte_reader.hpp"
+#include "io/mesh_file.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats::io {
+namespace {
+
+constexpr std::uint64_t kMaxLibraryBytes = std::uint64_t{64} << 20;
+
+/// A number of an untrusted file, limited to a range; what is not finite becomes `fallback`.
+float bounded(float value, float low, float high, float fallback) {
+  return std::isfinite(value) ? std::clamp(value, low, high) : fallback;
+}
+
+Rgb color_of(const float (&values)[3], float high) {
+  Rgb color;
+  for (std::size_t c = 0; c < 3; ++c) color[c] = bounded(values[c], 0.0f, high, 0.0f);
+  return color;
+}
+
+bool is_black(const Rgb& color) { return color == Rgb{0, 0, 0}; }
+
+Material map_material(const tinyobj::material_t& mtl) {
+  Material material;
+  material.name = mtl.name;
+  material.color = color_of(mtl.diffuse, 1.0f);
+  const Rgb specular = color_of(mtl.specular, 1.0f);
+  const Rgb filter = color_of(mtl.transmittance, 1.0f);
+  const float dissolve = bounded(mtl.dissolve, 0.0f, 1.0f, 1.0f);
+  const float ior = mtl.ior > 0.0f ? bounded(mtl.ior, 0.01f, 10.0f, 1.0f) : 1.0f;
+  material.emission = color_of(mtl.emission, std::numeric_limits<float>::max());
+  // tinyobjloader's 0 0 0 is a filter that the file lacks; 1 1 1, which exporters write for opaque
+  // materials too, filters nothing.
+  const bool filters = !is_black(filter) && filter != Rgb{1, 1, 1};
+  const int illum = mtl.illum;
+  if (illum == 3 || illum == 5) {
+    material.kind = Material::Kind::kMirror;
+    if (!is_black(specular)) material.color = specular;
+    return material;
+  }
+  if (illum == 4 || illum == 6 || illum == 7 || illum == 9 ||
+      (ior > 1.0f && (dissolve < 1.0f || filters))) {
+    material.kind = Material::Kind::kGlass;
+    material.ior = ior;
+    material.color = filters ? filter : Rgb{1, 1, 1};
+    return material;
+  }
+  if (illum != 1) {
+    material.specular = (specular[0] + specular[1] + specular[2]) / 3.0f;
+    // The width r whose exponent 2/r^4 - 2 is Ns.
+    const float exponent = bounded(mtl.shininess, 0.0f, 1e4f, 0.0f);
+    material.roughness = std::pow(2.0f / (exponent + 2.0f), 0.25f);
+  }
+  if (dissolve < 1.0f) {
+    material.kind = Material::Kind::kTransparent;
+    material.opacity = dissolve;
+  } else if (!is_black(material.emission) && is_black(material.color)) {
+    material.kind = Material::Kind::kEmissive;
+  }
+  return material;
+}
+
+std::string trimmed(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t\r";
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return std::string(text.substr(first, text.find_last_not_of(kBlanks) - first + 1));
+}
+
+/// Files written on Windows separate folders by backslashes.
+std::filesystem::path relative_to(const std::filesystem::path& file, std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  return (file.parent_path() / name).lexically_normal();
+}
+
+}  // namespace
+
+void MtlMaterials::add_library(std::string_view names) {
+  const std::string whole = trimmed(names);
+  std::error_code error;
+  // A name may hold blanks, although the format separates names by them.
+  if (std::filesystem::exists(relative_to(obj_, whole), error)) {
+    read_library(relative_to(obj_, whole));
+    return;
+  }
+  std::istringstream words(whole);
+  for (std::string name; words >> name;) {
+    const std::filesystem::path path = relative_to(obj_, name);
+    if (std::filesystem::exists(path, error)) {
+      read_library(path);
+    } else {
+      spdlog::warn("{}: the material file {} does not exist, so its materials are the default one",
+                   obj_.string(), path.string());
+    }
+  }
+}
+
+void MtlMaterials::read_library(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_file(path, kMaxLibraryBytes);
+  std::istringstream stream(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  std::map<std::string, int> indices;
+  std::vector<tinyobj::material_t> read;
+  std::string warnings;
+  std::string errors;
+  tinyobj::LoadMtl(&indices, &read, &stream, &warnings, &errors);
+  for (const tinyobj::material_t& mtl : read) {
+    const std::string name = trimmed(mtl.name);
+    if (name.empty() || known_.contains(name)) continue;
+    Material material = map_material(mtl);
+    material.name = name;
+    known_.emplace(name, std::move(material));
+    const std::string map = trimmed(mtl.diffuse_texname);
+    if (!map.empty()) texture_paths_.emplace(name, relative_to(path, map));
+  }
+}
+
+int MtlMaterials::texture(const std::filesystem::path& path, const std::string& material) {
+  const auto [entry, added] = loaded_.emplace(path, static_cast<int>(textures.size()));
+  if (added) {
+    try {
+      textures.push_back(to_texture(read_image(path)));
+    } catch (const DataError& error) {
+      throw DataError(fmt::format("The texture of the material '{}' of {} cannot be used: {}",
+                                  material, obj_.string(), error.what()));
+    }
+  }
+  return entry->second;
+}
+
+std::uint32_t MtlMaterials::index(std::string_view name) {
+  const std::string key = trimmed(name);
+  const auto [entry, added] = used_.emplace(key, static_cast<std::uint32_t>(materials.size()));
+  if (!added) return entry->second;
+  const auto found = known_.find(key);
+  if (found != known_.end()) {
+    Material material = found->second;
+    const auto path = texture_paths_.find(key);
+    if (path != texture_paths_.end()) material.texture = texture(path->second, key);
+    materials.push_back(std::move(material));
+  } else {
+    if (!key.empty() && !known_.empty()) {
+      spdlog::warn("{}: the material '{}' is in no material file, so it is the default one",
+                   obj_.string(), key);
+    }
+    materials.emplace_back().name = key.empty() ? "default" : key;
+  }
+  return entry->second;
+}
+
+}  // namespace raysplats::io
