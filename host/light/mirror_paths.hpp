@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "device/buffer.hpp"
+#include "device/context.hpp"
+#include "light/surface_store.hpp"
+#include "primitives/scan.hpp"
+#include "raysplats/scene.hpp"
+#include "trace/ray_backward.hpp"
+#include "trace/ray_tracer.hpp"
+
+namespace raysplats {
+
+/// Known mirrors of a scene of Gaussians. Every surface reflects from both sides, times the colour
+/// of its material.
+struct Mirrors {
+  std::vector<Mesh> meshes;
+  std::vector<Material> materials;
+  int max_bounces = 4;  ///< mirrors that a ray may meet; behind the last one it is black
+};
+
+/// Rays through Gaussians that mirrors turn (docs/light.md), with gradients: the segments of a path
+/// are traced one after the other, all paths of a batch together, and without the ones that ended.
+/// The tracer must have a black background; here it is an argument.
+class MirrorPaths {
+ public:
+  /// `tracer` is not owned. Throws as SurfaceStore, UsageError for a negative number of bounces.
+  MirrorPaths(Context& context, RayTracer& tracer, const Mirrors& mirrors);
+
+  /// Rays of the batch that comes next: to be filled by the caller, their ends move to the mirrors.
+  Buffer<Ray>& rays() { return levels_[0].rays; }
+  /// Traces the first `count` of rays(). `direction` is that of colours before the first mirror;
+  /// behind it they follow the ray.
+  void trace(const DeviceGaussians& gaussians,
+             std::size_t count,
+             ColorDirection direction,
+             const std::array<float, 3>& background);
+  /// What the rays saw: colour with the background, and coverage.
+  const Buffer<std::array<float, 4>>& seen() const { return levels_[0].seen; }
+
+  /// Gradients of seen(), `count` of them, to be filled by the caller before backward().
+  Buffer<RayBackward::Gradient>& gradients() { return levels_[0].gradients; }
+  /// Adds the gradients of the last trace() to `sums`.
+  void backward(const DeviceGaussians& gaussians, RayBackward& sums);
+
+  /// Rays of the last trace() that stopped because of max_hits; blocks.
+  std::uint64_t capped_rays() const;
+
+ private:
+  struct Level {
+    std::size_t count = 0;
+    Buffer<Ray> rays;
+    Buffer<RsPath> paths;
+    Buffer<RsSurfaceHit> hits;
+    Buffer<std::uint32_t> starts;
+    Buffer<RayResult> results;
+    Buffer<std::array<float, 4>> seen;
+    Buffer<RayBackward::Gradient> gradients;
+  };
+
+  bool has_mirrors() const { return surfaces_ != nullptr; }
+  std::size_t find_mirrors(std::size_t level);
+  Kernel kernel(const char* name) const;
+
+  Context* context_;
+  RayTracer* tracer_;
+  int max_bounces_;
+  std::unique_ptr<SurfaceStore> surfaces_;  // null without mirrors
+  Scan scan_;
+  std::vector<Level> levels_;
+  std::size_t used_ = 0;  // levels of the last trace()
+  ColorDirection direction_ = ColorDirection::kRay;
+  std::array<float, 4> background_{};
+  // Stand for what there is not.
+  Buffer<RsSurfaceHit> no_hits_;
+  Buffer<std::uint32_t> no_words_;
+  Buffer<RsMaterial> no_materials_;
+  Buffer<std::array<float, 4>> no_colors_;
+};
+
+}  // namespace raysplats

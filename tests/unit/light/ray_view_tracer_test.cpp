@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "light/ray_view_tracer.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "core/camera_model.hpp"
+#include "raysplats/error.hpp"
+#include "unit/trace/trace_fixture.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+struct Host {
+  std::vector<float> means, quaternions, scales, opacities, sh, screen;
+
+  explicit Host(const GaussianGradients& g)
+      : means(g.means.download()),
+        quaternions(g.quaternions.download()),
+        scales(g.scales.download()),
+        opacities(g.opacities.download()),
+        sh(g.sh.download()),
+        screen(g.screen.download()) {}
+};
+
+template <class Expected>
+void check_gradients(const Host& got, const Expected& expected, double limit) {
+  const auto check = [&](const char* what, const std::vector<float>& a, const auto& b) {
+    CAPTURE(what);
+    CHECK(relative_error(a, std::vector<double>(b.begin(), b.end())) < limit);
+  };
+  check("means", got.means, expected.means);
+  check("quaternions", got.quaternions, expected.quaternions);
+  check("scales", got.scales, expected.scales);
+  check("opacities", got.opacities, expected.opacities);
+  check("sh", got.sh, expected.sh);
+}
+
+struct Traced {
+  Image image;
+  Host gradients;
+};
+
+template <class Tracer>
+Traced trace_and_differentiate(Context& context,
+                               Tracer& tracer,
+                               const DeviceGaussians& gaussians,
+                               const Camera& camera,
+                               const std::vector<float>& image_gradient) {
+  tracer.update(gaussians);
+  tracer.forward(gaussians, camera, true);
+  Buffer<float> gradient(context, image_gradient.size(), "image gradient");
+  gradient.upload(image_gradient);
+  GaussianGradients out;
+  tracer.backward(gaussians, gradient, out);
+  return {tracer.download_image(), Host(out)};
+}
+
+// A flat mirror in double precision.
+struct Panel {
+  glm::dvec3 corner, a, b;  // the rectangle corner + u a + v b
+  glm::dvec3 tint;
+};
+
+// What a pixel sees through mirrors, and the hits on the way.
+struct Seen {
+  glm::dvec3 color{0.0};
+  double alpha = 0.0;
+  double margin = 1.0;
+  std::vector<std::uint32_t> hits;
+};
+
+Seen see(const reference::Parameters& parameters,
+         const TraceOptions& options,
+         const std::vector<Panel>& panels,
+         int max_bounces,
+         const CameraRay& ray) {
+  Seen out;
+  const glm::dvec3 background(options.background[0], options.background[1], options.background[2]);
+  TraceOptions dark = options;
+  dark.background = {0, 0, 0};
+  glm::dvec3 origin = ray.origin, direction = ray.direction, weight(1.0);
+  double passed = 1.0;
+  const Panel* from = nullptr;
+  for (int bounce = 0;; ++bounce) {
+    double t_end = 1e30;
+    const Panel* met = nullptr;
+    glm::dvec3 normal(0.0);
+    for (const Panel& panel : panels) {
+      const glm::dvec3 n = glm::normalize(glm::cross(panel.a, panel.b));
+      const double t = glm::dot(panel.corner - origin, n) / glm::dot(direction, n);
+      if (&panel == from || !(t > 0.0) || t >= t_end) continue;
+      const glm::dvec3 p = origin + t * direction - panel.corner;
+      const double u = glm::dot(p, panel.a) / glm::dot(panel.a, panel.a);
+      const double v = glm::dot(p, panel.b) / glm::dot(panel.b, panel.b);
+      out.margin =
+          std::min({out.margin, std::abs(u), std::abs(v), std::abs(1 - u), std::abs(1 - v)});
+      if (u < 0 || u > 1 || v < 0 || v > 1) continue;
+      t_end = t;
+      met = &panel;
+      normal = n;
+    }
+    const reference::RayTrace traced = reference::trace_ray(
+        parameters, dark, origin, direction, 0.0, t_end,
+        bounce == 0 ? reference::ColorMode::kFromOrigin : reference::ColorMode::kAlongRay);
+    out.margin = std::min(out.margin, traced.margin);
+    for (const reference::Hit& hit : traced.hits) out.hits.push_back(hit.index);
+    out.hits.push_back(0xffffffffu);
+    out.color += weight * traced.color;
+    weight *= traced.transmittance;
+    passed *= traced.transmittance;
+    if (met == nullptr) {
+      out.color += weight * background;
+      break;
+    }
+    if (bounce == max_bounces) {
+      passed = 0.0;
+      break;
+    }
+    weight *= met->tint;
+    origin += t_end * direction;
+    direction -= 2.0 * glm::dot(direction, normal) * normal;
+    from = met;
+  }
+  out.alpha = 1.0 - passed;
+  return out;
+}
+
+Mirrors mirrors_of(const std::vector<Panel>& panels, int max_bounces) {
+  Mirrors out;
+  out.max_bounces = max_bounces;
+  for (const Panel& panel : panels) {
+    Mesh mesh;
+    for (const glm::dvec3& p : {panel.corner, panel.corner + panel.a,
+                                panel.corner + panel.a + panel.b, panel.corner + panel.b}) {
+      for (int k = 0; k < 3; ++k) mesh.positions.push_back(static_cast<float>(p[k]));
+    }
+    mesh.triangles = {0, 1, 2, 0, 2, 3};
+    mesh.materials.assign(2, static_cast<std::uint32_t>(out.materials.size()));
+    Material material;
+    material.kind = Material::Kind::kMirror;
+    for (int k = 0; k < 3; ++k)
+      material.color[static_cast<std::size_t>(k)] = static_cast<float>(panel.tint[k]);
+    out.materials.push_back(material);
+    out.meshes.push_back(mesh);
+  }
+  return out;
+}
+
+Camera fisheye_camera(int width, int height) {
+  Camera camera = reference::cube_camera(width, height);
+  camera.model = CameraModel::kFisheye;
+  camera.translation = {0.0, 0.0, 2.2};
+  camera.fx = camera.fy = 0.35 * width;
+  camera.distortion.k1 = -0.03;
+  camera.distortion.k2 = 0.004;
+  return camera;
+}
+
+}  // namespace
+
+TEST_CASE("a pinhole's picture and gradients are those of the camera tracer") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(800, 91, 2);
+  const Camera camera = look_at({0.4, -0.6, -4.0}, {0, 0, 0}, {0, 1, 0}, 66, 58, 80);
+  TraceOptions options;
+  options.background = {0.3f, 0.2f, 0.1f};
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const reference::Render render = reference::render(reference::Parameters(model), options, camera);
+  std::vector<float> gradient = random_image_gradient(render.pixels(), 5);
+  for (std::size_t i = 0; i < render.pixels(); ++i) {
+    if (render.margin[i] >= 1e-4) continue;
+    for (std::size_t c = 0; c < 4; ++c) gradient[c * render.pixels() + i] = 0.0f;
+  }
+  CameraTracer packets(context, options);
+  RayViewTracer rays(context, options);
+  const Traced expected = trace_and_differentiate(context, packets, gaussians, camera, gradient);
+  const Traced got = trace_and_differentiate(context, rays, gaussians, camera, gradient);
+  CHECK(compare(got.image, render, 1e-4).maximum < 2e-3);
+  check_gradients(got.gradients, expected.gradients, 1e-3);
+
+  // In batches that are traced again; 58 x 66 pixels are less than one.
+  const Camera large = look_at({0.4, -0.6, -4.0}, {0, 0, 0}, {0, 1, 0}, 110, 90, 150);
+  const std::vector<float> noise = random_image_gradient(110 * 90, 6);
+  TraceOptions tight = options;
+  tight.memory_budget = 1000;
+  RayViewTracer batches(context, tight);
+  const Traced whole = trace_and_differentiate(context, rays, gaussians, large, noise);
+  const Traced parts = trace_and_differentiate(context, batches, gaussians, large, noise);
+  CHECK(whole.image.data == parts.image.data);
+  check_gradients(parts.gradients, whole.gradients, 1e-4);
+}
+
+TEST_CASE("pictures and gradients of distorted cameras equal the double reference [small]") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(40, 92, 1);
+  TraceOptions options;
+  options.hit_order = HitOrder::kPeak;
+  options.background = {0.3f, 0.2f, 0.1f};
+  const reference::Parameters parameters(model);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  for (const CameraModel lens : {CameraModel::kFisheye, CameraModel::kOpenCv,
+                                 CameraModel::kEquirectangular, CameraModel::kOrthographic}) {
+    CAPTURE(static_cast<int>(lens));
+    Camera camera = fisheye_camera(18, 16);
+    camera.model = lens;
+    if (lens == CameraModel::kOpenCv) {
+      camera.fx = camera.fy = 12;
+      camera.distortion = {-0.12, 0.02, 0.0, 0.003, -0.002, 0.0};
+    }
+    if (lens == CameraModel::kOrthographic) camera.fx = camera.fy = 7;
+    const std::size_t pixels = 18 * 16;
+    std::vector<float> gradient = random_image_gradient(pixels, 7);
+    const reference::ColorMode mode = lens == CameraModel::kOrthographic
+                                          ? reference::ColorMode::kAlongRay
+                                          : reference::ColorMode::kFromOrigin;
+    std::vector<reference::RayQuery> queries;
+    std::vector<double> wide;
+    std::vector<reference::RayTrace> expected;
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const CameraRay ray =
+          camera_ray(camera, static_cast<double>(i % 18) + 0.5, static_cast<double>(i / 18) + 0.5);
+      queries.push_back({ray.origin, ray.direction, 0.0, ray.valid ? 1e30 : -1.0});
+      expected.push_back(reference::trace_ray(parameters, options, ray.origin, ray.direction, 0.0,
+                                              queries.back().t_max, mode));
+      for (std::size_t c = 0; c < 4; ++c) {
+        if (expected[i].margin < 1e-4) gradient[c * pixels + i] = 0.0f;
+        wide.push_back(gradient[c * pixels + i]);
+      }
+    }
+    RayViewTracer tracer(context, options);
+    const Traced got = trace_and_differentiate(context, tracer, gaussians, camera, gradient);
+    std::size_t compared = 0;
+    for (std::size_t i = 0; i < pixels; ++i) {
+      if (expected[i].margin < 1e-4) continue;
+      ++compared;
+      for (std::size_t c = 0; c < 3; ++c) {
+        CHECK(got.image.data[4 * i + c] ==
+              doctest::Approx(expected[i].color[static_cast<int>(c)]).epsilon(2e-3));
+      }
+      CHECK(got.image.data[4 * i + 3] == doctest::Approx(expected[i].alpha).epsilon(2e-3));
+    }
+    CHECK(compared > pixels / 2);
+    check_gradients(got.gradients,
+                    reference::ray_gradient(parameters, options, queries, wide, mode), 1e-3);
+  }
+}
+
+TEST_CASE("gradients through mirrors equal finite differences of a double reference [small]") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(14, 93, 1);
+  for (float& scale : model.log_scales) scale = std::min(scale, std::log(0.3f));
+  TraceOptions options;
+  options.background = {0.3f, 0.5f, 0.2f};
+  const reference::Parameters parameters(model);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  Camera camera = reference::cube_camera(14, 12);
+  camera.fx = camera.fy = 14;
+  camera.rotation = look_at({0, 0, -4}, {0.3, 0.1, 0}, {0, -1, 0}, 14, 12, 14).rotation;
+  camera.translation = -(camera.rotation * glm::dvec3(0, 0, -4));
+  // A wall behind the Gaussians and a tilted one beside them: some rays meet both.
+  const std::vector<Panel> panels{{{-2, -2, 1.3}, {4, 0, 0}, {0, 4, 0}, {0.9, 0.7, 0.8}},
+                                  {{1.4, -2, -1.5}, {0.3, 0, 2.9}, {0, 4, 0}, {0.5, 0.9, 0.6}}};
+  const std::size_t pixels = 14 * 12;
+  for (const int bounces : {0, 1, 3}) {
+    CAPTURE(bounces);
+    std::vector<float> gradient = random_image_gradient(pixels, 8);
+    std::vector<CameraRay> rays;
+    std::vector<Seen> at;
+    std::size_t reflected = 0, twice = 0, left_out = 0;
+    for (std::size_t i = 0; i < pixels; ++i) {
+      rays.push_back(
+          camera_ray(camera, static_cast<double>(i % 14) + 0.5, static_cast<double>(i / 14) + 0.5));
+      at.push_back(see(parameters, options, panels, bounces, rays[i]));
+      const auto segments = std::count(at[i].hits.begin(), at[i].hits.end(), 0xffffffffu);
+      reflected += segments > 1 ? 1 : 0;
+      twice += segments > 2 ? 1 : 0;
+      if (at[i].margin >= 1e-4) continue;
+      ++left_out;
+      for (std::size_t c = 0; c < 4; ++c) gradient[c * pixels + i] = 0.0f;
+    }
+    CHECK(left_out < pixels / 4);
+    CHECK((reflected > 40) == (bounces > 0));
+    CHECK((twice > 4) == (bounces > 1));
+
+    RayViewTracer tracer(context, options, mirrors_of(panels, bounces));
+    const Traced got = trace_and_differentiate(context, tracer, gaussians, camera, gradient);
+    for (std::size_t i = 0; i < pixels; ++i) {
+      if (at[i].margin < 1e-4) continue;
+      CAPTURE(i);
+      for (std::size_t c = 0; c < 3; ++c) {
+        CHECK(got.image.data[4 * i + c] ==
+              doctest::Approx(at[i].color[static_cast<int>(c)]).epsilon(2e-3));
+      }
+      CHECK(got.image.data[4 * i + 3] == doctest::Approx(at[i].alpha).epsilon(2e-3));
+    }
+
+    const double step = 1e-5;
+    reference::Parameters numeric = parameters.zeros();
+    for (std::size_t n = 0; n < parameters.scalar_count(); ++n) {
+      reference::Parameters plus = parameters, minus = parameters;
+      plus.at(n) += step;
+      minus.at(n) -= step;
+      for (std::size_t i = 0; i < pixels; ++i) {
+        if (at[i].margin < 1e-4) continue;
+        const Seen above = see(plus, options, panels, bounces, rays[i]);
+        const Seen below = see(minus, options, panels, bounces, rays[i]);
+        REQUIRE(above.hits == at[i].hits);
+        REQUIRE(below.hits == at[i].hits);
+        double change = gradient[3 * pixels + i] * (above.alpha - below.alpha);
+        for (std::size_t c = 0; c < 3; ++c) {
+          const int k = static_cast<int>(c);
+          change += gradient[c * pixels + i] * (above.color[k] - below.color[k]);
+        }
+        numeric.at(n) += change / (2.0 * step);
+      }
+    }
+    check_gradients(got.gradients, numeric, 1e-3);
+  }
+}
+
+TEST_CASE("what a tracer of rays refuses, and a tree that is refitted") {
+  Context context = make_test_context();
+  TraceOptions near;
+  near.near_depth = 0.5f;
+  CHECK_THROWS_AS(RayViewTracer(context, near), UsageError);
+  Mirrors endless;
+  endless.max_bounces = -1;
+  CHECK_THROWS_AS(RayViewTracer(context, {}, endless), UsageError);
+  RayViewTracer tracer(context, {});
+  Gaussians model = reference::random_scene(300, 94, 0);
+  const Camera camera = fisheye_camera(30, 30);
+  Buffer<float> gradient(context, 4 * 900, "image gradient");
+  gradient.clear();
+  GaussianGradients out;
+  DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  tracer.update(gaussians);
+  tracer.forward(gaussians, camera);
+  CHECK_THROWS_AS(tracer.backward(gaussians, gradient, out), UsageError);
+  CHECK(tracer.capped_rays() == 0);
+  // Many small changes: the tree is refitted most of the times.
+  CounterRng rng(95, 1);
+  for (int round = 0; round < 40; ++round) {
+    for (float& x : model.means) x += static_cast<float>(0.01 * rng.normal());
+    gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+    tracer.update(gaussians);
+  }
+  tracer.forward(gaussians, camera);
+  RayViewTracer fresh(context, {});
+  fresh.update(gaussians);
+  fresh.forward(gaussians, camera);
+  CHECK(fresh.download_image().data == tracer.download_image().data);
+}
