@@ -60,6 +60,7 @@ Context::Context(const DeviceInfo& device, const ContextOptions& options)
   impl_->info.tuning.reset();
   if (options.tuning) impl_->info.tuning = TuningStore(options.cache_directory).find(device);
   impl_->device = devices[device.index].device;
+  impl_->canaries = Canaries::from_environment();
   try {
     impl_->context = cl::Context(impl_->device);
     impl_->queue = cl::CommandQueue(

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "device/canaries.hpp"
 #include "device/cl.hpp"
 #include "device/context.hpp"
 #include "device/profiler.hpp"
@@ -32,6 +33,7 @@ struct Context::Impl {
   cl::Context context;
   cl::CommandQueue queue;
   Profiler profiler;
+  std::unique_ptr<Canaries> canaries;  // usually none
   std::map<std::string, cl::Program> programs;  // by program path and build options
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;

@@ -52,6 +52,10 @@ void Kernel::enqueue(const Range& range) {
     context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local, nullptr,
                                        context.next_event(event));
     context.timed(impl_->program, impl_->name, event);
+    if (context.canaries) {
+      context.canaries->check(context.queue,
+                              fmt::format("Kernel {} of {}", impl_->name, impl_->program));
+    }
   } catch (const cl::Error& error) {
     throw_cl_error(
         error,
