@@ -224,6 +224,32 @@ TEST_CASE("many samples tend to the reference's mean over the pixel") {
   CHECK(share_beyond_three_sigma(found, expected) < 0.06);
 }
 
+TEST_CASE("later glass surfaces choose by Fresnel's share") {
+  Context context = make_test_context();
+  Scene scene;
+  scene.render.ambient = {0, 0, 0};
+  scene.render.samples = 64;
+  add_mesh(scene, box({-9, -9, 0}, {9, 9, 0.3}, 0), glass(2.5f));
+  add_mesh(scene, box({-9, -9, 0.6}, {9, 9, 0.8}, 0), glass(3.5f));
+  Material glow = white(Material::Kind::kEmissive);
+  glow.emission = {1, 1, 1};
+  add_mesh(scene, rectangle({0, 0, 2}, {30, 0, 0}, {0, 30, 0}, 0), glow);
+  const Camera camera = cube_camera(6, 6);
+  for (const int bounces : {5, 8}) {
+    scene.render.max_bounces = bounces;
+    const double found = mean_of(render_on_device(context, scene, camera))[0];
+    const reference::LightRender dense = reference::render_light(scene, camera);
+    double expected = 0, chance = 0;
+    for (std::size_t i = 0; i < dense.pixels(); ++i) {
+      expected += dense.image[i] / static_cast<double>(dense.pixels());
+      chance += dense.chance[i] / static_cast<double>(dense.pixels());
+    }
+    CHECK(chance > 0.5);
+    // 2304 samples of a value in [0, 1]: a standard error below 0.01.
+    CHECK(std::abs(found - expected) < 0.03);
+  }
+}
+
 TEST_CASE("a sphere light's shadow is the visible share of its disc on average") {
   Context context = make_test_context();
   Scene scene;

@@ -78,6 +78,8 @@ TEST_CASE("an opaque mesh is drawn within the cloud") {
   scene.materials[0].specular = 0.6f;
   scene.materials[0].roughness = 0.4f;
   check_picture(context, scene, kCamera, "two lights and a highlight");
+  scene.materials[0].roughness = 0.9f;  // wide enough to reach behind the terminator
+  check_picture(context, scene, kCamera, "a wide highlight");
   scene.trace.hit_order = HitOrder::kPeak;
   check_picture(context, scene, kCamera, "peak order");
 }
@@ -168,6 +170,11 @@ TEST_CASE("glass") {
   check_picture(context, scene, kCamera, "ball", 3e-3, 0.35);
   scene.gaussians = Gaussians{};
   check_picture(context, scene, kCamera, "ball alone", 2e-3, 0.1);
+  // So coarse that many directions about the shading normal end on the wrong side.
+  scene.environment.equirect = waves(32, 16);
+  scene.meshes[1] = ball({0, 0, 0}, 0.8, 3, 1, true);
+  check_picture(context, scene, cube_camera(32, 32), "coarse smooth ball", 2e-3, 0.1);
+  scene.environment.equirect = Image{};
   // More surfaces: the rays that leave the box stay few, and few pixels have a chance left.
   scene.meshes[1] = box({-0.7, -0.6, -0.5}, {0.4, 0.6, 0.5}, 1);
   scene.render.max_bounces = 2;
