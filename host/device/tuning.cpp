@@ -24,6 +24,7 @@ constexpr std::uintmax_t kMaxBytes = std::uintmax_t{1} << 20;
 constexpr std::array<int, 5> kWidths{1, 2, 4, 8, 16};
 constexpr std::array<int, 4> kTiles{8, 16, 32, 64};
 constexpr int kMaxPending = 1024;
+constexpr std::uint64_t kMaxNumber = 1 << 20;
 
 using Entry = TuningStore::Entry;
 
@@ -36,16 +37,25 @@ bool is_current(const Entry& entry, const DeviceInfo& device) {
          entry.version == RAYSPLATS_VERSION;
 }
 
+// Conversions of numbers out of range would wrap or be undefined.
+int whole_number(const nlohmann::json& json, const char* key) {
+  const nlohmann::json& value = json.at(key);
+  if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMaxNumber) {
+    throw DataError(std::string("'") + key + "' is no whole number in its range");
+  }
+  return value.get<int>();
+}
+
 Entry entry_from(const nlohmann::json& json) {
   Entry entry;
   entry.device = json.at("device").get<std::string>();
   entry.platform = json.at("platform").get<std::string>();
   entry.driver = json.at("driver").get<std::string>();
   entry.version = json.at("raysplats").get<std::string>();
-  entry.tuning.packet_width = json.at("packet_width").get<int>();
-  entry.tuning.tile = json.at("tile").get<int>();
-  entry.tuning.pending = json.at("pending").get<int>();
-  entry.tuning.group = json.at("group").get<int>();
+  entry.tuning.packet_width = whole_number(json, "packet_width");
+  entry.tuning.tile = whole_number(json, "tile");
+  entry.tuning.pending = whole_number(json, "pending");
+  entry.tuning.group = whole_number(json, "group");
   if (!is_valid(entry.tuning)) throw DataError("a value is out of range");
   return entry;
 }
