@@ -163,6 +163,11 @@ Command add_bench_command(CLI::App& app) {
   command->add_option("--rays", options->bench.rays, "Arbitrary rays, at most")
       ->check(at_least(1))
       ->capture_default_str();
+  command
+      ->add_option("--triangles", options->bench.triangles,
+                   "Of the larger mesh; the smaller has a tenth")
+      ->check(between(100, 1e8))
+      ->capture_default_str();
   command->add_option("--filter", options->bench.filter, "Only ids row/scene/size that match this")
       ->type_name("REGEX");
   command->add_flag("--list", options->list, "Print the ids and stop");

@@ -104,6 +104,7 @@ std::map<std::string, std::string> option_texts(const Context& context,
            std::to_string(model != nullptr ? model->gaussians.sh_degree : options.sh_degree)},
           {"repeat", std::to_string(options.repeat)},
           {"rays", std::to_string(options.rays)},
+          {"triangles", std::to_string(options.triangles)},
           {"packet-width", std::to_string(options.trace.packet_width)},
           {"hit-order", options.trace.hit_order == HitOrder::kPeak ? "peak" : "entry"},
           {"quantile", fmt::format("{:g}", options.trace.quantile)},
@@ -155,7 +156,16 @@ const std::vector<BenchRowInfo>& bench_rows() {
       {"densify", "Gaussians", "density control of every tenth Gaussian, planned on the host"},
       {"iteration", "iterations", "training: bounds, forward, loss, backward, sums, Adam"},
       {"rays-update", "Gaussians", "records and tree for arbitrary rays"},
-      {"rays", "rays", "incoherent rays between random points"}};
+      {"rays", "rays", "incoherent rays between random points"},
+      {"surfaces-small", "rays", "camera rays to a closed body of a tenth of --triangles"},
+      {"surfaces-large", "rays", "camera rays to a closed body of --triangles"},
+      {"surfaces-random", "rays", "incoherent rays to the large body"},
+      {"light", "rays", "one image by the tracer of light, without a mesh"},
+      {"light-mesh-small", "rays", "with the small body, diffuse, and no lights"},
+      {"light-mesh-large", "rays", "with the large body, diffuse, and no lights"},
+      {"light-mirror", "rays", "with the small body as a mirror: mirrored rays too"},
+      {"light-glass", "rays", "with the small body of glass: all its rays too"},
+      {"light-shadows", "rays", "with the small body and a light: shadow rays of both too"}};
   return rows;
 }
 

@@ -32,8 +32,9 @@ struct BenchOptions {
   int sh_degree = 0;
   std::string filter;  ///< regular expression, searched in the ids; "" = all
   int repeat = 5;
-  double min_seconds = 0.02;  ///< per repetition
-  std::size_t rays = 65536;   ///< arbitrary rays, at most
+  double min_seconds = 0.02;          ///< per repetition
+  std::size_t rays = 65536;           ///< arbitrary rays, at most
+  std::size_t triangles = 1'000'000;  ///< of the larger body; the smaller has a tenth
   std::uint64_t seed = 1;
   TraceOptions trace;
 };

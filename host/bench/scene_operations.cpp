@@ -217,11 +217,30 @@ SceneBench::~SceneBench() = default;
 
 std::vector<BenchOperation> SceneBench::operations() {
   Impl& self = *impl_;
-  return {self.sort(),    self.bounds(),    self.build(),
-          self.refit(),   self.view(),      self.backward(),
-          self.loss(),    self.adam_step(), self.density_statistics(),
-          self.densify(), self.iteration(), self.rays_update(),
-          self.rays()};
+  const std::size_t large = self.options.triangles, small = large / 10;
+  using Kind = Material::Kind;
+  return {self.sort(),
+          self.bounds(),
+          self.build(),
+          self.refit(),
+          self.view(),
+          self.backward(),
+          self.loss(),
+          self.adam_step(),
+          self.density_statistics(),
+          self.densify(),
+          self.iteration(),
+          self.rays_update(),
+          self.rays(),
+          self.surfaces("surfaces-small", small, true),
+          self.surfaces("surfaces-large", large, true),
+          self.surfaces("surfaces-random", large, false),
+          self.light("light", 0, Kind::kDiffuse, false),
+          self.light("light-mesh-small", small, Kind::kDiffuse, false),
+          self.light("light-mesh-large", large, Kind::kDiffuse, false),
+          self.light("light-mirror", small, Kind::kMirror, false),
+          self.light("light-glass", small, Kind::kGlass, false),
+          self.light("light-shadows", small, Kind::kDiffuse, true)};
 }
 
 }  // namespace raysplats

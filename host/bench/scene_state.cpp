@@ -126,23 +126,27 @@ void SceneBench::Impl::make_density() {
   }
 }
 
-// The rays of the generated scenes, stretched to the middle of other models: outliers of trained
-// models lie far away.
+// Outliers of trained models lie far away.
+SceneBench::Impl::Middle SceneBench::Impl::middle() const {
+  Middle out;
+  if (model.unit_cube) return out;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < count(); ++i) {
+      values.push_back(static_cast<double>(model.gaussians.means[3 * i + axis]));
+    }
+    const std::array<double, 2> ends{kOutliers, 1.0 - kOutliers};
+    const std::vector<double> range = quantiles(std::move(values), ends);
+    out.center[axis] = 0.5 * (range[0] + range[1]);
+    out.half[axis] = std::max(0.5 * (range[1] - range[0]), 1e-6);
+  }
+  return out;
+}
+
+// The rays of the generated scenes, stretched to the middle of other models.
 void SceneBench::Impl::make_rays() {
   if (!ray_list.empty()) return;
-  std::array<double, 3> center{}, half{1.0, 1.0, 1.0};
-  if (!model.unit_cube) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      std::vector<double> values;
-      for (std::size_t i = 0; i < count(); ++i) {
-        values.push_back(static_cast<double>(model.gaussians.means[3 * i + axis]));
-      }
-      const std::array<double, 2> ends{kOutliers, 1.0 - kOutliers};
-      const std::vector<double> range = quantiles(std::move(values), ends);
-      center[axis] = 0.5 * (range[0] + range[1]);
-      half[axis] = std::max(0.5 * (range[1] - range[0]), 1e-6);
-    }
-  }
+  const auto [center, half] = middle();
   const std::size_t rays = std::min(options.rays, static_cast<std::size_t>(pixels()));
   for (const BenchRay& unit : bench_rays(rays, options.seed)) {
     Ray ray{};

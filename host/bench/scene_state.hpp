@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -9,7 +10,10 @@
 #include "bench/scene_bench.hpp"
 #include "bvh/gaussian_bounds.hpp"
 #include "bvh/lbvh.hpp"
+#include "light/light_tracer.hpp"
+#include "light/triangle_tracer.hpp"
 #include "primitives/radix_sort.hpp"
+#include "raysplats/scene.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/ray_tracer.hpp"
 #include "train/adam.hpp"
@@ -37,6 +41,16 @@ struct SceneBench::Impl {
   void make_density();
   void make_rays();
   DeviceGaussians copy_of_gaussians();
+  /// Where most of the model is.
+  struct Middle {
+    std::array<double, 3> center{};
+    std::array<double, 3> half{1.0, 1.0, 1.0};
+  };
+  Middle middle() const;
+  /// A closed body of about `triangles` triangles in the middle of the model.
+  Mesh body(std::size_t triangles) const;
+  void make_light_tracer(std::size_t triangles, Material::Kind kind, bool lights);
+  void make_triangles(std::size_t triangles, bool camera_rays);
 
   BenchOperation bounds();
   BenchOperation sort();
@@ -51,6 +65,9 @@ struct SceneBench::Impl {
   BenchOperation density_statistics();
   BenchOperation densify();
   BenchOperation iteration();
+  BenchOperation surfaces(const char* row, std::size_t triangles, bool camera_rays);
+  /// One image by LightTracer; no body for 0 triangles.
+  BenchOperation light(const char* row, std::size_t triangles, Material::Kind kind, bool lights);
 
   BenchWork bounds_work() const;
   BenchWork build_work() const;
@@ -91,6 +108,10 @@ struct SceneBench::Impl {
   std::vector<float> density_signal;
   DeviceGaussians densified;
   std::size_t densified_count = 0;
+  std::unique_ptr<TriangleTracer> triangle_tracer;
+  Buffer<Ray> surface_rays;
+  Buffer<RsSurfaceHit> surface_hits;
+  std::unique_ptr<LightTracer> light_tracer;
 };
 
 /// Bytes and flops of both, items of the first.

@@ -263,4 +263,45 @@ std::vector<BenchRay> bench_rays(std::size_t count, std::uint64_t seed) {
   return rays;
 }
 
+Mesh bench_body(std::size_t triangles, const std::array<double, 3>& center, double radius) {
+  const int rows = std::max(2, static_cast<int>(std::lround(0.5 * std::sqrt(triangles))));
+  const int columns = 2 * rows;
+  // The poles' triangles that have no area are left in: tracers must cope with them.
+  const auto point = [&](double polar, double around) {
+    const double bumps = 1.0 + 0.05 * std::sin(9.0 * polar) * std::cos(11.0 * around);
+    return glm::dvec3(std::sin(polar) * std::cos(around), std::cos(polar),
+                      std::sin(polar) * std::sin(around)) *
+           (radius * bumps);
+  };
+  Mesh mesh;
+  for (int i = 0; i <= rows; ++i) {
+    for (int j = 0; j <= columns; ++j) {
+      constexpr double kStep = 1e-4;
+      const double polar = std::numbers::pi * i / rows;
+      const double around = 2.0 * std::numbers::pi * j / columns;
+      const glm::dvec3 at = point(polar, around);
+      const double inner = std::clamp(polar, kStep, std::numbers::pi - kStep);
+      const glm::dvec3 normal =
+          glm::normalize(glm::cross(point(inner, around + kStep) - point(inner, around - kStep),
+                                    point(inner + kStep, around) - point(inner - kStep, around)));
+      for (int k = 0; k < 3; ++k) {
+        mesh.positions.push_back(static_cast<float>(center[static_cast<std::size_t>(k)] + at[k]));
+        mesh.normals.push_back(static_cast<float>(normal[k]));
+      }
+    }
+  }
+  const auto vertex = [&](int i, int j) {
+    return static_cast<std::uint32_t>(i * (columns + 1) + j);
+  };
+  for (int i = 0; i < rows; ++i) {
+    for (int j = 0; j < columns; ++j) {
+      const std::uint32_t a = vertex(i, j), b = vertex(i, j + 1);
+      const std::uint32_t c = vertex(i + 1, j), d = vertex(i + 1, j + 1);
+      mesh.triangles.insert(mesh.triangles.end(), {a, b, d, a, d, c});
+      mesh.materials.insert(mesh.materials.end(), 2, 0u);
+    }
+  }
+  return mesh;
+}
+
 }  // namespace raysplats

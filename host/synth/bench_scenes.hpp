@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "raysplats/camera.hpp"
 #include "raysplats/gaussians.hpp"
+#include "raysplats/scene.hpp"
 
 namespace raysplats {
 
@@ -40,5 +42,9 @@ struct BenchRay {
 /// Rays without coherence that all cross [-1, 1]^3: each passes through a uniform point of the cube
 /// in a uniform direction of length 1, and starts 4 units before that point, outside the cube.
 std::vector<BenchRay> bench_rays(std::size_t count, std::uint64_t seed);
+
+/// A closed body with bumps: a grid of n x 2 n cells on a sphere, two triangles each, as many as
+/// come nearest to `triangles` (at least 8), with smooth normals and material 0.
+Mesh bench_body(std::size_t triangles, const std::array<double, 3>& center, double radius);
 
 }  // namespace raysplats

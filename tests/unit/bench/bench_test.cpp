@@ -21,6 +21,7 @@ BenchOptions tiny() {
   options.repeat = 2;
   options.min_seconds = 1e-4;
   options.rays = 256;
+  options.triangles = 2000;
   return options;
 }
 

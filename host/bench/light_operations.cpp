@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <utility>
+
+#include "bench/scene_state.hpp"
+#include "light/work.h"
+#include "synth/bench_scenes.hpp"
+#include "trace/camera_rays.hpp"
+
+namespace raysplats {
+namespace {
+
+// Of the model's half extent.
+constexpr double kBodySize = 0.5;
+constexpr float kLightDistance = 3.0f;
+
+}  // namespace
+
+Mesh SceneBench::Impl::body(std::size_t triangles) const {
+  const auto [center, half] = middle();
+  return bench_body(triangles, center, kBodySize * *std::min_element(half.begin(), half.end()));
+}
+
+void SceneBench::Impl::make_triangles(std::size_t triangles, bool from_camera) {
+  if (!triangle_tracer) triangle_tracer = std::make_unique<TriangleTracer>(context);
+  const Mesh mesh = body(triangles);
+  triangle_tracer->build({&mesh, 1});
+  if (from_camera) {
+    CameraRays(context).generate(model.camera, Lens{}, 0, static_cast<std::size_t>(pixels()),
+                                 surface_rays);
+    return;
+  }
+  make_rays();
+  surface_rays.ensure(context, ray_list.size(), "benchmark rays");
+  surface_rays.upload(ray_list);
+}
+
+BenchOperation SceneBench::Impl::surfaces(const char* row,
+                                          std::size_t triangles,
+                                          bool from_camera) {
+  return {[=, this] { make_triangles(triangles, from_camera); },
+          {},
+          [this] { triangle_tracer->nearest(surface_rays, surface_rays.size(), surface_hits); },
+          {{row, {}, false, [this] {
+              const auto rays = static_cast<double>(surface_rays.size());
+              return BenchWork{{{"rays", rays}},
+                               RS_WORK_SURFACE_RAY_BYTES * rays,
+                               RS_WORK_SURFACE_RAY_FLOPS * rays};
+            }}}};
+}
+
+void SceneBench::Impl::make_light_tracer(std::size_t triangles, Material::Kind kind, bool lights) {
+  Scene scene;
+  scene.gaussians = model.gaussians;
+  scene.trace = options.trace;
+  Material material;
+  material.kind = kind;
+  scene.materials = {material};
+  if (triangles > 0) scene.meshes.push_back(body(triangles));
+  if (lights) {
+    const auto [center, half] = middle();
+    Light light;
+    light.color = {10, 10, 10};
+    for (std::size_t k = 0; k < 3; ++k) {
+      light.position[k] = static_cast<float>(center[k]) +
+                          (k == 2 ? -1.0f : 1.0f) * kLightDistance * static_cast<float>(half[k]);
+    }
+    scene.lights = {light};
+  }
+  light_tracer = std::make_unique<LightTracer>(context, scene);
+}
+
+BenchOperation SceneBench::Impl::light(const char* row,
+                                       std::size_t triangles,
+                                       Material::Kind kind,
+                                       bool lights) {
+  return {[=, this] { make_light_tracer(triangles, kind, lights); },
+          {},
+          [this] { light_tracer->render(model.camera); },
+          {{row, {}, false, [this] {
+              const LightTracer::Statistics s = light_tracer->statistics();
+              const auto paths = static_cast<double>(s.camera_rays + s.continued_rays);
+              const auto shadows = static_cast<double>(s.shadow_rays);
+              return BenchWork{{{"rays", paths + shadows}, {"shadow rays", shadows}},
+                               RS_WORK_PATH_BYTES * paths + RS_WORK_SHADOW_RAY_BYTES * shadows,
+                               RS_WORK_SURFACE_RAY_FLOPS * (paths + shadows)};
+            }}}};
+}
+
+}  // namespace raysplats
