@@ -329,7 +329,7 @@ int pass_glass(const RsPath* path,
   out[1] = new_direction(&inside, s, into * (1.0f - F), refraction);
   for (int k = 0; k < 2; ++k) {
     out[k].path.splits = path->splits + 1;
-    out[k].path.lineage = 2 * path->lineage + (uint)k;
+    out[k].path.lineage = path->lineage + ((uint)k << path->splits);
   }
   return 2;
 }
