@@ -25,7 +25,7 @@ namespace {
 constexpr int kMaxSide = 32768;
 constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
 constexpr std::string_view kPngStart = "\x89PNG\r\n\x1a\n";
-constexpr const char* kFormats = "PNG, JPEG, EXR, TIFF or BMP";
+constexpr const char* kFormats = "PNG, JPEG, EXR, HDR, TIFF or BMP";
 
 std::string lower_extension(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
@@ -41,6 +41,7 @@ std::string_view format_of(std::string_view magic) {
   if (magic.starts_with("\xff\xd8\xff")) return "jpeg";
   if (magic.starts_with("\x76\x2f\x31\x01")) return "openexr";
   if (magic.starts_with("BM")) return "bmp";
+  if (magic.starts_with("#?RADIANCE") || magic.starts_with("#?RGBE")) return "hdr";
   const std::array<std::string_view, 4> tiff{
       std::string_view("II*\0", 4), std::string_view("MM\0*", 4), std::string_view("II+\0", 4),
       std::string_view("MM\0+", 4)};
@@ -233,7 +234,8 @@ namespace io {
 
 bool has_image_extension(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
-  const std::array<const char*, 7> known{".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff", ".bmp"};
+  const std::array<const char*, 8> known{".png", ".jpg", ".jpeg", ".exr",
+                                         ".hdr", ".tif", ".tiff", ".bmp"};
   return std::find(known.begin(), known.end(), extension) != known.end();
 }
 

@@ -22,8 +22,8 @@ ImageSize image_size(const std::filesystem::path& path);
 /// read_image() of a PNG or JPEG file in memory; `name` stands for its path in errors.
 Image decode_image(std::span<const std::byte> bytes, const std::string& name);
 
-/// Whether read_image() knows the extension (.png, .jpg, .jpeg, .exr, .tif, .tiff, .bmp in any
-/// case).
+/// Whether read_image() knows the extension (.png, .jpg, .jpeg, .exr, .hdr, .tif, .tiff, .bmp in
+/// any case).
 bool has_image_extension(const std::filesystem::path& path);
 
 }  // namespace raysplats::io

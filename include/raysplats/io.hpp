@@ -19,7 +19,7 @@ Gaussians read_ply(const std::filesystem::path& path);
 /// Writes an Inria-style binary little-endian 3DGS PLY atomically (temporary file, sync, rename).
 void write_ply(const std::filesystem::path& path, const Gaussians& model);
 
-/// Reads PNG, JPEG, EXR, TIFF or BMP as float; 1 to 4 channels as in the file (grey stays 1
+/// Reads PNG, JPEG, EXR, Radiance HDR, TIFF or BMP as float; 1 to 4 channels as in the file (grey stays 1
 /// channel).
 Image read_image(const std::filesystem::path& path);
 

@@ -132,6 +132,26 @@ TEST_CASE("JPEG is close to the original and drops alpha") {
   CHECK(worst < 0.03);
 }
 
+TEST_CASE("Radiance HDR is read as float, with its exponents") {
+  const Scratch scratch;
+  std::string bytes = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n";
+  // Mantissas over 256 times two to the exponent - 128.
+  for (const int value : {128, 64, 32, 129, 128, 128, 0, 132}) {
+    bytes.push_back(static_cast<char>(value));
+  }
+  write_bytes(scratch / "a.hdr", bytes);
+  const Image image = read_image(scratch / "a.hdr");
+  REQUIRE(image.width == 2);
+  REQUIRE(image.channels == 3);
+  const std::vector<float> expected{1.0f, 0.5f, 0.25f, 8.0f, 8.0f, 0.0f};
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    // Some readers add half a step of the mantissa.
+    CHECK(std::abs(image.data[i] - expected[i]) <= 0.04f * std::max(expected[i], 1.0f));
+  }
+  write_bytes(scratch / "b.hdr", bytes.substr(0, bytes.size() - 6));
+  CHECK(contains(data_error([&] { read_image(scratch / "b.hdr"); }), "b.hdr"));
+}
+
 TEST_CASE("TIFF, BMP, 16-bit PNG and uppercase extensions are read as value over maximum") {
   const Scratch scratch;
   const std::array<std::uint16_t, 6> wide{0, 1, 257, 32768, 65534, 65535};
