@@ -121,12 +121,17 @@ void set_lens(Camera& out, const SceneCamera& camera) {
   }
 }
 
+/// Square, but a panorama is twice as wide as high.
+int default_height(const SceneCamera& camera, int width) {
+  return camera.model == CameraModel::kEquirectangular ? std::max(1, width / 2) : kSide;
+}
+
 std::vector<Camera> placed(const SceneCamera& camera) {
   const glm::dvec3 eye = camera.position.value_or(glm::dvec3(0.0));
   const glm::dvec3 target = camera.target.value_or(glm::dvec3(0.0));
   const glm::dvec3 up = camera.up.value_or(glm::dvec3(0.0, -1.0, 0.0));
   const int width = camera.width.value_or(kSide);
-  const int height = camera.height.value_or(kSide);
+  const int height = camera.height.value_or(default_height(camera, width));
   Camera out = look_at(eye, target, glm::normalize(up), width, height, 1.0);
   set_lens(out, camera);
   return {out};
@@ -173,6 +178,7 @@ std::vector<Camera> on_orbit(const SceneCamera& camera, const SceneExtent& exten
   }
   if (camera.up) shape.up = *camera.up;
   if (camera.width) shape.width = *camera.width;
+  if (camera.file.empty()) shape.height = default_height(camera, shape.width);
   if (camera.height) shape.height = *camera.height;
   if (camera.elevation) shape.elevation_degrees = *camera.elevation;
   if (camera.distance) shape.distance = *camera.distance;
@@ -216,6 +222,7 @@ SceneCamera read_scene_camera(io::TomlTable& table) {
     table.choice<Split>("split", camera.split,
                         {{"test", Split::kTest}, {"train", Split::kTrain}, {"all", Split::kAll}});
     table.number("test-every", camera.data_options.test_every, 0, 1e9);
+    table.flag("undistort", camera.data_options.undistort);
   } else {
     if (data) {
       camera.file = *data;

@@ -214,12 +214,12 @@ ShadowSettings read_shadows(TomlTable table) {
 RenderSettings read_render(TomlTable& table) {
   RenderSettings r;
   table.number("samples", r.samples, 1, 65536);
-  table.number("max-bounces", r.max_bounces, 0, 1000);
+  table.number("max-bounces", r.max_bounces, 1, 1000);
   table.number("min-throughput", r.min_throughput, 0, 1);
   table.seed("seed", r.seed);
   table.vector("ambient", r.ambient, 0, kMaxColor);
   table.flag("indirect", r.indirect);
-  table.number("light-samples", r.light_samples, 1, 4096);
+  table.number("light-samples", r.light_samples, 1, 1024);
   table.number("aperture", r.aperture, 0, kHuge);
   table.number("focus-distance", r.focus_distance, 1e-9, kHuge);
   table.number("bias", r.bias, 0, kHuge);
@@ -241,7 +241,6 @@ SceneTrace read_trace(TomlTable& table) {
   maybe(table, "quantile", t.quantile, 0.01, 100);
   maybe(table, "min-transmittance", t.min_transmittance, 0, 0.5);
   maybe(table, "max-hits", t.max_hits, 1, 1e6);
-  maybe(table, "near", t.near_depth, 0, kHuge);
   if (table.has("hit-order")) {
     HitOrder order{};
     table.choice<HitOrder>("hit-order", order,
@@ -306,7 +305,6 @@ glm::dmat4 SceneMesh::placement(double time) const {
 TraceOptions SceneTrace::over(TraceOptions base) const {
   base.quantile = quantile.value_or(base.quantile);
   base.min_transmittance = min_transmittance.value_or(base.min_transmittance);
-  base.near_depth = near_depth.value_or(base.near_depth);
   base.max_hits = max_hits.value_or(base.max_hits);
   base.packet_width = packet_width.value_or(base.packet_width);
   base.hit_order = hit_order.value_or(base.hit_order);

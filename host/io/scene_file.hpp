@@ -59,9 +59,10 @@ struct SceneEnvironment {
   float rotation = 0.0f;
 };
 
-/// Tracing options that were given; the others are as the models were trained.
+/// Tracing options that were given; the others are as the models were trained. near_depth means
+/// nothing to rays that are not a camera's.
 struct SceneTrace {
-  std::optional<float> quantile, min_transmittance, near_depth;
+  std::optional<float> quantile, min_transmittance;
   std::optional<int> max_hits, packet_width;
   std::optional<HitOrder> hit_order;
   std::optional<bool> adaptive_radius;
@@ -82,9 +83,11 @@ struct SceneFile {
   SceneCamera camera;
   RenderSettings render;
   SceneTrace trace;
-  TraceOptions trained;              ///< what `trace` goes over
-  std::optional<int> frames;         ///< [animation]
-  std::optional<int> width, height;  ///< size of the pictures whatever the camera says
+  TraceOptions trained;       ///< what `trace` goes over
+  std::optional<int> frames;  ///< [animation]
+  /// Size of the pictures whatever the camera says, then divided by `downscale`.
+  std::optional<int> width, height;
+  double downscale = 1.0;
 };
 
 /// Reads a scene file. Throws UsageError for unknown keys (with the nearest known one), wrong

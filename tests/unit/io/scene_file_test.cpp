@@ -238,7 +238,6 @@ min-transmittance = 0.001
 max-hits = 100
 hit-order = "peak"
 adaptive-radius = true
-near = 0.5
 background = [1, 1, 0.5]
 packet-width = 8
 memory-budget = 64
@@ -273,7 +272,6 @@ frames = 24
   CHECK(trace.max_hits == 100);
   CHECK(trace.hit_order == HitOrder::kPeak);
   CHECK(trace.adaptive_radius);
-  CHECK(trace.near_depth == 0.5f);
   CHECK(trace.background == std::array<float, 3>{1, 1, 0.5f});
   CHECK(trace.packet_width == 8);
   CHECK(trace.memory_budget == std::size_t{64} << 20);
@@ -339,8 +337,9 @@ TEST_CASE("scene file: placed cameras of every model") {
   CHECK(half_angle(fisheye) == doctest::Approx(95.0));
   CHECK(half_angle(camera(pose + "model = 'opencv'\nfov = 50\nk1 = -0.1\n")) ==
         doctest::Approx(25.0));
-  const Camera round = camera(pose + "model = 'equirectangular'\nwidth = 200\nheight = 100\n");
+  const Camera round = camera(pose + "model = 'equirectangular'\nwidth = 200\n");
   CHECK(round.model == CameraModel::kEquirectangular);
+  CHECK(round.height == 100);
   CHECK(near(camera_ray(round, 100, 50).direction, {0, 0, 1}));
   const Camera flat = camera(pose + "model = 'orthographic'\nextent = 4\nheight = 400\n");
   CHECK(flat.model == CameraModel::kOrthographic);
@@ -484,6 +483,8 @@ TEST_CASE("scene file: what is wrong is named with its line") {
 
   usage(kModel + "[render]\nsamples = 1.5\n", {"whole number"});
   usage(kModel + "[render]\nsamples = 0\n", {"'samples'", "1 to"});
+  usage(kModel + "[render]\nmax-bounces = 0\n", {"'max-bounces'", "1 to"});
+  usage(kModel + "[render]\nlight-samples = 1025\n", {"'light-samples'", "1024"});
   usage(kModel + "[render]\nseed = -1\n", {"'seed'"});
   usage(kModel + "[render]\nindirect = 1\n", {"true or false"});
   usage(kModel + "[trace]\npacket-width = 3\n", {"'packet-width'"});

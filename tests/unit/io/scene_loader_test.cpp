@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/scene_loader.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "raysplats/io.hpp"
+#include "reference/scenes.hpp"
+#include "scratch.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+/// Two triangles of a bent sheet, one per material; the second has a texture.
+constexpr const char* kSheet =
+    "mtllib sheet.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    "usemtl Plain\nf 1/1 2/2 3/3\nusemtl Printed\nf 1/1 3/2 4/3\n";
+constexpr const char* kMaterials =
+    "newmtl Plain\nKd 0.1 0.2 0.3\nnewmtl Printed\nKd 1 1 1\nmap_Kd print.png\n";
+
+class Folder {
+ public:
+  Folder() {
+    write_ply(scratch_ / "a.ply", reference::random_scene(40, 1, 1));
+    write_ply(scratch_ / "b.ply", reference::random_scene(10, 2, 3));
+    write_bytes(scratch_ / "sheet.obj", kSheet);
+    write_bytes(scratch_ / "sheet.mtl", kMaterials);
+    write_image(scratch_ / "print.png", Image(4, 2, 3, 0.5f));
+    write_image(scratch_ / "grey.png", Image(3, 3, 1, 1.0f));
+    write_image(scratch_ / "sky.exr", Image(8, 4, 4, 2.0f));
+  }
+  LoadedScene load(const std::string& text) const { return load_scene(read(text)); }
+  SceneFile read(const std::string& text) const {
+    write_bytes(scratch_ / "scene.toml", text);
+    return read_scene_file(scratch_ / "scene.toml");
+  }
+  const Scratch& scratch() const { return scratch_; }
+
+ private:
+  Scratch scratch_;
+};
+
+const std::string kCamera = "[camera]\nposition = [0, 0, -3]\ntarget = [0, 0, 0]\nwidth = 40\n";
+
+std::vector<float> sorted_x(const Gaussians& model, double scale, double offset) {
+  std::vector<float> out;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    out.push_back(static_cast<float>(scale * model.means[3 * i] + offset));
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("scene loader: models are placed and joined") {
+  const Folder folder;
+  const LoadedScene loaded = folder.load(
+      "[[model]]\nfile = 'a.ply'\n[[model]]\nfile = 'b.ply'\nscale = 2\ntranslate = [100, 0, 0]\n"
+      "[[model]]\nfile = 'b.ply'\ntranslate = [200, 0, 0]\n" +
+      kCamera);
+  const Gaussians& all = loaded.scene.gaussians;
+  CHECK(all.size() == 60);
+  CHECK(all.sh_degree == 3);
+  std::vector<float> expected = sorted_x(read_ply(folder.scratch() / "a.ply"), 1, 0);
+  for (const auto& [scale, offset] : {std::pair{2.0, 100.0}, std::pair{1.0, 200.0}}) {
+    const std::vector<float> more = sorted_x(read_ply(folder.scratch() / "b.ply"), scale, offset);
+    expected.insert(expected.end(), more.begin(), more.end());
+  }
+  CHECK(sorted_x(all, 1, 0) == expected);
+  CHECK(loaded.frames() == 1);
+  CHECK(loaded.cameras[0].name == "frame_0000");
+  CHECK(loaded.scene.meshes.empty());
+  CHECK_FALSE(loaded.moves());
+}
+
+TEST_CASE("scene loader: materials and textures of meshes and of the scene") {
+  const Folder folder;
+  const LoadedScene loaded = folder.load(R"(
+[[mesh]]
+file = "sheet.obj"
+[[mesh]]
+file = "sheet.obj"
+material = "chrome"
+[[mesh]]
+file = "sheet.obj"
+material = { Printed = "paper" }
+[[material]]
+name = "chrome"
+kind = "mirror"
+[[material]]
+name = "paper"
+kind = "diffuse"
+texture = "grey.png"
+)" + kCamera);
+  const Scene& scene = loaded.scene;
+  REQUIRE(scene.meshes.size() == 3);
+  REQUIRE(scene.materials.size() == 4);
+  const auto material = [&](std::size_t mesh, std::size_t triangle) {
+    return scene.materials.at(scene.meshes[mesh].materials.at(triangle));
+  };
+  CHECK(material(0, 0).name == "Plain");
+  CHECK(material(0, 1).name == "Printed");
+  CHECK(material(1, 0).name == "chrome");
+  CHECK(material(1, 1).name == "chrome");
+  CHECK(material(1, 1).kind == Material::Kind::kMirror);
+  CHECK(material(2, 0).name == "Plain");
+  CHECK(material(2, 1).name == "paper");
+  REQUIRE(scene.textures.size() == 2);
+  for (const Image& texture : scene.textures) CHECK(texture.channels == 3);
+  CHECK(scene.textures.at(static_cast<std::size_t>(material(0, 1).texture)).width == 4);
+  CHECK(scene.textures.at(static_cast<std::size_t>(material(2, 1).texture)).width == 3);
+  CHECK(material(0, 0).texture == -1);
+
+  const SceneFile wrong = folder.read(
+      "[[mesh]]\nfile = 'sheet.obj'\nmaterial = { Plane = 'm' }\n[[material]]\nname = "
+      "'m'\nkind = 'mirror'\n" +
+      kCamera);
+  std::string message;
+  try {
+    load_scene(wrong);
+  } catch (const UsageError& error) {
+    message = error.what();
+  }
+  INFO(message);
+  CHECK(contains(message, "line 1"));
+  CHECK(contains(message, "'Plain'"));
+}
+
+TEST_CASE("scene loader: normals and placement of meshes") {
+  const Folder folder;
+  const LoadedScene loaded = folder.load(R"(
+[[mesh]]
+file = "sheet.obj"
+normals = "flat"
+translate = [0, 0, 5]
+[[mesh]]
+file = "sheet.obj"
+normals = "smooth"
+[[mesh]]
+file = "sheet.obj"
+normals = "smooth"
+crease-angle = 60
+[[mesh]]
+file = "sheet.obj"
+normals = "smooth"
+scale = [1, 1, 3]
+)" + kCamera);
+  const std::vector<Mesh>& meshes = loaded.scene.meshes;
+  CHECK(meshes[0].normals.empty());
+  CHECK(meshes[0].positions[2] == 5.0f);
+  // The sheet is bent by a right angle along an edge: one normal there, or two above the crease.
+  const auto is = [&](const Mesh& mesh, std::size_t corner, const std::vector<double>& n) {
+    const std::size_t v = mesh.triangles[corner];
+    double error = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      error = std::max(error, std::abs(static_cast<double>(mesh.normals[3 * v + k]) - n[k]));
+    }
+    return error < 1e-6;
+  };
+  const double half = std::sqrt(0.5);
+  CHECK(is(meshes[1], 0, {half, 0, half}));
+  CHECK(is(meshes[2], 0, {0, 0, 1}));
+  CHECK(is(meshes[2], 3, {1, 0, 0}));
+  // Edges are weighted by the angles they have in the world.
+  CHECK(is(meshes[3], 0, {half, 0, half}));
+}
+
+TEST_CASE("scene loader: frames of an animation") {
+  const Folder folder;
+  const LoadedScene loaded = folder.load(
+      "[[mesh]]\nfile = 'sheet.obj'\nmove = [8, 0, 0]\n[[mesh]]\nfile = 'sheet.obj'\n"
+      "[animation]\nframes = 4\n" +
+      kCamera);
+  CHECK(loaded.moves());
+  REQUIRE(loaded.frames() == 4);
+  CHECK(loaded.cameras[3].name == "frame_0003");
+  for (int frame = 0; frame < 4; ++frame) {
+    const std::vector<Mesh> meshes = loaded.meshes(frame);
+    REQUIRE(meshes.size() == 2);
+    CHECK(meshes[0].positions[0] == doctest::Approx(2.0 * frame));
+    CHECK(meshes[1].positions[0] == 0.0f);
+  }
+  // Cameras in turn; a still scene has as many frames as cameras.
+  const std::string orbit = "[[mesh]]\nfile = 'sheet.obj'\n[camera]\norbit = { frames = 3 }\n";
+  const LoadedScene turns = folder.load(orbit + "[animation]\nframes = 5\n");
+  REQUIRE(turns.frames() == 5);
+  CHECK(turns.cameras[4].translation == turns.cameras[1].translation);
+  CHECK(turns.cameras[4].name == "frame_0004");
+  CHECK(folder.load(orbit).frames() == 3);
+}
+
+TEST_CASE("scene loader: environment, sizes and options") {
+  const Folder folder;
+  const std::string model = "[[model]]\nfile = 'a.ply'\n";
+  SceneFile file = folder.read(model + "[environment]\nimage = 'sky.exr'\nexposure = 2\n" +
+                               kCamera + "up = [0, 0, 1]\nheight = 20\n");
+  const Environment sky = load_scene(file).scene.environment;
+  CHECK(sky.color == Rgb{4, 4, 4});
+  CHECK(sky.equirect.channels == 3);
+  CHECK(sky.equirect.data[0] == 2.0f);
+  CHECK(sky.up == std::array<float, 3>{0, 0, 1});
+
+  file = folder.read(model + "[trace]\nbackground = [1, 0.5, 0]\nmax-hits = 7\n" + kCamera +
+                     "height = 20\n");
+  file.trained.hit_order = HitOrder::kPeak;
+  file.width = 20;
+  const LoadedScene loaded = load_scene(file);
+  CHECK(loaded.scene.environment.color == Rgb{1, 0.5f, 0});
+  CHECK(loaded.scene.environment.equirect.data.empty());
+  CHECK(loaded.scene.environment.up == std::array<float, 3>{0, -1, 0});
+  CHECK(loaded.scene.trace.max_hits == 7);
+  CHECK(loaded.scene.trace.hit_order == HitOrder::kPeak);
+  CHECK(loaded.cameras[0].width == 20);
+  CHECK(loaded.cameras[0].height == 10);
+  file.width.reset();
+  file.downscale = 4;
+  CHECK(load_scene(file).cameras[0].width == 10);
+}
