@@ -24,6 +24,7 @@ RawBuffer::RawBuffer(Context& context, std::size_t bytes, const std::string& lab
                     static_cast<double>(owner.info.max_allocation) / (1 << 20)));
   }
   try {
+    owner.faults.check(Fault::kAllocation);
     const cl::Buffer buffer =
         owner.canaries
             ? owner.canaries->allocate(owner.context, owner.device, owner.queue, bytes, label)

@@ -90,6 +90,11 @@ class Buffer {
     static_assert(sizeof(T) % 4 == 0);
     if (count > 0) raw_.fill(0, count * sizeof(T), 0);
   }
+  /// Sets every 32-bit word of all elements to `word`.
+  void fill(std::uint32_t word) {
+    static_assert(sizeof(T) % 4 == 0);
+    if (size_ > 0) raw_.fill(word, size_ * sizeof(T), 0);
+  }
   void copy_from(const Buffer& source,
                  std::size_t count,
                  std::size_t source_offset = 0,

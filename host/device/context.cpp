@@ -24,11 +24,15 @@ cl::Program compile(Context::Impl& context,
                     const std::string& options) {
   cl::Program program(context.context, source);
   try {
+    context.faults.check(Fault::kBuild);
     program.build({context.device}, options.c_str());
   } catch (const cl::Error& error) {
-    throw DeviceError(fmt::format("Kernel file {} does not compile on {} with '{}' ({}):\n{}", path,
-                                  context.info.name, options, cl_error_name(error.err()),
-                                  program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(context.device)));
+    const std::string log = program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(context.device);
+    throw DeviceError(fmt::format(
+        "Kernel file {} does not compile on {} with '{}' ({}): update the driver or choose another "
+        "--device{}{}",
+        path, context.info.name, options, cl_error_name(error.err()), log.empty() ? "" : "\n",
+        log));
   }
   return program;
 }
@@ -128,12 +132,16 @@ cl::Program& Context::Impl::program(const std::string& path, const BuildOptions&
   const std::string flags = build.text().empty()
                                 ? kCompilerOptions
                                 : fmt::format("{} {}", kCompilerOptions, build.text());
-  if (!options.kernel_cache) return programs[key] = compile(*this, path, source, flags);
+  if (!options.kernel_cache || faults.due(Fault::kBuild))
+    return programs[key] = compile(*this, path, source, flags);
 
   const ProgramCache cache(options.cache_directory);
   const std::string cache_key = ProgramCache::key(source, flags, info);
   if (const auto binary = cache.load(cache_key)) {
-    if (auto program = from_binary(*this, *binary, flags)) return programs[key] = *program;
+    if (auto program = from_binary(*this, *binary, flags)) {
+      faults.check(Fault::kBuild);
+      return programs[key] = *program;
+    }
     cache.remove(cache_key);
   }
   cl::Program program = compile(*this, path, source, flags);

@@ -9,6 +9,7 @@
 #include "device/canaries.hpp"
 #include "device/cl.hpp"
 #include "device/context.hpp"
+#include "device/fault_injection.hpp"
 #include "device/profiler.hpp"
 
 namespace raysplats {
@@ -34,6 +35,7 @@ struct Context::Impl {
   cl::CommandQueue queue;
   Profiler profiler;
   std::unique_ptr<Canaries> canaries;  // usually none
+  FaultInjection faults;
   std::map<std::string, cl::Program> programs;  // by program path and build options
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;

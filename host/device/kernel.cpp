@@ -43,13 +43,16 @@ void Kernel::set_bytes(unsigned index, const void* value, std::size_t bytes) {
 void Kernel::enqueue(const Range& range) {
   const auto& g = range.global;
   const auto& l = range.local;
+  const auto& o = range.offset;
   if (g[0] == 0 || g[1] == 0 || g[2] == 0) return;
   const cl::NDRange global(g[0], g[1], g[2]);
+  const cl::NDRange offset(o[0], o[1], o[2]);
   const cl::NDRange local = l[0] == 0 ? cl::NullRange : cl::NDRange(l[0], l[1], l[2]);
   Context::Impl& context = *impl_->context;
   try {
     cl::Event event;
-    context.queue.enqueueNDRangeKernel(impl_->kernel, cl::NullRange, global, local, nullptr,
+    context.faults.check(Fault::kLaunch);
+    context.queue.enqueueNDRangeKernel(impl_->kernel, offset, global, local, nullptr,
                                        context.next_event(event));
     context.timed(impl_->program, impl_->name, event);
     if (context.canaries) {

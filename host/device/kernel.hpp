@@ -16,16 +16,18 @@ struct LocalMemory {
   std::size_t bytes;
 };
 
-/// Sizes of a launch; unused dimensions are 1. `local` of all zeros lets the driver choose.
+/// Sizes of a launch; unused dimensions are 1. `local` of all zeros lets the driver choose. Global
+/// ids begin at `offset`.
 struct Range {
   std::array<std::size_t, 3> global{1, 1, 1};
   std::array<std::size_t, 3> local{0, 0, 0};
+  std::array<std::size_t, 3> offset{0, 0, 0};
 
   /// One dimension of at least `count` work-items in groups of `group` (rounded up: kernels check
   /// their id).
   static Range linear(std::size_t count, std::size_t group) {
     const std::size_t groups = (count + group - 1) / group;
-    return Range{{groups * group, 1, 1}, {group, 1, 1}};
+    return Range{{groups * group, 1, 1}, {group, 1, 1}, {}};
   }
   /// Two dimensions, rounded up likewise.
   static Range plane(std::size_t width,
@@ -33,8 +35,8 @@ struct Range {
                      std::size_t group_width,
                      std::size_t group_height) {
     const auto up = [](std::size_t n, std::size_t g) { return (n + g - 1) / g * g; };
-    return Range{{up(width, group_width), up(height, group_height), 1},
-                 {group_width, group_height, 1}};
+    return Range{
+        {up(width, group_width), up(height, group_height), 1}, {group_width, group_height, 1}, {}};
   }
 };
 

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/fault_injection.hpp"
+
+#include <charconv>
+#include <cstdlib>
+#include <string_view>
+
+#include "device/cl.hpp"
+
+namespace raysplats {
+namespace {
+
+struct Description {
+  const char* variable;
+  const char* call;
+  cl_int status;
+};
+
+// In the order of Fault.
+constexpr std::array<Description, 3> kFaults{{
+    {"RAYSPLATS_FAIL_ALLOC", "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE},
+    {"RAYSPLATS_FAIL_BUILD", "clBuildProgram", CL_BUILD_PROGRAM_FAILURE},
+    {"RAYSPLATS_FAIL_LAUNCH", "clEnqueueNDRangeKernel", CL_OUT_OF_RESOURCES},
+}};
+
+}  // namespace
+
+FaultInjection::FaultInjection() {
+  for (std::size_t i = 0; i < kFaults.size(); ++i) {
+    const char* text = std::getenv(kFaults[i].variable);
+    if (text == nullptr) continue;
+    const std::string_view digits(text);
+    // What is no number makes nothing fail.
+    std::from_chars(digits.data(), digits.data() + digits.size(), left_[i]);
+  }
+}
+
+void FaultInjection::check(Fault fault) {
+  const auto index = static_cast<std::size_t>(fault);
+  std::size_t& left = left_[index];
+  if (left == 0 || --left > 0) return;
+  throw cl::Error(kFaults[index].status, kFaults[index].call);
+}
+
+bool FaultInjection::due(Fault fault) const { return left_[static_cast<std::size_t>(fault)] == 1; }
+
+}  // namespace raysplats
