@@ -9,10 +9,13 @@
 //   PRIVATE_COPIES 1: work-item g of `groups` takes every groups-th tile and adds to its own copy
 //   of the gradient
 //                     lines: no atomics, the same sum every time.    global: groups
-//   PRIVATE_COPIES 0: one copy, compare-and-swap adds.              global: packets of the band
+//   EXACT_SUMS 1:     one long integer per component (exact_sum.h): the same sum whatever the order
+//                     of the packets, with integer atomics only.       global: packets of the band
+//   otherwise:        one copy, compare-and-swap adds.                 global: packets of the band
 // Components of a line's gradient follow the line; slot 2 (m_z, of which order makes no gradient)
 // sums the per-ray lengths of the screen gradient instead, the densification signal of AbsGS (Ye et
 // al. 2024).
+#include "trace/exact_sum.h"
 #include "trace/hit_stream.h"
 #include "trace/packet.h"
 
@@ -21,6 +24,9 @@
 #endif
 #ifndef PRIVATE_COPIES
 #define PRIVATE_COPIES 0
+#endif
+#ifndef EXACT_SUMS
+#define EXACT_SUMS 0
 #endif
 
 // Lane i of the result is the sum of v[i] over its lanes. With 16 lanes, pairs of vectors are
@@ -53,26 +59,38 @@ float16 sum_lanes(const fv* v) {
 #endif
 }
 
-void add_line(volatile __global float* target, float16 value) {
+// Where the gradients of lines are summed. `limit` bounds what one ray may add to an exact sum.
+typedef struct {
+  __global float* lines;
+  float limit;
+} LineSums;
+
+void add_line(const LineSums* sums, const uint index, const float16 value) {
 #if PRIVATE_COPIES
-  *(__global float16*)target += value;
+  *(__global float16*)(sums->lines + (size_t)index * 16) += value;
 #else
   union {
     float16 v;
     float s[16];
   } part;
   part.v = value;
+#if EXACT_SUMS
+  volatile __global uint* words =
+      (volatile __global uint*)sums->lines + (size_t)index * (16 * RS_EXACT_WORDS);
+  for (int i = 0; i < 16; ++i) rs_exact_add(words + i, part.s[i], sums->limit);
+#else
+  volatile __global uint* words = (volatile __global uint*)sums->lines + (size_t)index * 16;
   for (int i = 0; i < 16; ++i) {
     if (part.s[i] == 0.0f) continue;
-    volatile __global uint* word = (volatile __global uint*)(target + i);
     // A plain first read would race with the others' writes; 0 is what most first writers find.
     uint old = 0;
     for (;;) {
-      const uint seen = atomic_cmpxchg(word, old, as_uint(as_float(old) + part.s[i]));
+      const uint seen = atomic_cmpxchg(words + i, old, as_uint(as_float(old) + part.s[i]));
       if (seen == old) break;
       old = seen;
     }
   }
+#endif
 #endif
 }
 
@@ -103,7 +121,7 @@ void add_gradient(const Pixels* p,
                   const fv alpha,
                   const fv weight,
                   __global const RsLine* restrict lines,
-                  __global float* gradient) {
+                  const LineSums* sums) {
   const bool general = reference & 1;
   __global const float* v = lines[reference >> 1].v;
   const PacketMeeting m = rs_meet(v, general, 0.0f, p->X, p->Y);
@@ -146,7 +164,7 @@ void add_gradient(const Pixels* p,
       g[9 + k] = g_origin;
     }
   }
-  add_line(gradient + (size_t)(reference >> 1) * 16, sum_lanes(g));
+  add_line(sums, reference >> 1, sum_lanes(g));
 }
 
 // The oldest open row has met all rows that it may change places with: its gradient is complete.
@@ -157,7 +175,7 @@ fv close_row(OpenRows* rows,
              const fv T_last,
              const float4 background,
              __global const RsLine* restrict lines,
-             __global float* gradient) {
+             const LineSums* sums) {
   const uint slot = rows->head;
   rows->head = (rows->head + 1) % WINDOW;
   --rows->size;
@@ -171,7 +189,7 @@ fv close_row(OpenRows* rows,
       select((rows->behind[slot] + T * sky) * passed, before * sky, RS_MASK(before <= T_last));
   const iv mine = RS_MASK(before > 0.0f);
   const fv g_alpha = select((fv)(0.0f), before * rows->projected[slot] - behind, mine);
-  add_gradient(p, rows->reference[slot], g_alpha, alpha, weight, lines, gradient);
+  add_gradient(p, rows->reference[slot], g_alpha, alpha, weight, lines, sums);
   return rows->blended[slot];
 }
 
@@ -187,7 +205,7 @@ void packet_backward(const RsCamera* camera,
                      const float4 background,
                      const float screen_x,
                      const float screen_y,
-                     __global float* gradient) {
+                     const LineSums* sums) {
   const int width = camera->width, height = camera->height;
   const uint packets_x = (width + PACKET_WIDTH - 1) / PACKET_WIDTH;
   const uint2 tail = stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH];
@@ -216,7 +234,7 @@ void packet_backward(const RsCamera* camera,
     const size_t first = (size_t)chunk * CHUNK;
     for (uint n = used - 1; n > 0; --n, --number) {
       while (rows.size > 0 && rows.oldest[rows.head] > number) {
-        behind += close_row(&rows, &p, T, T_last, background, lines, gradient);
+        behind += close_row(&rows, &p, T, T_last, background, lines, sums);
       }
       const fv before = rs_load_float(pool_transmittance + (first + n) * PACKET);
       if (!rs_any(RS_MASK(before > 0.0f))) continue;
@@ -246,7 +264,7 @@ void packet_backward(const RsCamera* camera,
     chunk = pool[first].x;
     used = CHUNK;
   }
-  while (rows.size > 0) close_row(&rows, &p, T, T_last, background, lines, gradient);
+  while (rows.size > 0) close_row(&rows, &p, T, T_last, background, lines, sums);
 }
 
 __kernel void trace_backward(const uint count,
@@ -264,18 +282,24 @@ __kernel void trace_backward(const uint count,
                              const float4 background,
                              const float screen_x,
                              const float screen_y,
+                             const float limit,
                              __global float* restrict gradients) {
   const RsCamera camera = camera_argument;
+  LineSums sums;
+  sums.lines = gradients;
+  sums.limit = limit;
 #if PRIVATE_COPIES
+  // Tiles are numbered over the whole image, so that the sums do not depend on the bands.
   const uint group = get_global_id(0);
-  __global float* gradient = gradients + (size_t)group * count * 16;
-  for (uint tile = group; tile < tiles_x * tile_rows; tile += groups) {
+  sums.lines += (size_t)group * count * 16;
+  const uint first = tile_row * tiles_x, end = first + tile_rows * tiles_x;
+  for (uint tile = first + (group + groups - first % groups) % groups; tile < end; tile += groups) {
     const int x0 = tile % tiles_x * TILE;
-    const int y0 = (tile_row + tile / tiles_x) * TILE;
+    const int y0 = tile / tiles_x * TILE;
     for (int y = y0; y < min(y0 + TILE, camera.height); y += PACKET_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += PACKET_WIDTH) {
         packet_backward(&camera, x, y, lines, image_gradient, transmittances, stream_ends, pool,
-                        pool_transmittance, background, screen_x, screen_y, gradient);
+                        pool_transmittance, background, screen_x, screen_y, &sums);
       }
     }
   }
@@ -288,6 +312,6 @@ __kernel void trace_backward(const uint count,
   const int y = get_global_id(1) * PACKET_HEIGHT + tile_row * TILE;
   if (x >= camera.width || y >= camera.height) return;
   packet_backward(&camera, x, y, lines, image_gradient, transmittances, stream_ends, pool,
-                  pool_transmittance, background, screen_x, screen_y, gradients);
+                  pool_transmittance, background, screen_x, screen_y, &sums);
 #endif
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -12,15 +13,19 @@
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
 #include "trace/candidate_lists.hpp"
+#include "trace/exact_sum.h"
 #include "trace/gaussian_kernel.hpp"
+#include "trace/launch_budget.hpp"
 #include "trace/packet_shape.hpp"
 
 namespace raysplats {
 namespace {
 
 using Stream = std::array<std::uint32_t, 2>;
+using ExactLine = std::array<std::uint32_t, 16 * RS_EXACT_WORDS>;
 
 constexpr std::size_t kLineGradientBytes = 64;
+constexpr std::size_t kRoundGroup = 64;
 constexpr std::uint32_t kChunkEntries =
     16;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
 
@@ -36,6 +41,8 @@ struct CameraTracer::Impl {
         options(options_in),
         packet(packet_shape(context_in.device(), options_in.packet_width)),
         lists(context_in, packet.tile),
+        forward_budget(options_in.launch_budget_ms, context_in.device().type),
+        backward_budget(forward_budget),
         counters(context_in, 3, "trace counters") {}
 
   void trace_rows(const DeviceGaussians& gaussians,
@@ -49,7 +56,9 @@ struct CameraTracer::Impl {
                      std::uint32_t row,
                      std::uint32_t rows);
   void finalize(const DeviceGaussians& gaussians, GaussianGradients& gradients, bool pose);
-  void choose_gradient_copies(std::size_t count);
+  void choose_gradient_sum(std::size_t count);
+  void prepare_gradient_sum();
+  Range packet_range(const Kernel& kernel, std::uint32_t row, std::uint32_t rows) const;
   void grow_pool(std::size_t chunks);
   Kernel& forward_kernel(bool keep);
   float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
@@ -77,6 +86,8 @@ struct CameraTracer::Impl {
   std::size_t count = 0;  // Gaussians of the last update()
   Buffer<RsAabb> boxes;
   CandidateLists lists;
+  LaunchBudget forward_budget;
+  LaunchBudget backward_budget;
   RsCamera camera{};
   std::array<Kernel, 2> forward_kernels;  // without and with kept hits
   int forward_variant = -1;
@@ -93,8 +104,10 @@ struct CameraTracer::Impl {
   bool hits_kept = false;      // the last forward() was asked to keep hits
   bool hits_complete = false;  // and all of them fit
   std::size_t copies = 1;
-  bool private_copies = false;
+  GradientSum sum = GradientSum::kCopies;  // never kAuto
   Buffer<std::array<float, 16>> line_gradients;
+  Buffer<ExactLine> exact_gradients;
+  std::size_t tidy_exact = 0;  // Gaussians whose exact sums are ready
   // Gaussians and copies of line_gradients when all copies but the first hold zeros.
   std::array<std::size_t, 2> tidy_copies{};
   Buffer<float> pose;
@@ -194,19 +207,46 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
   return kernel;
 }
 
+// Rows [row, row + rows) of tiles, counted from the first row of the candidate lists or the image.
+Range CameraTracer::Impl::packet_range(const Kernel& kernel,
+                                       std::uint32_t row,
+                                       std::uint32_t rows) const {
+  const auto group = packet_group(packet, kernel.max_work_group_size());
+  const auto tile = static_cast<std::size_t>(packet.tile / packet.height);
+  Range range =
+      Range::plane(static_cast<std::size_t>((camera.width + packet.width - 1) / packet.width),
+                   rows * tile, group[0], group[1]);
+  range.offset[1] = row * tile;
+  return range;
+}
+
+// Calls launch(first, number) for all `rows`, as many at once as the budget of time allows.
+template <class Launch>
+void in_bands(Context& context, LaunchBudget& budget, std::uint32_t rows, const Launch& launch) {
+  for (std::uint32_t row = 0; row < rows;) {
+    const std::uint32_t now = budget.rows(rows - row);
+    if (budget.bounded()) context.finish();
+    const auto begin = std::chrono::steady_clock::now();
+    launch(row, now);
+    if (budget.bounded()) {
+      context.finish();
+      budget.record(
+          now, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    }
+    row += now;
+  }
+}
+
 void CameraTracer::Impl::launch_forward(std::uint32_t row, std::uint32_t rows, bool keep) {
   Kernel& kernel = forward_kernel(keep);
-  const auto group = packet_group(packet, kernel.max_work_group_size());
-  const auto up = [](int a, int b) { return static_cast<std::size_t>((a + b - 1) / b); };
-  const Range range = Range::plane(
-      up(camera.width, packet.width),
-      static_cast<std::size_t>(rows) * static_cast<std::size_t>(packet.tile / packet.height),
-      group[0], group[1]);
-  kernel.launch(range, lists.lines(), lists.references(), lists.boxes(), lists.box_stride(),
-                lists.limits(), lists.offsets(), camera, lists.tiles_x(), row,
-                options.min_transmittance, options.max_hits, background_of(options), image, depth,
-                transmittances, stream_ends, pool, pool_transmittance,
-                static_cast<std::uint32_t>(keep ? pool_capacity() : 0), counters);
+  in_bands(context, forward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
+    kernel.launch(packet_range(kernel, first, number), lists.lines(), lists.references(),
+                  lists.boxes(), lists.box_stride(), lists.limits(), lists.offsets(), camera,
+                  lists.tiles_x(), row, options.min_transmittance, options.max_hits,
+                  background_of(options), image, depth, transmittances, stream_ends, pool,
+                  pool_transmittance, static_cast<std::uint32_t>(keep ? pool_capacity() : 0),
+                  counters);
+  });
 }
 
 void CameraTracer::Impl::grow_pool(std::size_t chunks) {
@@ -216,40 +256,64 @@ void CameraTracer::Impl::grow_pool(std::size_t chunks) {
                             "hit transmittances");
 }
 
-void CameraTracer::Impl::choose_gradient_copies(std::size_t count) {
+void CameraTracer::Impl::choose_gradient_sum(std::size_t count) {
   // CPUs add to private copies: no atomics and the same sum every time. GPUs have too many groups
   // for that.
-  const std::size_t wanted = 2 * static_cast<std::size_t>(context.device().compute_units);
+  const std::size_t units = std::max<std::size_t>(context.device().compute_units, 1);
   const std::size_t bytes = std::max<std::size_t>(count, 1) * kLineGradientBytes;
   const std::size_t room =
       std::min<std::size_t>(options.memory_budget / 4, context.device().max_allocation) / bytes;
-  private_copies =
-      context.device().type == DeviceType::kCpu && room >= context.device().compute_units;
-  copies = private_copies ? std::min(wanted, room) : 1;
+  sum = options.gradient_sum;
+  if (sum == GradientSum::kAuto && context.device().type == DeviceType::kCpu)
+    sum = GradientSum::kCopies;
+  if (sum == GradientSum::kAuto || (sum == GradientSum::kCopies && room < units))
+    sum = options.deterministic ? GradientSum::kExact : GradientSum::kAtomic;
+  copies = sum == GradientSum::kCopies ? std::min(2 * units, room) : 1;
+}
+
+// Zeros where the backward pass will add.
+void CameraTracer::Impl::prepare_gradient_sum() {
+  const std::array<std::size_t, 2> shape{count, copies};
+  const bool tidy = tidy_copies == shape;
+  tidy_copies = {};
+  line_gradients.ensure(context, count * copies, "line gradients");
+  if (sum != GradientSum::kExact) {
+    line_gradients.clear(tidy ? count : count * copies);
+    return;
+  }
+  const bool ready = tidy_exact == count && exact_gradients.size() == count;
+  tidy_exact = 0;
+  exact_gradients.ensure(context, count, "exact line gradients");
+  if (!ready) exact_gradients.fill(RS_EXACT_BIAS);
 }
 
 void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
+  const bool exact = sum == GradientSum::kExact;
+  const bool shared = sum != GradientSum::kCopies;
   BuildOptions build;
   build.define("PACKET", packet.lanes)
       .define("TILE", packet.tile)
       .define("CHUNK", kChunkEntries)
-      .define("PRIVATE_COPIES", private_copies ? 1 : 0);
+      .define("PRIVATE_COPIES", shared ? 0 : 1)
+      .define("EXACT_SUMS", exact ? 1 : 0);
   Kernel kernel = context.kernel("trace/backward.cl", "trace_backward", build);
-  Range range{{copies, 1, 1}, {1, 1, 1}};
-  if (!private_copies) {
-    const auto group = packet_group(packet, kernel.max_work_group_size());
-    const auto up = [](int a, int b) { return static_cast<std::size_t>((a + b - 1) / b); };
-    range = Range::plane(
-        up(camera.width, packet.width),
-        static_cast<std::size_t>(rows) * static_cast<std::size_t>(packet.tile / packet.height),
-        group[0], group[1]);
-  }
-  kernel.launch(range, static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(copies),
-                lists.lines(), image_gradient, transmittances, stream_ends, pool,
-                pool_transmittance, camera, lists.tiles_x(), row, rows, background_of(options),
-                screen_x(), screen_y(), line_gradients);
+  // No ray meets a Gaussian twice.
+  const auto addends = static_cast<float>(packet_count() * static_cast<std::size_t>(packet.lanes));
+  const float limit = std::ldexp(1.0f, RS_EXACT_HIGH) / std::max(addends, 1.0f);
+  const auto launch = [&](std::uint32_t first, std::uint32_t number, const auto& gradients) {
+    const Range range =
+        shared ? packet_range(kernel, first, number) : Range{{copies, 1, 1}, {1, 1, 1}, {}};
+    // Shared sums find their rows by the offset of the launch.
+    kernel.launch(range, static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(copies),
+                  lists.lines(), image_gradient, transmittances, stream_ends, pool,
+                  pool_transmittance, camera, lists.tiles_x(), shared ? row : row + first, number,
+                  background_of(options), screen_x(), screen_y(), limit, gradients);
+  };
+  in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
+    exact ? launch(first, number, exact_gradients) : launch(first, number, line_gradients);
+  });
 }
 
 // Traces rows again with the pool to themselves, then runs them backwards; halves them until their
@@ -310,12 +374,8 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
   }
   self.saved = statistics();
   self.statistics_saved = true;
-  self.choose_gradient_copies(gaussians.count);
-  const std::array<std::size_t, 2> shape{gaussians.count, self.copies};
-  const bool tidy = self.tidy_copies == shape;
-  self.tidy_copies = {};
-  self.line_gradients.ensure(self.context, shape[0] * shape[1], "line gradients");
-  self.line_gradients.clear(tidy ? shape[0] : shape[0] * shape[1]);
+  self.choose_gradient_sum(gaussians.count);
+  self.prepare_gradient_sum();
   if (self.hits_complete) {
     self.launch_backward(image_gradient, 0, self.lists.tile_rows());
   } else {
@@ -329,8 +389,15 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
                          std::min(band, static_cast<std::uint32_t>(all) - row));
     }
   }
+  if (self.sum == GradientSum::kExact) {
+    self.context.kernel("trace/exact_lines.cl", "round_exact_lines")
+        .launch(Range::linear(gaussians.count, kRoundGroup),
+                static_cast<std::uint32_t>(gaussians.count), self.exact_gradients,
+                self.line_gradients);
+    self.tidy_exact = gaussians.count;
+  }
   self.finalize(gaussians, gradients, false);
-  self.tidy_copies = shape;
+  self.tidy_copies = {gaussians.count, self.copies};
 }
 
 CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& gaussians) {

@@ -16,6 +16,15 @@ enum class HitOrder {
 /// Function from the trained scale parameter to the standard deviation.
 enum class ScaleActivation { kExp, kSigmoid };
 
+/// How the gradients that rays send to one Gaussian are added.
+enum class GradientSum {
+  kAuto,    ///< private copies on CPUs where they fit; elsewhere exact, or atomic when the bits do
+            ///< not matter
+  kCopies,  ///< one copy per worker, added in a fixed order; exact or atomic where they do not fit
+  kExact,   ///< long integers: the same bits whatever the order, and with any number of workers
+  kAtomic,  ///< compare-and-swap on floats: the last bits depend on the scheduling
+};
+
 struct TraceOptions {
   float quantile =
       11.3449f;  ///< Q: a ray meets a Gaussian when the squared whitened distance is <= Q
@@ -28,6 +37,9 @@ struct TraceOptions {
   std::array<float, 3> background{0.0f, 0.0f, 0.0f};
   bool depth = false;    ///< camera rays also yield expected depth, median depth and hit count
   int packet_width = 0;  ///< rays per work-item: 1, 2, 4, 8 or 16; 0 = the device's own
+  GradientSum gradient_sum = GradientSum::kAuto;
+  bool deterministic = true;       ///< kAuto gives the same gradients to the bit every time
+  double launch_budget_ms = -1.0;  ///< time of one launch; 0 = unbounded, -1 = the device's default
   std::size_t memory_budget = std::size_t{1} << 30;  ///< bytes for hit lists and private gradients
 };
 
