@@ -186,7 +186,10 @@ Region visible_region(std::span<const Camera> cameras) {
   for (const Camera& camera : cameras) {
     const double depth = glm::dot(target - camera.center(), view_axis(camera));
     if (depth <= 0) continue;
-    half_sides.push_back(depth *
+    // A panorama sees everything around it, parallel rays see as much at every depth.
+    if (camera.model == CameraModel::kEquirectangular) return around;
+    const double reach = camera.model == CameraModel::kOrthographic ? 1.0 : depth;
+    half_sides.push_back(reach *
                          std::min(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy));
   }
   if (4 * half_sides.size() < 3 * cameras.size()) return around;

@@ -84,8 +84,13 @@ void add_train_options(CLI::App& app, TrainOptions& options) {
           [set](std::int64_t count) { set({count > 0 ? "true" : "false"}); }, key.help);
     } else {
       option = app.add_option_function<std::vector<std::string>>(
-          key.name == "iterations" ? "-n," + flag : flag, key.set, key.help);
-      option->default_str(key.text())->type_name("")->expected(1)->take_last();
+          key.name == "iterations" ? "-n," + flag
+          : key.name == "mirrors"  ? "--mirror," + flag
+                                   : flag,
+          key.set, key.help);
+      option->default_str(key.text())->type_name("")->expected(1);
+      option->multi_option_policy(key.repeatable ? CLI::MultiOptionPolicy::TakeAll
+                                                 : CLI::MultiOptionPolicy::TakeLast);
     }
     option->group(key.section);
   }

@@ -6,6 +6,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <type_traits>
 #include <utility>
@@ -128,6 +129,23 @@ class Table {
         [&target] { return fmt::format("[{}]", fmt::join(target, ", ")); });
   }
 
+  void paths(const std::string& name, std::vector<std::string>& target, const std::string& help) {
+    // Absolute, so that a resumed run finds them from anywhere.
+    add(
+        name, help, false,
+        [&target](const Values& values) {
+          target.clear();
+          for (const std::string& value : values) {
+            if (!value.empty()) target.push_back(std::filesystem::absolute(value).string());
+          }
+        },
+        [&target] {
+          return target.empty() ? std::string("[]")
+                                : fmt::format("[\"{}\"]", fmt::join(target, "\", \""));
+        });
+    keys_.back().repeatable = true;
+  }
+
   void learning_rate(const std::string& name, LearningRate& rate, const std::string& help) {
     number(name, rate.initial, 0, 1e3, "learning rate of " + help);
     number(name + "-final", rate.final_value, 0, 1e3, "value that " + name + " decays to");
@@ -173,6 +191,11 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.iterations("resolution-schedule", o.resolution_schedule,
                "iterations at which the image size doubles: n entries start at 1/2^n of the size; "
                "[] = full size");
+
+  t.paths("mirrors", o.mirrors,
+          "meshes (OBJ, PLY, GLB) of mirrors that are known: photos may show the scene in them");
+  t.number("mirror-bounces", o.mirror_bounces, 0, 64,
+           "mirrors that a ray may meet one after the other; behind the last it is black");
 
   t.section("Start");
   t.text("init", o.init,

@@ -19,6 +19,7 @@ struct TrainKey {
   std::function<void(const std::vector<std::string>&)> set;
   /// The present value as TOML.
   std::function<std::string()> text;
+  bool repeatable = false;  ///< a list to which every use on the command line adds
 };
 
 /// Every training option, bound to the members of `options`, in the order of the documentation. The

@@ -16,7 +16,6 @@
 #include "core/morton_order.hpp"
 #include "eval/evaluator.hpp"
 #include "raysplats/error.hpp"
-#include "trace/camera_tracer.hpp"
 #include "train/adam.hpp"
 #include "train/checkpoint.hpp"
 #include "train/density_control.hpp"
@@ -25,6 +24,7 @@
 #include "train/memory_estimate.hpp"
 #include "train/run_state.hpp"
 #include "train/schedule.hpp"
+#include "train/step_tracer.hpp"
 #include "train/target_cache.hpp"
 #include "train/train_config.hpp"
 
@@ -149,7 +149,7 @@ struct Trainer::Impl {
   double extent;
   bool cut_out;
   std::array<float, 3> background;
-  CameraTracer tracer;
+  StepTracer tracer;
   ImageLoss loss;
   Adam adam;
   DensityControl density;
@@ -183,7 +183,9 @@ Trainer::Impl::Impl(Context& device,
       extent(scene_extent(train_cameras)),
       cut_out(dataset.alpha_is_background),
       background(background_color(options, cut_out)),
-      tracer(device, trace_options_of(options, background)),
+      tracer(device,
+             trace_options_of(options, background),
+             load_mirrors(options.mirrors, options.mirror_bounces)),
       loss(device, options.pixel_loss, static_cast<float>(options.ssim_weight)),
       adam(device, adam_options_of(options)),
       density(device, options, extent),
@@ -218,6 +220,13 @@ void Trainer::Impl::start() {
       grows ? std::max(gaussians.count, static_cast<std::size_t>(options.max_gaussians))
             : gaussians.count;
   check_memory(estimate_memory(options, most, pixels, train_views.size()), context.device());
+  const auto by_rays = std::count_if(train_cameras.begin(), train_cameras.end(),
+                                     [this](const Camera& c) { return tracer.by_rays(c); });
+  if (by_rays > 0) {
+    spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),
+                 options.mirrors.empty() ? "their cameras are no pinholes"
+                                         : "there are mirrors in the scene");
+  }
   run.write_config(options);
   run.write_cameras(train_cameras);
 }
@@ -231,8 +240,8 @@ void Trainer::Impl::step() {
   const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
   const std::array<float, 3> behind = step_background(options, cut_out, background, iteration);
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
-  tracer.options().background = behind;
-  tracer.update(gaussians);
+  tracer.set_background(behind);
+  tracer.update();
   tracer.forward(gaussians, camera, true);
   loss.evaluate(tracer.image(), targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
@@ -287,8 +296,8 @@ void Trainer::Impl::control_density() {
 void Trainer::Impl::evaluate_views(bool last) {
   if (test_views.empty()) return;
   evaluating.start();
-  tracer.options().background = background;
-  tracer.update(gaussians);
+  tracer.set_background(background);
+  tracer.update();
   const auto render = [this](const Camera& camera) {
     tracer.forward(gaussians, camera);
     return tracer.download_image();
@@ -322,7 +331,6 @@ void Trainer::Impl::save_checkpoint() {
 }
 
 void Trainer::Impl::write_metrics(bool complete) {
-  const CameraTracer::Statistics statistics = tracer.statistics();
   run.write_metrics({{"complete", complete},
                      {"iteration", iteration},
                      {"iterations", options.iterations},
@@ -330,7 +338,7 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"loss", last_loss},
                      {"training_seconds", training.seconds()},
                      {"evaluation_seconds", evaluating.seconds()},
-                     {"capped_rays", statistics.capped_rays},
+                     {"capped_rays", tracer.capped_rays()},
                      {"skipped_updates", adam.skipped()},
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", context.device().name}});

@@ -42,6 +42,8 @@ struct TrainOptions {
   std::string background = "auto";   ///< "auto", "random" or "r,g,b"
   std::int64_t image_budget = 1024;  ///< MiB
   std::vector<std::int64_t> resolution_schedule{300, 1000};
+  std::vector<std::string> mirrors;  ///< mesh files of known mirrors
+  int mirror_bounces = 4;            ///< mirrors that a ray may meet
 
   // Start
   std::string init = "auto";  ///< "auto", "colmap", "random" or the path of a PLY
