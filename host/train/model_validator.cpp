@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/model_validator.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <vector>
+
+#include "bvh/lbvh_validate.hpp"
+#include "raysplats/gaussians.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kGroupSize = 64;
+constexpr std::size_t kCpuChunk = 1024;
+constexpr std::size_t kGpuChunk = 4;
+
+std::size_t width_of(ParameterGroup group, int sh_degree) {
+  switch (group) {
+    case ParameterGroup::kMeans:
+    case ParameterGroup::kScales:
+      return 3;
+    case ParameterGroup::kQuaternions:
+      return 4;
+    case ParameterGroup::kOpacities:
+      return 1;
+    case ParameterGroup::kSh:
+      break;
+  }
+  return 3 * static_cast<std::size_t>(sh_coefficients(sh_degree));
+}
+
+const Buffer<float>& values_of(const DeviceGaussians& gaussians, ParameterGroup group) {
+  switch (group) {
+    case ParameterGroup::kMeans:
+      return gaussians.means;
+    case ParameterGroup::kQuaternions:
+      return gaussians.quaternions;
+    case ParameterGroup::kScales:
+      return gaussians.scales;
+    case ParameterGroup::kOpacities:
+      return gaussians.opacities;
+    case ParameterGroup::kSh:
+      break;
+  }
+  return gaussians.sh;
+}
+
+}  // namespace
+
+ModelValidator::ModelValidator(Context& context,
+                               ScaleActivation activation,
+                               const TraceOptions& options)
+    : context_(context),
+      quantile_(options.quantile),
+      chunk_(context.device().type == DeviceType::kCpu ? kCpuChunk : kGpuChunk),
+      kernel_(context.kernel("train/validate.cl", "find_non_finite")),
+      bounds_(context, activation == ScaleActivation::kSigmoid, options.adaptive_radius),
+      tree_(context),
+      found_(context, 2, "validation") {}
+
+std::string ModelValidator::find_non_finite(const Buffer<float>& values,
+                                            const std::string& name,
+                                            std::size_t width) {
+  if (values.size() == 0) return "";
+  found_.upload(std::array<std::uint32_t, 2>{0, 0xffffffffu});
+  const std::size_t count = values.size() / width;
+  kernel_.launch(Range::linear((count + chunk_ - 1) / chunk_, kGroupSize), values, found_,
+                 static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(width),
+                 static_cast<std::uint32_t>(chunk_));
+  const std::vector<std::uint32_t> found = found_.download();
+  if (found[0] == 0) return "";
+  return fmt::format("{} numbers of '{}' are not finite, the first of them in Gaussian {}",
+                     found[0], name, found[1]);
+}
+
+// Every Gaussian whose numbers are finite and whose quaternion is not zero has a box around its
+// mean, and the tree over the boxes holds together.
+std::string ModelValidator::check_boxes(const DeviceGaussians& gaussians) {
+  bounds_.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
+                  gaussians.count, quantile_, boxes_);
+  std::vector<RsAabb> boxes(gaussians.count);
+  boxes_.download(std::span<RsAabb>(boxes));
+  const std::vector<float> means = gaussians.means.download();
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const RsAabb& box = boxes[i];
+    if (box.lo[0] > box.hi[0] && box.lo[1] > box.hi[1] && box.lo[2] > box.hi[2]) continue;  // empty
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const float mean = means[3 * i + axis];
+      if (box.lo[axis] <= mean && mean <= box.hi[axis]) continue;
+      return fmt::format("the box of Gaussian {} from {} to {} leaves out its mean {} on axis {}",
+                         i, box.lo[axis], box.hi[axis], mean, axis);
+    }
+  }
+  tree_.build(boxes_, gaussians.count);
+  return validate_lbvh(tree_, boxes);
+}
+
+std::string ModelValidator::find_fault(const DeviceGaussians& gaussians, const Adam& adam) {
+  if (gaussians.count == 0) return "";
+  for (const ParameterGroup group : kParameterGroups) {
+    const std::string name = group_name(group);
+    const std::size_t width = width_of(group, gaussians.sh_degree);
+    for (const auto& [values, what] :
+         {std::pair(&values_of(gaussians, group), name),
+          std::pair(&adam.first_moment(group), "first moments of " + name),
+          std::pair(&adam.second_moment(group), "second moments of " + name)}) {
+      const std::string fault = find_non_finite(*values, what, width);
+      if (!fault.empty()) return fault;
+    }
+  }
+  return check_boxes(gaussians);
+}
+
+}  // namespace raysplats
