@@ -21,7 +21,9 @@
 
 #define RS_FAR 3.402823466e+38f
 
+// direct: 1 when the rays leave the camera's centre.
 __kernel void begin_paths(const uint count,
+                          const int direct,
                           __global const float8* restrict rays,
                           __global RsPath* restrict paths) {
   const uint i = get_global_id(0);
@@ -34,7 +36,7 @@ __kernel void begin_paths(const uint count,
   for (int k = 0; k < 3; ++k) path.throughput[k] = 1.0f;
   path.media[0] = path.media[1] = 0;
   path.splits = path.lineage = 0;
-  path.padding = 0;
+  path.direct = direct;
   paths[i] = path;
 }
 
@@ -49,6 +51,7 @@ __kernel void load_surfaces(const uint count,
                             __global const float* restrict texels,
                             __global const RsPath* restrict paths,
                             __global float8* restrict rays,
+                            __global uint* restrict from_origin,
                             __global RsSurface* restrict surfaces) {
   const uint i = get_global_id(0);
   if (i >= count) return;
@@ -57,6 +60,7 @@ __kernel void load_surfaces(const uint count,
   ray.s3 = paths[i].begin;
   ray.s7 = paths[i].blind ? -1.0f : (hit.triangle < 0 ? RS_FAR : hit.t);
   rays[i] = ray;
+  from_origin[i] = (uint)paths[i].direct;
   RsSurface s;
   s.t = hit.t;
   s.triangle = hit.triangle;
@@ -262,6 +266,7 @@ Continuation new_direction(const RsPath* path,
   Continuation out;
   out.path = *path;
   out.path.begin = 0.0f;
+  out.path.direct = 0;
   out.path.skip = s->triangle;
   vstore3(throughput, 0, out.path.throughput);
   const float3 normal = load3(s->normal);

@@ -47,7 +47,8 @@ void blend_hits(const RayScene* scene,
 
 // rays: 8 floats each (origin, t_min, direction, t_max). results: 8 words each (colour, alpha,
 // expected depth, median depth, hits, capped). level_begin[l]: first node of level l, from 1;
-// ray_order: which ray a work-item traces, read when `ordered`.
+// ray_order: which ray a work-item traces, read when `ordered`. color_from_origin: 0 for colours
+// along the rays, 1 from their origins, 2 as from_origin[] says for each.
 __kernel void trace_rays(const uint ray_count,
                          const uint rays_per_item,
                          const int levels,
@@ -58,6 +59,7 @@ __kernel void trace_rays(const uint ray_count,
                          const int sh_coefficients,
                          const int active_degree,
                          const int color_from_origin,
+                         __global const uint* restrict from_origin,
                          const float quantile,
                          const float min_transmittance,
                          const int max_hits,
@@ -68,16 +70,17 @@ __kernel void trace_rays(const uint ray_count,
                          __global float8* restrict results) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
-  const RayScene scene = {level_begin,   nodes,
-                          blocks,        sh,
-                          levels,        sh_coefficients,
-                          active_degree, color_from_origin,
-                          quantile,      min_transmittance,
-                          max_hits};
+  RayScene scene = {level_begin,   nodes,
+                    blocks,        sh,
+                    levels,        sh_coefficients,
+                    active_degree, color_from_origin,
+                    quantile,      min_transmittance,
+                    max_hits};
   for (uint position = first; position < last; ++position) {
     const size_t id = ordered ? ray_order[position] : position;
     const float8 raw = rays[id];
     RayData ray = ray_data(raw);
+    if (color_from_origin == 2) scene.color_from_origin = (int)from_origin[id];
     float basis[25];
     basis_along_ray(&scene, &ray, basis);
     RayState state = {(float4)(0.0f), 1.0f, 0.0f, 0.0f, 0, false, false, -1.0f, 0};

@@ -46,25 +46,33 @@ void check(const RenderSettings& s) {
   }
 }
 
-// A thousandth of the diagonal of the box around means and vertices.
-float default_bias(const Gaussians& gaussians, const std::vector<Mesh>& meshes) {
+struct Box {
   std::array<float, 3> lo, hi;
-  lo.fill(std::numeric_limits<float>::max());
-  hi.fill(std::numeric_limits<float>::lowest());
-  const auto add = [&](const std::vector<float>& points) {
+
+  Box() {
+    lo.fill(std::numeric_limits<float>::max());
+    hi.fill(std::numeric_limits<float>::lowest());
+  }
+  void add(const std::vector<float>& points) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       lo[i % 3] = std::min(lo[i % 3], points[i]);
       hi[i % 3] = std::max(hi[i % 3], points[i]);
     }
-  };
-  add(gaussians.means);
-  for (const Mesh& mesh : meshes) add(mesh.positions);
-  double sum = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double extent = std::max(0.0, static_cast<double>(hi[k]) - static_cast<double>(lo[k]));
-    sum += extent * extent;
   }
-  return static_cast<float>(1e-3 * std::sqrt(sum));
+  double diagonal() const {
+    double sum = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double extent = std::max(0.0, static_cast<double>(hi[k]) - static_cast<double>(lo[k]));
+      sum += extent * extent;
+    }
+    return std::sqrt(sum);
+  }
+};
+
+Box box_of(const Gaussians& gaussians) {
+  Box box;
+  box.add(gaussians.means);
+  return box;
 }
 
 }  // namespace
@@ -79,10 +87,13 @@ struct LightTracer::Impl {
         surfaces(context_in, scene),
         lights(scene.lights),
         camera_rays(context_in),
-        scan(context_in) {
-    if (settings.bias == 0) settings.bias = default_bias(scene.gaussians, scene.meshes);
+        scan(context_in),
+        means_box(box_of(scene.gaussians)) {
+    choose_bias(scene.meshes);
     tracer.update(gaussians);
   }
+
+  void choose_bias(const std::vector<Mesh>& meshes);
 
   Kernel kernel(const char* name) { return context.kernel(kProgram, name); }
   std::size_t batch_size() const;
@@ -104,6 +115,8 @@ struct LightTracer::Impl {
   std::vector<Light> lights;
   CameraRays camera_rays;
   Scan scan;
+  Box means_box;
+  float bias = 0;
   Statistics statistics;
 
   Buffer<Ray> rays, next_rays, shadow_rays;
@@ -112,6 +125,7 @@ struct LightTracer::Impl {
   Buffer<RsSurface> met;
   Buffer<RayResult> results, blocked;
   Buffer<std::int32_t> skip;
+  Buffer<std::uint32_t> from_origin;
   Buffer<float> passes;
   Buffer<std::array<float, 4>> gaussian_light;
   Buffer<std::array<float, 8>> surface_light;
@@ -119,6 +133,13 @@ struct LightTracer::Impl {
   Buffer<std::uint32_t> offsets;
   Buffer<std::array<std::uint32_t, 4>> tallies, partials;
 };
+
+// A thousandth of the scene unless the settings say otherwise.
+void LightTracer::Impl::choose_bias(const std::vector<Mesh>& meshes) {
+  Box box = means_box;
+  for (const Mesh& mesh : meshes) box.add(mesh.positions);
+  bias = settings.bias > 0 ? settings.bias : static_cast<float>(1e-3 * box.diagonal());
+}
 
 std::size_t LightTracer::Impl::batch_size() const {
   const std::size_t room = std::min(options.memory_budget / 2 / kPathBytes,
@@ -137,7 +158,7 @@ RsWave LightTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pi
   wave.indirect = settings.indirect ? 1 : 0;
   std::copy(settings.ambient.begin(), settings.ambient.end(), wave.ambient);
   wave.strength = settings.shadows.strength;
-  wave.bias = settings.bias;
+  wave.bias = bias;
   wave.lights = static_cast<std::int32_t>(lights.size());
   wave.light_samples = settings.light_samples;
   wave.first_pixel = u32(first_pixel);
@@ -156,7 +177,9 @@ void LightTracer::Impl::trace_sample(const Camera& camera,
   lens.focus_distance = settings.focus_distance;
   camera_rays.generate(camera, lens, first, count, rays);
   paths.ensure(context, count, "paths");
-  kernel("begin_paths").launch(Range::linear(count, kGroup), u32(count), rays, paths);
+  kernel("begin_paths")
+      .launch(Range::linear(count, kGroup), u32(count),
+              camera.model == CameraModel::kOrthographic ? 0 : 1, rays, paths);
   RsWave wave = wave_record(sample, first);
   statistics.camera_rays += count;
   for (std::size_t live = count; live > 0; ++wave.bounce) {
@@ -169,6 +192,7 @@ std::size_t LightTracer::Impl::trace_wave(const RsWave& wave, std::size_t count)
   const Range each = Range::linear(count, kGroup);
   hits.ensure(context, count, "surface hits");
   met.ensure(context, count, "surfaces");
+  from_origin.ensure(context, count, "colour directions");
   gaussian_light.ensure(context, count, "light on Gaussians");
   surface_light.ensure(context, count, "light on surfaces");
   gained.ensure(context, count, "light of paths");
@@ -180,8 +204,9 @@ std::size_t LightTracer::Impl::trace_wave(const RsWave& wave, std::size_t count)
   surfaces.triangles().nearest(rays, paths, count, hits);
   kernel("load_surfaces")
       .launch(each, u32(count), hits, surfaces.vertices(), surfaces.triangle_materials(),
-              surfaces.materials(), surfaces.textures(), surfaces.texels(), paths, rays, met);
-  tracer.trace(gaussians, rays, count, results, ColorDirection::kRay);
+              surfaces.materials(), surfaces.textures(), surfaces.texels(), paths, rays,
+              from_origin, met);
+  tracer.trace(gaussians, rays, from_origin, count, results);
   gaussian_light.clear(count);
   surface_light.clear(count);
   const ShadowSettings& shadows = settings.shadows;
@@ -258,6 +283,7 @@ LightTracer::~LightTracer() = default;
 
 void LightTracer::set_meshes(const std::vector<Mesh>& meshes) {
   impl_->surfaces.set_meshes(meshes);
+  impl_->choose_bias(meshes);
 }
 
 Image LightTracer::render(const Camera& camera) {

@@ -51,10 +51,12 @@ struct LightPath {
 
 /// The light along one ray after docs/light.md, by recursion over brute force. `direction` is
 /// normalised first. Mirrors are smooth whatever their roughness, sphere lights are integrated over
-/// 256 points of their disc instead of sampled. Throws UsageError for indirect light.
+/// 256 points of their disc instead of sampled. `from_center`: the ray leaves a camera's centre.
+/// Throws UsageError for indirect light.
 LightPath trace_light(const LightScene& scene,
                       const glm::dvec3& origin,
-                      const glm::dvec3& direction);
+                      const glm::dvec3& direction,
+                      bool from_center = false);
 LightPath trace_light(const Scene& scene, const glm::dvec3& origin, const glm::dvec3& direction);
 
 /// The share of a light's colour that reaches a point past triangles and Gaussians (V before

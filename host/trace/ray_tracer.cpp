@@ -23,6 +23,19 @@ static_assert(sizeof(Ray) == 32 && sizeof(RayResult) == 32,
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
+// color_from_origin of rays.cl.
+std::int32_t color_mode(ColorDirection direction) {
+  switch (direction) {
+    case ColorDirection::kFromOrigin:
+      return 1;
+    case ColorDirection::kPerRay:
+      return 2;
+    case ColorDirection::kRay:
+      break;
+  }
+  return 0;
+}
+
 }  // namespace
 
 struct RayTracer::Impl {
@@ -30,12 +43,14 @@ struct RayTracer::Impl {
       : context(context_in),
         options(options_in),
         tree(context_in, options_in, lanes),
-        order(context_in) {}
+        order(context_in),
+        no_flags(context_in, 1, "no flags of rays") {}
 
   Context& context;
   TraceOptions options;
   RayTree tree;
   RayOrder order;
+  Buffer<std::uint32_t> no_flags;
   Buffer<Ray> rays;
   Buffer<RayResult> results;
 };
@@ -53,6 +68,29 @@ void RayTracer::trace(const DeviceGaussians& gaussians,
                       std::size_t count,
                       Buffer<RayResult>& results,
                       ColorDirection color_direction) {
+  if (color_direction == ColorDirection::kPerRay) {
+    throw UsageError("Colours by the ray need a flag for each: pass their buffer");
+  }
+  launch(gaussians, rays, count, results, color_direction, impl_->no_flags);
+}
+
+void RayTracer::trace(const DeviceGaussians& gaussians,
+                      const Buffer<Ray>& rays,
+                      const Buffer<std::uint32_t>& from_origin,
+                      std::size_t count,
+                      Buffer<RayResult>& results) {
+  if (from_origin.size() < count) {
+    throw UsageError(fmt::format("{} rays need as many flags, not {}", count, from_origin.size()));
+  }
+  launch(gaussians, rays, count, results, ColorDirection::kPerRay, from_origin);
+}
+
+void RayTracer::launch(const DeviceGaussians& gaussians,
+                       const Buffer<Ray>& rays,
+                       std::size_t count,
+                       Buffer<RayResult>& results,
+                       ColorDirection color_direction,
+                       const Buffer<std::uint32_t>& from_origin) {
   Impl& self = *impl_;
   if (self.tree.tree().size() != gaussians.count) {
     throw UsageError("RayTracer::update() must follow every change of the Gaussians");
@@ -75,7 +113,7 @@ void RayTracer::trace(const DeviceGaussians& gaussians,
       .launch(Range::linear((count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup),
               u32(count), u32(rays_per_item), tree.levels(), tree.level_begin(), tree.nodes(),
               self.tree.blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
-              gaussians.active_sh_degree, color_direction == ColorDirection::kFromOrigin ? 1 : 0,
+              gaussians.active_sh_degree, color_mode(color_direction), from_origin,
               options.quantile, options.min_transmittance, options.max_hits, background, rays,
               ordered ? 1 : 0, self.order.indices(), results);
 }

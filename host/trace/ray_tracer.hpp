@@ -27,6 +27,7 @@ struct Ray {
 enum class ColorDirection {
   kRay,         ///< the ray's own direction (secondary rays, cameras without a centre)
   kFromOrigin,  ///< from the ray's origin to the mean (what camera rays use)
+  kPerRay,      ///< one or the other, as a buffer says
 };
 
 struct RayResult {
@@ -62,6 +63,13 @@ class RayTracer {
              std::size_t count,
              Buffer<RayResult>& results,
              ColorDirection color_direction = ColorDirection::kRay);
+  /// The same with colours from the origin for rays whose from_origin is 1, along the ray where it
+  /// is 0.
+  void trace(const DeviceGaussians& gaussians,
+             const Buffer<Ray>& rays,
+             const Buffer<std::uint32_t>& from_origin,
+             std::size_t count,
+             Buffer<RayResult>& results);
 
   /// Colour behind the Gaussians from the next trace() on.
   void set_background(const std::array<float, 3>& background);
@@ -70,6 +78,13 @@ class RayTracer {
   const RayTree& tree() const;
 
  private:
+  void launch(const DeviceGaussians& gaussians,
+              const Buffer<Ray>& rays,
+              std::size_t count,
+              Buffer<RayResult>& results,
+              ColorDirection color_direction,
+              const Buffer<std::uint32_t>& from_origin);
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

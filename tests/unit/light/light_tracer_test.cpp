@@ -2,6 +2,7 @@
 #include "light/light_tracer.hpp"
 
 #include "light_fixture.hpp"
+#include "trace/camera_tracer.hpp"
 
 using namespace raysplats;
 using reference::ball;
@@ -274,4 +275,30 @@ TEST_CASE("other cameras and sizes of picture") {
                 "from behind", 2e-3, 0.2);
   check_picture(context, scene, look_at({0.9, 0.0, 0.2}, {-1, 0, 0}, {0, -1, 0}, 20, 16, 10.0),
                 "amid the cloud", 2e-3, 0.2);
+}
+
+TEST_CASE("a scene without meshes is what the packet tracer draws") {
+  Context context = make_test_context();
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    Scene scene = cloud_scene(2);
+    scene.trace.hit_order = order;
+    scene.environment.color = {0.2f, 0.4f, 0.6f};
+    TraceOptions options = scene.trace;
+    options.background = scene.environment.color;
+    const Camera camera = cube_camera(24, 20);
+    const Image image = LightTracer(context, scene).render(camera);
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, scene.gaussians, ScaleActivation::kExp);
+    CameraTracer packets(context, options);
+    packets.update(gaussians);
+    packets.forward(gaussians, camera);
+    const Image expected = packets.download_image();
+    double largest = 0, sum = 0;
+    for (std::size_t i = 0; i < expected.data.size(); ++i) {
+      largest = std::max(largest, std::abs(static_cast<double>(image.data[i] - expected.data[i])));
+      sum += static_cast<double>(expected.data[i]);
+    }
+    CHECK(sum > 1.0);
+    CHECK(largest < 1e-4);
+  }
 }
