@@ -16,37 +16,24 @@
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "render_flags.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats::cli {
 namespace {
 
-struct Options {
-  std::string model;
-  DataFlags data;
-  std::string cameras;
-  std::optional<int> orbit;
-  std::string output;
-  std::string format = "png";
-  int supersample = 1;
-  bool depth = false;
-  std::optional<int> width;
-  std::optional<int> height;
-  std::optional<double> fov;
-  std::optional<double> elevation;
-  std::optional<double> distance;
-  std::optional<std::string> up;
-  TraceFlags trace;
-  DeviceFlags device;
-};
-
-FrameFormat parse_format(const std::string& name) {
-  if (name == "exr") return FrameFormat::kExr;
-  if (name == "jpg") return FrameFormat::kJpg;
-  return FrameFormat::kPng;
-}
-
-void check(const Options& options) {
+void check(const RenderFlags& options) {
+  const std::pair<const char*, bool> of_scenes[] = {
+      {"--samples", options.samples.has_value()},
+      {"--max-bounces", options.max_bounces.has_value()},
+      {"--seed", options.seed.has_value()},
+      {"--frames", !options.frames.empty()}};
+  for (const auto& [name, given] : of_scenes) {
+    if (given) {
+      throw UsageError(fmt::format("{} is for scene files: MODEL is {}, which is no .toml", name,
+                                   options.model));
+    }
+  }
   const int sources = (options.data.data.empty() ? 0 : 1) + (options.cameras.empty() ? 0 : 1);
   if (sources == 0 && !options.orbit) {
     throw UsageError(
@@ -72,7 +59,7 @@ std::vector<Camera> cameras_of(const Dataset& dataset, Split split) {
   return cameras;
 }
 
-std::vector<Camera> orbit(const Options& options,
+std::vector<Camera> orbit(const RenderFlags& options,
                           const Gaussians& model,
                           const std::vector<Camera>& photos) {
   OrbitOptions shape;
@@ -100,7 +87,11 @@ std::vector<Camera> orbit(const Options& options,
   return orbit_cameras(extent, shape);
 }
 
-void run(const Options& options, const GlobalOptions& global) {
+void run(const RenderFlags& options, const GlobalOptions& global) {
+  if (is_scene_file(options.model)) {
+    render_scene(options, global);
+    return;
+  }
   check(options);
   const ModelSource source = find_model(options.model);
   const Gaussians model = in_morton_order(read_ply(source.ply));
@@ -135,7 +126,7 @@ void run(const Options& options, const GlobalOptions& global) {
                     global.quiet ? nullptr : stderr);
   const FrameReport report = write_frames(
       tracer, gaussians, cameras, options.output,
-      {parse_format(options.format), options.supersample, options.depth}, [&](std::size_t done) {
+      {options.frame_format(), options.supersample, options.depth}, [&](std::size_t done) {
         progress.update(static_cast<std::int64_t>(done), "");
         return !interrupt.requested();
       });
@@ -156,9 +147,11 @@ void run(const Options& options, const GlobalOptions& global) {
 
 Command add_render_command(CLI::App& app, const GlobalOptions& global) {
   CLI::App* command = app.add_subcommand(
-      "render", "Render a model from a data set's cameras, a file's or an orbit");
-  auto options = std::make_shared<Options>();
-  command->add_option("MODEL", options->model, "3DGS PLY, or the folder of a training run")
+      "render", "Render a model or a scene file from a data set's cameras, a file's or an orbit");
+  auto options = std::make_shared<RenderFlags>();
+  command
+      ->add_option("MODEL", options->model,
+                   "3DGS PLY, the folder of a training run, or a scene file (.toml)")
       ->required()
       ->type_name("");
   command->add_option("-o,--output", options->output, "Folder for the frames")
@@ -203,6 +196,20 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->group(orbit)
       ->check(triple())
       ->type_name("X,Y,Z");
+
+  const std::string scene = "Scene files (over what they say)";
+  command->add_option("--samples", options->samples, "Rays per pixel")
+      ->group(scene)
+      ->check(between(1, 65536));
+  command->add_option("--max-bounces", options->max_bounces, "Surfaces that a path may meet")
+      ->group(scene)
+      ->check(between(1, 1000));
+  command->add_option("--seed", options->seed, "Of everything that is random")->group(scene);
+  command
+      ->add_option("--frames", options->frames,
+                   "Only the frames from START up to END, which is left out; either may be empty")
+      ->group(scene)
+      ->type_name("START:END");
 
   command->add_option("--supersample", options->supersample, "S x S rays per pixel, averaged")
       ->check(between(1, 16));

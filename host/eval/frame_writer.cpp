@@ -68,30 +68,6 @@ Image average_depth(const Image& depth, const Image& rgba, int factor) {
   return out;
 }
 
-void write_frame(const std::filesystem::path& stem,
-                 const Image& rgba,
-                 const Image& depth,
-                 const FrameOptions& options) {
-  const auto file = [&](const char* suffix, const std::filesystem::path& type) {
-    std::filesystem::path path = stem;
-    path += suffix;
-    path += type;
-    return path;
-  };
-  if (options.format == FrameFormat::kExr) {
-    if (!options.depth) {
-      write_image(file("", extension(options.format)), rgba);
-      return;
-    }
-    Image channels = with_channels(rgba, 5);
-    for (std::size_t i = 0; i < channels.pixels(); ++i) channels.data[5 * i + 4] = depth.data[i];
-    write_image(file("", extension(options.format)), channels, {"Z"});
-    return;
-  }
-  write_image(file("", extension(options.format)), with_channels(rgba, 3));
-  if (options.depth) write_image(file("_depth", ".png"), depth_preview(depth, rgba));
-}
-
 }  // namespace
 
 std::vector<std::string> frame_names(std::span<const Camera> cameras) {
@@ -148,6 +124,30 @@ Image depth_preview(const Image& depth, const Image& rgba) {
     if (covered(i)) out.data[i] = high > low ? (high - depth.data[i]) / (high - low) : 1.0f;
   }
   return out;
+}
+
+void write_frame(const std::filesystem::path& stem,
+                 const Image& rgba,
+                 const Image& depth,
+                 const FrameOptions& options) {
+  const auto file = [&](const char* suffix, const std::filesystem::path& type) {
+    std::filesystem::path path = stem;
+    path += suffix;
+    path += type;
+    return path;
+  };
+  if (options.format == FrameFormat::kExr) {
+    if (!options.depth) {
+      write_image(file("", extension(options.format)), rgba);
+      return;
+    }
+    Image channels = with_channels(rgba, 5);
+    for (std::size_t i = 0; i < channels.pixels(); ++i) channels.data[5 * i + 4] = depth.data[i];
+    write_image(file("", extension(options.format)), channels, {"Z"});
+    return;
+  }
+  write_image(file("", extension(options.format)), with_channels(rgba, 3));
+  if (options.depth) write_image(file("_depth", ".png"), depth_preview(depth, rgba));
 }
 
 FrameReport write_frames(CameraTracer& tracer,

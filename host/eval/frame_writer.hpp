@@ -48,6 +48,13 @@ Image box_average(const Image& image, int factor);
 /// alpha (channel 3 of `rgba`) is below one half are 0 and do not count.
 Image depth_preview(const Image& depth, const Image& rgba);
 
+/// Writes one frame: `stem` with the format's extension, RGB of `rgba` for 8-bit formats. `depth`
+/// is used where options.depth is set. Throws DataError when a file fails.
+void write_frame(const std::filesystem::path& stem,
+                 const Image& rgba,
+                 const Image& depth,
+                 const FrameOptions& options);
+
 /// Traces every camera and writes its files to `folder`, which exists. `done` hears the number of
 /// finished frames and returns false to stop early. The tracer is up to date with the Gaussians,
 /// and has options().depth set when options.depth is. Throws UsageError for a supersampling factor

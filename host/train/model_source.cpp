@@ -104,4 +104,15 @@ TraceOptions trace_options(const ModelSource& source, bool cut_out) {
   return out;
 }
 
+void find_models(SceneFile& scene) {
+  bool known = false;
+  for (SceneModel& model : scene.models) {
+    const ModelSource source = find_model(model.file);
+    model.file = source.ply;
+    if (known || !source.trained) continue;
+    scene.trained = trace_options(source, false);
+    known = true;
+  }
+}
+
 }  // namespace raysplats

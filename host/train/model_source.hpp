@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "io/scene_file.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/trace_options.hpp"
 #include "raysplats/train_options.hpp"
@@ -35,5 +36,9 @@ DatasetOptions dataset_options(const ModelSource& source);
 /// What a model has to be traced with to look as in training; `cut_out` as for background_color().
 /// The defaults of TraceOptions when nothing is known.
 TraceOptions trace_options(const ModelSource& source, bool cut_out);
+
+/// Replaces run folders among a scene's models by their newest PLY, and makes the options of the
+/// first model that is in a run what the scene's [trace] goes over. Throws as find_model().
+void find_models(SceneFile& scene);
 
 }  // namespace raysplats

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "eval/frame_writer.hpp"
+#include "options.hpp"
+
+namespace raysplats::cli {
+
+/// Options of the command `render`, as given.
+struct RenderFlags {
+  std::string model;
+  DataFlags data;
+  std::string cameras;
+  std::optional<int> orbit;
+  std::string output;
+  std::string format = "png";
+  int supersample = 1;
+  bool depth = false;
+  std::optional<int> width;
+  std::optional<int> height;
+  std::optional<double> fov;
+  std::optional<double> elevation;
+  std::optional<double> distance;
+  std::optional<std::string> up;
+  std::optional<int> samples;
+  std::optional<int> max_bounces;
+  std::optional<std::uint64_t> seed;
+  std::string frames;
+  TraceFlags trace;
+  DeviceFlags device;
+
+  FrameFormat frame_format() const;
+};
+
+/// Whether the first argument of `render` is a scene file: its name ends in .toml.
+bool is_scene_file(const std::string& model);
+
+/// `render` of a scene file.
+void render_scene(const RenderFlags& flags, const GlobalOptions& global);
+
+}  // namespace raysplats::cli

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <charconv>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "base/interrupt.hpp"
+#include "base/output_directory.hpp"
+#include "base/progress.hpp"
+#include "device/profiler.hpp"
+#include "eval/scene_frames.hpp"
+#include "io/scene_loader.hpp"
+#include "light/light_tracer.hpp"
+#include "raysplats/error.hpp"
+#include "render_flags.hpp"
+#include "train/model_source.hpp"
+
+namespace raysplats::cli {
+namespace {
+
+using Source = SceneCamera::Source;
+
+void check(const RenderFlags& flags) {
+  if (flags.depth) {
+    throw UsageError(
+        "--depth is for models alone: a scene with mirrors and glass has no single depth");
+  }
+  if (flags.supersample != 1) {
+    throw UsageError("--supersample is for models alone: scene files take --samples");
+  }
+  if (flags.trace.near_depth) {
+    throw UsageError(
+        "--near is for models alone: rays that leave a mirror have no camera that could be near");
+  }
+  const bool data = !flags.data.data.empty();
+  if (!flags.cameras.empty() && (data || flags.orbit)) {
+    throw UsageError(
+        "--cameras is a path of its own: leave out --data and --orbit, or leave out --cameras "
+        "(--orbit goes with --data)");
+  }
+  if ((flags.fov || flags.elevation || flags.distance || flags.up) && !flags.orbit) {
+    throw UsageError("--fov, --elevation, --distance and --up shape an orbit: add --orbit N");
+  }
+}
+
+/// What the command line says goes over what the file says.
+void override_camera(const RenderFlags& flags, SceneFile& scene) {
+  SceneCamera& camera = scene.camera;
+  scene.width = flags.width;
+  scene.height = flags.height;
+  const bool data = !flags.data.data.empty();
+  if (flags.orbit) {
+    if (camera.source != Source::kOrbit) {
+      // The lens and up of the file's camera stay, its place does not.
+      camera.target.reset();
+      camera.file.clear();
+      camera.views.clear();
+    }
+    camera.source = Source::kOrbit;
+    camera.frames = *flags.orbit;
+    if (flags.fov) {
+      camera.fov = *flags.fov;
+      camera.focal.reset();
+    }
+    if (flags.elevation) camera.elevation = *flags.elevation;
+    if (flags.distance) camera.distance = *flags.distance;
+    if (flags.up) {
+      const std::array<double, 3> up = parse_triple(*flags.up);
+      camera.up = glm::dvec3(up[0], up[1], up[2]);
+    }
+    scene.frames.reset();
+  }
+  if (data) {
+    if (!flags.orbit) {
+      camera = {};
+      camera.source = Source::kData;
+    }
+    camera.file = flags.data.data;
+    camera.split = parse_split(flags.data.split);
+    camera.data_options = flags.data.over({});
+  } else if (!flags.cameras.empty()) {
+    camera = {};
+    camera.source = Source::kFile;
+    camera.file = flags.cameras;
+  }
+  if (data || !flags.cameras.empty()) camera.place = scene.path.string();
+  if (!data) scene.downscale = flags.data.downscale.value_or(1.0);
+}
+
+/// "START:END" as a range within `count` frames.
+std::pair<std::size_t, std::size_t> parse_frames(const std::string& text, std::size_t count) {
+  if (text.empty()) return {0, count};
+  const std::size_t colon = text.find(':');
+  const auto number = [&](const std::string& part, std::size_t& target) {
+    if (part.empty()) return true;
+    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), target);
+    return error == std::errc() && end == part.data() + part.size();
+  };
+  std::size_t first = 0;
+  std::size_t last = count;
+  if (colon == std::string::npos || !number(text.substr(0, colon), first) ||
+      !number(text.substr(colon + 1), last)) {
+    throw UsageError(fmt::format("--frames '{}' is not START:END, as in 0:10, 10: or :10", text));
+  }
+  last = std::min(last, count);
+  if (first >= last) {
+    throw UsageError(
+        fmt::format("--frames '{}' holds none of the {} frames of the scene", text, count));
+  }
+  return {first, last};
+}
+
+void print_summary(const SceneReport& report, const std::string& output) {
+  const auto millions = [&](std::uint64_t rays) {
+    return 1e-6 * static_cast<double>(rays) / report.trace_seconds;
+  };
+  fmt::print(
+      "{} frames in {} ({:.2f} s of tracing; million rays per second: {:.2f} camera, {:.2f} "
+      "continued, {:.2f} shadow)\n",
+      report.frames, output, report.trace_seconds, millions(report.rays.camera_rays),
+      millions(report.rays.continued_rays), millions(report.rays.shadow_rays));
+}
+
+}  // namespace
+
+FrameFormat RenderFlags::frame_format() const {
+  if (format == "exr") return FrameFormat::kExr;
+  if (format == "jpg") return FrameFormat::kJpg;
+  return FrameFormat::kPng;
+}
+
+bool is_scene_file(const std::string& model) {
+  return std::filesystem::path(model).extension() == ".toml";
+}
+
+void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
+  check(flags);
+  SceneFile file = read_scene_file(flags.model);
+  find_models(file);
+  override_camera(flags, file);
+  file.trained = flags.trace.over(file.trace.over(file.trained));
+  file.trace = {};
+  if (flags.samples) file.render.samples = *flags.samples;
+  if (flags.max_bounces) file.render.max_bounces = *flags.max_bounces;
+  if (flags.seed) file.render.seed = *flags.seed;
+  const LoadedScene loaded = load_scene(file);
+  const auto [first, last] = parse_frames(flags.frames, loaded.cameras.size());
+
+  const std::unique_ptr<Context> context = open_context(flags.device);
+  LightTracer tracer(*context, loaded.scene);
+  make_output_directory(flags.output);
+  spdlog::info("{}: {} Gaussians, {} meshes, {} lights, {} frames", flags.model,
+               loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
+               loaded.scene.lights.size(), last - first);
+
+  const InterruptGuard interrupt;
+  Progress progress("rendering", static_cast<std::int64_t>(last - first), 0,
+                    global.quiet ? nullptr : stderr);
+  const SceneReport report = write_scene_frames(
+      tracer, loaded, first, last, flags.output, flags.frame_format(), [&](std::size_t done) {
+        progress.update(static_cast<std::int64_t>(done), "");
+        return !interrupt.requested();
+      });
+  progress.finish();
+  if (report.frames < last - first) {
+    throw Error(ErrorCode::kInterrupted,
+                fmt::format("Interrupted after {} of {} frames: what is in {} is whole",
+                            report.frames, last - first, flags.output));
+  }
+  const LightTracer::Statistics& rays = report.rays;
+  warn_of_capped_rays(rays.capped_rays, rays.camera_rays + rays.continued_rays + rays.shadow_rays,
+                      loaded.scene.trace);
+  if (rays.ended_by_bounces > 0) {
+    spdlog::info("{} paths ended after --max-bounces {}", rays.ended_by_bounces,
+                 loaded.scene.render.max_bounces);
+  }
+  print_summary(report, flags.output);
+  if (flags.device.profile) fmt::print("{}", context->profiler().table());
+}
+
+}  // namespace raysplats::cli

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "eval/scene_frames.hpp"
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+namespace raysplats {
+namespace {
+
+void add(LightTracer::Statistics& sum, const LightTracer::Statistics& frame) {
+  sum.camera_rays += frame.camera_rays;
+  sum.continued_rays += frame.continued_rays;
+  sum.shadow_rays += frame.shadow_rays;
+  sum.capped_rays += frame.capped_rays;
+  sum.ended_by_bounces += frame.ended_by_bounces;
+}
+
+}  // namespace
+
+SceneReport write_scene_frames(LightTracer& tracer,
+                               const LoadedScene& scene,
+                               std::size_t first,
+                               std::size_t last,
+                               const std::filesystem::path& folder,
+                               FrameFormat format,
+                               const std::function<bool(std::size_t)>& done) {
+  const std::vector<std::string> names = frame_names(scene.cameras);
+  SceneReport report;
+  for (std::size_t i = first; i < last; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<int>(i)));
+    const Image rgba = tracer.render(scene.cameras[i]);
+    report.trace_seconds +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    add(report.rays, tracer.statistics());
+    write_frame(folder / names[i], rgba, {}, {format, 1, false});
+    ++report.frames;
+    if (done && !done(report.frames)) break;
+  }
+  return report;
+}
+
+}  // namespace raysplats
