@@ -15,7 +15,7 @@
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "trace/camera_tracer.hpp"
+#include "trace/view_tracer.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats::cli {
@@ -44,7 +44,7 @@ void run(const Options& options, const GlobalOptions& global) {
   const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   const std::unique_ptr<Context> context = open_context(options.device);
   const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
-  CameraTracer tracer(*context, trace);
+  ViewTracer tracer(*context, trace);
   tracer.update(gaussians);
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), views);
@@ -55,10 +55,9 @@ void run(const Options& options, const GlobalOptions& global) {
   std::uint64_t rays = 0;
   std::uint64_t capped = 0;
   const auto render = [&](const Camera& camera) {
-    tracer.forward(gaussians, camera);
-    Image image = tracer.download_image();
+    Image image = tracer.render(gaussians, camera);
     rays += image.pixels();
-    capped += tracer.statistics().capped_rays;
+    capped += tracer.capped_rays();
     return image;
   };
   EvaluationOptions evaluation;

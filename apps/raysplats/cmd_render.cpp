@@ -46,11 +46,19 @@ void check(const RenderFlags& options) {
         "(--orbit goes with --data)");
   }
   const bool shaped = options.width || options.height || options.fov || options.elevation ||
-                      options.distance || options.up;
+                      options.distance || options.up || options.camera_model;
   if (shaped && !options.orbit) {
     throw UsageError(
-        "--width, --height, --fov, --elevation, --distance and --up shape an orbit: add --orbit N");
+        "--width, --height, --fov, --elevation, --distance, --up and --camera-model shape an "
+        "orbit: add --orbit N");
   }
+}
+
+CameraModel camera_model(const std::string& name) {
+  if (name == "fisheye") return CameraModel::kFisheye;
+  if (name == "equirectangular") return CameraModel::kEquirectangular;
+  if (name == "orthographic") return CameraModel::kOrthographic;
+  return CameraModel::kPinhole;
 }
 
 std::vector<Camera> cameras_of(const Dataset& dataset, Split split) {
@@ -79,8 +87,10 @@ std::vector<Camera> orbit(const RenderFlags& options,
     shape.height = first.height;
     shape.fov_degrees = field_of_view(first);
   }
-  if (options.width) shape.width = *options.width;
+  shape.model = camera_model(options.camera_model.value_or("pinhole"));
   if (options.height) shape.height = *options.height;
+  if (shape.model == CameraModel::kEquirectangular) shape.width = 2 * shape.height;
+  if (options.width) shape.width = *options.width;
   if (options.fov) shape.fov_degrees = *options.fov;
   if (options.elevation) shape.elevation_degrees = *options.elevation;
   if (options.distance) shape.distance = *options.distance;
@@ -89,6 +99,11 @@ std::vector<Camera> orbit(const RenderFlags& options,
 
 void run(const RenderFlags& options, const GlobalOptions& global) {
   if (is_scene_file(options.model)) {
+    if (options.camera_model) {
+      throw UsageError(
+          fmt::format("--camera-model is for models: the lens of {} is the [camera] of the file",
+                      options.model));
+    }
     render_scene(options, global);
     return;
   }
@@ -116,7 +131,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   trace.depth = options.depth;
   const std::unique_ptr<Context> context = open_context(options.device);
   const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
-  CameraTracer tracer(*context, trace);
+  ViewTracer tracer(*context, trace);
   tracer.update(gaussians);
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), cameras.size());
@@ -192,6 +207,11 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->add_option("--distance", options->distance,
                    "Of the eye from the centre (the model fits, or the cameras' median)")
       ->group(orbit);
+  command
+      ->add_option("--camera-model", options->camera_model,
+                   "pinhole, fisheye, equirectangular (twice as wide as high) or orthographic")
+      ->group(orbit)
+      ->check(one_of({"pinhole", "fisheye", "equirectangular", "orthographic"}));
   command->add_option("--up", options->up, "World direction that is up (0,-1,0, or the cameras')")
       ->group(orbit)
       ->check(triple())

@@ -26,6 +26,7 @@ struct RenderFlags {
   std::optional<double> elevation;
   std::optional<double> distance;
   std::optional<std::string> up;
+  std::optional<std::string> camera_model;
   std::optional<int> samples;
   std::optional<int> max_bounces;
   std::optional<std::uint64_t> seed;

@@ -33,10 +33,15 @@ void check(const OrbitOptions& options) {
     throw UsageError(fmt::format("An image of {}x{} pixels is none: both sides must be at least 1",
                                  options.width, options.height));
   }
-  if (!(options.fov_degrees > 0.0 && options.fov_degrees < 180.0)) {
+  if (options.model == CameraModel::kOpenCv) {
     throw UsageError(
-        fmt::format("A field of view of {} degrees makes no image: choose one between 0 and 180",
-                    options.fov_degrees));
+        "An orbit has no lens with OpenCV distortion: take cameras with distortion from a file");
+  }
+  const double widest = options.model == CameraModel::kFisheye ? 360.0 : 180.0;
+  if (!(options.fov_degrees > 0.0 && options.fov_degrees < widest)) {
+    throw UsageError(
+        fmt::format("A field of view of {} degrees makes no image: choose one between 0 and {}",
+                    options.fov_degrees, widest));
   }
   if (!(std::abs(options.elevation_degrees) < 90.0)) {
     throw UsageError(
@@ -137,9 +142,15 @@ std::vector<Camera> orbit_cameras(const SceneExtent& extent, const OrbitOptions&
   const glm::dvec3 second = glm::cross(up, first);
 
   const double half_fov = 0.5 * options.fov_degrees * kRadians;
-  const double distance =
-      options.distance > 0.0 ? options.distance : extent.radius / std::sin(half_fov);
-  const double focal = 0.5 * std::min(options.width, options.height) / std::tan(half_fov);
+  // A panorama, and a fisheye beyond 180 degrees, cannot be too near to see everything.
+  const bool all_around =
+      options.model == CameraModel::kEquirectangular || half_fov > 90.0 * kRadians;
+  const double fitting = extent.radius / (all_around ? 1.0 : std::sin(half_fov));
+  const double distance = options.distance > 0.0 ? options.distance : fitting;
+  const double half_side = 0.5 * std::min(options.width, options.height);
+  double focal = half_side / std::tan(half_fov);
+  if (options.model == CameraModel::kFisheye) focal = half_side / half_fov;
+  if (options.model == CameraModel::kOrthographic) focal /= distance;
   const double elevation = options.elevation_degrees * kRadians;
   std::vector<Camera> cameras;
   cameras.reserve(static_cast<std::size_t>(options.frames));
@@ -149,6 +160,7 @@ std::vector<Camera> orbit_cameras(const SceneExtent& extent, const OrbitOptions&
     const glm::dvec3 eye =
         extent.center + distance * (std::cos(elevation) * ring + std::sin(elevation) * up);
     cameras.push_back(look_at(eye, extent.center, up, options.width, options.height, focal));
+    cameras.back().model = options.model;
     cameras.back().name = fmt::format("frame_{:04d}", i);
   }
   return cameras;

@@ -38,6 +38,9 @@ struct OrbitOptions {
   double elevation_degrees = 20.0;  ///< of the eye above the plane through the centre
   double distance = 0.0;  ///< of the eye from the centre; 0 = the extent just fits the image
   glm::dvec3 up{0.0, -1.0, 0.0};
+  /// Any but kOpenCv. kFisheye sees fov_degrees (up to 360) without distortion, kOrthographic what
+  /// a pinhole sees of the plane through the centre, kEquirectangular everything.
+  CameraModel model = CameraModel::kPinhole;
 };
 
 /// Distance and elevation at which photos were taken, for an orbit that stays where the model was
@@ -48,8 +51,8 @@ OrbitOptions orbit_like(std::span<const Camera> cameras,
                         OrbitOptions options);
 
 /// Cameras on a full circle around `extent`, equally spaced, counter-clockwise seen from above, all
-/// looking at the centre. Throws UsageError for sizes, counts, angles or directions that make no
-/// camera.
+/// looking at the centre. Throws UsageError for sizes, counts, angles, models or directions that
+/// make no camera.
 std::vector<Camera> orbit_cameras(const SceneExtent& extent, const OrbitOptions& options);
 
 }  // namespace raysplats

@@ -150,7 +150,7 @@ void write_frame(const std::filesystem::path& stem,
   if (options.depth) write_image(file("_depth", ".png"), depth_preview(depth, rgba));
 }
 
-FrameReport write_frames(CameraTracer& tracer,
+FrameReport write_frames(ViewTracer& tracer,
                          const DeviceGaussians& gaussians,
                          std::span<const Camera> cameras,
                          const std::filesystem::path& folder,
@@ -165,13 +165,12 @@ FrameReport write_frames(CameraTracer& tracer,
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Camera camera = downscaled(cameras[i], 1.0 / options.supersample);
     const auto start = std::chrono::steady_clock::now();
-    tracer.forward(gaussians, camera);
-    const Image samples = tracer.download_image();
+    const Image samples = tracer.render(gaussians, camera);
     Image depth;
-    if (options.depth) depth = average_depth(tracer.download_depth(), samples, options.supersample);
+    if (options.depth) depth = average_depth(tracer.depth(), samples, options.supersample);
     report.trace_seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    report.capped_rays += tracer.statistics().capped_rays;
+    report.capped_rays += tracer.capped_rays();
     report.rays += samples.pixels();
     write_frame(folder / names[i], box_average(samples, options.supersample), depth, options);
     ++report.frames;

@@ -11,8 +11,8 @@
 
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
-#include "trace/camera_tracer.hpp"
 #include "trace/device_gaussians.hpp"
+#include "trace/view_tracer.hpp"
 
 namespace raysplats {
 
@@ -57,9 +57,9 @@ void write_frame(const std::filesystem::path& stem,
 
 /// Traces every camera and writes its files to `folder`, which exists. `done` hears the number of
 /// finished frames and returns false to stop early. The tracer is up to date with the Gaussians,
-/// and has options().depth set when options.depth is. Throws UsageError for a supersampling factor
-/// outside 1..16, DataError when a file fails.
-FrameReport write_frames(CameraTracer& tracer,
+/// and made with the option depth when options.depth is set. Throws UsageError for a supersampling
+/// factor outside 1..16, DataError when a file fails.
+FrameReport write_frames(ViewTracer& tracer,
                          const DeviceGaussians& gaussians,
                          std::span<const Camera> cameras,
                          const std::filesystem::path& folder,

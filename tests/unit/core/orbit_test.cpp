@@ -123,6 +123,32 @@ TEST_CASE("up, distance and elevation come from the cameras") {
   CHECK(estimate_up({}) == glm::dvec3(0, -1, 0));
 }
 
+TEST_CASE("orbits of other camera models see the extent too") {
+  const double degree = 3.14159265358979 / 180.0;
+  const SceneExtent extent{glm::dvec3(1, 0, 0), 2.0};
+  OrbitOptions options;
+  options.frames = 3;
+  options.width = 64;
+  options.height = 48;
+  options.model = CameraModel::kFisheye;
+  options.fov_degrees = 120.0;
+  const Camera fisheye = orbit_cameras(extent, options)[1];
+  CHECK(fisheye.model == CameraModel::kFisheye);
+  CHECK(fisheye.fx * 60.0 * degree == doctest::Approx(24.0));
+  CHECK(to_camera(fisheye, extent.center).z == doctest::Approx(2.0 / std::sin(60.0 * degree)));
+  options.fov_degrees = 220.0;
+  CHECK(to_camera(orbit_cameras(extent, options)[2], extent.center).z == doctest::Approx(2.0));
+  options.model = CameraModel::kEquirectangular;
+  options.fov_degrees = 45.0;
+  CHECK(to_camera(orbit_cameras(extent, options)[2], extent.center).z == doctest::Approx(2.0));
+  options.model = CameraModel::kOrthographic;
+  options.distance = 7.0;
+  // The plane through the centre as a pinhole at that distance shows it.
+  const Camera parallel = orbit_cameras(extent, options)[0];
+  CHECK(24.0 / parallel.fx == doctest::Approx(7.0 * std::tan(22.5 * degree)));
+  CHECK(to_camera(parallel, extent.center).z == doctest::Approx(7.0));
+}
+
 TEST_CASE("orbits that make no camera are refused") {
   const SceneExtent extent;
   const auto refused = [&](auto change) {
@@ -133,6 +159,11 @@ TEST_CASE("orbits that make no camera are refused") {
   refused([](OrbitOptions& o) { o.frames = 0; });
   refused([](OrbitOptions& o) { o.width = 0; });
   refused([](OrbitOptions& o) { o.fov_degrees = 180.0; });
+  refused([](OrbitOptions& o) { o.model = CameraModel::kOpenCv; });
+  refused([](OrbitOptions& o) {
+    o.model = CameraModel::kFisheye;
+    o.fov_degrees = 361.0;
+  });
   refused([](OrbitOptions& o) { o.elevation_degrees = 90.0; });
   refused([](OrbitOptions& o) { o.up = glm::dvec3(0.0); });
   refused([](OrbitOptions& o) { o.distance = -1.0; });

@@ -90,7 +90,7 @@ TEST_CASE("frames hold what the tracer saw") {
   TraceOptions trace;
   trace.background = {0.0f, 0.0f, 1.0f};
   trace.depth = true;
-  CameraTracer tracer(context, trace);
+  ViewTracer tracer(context, trace);
   const DeviceGaussians gaussians =
       DeviceGaussians::upload(context, red_balls(), ScaleActivation::kExp);
   tracer.update(gaussians);
@@ -120,8 +120,10 @@ TEST_CASE("frames hold what the tracer saw") {
 
   // The independent view of the same frame: four rays per pixel averaged from a picture of twice
   // the size.
-  tracer.forward(gaussians, downscaled(camera, 0.5));
-  const Image expected = box_average(tracer.download_image(), 2);
+  CameraTracer packets(context, trace);
+  packets.update(gaussians);
+  packets.forward(gaussians, downscaled(camera, 0.5));
+  const Image expected = box_average(packets.download_image(), 2);
   options.depth = false;
   write_frames(tracer, gaussians, cameras, folder.path, options);
   const Image exr = read_image(folder.path / "ball.exr");
@@ -148,6 +150,19 @@ TEST_CASE("frames hold what the tracer saw") {
   CHECK(depth.at(16, 10, 0) > 0.9f);
   CHECK(depth.at(24, 10, 0) < 0.1f);
   CHECK(depth.at(0, 0, 0) == 0.0f);
+
+  // A camera that packets cannot trace.
+  Camera panorama = camera;
+  panorama.model = CameraModel::kEquirectangular;
+  panorama.name = "panorama.png";
+  panorama.width = 64;
+  panorama.height = 32;
+  options.format = FrameFormat::kExr;
+  options.supersample = 1;
+  write_frames(tracer, gaussians, std::vector<Camera>{panorama}, folder.path, options);
+  const std::vector<float> around = exr_channel(folder.path / "panorama.exr", "Z");
+  CHECK(around[16 * 64 + 32] == doctest::Approx(4.0f).epsilon(0.02));
+  CHECK(around[16 * 64] == 0.0f);
 
   options.supersample = 0;
   CHECK_THROWS_AS(write_frames(tracer, gaussians, cameras, folder.path, options), UsageError);
