@@ -3,6 +3,7 @@
 // matrices, means, opacities and colours in lanes, and the boxes of the blocks.
 #include "bvh/box.h"
 #include "primitives/prefetch.h"
+#include "shared/color.h"
 #include "trace/gaussian.h"
 #include "trace/ray_block.h"
 
@@ -97,9 +98,8 @@ __kernel void fill_blocks(const uint count,
         v[9] = 0.5f * Q;
         v[RS_BLOCK_OPACITY] = opacity;
       }
-      color =
-          fmax(0.5f + 0.28209479177387814f * vload3(0, sh + (size_t)index * 3 * sh_coefficients),
-               (float3)(0.0f));
+      color = 0.5f + 0.28209479177387814f * vload3(0, sh + (size_t)index * 3 * sh_coefficients);
+      color = fmin(fmax(color, (float3)(0.0f)), (float3)(RS_MAX_COLOR));
     }
     __global float* record = blocks + (size_t)block * (RS_BLOCK_VECTORS * PACKET);
     for (int k = 0; k < RS_BLOCK_COLOR; ++k) record[k * PACKET + lane] = v[k];

@@ -3,6 +3,7 @@
 // 64-byte line (camera line or general form, docs/model.md) and the record that culls it (box of
 // the exact outline, least depth). One work-item per VECTOR Gaussians from number `begin` on, any
 // local size; end - begin is a multiple of VECTOR. Lines of hidden Gaussians are undefined.
+#include "shared/color.h"
 #include "trace/view.h"
 
 #ifndef PEAK_ORDER
@@ -106,9 +107,10 @@ void write_colour(const ViewGaussian* g, __global const float* sh, gv* colour) {
     green += basis[k] * c[3 * k + 1];
     b += basis[k] * c[3 * k + 2];
   }
-  colour[0] = larger(r, (gv)(0.0f));
-  colour[1] = larger(green, (gv)(0.0f));
-  colour[2] = larger(b, (gv)(0.0f));
+  const gv most = (gv)(RS_MAX_COLOR);
+  colour[0] = smaller(larger(r, (gv)(0.0f)), most);
+  colour[1] = smaller(larger(green, (gv)(0.0f)), most);
+  colour[2] = smaller(larger(b, (gv)(0.0f)), most);
 }
 
 __kernel void prepare_view(const uint begin,

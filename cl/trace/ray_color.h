@@ -4,6 +4,7 @@
 #define RS_TRACE_RAY_COLOR_H
 
 #include "primitives/prefetch.h"
+#include "shared/color.h"
 #include "shared/layout.h"
 #include "shared/sh.h"
 #include "trace/ray_block.h"
@@ -56,7 +57,7 @@ float4 hit_color(const RayScene* scene,
   even += basis[0] * vload3(0, c);
   for (int k = 1; k < active; k += 2) odd += basis[k] * vload3(k, c);
   for (int k = 2; k < active; k += 2) even += basis[k] * vload3(k, c);
-  return (float4)(fmax(even + odd, (float3)(0.0f)), 0.0f);
+  return (float4)(fmin(fmax(even + odd, (float3)(0.0f)), (float3)(RS_MAX_COLOR)), 0.0f);
 }
 
 // Blending reads a Gaussian's coefficients long after its hit is found: time to fetch them.
