@@ -174,7 +174,9 @@ void blend_hits(const RayScene* scene,
     const float alpha = pending->alpha[i];
     const float3 color = pending->color[i].xyz;
     const float projected = dot(color, gradient) + state->gradient.w;
-    const float3 by_color = color > 0.0f ? before[i] * alpha * gradient : (float3)(0.0f);
+    // Nothing passes where the colour is clamped.
+    const float3 by_color =
+        color > 0.0f && color < RS_MAX_COLOR ? before[i] * alpha * gradient : (float3)(0.0f);
     add_hit(scene, ray, basis, pending->index[i], alpha, before[i] * (projected - behind), by_color,
             state);
     behind = alpha * projected + (1.0f - alpha) * behind;

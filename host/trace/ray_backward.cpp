@@ -104,6 +104,9 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   if (!begun_ || shape_[0] != gaussians.count || degree_ != gaussians.active_sh_degree) {
     throw UsageError("RayBackward::begin() must come before add(), for the same Gaussians");
   }
+  if (color_direction == ColorDirection::kPerRay) {
+    throw UsageError("Gradients of rays with flags of their own are not taken: pass one direction");
+  }
   if (rays.size() < count || results.size() < count || gradients.size() < count) {
     throw UsageError(
         fmt::format("Gradients of {} rays cannot be taken from {} rays, {} results and {} "

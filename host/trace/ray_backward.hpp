@@ -46,8 +46,8 @@ class RayBackward {
 
   void begin(const DeviceGaussians& gaussians, const RayScreen& screen = {});
   /// The first `count` of `rays` again, with the `results` that the tracer gave them (background
-  /// included) and the gradients of those. Enqueues and returns. Throws UsageError without begin()
-  /// and for buffers that are too small.
+  /// included) and the gradients of those. Enqueues and returns. Throws UsageError without begin(),
+  /// for buffers that are too small, and for ColorDirection::kPerRay.
   void add(const DeviceGaussians& gaussians,
            const Buffer<Ray>& rays,
            std::size_t count,
