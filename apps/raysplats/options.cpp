@@ -140,7 +140,7 @@ void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOp
 DatasetOptions DataFlags::over(DatasetOptions base) const {
   if (downscale) base.downscale = *downscale;
   if (test_every) base.test_every = *test_every;
-  if (undistort) base.undistort = *undistort == "true";
+  if (undistort) base.undistort = *undistort;
   return base;
 }
 
@@ -162,12 +162,12 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags) {
          "Every n-th view is a test view where the data set has no split (8, or as the run)")
       ->group(group)
       ->check(at_least(0));
-  app.add_option("--undistort", flags.undistort,
-                 "false: compare with the photos' own pixels through their lenses (true, or as the "
-                 "run)")
-      ->group(group)
-      ->check(one_of({"true", "false"}))
-      ->type_name("BOOL");
+  app.add_flag_function(
+         "--undistort,!--no-undistort",
+         [&flags](std::int64_t count) { flags.undistort = count > 0; },
+         "Make photos with OpenCV distortion pinhole pictures (default, or as the run); no: keep "
+         "their own pixels and lenses")
+      ->group(group);
   return data;
 }
 

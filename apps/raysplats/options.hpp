@@ -76,7 +76,7 @@ struct DataFlags {
   std::string split = "test";
   std::optional<double> downscale;
   std::optional<int> test_every;
-  std::optional<std::string> undistort;
+  std::optional<bool> undistort;
 
   DatasetOptions over(DatasetOptions base) const;
 };
