@@ -16,6 +16,7 @@
 
 #include "base/atomic_file.hpp"
 #include "io/byte_reader.hpp"
+#include "io/exr_header.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -190,6 +191,7 @@ std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, 
     whole = has_whole_png_chunks(start, true);
   }
   if (!whole) fail_damaged(path.string());
+  if (format == "openexr") io::check_exr_header(path, kMaxSide);
   return open_decoder(format, path.string(), nullptr);
 }
 
