@@ -19,22 +19,30 @@ bool all_within(std::span<const float> values, float low, float high) {
 }
 
 constexpr float kHuge = std::numeric_limits<float>::max();
+// Brighter light than any picture needs, and small enough that sums and products of it stay finite.
+constexpr float kMaxLight = 1e6f;
 
 void check(const Material& m, std::size_t texture_count) {
-  const bool sound = all_within(m.color, 0, kHuge) && all_within(m.absorption, 0, kHuge) &&
-                     all_within(m.emission, 0, kHuge) &&
+  const bool sound = all_within(m.color, 0, 1) && all_within(m.absorption, 0, kHuge) &&
+                     all_within(m.emission, 0, kMaxLight) &&
                      all_within(std::array{m.opacity, m.roughness, shadow_opacity(m)}, 0, 1) &&
                      m.specular >= 0 && m.specular <= kHuge && m.ior > 0 && m.ior <= kHuge;
   if (!sound) {
     throw UsageError(fmt::format(
-        "Material '{}' is out of range: colours, absorption, emission and specular must not be "
-        "negative, opacity, roughness and shadow lie in [0, 1], and ior is positive",
+        "Material '{}' is out of range: colours, opacity, roughness and shadow lie in [0, 1], "
+        "emission in [0, 1e6], absorption and specular must not be negative, and ior is positive",
         m.name));
   }
   if (m.texture >= 0 && static_cast<std::size_t>(m.texture) >= texture_count) {
     throw UsageError(
         fmt::format("Material '{}' names texture {} of {}", m.name, m.texture, texture_count));
   }
+}
+
+void check_light(std::span<const float> values, const char* what) {
+  if (all_within(values, 0, kMaxLight)) return;
+  throw UsageError(
+      fmt::format("{} has a number that is not finite, negative or above 1e6: correct it", what));
 }
 
 RsMaterial record(const Material& m) {
@@ -98,6 +106,7 @@ SurfaceStore::SurfaceStore(Context& context, const Scene& scene)
     if (image.channels != 3 || image.pixels() == 0) {
       throw UsageError("A texture must have three channels and at least one texel");
     }
+    check_light(image.data, "A texture");
     textures.push_back(
         {static_cast<std::uint32_t>(texels.size() / 3), image.width, image.height, 0});
     texels.insert(texels.end(), image.data.begin(), image.data.end());
@@ -110,6 +119,9 @@ SurfaceStore::SurfaceStore(Context& context, const Scene& scene)
     check(material, scene.textures.size());
     materials.push_back(record(material));
   }
+  check_light(scene.environment.color, "The environment's colour");
+  check_light(scene.environment.equirect.data, "The environment's picture");
+  check_light(scene.render.ambient, "The ambient light");
   std::vector<RsLight> lights;
   for (const Light& light : scene.lights) lights.push_back(record(light, lights.size()));
   store(context, textures, "textures", textures_);
