@@ -227,6 +227,99 @@ void make_checkpoints(const fs::path& root) {
   }
 }
 
+void make_meshes(const fs::path& root) {
+  const Corpus corpus(root, "mesh");
+  corpus.add("square.obj",
+             std::string(1, '\0') +
+                 "mtllib input.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\n"
+                 "vn 0 0 1\nusemtl m\nf 1/1/1 2/2/1 3/1/1 -1/2/1\nf -4 -3 -2\n");
+  corpus.add(
+      "material.mtl",
+      std::string(1, '\0') +
+          "newmtl m\nKd .5 .5 .5\nKs 1 1 1\nNs 20\nKe 0 0 0\nNi 1.5\nd .5\nillum 3\n"
+          "map_Kd input.png\nmtllib input.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+  corpus.add("triangle.ply",
+             "\1ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+             "property float z\nproperty float nx\nproperty float ny\nproperty float nz\n"
+             "property float s\nproperty float t\nelement face 1\n"
+             "property list uchar int vertex_indices\nend_header\n0 0 0 0 0 1 0 0\n"
+             "1 0 0 0 0 1 1 0\n0 1 0 0 0 1 0 1\n3 0 1 2\n");
+  const std::string gltf =
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,)"
+      R"("translation":[0,0,1],"rotation":[0,0,0,1],"scale":[1,1,1],"children":[1]},{}],"meshes":)"
+      R"([{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],"materials":)"
+      R"([{"pbrMetallicRoughness":{"baseColorFactor":[1,0,0,1],"metallicFactor":0}}],"buffers":)"
+      R"([{BUFFER"byteLength":44}],"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},)"
+      R"({"buffer":0,"byteOffset":36,"byteLength":6}],"accessors":[{"bufferView":0,"componentType")"
+      R"(:5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},{"bufferView":1,)"
+      R"("componentType":5123,"count":3,"type":"SCALAR"}]})";
+  const auto with_buffer = [&](const std::string& uri) {
+    std::string text = gltf;
+    return text.replace(text.find("BUFFER"), 6, uri);
+  };
+  corpus.add("triangle.gltf",
+             "\2" + with_buffer(R"("uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAA)"
+                                R"(AACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=",)"));
+  std::string json = with_buffer("");
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  Bytes glb;
+  glb.add_text("glTF").add(2u).add(static_cast<std::uint32_t>(12 + 8 + json.size() + 8 + 44));
+  glb.add(static_cast<std::uint32_t>(json.size())).add_text("JSON").add_text(json);
+  glb.add(44u).add_text(std::string_view("BIN\0", 4));
+  for (const float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) glb.add(value);
+  for (const std::uint16_t index : {0, 1, 2, 0}) glb.add(index);
+  corpus.add("triangle.glb", glb.take(3));
+}
+
+void make_scenes(const fs::path& root) {
+  const Corpus corpus(root, "scene");
+  corpus.add("small.toml", R"([[model]]
+file = "model.ply"
+translate = [0, 1, 0]
+[[mesh]]
+file = "mesh.obj"
+matrix = [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]
+material = "gold"
+normals = "smooth"
+crease-angle = 40
+turn = { axis = [0, 1, 0], degrees = 360 }
+move = [0, 0, 1]
+[[mesh]]
+file = "mesh.obj"
+scale = 0.5
+rotate = { axis = [0, 0, 1], degrees = 25 }
+[[material]]
+name = "gold"
+kind = "mirror"
+color = [0.9, 0.7, 0.3]
+texture = "image.png"
+roughness = 0.1
+[[light]]
+kind = "sphere"
+position = [1.5, -3, 0.5]
+radius = 0.3
+intensity = 8
+[[light]]
+kind = "directional"
+direction = [0, 1, 0]
+[environment]
+image = "image.png"
+[camera]
+width = 16
+height = 9
+fov = 50
+up = [0, -1, 0]
+orbit = { frames = 3, elevation = 15, distance = 3 }
+[render]
+samples = 2
+max-bounces = 4
+[render.shadows]
+strength = 0.6
+[animation]
+frames = 3
+)");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -243,5 +336,7 @@ int main(int argc, char** argv) {
   make_images(root);
   make_reports(root);
   make_checkpoints(root);
+  make_meshes(root);
+  make_scenes(root);
   return 0;
 }
