@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Runs the small kernel tests (their names contain "[small]") on Oclgrind, an OpenCL device that checks every memory
 # access, data races and the arguments of API calls. Oclgrind's own exit status does not tell, so the
-# log must stay empty.
+# log must stay empty. Kernels are built without optimisation: Oclgrind 21.10 gets what LLVM makes of a vector
+# comparison that is added to integers wrong (it extends true to 255, not 1).
 # usage: scripts/oclgrind.sh [BUILD]     (default: build/release, brought up to date first)
 # Needs the Debian package oclgrind.
 set -euo pipefail
@@ -36,7 +37,8 @@ for program in "$build"/bin/test_*; do
   say "$name: $count test cases"
   log=$work/$name.log
   : >"$log"
-  if ! oclgrind --data-races --check-api --log "$log" "$program" --test-case="$filter"; then
+  if ! oclgrind --data-races --check-api --build-options -cl-opt-disable --log "$log" \
+    "$program" --test-case="$filter"; then
     failed+=("$name: a test failed")
   fi
   if [[ -s $log ]]; then

@@ -53,6 +53,18 @@ TEST_CASE("scan: every shape gives the same sums") {
   }
 }
 
+TEST_CASE("scan: few elements in both forms [small]") {
+  Context context(select_device(""));
+  for (const std::size_t size : {1u, 16u}) {
+    for (const std::size_t groups : {1u, 3u}) {
+      CAPTURE(size);
+      CAPTURE(groups);
+      Scan scan(context, ChunkShape{groups, size, 1});
+      for (const std::size_t count : {0u, 1u, 5u, 64u, 131u}) check_scan(context, scan, count, 8);
+    }
+  }
+}
+
 TEST_CASE("scan: a buffer without room for the total is refused") {
   Context context(select_device(""));
   Scan scan(context);

@@ -15,7 +15,8 @@ namespace raysplats {
 namespace {
 
 Context& context() {
-  static Context instance(select_device(""));
+  // Not static: at the end of the program it has to go before what a driver keeps per thread.
+  thread_local Context instance(select_device(""));
   return instance;
 }
 
@@ -160,7 +161,8 @@ TEST_CASE("adam: many steps agree with double precision, for every SH degree and
   }
 }
 
-TEST_CASE("adam: the first step moves every parameter by its learning rate against the sign") {
+TEST_CASE(
+    "adam: the first step moves every parameter by its learning rate against the sign [small]") {
   Fixture f(5, 1);
   for (auto& group : f.gradient) {
     for (float& value : group) value = -0.125f;
@@ -189,7 +191,7 @@ TEST_CASE("adam: a zero gradient with the smallest epsilon moves nothing") {
   f.check(adam, 1e-30);
 }
 
-TEST_CASE("adam: a Gaussian with a non-finite gradient is skipped and counted") {
+TEST_CASE("adam: a Gaussian with a non-finite gradient is skipped and counted [small]") {
   for (const std::size_t count : {1u, 64u, 150u}) {
     Fixture f(count, 2);
     const AdamOptions options;
@@ -212,7 +214,7 @@ TEST_CASE("adam: a Gaussian with a non-finite gradient is skipped and counted") 
   }
 }
 
-TEST_CASE("adam: visible_only leaves what no ray met alone") {
+TEST_CASE("adam: visible_only leaves what no ray met alone [small]") {
   Fixture f(200, 1);
   AdamOptions options;
   options.visible_only = true;
@@ -232,7 +234,7 @@ TEST_CASE("adam: visible_only leaves what no ray met alone") {
   f.check(adam, 1e-5);
 }
 
-TEST_CASE("adam: remap moves moments with their Gaussians, reset zeroes one group") {
+TEST_CASE("adam: remap moves moments with their Gaussians, reset zeroes one group [small]") {
   Fixture f(90, 2);
   const AdamOptions options;
   Adam adam(context(), options);

@@ -18,7 +18,8 @@ namespace raysplats {
 namespace {
 
 Context& context() {
-  static Context instance(select_device(""));
+  // Not static: at the end of the program it has to go before what a driver keeps per thread.
+  thread_local Context instance(select_device(""));
   return instance;
 }
 
@@ -193,7 +194,7 @@ TEST_CASE("image loss: value and gradient agree with the definition in double pr
   }
 }
 
-TEST_CASE("image loss: masks weigh pixels, alpha over a background composites the photo") {
+TEST_CASE("image loss: masks weigh pixels, alpha over a background composites the photo [small]") {
   for (const bool alpha_is_background : {false, true}) {
     for (const PixelLoss pixel_loss : {PixelLoss::kL1, PixelLoss::kL2}) {
       CAPTURE(alpha_is_background);
