@@ -11,10 +11,38 @@
 #include "raysplats/error.hpp"
 
 namespace raysplats {
+namespace {
+
+// The name of a file is durable only once its folder is synced; a folder that cannot be opened is
+// no error.
+void sync_folder(const std::filesystem::path& folder) {
+  const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory < 0) return;
+  ::fsync(directory);
+  ::close(directory);
+}
+
+// .NAME.PROCESS.tmp or .NAME.PROCESS.tmp.EXTENSION, as AtomicFile makes them.
+bool is_temporary_name(const std::string& name) {
+  const std::size_t mark = name.rfind(".tmp");
+  if (mark == std::string::npos || name.front() != '.') return false;
+  if (mark + 4 != name.size() && name[mark + 4] != '.') return false;
+  const std::size_t dot = name.rfind('.', mark - 1);
+  if (dot == std::string::npos || dot == 0 || dot + 1 == mark) return false;
+  return name.find_first_not_of("0123456789", dot + 1) == mark;
+}
+
+}  // namespace
 
 AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)) {
   const std::filesystem::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
   std::error_code error;
+  for (std::filesystem::path above = folder;
+       !above.empty() && above.has_relative_path() && !std::filesystem::exists(above, error);) {
+    above = above.has_parent_path() ? above.parent_path() : ".";
+    synced_folders_.push_back(above);
+  }
+  synced_folders_.insert(synced_folders_.begin(), folder);
   std::filesystem::create_directories(folder, error);
   temporary_ = folder / fmt::format(".{}.{}.tmp{}", target_.stem().string(), ::getpid(),
                                     target_.extension().string());
@@ -51,14 +79,23 @@ void AtomicFile::commit() {
   if (::close(descriptor) != 0) fail("be closed");
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("be renamed into place");
   committed_ = true;
-  // The rename itself is durable only once the folder is synced; a folder that cannot be opened is
-  // no error.
-  const std::filesystem::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
-  const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (directory >= 0) {
-    ::fsync(directory);
-    ::close(directory);
+  for (const std::filesystem::path& folder : synced_folders_) sync_folder(folder);
+}
+
+std::size_t remove_stale_temporaries(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> stale;
+  for (std::filesystem::recursive_directory_iterator entry(folder, error), end;
+       !error && entry != end; entry.increment(error)) {
+    std::error_code status;
+    if (entry->is_regular_file(status) && is_temporary_name(entry->path().filename().string()))
+      stale.push_back(entry->path());
   }
+  std::size_t removed = 0;
+  for (const std::filesystem::path& path : stale) {
+    if (std::filesystem::remove(path, error)) ++removed;
+  }
+  return removed;
 }
 
 void write_text_file(const std::filesystem::path& path, std::string_view text) {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <string_view>
+#include <vector>
 
 namespace raysplats {
 
@@ -29,9 +31,14 @@ class AtomicFile {
   void fail(const char* action) const;
   std::filesystem::path target_;
   std::filesystem::path temporary_;
+  std::vector<std::filesystem::path> synced_folders_;  // by commit(): the target's and new ones
   int descriptor_ = -1;
   bool committed_ = false;
 };
+
+/// Removes the temporary files that processes which were killed left in `folder` and below. Only
+/// for folders that no other process writes to. Returns how many there were.
+std::size_t remove_stale_temporaries(const std::filesystem::path& folder);
 
 /// Writes a whole text file atomically.
 void write_text_file(const std::filesystem::path& path, std::string_view text);

@@ -9,7 +9,15 @@ namespace {
 // A signal handler can reach nothing but a variable of static storage.
 volatile std::sig_atomic_t interrupted = 0;
 
-extern "C" void mark_interrupt(int) { interrupted = 1; }
+// The second signal ends the process at once, whichever of the two it is: delivered again when the
+// handler returns, it meets the default action.
+extern "C" void mark_interrupt(int signal) {
+  if (interrupted != 0) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+  }
+  interrupted = 1;
+}
 
 }  // namespace
 
@@ -18,7 +26,7 @@ InterruptGuard::InterruptGuard() {
   struct sigaction action {};
   action.sa_handler = mark_interrupt;
   sigemptyset(&action.sa_mask);
-  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+  action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, &previous_int_);
   sigaction(SIGTERM, &action, &previous_term_);
 }
