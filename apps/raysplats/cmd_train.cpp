@@ -25,7 +25,7 @@ struct Options {
 /// A resumed run keeps its options; the command line and a --config go before them.
 void keep_run_options(CLI::App& command, Options& options) {
   if (options.resume.empty() || command.get_option("--config")->count() > 0) return;
-  std::filesystem::path run = options.resume;
+  std::filesystem::path run = options.resume == "latest" ? options.output : options.resume;
   if (!std::filesystem::is_directory(run)) run = run.parent_path().parent_path();
   const std::filesystem::path config = run / "config.toml";
   if (!std::filesystem::exists(config)) return;
@@ -65,7 +65,8 @@ Command add_train_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("RUN");
   command
       ->add_option("--resume", options->resume,
-                   "Go on from the newest checkpoint of a run, with its options")
+                   "Go on from the newest whole checkpoint of a run, with its options; 'latest' "
+                   "means that of --output, or a new start while there is none")
       ->type_name("RUN");
   add_device_flags(*command, options->device);
   add_train_options(*command, options->train);

@@ -7,6 +7,8 @@
 // owns BLOCK consecutive Gaussians, so every group is one contiguous run for it; only a block with
 // an exception is walked Gaussian by Gaussian.
 //
+// A guard word that is not 0 turns the whole step off (train/guard.cl).
+//
 // Launch of adam_step: one work-item per block, any work-group size.
 // Complexity: reads parameter, gradient and both moments once, writes all but the gradient: bound
 // by memory.
@@ -115,6 +117,7 @@ __kernel void adam_step(__global float* means,
                         __global float* sh_second,
                         const __global float* screen,
                         __global uint* skipped,
+                        const __global uint* guard,
                         uint count,
                         int sh_floats,
                         float means_rate,
@@ -131,7 +134,7 @@ __kernel void adam_step(__global float* means,
                         float root_scale,
                         int visible_only) {
   const size_t first = get_global_id(0) * (size_t)BLOCK;
-  if (first >= count) return;
+  if (first >= count || guard[0] != 0) return;
   const size_t last = min(first + BLOCK, (size_t)count);
   const AdamConstants k = {beta1, rest1, beta2, rest2, epsilon, root_scale};
   const AdamGroup mean_group = {means, means_gradient, means_first, means_second};

@@ -19,15 +19,16 @@
 #define ROLE_FIRST_CHILD 2u
 
 // statistics: 2 N, {sum of the signal, number of views that saw the Gaussian}; signal 0 = screen, 1
-// = absolute.
+// = absolute. A signal that is not finite is left out; a guard word that is not 0 turns all off.
 kernel void accumulate_screen(uint count,
                               uint signal,
                               global const float* screen,
+                              global const uint* guard,
                               global float* statistics) {
   const uint i = get_global_id(0);
-  if (i >= count) return;
+  if (i >= count || guard[0] != 0) return;
   const float visible = screen[3 * i + 2];
-  if (visible > 0.0f) {
+  if (visible > 0.0f && isfinite(screen[3 * i + signal])) {
     statistics[2 * i] += screen[3 * i + signal];
     statistics[2 * i + 1] += 1.0f;
   }

@@ -30,7 +30,8 @@ Adam::Adam(Context& context, const AdamOptions& options, int vector)
     : context_(context),
       options_(options),
       serial_(context.device().type == DeviceType::kCpu),
-      skipped_(context, 1, "Adam skipped updates") {
+      skipped_(context, 1, "Adam skipped updates"),
+      open_guard_(context, 1, "Adam guard") {
   if (!(options.beta1 >= 0 && options.beta1 < 1 && options.beta2 >= 0 && options.beta2 < 1 &&
         options.epsilon > 0)) {
     throw UsageError(fmt::format(
@@ -43,6 +44,7 @@ Adam::Adam(Context& context, const AdamOptions& options, int vector)
   step_kernel_ = context.kernel("train/adam.cl", "adam_step", build);
   remap_kernel_ = context.kernel("train/adam.cl", "remap_rows", build);
   skipped_.clear();
+  open_guard_.clear();
 }
 
 void Adam::initialize(std::size_t count, int sh_degree) {
@@ -60,7 +62,8 @@ void Adam::initialize(std::size_t count, int sh_degree) {
 
 void Adam::step(DeviceGaussians& gaussians,
                 const GaussianGradients& gradients,
-                const AdamRates& rates) {
+                const AdamRates& rates,
+                const Buffer<std::uint32_t>* guard) {
   if (moments_[0].width == 0) initialize(gaussians.count, gaussians.sh_degree);
   Moments& sh = moments(ParameterGroup::kSh);
   const std::size_t sh_floats = 3 * static_cast<std::size_t>(sh_coefficients(gaussians.sh_degree));
@@ -87,13 +90,13 @@ void Adam::step(DeviceGaussians& gaussians,
       gradients.quaternions, quaternion.first, quaternion.second, gaussians.scales,
       gradients.scales, scale.first, scale.second, gaussians.opacities, gradients.opacities,
       opacity.first, opacity.second, gaussians.sh, gradients.sh, sh.first, sh.second,
-      gradients.screen, skipped_, static_cast<std::uint32_t>(count_),
-      static_cast<std::int32_t>(sh_floats), rate(rates.means), rate(rates.quaternions),
-      rate(rates.scales), rate(rates.opacities), rate(rates.sh_dc), rate(rates.sh_rest),
-      static_cast<float>(options_.beta1), static_cast<float>(1.0 - options_.beta1),
-      static_cast<float>(options_.beta2), static_cast<float>(1.0 - options_.beta2),
-      static_cast<float>(options_.epsilon), static_cast<float>(1.0 / std::sqrt(bias2)),
-      options_.visible_only ? 1 : 0);
+      gradients.screen, skipped_, guard != nullptr ? *guard : open_guard_,
+      static_cast<std::uint32_t>(count_), static_cast<std::int32_t>(sh_floats), rate(rates.means),
+      rate(rates.quaternions), rate(rates.scales), rate(rates.opacities), rate(rates.sh_dc),
+      rate(rates.sh_rest), static_cast<float>(options_.beta1),
+      static_cast<float>(1.0 - options_.beta1), static_cast<float>(options_.beta2),
+      static_cast<float>(1.0 - options_.beta2), static_cast<float>(options_.epsilon),
+      static_cast<float>(1.0 / std::sqrt(bias2)), options_.visible_only ? 1 : 0);
 }
 
 void Adam::remap(const Buffer<std::uint32_t>& source, std::size_t new_count) {

@@ -50,7 +50,10 @@ class Adam {
   /// Applies one step; enqueues without waiting. The first call initialises by itself. Throws
   /// UsageError when the number of Gaussians or SH coefficients is not that of the moments (remap()
   /// or initialize() was forgotten).
-  void step(DeviceGaussians& gaussians, const GaussianGradients& gradients, const AdamRates& rates);
+  void step(DeviceGaussians& gaussians,
+            const GaussianGradients& gradients,
+            const AdamRates& rates,
+            const Buffer<std::uint32_t>* guard = nullptr);
 
   /// After densification: Gaussian i continues with the moments of the old Gaussian source[i], or
   /// with zeros when that is 0xffffffff.
@@ -68,6 +71,8 @@ class Adam {
   /// Uploads both moments of a group; the sizes must be those of initialize().
   void restore(ParameterGroup group, std::span<const float> first, std::span<const float> second);
 
+  /// The same count on the device.
+  const Buffer<std::uint32_t>& refused() const { return skipped_; }
   /// Updates skipped since the start because a gradient was not finite; blocks.
   std::uint32_t skipped() const { return skipped_.read(0); }
 
@@ -87,6 +92,7 @@ class Adam {
   bool serial_;
   Kernel step_kernel_, remap_kernel_;
   Buffer<std::uint32_t> skipped_;
+  Buffer<std::uint32_t> open_guard_;  // a guard that lets every step pass
   std::array<Moments, kParameterGroups.size()> moments_;
   std::size_t count_ = 0;
   std::int64_t steps_ = 0;

@@ -23,10 +23,16 @@ static_assert(std::endian::native == std::endian::little,
 
 // The line end shows transfers in text mode, as in PNG.
 constexpr std::array<char, 8> kMagic{'R', 'S', 'C', 'K', 'P', 'T', '\r', '\n'};
-constexpr std::uint32_t kVersion = 1;
+// Version 1 had the seconds of training in its header and no data set.
+constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kOldestVersion = 1;
 constexpr std::uint32_t kMaxSections = 64;
 constexpr std::uint64_t kMaxHeader = 1 << 20;
 constexpr std::size_t kNameBytes = 32;
+constexpr int kMaxShDegree = 4;
+// Far above what any device holds, and small enough that sizes made of it cannot overflow.
+constexpr std::uint64_t kMaxGaussians = std::uint64_t{1} << 40;
+constexpr std::int64_t kMaxIterations = std::int64_t{1} << 60;
 
 struct Preamble {
   std::array<char, 8> magic;
@@ -85,22 +91,40 @@ nlohmann::json header_of(const Checkpoint& c) {
           {"active_sh_degree", c.active_sh_degree},
           {"scale_activation", c.scale_activation},
           {"scene_extent", c.scene_extent},
-          {"training_seconds", c.training_seconds},
+          {"dataset", c.dataset},
+          {"bad_steps", c.bad_steps},
+          {"bad_steps_in_a_row", c.bad_steps_in_a_row},
           {"config", c.config}};
 }
 
-Checkpoint parse_header(const std::string& text) {
+// A whole number of the header within its range: conversions of others would wrap or be undefined.
+template <class T>
+void get_whole(const nlohmann::json& json, const char* key, T low, T high, T& target) {
+  const nlohmann::json& value = json.at(key);
+  const bool fits = value.is_number_unsigned()
+                        ? value.get<std::uint64_t>() <= static_cast<std::uint64_t>(high)
+                        : value.is_number_integer() &&
+                              value.get<std::int64_t>() >= static_cast<std::int64_t>(low);
+  if (!fits) throw DataError(fmt::format("'{}' is out of range", key));
+  value.get_to(target);
+}
+
+Checkpoint parse_header(const std::string& text, std::uint32_t version) {
   const nlohmann::json json = nlohmann::json::parse(text);
   Checkpoint c;
-  json.at("iteration").get_to(c.iteration);
-  json.at("count").get_to(c.count);
-  json.at("seed").get_to(c.seed);
-  json.at("optimiser_steps").get_to(c.optimiser_steps);
-  json.at("sh_degree").get_to(c.sh_degree);
-  json.at("active_sh_degree").get_to(c.active_sh_degree);
+  get_whole<std::int64_t>(json, "iteration", 0, kMaxIterations, c.iteration);
+  get_whole<std::uint64_t>(json, "count", 0, kMaxGaussians, c.count);
+  get_whole<std::uint64_t>(json, "seed", 0, UINT64_MAX, c.seed);
+  get_whole<std::int64_t>(json, "optimiser_steps", 0, kMaxIterations, c.optimiser_steps);
+  get_whole<int>(json, "sh_degree", 0, kMaxShDegree, c.sh_degree);
+  get_whole<int>(json, "active_sh_degree", 0, c.sh_degree, c.active_sh_degree);
   json.at("scale_activation").get_to(c.scale_activation);
   json.at("scene_extent").get_to(c.scene_extent);
-  json.at("training_seconds").get_to(c.training_seconds);
+  if (version > 1) {
+    json.at("dataset").get_to(c.dataset);
+    get_whole<std::uint32_t>(json, "bad_steps", 0, UINT32_MAX, c.bad_steps);
+    get_whole<std::uint32_t>(json, "bad_steps_in_a_row", 0, UINT32_MAX, c.bad_steps_in_a_row);
+  }
   json.at("config").get_to(c.config);
   return c;
 }
@@ -139,8 +163,10 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
   Preamble preamble{};
   reader.read(&preamble, sizeof(preamble));
   if (preamble.magic != kMagic) reader.fail("is not a raysplats checkpoint");
-  if (preamble.version != kVersion)
-    reader.fail(fmt::format("has the unknown version {}", preamble.version));
+  if (preamble.version < kOldestVersion || preamble.version > kVersion) {
+    reader.fail(fmt::format("has version {}, and this program reads {} to {}", preamble.version,
+                            kOldestVersion, kVersion));
+  }
   if (preamble.header_bytes > std::min(kMaxHeader, reader.left()))
     reader.fail("has a damaged header");
   if (preamble.sections > kMaxSections) reader.fail("has a damaged section table");
@@ -150,8 +176,8 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
     reader.fail("has a damaged header");
   Checkpoint checkpoint;
   try {
-    checkpoint = parse_header(header);
-  } catch (const nlohmann::json::exception& error) {
+    checkpoint = parse_header(header, preamble.version);
+  } catch (const std::exception& error) {
     reader.fail(fmt::format("has a header that cannot be understood ({})", error.what()));
   }
   std::vector<SectionEntry> table(preamble.sections);

@@ -9,7 +9,8 @@
 
 namespace raysplats {
 
-/// The whole state of a training run between two iterations. As a file (.rsck, little-endian):
+/// The whole state of a training run between two iterations, and nothing else: equal states give
+/// equal files (no times, no paths). As a file (.rsck, little-endian):
 ///   8 bytes "RSCKPT\r\n" | u32 version | u32 number of sections | u64 bytes of the header | u64
 ///   xxh64 of the header | header (JSON: everything that is no array) | section table, 56 bytes
 ///   each: name (32 bytes, zero-padded), u64 offset in the file, u64 bytes, u64 xxh64 | u64 xxh64
@@ -23,7 +24,9 @@ struct Checkpoint {
   int active_sh_degree = 0;
   std::string scale_activation;  ///< "exp" or "sigmoid"
   double scene_extent = 0;
-  double training_seconds = 0;                         ///< evaluation excluded
+  std::string dataset;          ///< dataset_fingerprint(); empty in files of version 1
+  std::uint32_t bad_steps = 0;  ///< StepGuard::Counts
+  std::uint32_t bad_steps_in_a_row = 0;
   std::string config;                                  ///< configuration of the run, TOML
   std::map<std::string, std::vector<float>> sections;  ///< names of at most 31 characters
 };

@@ -20,10 +20,16 @@ std::uint32_t low_word(std::uint64_t bits) { return static_cast<std::uint32_t>(b
 }  // namespace
 
 DensityControl::DensityControl(Context& context, const TrainOptions& options, double extent)
-    : context_(context), options_(options), extent_(extent) {}
+    : context_(context),
+      options_(options),
+      extent_(extent),
+      open_guard_(context, 1, "density guard") {
+  open_guard_.clear();
+}
 
 void DensityControl::accumulate(const DeviceGaussians& gaussians,
-                                const GaussianGradients& gradients) {
+                                const GaussianGradients& gradients,
+                                const Buffer<std::uint32_t>* guard) {
   if (statistics_.size() != 2 * gaussians.count) {
     statistics_ = Buffer<float>(context_, 2 * gaussians.count, "density statistics");
     statistics_.clear();
@@ -31,7 +37,7 @@ void DensityControl::accumulate(const DeviceGaussians& gaussians,
   const std::uint32_t signal = options_.densify_signal == DensifySignal::kAbsolute ? 1u : 0u;
   context_.kernel(kProgram, "accumulate_screen")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
-              signal, gradients.screen, statistics_);
+              signal, gradients.screen, guard != nullptr ? *guard : open_guard_, statistics_);
 }
 
 bool DensityControl::refines_at(std::int64_t iteration) const {

@@ -18,8 +18,11 @@ class DensityControl {
   /// `extent` is the scene extent that the relative sizes of the options refer to.
   DensityControl(Context& context, const TrainOptions& options, double extent);
 
-  /// Adds the statistics of one view; enqueues without waiting.
-  void accumulate(const DeviceGaussians& gaussians, const GaussianGradients& gradients);
+  /// Adds the statistics of one view; enqueues without waiting. A `guard` whose first word is not 0
+  /// keeps them as they are.
+  void accumulate(const DeviceGaussians& gaussians,
+                  const GaussianGradients& gradients,
+                  const Buffer<std::uint32_t>* guard = nullptr);
 
   /// Whether refine() is due after `iteration` (counted from 1), or resetting the opacities is.
   bool refines_at(std::int64_t iteration) const;
@@ -45,6 +48,7 @@ class DensityControl {
   TrainOptions options_;
   double extent_;
   Buffer<float> statistics_;
+  Buffer<std::uint32_t> open_guard_;
 };
 
 }  // namespace raysplats

@@ -123,6 +123,11 @@ void ImageLoss::evaluate(const Buffer<float>& image,
                            -s.ssim_weight * share);
 }
 
+ImageLoss::Partials ImageLoss::partials() const {
+  const Impl& s = *impl_;
+  return {s.pixel_partials, s.ssim_partials, static_cast<int>(s.tiles_x() * s.tiles_y())};
+}
+
 ImageLoss::Value ImageLoss::value() {
   Impl& s = *impl_;
   if (s.width == 0) throw UsageError("The loss has no value before an image was evaluated");

@@ -24,6 +24,14 @@ namespace raysplats {
 /// 1 everywhere.
 class ImageLoss {
  public:
+  /// Where evaluate() leaves its sums: per tile {pixel term, squared error, weight, 0}, and SSIM
+  /// per tile and channel.
+  struct Partials {
+    const Buffer<std::array<float, 4>>& pixel;
+    const Buffer<float>& ssim;
+    int tiles;
+  };
+
   struct Value {
     double total = 0;
     double pixel = 0;
@@ -51,6 +59,9 @@ class ImageLoss {
   /// Loss of the last evaluate(); blocks. Sums are taken in a fixed order: equal inputs give equal
   /// values.
   Value value();
+
+  /// Of the last evaluate().
+  Partials partials() const;
 
  private:
   struct Impl;

@@ -8,25 +8,40 @@
 
 namespace raysplats {
 
-/// Device memory that a training run will need, in bytes, from the largest number of Gaussians it
-/// may reach.
+/// What a training run wants to hold.
+struct MemoryDemand {
+  std::size_t gaussians = 0;  ///< most that it may reach
+  std::size_t pixels = 0;     ///< of the largest view
+  std::size_t views = 0;      ///< photos to train on
+};
+
+/// Device memory that a training run will need, in bytes.
 struct MemoryEstimate {
   std::size_t gaussians =
       0;  ///< parameters, gradients, Adam moments, the second copy while densifying
-  std::size_t tracing = 0;  ///< records per view, tree and sort buffers
+  std::size_t tracing = 0;  ///< records per view, sums of gradients and sort buffers
   std::size_t images = 0;   ///< photos within their budget, and the buffers of one view
-  std::size_t hits = 0;     ///< memory-budget
+  std::size_t hits = 0;  ///< hit streams, tile lists and private gradients: memory-budget at most
   std::size_t largest_buffer = 0;
   std::size_t total() const { return gaussians + tracing + images + hits; }
 };
 
-/// `pixels` of the largest view, `views` photos to train on.
 MemoryEstimate estimate_memory(const TrainOptions& options,
-                               std::size_t max_gaussians,
-                               std::size_t pixels,
-                               std::size_t views);
+                               const MemoryDemand& demand,
+                               const DeviceInfo& device);
 
-/// Throws ResourceError with the figures when the device has less than that.
-void check_memory(const MemoryEstimate& estimate, const DeviceInfo& device);
+/// Whether the device has that much, with a tenth left for the driver and other programs.
+bool fits(const MemoryEstimate& estimate, const DeviceInfo& device);
+
+/// The most Gaussians with which a run of these views fits; 0 when none do.
+std::size_t gaussians_that_fit(const TrainOptions& options,
+                               const MemoryDemand& demand,
+                               const DeviceInfo& device);
+
+/// Throws ResourceError with the figures, and how many Gaussians would fit, when the device has
+/// less than the run needs.
+void check_memory(const TrainOptions& options,
+                  const MemoryDemand& demand,
+                  const DeviceInfo& device);
 
 }  // namespace raysplats

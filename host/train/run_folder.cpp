@@ -2,12 +2,16 @@
 #include "train/run_folder.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "base/atomic_file.hpp"
 #include "base/output_directory.hpp"
@@ -19,6 +23,8 @@ namespace raysplats {
 namespace {
 
 constexpr char kCsvHeader[] = "iteration,seconds,loss,psnr,gaussians,it_per_s\n";
+
+std::ptrdiff_t columns(std::string_view row) { return std::count(row.begin(), row.end(), ','); }
 
 nlohmann::json to_json(const EvaluationRow& row) {
   return {{"iteration", row.iteration}, {"training_seconds", row.training_seconds},
@@ -41,6 +47,13 @@ EvaluationRow evaluation_from_json(const nlohmann::json& json) {
 
 RunFolder::RunFolder(std::filesystem::path path) : path_(std::move(path)) {
   make_output_directory(path_);
+}
+
+FileLock RunFolder::lock() const {
+  FileLock lock(path_ / ".lock");
+  const std::size_t stale = remove_stale_temporaries(path_);
+  if (stale > 0) spdlog::info("{} temporary files of a run that was killed are removed", stale);
+  return lock;
 }
 
 std::filesystem::path RunFolder::evaluation_folder(std::int64_t iteration) const {
@@ -88,7 +101,9 @@ void RunFolder::begin_metrics(std::int64_t iteration) {
     std::getline(rows, line);
     while (std::getline(rows, line)) {
       const long long recorded = std::strtoll(line.c_str(), nullptr, 10);
-      if (recorded > 0 && recorded <= iteration) csv += line + "\n";
+      // Rows that a power failure cut off are dropped.
+      if (recorded > 0 && recorded <= iteration && columns(line) == columns(kCsvHeader))
+        csv += line + "\n";
     }
     std::ifstream metrics(path_ / "metrics.json");
     try {
@@ -123,6 +138,21 @@ void RunFolder::write_metrics(const nlohmann::json& summary) const {
   for (const EvaluationRow& row : evaluations_) json["evaluations"].push_back(to_json(row));
   json["note"] = "training_seconds exclude evaluation";
   write_text_file(path_ / "metrics.json", json.dump(2) + "\n");
+}
+
+double recorded_seconds(const std::filesystem::path& run_folder, std::int64_t iteration) {
+  std::ifstream rows(run_folder / "metrics.csv");
+  std::string line;
+  std::getline(rows, line);
+  double seconds = 0;
+  while (std::getline(rows, line)) {
+    char* end = nullptr;
+    const long long recorded = std::strtoll(line.c_str(), &end, 10);
+    if (recorded <= 0 || recorded > iteration || *end != ',') continue;
+    const double value = std::strtod(end + 1, nullptr);
+    if (value >= 0 && std::isfinite(value)) seconds = value;
+  }
+  return seconds;
 }
 
 }  // namespace raysplats

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/file_lock.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/train_options.hpp"
@@ -36,7 +37,8 @@ struct EvaluationRow {
 };
 
 /// The folder of one training run: config.toml, cameras.json, metrics.csv, metrics.json,
-/// checkpoints/, eval/ and point_cloud/iteration_N/point_cloud.ply.
+/// checkpoints/, eval/, point_cloud/iteration_N/point_cloud.ply, and .lock while it trains (the
+/// file stays, the lock on it does not).
 class RunFolder {
  public:
   /// Makes the folder. Throws DataError when it cannot be written to.
@@ -51,6 +53,10 @@ class RunFolder {
   void write_cameras(std::span<const Camera> cameras) const;
   void write_model(const Gaussians& model, std::int64_t iteration) const;
 
+  /// Keeps other runs out of the folder until the lock goes, and removes temporary files that a
+  /// killed run left. Throws DataError when another run has the folder.
+  [[nodiscard]] FileLock lock() const;
+
   /// Starts metrics.csv and the evaluations anew, keeping what was recorded up to `iteration` (0
   /// keeps nothing).
   void begin_metrics(std::int64_t iteration);
@@ -64,5 +70,9 @@ class RunFolder {
   std::filesystem::path path_;
   std::vector<EvaluationRow> evaluations_;
 };
+
+/// Seconds of training that the metrics.csv of a run folder has recorded up to `iteration`; 0 when
+/// it has none.
+double recorded_seconds(const std::filesystem::path& run_folder, std::int64_t iteration);
 
 }  // namespace raysplats

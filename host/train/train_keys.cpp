@@ -174,6 +174,8 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.number("iterations", o.iterations, 0, kMaxCount, "training steps, one view each");
   t.number("seed", o.seed, 0, 1.8e19,
            "seed of view order, random start and splits; a run is a function of it");
+  t.flag("deterministic", o.deterministic,
+         "the same seed gives the same bytes on the same device, whatever the scheduling");
 
   t.section("Data");
   t.number("downscale", o.downscale, 0.01, 1e4, "photos are reduced by this factor");
@@ -260,6 +262,19 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
            "rays per work-item: 1, 2, 4, 8 or 16; 0 = fit to the device");
   t.number("memory-budget", o.memory_budget, 1, 1e9,
            "MiB for hit lists; above it they are computed again");
+  t.choice<GradientSum>(
+      "gradient-sum", o.gradient_sum,
+      {{"auto", GradientSum::kAuto},
+       {"copies", GradientSum::kCopies},
+       {"exact", GradientSum::kExact},
+       {"atomic", GradientSum::kAtomic}},
+      "how the gradients of rays are added: private copies (CPUs), exact (long integers, the same "
+      "bits in any order) or atomic (floats, not deterministic); auto = copies on CPUs, else "
+      "exact, "
+      "or atomic with no deterministic");
+  t.number("launch-budget-ms", o.launch_budget_ms, -1, 1e9,
+           "a view is traced in bands of rows that take about this long each, so that watchdogs of "
+           "displays do not stop them; 0 = no bound, -1 = none on CPUs and 100 elsewhere");
 
   t.section("Density control");
   t.number("densify-from", o.densify_from, 0, kMaxCount,
@@ -291,6 +306,9 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.number("opacity-reset-value", o.opacity_reset_value, 1e-4, 0.9999, "opacity after a reset");
 
   t.section("Reports and files");
+  t.number("validate-every", o.validate_every, 0, kMaxCount,
+           "iterations between checks of the model, its optimiser, boxes and tree; the first fault "
+           "stops the run; 0 = none");
   t.number("log-every", o.log_every, 1, kMaxCount,
            "iterations between rows of metrics.csv and the progress line");
   t.number("eval-every", o.eval_every, 0, kMaxCount,

@@ -7,23 +7,29 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
+#include "base/atomic_file.hpp"
 #include "base/interrupt.hpp"
 #include "base/progress.hpp"
 #include "core/morton_order.hpp"
 #include "eval/evaluator.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
 #include "train/adam.hpp"
 #include "train/checkpoint.hpp"
+#include "train/dataset_fingerprint.hpp"
 #include "train/density_control.hpp"
 #include "train/image_loss.hpp"
 #include "train/initialization.hpp"
 #include "train/memory_estimate.hpp"
+#include "train/model_validator.hpp"
 #include "train/run_state.hpp"
 #include "train/schedule.hpp"
+#include "train/step_guard.hpp"
 #include "train/step_tracer.hpp"
 #include "train/target_cache.hpp"
 #include "train/train_config.hpp"
@@ -72,6 +78,9 @@ TraceOptions trace_options_of(const TrainOptions& options, const std::array<floa
   trace.near_depth = static_cast<float>(options.near_depth);
   trace.background = background;
   trace.packet_width = options.packet_width;
+  trace.gradient_sum = options.gradient_sum;
+  trace.deterministic = options.deterministic;
+  trace.launch_budget_ms = options.launch_budget_ms;
   trace.memory_budget = static_cast<std::size_t>(options.memory_budget) * kMiB;
   return trace;
 }
@@ -113,6 +122,23 @@ std::size_t host_image_budget(const TrainOptions& options, const std::vector<Cam
   return kReadAhead * largest;
 }
 
+// The same error with a remark at its end.
+[[noreturn]] void throw_with(const Error& error, const std::string& remark) {
+  const std::string message = fmt::format("{}; {}", error.what(), remark);
+  switch (error.code()) {
+    case ErrorCode::kUsage:
+      throw UsageError(message);
+    case ErrorCode::kData:
+      throw DataError(message);
+    case ErrorCode::kDevice:
+      throw DeviceError(message);
+    case ErrorCode::kMemory:
+      throw ResourceError(message);
+    default:
+      throw Error(error.code(), message);
+  }
+}
+
 bool contains(const std::vector<std::int64_t>& list, std::int64_t value) {
   return std::find(list.begin(), list.end(), value) != list.end();
 }
@@ -135,8 +161,15 @@ struct Trainer::Impl {
   void control_density();
   void evaluate_views(bool last);
   void save_model();
+  void resume(const std::filesystem::path& source);
+  Checkpoint state();
   void save_checkpoint();
+  void check_guard();
+  void validate_model();
+  void write_dump();
+  std::string rescue();
   void write_metrics(bool complete);
+  void run_iterations(Progress& progress, const InterruptGuard& interrupt);
   TrainSummary train(bool show_progress);
 
   Context& context;
@@ -148,11 +181,14 @@ struct Trainer::Impl {
   std::vector<Camera> train_cameras;
   double extent;
   bool cut_out;
+  std::string fingerprint;
   std::array<float, 3> background;
   StepTracer tracer;
   ImageLoss loss;
   Adam adam;
   DensityControl density;
+  StepGuard guard;
+  std::optional<ModelValidator> validator;  // once it is asked for
   TargetCache targets;
   ViewOrder order;
 
@@ -161,6 +197,9 @@ struct Trainer::Impl {
   Buffer<float> image_gradient;
   std::int64_t iteration = 0;  // completed
   bool started = false;
+  bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
+  std::int64_t saved = -1;  // iteration of the newest checkpoint of this run
+  std::uint32_t reported_bad_steps = 0;
   Stopwatch training;
   Stopwatch evaluating;
   double last_loss = 0;
@@ -182,6 +221,7 @@ Trainer::Impl::Impl(Context& device,
       train_cameras(cameras_of(dataset, train_views)),
       extent(scene_extent(train_cameras)),
       cut_out(dataset.alpha_is_background),
+      fingerprint(dataset_fingerprint(dataset)),
       background(background_color(options, cut_out)),
       tracer(device,
              trace_options_of(options, background),
@@ -189,6 +229,7 @@ Trainer::Impl::Impl(Context& device,
       loss(device, options.pixel_loss, static_cast<float>(options.ssim_weight)),
       adam(device, adam_options_of(options)),
       density(device, options, extent),
+      guard(device),
       targets(device,
               views_of(dataset, train_views),
               static_cast<std::size_t>(options.image_budget) * kMiB,
@@ -202,7 +243,9 @@ Trainer::Impl::Impl(Context& device,
 
 // Makes the first model, unless resume() has brought one.
 void Trainer::Impl::start() {
-  if (!started) {
+  if (started) {
+    run.begin_metrics(iteration);
+  } else {
     Gaussians model = initial_model(dataset, train_cameras, options);
     if (model.size() == 0) throw UsageError("The first model has no Gaussians: use --init random");
     const std::vector<std::uint32_t> along_curve = morton_order(model.means);
@@ -211,6 +254,7 @@ void Trainer::Impl::start() {
     adam.initialize(gaussians.count, gaussians.sh_degree);
     run.begin_metrics(0);
     started = true;
+    whole = true;
   }
   std::size_t pixels = 0;
   for (const Camera& camera : train_cameras) pixels = std::max(pixels, pixels_of(camera));
@@ -219,7 +263,7 @@ void Trainer::Impl::start() {
   const std::size_t most =
       grows ? std::max(gaussians.count, static_cast<std::size_t>(options.max_gaussians))
             : gaussians.count;
-  check_memory(estimate_memory(options, most, pixels, train_views.size()), context.device());
+  check_memory(options, {most, pixels, train_views.size()}, context.device());
   const auto by_rays = std::count_if(train_cameras.begin(), train_cameras.end(),
                                      [this](const Camera& c) { return tracer.by_rays(c); });
   if (by_rays > 0) {
@@ -245,21 +289,76 @@ void Trainer::Impl::step() {
   tracer.forward(gaussians, camera, true);
   loss.evaluate(tracer.image(), targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
+  const ImageLoss::Partials partials = loss.partials();
+  guard.check_loss(partials.pixel, partials.ssim, partials.tiles);
   tracer.backward(gaussians, image_gradient, gradients);
-  if (iteration < options.densify_until) density.accumulate(gaussians, gradients);
-  adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration));
+  whole = false;
+  if (iteration < options.densify_until) density.accumulate(gaussians, gradients, &guard.mark());
+  adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
+  guard.close(adam.refused(), gaussians.count);
   ++iteration;
+  whole = true;
+}
+
+// Stops the run when the guard has stopped the steps; waits for the device.
+void Trainer::Impl::check_guard() {
+  const StepGuard::Counts counts = guard.counts();
+  if (counts.stopped) {
+    write_dump();
+    throw Error(
+        ErrorCode::kRuntime,
+        fmt::format("The loss or the gradients were not finite in {} steps in a row by iteration "
+                    "{}; the model before them, the last picture and its camera are in {}: lower "
+                    "the learning rates, or look for photos and points that are not finite",
+                    StepGuard::kLimit, iteration, (run.path() / "dump").string()));
+  }
+  if (counts.bad_steps > reported_bad_steps) {
+    spdlog::warn("iteration {}: {} steps so far had a loss or gradients that were not finite",
+                 iteration, counts.bad_steps);
+    reported_bad_steps = counts.bad_steps;
+  }
+}
+
+// Stops the run at a fault that no step may leave behind.
+void Trainer::Impl::validate_model() {
+  if (!validator) {
+    validator.emplace(context, options.scale_activation, trace_options_of(options, background));
+  }
+  const std::string fault = validator->find_fault(gaussians, adam);
+  if (fault.empty()) return;
+  throw Error(ErrorCode::kRuntime,
+              fmt::format("The model is damaged after iteration {}: {}; resume from an earlier "
+                          "checkpoint, with --validate-every 1 to find the step, or on another "
+                          "--device",
+                          iteration, fault));
+}
+
+// What somebody who looks for the cause needs.
+void Trainer::Impl::write_dump() {
+  const std::filesystem::path folder = run.path() / "dump";
+  write_image(folder / "picture.exr", tracer.download_image());
+  const Camera& camera = train_cameras[order.at(iteration - 1)];
+  nlohmann::json rotation = nlohmann::json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) rotation.push_back(camera.rotation[column][row]);
+  }
+  const nlohmann::json json{
+      {"iteration", iteration},
+      {"loss", loss.value().total},
+      {"view", camera.name},
+      {"width", camera.width},
+      {"height", camera.height},
+      {"world_to_camera", rotation},
+      {"translation", {camera.translation[0], camera.translation[1], camera.translation[2]}},
+      {"refused_gradients", adam.skipped()}};
+  write_text_file(folder / "step.json", json.dump(2) + "\n");
+  write_checkpoint(folder / "state.rsck", state());
 }
 
 // Waits for the device and reports the step just done.
 void Trainer::Impl::report(Progress& progress) {
   const ImageLoss::Value value = loss.value();
-  if (!std::isfinite(value.total)) {
-    throw Error(ErrorCode::kRuntime, fmt::format("The loss is {} at iteration {}: lower the "
-                                                 "learning rates, or look for photos and points "
-                                                 "that are not finite",
-                                                 value.total, iteration));
-  }
+  check_guard();
   last_loss = value.total;
   const double psnr = std::min(value.psnr, 100.0);
   recent_psnr = recent_psnr ? *recent_psnr + (psnr - *recent_psnr) / kRecentViews : psnr;
@@ -275,7 +374,12 @@ void Trainer::Impl::report(Progress& progress) {
 
 // What happens between this step and the next one: density control.
 void Trainer::Impl::control_density() {
-  if (density.refines_at(iteration)) {
+  const bool refines = density.refines_at(iteration);
+  const bool resets = density.resets_at(iteration);
+  if (!refines && !resets) return;
+  check_guard();
+  whole = false;
+  if (refines) {
     const DensityPlan plan = density.refine(gaussians, iteration);
     if (plan.changes()) {
       const std::vector<std::uint32_t> source = plan.state_source();
@@ -286,10 +390,11 @@ void Trainer::Impl::control_density() {
     spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",
                   iteration, plan.cloned, plan.split, plan.pruned, plan.refused, gaussians.count);
   }
-  if (density.resets_at(iteration)) {
+  if (resets) {
     density.reset_opacities(gaussians);
     adam.reset(ParameterGroup::kOpacities);
   }
+  whole = true;
 }
 
 // Traces the test views; the time counts as evaluation, not as training.
@@ -318,16 +423,70 @@ void Trainer::Impl::evaluate_views(bool last) {
 
 void Trainer::Impl::save_model() { run.write_model(gaussians.download(), iteration); }
 
-void Trainer::Impl::save_checkpoint() {
+Checkpoint Trainer::Impl::state() {
   Checkpoint checkpoint;
   checkpoint.iteration = iteration;
   checkpoint.seed = options.seed;
   checkpoint.scene_extent = extent;
-  checkpoint.training_seconds = training.seconds();
+  checkpoint.dataset = fingerprint;
   checkpoint.config = to_toml(options);
+  const StepGuard::Counts counts = guard.counts();
+  checkpoint.bad_steps = counts.bad_steps;
+  checkpoint.bad_steps_in_a_row = counts.in_a_row;
   store_state(gaussians, adam, density, checkpoint);
-  write_checkpoint(checkpoint_path(run.path(), iteration), checkpoint);
+  return checkpoint;
+}
+
+void Trainer::Impl::save_checkpoint() {
+  write_checkpoint(checkpoint_path(run.path(), iteration), state());
+  saved = iteration;
   remove_old_checkpoints(run.path(), options.keep_checkpoints);
+}
+
+// After a failure: saves the last whole state, if the device still gives it. Returns what the user
+// can do then.
+std::string Trainer::Impl::rescue() {
+  if (whole && saved != iteration) {
+    try {
+      context.finish();
+      write_checkpoint(checkpoint_path(run.path(), iteration), state());
+      saved = iteration;
+    } catch (const std::exception& error) {
+      spdlog::warn("the state of iteration {} cannot be saved: {}", iteration, error.what());
+    }
+  }
+  if (saved < 0) return "nothing was saved yet";
+  return fmt::format("iteration {} is saved: continue with --resume {}", saved,
+                     run.path().string());
+}
+
+void Trainer::Impl::resume(const std::filesystem::path& source) {
+  const bool own = source == "latest";
+  const std::filesystem::path place = own ? run.path() : source;
+  if (own && list_checkpoints(place).empty()) {
+    spdlog::info("{} holds no checkpoint yet: the run starts anew", place.string());
+    return;
+  }
+  const Checkpoint checkpoint = load_latest_checkpoint(place);
+  if (checkpoint.seed != options.seed) {
+    throw UsageError(fmt::format(
+        "The checkpoint was made with seed {}, not {}: resume with the configuration of the run",
+        checkpoint.seed, options.seed));
+  }
+  if (!checkpoint.dataset.empty() && checkpoint.dataset != fingerprint) {
+    throw UsageError(fmt::format(
+        "The checkpoint of iteration {} was made with other data than {}: resume with "
+        "the photos, cameras and --downscale of the run, or start a new one with --init",
+        checkpoint.iteration, dataset.root.string()));
+  }
+  restore_state(context, checkpoint, options, gaussians, adam, density);
+  guard.restore({checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false});
+  reported_bad_steps = checkpoint.bad_steps;
+  iteration = checkpoint.iteration;
+  const bool file = !std::filesystem::is_directory(place);
+  training.set(recorded_seconds(file ? place.parent_path().parent_path() : place, iteration));
+  started = true;
+  whole = true;
 }
 
 void Trainer::Impl::write_metrics(bool complete) {
@@ -340,17 +499,12 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"evaluation_seconds", evaluating.seconds()},
                      {"capped_rays", tracer.capped_rays()},
                      {"skipped_updates", adam.skipped()},
+                     {"bad_steps", guard.counts().bad_steps},
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", context.device().name}});
 }
 
-TrainSummary Trainer::Impl::train(bool show_progress) {
-  start();
-  const InterruptGuard interrupt;
-  Progress progress("Training", options.iterations, iteration, show_progress ? stderr : nullptr);
-  row_iteration = iteration;
-  row_seconds = training.seconds();
-  training.start();
+void Trainer::Impl::run_iterations(Progress& progress, const InterruptGuard& interrupt) {
   const auto pause = [&](const auto& work) {
     context.finish();
     training.stop();
@@ -364,6 +518,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     step();
     const bool last = iteration == options.iterations;
     if (last || every(options.log_every, iteration)) report(progress);
+    if (every(options.validate_every, iteration)) pause([this] { validate_model(); });
     // Asked once: a signal that comes later is seen after the next step.
     stop = interrupt.requested();
     const bool evaluates =
@@ -377,6 +532,26 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
       pause([this] { save_checkpoint(); });
   }
   context.finish();
+}
+
+TrainSummary Trainer::Impl::train(bool show_progress) {
+  const InterruptGuard interrupt;
+  const FileLock lock = run.lock();
+  start();
+  Progress progress("Training", options.iterations, iteration, show_progress ? stderr : nullptr);
+  row_iteration = iteration;
+  row_seconds = training.seconds();
+  training.start();
+  try {
+    run_iterations(progress, interrupt);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kRuntime) throw;  // the model itself is at fault
+    throw_with(error, rescue());
+  } catch (const std::bad_alloc&) {
+    throw_with(ResourceError("The host has no memory left: use smaller images (--downscale) or a "
+                             "smaller --image-budget"),
+               rescue());
+  }
   training.stop();
   progress.finish();
   write_metrics(iteration == options.iterations);
@@ -403,20 +578,7 @@ Trainer::Trainer(Context& context,
     : impl_(std::make_unique<Impl>(context, std::move(dataset), options, std::move(run_folder))) {}
 Trainer::~Trainer() = default;
 
-void Trainer::resume(const std::filesystem::path& source) {
-  const Checkpoint checkpoint = load_latest_checkpoint(source);
-  if (checkpoint.seed != impl_->options.seed) {
-    throw UsageError(fmt::format(
-        "The checkpoint was made with seed {}, not {}: resume with the configuration of the run",
-        checkpoint.seed, impl_->options.seed));
-  }
-  restore_state(impl_->context, checkpoint, impl_->options, impl_->gaussians, impl_->adam,
-                impl_->density);
-  impl_->iteration = checkpoint.iteration;
-  impl_->training.set(checkpoint.training_seconds);
-  impl_->started = true;
-  impl_->run.begin_metrics(checkpoint.iteration);
-}
+void Trainer::resume(const std::filesystem::path& source) { impl_->resume(source); }
 
 TrainSummary Trainer::run(bool show_progress) { return impl_->train(show_progress); }
 

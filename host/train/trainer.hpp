@@ -37,13 +37,16 @@ class Trainer {
   ~Trainer();
 
   /// Continues from the newest valid checkpoint of a run folder, or from a checkpoint file, instead
-  /// of starting anew. Throws UsageError when it does not fit the options, DataError when there is
-  /// none.
+  /// of starting anew; "latest" is the run's own folder, and starts anew while that holds none.
+  /// Throws UsageError when it does not fit the options or was made with other data, DataError when
+  /// there is none that is whole or another run has the folder.
   void resume(const std::filesystem::path& source);
 
   /// Trains up to options.iterations. SIGINT and SIGTERM finish the iteration, save a checkpoint
-  /// and the model and throw Error(kInterrupted). A loss that is not finite throws Error(kRuntime)
-  /// naming the iteration.
+  /// and the model and throw Error(kInterrupted). Ten steps in a row that are not finite
+  /// (StepGuard) leave RUN/dump and throw Error(kRuntime) naming the iteration. After other
+  /// failures the last whole state is saved when the device still gives it, and the error says
+  /// which iteration that is. Throws DataError when another run has the folder.
   TrainSummary run(bool show_progress = true);
 
   /// The model as it is now; completed iterations.

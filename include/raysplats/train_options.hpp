@@ -34,6 +34,7 @@ struct TrainOptions {
   // Run
   std::int64_t iterations = 10000;
   std::uint64_t seed = 42;
+  bool deterministic = true;
 
   // Data
   double downscale = 1.0;
@@ -82,6 +83,8 @@ struct TrainOptions {
   double near_depth = 0.0;
   int packet_width = 0;
   std::int64_t memory_budget = 1024;  ///< MiB
+  GradientSum gradient_sum = GradientSum::kAuto;
+  double launch_budget_ms = -1.0;  ///< 0 = unbounded, -1 = the device's default
 
   // Density control
   std::int64_t densify_from = 300;
@@ -100,6 +103,7 @@ struct TrainOptions {
 
   // Reports and files
   std::int64_t log_every = 10;
+  std::int64_t validate_every = 0;
   std::int64_t eval_every = 0;
   std::vector<std::int64_t> eval_at{1000, 3000, 7000};
   int eval_views = 0;  ///< 0 = all

@@ -257,8 +257,7 @@ TEST_CASE("a device with too little memory is refused with the figures") {
   DeviceInfo small = scene.context.device();
   small.global_memory = std::uint64_t{4} << 30;
   small.max_allocation = 1 << 20;
-  CHECK_THROWS_AS(check_memory(estimate_memory(small_options(), 100000, 1000, 10), small),
-                  ResourceError);
+  CHECK_THROWS_AS(check_memory(small_options(), {100000, 1000, 10}, small), ResourceError);
   Dataset empty = scene.dataset;
   for (View& view : empty.views) view.test = true;
   CHECK_THROWS_AS(Trainer(scene.context, empty, small_options(), scene.folder / "run"), UsageError);

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Decides on the device which training steps count. guard_loss, before the update, marks a step
+// whose loss is not finite; the kernels that change the model read the mark and leave everything as
+// it is. guard_close, after the update, keeps count: a step is bad when it was marked, or when more
+// than one Gaussian in RS_GUARD_SHARE refused its gradient. After `limit` bad steps in a row all
+// further steps are marked, until the host looks.
+//   state: 0 mark of the present step, 1 bad steps in a row, 2 bad steps, 3 stopped (0 or 1), 4
+//   refused gradients before this step
+// Launch: guard_loss any number of work-items, which walk the partial sums of the loss; guard_close
+// one work-item.
+#define RS_GUARD_SHARE 1000
+
+__kernel void guard_loss(const __global float4* pixel_partials,
+                         const __global float* ssim_partials,
+                         int tiles,
+                         volatile __global uint* state) {
+  const int items = get_global_size(0);
+  // Zero times a number is zero, unless the number is not finite.
+  float poison = 0.0f;
+  for (int i = get_global_id(0); i < tiles; i += items) poison += 0.0f * pixel_partials[i].x;
+  for (int i = get_global_id(0); i < 3 * tiles; i += items) poison += 0.0f * ssim_partials[i];
+  if (!(poison == 0.0f)) atomic_or(state, 1u);
+}
+
+__kernel void guard_close(const __global uint* refused,
+                          uint count,
+                          uint limit,
+                          __global uint* state) {
+  const uint now = refused[0];
+  const uint fresh = now - state[4];
+  state[4] = now;
+  if (state[3] == 0) {
+    const bool bad = state[0] != 0 || fresh > count / RS_GUARD_SHARE;
+    state[1] = bad ? state[1] + 1 : 0;
+    state[2] += bad;
+    state[3] = state[1] >= limit;
+  }
+  state[0] = state[3];
+}

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/dataset_fingerprint.hpp"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <vector>
+
+namespace raysplats {
+namespace {
+
+std::string description(const View& view) {
+  const Camera& camera = view.source_camera;
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(view.image_path, error);
+  std::string text =
+      fmt::format("{} {} {}x{} {} {} {} {}", camera.name, error ? std::uintmax_t{0} : bytes,
+                  camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy);
+  const Distortion& lens = camera.distortion;
+  text += fmt::format(" {} {} {} {} {} {} {}", static_cast<int>(camera.model), lens.k1, lens.k2,
+                      lens.k3, lens.p1, lens.p2, lens.k4);
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) text += fmt::format(" {}", camera.rotation[column][row]);
+    text += fmt::format(" {}", camera.translation[column]);
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string dataset_fingerprint(const Dataset& dataset) {
+  // The order of the views depends on the split.
+  std::vector<std::string> lines;
+  for (const View& view : dataset.views) lines.push_back(description(view));
+  std::sort(lines.begin(), lines.end());
+  std::string text;
+  for (const std::string& line : lines) text += line;
+  const std::vector<float>& points = dataset.points.positions;
+  const std::vector<float>& colors = dataset.points.colors;
+  const XXH64_hash_t views = XXH64(text.data(), text.size(), 0);
+  const XXH64_hash_t places = XXH64(points.data(), points.size() * sizeof(float), views);
+  return fmt::format("{:016x}", XXH64(colors.data(), colors.size() * sizeof(float), places));
+}
+
+}  // namespace raysplats

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/step_guard.hpp"
+
+#include <array>
+#include <vector>
+
+namespace raysplats {
+namespace {
+
+constexpr char kProgram[] = "train/guard.cl";
+constexpr std::size_t kItems = 64;
+constexpr std::size_t kWords = 5;  // as in cl/train/guard.cl
+
+}  // namespace
+
+StepGuard::StepGuard(Context& context)
+    : check_(context.kernel(kProgram, "guard_loss")),
+      close_(context.kernel(kProgram, "guard_close")),
+      state_(context, kWords, "step guard") {
+  state_.clear();
+}
+
+void StepGuard::check_loss(const Buffer<std::array<float, 4>>& pixel_partials,
+                           const Buffer<float>& ssim_partials,
+                           int tiles) {
+  check_.launch(Range{{kItems, 1, 1}, {0, 0, 0}, {}}, pixel_partials, ssim_partials, tiles, state_);
+}
+
+void StepGuard::close(const Buffer<std::uint32_t>& refused, std::size_t count) {
+  close_.launch(Range{{1, 1, 1}, {1, 1, 1}, {}}, refused, static_cast<std::uint32_t>(count), kLimit,
+                state_);
+}
+
+StepGuard::Counts StepGuard::counts() const {
+  const std::vector<std::uint32_t> words = state_.download();
+  return {words[1], words[2], words[3] != 0};
+}
+
+void StepGuard::restore(const Counts& counts) {
+  const std::uint32_t stopped = counts.stopped ? 1 : 0;
+  state_.upload(
+      std::array<std::uint32_t, kWords>{stopped, counts.in_a_row, counts.bad_steps, stopped, 0});
+}
+
+}  // namespace raysplats

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "device/context.hpp"
+
+namespace raysplats {
+
+/// Keeps training steps that are not finite from reaching the model, without the host waiting for
+/// any of them: a step whose loss is not finite changes nothing, and a Gaussian whose gradient is
+/// not finite keeps its parameters (Adam). Steps of the first kind, and those in which more than
+/// one Gaussian in a thousand refused its gradient, are bad; after kLimit in a row nothing changes
+/// any more, so that the model stays as it was until the host looks.
+class StepGuard {
+ public:
+  static constexpr std::uint32_t kLimit = 10;
+
+  struct Counts {
+    std::uint32_t in_a_row = 0;
+    std::uint32_t bad_steps = 0;
+    bool stopped = false;
+  };
+
+  explicit StepGuard(Context& context);
+
+  /// Marks the present step when the partial sums of its loss are not finite (ImageLoss).
+  void check_loss(const Buffer<std::array<float, 4>>& pixel_partials,
+                  const Buffer<float>& ssim_partials,
+                  int tiles);
+  /// After the update: counts. `refused` is Adam's count of refused gradients, `count` the
+  /// Gaussians.
+  void close(const Buffer<std::uint32_t>& refused, std::size_t count);
+
+  /// Not 0 in its first word: the kernels of this step change nothing.
+  const Buffer<std::uint32_t>& mark() const { return state_; }
+  /// Blocks.
+  Counts counts() const;
+  /// Goes on counting from a checkpoint.
+  void restore(const Counts& counts);
+
+ private:
+  Kernel check_, close_;
+  Buffer<std::uint32_t> state_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/step_guard.hpp"
+
+#include <doctest/doctest.h>
+
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "raysplats/device.hpp"
+#include "train/adam.hpp"
+#include "train/density_control.hpp"
+#include "train/image_loss.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+constexpr int kSide = 40;
+constexpr std::size_t kPixels = kSide * kSide;
+
+// A guard with the loss that it watches.
+struct Fixture {
+  Context context{select_device("")};
+  ImageLoss loss{context, PixelLoss::kL1, 0.2f};
+  StepGuard guard{context};
+  Buffer<float> image{context, 4 * kPixels, "image"};
+  Buffer<std::uint32_t> photo{context, kPixels, "photo"};
+  Buffer<float> gradient;
+  Buffer<std::uint32_t> refused{context, 1, "refused"};
+  std::uint32_t refused_so_far = 0;
+
+  Fixture() {
+    photo.fill(0xff804020u);
+    refused.clear();
+  }
+
+  // A step whose picture has `value` in one pixel and in which Adam refuses `refusals` of `count`.
+  void step(float value, std::uint32_t refusals = 0, std::size_t count = 5000) {
+    std::vector<float> pixels(4 * kPixels, 0.5f);
+    pixels[777] = value;
+    image.upload(pixels);
+    loss.evaluate(image, photo, false, {0, 0, 0}, kSide, kSide, gradient);
+    const ImageLoss::Partials partials = loss.partials();
+    guard.check_loss(partials.pixel, partials.ssim, partials.tiles);
+    marked = guard.mark().read(0) != 0;
+    refused_so_far += refusals;
+    refused.upload(std::array<std::uint32_t, 1>{refused_so_far});
+    guard.close(refused, count);
+  }
+  bool marked = false;  // the last step
+};
+
+const float kNan = std::numeric_limits<float>::quiet_NaN();
+const float kInfinity = std::numeric_limits<float>::infinity();
+
+}  // namespace
+
+TEST_CASE("steps whose loss is not finite are marked and counted, ten in a row stop the rest") {
+  Fixture f;
+  f.step(0.5f);
+  CHECK(!f.marked);
+  for (const float bad : {kNan, kInfinity, -kInfinity}) {
+    f.step(bad);
+    CHECK(f.marked);
+  }
+  CHECK(f.guard.counts().in_a_row == 3);
+  f.step(0.5f);
+  CHECK(!f.marked);
+  CHECK(f.guard.counts().in_a_row == 0);
+  CHECK(f.guard.counts().bad_steps == 3);
+  for (std::uint32_t i = 1; i <= StepGuard::kLimit; ++i) {
+    CHECK(!f.guard.counts().stopped);
+    f.step(kNan);
+    CHECK(f.guard.counts().in_a_row == i);
+  }
+  CHECK(f.guard.counts().stopped);
+  f.step(0.5f);
+  CHECK(f.marked);  // nothing changes any more
+  CHECK(f.guard.counts().stopped);
+  CHECK(f.guard.counts().bad_steps == 13);
+}
+
+TEST_CASE("one refused gradient in a thousand is no bad step, more are") {
+  Fixture f;
+  f.step(0.5f, 5, 5000);
+  CHECK(f.guard.counts().bad_steps == 0);
+  f.step(0.5f, 6, 5000);
+  CHECK(f.guard.counts().bad_steps == 1);
+  f.step(0.5f, 1, 999);
+  CHECK(f.guard.counts().bad_steps == 2);
+  CHECK(f.guard.counts().in_a_row == 2);
+  f.step(0.5f, 0, 999);
+  CHECK(f.guard.counts().in_a_row == 0);
+}
+
+TEST_CASE("counts go on from where they were") {
+  Fixture f;
+  f.guard.restore({9, 21, false});
+  CHECK(f.guard.counts().bad_steps == 21);
+  f.step(kNan);
+  CHECK(f.guard.counts().in_a_row == 10);
+  CHECK(f.guard.counts().stopped);
+}
+
+TEST_CASE("a marked step changes neither parameters nor moments nor statistics") {
+  Context context(select_device(""));
+  Gaussians model;
+  model.resize(130);
+  DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  GaussianGradients gradients;
+  const auto ones = [&](Buffer<float>& buffer, std::size_t size) {
+    buffer = Buffer<float>(context, size, "gradient");
+    buffer.upload(std::vector<float>(size, 1.0f));
+  };
+  ones(gradients.means, 3 * 130);
+  ones(gradients.quaternions, 4 * 130);
+  ones(gradients.scales, 3 * 130);
+  ones(gradients.opacities, 130);
+  ones(gradients.sh, gaussians.sh.size());
+  ones(gradients.screen, 3 * 130);
+  Adam adam(context, {});
+  TrainOptions options;
+  DensityControl density(context, options, 1.0);
+  const AdamRates rates{1, 1, 1, 1, 1, 1};
+  adam.initialize(gaussians.count, gaussians.sh_degree);
+  Buffer<std::uint32_t> guard(context, 5, "guard");
+  guard.fill(1);
+  density.accumulate(gaussians, gradients, &guard);
+  adam.step(gaussians, gradients, rates, &guard);
+  CHECK(gaussians.means.download() == model.means);
+  CHECK(gaussians.opacities.download() == model.opacities);
+  CHECK(adam.first_moment(ParameterGroup::kSh).download() ==
+        std::vector<float>(gaussians.sh.size(), 0.0f));
+  CHECK(density.statistics().download() == std::vector<float>(260, 0.0f));
+  guard.clear();
+  density.accumulate(gaussians, gradients, &guard);
+  adam.step(gaussians, gradients, rates, &guard);
+  CHECK(gaussians.means.download() != model.means);
+  CHECK(density.statistics().download() == std::vector<float>(260, 1.0f));
+}
