@@ -18,6 +18,15 @@ namespace {
 // Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not.
 constexpr const char* kCompilerOptions = "-cl-std=CL1.2 -cl-mad-enable";
 
+// Nothing when the driver has none.
+std::string build_log(const cl::Program& program, const cl::Device& device) {
+  try {
+    return program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device);
+  } catch (const cl::Error&) {
+    return "";
+  }
+}
+
 cl::Program compile(Context::Impl& context,
                     const std::string& path,
                     const std::string& source,
@@ -27,7 +36,7 @@ cl::Program compile(Context::Impl& context,
     context.faults.check(Fault::kBuild);
     program.build({context.device}, options.c_str());
   } catch (const cl::Error& error) {
-    const std::string log = program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(context.device);
+    const std::string log = build_log(program, context.device);
     throw DeviceError(fmt::format(
         "Kernel file {} does not compile on {} with '{}' ({}): update the driver or choose another "
         "--device{}{}",
@@ -137,17 +146,28 @@ cl::Program& Context::Impl::program(const std::string& path, const BuildOptions&
 
   const ProgramCache cache(options.cache_directory);
   const std::string cache_key = ProgramCache::key(source, flags, info);
-  if (const auto binary = cache.load(cache_key)) {
-    if (auto program = from_binary(*this, *binary, flags)) {
-      faults.check(Fault::kBuild);
+  const auto cached = [&]() -> std::optional<cl::Program> {
+    const auto binary = cache.load(cache_key);
+    if (!binary) return std::nullopt;
+    auto program = from_binary(*this, *binary, flags);
+    if (!program) cache.remove(cache_key);
+    return program;
+  };
+  std::optional<cl::Program> program = cached();
+  if (!program) {
+    // One process at a time: the others find the result, and some drivers fail when several compile
+    // the same source.
+    const ProgramCache::BuildLock lock = cache.lock_builds();
+    program = cached();
+    if (!program) {
+      program = compile(*this, path, source, flags);
+      const cl::Program::Binaries binaries = program->getInfo<CL_PROGRAM_BINARIES>();
+      if (binaries.size() == 1 && !binaries[0].empty()) cache.store(cache_key, binaries[0]);
       return programs[key] = *program;
     }
-    cache.remove(cache_key);
   }
-  cl::Program program = compile(*this, path, source, flags);
-  const cl::Program::Binaries binaries = program.getInfo<CL_PROGRAM_BINARIES>();
-  if (binaries.size() == 1 && !binaries[0].empty()) cache.store(cache_key, binaries[0]);
-  return programs[key] = program;
+  faults.check(Fault::kBuild);
+  return programs[key] = *program;
 }
 
 void Context::Impl::timed(const std::string& path,

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "device/program_cache.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sys/file.h>
 #include <unistd.h>
 #include <xxhash.h>
 
 #include <array>
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -36,6 +39,17 @@ std::filesystem::path default_cache_directory() {
     return std::filesystem::path(home) / ".cache" / "raysplats";
   }
   return {};
+}
+
+ProgramCache::BuildLock::BuildLock(const std::filesystem::path& directory)
+    : descriptor_(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (descriptor_ < 0) return;
+  while (::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
+  }
+}
+
+ProgramCache::BuildLock::~BuildLock() {
+  if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 ProgramCache::ProgramCache(const std::string& directory)
