@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/byte_reader.hpp"
@@ -22,6 +23,37 @@ constexpr std::size_t kMaxName = 256;
 constexpr std::uint32_t kMultiPart = 0x1000;
 
 constexpr std::uint64_t kChunkOffsetBytes = 8;
+
+constexpr std::size_t kChannelBytes = 16;
+
+struct FixedType {
+  std::string_view name;
+  std::size_t bytes;
+};
+constexpr std::array<FixedType, 24> kFixedTypes{{{"box2i", 16},
+                                                 {"box2f", 16},
+                                                 {"chromaticities", 32},
+                                                 {"compression", 1},
+                                                 {"deepImageState", 1},
+                                                 {"double", 8},
+                                                 {"envmap", 1},
+                                                 {"float", 4},
+                                                 {"int", 4},
+                                                 {"keycode", 28},
+                                                 {"lineOrder", 1},
+                                                 {"m33d", 72},
+                                                 {"m33f", 36},
+                                                 {"m44d", 128},
+                                                 {"m44f", 64},
+                                                 {"rational", 8},
+                                                 {"tiledesc", 9},
+                                                 {"timecode", 8},
+                                                 {"v2d", 16},
+                                                 {"v2f", 8},
+                                                 {"v2i", 8},
+                                                 {"v3d", 24},
+                                                 {"v3f", 12},
+                                                 {"v3i", 12}}};
 
 struct Start {
   std::vector<std::byte> bytes;  // as much as a header may have
@@ -63,28 +95,58 @@ class Part {
   }
 
  private:
+  // OpenEXR reads an attribute by its type, not by its size: where they differ, it takes what
+  // follows for the next attribute.
   void check_attribute(const std::string& name) {
-    reader_.zero_terminated("the type of an attribute", kMaxName);
+    const std::string type = reader_.zero_terminated("the type of an attribute", kMaxName);
     const auto size = reader_.read<std::int32_t>("the size of an attribute");
     if (size < 0 || static_cast<std::size_t>(size) > reader_.remaining()) {
       reader_.fail(fmt::format("the attribute '{}' is longer than the header", name));
     }
-    if ((name == "dataWindow" || name == "displayWindow") && size == 16) {
-      check_window(name == "dataWindow");
-    } else if (name == "chunkCount" && size == 4) {
-      check_chunks(reader_.read<std::uint32_t>("the count of chunks"));
-    } else if (name == "tiles" && size == 9) {
-      tiled_ = true;
-      for (std::uint64_t& side : tile_) {
-        side = reader_.read<std::uint32_t>("the size of a tile");
-        if (side < 1 || side > static_cast<std::uint64_t>(max_side_)) {
-          reader_.fail(fmt::format("a tile has a side of {} pixels", side));
-        }
-      }
-      reader_.skip(1, "the levels of tiles");
-    } else {
-      reader_.skip(static_cast<std::uint64_t>(size), "an attribute");
+    const auto bytes = static_cast<std::size_t>(size);
+    const std::size_t end = reader_.offset() + bytes;
+    const auto fixed =
+        std::find_if(kFixedTypes.begin(), kFixedTypes.end(),
+                     [&](const FixedType& candidate) { return type == candidate.name; });
+    if (fixed != kFixedTypes.end() && fixed->bytes != bytes) {
+      reader_.fail(
+          fmt::format("the attribute '{}' has {} bytes, its type {}", name, bytes, fixed->bytes));
     }
+    if (type == "chlist") {
+      while (!reader_.zero_terminated("the name of a channel", kMaxName).empty()) {
+        reader_.skip(kChannelBytes, "a channel");
+      }
+    } else if (type == "stringvector") {
+      while (reader_.offset() < end) {
+        reader_.skip(reader_.read<std::uint32_t>("the length of a text"), "a text");
+      }
+    } else if (type == "preview") {
+      const std::uint64_t width = reader_.read<std::uint32_t>("the size of a preview");
+      const std::uint64_t height = reader_.read<std::uint32_t>("the size of a preview");
+      reader_.skip(saturating_product(4, width * height), "a preview");
+    } else if ((name == "dataWindow" || name == "displayWindow") && type == "box2i") {
+      check_window(name == "dataWindow");
+    } else if (name == "chunkCount" && type == "int") {
+      check_chunks(reader_.read<std::uint32_t>("the count of chunks"));
+    } else if (type == "tiledesc") {
+      check_tiles();
+    } else {
+      reader_.skip(bytes, "an attribute");
+    }
+    if (reader_.offset() != end) {
+      reader_.fail(fmt::format("the attribute '{}' has another size than it says", name));
+    }
+  }
+
+  void check_tiles() {
+    tiled_ = true;
+    for (std::uint64_t& side : tile_) {
+      side = reader_.read<std::uint32_t>("the size of a tile");
+      if (side < 1 || side > static_cast<std::uint64_t>(max_side_)) {
+        reader_.fail(fmt::format("a tile has a side of {} pixels", side));
+      }
+    }
+    reader_.skip(1, "the levels of tiles");
   }
 
   // A box of whole numbers: its corners belong to it.

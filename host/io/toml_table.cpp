@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "base/nearest_name.hpp"
 #include "io/byte_reader.hpp"
@@ -50,6 +51,8 @@ std::string range(double low, double high) {
 
 }  // namespace
 
+void fail_toml_assertion() { throw std::logic_error("an assertion of toml++"); }
+
 toml::table read_toml(const std::filesystem::path& path) {
   const std::vector<std::byte> bytes = read_file(path, kMaxBytes);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -60,6 +63,9 @@ toml::table read_toml(const std::filesystem::path& path) {
     std::replace(reason.begin(), reason.end(), '\n', ' ');
     throw UsageError(
         fmt::format("{}, line {}: {}", path.string(), error.source().begin.line, reason));
+  } catch (const std::logic_error&) {
+    throw UsageError(fmt::format("{} is no TOML: look for '[', quotes and keys without their rest",
+                                 path.string()));
   }
 }
 

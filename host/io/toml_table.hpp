@@ -12,7 +12,19 @@
 #include <utility>
 #include <vector>
 
+namespace raysplats::io {
+/// Throws std::logic_error, which read_toml() turns into a UsageError.
+[[noreturn]] void fail_toml_assertion();
+}  // namespace raysplats::io
+
+// In optimised builds toml++ takes its own assertions for granted, and files exist that break them
+// ("[[" before a line end): they throw instead, whatever the build.
+#pragma push_macro("NDEBUG")
+#undef NDEBUG
+#define TOML_ASSERT(condition) \
+  ((condition) ? static_cast<void>(0) : ::raysplats::io::fail_toml_assertion())
 #include <toml++/toml.h>
+#pragma pop_macro("NDEBUG")
 
 namespace raysplats::io {
 
