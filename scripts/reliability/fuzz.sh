@@ -27,6 +27,7 @@ fi
 [[ -e $build/build.ninja ]] || cmake --preset fuzz -B "$build"
 cmake --build "$build" --target "${targets[@]/#/fuzz_}"
 mkdir -p "$build/findings"
+export LSAN_OPTIONS=suppressions=$PWD/tests/sanitizers/lsan.supp:print_suppressions=0
 failed=()
 for target in "${targets[@]}"; do
   mkdir -p "$build/corpus/$target"

@@ -2,10 +2,13 @@
 #include "program.hpp"
 
 #include <fcntl.h>
+#include <linux/capability.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -15,40 +18,61 @@
 
 namespace fs = std::filesystem;
 
-Outcome raysplats_program(const std::vector<std::string>& arguments,
-                          const Surroundings& surroundings) {
-  const TemporaryFolder folder;
-  const std::string out = folder / "out";
-  const std::string err = folder / "err";
+RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
+                               const Surroundings& surroundings) {
+  const std::string out = folder_ / "out";
+  const std::string err = folder_ / "err";
   std::vector<std::string> words{RAYSPLATS_PROGRAM};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
-  const pid_t child = ::fork();
-  if (child < 0) throw std::system_error(errno, std::generic_category(), "fork");
-  if (child == 0) {
-    const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600);
-    const int err_file = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
-    if (::dup2(out_file, STDOUT_FILENO) < 0 || ::dup2(err_file, STDERR_FILENO) < 0) ::_exit(125);
-    for (const auto& [name, value] : surroundings.environment)
-      ::setenv(name.c_str(), value.c_str(), 1);
-    if (surroundings.file_size_limit != RLIM_INFINITY) {
-      const rlimit limit{surroundings.file_size_limit, surroundings.file_size_limit};
-      if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
-    }
-    ::execv(argv[0], argv.data());
-    ::_exit(127);
+  process_ = ::fork();
+  if (process_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
+  if (process_ > 0) return;
+  const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600);
+  const int err_file = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
+  if (::dup2(out_file, STDOUT_FILENO) < 0 || ::dup2(err_file, STDERR_FILENO) < 0) ::_exit(125);
+  for (const auto& [name, value] : surroundings.environment)
+    ::setenv(name.c_str(), value.c_str(), 1);
+  if (surroundings.file_size_limit != RLIM_INFINITY) {
+    const rlimit limit{surroundings.file_size_limit, surroundings.file_size_limit};
+    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
   }
-  int status = 0;
-  if (::waitpid(child, &status, 0) != child)
+  if (surroundings.permissions_count && ::geteuid() == 0 &&
+      ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0) != 0) {
+    ::_exit(126);
+  }
+  ::execv(argv[0], argv.data());
+  ::_exit(127);
+}
+
+RunningProgram::~RunningProgram() {
+  if (ended_) return;
+  ::kill(process_, SIGKILL);
+  ::waitpid(process_, nullptr, 0);
+}
+
+bool RunningProgram::runs() {
+  if (!ended_) ended_ = ::waitpid(process_, &status_, WNOHANG) == process_;
+  return !ended_;
+}
+
+Outcome RunningProgram::wait() {
+  if (!ended_ && ::waitpid(process_, &status_, 0) != process_)
     throw std::system_error(errno, std::generic_category(), "waitpid");
+  ended_ = true;
   Outcome outcome;
-  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  outcome.out = read_file(out);
-  outcome.err = read_file(err);
+  outcome.code = WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_);
+  outcome.out = read_file(folder_ / "out");
+  outcome.err = read_file(folder_ / "err");
   return outcome;
+}
+
+Outcome raysplats_program(const std::vector<std::string>& arguments,
+                          const Surroundings& surroundings) {
+  return RunningProgram(arguments, surroundings).wait();
 }
 
 TemporaryFolder::TemporaryFolder() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <sys/resource.h>
+#include <sys/types.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -19,6 +20,7 @@ struct Outcome {
 struct Surroundings {
   std::vector<std::pair<std::string, std::string>> environment;  ///< added to the test's own
   rlim_t file_size_limit = RLIM_INFINITY;  ///< bytes; beyond it writes fail, as on a full disk
+  bool permissions_count = false;          ///< even for root: what may not be written cannot be
 };
 
 /// Runs `raysplats` with `arguments` and waits for it.
@@ -37,6 +39,28 @@ class TemporaryFolder {
 
  private:
   std::filesystem::path path_;
+};
+
+/// A run of `raysplats` that goes on while the test does something else; killed when it is still
+/// there at the end.
+class RunningProgram {
+ public:
+  explicit RunningProgram(const std::vector<std::string>& arguments,
+                          const Surroundings& surroundings = {});
+  ~RunningProgram();
+  RunningProgram(const RunningProgram&) = delete;
+  RunningProgram& operator=(const RunningProgram&) = delete;
+
+  pid_t process() const { return process_; }
+  /// Whether it has not ended yet.
+  bool runs();
+  Outcome wait();
+
+ private:
+  TemporaryFolder folder_;
+  pid_t process_ = -1;
+  int status_ = 0;
+  bool ended_ = false;
 };
 
 void write_file(const std::filesystem::path& path, const std::string& content);

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "device/context.hpp"
+#include "primitives/scan.hpp"
+#include "raysplats/device.hpp"
+#include "raysplats/error.hpp"
+#include "tiny_run.hpp"
+#include "train/checkpoint.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+
+// A run that would take for ever.
+Words endless(const std::string& run) {
+  return tiny_training(run) + Words{"-n", "100000000", "--log-level", "error"};
+}
+
+// Waits until the run has written a checkpoint.
+void wait_for_checkpoint(RunningProgram& program, const std::string& run) {
+  for (int i = 0; i < 3000 && raysplats::list_checkpoints(run).empty(); ++i) {
+    REQUIRE(program.runs());
+    std::this_thread::sleep_for(10ms);
+  }
+}
+
+bool every_checkpoint_is_whole(const std::string& run) {
+  for (const auto& path : raysplats::list_checkpoints(run)) {
+    try {
+      raysplats::read_checkpoint(path);
+    } catch (const raysplats::Error&) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+TEST_CASE("SIGINT and SIGTERM finish the iteration, save and end with 130") {
+  const TemporaryFolder folder;
+  for (const int signal : {SIGINT, SIGTERM}) {
+    CAPTURE(signal);
+    const std::string run = folder / std::to_string(signal);
+    RunningProgram program(endless(run));
+    wait_for_checkpoint(program, run);
+    REQUIRE(::kill(program.process(), signal) == 0);
+    const Outcome outcome = program.wait();
+    INFO(outcome.err);
+    CHECK(outcome.code == 130);
+    CHECK(one_sentence(outcome));
+    CHECK(has(outcome.err, "--resume"));
+    const raysplats::Checkpoint newest = raysplats::load_latest_checkpoint(run);
+    CHECK(has(outcome.err, "iteration " + std::to_string(newest.iteration)));
+    CHECK(std::filesystem::exists(model_of(run, static_cast<int>(newest.iteration))));
+    CHECK(temporaries(run) == 0);
+  }
+}
+
+TEST_CASE("a second signal of either kind ends the run at once with whole files") {
+  const TemporaryFolder folder;
+  for (const auto& [first, second] : {std::pair{SIGINT, SIGINT}, {SIGINT, SIGTERM}}) {
+    CAPTURE(second);
+    const std::string run = folder / std::to_string(second);
+    RunningProgram program(endless(run));
+    wait_for_checkpoint(program, run);
+    // Both wait while the process is stopped, and are delivered together.
+    REQUIRE(::kill(program.process(), SIGSTOP) == 0);
+    REQUIRE(::kill(program.process(), first) == 0);
+    if (second != first) {
+      REQUIRE(::kill(program.process(), second) == 0);
+      REQUIRE(::kill(program.process(), SIGCONT) == 0);
+    } else {
+      REQUIRE(::kill(program.process(), SIGCONT) == 0);
+      while (program.runs() && ::kill(program.process(), second) == 0)
+        std::this_thread::sleep_for(1ms);
+    }
+    const Outcome outcome = program.wait();
+    INFO(outcome.err);
+    // By the signal, or, had the run been quicker, with 130 all the same.
+    CHECK((outcome.code == 128 + second || outcome.code == 128 + first || outcome.code == 130));
+    CHECK(every_checkpoint_is_whole(run));
+    const Outcome resumed =
+        raysplats_program(tiny_training(run) + Words{"--resume", "latest", "-n", "1"});
+    INFO(resumed.err);
+    CHECK(resumed.code == 0);
+    CHECK(temporaries(run) == 0);
+  }
+}
+
+TEST_CASE("a folder takes one run at a time, and a lock that was left behind none") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  RunningProgram first(endless(run));
+  wait_for_checkpoint(first, run);
+  for (const Words& more : {Words{}, Words{"--resume", "latest"}}) {
+    const Outcome second = raysplats_program(tiny_training(run) + more);
+    INFO(second.err);
+    CHECK(second.code == 3);
+    CHECK(one_sentence(second));
+    CHECK(has(second.err, run));
+    CHECK(has(second.err, "process " + std::to_string(first.process())));
+  }
+  CHECK(first.runs());
+  REQUIRE(::kill(first.process(), SIGKILL) == 0);
+  CHECK(first.wait().code == 128 + SIGKILL);
+  REQUIRE(std::filesystem::exists(std::filesystem::path(run) / ".lock"));
+  const std::int64_t reached = raysplats::load_latest_checkpoint(run).iteration;
+  const Outcome resumed = raysplats_program(
+      tiny_training(run) + Words{"--resume", "latest", "-n", std::to_string(reached + 2)});
+  INFO(resumed.err);
+  CHECK(resumed.code == 0);
+}
+
+TEST_CASE("eight processes fill one kernel cache at once") {
+  const TemporaryFolder folder;
+  std::vector<pid_t> children;
+  for (int i = 0; i < 8; ++i) {
+    const pid_t child = ::fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      // Nothing in this program has used OpenCL before, so that every child has its own.
+      int status = 1;
+      ::setenv("POCL_CACHE_DIR", (folder / "driver").c_str(), 1);
+      try {
+        raysplats::ContextOptions options;
+        options.cache_directory = folder / "cache";
+        raysplats::Context context(raysplats::select_device(""), options);
+        raysplats::Scan scan(context);
+        raysplats::Buffer<std::uint32_t> values(context, 4, "values");
+        values.upload(std::array<std::uint32_t, 4>{5, 6, 7, 0});
+        scan.exclusive(values, 3);
+        status = values.download() == std::vector<std::uint32_t>{0, 5, 11, 18} ? 0 : 2;
+      } catch (const std::exception& error) {
+        std::fprintf(stderr, "%s\n", error.what());
+      }
+      ::_exit(status);
+    }
+    children.push_back(child);
+  }
+  for (const pid_t child : children) {
+    int status = -1;
+    CHECK(::waitpid(child, &status, 0) == child);
+    CHECK(status == 0);
+  }
+  std::size_t kept = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "cache")) {
+    CHECK(entry.path().extension() == ".bin");  // nothing half-written stays
+    ++kept;
+  }
+  CHECK(kept >= 1);
+}
