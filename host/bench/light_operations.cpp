@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "bench/scene_state.hpp"
@@ -38,14 +39,18 @@ void SceneBench::Impl::make_triangles(std::size_t triangles, bool from_camera) {
 BenchOperation SceneBench::Impl::surfaces(const char* row,
                                           std::size_t triangles,
                                           bool from_camera) {
-  return {[=, this] { make_triangles(triangles, from_camera); },
+  // The work is asked for when later rows have used the same tracer.
+  const auto rays = std::make_shared<double>();
+  return {[=, this] {
+            make_triangles(triangles, from_camera);
+            *rays = static_cast<double>(surface_rays.size());
+          },
           {},
           [this] { triangle_tracer->nearest(surface_rays, surface_rays.size(), surface_hits); },
-          {{row, {}, false, [this] {
-              const auto rays = static_cast<double>(surface_rays.size());
-              return BenchWork{{{"rays", rays}},
-                               RS_WORK_SURFACE_RAY_BYTES * rays,
-                               RS_WORK_SURFACE_RAY_FLOPS * rays};
+          {{row, {}, false, [rays] {
+              return BenchWork{{{"rays", *rays}},
+                               RS_WORK_SURFACE_RAY_BYTES * *rays,
+                               RS_WORK_SURFACE_RAY_FLOPS * *rays};
             }}}};
 }
 
@@ -74,11 +79,15 @@ BenchOperation SceneBench::Impl::light(const char* row,
                                        std::size_t triangles,
                                        Material::Kind kind,
                                        bool lights) {
+  const auto statistics = std::make_shared<LightTracer::Statistics>();
   return {[=, this] { make_light_tracer(triangles, kind, lights); },
           {},
-          [this] { light_tracer->render(model.camera); },
-          {{row, {}, false, [this] {
-              const LightTracer::Statistics s = light_tracer->statistics();
+          [=, this] {
+            light_tracer->render(model.camera);
+            *statistics = light_tracer->statistics();
+          },
+          {{row, {}, false, [statistics] {
+              const LightTracer::Statistics& s = *statistics;
               const auto paths = static_cast<double>(s.camera_rays + s.continued_rays);
               const auto shadows = static_cast<double>(s.shadow_rays);
               return BenchWork{{{"rays", paths + shadows}, {"shadow rays", shadows}},
