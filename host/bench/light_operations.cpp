@@ -90,9 +90,11 @@ BenchOperation SceneBench::Impl::light(const char* row,
               const LightTracer::Statistics& s = *statistics;
               const auto paths = static_cast<double>(s.camera_rays + s.continued_rays);
               const auto shadows = static_cast<double>(s.shadow_rays);
-              return BenchWork{{{"rays", paths + shadows}, {"shadow rays", shadows}},
-                               RS_WORK_PATH_BYTES * paths + RS_WORK_SHADOW_RAY_BYTES * shadows,
-                               RS_WORK_SURFACE_RAY_FLOPS * (paths + shadows)};
+              BenchWork work{{{"rays", paths + shadows}},
+                             RS_WORK_PATH_BYTES * paths + RS_WORK_SHADOW_RAY_BYTES * shadows,
+                             RS_WORK_SURFACE_RAY_FLOPS * (paths + shadows)};
+              if (shadows > 0) work.items.push_back({"shadow rays", shadows});
+              return work;
             }}}};
 }
 
