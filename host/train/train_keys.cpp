@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -41,6 +42,18 @@ const std::string& single(const std::string& key, const Values& values) {
     throw UsageError(fmt::format("The option '{}' takes one value, not {}", key, values.size()));
   }
   return values.front();
+}
+
+// What a configuration file can hold between double quotes: there are no escapes.
+const std::string& quotable(const std::string& key, const std::string& value) {
+  const bool bad = std::any_of(value.begin(), value.end(), [](char c) {
+    return c == '"' || static_cast<unsigned char>(c) < 0x20;
+  });
+  if (bad) {
+    throw UsageError(
+        fmt::format("The option '{}' takes no double quotes and no control characters", key));
+  }
+  return value;
 }
 
 // Collects the table; every function adds one key.
@@ -104,7 +117,9 @@ class Table {
     // A list of numbers may arrive split at its commas.
     add(
         name, help, false,
-        [&target](const Values& values) { target = fmt::format("{}", fmt::join(values, ",")); },
+        [name, &target](const Values& values) {
+          target = quotable(name, fmt::format("{}", fmt::join(values, ",")));
+        },
         [&target] { return fmt::format("\"{}\"", target); });
   }
 
@@ -133,10 +148,11 @@ class Table {
     // Absolute, so that a resumed run finds them from anywhere.
     add(
         name, help, false,
-        [&target](const Values& values) {
+        [name, &target](const Values& values) {
           target.clear();
           for (const std::string& value : values) {
-            if (!value.empty()) target.push_back(std::filesystem::absolute(value).string());
+            if (value.empty()) continue;
+            target.push_back(std::filesystem::absolute(quotable(name, value)).string());
           }
         },
         [&target] {
