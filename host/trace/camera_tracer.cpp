@@ -264,10 +264,11 @@ void CameraTracer::Impl::choose_gradient_sum(std::size_t count) {
   const std::size_t room =
       std::min<std::size_t>(options.memory_budget / 4, context.device().max_allocation) / bytes;
   sum = options.gradient_sum;
-  if (sum == GradientSum::kAuto && context.device().type == DeviceType::kCpu)
-    sum = GradientSum::kCopies;
-  if (sum == GradientSum::kAuto || (sum == GradientSum::kCopies && room < units))
-    sum = options.deterministic ? GradientSum::kExact : GradientSum::kAtomic;
+  if (sum == GradientSum::kAuto) {
+    const GradientSum shared = options.deterministic ? GradientSum::kExact : GradientSum::kAtomic;
+    sum = context.device().type == DeviceType::kCpu ? GradientSum::kCopies : shared;
+  }
+  if (sum == GradientSum::kCopies && room < units) sum = GradientSum::kExact;
   copies = sum == GradientSum::kCopies ? std::min(2 * units, room) : 1;
 }
 

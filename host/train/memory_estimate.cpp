@@ -22,9 +22,9 @@ bool may_sum_exactly(const TrainOptions& options, const DeviceInfo& device) {
     case GradientSum::kExact:
       return true;
     case GradientSum::kAtomic:
+    case GradientSum::kCopies:  // where those do not fit their share of memory-budget
       return false;
     case GradientSum::kAuto:
-    case GradientSum::kCopies:
       break;
   }
   return options.deterministic && device.type != DeviceType::kCpu;

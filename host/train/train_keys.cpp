@@ -190,8 +190,10 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.number("iterations", o.iterations, 0, kMaxCount, "training steps, one view each");
   t.number("seed", o.seed, 0, 1.8e19,
            "seed of view order, random start and splits; a run is a function of it");
-  t.flag("deterministic", o.deterministic,
-         "the same seed gives the same bytes on the same device, whatever the scheduling");
+  t.flag(
+      "deterministic", o.deterministic,
+      "the same seed gives the same bytes on the same device, whatever the scheduling; CPUs always "
+      "do, others add gradients in long integers for it");
 
   t.section("Data");
   t.number("downscale", o.downscale, 0.01, 1e4, "photos are reduced by this factor");
@@ -286,8 +288,8 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
        {"atomic", GradientSum::kAtomic}},
       "how the gradients of rays are added: private copies (CPUs), exact (long integers, the same "
       "bits in any order) or atomic (floats, not deterministic); auto = copies on CPUs, else "
-      "exact, "
-      "or atomic with no deterministic");
+      "atomic, "
+      "or exact with deterministic");
   t.number("launch-budget-ms", o.launch_budget_ms, -1, 1e9,
            "a view is traced in bands of rows that take about this long each, so that watchdogs of "
            "displays do not stop them; 0 = no bound, -1 = none on CPUs and 100 elsewhere");

@@ -18,9 +18,9 @@ enum class ScaleActivation { kExp, kSigmoid };
 
 /// How the gradients that rays send to one Gaussian are added.
 enum class GradientSum {
-  kAuto,    ///< private copies on CPUs where they fit; elsewhere exact, or atomic when the bits do
-            ///< not matter
-  kCopies,  ///< one copy per worker, added in a fixed order; exact or atomic where they do not fit
+  kAuto,  ///< private copies on CPUs, exact where they do not fit; elsewhere atomic, or exact when
+          ///< it has to be deterministic
+  kCopies,  ///< one copy per worker, added in a fixed order; exact where they do not fit
   kExact,   ///< long integers: the same bits whatever the order, and with any number of workers
   kAtomic,  ///< compare-and-swap on floats: the last bits depend on the scheduling
 };
@@ -38,7 +38,7 @@ struct TraceOptions {
   bool depth = false;    ///< camera rays also yield expected depth, median depth and hit count
   int packet_width = 0;  ///< rays per work-item: 1, 2, 4, 8 or 16; 0 = the device's own
   GradientSum gradient_sum = GradientSum::kAuto;
-  bool deterministic = true;       ///< kAuto gives the same gradients to the bit every time
+  bool deterministic = false;      ///< kAuto gives the same bits every time; on CPUs it always does
   double launch_budget_ms = -1.0;  ///< time of one launch; 0 = unbounded, -1 = the device's default
   std::size_t memory_budget = std::size_t{1} << 30;  ///< bytes for hit lists and private gradients
 };

@@ -52,7 +52,7 @@ RANDOM=$seed
 
 # train FOLDER MORE...
 train=("$raysplats" -q train "$folder/data" -n "$iterations" --init-count 400 --max-gaussians 800 --sh-degree 1
-  --densify-from 8 --densify-every 8 --resolution-schedule 10 --checkpoint-every 1 --log-every 1)
+  --densify-from 8 --densify-every 8 --resolution-schedule 10 --checkpoint-every 1 --log-every 1 --deterministic)
 begin=$(date +%s%N)
 "${train[@]}" -o "$folder/reference" >"$folder/log.txt" 2>&1 || fail "the undisturbed run failed, see $folder/log.txt"
 length=$((($(date +%s%N) - begin) / 1000000))

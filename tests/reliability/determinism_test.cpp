@@ -15,7 +15,7 @@ TEST_CASE(
   CHECK(same_result(folder / "a", undisturbed()));
   CHECK(same_result(folder / "b", undisturbed()));
 
-  const Words half = tiny_training(folder / "c") + Words{"--deterministic"};
+  const Words half = tiny_training(folder / "c");
   REQUIRE(raysplats_program(half).code == 0);
   REQUIRE(std::filesystem::remove(checkpoint_of(folder / "c", kIterations)));
   REQUIRE(std::filesystem::remove(model_of(folder / "c")));

@@ -57,6 +57,7 @@ inline Words tiny_training(const std::string& run) {
           "5",
           "--resolution-schedule",
           "12",
+          "--deterministic",
           "-q"};
 }
 

@@ -67,6 +67,7 @@ TEST_CASE("hit lists count up to their budget, exact sums where they may be used
   options.memory_budget = 512;
   CHECK(estimate_memory(options, demand, gpu).hits == std::size_t{512} << 20);
   options.max_hits = 2;
+  options.deterministic = true;
   CHECK(estimate_memory(options, demand, gpu).hits == 24'000'000);
   const std::size_t exact = estimate_memory(options, demand, gpu).tracing;
   CHECK(exact == estimate_memory(options, demand, cpu).tracing + 320 * demand.gaussians);
