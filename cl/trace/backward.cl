@@ -15,20 +15,13 @@
 // Components of a line's gradient follow the line; slot 2 (m_z, of which order makes no gradient)
 // sums the per-ray lengths of the screen gradient instead, the densification signal of AbsGS (Ye et
 // al. 2024).
-#include "trace/exact_sum.h"
 #include "trace/hit_stream.h"
+#include "trace/line_sum.h"
 #include "trace/packet.h"
 
 #ifndef TILE
 #define TILE 32
 #endif
-#ifndef PRIVATE_COPIES
-#define PRIVATE_COPIES 0
-#endif
-#ifndef EXACT_SUMS
-#define EXACT_SUMS 0
-#endif
-
 // Lane i of the result is the sum of v[i] over its lanes. With 16 lanes, pairs of vectors are
 // folded into one by adding halves, then quarters, and so on: 15 additions for all sums.
 float16 sum_lanes(const fv* v) {
@@ -56,41 +49,6 @@ float16 sum_lanes(const fv* v) {
                    rs_lane_sum(v[4]), rs_lane_sum(v[5]), rs_lane_sum(v[6]), rs_lane_sum(v[7]),
                    rs_lane_sum(v[8]), rs_lane_sum(v[9]), rs_lane_sum(v[10]), rs_lane_sum(v[11]),
                    rs_lane_sum(v[12]), rs_lane_sum(v[13]), rs_lane_sum(v[14]), rs_lane_sum(v[15]));
-#endif
-}
-
-// Where the gradients of lines are summed. `limit` bounds what one ray may add to an exact sum.
-typedef struct {
-  __global float* lines;
-  float limit;
-} LineSums;
-
-void add_line(const LineSums* sums, const uint index, const float16 value) {
-#if PRIVATE_COPIES
-  *(__global float16*)(sums->lines + (size_t)index * 16) += value;
-#else
-  union {
-    float16 v;
-    float s[16];
-  } part;
-  part.v = value;
-#if EXACT_SUMS
-  volatile __global uint* words =
-      (volatile __global uint*)sums->lines + (size_t)index * (16 * RS_EXACT_WORDS);
-  for (int i = 0; i < 16; ++i) rs_exact_add(words + i, part.s[i], sums->limit);
-#else
-  volatile __global uint* words = (volatile __global uint*)sums->lines + (size_t)index * 16;
-  for (int i = 0; i < 16; ++i) {
-    if (part.s[i] == 0.0f) continue;
-    // A plain first read would race with the others' writes; 0 is what most first writers find.
-    uint old = 0;
-    for (;;) {
-      const uint seen = atomic_cmpxchg(words + i, old, as_uint(as_float(old) + part.s[i]));
-      if (seen == old) break;
-      old = seen;
-    }
-  }
-#endif
 #endif
 }
 
@@ -164,7 +122,7 @@ void add_gradient(const Pixels* p,
       g[9 + k] = g_origin;
     }
   }
-  add_line(sums, reference >> 1, sum_lanes(g));
+  rs_add_line(sums, reference >> 1, sum_lanes(g));
 }
 
 // The oldest open row has met all rows that it may change places with: its gradient is complete.

@@ -13,18 +13,19 @@
 //
 // Launch: `items` work-items; each takes every items-th chunk of `chunk` rays in the order given.
 //   PRIVATE_COPIES 1: work-item i adds to copy i of `sums`: no atomics, the same sum every time
-//   PRIVATE_COPIES 0: one copy, compare-and-swap adds
+//   EXACT_SUMS 1:     one copy of long integers (exact_sum.h): the same sum in any order
+//   otherwise:        one copy, compare-and-swap adds
+#include "trace/line_sum.h"
 #include "trace/ray_color.h"
 #include "trace/ray_sums.h"
 
-#ifndef PRIVATE_COPIES
-#define PRIVATE_COPIES 0
-#endif
+// Lines of sums per Gaussian.
+#define RS_RAY_LINES (RS_RAY_SUMS / 16)
 
 typedef struct {
   // Read only.
   __global const float* records;
-  __global float* sums;
+  LineSums sums;
   float16 screen;   // as the kernel's argument
   float4 gradient;  // of the ray's colour and alpha
   float sky;        // background . gradient
@@ -38,35 +39,6 @@ typedef struct {
   uint last_index;
   float blended;
 } RayState;
-
-void add_sum(__global float* target, float value) {
-#if PRIVATE_COPIES
-  *target += value;
-#else
-  if (value == 0.0f) return;
-  volatile __global uint* word = (volatile __global uint*)target;
-  // A plain first read would race with the others' writes; 0 is what most first writers find.
-  uint old = 0;
-  for (;;) {
-    const uint seen = atomic_cmpxchg(word, old, as_uint(as_float(old) + value));
-    if (seen == old) break;
-    old = seen;
-  }
-#endif
-}
-
-void add_sums(__global float* target, float16 value) {
-#if PRIVATE_COPIES
-  *(__global float16*)target += value;
-#else
-  union {
-    float16 v;
-    float s[16];
-  } part;
-  part.v = value;
-  for (int i = 0; i < 16; ++i) add_sum(target + i, part.s[i]);
-#endif
-}
 
 // Adds what one hit contributes: `by_alpha` = dL/dalpha, `by_color` = dL/dcolour, zero where the
 // colour is clamped.
@@ -101,7 +73,6 @@ void add_hit(const RayScene* scene,
   sum.s9 = alpha * by_alpha;
   sum.sa = sqrt(dot(on_screen, on_screen));
   sum.sef = (float2)(0.0f);
-  __global float* target = state->sums + (size_t)index * RS_RAY_SUMS;
 #if SH_DEGREE == 0
   (void)scene;
   (void)basis_of_ray;
@@ -123,13 +94,14 @@ void add_hit(const RayScene* scene,
     const float3 by_n = (float3)(slope[0], slope[1], slope[2]);
     sum.sbcd = (by_n - n * dot(by_n, n)) * inverse;
   }
+  const size_t first = (size_t)index * RS_RAY_SUMS + RS_RAY_SH;
   for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) {
-    add_sum(target + RS_RAY_SH + k, basis[k] * by_color.x);
-    add_sum(target + RS_RAY_SH + RS_RAY_FUNCTIONS + k, basis[k] * by_color.y);
-    add_sum(target + RS_RAY_SH + 2 * RS_RAY_FUNCTIONS + k, basis[k] * by_color.z);
+    rs_add_sum(&state->sums, first + k, basis[k] * by_color.x);
+    rs_add_sum(&state->sums, first + RS_RAY_FUNCTIONS + k, basis[k] * by_color.y);
+    rs_add_sum(&state->sums, first + 2 * RS_RAY_FUNCTIONS + k, basis[k] * by_color.z);
   }
 #endif
-  add_sums(target, sum);
+  rs_add_line(&state->sums, (size_t)index * RS_RAY_LINES, sum);
 }
 
 void blend_hits(const RayScene* scene,
@@ -155,9 +127,11 @@ void blend_hits(const RayScene* scene,
     state->last_index = pending->index[i];
     state->stopped = state->transmittance < scene->min_transmittance;
     RS_PREFETCH_READ(state->records + (size_t)pending->index[i] * 16);
+#if !EXACT_SUMS
     for (int k = 0; k < RS_RAY_SUMS; k += 16) {
-      RS_PREFETCH_WRITE(state->sums + (size_t)pending->index[i] * RS_RAY_SUMS + k);
+      RS_PREFETCH_WRITE(state->sums.lines + (size_t)pending->index[i] * RS_RAY_SUMS + k);
     }
+#endif
   }
   const float3 gradient = state->gradient.xyz;
   float behind = state->sky;
@@ -187,7 +161,8 @@ void blend_hits(const RayScene* scene,
 
 // rays, results, tree and order as in rays.cl; gradients: dL/d(R, G, B, alpha) per ray; records:
 // whitening matrix and mean of every Gaussian (ray_gradients.cl); screen: a 3 x 3 matrix in 0..8,
-// row-major, from the gradient of a mean to its share on the screen for a mean at distance 1.
+// row-major, from the gradient of a mean to its share on the screen for a mean at distance 1; limit
+// and sums: as for LineSums.
 __kernel void ray_backward(const uint ray_count,
                            const uint chunk,
                            const uint items,
@@ -210,6 +185,7 @@ __kernel void ray_backward(const uint ray_count,
                            __global const float8* restrict results,
                            __global const float4* restrict gradients,
                            __global const float* restrict records,
+                           const float limit,
                            __global float* restrict sums) {
   const uint item = get_global_id(0);
   if (item >= items) return;
@@ -222,11 +198,12 @@ __kernel void ray_backward(const uint ray_count,
   RayState state;
   state.records = records;
 #if PRIVATE_COPIES
-  state.sums = sums + (size_t)item * gaussians * RS_RAY_SUMS;
+  sums += (size_t)item * gaussians * RS_RAY_SUMS;
 #else
   (void)gaussians;
-  state.sums = sums;
 #endif
+  state.sums.lines = sums;
+  state.sums.limit = limit;
   state.screen = screen;
   for (size_t begin = (size_t)item * chunk; begin < ray_count; begin += (size_t)items * chunk) {
     const size_t end = min(begin + chunk, (size_t)ray_count);

@@ -49,6 +49,8 @@ class MirrorPaths {
   /// Adds the gradients of the last trace() to `sums`.
   void backward(const DeviceGaussians& gaussians, RayBackward& sums);
 
+  /// Most rays that come of one: itself and its reflections.
+  std::size_t segments() const { return levels_.size(); }
   /// Rays of the last trace() that stopped because of max_hits; blocks.
   std::uint64_t capped_rays() const;
 

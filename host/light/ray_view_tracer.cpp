@@ -146,7 +146,7 @@ void RayViewTracer::backward(const DeviceGaussians& gaussians,
         "RayViewTracer::backward() must follow forward(keep = true) of the same Gaussians, with a "
         "gradient of the picture's size");
   }
-  self.sums.begin(gaussians, RayScreen::of(self.camera));
+  self.sums.begin(gaussians, RayScreen::of(self.camera), pixels * self.paths.segments());
   for (std::size_t first = 0; first < pixels; first += self.batch()) {
     const std::size_t count = std::min(self.batch(), pixels - first);
     if (self.batch() < pixels) self.trace(gaussians, first, count);

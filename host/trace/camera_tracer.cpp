@@ -6,15 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
 #include "trace/candidate_lists.hpp"
-#include "trace/exact_sum.h"
 #include "trace/gaussian_kernel.hpp"
+#include "trace/gradient_sums.hpp"
 #include "trace/launch_budget.hpp"
 #include "trace/packet_shape.hpp"
 
@@ -22,10 +21,9 @@ namespace raysplats {
 namespace {
 
 using Stream = std::array<std::uint32_t, 2>;
-using ExactLine = std::array<std::uint32_t, 16 * RS_EXACT_WORDS>;
 
-constexpr std::size_t kLineGradientBytes = 64;
-constexpr std::size_t kRoundGroup = 64;
+// Private copies of gradients per compute unit: more share the tiles out more evenly.
+constexpr std::size_t kCopiesPerUnit = 2;
 constexpr std::uint32_t kChunkEntries =
     16;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
 
@@ -43,7 +41,8 @@ struct CameraTracer::Impl {
         lists(context_in, packet.tile),
         forward_budget(options_in.launch_budget_ms, context_in.device().type),
         backward_budget(forward_budget),
-        counters(context_in, 3, "trace counters") {}
+        counters(context_in, 3, "trace counters"),
+        sums(context_in, "line gradients") {}
 
   void trace_rows(const DeviceGaussians& gaussians,
                   std::uint32_t row,
@@ -56,8 +55,6 @@ struct CameraTracer::Impl {
                      std::uint32_t row,
                      std::uint32_t rows);
   void finalize(const DeviceGaussians& gaussians, GaussianGradients& gradients, bool pose);
-  void choose_gradient_sum(std::size_t count);
-  void prepare_gradient_sum();
   Range packet_range(const Kernel& kernel, std::uint32_t row, std::uint32_t rows) const;
   void grow_pool(std::size_t chunks);
   Kernel& forward_kernel(bool keep);
@@ -103,13 +100,7 @@ struct CameraTracer::Impl {
   bool statistics_saved = false;
   bool hits_kept = false;      // the last forward() was asked to keep hits
   bool hits_complete = false;  // and all of them fit
-  std::size_t copies = 1;
-  GradientSum sum = GradientSum::kCopies;  // never kAuto
-  Buffer<std::array<float, 16>> line_gradients;
-  Buffer<ExactLine> exact_gradients;
-  std::size_t tidy_exact = 0;  // Gaussians whose exact sums are ready
-  // Gaussians and copies of line_gradients when all copies but the first hold zeros.
-  std::array<std::size_t, 2> tidy_copies{};
+  GradientSums sums;
   Buffer<float> pose;
   GaussianGradients pose_scratch;
 };
@@ -256,64 +247,24 @@ void CameraTracer::Impl::grow_pool(std::size_t chunks) {
                             "hit transmittances");
 }
 
-void CameraTracer::Impl::choose_gradient_sum(std::size_t count) {
-  // CPUs add to private copies: no atomics and the same sum every time. GPUs have too many groups
-  // for that.
-  const std::size_t units = std::max<std::size_t>(context.device().compute_units, 1);
-  const std::size_t bytes = std::max<std::size_t>(count, 1) * kLineGradientBytes;
-  const std::size_t room =
-      std::min<std::size_t>(options.memory_budget / 4, context.device().max_allocation) / bytes;
-  sum = options.gradient_sum;
-  if (sum == GradientSum::kAuto) {
-    const GradientSum shared = options.deterministic ? GradientSum::kExact : GradientSum::kAtomic;
-    sum = context.device().type == DeviceType::kCpu ? GradientSum::kCopies : shared;
-  }
-  if (sum == GradientSum::kCopies && room < units) sum = GradientSum::kExact;
-  copies = sum == GradientSum::kCopies ? std::min(2 * units, room) : 1;
-}
-
-// Zeros where the backward pass will add.
-void CameraTracer::Impl::prepare_gradient_sum() {
-  const std::array<std::size_t, 2> shape{count, copies};
-  const bool tidy = tidy_copies == shape;
-  tidy_copies = {};
-  line_gradients.ensure(context, count * copies, "line gradients");
-  if (sum != GradientSum::kExact) {
-    line_gradients.clear(tidy ? count : count * copies);
-    return;
-  }
-  const bool ready = tidy_exact == count && exact_gradients.size() == count;
-  tidy_exact = 0;
-  exact_gradients.ensure(context, count, "exact line gradients");
-  if (!ready) exact_gradients.fill(RS_EXACT_BIAS);
-}
-
 void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
-  const bool exact = sum == GradientSum::kExact;
-  const bool shared = sum != GradientSum::kCopies;
   BuildOptions build;
-  build.define("PACKET", packet.lanes)
-      .define("TILE", packet.tile)
-      .define("CHUNK", kChunkEntries)
-      .define("PRIVATE_COPIES", shared ? 0 : 1)
-      .define("EXACT_SUMS", exact ? 1 : 0);
-  Kernel kernel = context.kernel("trace/backward.cl", "trace_backward", build);
+  build.define("PACKET", packet.lanes).define("TILE", packet.tile).define("CHUNK", kChunkEntries);
+  Kernel kernel = context.kernel("trace/backward.cl", "trace_backward", sums.define(build));
   // No ray meets a Gaussian twice.
-  const auto addends = static_cast<float>(packet_count() * static_cast<std::size_t>(packet.lanes));
-  const float limit = std::ldexp(1.0f, RS_EXACT_HIGH) / std::max(addends, 1.0f);
-  const auto launch = [&](std::uint32_t first, std::uint32_t number, const auto& gradients) {
-    const Range range =
-        shared ? packet_range(kernel, first, number) : Range{{copies, 1, 1}, {1, 1, 1}, {}};
-    // Shared sums find their rows by the offset of the launch.
-    kernel.launch(range, static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(copies),
-                  lists.lines(), image_gradient, transmittances, stream_ends, pool,
-                  pool_transmittance, camera, lists.tiles_x(), shared ? row : row + first, number,
-                  background_of(options), screen_x(), screen_y(), limit, gradients);
-  };
+  const float limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet.lanes));
+  const bool shared = !sums.is_private();
   in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    exact ? launch(first, number, exact_gradients) : launch(first, number, line_gradients);
+    const Range range =
+        shared ? packet_range(kernel, first, number) : Range{{sums.copies(), 1, 1}, {1, 1, 1}, {}};
+    // Shared sums find their rows by the offset of the launch.
+    kernel.launch(range, static_cast<std::uint32_t>(count),
+                  static_cast<std::uint32_t>(sums.copies()), lists.lines(), image_gradient,
+                  transmittances, stream_ends, pool, pool_transmittance, camera, lists.tiles_x(),
+                  shared ? row : row + first, number, background_of(options), screen_x(),
+                  screen_y(), limit, sums.target());
   });
 }
 
@@ -358,11 +309,11 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
   GaussianKernel kernel(context, "trace/finalize_gradients.cl", "finalize_gradients", build);
-  kernel.launch(n, static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(copies),
-                line_gradients, lists.bounds(), lists.lines(), gaussians.means,
-                gaussians.quaternions, gaussians.scales, gaussians.opacities, gaussians.sh, camera,
-                screen_x(), screen_y(), gradients.means, gradients.quaternions, gradients.scales,
-                gradients.opacities, gradients.sh, gradients.screen, pose);
+  kernel.launch(n, static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(sums.copies()),
+                sums.lines(), lists.bounds(), lists.lines(), gaussians.means, gaussians.quaternions,
+                gaussians.scales, gaussians.opacities, gaussians.sh, camera, screen_x(), screen_y(),
+                gradients.means, gradients.quaternions, gradients.scales, gradients.opacities,
+                gradients.sh, gradients.screen, pose);
 }
 
 void CameraTracer::backward(const DeviceGaussians& gaussians,
@@ -375,8 +326,9 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
   }
   self.saved = statistics();
   self.statistics_saved = true;
-  self.choose_gradient_sum(gaussians.count);
-  self.prepare_gradient_sum();
+  self.sums.prepare(GradientSumChoice::of(self.options, self.context.device(), gaussians.count,
+                                          self.options.memory_budget / 4, kCopiesPerUnit),
+                    gaussians.count);
   if (self.hits_complete) {
     self.launch_backward(image_gradient, 0, self.lists.tile_rows());
   } else {
@@ -390,15 +342,9 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
                          std::min(band, static_cast<std::uint32_t>(all) - row));
     }
   }
-  if (self.sum == GradientSum::kExact) {
-    self.context.kernel("trace/exact_lines.cl", "round_exact_lines")
-        .launch(Range::linear(gaussians.count, kRoundGroup),
-                static_cast<std::uint32_t>(gaussians.count), self.exact_gradients,
-                self.line_gradients);
-    self.tidy_exact = gaussians.count;
-  }
+  self.sums.round();
   self.finalize(gaussians, gradients, false);
-  self.tidy_copies = {gaussians.count, self.copies};
+  self.sums.settle();
 }
 
 CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& gaussians) {

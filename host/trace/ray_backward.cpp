@@ -20,12 +20,6 @@ constexpr std::size_t kCpuChunk = 64;
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
-// RS_RAY_SUMS of ray_sums.h.
-std::size_t sums_per_gaussian(int degree) {
-  if (degree == 0) return 16;
-  return (16 + 3 * static_cast<std::size_t>(sh_coefficients(degree)) + 15) / 16 * 16;
-}
-
 }  // namespace
 
 RayScreen RayScreen::of(const Camera& camera) {
@@ -53,21 +47,25 @@ RayScreen RayScreen::of(const Camera& camera) {
 }
 
 RayBackward::RayBackward(Context& context, const RayTracer& tracer)
-    : context_(&context), tracer_(&tracer), order_(context) {}
+    : context_(&context), tracer_(&tracer), order_(context), sums_(context, "ray gradient sums") {}
 
-// As CameraTracer: CPUs add to private copies, without atomics and the same sum every time; GPUs
-// have too many work-items for that. Returns copies and whether they are private.
-std::array<std::size_t, 2> RayBackward::choose_copies(std::size_t count, std::size_t sums) const {
-  const DeviceInfo& device = context_->device();
-  const std::size_t units = device.compute_units;
-  const std::size_t bytes = std::max<std::size_t>(count, 1) * sums * sizeof(float);
-  const std::size_t room =
-      std::min<std::size_t>(tracer_->options().memory_budget / 2, device.max_allocation) / bytes;
-  const bool private_copies = device.type == DeviceType::kCpu && room >= units;
-  return {private_copies ? units : 1, private_copies ? std::size_t{1} : 0};
+// RS_RAY_SUMS / 16 of ray_sums.h.
+std::size_t RayBackward::sum_lines(int degree) {
+  if (degree == 0) return 1;
+  return (16 + 3 * static_cast<std::size_t>(sh_coefficients(degree)) + 15) / 16;
 }
 
-void RayBackward::begin(const DeviceGaussians& gaussians, const RayScreen& screen) {
+GradientSumChoice RayBackward::sum_choice(const TraceOptions& options,
+                                          const DeviceInfo& device,
+                                          std::size_t gaussians,
+                                          int degree) {
+  return GradientSumChoice::of(options, device, gaussians * sum_lines(degree),
+                               options.memory_budget / 2, 1);
+}
+
+void RayBackward::begin(const DeviceGaussians& gaussians,
+                        const RayScreen& screen,
+                        std::size_t rays) {
   if (tracer_->tree().tree().size() != gaussians.count) {
     throw UsageError("RayTracer::update() must follow every change of the Gaussians");
   }
@@ -78,14 +76,12 @@ void RayBackward::begin(const DeviceGaussians& gaussians, const RayScreen& scree
   }
   screen_[12] = static_cast<float>(screen.distance);
   degree_ = gaussians.active_sh_degree;
-  const std::size_t sums = sums_per_gaussian(degree_);
-  const auto [copies, private_copies] = choose_copies(gaussians.count, sums);
-  private_copies_ = private_copies != 0;
-  const std::array<std::size_t, 3> shape{gaussians.count, sums, copies};
-  const bool tidy = shape == shape_ && !begun_;
-  shape_ = shape;
-  sums_.ensure(*context_, gaussians.count * sums * copies, "ray gradient sums");
-  sums_.clear(gaussians.count * sums * (tidy ? 1 : copies));
+  count_ = gaussians.count;
+  rays_ = rays;
+  taken_ = 0;
+  begun_ = false;
+  sums_.prepare(sum_choice(tracer_->options(), context_->device(), count_, degree_),
+                count_ * sum_lines(degree_));
   records_.ensure(*context_, 16 * gaussians.count, "ray gradient records");
   BuildOptions build;
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0);
@@ -101,7 +97,7 @@ void RayBackward::add(const DeviceGaussians& gaussians,
                       const Buffer<RayResult>& results,
                       const Buffer<Gradient>& gradients,
                       ColorDirection color_direction) {
-  if (!begun_ || shape_[0] != gaussians.count || degree_ != gaussians.active_sh_degree) {
+  if (!begun_ || count_ != gaussians.count || degree_ != gaussians.active_sh_degree) {
     throw UsageError("RayBackward::begin() must come before add(), for the same Gaussians");
   }
   if (color_direction == ColorDirection::kPerRay) {
@@ -113,6 +109,13 @@ void RayBackward::add(const DeviceGaussians& gaussians,
                     "gradients: pass as many of each",
                     count, rays.size(), results.size(), gradients.size()));
   }
+  if (count > rays_ - taken_) {
+    throw UsageError(
+        fmt::format("RayBackward::begin() was told of {} rays and got {} already: tell it of all, "
+                    "{} more cannot be taken",
+                    rays_, taken_, count));
+  }
+  taken_ += count;
   if (count == 0 || gaussians.count == 0) return;
   const DeviceInfo& device = context_->device();
   const TraceOptions& options = tracer_->options();
@@ -120,9 +123,9 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   const bool cpu = device.type == DeviceType::kCpu;
   const bool ordered = order_.compute(tree, rays, count);
   BuildOptions build = ray_walk_build(device, options, tree.lanes());
-  build.define("SH_DEGREE", degree_).define("PRIVATE_COPIES", private_copies_ ? 1 : 0);
+  sums_.define(build.define("SH_DEGREE", degree_));
   const std::size_t chunk = cpu ? kCpuChunk : 1;
-  const std::size_t items = private_copies_ ? shape_[2] : (count + chunk - 1) / chunk;
+  const std::size_t items = sums_.is_private() ? sums_.copies() : (count + chunk - 1) / chunk;
   const std::array<float, 4> background{options.background[0], options.background[1],
                                         options.background[2], 0.0f};
   context_->kernel("trace/ray_backward.cl", "ray_backward", build)
@@ -131,11 +134,12 @@ void RayBackward::add(const DeviceGaussians& gaussians,
               tracer_->tree().blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
               color_direction == ColorDirection::kFromOrigin ? 1 : 0, options.quantile,
               options.min_transmittance, options.max_hits, background, screen_, rays,
-              ordered ? 1 : 0, order_.indices(), results, gradients, records_, sums_);
+              ordered ? 1 : 0, order_.indices(), results, gradients, records_,
+              GradientSums::limit(rays_), sums_.target());
 }
 
 void RayBackward::finish(const DeviceGaussians& gaussians, GaussianGradients& gradients) {
-  if (!begun_ || shape_[0] != gaussians.count) {
+  if (!begun_ || count_ != gaussians.count) {
     throw UsageError("RayBackward::begin() must come before finish(), for the same Gaussians");
   }
   const std::size_t n = gaussians.count;
@@ -149,10 +153,13 @@ void RayBackward::finish(const DeviceGaussians& gaussians, GaussianGradients& gr
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("SH_DEGREE", degree_)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
+  sums_.round();
   GaussianKernel kernel(*context_, kGradients, "finish_ray_gradients", build);
-  kernel.launch(n, u32(n), u32(shape_[2]), sums_, records_, gaussians.quaternions, gaussians.scales,
-                gaussians.opacities, screen_, gradients.means, gradients.quaternions,
-                gradients.scales, gradients.opacities, gradients.sh, gradients.screen);
+  kernel.launch(n, u32(n), u32(sums_.copies()), sums_.lines(), records_, gaussians.quaternions,
+                gaussians.scales, gaussians.opacities, screen_, gradients.means,
+                gradients.quaternions, gradients.scales, gradients.opacities, gradients.sh,
+                gradients.screen);
+  sums_.settle();
   begun_ = false;
 }
 

@@ -9,6 +9,7 @@
 #include "device/context.hpp"
 #include "raysplats/camera.hpp"
 #include "trace/device_gaussians.hpp"
+#include "trace/gradient_sums.hpp"
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tracer.hpp"
 
@@ -36,7 +37,8 @@ struct RayScreen {
 
 /// Gradients of a loss over arbitrary rays for the parameters of the Gaussians. begin(), any number
 /// of add(), finish(): the segments of a path add up. The Gaussians and the tracer's tree stay as
-/// they are meanwhile; min_transmittance, max_hits and the order of hits are the tracer's.
+/// they are meanwhile; min_transmittance, max_hits, the order of hits and the way of adding are the
+/// tracer's.
 class RayBackward {
  public:
   using Gradient = std::array<float, 4>;  ///< of a ray: dL/d(R, G, B) of its colour, dL/dalpha
@@ -44,10 +46,18 @@ class RayBackward {
   /// `tracer` is not owned.
   RayBackward(Context& context, const RayTracer& tracer);
 
-  void begin(const DeviceGaussians& gaussians, const RayScreen& screen = {});
+  /// Rays that one begin() may take, unless it is told fewer.
+  static constexpr std::size_t kMostRays = std::size_t{1} << 32;
+
+  /// `rays` is at least the number that all add() together will bring: the fewer, the larger the
+  /// gradients that exact sums take (GradientSums::limit()).
+  void begin(const DeviceGaussians& gaussians,
+             const RayScreen& screen = {},
+             std::size_t rays = kMostRays);
   /// The first `count` of `rays` again, with the `results` that the tracer gave them (background
   /// included) and the gradients of those. Enqueues and returns. Throws UsageError without begin(),
-  /// for buffers that are too small, and for ColorDirection::kPerRay.
+  /// for more rays than it was told, for buffers that are too small, and for
+  /// ColorDirection::kPerRay.
   void add(const DeviceGaussians& gaussians,
            const Buffer<Ray>& rays,
            std::size_t count,
@@ -57,21 +67,25 @@ class RayBackward {
   /// Overwrites `gradients`, growing its buffers as needed.
   void finish(const DeviceGaussians& gaussians, GaussianGradients& gradients);
 
- private:
-  std::array<std::size_t, 2> choose_copies(std::size_t count, std::size_t sums) const;
+  /// Lines of 16 floats that are summed per Gaussian, and how.
+  static std::size_t sum_lines(int sh_degree);
+  static GradientSumChoice sum_choice(const TraceOptions& options,
+                                      const DeviceInfo& device,
+                                      std::size_t gaussians,
+                                      int sh_degree);
 
+ private:
   Context* context_;
   const RayTracer* tracer_;
   RayOrder order_;
   bool begun_ = false;
-  bool private_copies_ = false;
   int degree_ = 0;
   std::array<float, 16> screen_{};
-  /// Gaussians, floats of each and copies; the copies behind the first hold zeros outside of
-  /// begin() to finish().
-  std::array<std::size_t, 3> shape_{};
+  std::size_t count_ = 0;  // Gaussians of begin()
+  std::size_t rays_ = 0;   // that begin() was told
+  std::size_t taken_ = 0;  // of these
   Buffer<float> records_;
-  Buffer<float> sums_;
+  GradientSums sums_;
 };
 
 }  // namespace raysplats

@@ -149,6 +149,12 @@ void validate(const TrainOptions& options) {
           "0");
     }
   }
+  if (options.deterministic && options.gradient_sum == GradientSum::kAtomic) {
+    throw UsageError(
+        "The options 'deterministic' and 'gradient-sum' = atomic contradict each other, because "
+        "atomic sums depend on the scheduling: use 'gradient-sum' = auto or leave 'deterministic' "
+        "off");
+  }
   if (options.background != "random") background_color(options, false);
 }
 

@@ -34,7 +34,7 @@ struct TrainOptions {
   // Run
   std::int64_t iterations = 10000;
   std::uint64_t seed = 42;
-  bool deterministic = false;  ///< CPUs always are
+  bool deterministic = false;  ///< CPUs always are, unless gradient_sum is kAtomic
 
   // Data
   double downscale = 1.0;

@@ -2,7 +2,10 @@
 #include <filesystem>
 #include <string>
 
+#include "base/atomic_file.hpp"
 #include "tiny_run.hpp"
+
+using namespace raysplats;
 
 TEST_CASE(
     "two runs with one seed leave the same bytes, and so do an interrupted and a resumed one") {
@@ -41,4 +44,26 @@ TEST_CASE(
   const std::string model = run("plain", {}, {});
   CHECK(run("three", {}, {{{"POCL_MAX_PTHREAD_COUNT", "3"}}}) == model);
   CHECK(run("bands", {"--launch-budget-ms", "0.001"}, {}) == model);
+}
+
+TEST_CASE("runs whose rays are traced one by one, through a mirror, leave the same bytes as well") {
+  const TemporaryFolder folder;
+  write_text_file(folder / "mirror.obj",
+                  "v -4 -4 -1.2\nv 4 -4 -1.2\nv 4 4 -1.2\nv -4 4 -1.2\nf 1 2 3\nf 1 3 4\n");
+  const auto run = [&](const std::string& name, const Words& more, const Surroundings& around) {
+    const Words mirror{"--mirror", folder / "mirror.obj"};
+    const Outcome outcome = raysplats_program(tiny_training(folder / name) + mirror + more, around);
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    return read_file(model_of(folder / name));
+  };
+  const std::string copies = run("copies", {}, {});
+  CHECK(copies != read_file(model_of(undisturbed())));
+  // A resumed run builds the tree over the Gaussians anew where the other one refitted it.
+  REQUIRE(std::filesystem::remove(checkpoint_of(folder / "copies", kIterations)));
+  CHECK(run("copies", {"--resume", "latest"}, {}) == copies);
+
+  const Words exact{"--gradient-sum", "exact"};
+  const std::string model = run("exact", exact, {});
+  CHECK(run("three", exact, {{{"POCL_MAX_PTHREAD_COUNT", "3"}}}) == model);
 }

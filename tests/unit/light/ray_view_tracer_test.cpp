@@ -25,6 +25,7 @@ struct Host {
         opacities(g.opacities.download()),
         sh(g.sh.download()),
         screen(g.screen.download()) {}
+  bool operator==(const Host&) const = default;
 };
 
 template <class Expected>
@@ -193,6 +194,11 @@ TEST_CASE("a pinhole's picture and gradients are those of the camera tracer") {
   const Traced parts = trace_and_differentiate(context, batches, gaussians, large, noise);
   CHECK(whole.image.data == parts.image.data);
   check_gradients(parts.gradients, whole.gradients, 1e-4);
+  // Exact sums do not notice the batches.
+  options.gradient_sum = tight.gradient_sum = GradientSum::kExact;
+  RayViewTracer exact(context, options), exact_batches(context, tight);
+  CHECK(trace_and_differentiate(context, exact, gaussians, large, noise).gradients ==
+        trace_and_differentiate(context, exact_batches, gaussians, large, noise).gradients);
 }
 
 TEST_CASE("pictures and gradients of distorted cameras equal the double reference [small]") {
@@ -248,6 +254,29 @@ TEST_CASE("pictures and gradients of distorted cameras equal the double referenc
     check_gradients(got.gradients,
                     reference::ray_gradient(parameters, options, queries, wide, mode), 1e-3);
   }
+}
+
+TEST_CASE("gradients through mirrors in exact sums are those in copies, in any batches") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(300, 96, 1);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const std::vector<Panel> panels{{{-2, -2, 1.3}, {4, 0, 0}, {0, 4, 0}, {0.9, 0.7, 0.8}},
+                                  {{1.4, -2, -1.5}, {0.3, 0, 2.9}, {0, 4, 0}, {0.5, 0.9, 0.6}}};
+  const Camera camera = reference::cube_camera(80, 70);
+  const std::vector<float> noise = random_image_gradient(80 * 70, 9);
+  const auto gradients = [&](GradientSum sum, std::size_t budget) {
+    TraceOptions options;
+    options.gradient_sum = sum;
+    options.memory_budget = budget;
+    RayViewTracer tracer(context, options, mirrors_of(panels, 3));
+    return trace_and_differentiate(context, tracer, gaussians, camera, noise).gradients;
+  };
+  const std::size_t large = std::size_t{1} << 28;
+  const Host exact = gradients(GradientSum::kExact, large);
+  check_gradients(exact, gradients(GradientSum::kCopies, large), 1e-5);
+  check_gradients(exact, gradients(GradientSum::kAtomic, large), 1e-5);
+  CHECK(gradients(GradientSum::kExact, 1000) == exact);
+  CHECK(gradients(GradientSum::kCopies, 1000) == exact);
 }
 
 TEST_CASE("gradients through mirrors equal finite differences of a double reference [small]") {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "trace/exact_sum.h"
+#include "trace/gradient_sums.hpp"
 #include "trace/launch_budget.hpp"
 #include "trace_fixture.hpp"
 
@@ -120,6 +121,42 @@ TEST_CASE("an addend that is not finite or beyond the limit makes an exact sum N
     CHECK(std::isnan(exact_sum(context, {bad, -9e8f, -9e8f, -9e8f, bad, 9e8f, bad})));
   }
   CHECK(exact_sum(context, {9e8f, 1.0f}) == 9e8f);
+}
+
+TEST_CASE("the way of adding follows the device, and is never atomic where it must not be") {
+  DeviceInfo cpu;
+  cpu.type = DeviceType::kCpu;
+  cpu.compute_units = 4;
+  cpu.max_allocation = 1 << 20;
+  DeviceInfo gpu = cpu;
+  gpu.type = DeviceType::kGpu;
+  TraceOptions options;
+  const auto choose = [&](const DeviceInfo& device, std::size_t lines, std::size_t room) {
+    return GradientSumChoice::of(options, device, lines, room, 2);
+  };
+  CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kCopies);
+  CHECK(choose(cpu, 100, 1 << 20).copies == 8);
+  CHECK(choose(cpu, 100, 5 * 6400).copies == 5);
+  CHECK(choose(gpu, 100, 1 << 20).sum == GradientSum::kAtomic);
+  CHECK(choose(gpu, 100, 1 << 20).copies == 1);
+  options.deterministic = true;
+  CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kCopies);
+  CHECK(choose(gpu, 100, 1 << 20).sum == GradientSum::kExact);
+  for (const GradientSum sum : {GradientSum::kAuto, GradientSum::kCopies}) {
+    options.gradient_sum = sum;
+    for (const bool deterministic : {false, true}) {
+      options.deterministic = deterministic;
+      CHECK(choose(cpu, 100, 3 * 6400).sum == GradientSum::kExact);
+      CHECK(choose(cpu, 100, 3 * 6400).copies == 1);
+      CHECK(choose(cpu, 10000, 1 << 24).sum == GradientSum::kExact);  // the largest allocation
+    }
+  }
+  options.gradient_sum = GradientSum::kCopies;
+  CHECK(choose(gpu, 100, 1 << 20).copies == 8);
+  options.gradient_sum = GradientSum::kAtomic;
+  CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kAtomic);
+  options.gradient_sum = GradientSum::kExact;
+  CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kExact);
 }
 
 TEST_CASE("every way of adding gradients gives the same, and all but atomics the same bits") {

@@ -39,6 +39,7 @@ struct Host {
         opacities(g.opacities.download()),
         sh(g.sh.download()),
         screen(g.screen.download()) {}
+  bool operator==(const Host&) const = default;
 };
 
 template <class Expected>
@@ -400,27 +401,121 @@ TEST_CASE("several batches of rays add up, and a new begin starts from zero") {
   CHECK_ERRORS(errors_of(Host(out), whole), 1e-5);
 }
 
-TEST_CASE("private copies and atomic adds give the same gradients, private ones the same bits") {
+TEST_CASE("every way of adding the gradients of rays equals the double reference") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(300, 83, 2);
+  for (const GradientSum sum : {GradientSum::kCopies, GradientSum::kExact, GradientSum::kAtomic}) {
+    for (const ColorDirection direction : {ColorDirection::kRay, ColorDirection::kFromOrigin}) {
+      CAPTURE(static_cast<int>(sum));
+      CAPTURE(static_cast<int>(direction));
+      TraceOptions options;
+      options.gradient_sum = sum;
+      CHECK_ERRORS(compare_gradients(context, model, options, random_rays(300, 32), direction),
+                   1e-3);
+    }
+  }
+}
+
+TEST_CASE("a few gradients of rays in exact sums equal the double reference [small]") {
+  Context context = make_test_context();
+  TraceOptions options;
+  for (const GradientSum sum : {GradientSum::kExact, GradientSum::kAtomic}) {
+    CAPTURE(static_cast<int>(sum));
+    options.gradient_sum = sum;
+    CHECK_ERRORS(compare_gradients(context, reference::random_scene(12, 84, 1), options,
+                                   random_rays(12, 33), ColorDirection::kFromOrigin),
+                 1e-3);
+  }
+}
+
+TEST_CASE("gradients of rays are the same to the bit but for atomics, exact ones in any order") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(3000, 80, 1);
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  const std::vector<Ray> rays = random_rays(5000, 30);
-  const Gradients gradients = random_gradients(rays.size(), 6);
+  std::vector<Ray> rays = random_rays(5000, 30);
+  Gradients gradients = random_gradients(rays.size(), 6);
   TraceOptions options;
   const auto run = [&] {
     return gradients_on_device(context, gaussians, options, rays, gradients, ColorDirection::kRay);
   };
-  const Host a = run(), b = run();
-  if (context.device().type == DeviceType::kCpu) {
-    CHECK(a.means == b.means);
-    CHECK(a.quaternions == b.quaternions);
-    CHECK(a.scales == b.scales);
-    CHECK(a.opacities == b.opacities);
-    CHECK(a.sh == b.sh);
-    CHECK(a.screen == b.screen);
+  options.gradient_sum = GradientSum::kCopies;
+  const Host copies = run();
+  CHECK(run() == copies);
+  options.gradient_sum = GradientSum::kAtomic;
+  CHECK_ERRORS(errors_of(run(), copies), 1e-5);
+  options.gradient_sum = GradientSum::kExact;
+  const Host exact = run();
+  CHECK_ERRORS(errors_of(exact, copies), 1e-5);
+  CHECK(run() == exact);
+  // Copies that do not fit give way to exact sums.
+  options.gradient_sum = GradientSum::kCopies;
+  options.memory_budget = 100000;
+  CHECK(run() == exact);
+  // Batches, too small to be ordered, added by one object that is used again.
+  options.gradient_sum = GradientSum::kExact;
+  RayTracer tracer(context, options);
+  tracer.update(gaussians);
+  RayBackward backward(context, tracer);
+  for (const std::size_t size : {std::size_t{5000}, std::size_t{1700}, std::size_t{333}}) {
+    CAPTURE(size);
+    backward.begin(gaussians);
+    for (std::size_t begin = 0; begin < rays.size(); begin += size) {
+      const auto from = static_cast<std::ptrdiff_t>(begin);
+      const auto to = static_cast<std::ptrdiff_t>(std::min(begin + size, rays.size()));
+      Batch batch(context, {rays.begin() + from, rays.begin() + to},
+                  {gradients.begin() + from, gradients.begin() + to});
+      const auto count = static_cast<std::size_t>(to - from);
+      tracer.trace(gaussians, batch.rays, count, batch.results);
+      backward.add(gaussians, batch.rays, count, batch.results, batch.gradients,
+                   ColorDirection::kRay);
+    }
+    GaussianGradients out;
+    backward.finish(gaussians, out);
+    CHECK(Host(out) == exact);
   }
-  options.memory_budget = 100000;  // too little for copies
-  CHECK_ERRORS(errors_of(run(), a), 1e-5);
+  // Nor does it matter in which order they come.
+  std::reverse(rays.begin(), rays.end());
+  std::reverse(gradients.begin(), gradients.end());
+  CHECK(run() == exact);
+}
+
+TEST_CASE("gradients of rays beyond the range of exact sums are refused, others are not touched") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(60, 85, 0);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const std::vector<Ray> rays = random_rays(40, 34);
+  Gradients gradients = random_gradients(rays.size(), 8);
+  TraceOptions options;
+  options.gradient_sum = GradientSum::kExact;
+  const auto opacities = [&] {
+    return gradients_on_device(context, gaussians, options, rays, gradients, ColorDirection::kRay)
+        .opacities;
+  };
+  const std::vector<float> before = opacities();
+  gradients[1] = {0, 0, 0, 1e30f};
+  const std::vector<float> after = opacities();
+  std::size_t refused = 0, kept = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    refused += std::isnan(after[i]) ? 1 : 0;
+    kept += before[i] != 0.0f && after[i] == before[i] ? 1 : 0;
+    CHECK(std::isfinite(before[i]));
+  }
+  CHECK(refused > 0);
+  CHECK(kept > 10);
+
+  RayTracer tracer(context, options);
+  tracer.update(gaussians);
+  Batch batch(context, rays, gradients);
+  tracer.trace(gaussians, batch.rays, 40, batch.results);
+  RayBackward backward(context, tracer);
+  const auto add = [&](std::size_t count) {
+    backward.add(gaussians, batch.rays, count, batch.results, batch.gradients,
+                 ColorDirection::kRay);
+  };
+  backward.begin(gaussians, {}, 60);
+  add(40);
+  CHECK_THROWS_AS(add(21), UsageError);
+  add(20);
 }
 
 TEST_CASE("no Gaussians and no rays have no gradients") {

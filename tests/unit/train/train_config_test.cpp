@@ -2,6 +2,7 @@
 #include "train/train_config.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -119,6 +120,22 @@ TEST_CASE("values out of range and of the wrong kind are refused by name") {
   }
   write_text_file(
       path, "position-lr = 0 # off\nposition-lr-final = 0\n\n# comment\neval-at = [1,\n 2]\n");
+  CHECK(message_of(path) == "");
+  std::filesystem::remove(path);
+}
+
+TEST_CASE("a deterministic run with atomic sums is refused as a contradiction") {
+  const auto path = temporary("atomic.toml");
+  const std::string both = "deterministic = true\ngradient-sum = \"atomic\"\n";
+  write_text_file(path, both);
+  CHECK(message_of(path).find("contradict") != std::string::npos);
+  write_text_file(path, "[train]\n" + both);
+  CHECK(message_of(path).find("contradict") != std::string::npos);
+  for (const char* sum : {"auto", "copies", "exact"}) {
+    write_text_file(path, fmt::format("deterministic = true\ngradient-sum = \"{}\"\n", sum));
+    CHECK(message_of(path) == "");
+  }
+  write_text_file(path, "deterministic = false\ngradient-sum = \"atomic\"\n");
   CHECK(message_of(path) == "");
   std::filesystem::remove(path);
 }
