@@ -47,9 +47,7 @@ struct RayViewTracer::Impl {
         paths(context_in, tracer, mirrors),
         sums(context_in, tracer) {}
 
-  std::size_t batch() const {
-    return std::max(kLeastBatch, tracer.options().memory_budget / 4 / kPathBytes);
-  }
+  std::size_t batch() const { return RayViewTracer::batch(tracer.options().memory_budget); }
   void trace(const DeviceGaussians& gaussians, std::size_t first, std::size_t count);
   Kernel kernel(const char* name) { return context.kernel("light/mirror_paths.cl", name); }
 
@@ -66,6 +64,10 @@ struct RayViewTracer::Impl {
   std::uint64_t capped = 0;  // of the batches before the last
   Buffer<float> image;
 };
+
+std::size_t RayViewTracer::batch(std::size_t memory_budget) {
+  return std::max(kLeastBatch, memory_budget / 4 / kPathBytes);
+}
 
 RayViewTracer::RayViewTracer(Context& context, const TraceOptions& options, const Mirrors& mirrors)
     : impl_(std::make_unique<Impl>(context, options, mirrors)) {}

@@ -18,6 +18,9 @@ namespace raysplats {
 /// have no gradients.
 class RayViewTracer {
  public:
+  /// Rays of camera pixels that are traced at once.
+  static std::size_t batch(std::size_t memory_budget);
+
   /// Throws UsageError for options.near_depth, which cuts for pinholes only, and as MirrorPaths.
   RayViewTracer(Context& context, const TraceOptions& options, const Mirrors& mirrors = {});
   ~RayViewTracer();

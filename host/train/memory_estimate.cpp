@@ -6,28 +6,73 @@
 #include <algorithm>
 #include <string>
 
+#include "light/ray_view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/gaussians.hpp"
 #include "shared/layout.h"
+#include "shared/light_layout.h"
 #include "trace/exact_sum.h"
+#include "trace/gradient_sums.hpp"
+#include "trace/ray_backward.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
+constexpr std::size_t kSortBytes = 16;  // of RadixSort for 32-bit keys, per pair
 
-// Whether gradients may be added in long integers, which take 16 sums per Gaussian.
-bool may_sum_exactly(const TrainOptions& options, const DeviceInfo& device) {
-  switch (options.gradient_sum) {
-    case GradientSum::kExact:
-      return true;
-    case GradientSum::kAtomic:
-    case GradientSum::kCopies:  // where those do not fit their share of memory-budget
-      return false;
-    case GradientSum::kAuto:
-      break;
-  }
-  return options.deterministic && device.type != DeviceType::kCpu;
+TraceOptions sum_options_of(const TrainOptions& options) {
+  TraceOptions out;
+  out.gradient_sum = options.gradient_sum;
+  out.deterministic = options.deterministic;
+  out.memory_budget = static_cast<std::size_t>(options.memory_budget) * kMiB;
+  return out;
+}
+
+// Whether gradients of packets may be added in long integers. Copies that do not fit their share
+// of memory-budget become that, too.
+bool may_sum_exactly(const TrainOptions& options, std::size_t gaussians, const DeviceInfo& device) {
+  const TraceOptions trace = sum_options_of(options);
+  return GradientSumChoice::of(trace, device, gaussians, trace.memory_budget / 4, 1).sum ==
+         GradientSum::kExact;
+}
+
+// What views that are traced ray by ray hold per Gaussian, and in their largest buffer.
+struct RayShare {
+  std::size_t bytes = 0;
+  std::size_t largest = 0;
+};
+
+RayShare rays_per_gaussian(const TrainOptions& options,
+                           std::size_t gaussians,
+                           const DeviceInfo& device) {
+  const auto lanes = static_cast<std::size_t>(ray_lanes(device, 0));
+  const GradientSumChoice choice =
+      RayBackward::sum_choice(sum_options_of(options), device, gaussians, options.sh_degree);
+  const std::size_t lines =
+      RayBackward::sum_lines(options.sh_degree) * sizeof(GradientSums::Line) * choice.copies;
+  const std::size_t exact = choice.sum == GradientSum::kExact ? lines * RS_EXACT_WORDS : 0;
+  const std::size_t block = sizeof(float) * (options.adaptive_radius ? 16 : 15);
+  // A node of six vectors for every block but one in `lanes`.
+  const std::size_t nodes = sizeof(float) * 6 / (lanes - 1) + 1;
+  // Box, code in two words, order and the sort's two copies, record.
+  return {sizeof(RsAabb) + 12 + kSortBytes + block + nodes + 64 + lines + exact,
+          std::max({lines, exact, block})};
+}
+
+// Rays of one launch, with results, gradients and the order in which they are traced, forward and
+// backward; with mirrors those that are reflected as well. Few meet more than one.
+std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels) {
+  constexpr std::size_t segment =
+      sizeof(Ray) + sizeof(RayResult) + 2 * sizeof(RayBackward::Gradient);
+  constexpr std::size_t order = 2 * (8 + kSortBytes);
+  const std::size_t mirrors =
+      options.mirrors.empty() ? 0 : sizeof(RsSurfaceHit) + sizeof(std::uint32_t);
+  const bool reflects = mirrors > 0 && options.mirror_bounces > 0;
+  const std::size_t reflected = reflects ? segment + mirrors + sizeof(RsPath) : 0;
+  const std::size_t rays = std::min(
+      pixels, RayViewTracer::batch(static_cast<std::size_t>(options.memory_budget) * kMiB));
+  return rays * (segment + order + mirrors + reflected);
 }
 
 double mib(std::size_t bytes) { return static_cast<double>(bytes) / static_cast<double>(kMiB); }
@@ -39,23 +84,34 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                                const DeviceInfo& device) {
   const auto sh = static_cast<std::size_t>(3 * sh_coefficients(options.sh_degree));
   const std::size_t floats = 3 + 4 + 3 + 1 + sh;
-  const std::size_t exact =
-      may_sum_exactly(options, device) ? 16 * RS_EXACT_WORDS * sizeof(std::uint32_t) : 0;
+  const std::size_t exact = may_sum_exactly(options, demand.gaussians, device)
+                                ? 16 * RS_EXACT_WORDS * sizeof(std::uint32_t)
+                                : 0;
   MemoryEstimate out;
   // Parameters, gradients and two moments; while the set changes, one more copy of the moments or
   // the parameters.
   out.gaussians = demand.gaussians * (floats * 4 + sh * 2 + 5) * sizeof(float);
   // Line, gradient line and its exact sums, bounds, box, candidate keys and values with their
   // second copies.
-  out.tracing =
-      demand.gaussians * (2 * sizeof(RsLine) + exact + sizeof(RsViewBounds) + sizeof(RsAabb) + 44);
+  const bool packets = demand.ray_views < demand.views || demand.views == 0;
+  const std::size_t record =
+      2 * sizeof(RsLine) + exact + sizeof(RsViewBounds) + sizeof(RsAabb) + 44;
+  if (packets) out.tracing = demand.gaussians * record;
   // Image, gradient, depth and about 12 planes of the loss.
   out.images = std::min(static_cast<std::size_t>(options.image_budget) * kMiB,
                         demand.views * demand.pixels * 4) +
                demand.pixels * 24 * sizeof(float);
-  out.hits = std::min(static_cast<std::size_t>(options.memory_budget) * kMiB,
-                      demand.pixels * static_cast<std::size_t>(options.max_hits) * 12);
-  out.largest_buffer = demand.gaussians * std::max({sh * sizeof(float), sizeof(RsLine), exact});
+  if (packets) {
+    out.hits = std::min(static_cast<std::size_t>(options.memory_budget) * kMiB,
+                        demand.pixels * static_cast<std::size_t>(options.max_hits) * 12);
+  }
+  std::size_t largest = std::max({sh * sizeof(float), sizeof(RsLine), packets ? exact : 0});
+  if (demand.ray_views > 0) {
+    const RayShare share = rays_per_gaussian(options, demand.gaussians, device);
+    out.rays = demand.gaussians * share.bytes + ray_bytes(options, demand.pixels);
+    largest = std::max(largest, share.largest);
+  }
+  out.largest_buffer = demand.gaussians * largest;
   return out;
 }
 
@@ -94,12 +150,12 @@ void check_memory(const TrainOptions& options,
                : "lower --memory-budget or --image-budget, or raise --downscale";
   throw ResourceError(fmt::format(
       "Training up to {} Gaussians needs about {:.0f} MiB ({:.0f} for Gaussians, {:.0f} for "
-      "tracing, "
-      "{:.0f} for images, {:.0f} for hits; {:.0f} in the largest buffer) but {} has {:.0f} MiB, of "
+      "tracing, {:.0f} for rays one by one, {:.0f} for images, {:.0f} for hits; {:.0f} in the "
+      "largest buffer) but {} has {:.0f} MiB, of "
       "which a run may take nine tenths, and {:.0f} MiB in one buffer: {}",
       demand.gaussians, mib(estimate.total()), mib(estimate.gaussians), mib(estimate.tracing),
-      mib(estimate.images), mib(estimate.hits), mib(estimate.largest_buffer), device.name,
-      mib(device.global_memory), mib(device.max_allocation), remedy));
+      mib(estimate.rays), mib(estimate.images), mib(estimate.hits), mib(estimate.largest_buffer),
+      device.name, mib(device.global_memory), mib(device.max_allocation), remedy));
 }
 
 }  // namespace raysplats

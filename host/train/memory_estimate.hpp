@@ -13,6 +13,7 @@ struct MemoryDemand {
   std::size_t gaussians = 0;  ///< most that it may reach
   std::size_t pixels = 0;     ///< of the largest view
   std::size_t views = 0;      ///< photos to train on
+  std::size_t ray_views = 0;  ///< of these, traced ray by ray (StepTracer::by_rays())
 };
 
 /// Device memory that a training run will need, in bytes.
@@ -20,10 +21,12 @@ struct MemoryEstimate {
   std::size_t gaussians =
       0;  ///< parameters, gradients, Adam moments, the second copy while densifying
   std::size_t tracing = 0;  ///< records per view, sums of gradients and sort buffers
-  std::size_t images = 0;   ///< photos within their budget, and the buffers of one view
-  std::size_t hits = 0;  ///< hit streams, tile lists and private gradients: memory-budget at most
+  std::size_t rays = 0;     ///< views traced ray by ray: tree, sums of gradients, rays (of mirrors:
+                         ///< two segments of a path, without their meshes)
+  std::size_t images = 0;  ///< photos within their budget, and the buffers of one view
+  std::size_t hits = 0;    ///< hit streams, tile lists and private gradients: memory-budget at most
   std::size_t largest_buffer = 0;
-  std::size_t total() const { return gaussians + tracing + images + hits; }
+  std::size_t total() const { return gaussians + tracing + rays + images + hits; }
 };
 
 MemoryEstimate estimate_memory(const TrainOptions& options,

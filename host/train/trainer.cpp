@@ -263,9 +263,10 @@ void Trainer::Impl::start() {
   const std::size_t most =
       grows ? std::max(gaussians.count, static_cast<std::size_t>(options.max_gaussians))
             : gaussians.count;
-  check_memory(options, {most, pixels, train_views.size()}, context.device());
   const auto by_rays = std::count_if(train_cameras.begin(), train_cameras.end(),
                                      [this](const Camera& c) { return tracer.by_rays(c); });
+  check_memory(options, {most, pixels, train_views.size(), static_cast<std::size_t>(by_rays)},
+               context.device());
   if (by_rays > 0) {
     spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),
                  options.mirrors.empty() ? "their cameras are no pinholes"

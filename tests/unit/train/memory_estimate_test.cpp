@@ -5,7 +5,9 @@
 
 #include <string>
 
+#include "light/ray_view_tracer.hpp"
 #include "raysplats/error.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 
@@ -29,6 +31,41 @@ std::string refusal(const TrainOptions& options,
     return error.what();
   }
   return "";
+}
+
+// A wall behind the cube of the reference scenes.
+Mirrors wall() {
+  Mirrors out;
+  Mesh mesh;
+  mesh.positions = {-9, -9, 2, 9, -9, 2, 9, 9, 2, -9, 9, 2};
+  mesh.triangles = {0, 1, 2, 0, 2, 3};
+  mesh.materials.assign(2, 0);
+  out.materials.resize(1);
+  out.materials[0].kind = Material::Kind::kMirror;
+  out.meshes.push_back(mesh);
+  return out;
+}
+
+// Most bytes that a view traced ray by ray holds, forward and backward, beside model, gradients and
+// picture.
+std::size_t bytes_of_rays(const Gaussians& model,
+                          int width,
+                          const TraceOptions& options,
+                          const Mirrors& mirrors) {
+  Context context = make_test_context();
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(width);
+  Buffer<float> image_gradient(context, 4 * pixels, "image gradient");
+  image_gradient.clear();
+  const std::size_t before = context.allocated_bytes();
+  RayViewTracer tracer(context, options, mirrors);
+  GaussianGradients gradients;
+  tracer.update(gaussians);
+  tracer.forward(gaussians, reference::cube_camera(width, width), true);
+  tracer.backward(gaussians, image_gradient, gradients);
+  const std::size_t known =
+      4 * (model.size() * (3 + 4 + 3 + 1 + 3) + model.sh.size()) + sizeof(float) * 4 * pixels;
+  return context.peak_allocated_bytes() - before - known;
 }
 
 }  // namespace
@@ -75,4 +112,61 @@ TEST_CASE("hit lists count up to their budget, exact sums where they may be used
   CHECK(exact == estimate_memory(options, demand, gpu).tracing + 320 * demand.gaussians);
   options.gradient_sum = GradientSum::kExact;
   CHECK(exact == estimate_memory(options, demand, cpu).tracing);
+}
+
+TEST_CASE("what views traced ray by ray take is estimated to an eighth") {
+  const DeviceInfo device = make_test_context().device();
+  for (const int degree : {0, 2}) {
+    for (const GradientSum sum : {GradientSum::kCopies, GradientSum::kExact}) {
+      for (const bool mirrored : {false, true}) {
+        // Mostly Gaussians, then mostly rays.
+        for (const auto& [count, width] : {std::pair{20000, 70}, std::pair{500, 300}}) {
+          CAPTURE(degree);
+          CAPTURE(static_cast<int>(sum));
+          CAPTURE(mirrored);
+          CAPTURE(count);
+          TrainOptions options;
+          options.sh_degree = degree;
+          options.gradient_sum = sum;
+          options.memory_budget = 256;
+          if (mirrored) options.mirrors = {"wall.obj"};
+          TraceOptions trace;
+          trace.gradient_sum = sum;
+          trace.memory_budget = std::size_t{256} << 20;
+          const auto gaussians = static_cast<std::size_t>(count);
+          const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(width);
+          const auto got =
+              static_cast<double>(bytes_of_rays(reference::random_scene(gaussians, 41, degree),
+                                                width, trace, mirrored ? wall() : Mirrors{}));
+          const MemoryEstimate estimate =
+              estimate_memory(options, {gaussians, pixels, 3, 3}, device);
+          CHECK(static_cast<double>(estimate.rays) == doctest::Approx(got).epsilon(0.125));
+          CHECK(estimate.tracing == 0);
+          CHECK(estimate.hits == 0);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("rays one by one count where a view needs them, in batches within their budget") {
+  DeviceInfo gpu = device_with(std::uint64_t{8} << 30, std::uint64_t{2} << 30);
+  TrainOptions options;
+  options.sh_degree = 3;
+  const std::size_t gaussians = 100'000, pixels = 10'000'000;
+  const MemoryEstimate packets = estimate_memory(options, {gaussians, pixels, 10}, gpu);
+  const MemoryEstimate some = estimate_memory(options, {gaussians, pixels, 10, 3}, gpu);
+  const MemoryEstimate all = estimate_memory(options, {gaussians, pixels, 10, 10}, gpu);
+  CHECK(packets.rays == 0);
+  CHECK(some.rays > 0);
+  CHECK(some.rays == all.rays);
+  CHECK(some.total() == packets.total() + all.rays);
+  CHECK(all.total() < some.total());
+  // 64 sums of 20 bytes more for each Gaussian.
+  options.deterministic = true;
+  const MemoryEstimate exact = estimate_memory(options, {gaussians, pixels, 10, 10}, gpu);
+  CHECK(exact.rays == all.rays + gaussians * 64 * 20);
+  CHECK(exact.largest_buffer == gaussians * 64 * 20);
+  options.memory_budget = 64;
+  CHECK(estimate_memory(options, {0, pixels, 10, 10}, gpu).rays < std::size_t{64} << 20);
 }
