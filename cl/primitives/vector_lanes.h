@@ -62,35 +62,34 @@ typedef fv rs_unaligned __attribute__((aligned(4)));
 #define rs_store_float(p, v) (*(__global rs_unaligned*)(p) = (v))
 #endif
 
-// Masks hold 0 or -1 in every lane. rs_lane_bits: one bit per lane whose mask is set, lane 0
-// lowest. Compilers with vectors of booleans keep them in mask registers; the plain form gives the
-// same.
-#if PACKET >= 8 && defined(__has_feature)
-#if __has_feature(ext_vector_type_boolean)
-#define RS_BOOLEAN_VECTORS 1
-typedef bool rs_booleans __attribute__((ext_vector_type(PACKET)));
-#if PACKET == 16
-typedef ushort rs_bits;
+// Masks hold 0 or -1 in every lane. rs_any, rs_all: whether any, or every lane is set. any() and
+// all() become one branch per pair of lanes in some compilers; a reduction becomes one test.
+// Not in SPIR: what reads that need not know reductions.
+#if PACKET > 1 && defined(__has_builtin) && !defined(__SPIR__) && !defined(__SPIRV__)
+#if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_and)
+#define RS_REDUCTIONS 1
+#endif
+#endif
+#ifdef RS_REDUCTIONS
+#define rs_any(mask) (__builtin_reduce_or(mask) != 0)
+#define rs_all(mask) (__builtin_reduce_and(mask) != 0)
 #else
-typedef uchar rs_bits;
-#endif
-#endif
+#define rs_any(mask) any(mask)
+#define rs_all(mask) all(mask)
 #endif
 
-#ifdef RS_BOOLEAN_VECTORS
-uint rs_lane_bits(iv mask) {
-  union {
-    rs_booleans lanes;
-    rs_bits bits;
-  } view;
-  view.lanes = __builtin_convertvector(mask, rs_booleans);
-  return view.bits;
-}
+// One bit per lane whose mask is set, lane 0 lowest. OpenCL C has no word for what x86 does in one
+// instruction; the plain form gives the same.
+#if PACKET == 16 && defined(__AVX512DQ__) && defined(__clang__)
+#define rs_lane_bits(mask) ((uint)__builtin_ia32_cvtd2mask512(mask))
+#elif PACKET == 8 && defined(__AVX__) && defined(__clang__)
+#define rs_lane_bits(mask) ((uint)__builtin_ia32_movmskps256(as_float8(mask)))
+#elif PACKET == 4 && defined(__SSE__) && defined(__clang__)
+#define rs_lane_bits(mask) ((uint)__builtin_ia32_movmskps(as_float4(mask)))
+#elif PACKET == 1
+#define rs_lane_bits(mask) ((uint)((mask)&1))
 #else
 uint rs_lane_bits(iv mask) {
-#if PACKET == 1
-  return mask & 1;
-#else
   const iv bit = mask & ((iv)(1) << RS_LANE_INDEX);
 #if PACKET == 16
   const int8 b8 = bit.lo | bit.hi;
@@ -106,16 +105,7 @@ uint rs_lane_bits(iv mask) {
   const int2 b2 = b4.lo | b4.hi;
   return b2.x | b2.y;
 #endif
-#endif
 }
-#endif
-
-#ifdef RS_BOOLEAN_VECTORS
-#define rs_any(mask) (rs_lane_bits(mask) != 0)
-#define rs_all(mask) (rs_lane_bits(mask) == (1u << PACKET) - 1u)
-#else
-#define rs_any(mask) any(mask)
-#define rs_all(mask) all(mask)
 #endif
 
 uint rs_lowest_bit(uint bits) { return 31 - clz(bits & -bits); }

@@ -9,6 +9,7 @@
 #ifndef RS_TRACE_PACKET_ROWS_H
 #define RS_TRACE_PACKET_ROWS_H
 
+#include "primitives/prefetch.h"
 #include "trace/candidates.h"
 #include "trace/hit_stream.h"
 #include "trace/packet_state.h"
@@ -17,6 +18,10 @@
 #ifndef PENDING
 #define PENDING 96
 #endif
+
+// Candidates tested before the rows found are opened. Their tests depend on nothing, so a processor
+// runs several at once; a branch per candidate would make each wait for the one before.
+#define RS_BATCH (PACKET > 1 ? 8 : 1)
 
 typedef struct {
   fv key[PENDING];
@@ -88,10 +93,40 @@ bool trace_in_rows(Candidates* candidates,
   uint opened = 0;
   iv alive = p->valid;
   candidates_restart(candidates);
+  uint next = candidates_next(candidates);
   while (rs_any(alive)) {
-    const uint k = candidates_next(candidates);
-    const bool draining = k == candidates->end;
-    const float bound = draining ? INFINITY : limits[k].x;
+    uint batch[RS_BATCH];
+    int size = 0;
+    for (; size < RS_BATCH && next != candidates->end; ++size) {
+      batch[size] = next;
+      RS_PREFETCH_READ(lines + (references[next] >> 1));
+      next = candidates_next(candidates);
+    }
+    if (slots.free_count < size) return false;
+    float first_key[RS_BATCH];
+    ushort found[RS_BATCH];
+    int found_count = 0;
+    for (int j = 0; j < size; ++j) {
+      const uint k = batch[j];
+      const uint reference = references[k];
+      fv key, alpha;
+      const iv hit =
+          packet_hit(p, lines[reference >> 1].v, reference & 1, limits[k].y, alive, &key, &alpha);
+      // Kept only where a lane hits, without a branch.
+      const ushort slot = slots.free[slots.free_count - 1];
+      rows.key[slot] = rs_as_float(rs_as_int(key) & 0x7fffffff);
+      rows.alpha[slot] = alpha;
+      rows.last_key[slot] = rs_lane_max(select((fv)(0.0f), key, hit));
+      rows.reference[slot] = reference;
+      found[found_count] = slot;
+      first_key[found_count] = rs_lane_min(select((fv)(INFINITY), key, hit));
+      const int hits = rs_any(hit) ? 1 : 0;
+      found_count += hits;
+      slots.free_count -= hits;
+    }
+    for (int j = 0; j < found_count; ++j) row_wait(&slots, found[j], first_key[j]);
+    const bool draining = next == candidates->end;
+    const float bound = draining ? INFINITY : limits[next].x;
     while (slots.waiting_count > 0 && slots.first_key[slots.waiting_count - 1] <= bound) {
       const float first_key = slots.first_key[--slots.waiting_count];
       const ushort slot = slots.waiting[slots.waiting_count];
@@ -135,19 +170,6 @@ bool trace_in_rows(Candidates* candidates,
       ++opened;
     }
     if (draining) break;
-
-    const uint reference = references[k];
-    fv key, alpha;
-    const iv hit =
-        packet_hit(p, lines[reference >> 1].v, reference & 1, limits[k].y, alive, &key, &alpha);
-    if (!rs_any(hit)) continue;
-    if (slots.free_count == 0) return false;
-    const ushort slot = slots.free[--slots.free_count];
-    rows.key[slot] = rs_as_float(rs_as_int(key) & 0x7fffffff);
-    rows.alpha[slot] = alpha;
-    rows.last_key[slot] = rs_lane_max(select((fv)(0.0f), key, hit));
-    rows.reference[slot] = reference;
-    row_wait(&slots, slot, rs_lane_min(select((fv)(INFINITY), key, hit)));
   }
   for (int i = 0; i < slots.open_count; ++i)
     row_settle(&rows, slots.open[i], lines, min_transmittance, p, &settled, stream);

@@ -72,7 +72,6 @@ iv packet_hit(const PacketState* p,
               fv* alpha) {
   const PacketMeeting m = rs_meet(v, general, quantile, p->X, p->Y);
   iv hit = m.inside & among;
-  if (!rs_any(hit)) return hit;
   const fv inverse = 1.0f / m.direction2;
   const fv distance2 = m.numerator * inverse;
 #if PEAK_ORDER
