@@ -64,8 +64,9 @@ typedef fv rs_unaligned __attribute__((aligned(4)));
 
 // Masks hold 0 or -1 in every lane. rs_any, rs_all: whether any, or every lane is set. any() and
 // all() become one branch per pair of lanes in some compilers; a reduction becomes one test.
-// Not in SPIR: what reads that need not know reductions.
-#if PACKET > 1 && defined(__has_builtin) && !defined(__SPIR__) && !defined(__SPIRV__)
+// Only where the compiler makes machine code of a CPU itself: what reads its intermediate code
+// elsewhere need not know reductions.
+#if PACKET > 1 && defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__))
 #if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_and)
 #define RS_REDUCTIONS 1
 #endif
