@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Installs the Debian packages that are missing, then configures and builds the release preset.
-# The program is build/release/bin/raysplats afterwards. With --tests the test programs are built too.
+# The program is build/release/bin/raysplats afterwards. With --tests the test programs are built too, and
+# what they run on is installed.
 # Needs the network only when a package is missing; root or sudo only then.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-readonly PACKAGES=(
+packages=(
   g++ cmake ninja-build pkg-config ccache git
   ocl-icd-opencl-dev opencl-headers opencl-clhpp-headers pocl-opencl-icd
   libglm-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libcli11-dev libxxhash-dev doctest-dev
@@ -19,7 +20,10 @@ say() { printf '== %s\n' "$*"; }
 targets=(raysplats_cli)
 case "${1:-}" in
   "") ;;
-  --tests) targets=(all) ;;
+  --tests)
+    targets=(all)
+    packages+=(oclgrind)
+    ;;
   *)
     echo "usage: scripts/setup.sh [--tests]" >&2
     exit 2
@@ -28,7 +32,7 @@ esac
 
 if command -v dpkg-query >/dev/null; then
   missing=()
-  for package in "${PACKAGES[@]}"; do
+  for package in "${packages[@]}"; do
     status=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
     [[ $status == installed ]] || missing+=("$package")
   done
@@ -48,7 +52,7 @@ if command -v dpkg-query >/dev/null; then
     say "All Debian packages are installed"
   fi
 else
-  say "No Debian package manager; the build needs: ${PACKAGES[*]}"
+  say "No Debian package manager; the build needs: ${packages[*]}"
 fi
 
 say "Configuring build/release"

@@ -122,7 +122,7 @@ TEST_CASE("gaussian bounds: contain the ellipsoid and are tight") {
   }
 }
 
-TEST_CASE("gaussian bounds: values that are not finite give empty boxes [small]") {
+TEST_CASE("gaussian bounds: values that are not finite give empty boxes [small] [tiny]") {
   Context context(select_device(""));
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
@@ -144,7 +144,7 @@ TEST_CASE("gaussian bounds: values that are not finite give empty boxes [small]"
   for (std::size_t i = 9; i < p.size(); ++i) CHECK_FALSE(is_empty(boxes[i]));
 }
 
-TEST_CASE("gaussian bounds: extreme lengths of quaternions and scales [small]") {
+TEST_CASE("gaussian bounds: extreme lengths of quaternions and scales [small] [tiny]") {
   Context context(select_device(""));
   Parameters p(4);
   for (std::size_t a = 0; a < 4; ++a) {

@@ -345,7 +345,7 @@ TEST_CASE("lbvh: a few boxes far away leave the order of the others as fine as i
   }
 }
 
-TEST_CASE("lbvh: far boxes in every division of the work [small]") {
+TEST_CASE("lbvh: far boxes in every division of the work [small] [tiny]") {
   Context context(select_device(""));
   for (const ChunkShape& shape : {ChunkShape{3, 1, 16}, ChunkShape{2, 16, 16}}) {
     Lbvh tree(context, shape);

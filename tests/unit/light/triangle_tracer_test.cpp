@@ -184,6 +184,14 @@ TEST_CASE("every width of the tree finds the same [small]") {
   }
 }
 
+TEST_CASE("a few triangles are met in trees of every width [tiny]") {
+  Context context = make_test_context();
+  for (const int lanes : {4, 8, 16}) {
+    CAPTURE(lanes);
+    check_against_brute_force(context, {triangle_soup(70, 4, 0.5)}, random_rays(60, 3), lanes);
+  }
+}
+
 TEST_CASE("trees of every depth and fill are sound") {
   Context context = make_test_context();
   for (const std::size_t count : {1, 2, 3, 15, 16, 17, 255, 256, 257, 5000}) {
@@ -453,7 +461,7 @@ TEST_CASE("long thin triangles are met where they are") {
   CHECK(a.different <= a.hits / 1000);
 }
 
-TEST_CASE("both sides of a single triangle are met, its interval is kept [small]") {
+TEST_CASE("both sides of a single triangle are met, its interval is kept [small] [tiny]") {
   Context context = make_test_context();
   Mesh mesh;
   mesh.positions = {-1, -1, 2, 3, -1, 2, -1, 3, 2};
@@ -505,7 +513,7 @@ TEST_CASE("of coincident triangles the one with the lowest number is met") {
   }
 }
 
-TEST_CASE("no mesh, empty meshes and mesh numbers [small]") {
+TEST_CASE("no mesh, empty meshes and mesh numbers [small] [tiny]") {
   Context context = make_test_context();
   TriangleTracer tracer(context);
   const std::vector<Ray> rays = {make_ray({0, 0, 0}, {0, 0, 1})};

@@ -102,7 +102,7 @@ TEST_CASE("radix sort: every division of the work gives the same result") {
   }
 }
 
-TEST_CASE("radix sort: one to four passes, some with one digit, in both forms [small]") {
+TEST_CASE("radix sort: one to four passes, some with one digit, in both forms [small] [tiny]") {
   Context context(select_device(""));
   for (const std::size_t size : {1u, 16u}) {
     CAPTURE(size);

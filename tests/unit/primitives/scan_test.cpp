@@ -53,7 +53,7 @@ TEST_CASE("scan: every shape gives the same sums") {
   }
 }
 
-TEST_CASE("scan: few elements in both forms [small]") {
+TEST_CASE("scan: few elements in both forms [small] [tiny]") {
   Context context(select_device(""));
   for (const std::size_t size : {1u, 16u}) {
     for (const std::size_t groups : {1u, 3u}) {

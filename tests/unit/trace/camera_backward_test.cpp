@@ -101,6 +101,23 @@ TEST_CASE("gradients of a tiny scene equal the double reference in every variant
   check_every_variant(reference::random_scene(24, 21, 1), reference::cube_camera(6, 5));
 }
 
+TEST_CASE("gradients of a few pixels equal the double reference in every way of adding [tiny]") {
+  Context context = make_test_context();
+  for (const int width : {1, 4}) {
+    for (const GradientSum sum :
+         {GradientSum::kCopies, GradientSum::kExact, GradientSum::kAtomic}) {
+      CAPTURE(width);
+      CAPTURE(static_cast<int>(sum));
+      TraceOptions options;
+      options.packet_width = width;
+      options.gradient_sum = sum;
+      CHECK_ERRORS(compare_gradients(context, reference::random_scene(8, 28, 1), options,
+                                     reference::cube_camera(5, 4)),
+                   1e-3);
+    }
+  }
+}
+
 TEST_CASE("gradients of every SH degree, the direction's part included") {
   Context context = make_test_context();
   for (int degree = 0; degree <= 4; ++degree) {

@@ -416,7 +416,7 @@ TEST_CASE("every way of adding the gradients of rays equals the double reference
   }
 }
 
-TEST_CASE("a few gradients of rays in exact sums equal the double reference [small]") {
+TEST_CASE("a few gradients of rays in shared sums equal the double reference [small] [tiny]") {
   Context context = make_test_context();
   TraceOptions options;
   for (const GradientSum sum : {GradientSum::kExact, GradientSum::kAtomic}) {

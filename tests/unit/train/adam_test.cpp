@@ -162,7 +162,8 @@ TEST_CASE("adam: many steps agree with double precision, for every SH degree and
 }
 
 TEST_CASE(
-    "adam: the first step moves every parameter by its learning rate against the sign [small]") {
+    "adam: the first step moves every parameter by its learning rate against the sign [small] "
+    "[tiny]") {
   Fixture f(5, 1);
   for (auto& group : f.gradient) {
     for (float& value : group) value = -0.125f;
@@ -191,7 +192,7 @@ TEST_CASE("adam: a zero gradient with the smallest epsilon moves nothing") {
   f.check(adam, 1e-30);
 }
 
-TEST_CASE("adam: a Gaussian with a non-finite gradient is skipped and counted [small]") {
+TEST_CASE("adam: a Gaussian with a non-finite gradient is skipped and counted [small] [tiny]") {
   for (const std::size_t count : {1u, 64u, 150u}) {
     Fixture f(count, 2);
     const AdamOptions options;
@@ -214,7 +215,7 @@ TEST_CASE("adam: a Gaussian with a non-finite gradient is skipped and counted [s
   }
 }
 
-TEST_CASE("adam: visible_only leaves what no ray met alone [small]") {
+TEST_CASE("adam: visible_only leaves what no ray met alone [small] [tiny]") {
   Fixture f(200, 1);
   AdamOptions options;
   options.visible_only = true;
@@ -234,7 +235,7 @@ TEST_CASE("adam: visible_only leaves what no ray met alone [small]") {
   f.check(adam, 1e-5);
 }
 
-TEST_CASE("adam: remap moves moments with their Gaussians, reset zeroes one group [small]") {
+TEST_CASE("adam: remap moves moments with their Gaussians, reset zeroes one group [small] [tiny]") {
   Fixture f(90, 2);
   const AdamOptions options;
   Adam adam(context(), options);

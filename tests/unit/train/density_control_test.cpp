@@ -65,7 +65,7 @@ void accumulate(Context& context,
 
 }  // namespace
 
-TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [small]") {
+TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [small] [tiny]") {
   Context context(select_device(""));
   const Gaussians model = model_of({0.01, 0.01, 0.01}, {0.5, 0.5, 0.5});
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
@@ -80,7 +80,7 @@ TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [
   }
 }
 
-TEST_CASE("clone, split and prune follow the thresholds [small]") {
+TEST_CASE("clone, split and prune follow the thresholds [small] [tiny]") {
   Context context(select_device(""));
   for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
     // 0 kept, 1 cloned, 2 split, 3 transparent, 4 too large, 5 never seen.
@@ -187,7 +187,7 @@ TEST_CASE("children are drawn from their parent's distribution, reproducibly") {
   }
 }
 
-TEST_CASE("under the cap the strongest candidates win [small]") {
+TEST_CASE("under the cap the strongest candidates win [small] [tiny]") {
   const std::size_t count = 10;
   const std::vector<float> means(3 * count, 0.0f), scales(3 * count, -5.0f);
   std::vector<float> opacities(count, 0.0f), statistics;
@@ -232,7 +232,7 @@ TEST_CASE("Gaussians that are not finite are removed and an empty result is an e
   CHECK_THROWS_AS(remover.refine(gaussians, 1), Error);
 }
 
-TEST_CASE("opacity reset lowers and never raises [small]") {
+TEST_CASE("opacity reset lowers and never raises [small] [tiny]") {
   Context context(select_device(""));
   DeviceGaussians gaussians = DeviceGaussians::upload(
       context, model_of({0.1, 0.1, 0.1}, {0.9, 0.005, 0.3}), ScaleActivation::kExp);

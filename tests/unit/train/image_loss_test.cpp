@@ -194,7 +194,8 @@ TEST_CASE("image loss: value and gradient agree with the definition in double pr
   }
 }
 
-TEST_CASE("image loss: masks weigh pixels, alpha over a background composites the photo [small]") {
+TEST_CASE(
+    "image loss: masks weigh pixels, alpha over a background composites the photo [small] [tiny]") {
   for (const bool alpha_is_background : {false, true}) {
     for (const PixelLoss pixel_loss : {PixelLoss::kL1, PixelLoss::kL2}) {
       CAPTURE(alpha_is_background);

@@ -30,14 +30,14 @@ struct Fixture {
 
 }  // namespace
 
-TEST_CASE("model validator: a sound model has no fault [small]") {
+TEST_CASE("model validator: a sound model has no fault [small] [tiny]") {
   Fixture f;
   CHECK(f.fault().empty());
   f.model.resize(0);
   CHECK(f.fault().empty());
 }
 
-TEST_CASE("model validator: the first number that is not finite is named [small]") {
+TEST_CASE("model validator: the first number that is not finite is named [small] [tiny]") {
   Fixture f;
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
