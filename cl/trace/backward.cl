@@ -15,6 +15,7 @@
 // Components of a line's gradient follow the line; slot 2 (m_z, of which order makes no gradient)
 // sums the per-ray lengths of the screen gradient instead, the densification signal of AbsGS (Ye et
 // al. 2024).
+#include "primitives/prefetch.h"
 #include "trace/hit_stream.h"
 #include "trace/line_sum.h"
 #include "trace/packet.h"
@@ -190,6 +191,11 @@ void packet_backward(const RsCamera* camera,
   uint used = tail.y;
   while (chunk != RS_NO_CHUNK) {
     const size_t first = (size_t)chunk * CHUNK;
+    for (uint n = used - 1; n > 0; --n) {
+      const uint gaussian = pool[first + n].x >> 1;
+      RS_PREFETCH_READ(lines + gaussian);
+      rs_fetch_line(sums, gaussian);
+    }
     for (uint n = used - 1; n > 0; --n, --number) {
       while (rows.size > 0 && rows.oldest[rows.head] > number) {
         behind += close_row(&rows, &p, T, T_last, background, lines, sums);

@@ -7,6 +7,7 @@
 #ifndef RS_TRACE_LINE_SUM_H
 #define RS_TRACE_LINE_SUM_H
 
+#include "primitives/prefetch.h"
 #include "trace/exact_sum.h"
 
 #ifndef PRIVATE_COPIES
@@ -40,6 +41,15 @@ void rs_add_sum(const LineSums* sums, const size_t number, const float value) {
     if (seen == old) break;
     old = seen;
   }
+#endif
+}
+
+// Line number `line` will be added to soon.
+void rs_fetch_line(const LineSums* sums, const size_t line) {
+  (void)sums;
+  (void)line;
+#if !EXACT_SUMS
+  RS_PREFETCH_WRITE(sums->lines + line * 16);
 #endif
 }
 

@@ -169,7 +169,7 @@ __kernel void prepare_view(const uint begin,
   box[5] = Q;
   box[6] = RS_AS_FLOAT(visible ? kind : (gi)(RS_LINE_HIDDEN));
   box[7] = (gv)(0.0f);
-  store_columns(box, 8, (__global float*)(bounds + i), 8);
+  store_records8(box, (__global float*)(bounds + i));
   if (!RS_ANY_GAUSSIAN(visible)) return;
 
   gv v[16];

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Candidate lists of image tiles: the Gaussians whose exact outline meets a tile, by least depth.
-//   count_tiles        counts[i] = tiles of the band that Gaussian i meets      global: Gaussians
+//   count_tiles        counts[i] = tiles of the band that Gaussian i meets
 //   fill_tiles         key = tile << 16 | quantised least depth, value = Gaussian << 1 | general
-//                      form, written at offsets[i]                              global: Gaussians
+//                      form, written at offsets[i]
 //   gather_candidates  list records in sorted order, first candidate per tile   global: candidates
-// Cost is O(Gaussians + candidates). An outline that the camera plane makes unbounded is replaced
-// by the box of the ellipsoid against the planes of the tile. Quantised depths order the list and
-// are a lower bound of the depth of this and every later hit of the list, which is what the exact
-// order of rays rests on.
+// The first two take VECTOR Gaussians per work-item from number `begin` on, any local size; end -
+// begin is a multiple of VECTOR. Cost is O(Gaussians + candidates). An outline that the camera
+// plane makes unbounded is replaced by the box of the ellipsoid against the planes of the tile.
+// Quantised depths order the list and are a lower bound of the depth of this and every later hit of
+// the list, which is what the exact order of rays rests on.
+#include "primitives/prefetch.h"
 #include "shared/layout.h"
+#include "trace/gaussian_lanes.h"
 
 #ifndef TILE
 #define TILE 32
@@ -20,36 +23,58 @@
 // Pixel centres count as this much wider, for rounding.
 #define RS_TILE_SLACK 0.01f
 
+// Columns of RsViewBounds.
+#define RS_BOUNDS_X0 0
+#define RS_BOUNDS_Y0 1
+#define RS_BOUNDS_X1 2
+#define RS_BOUNDS_Y1 3
+#define RS_BOUNDS_DEPTH 4
+#define RS_BOUNDS_QUANTILE 5
+#define RS_BOUNDS_KIND 6
+
 typedef struct {
-  int x0, y0, x1, y1;  // first and last tile of the outline's box, empty when x0 > x1 or y0 > y1
-} TileRange;
+  IntLanes x0, y0, x1, y1;  // first and last tile of the outline's box, empty when x0 > x1
+} TileRanges;
 
-// First tile whose last pixel centre is at or behind `pixel`; last tile whose first is before it.
-int first_tile(float pixel) { return (int)ceil((pixel + 0.5f - RS_TILE_SLACK) / TILE) - 1; }
-int last_tile(float pixel) { return (int)floor((pixel - 0.5f + RS_TILE_SLACK) / TILE); }
-
-TileRange tile_range(const RsViewBounds* b, const RsCamera* camera, const int row, const int rows) {
-  // Far outside numbers would overflow integers.
-  const float far = 1e6f;
-  const float x0 = clamp(b->x0 * camera->fx + camera->cx, -far, far);
-  const float x1 = clamp(b->x1 * camera->fx + camera->cx, -far, far);
-  const float y0 = clamp(b->y0 * camera->fy + camera->cy, -far, far);
-  const float y1 = clamp(b->y1 * camera->fy + camera->cy, -far, far);
-  TileRange range;
-  range.x0 = max(first_tile(x0), 0);
-  range.y0 = max(first_tile(y0), row);
-  range.x1 = min(last_tile(x1), (camera->width - 1) / TILE);
-  range.y1 = min(last_tile(y1), min(row + rows, (camera->height + TILE - 1) / TILE) - 1);
-  const bool visible = b->kind != RS_LINE_HIDDEN && x0 <= camera->width - 0.5f + RS_TILE_SLACK &&
-                       y0 <= camera->height - 0.5f + RS_TILE_SLACK;
-  if (!visible) range.x1 = range.x0 - 1;
-  return range;
+gi round_down(const gv v) {
+  const gi whole = RS_TO_INT(v);
+  return whole - (RS_TO_FLOAT(whole) > v ? (gi)(1) : (gi)(0));
 }
 
-bool is_unbounded(const RsViewBounds* b) { return b->x0 == -INFINITY; }
+// First tile whose last pixel centre is at or behind `pixel`; last tile whose first is before it.
+gi first_tile(const gv pixel) {
+  return -round_down(-(pixel + 0.5f - RS_TILE_SLACK) * (1.0f / TILE)) - 1;
+}
+gi last_tile(const gv pixel) { return round_down((pixel - 0.5f + RS_TILE_SLACK) * (1.0f / TILE)); }
+
+gi lesser(const gi a, const int b) { return a < b ? a : (gi)(b); }
+gi greater(const gi a, const int b) { return a > b ? a : (gi)(b); }
+// Pixels far outside would overflow integers.
+gv within_reach(const gv pixel) { return smaller(larger(pixel, (gv)(-1e6f)), (gv)(1e6f)); }
+
+// Of Gaussians with bounds b, in the tile rows [row, row + rows). Returns the lanes with an empty
+// range.
+gi tile_ranges(
+    const gv* b, const RsCamera* camera, const int row, const int rows, TileRanges* range) {
+  const gv x0 = within_reach(b[RS_BOUNDS_X0] * camera->fx + camera->cx);
+  const gv x1 = within_reach(b[RS_BOUNDS_X1] * camera->fx + camera->cx);
+  const gv y0 = within_reach(b[RS_BOUNDS_Y0] * camera->fy + camera->cy);
+  const gv y1 = within_reach(b[RS_BOUNDS_Y1] * camera->fy + camera->cy);
+  range->x0.v = greater(first_tile(x0), 0);
+  range->y0.v = greater(first_tile(y0), row);
+  range->x1.v = lesser(last_tile(x1), (camera->width - 1) / TILE);
+  range->y1.v = lesser(last_tile(y1), min(row + rows, (camera->height + TILE - 1) / TILE) - 1);
+  const gi kind = RS_AS_INT(b[RS_BOUNDS_KIND]);
+  return (kind == RS_LINE_HIDDEN) | (x0 > camera->width - 0.5f + RS_TILE_SLACK) |
+         (y0 > camera->height - 0.5f + RS_TILE_SLACK) | (range->x1.v < range->x0.v) |
+         (range->y1.v < range->y0.v);
+}
 
 // Whether the planes of a tile's frustum keep the box out; it may still be outside when not.
-bool box_outside(const RsCamera* camera, const int tile_x, const int tile_y, const RsAabb* box) {
+bool box_outside(const RsCamera* camera,
+                 const int tile_x,
+                 const int tile_y,
+                 __global const RsAabb* box) {
   const float x0 = (tile_x * TILE + 0.5f - RS_TILE_SLACK - camera->cx) / camera->fx;
   const float x1 =
       (min((tile_x + 1) * TILE, camera->width) - 0.5f + RS_TILE_SLACK - camera->cx) / camera->fx;
@@ -73,67 +98,107 @@ bool box_outside(const RsCamera* camera, const int tile_x, const int tile_y, con
   return false;
 }
 
-__kernel void count_tiles(const uint count,
+uint tiles_of_box(const TileRanges* range,
+                  const int lane,
+                  const RsCamera* camera,
+                  __global const RsAabb* box) {
+  uint found = 0;
+  for (int y = range->y0.s[lane]; y <= range->y1.s[lane]; ++y) {
+    for (int x = range->x0.s[lane]; x <= range->x1.s[lane]; ++x)
+      found += !box_outside(camera, x, y, box);
+  }
+  return found;
+}
+
+__kernel void count_tiles(const uint begin,
+                          const uint end,
                           __global const RsViewBounds* restrict bounds,
                           __global const RsAabb* restrict boxes,
                           const RsCamera camera_argument,
                           const int row,
                           const int rows,
                           __global uint* restrict counts) {
-  const uint i = get_global_id(0);
-  if (i >= count) return;
+  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  if (i >= end) return;
   const RsCamera camera = camera_argument;
-  const RsViewBounds b = bounds[i];
-  const TileRange range = tile_range(&b, &camera, row, rows);
-  uint found = 0;
-  if (range.x1 >= range.x0 && range.y1 >= range.y0) {
-    if (is_unbounded(&b)) {
-      const RsAabb box = boxes[i];
-      for (int y = range.y0; y <= range.y1; ++y) {
-        for (int x = range.x0; x <= range.x1; ++x) found += !box_outside(&camera, x, y, &box);
-      }
-    } else {
-      found = (uint)(range.x1 - range.x0 + 1) * (uint)(range.y1 - range.y0 + 1);
+  gv b[8];
+  load_records8((__global const float*)(bounds + i), b);
+  TileRanges range;
+  const gi empty = tile_ranges(b, &camera, row, rows, &range);
+  IntLanes found;
+  found.v = (range.x1.v - range.x0.v + 1) * (range.y1.v - range.y0.v + 1);
+  found.v = empty ? (gi)(0) : found.v;
+  const gi unbounded = b[RS_BOUNDS_X0] == -INFINITY;
+  if (RS_ANY_GAUSSIAN(unbounded & !empty)) {
+    IntLanes mask;
+    mask.v = unbounded & !empty;
+    for (int lane = 0; lane < VECTOR; ++lane) {
+      if (mask.s[lane] != 0) found.s[lane] = tiles_of_box(&range, lane, &camera, boxes + i + lane);
     }
   }
-  counts[i] = found;
+  *(__global gi_unaligned*)(counts + i) = found.v;
 }
 
-uint depth_key(float depth) {
-  if (!(depth > 0.0f)) return 0;
-  return (uint)clamp((log2(depth) + 10.0f) * 2048.0f, 0.0f, 65535.0f);
+// Depths from 2^-10 to 2^22 in 2048 steps an octave: the upper bits of a float.
+#define RS_DEPTH_BITS 12
+#define RS_DEPTH_FIRST ((127 - 10) << (23 - RS_DEPTH_BITS))
+
+uint depth_key(const float depth) {
+  return clamp((as_int(depth) >> RS_DEPTH_BITS) - RS_DEPTH_FIRST, 0, 65535);
 }
 
-float depth_bound(uint key) {
-  return key == 0 ? 0.0f : exp2((float)key / 2048.0f - 10.0f) * 0.9999f;
+float depth_bound(const uint key) {
+  return key == 0 ? 0.0f : as_float((key + RS_DEPTH_FIRST) << RS_DEPTH_BITS) * 0.9999f;
 }
+
+// What the least depth of Gaussians in a tile needs of their lines.
+typedef struct {
+  FloatLanes mean_x, mean_y;
+  FloatLanes along, slope_x, slope_y;  // <o', d'> at the mean, and its slopes
+  FloatLanes most_x, most_y;           // what a slope adds at the end of the outline
+  FloatLanes limit;                    // of that product with the point of a hit
+  FloatLanes depth;                    // no hit is nearer
+} DepthPlanes;
 
 // Lower bound of the depth of all hits of one Gaussian in a tile: of its own least depth, and of
 // the plane <o', x'> = limit in whitened space, beyond which all its hits lie: limit is Q in peak
 // order (Thales: peaks lie on the sphere over mean and camera), sqrt(Q) |o'| for near roots. The
 // depth of the plane is a ratio of linear functions of the ray, so its least value is at a corner.
-float least_depth(const RsViewBounds* b,
-                  __global const float* v,
-                  const RsCamera* camera,
-                  const int tile_x,
-                  const int tile_y) {
-  if (b->kind != RS_LINE_PROJECTIVE) return b->depth;
-  const float x = v[7] > 0.0f ? fmin(b->x1, ((tile_x + 1) * TILE - camera->cx) / camera->fx)
-                              : fmax(b->x0, (tile_x * TILE - camera->cx) / camera->fx);
-  const float y = v[8] > 0.0f ? fmin(b->y1, ((tile_y + 1) * TILE - camera->cy) / camera->fy)
-                              : fmax(b->y0, (tile_y * TILE - camera->cy) / camera->fy);
-  const float along = v[6] + v[7] * (x - v[0]) + v[8] * (y - v[1]);
-  const float origin2 = v[6] * v[2] * v[2];
+void depth_planes(const gv* b, __global const RsLine* lines, DepthPlanes* planes) {
+  gv v[16];
+  load_columns(lines->v, 16, VECTOR == 1 ? 9 : 16, v);
+  const gv origin2 = v[6] * v[2] * v[2];
 #if PEAK_ORDER
-  const float limit = b->quantile;
+  const gv limit = b[RS_BOUNDS_QUANTILE];
 #else
-  const float limit = sqrt(b->quantile * origin2);
+  const gv limit = sqrt(b[RS_BOUNDS_QUANTILE] * origin2);
 #endif
-  const float plane = along > 0.0f ? (origin2 - limit) / (v[2] * along) : 0.0f;
-  return fmax(b->depth, plane * 0.9999f);
+  const gi projective = RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_PROJECTIVE;
+  planes->mean_x.v = v[0];
+  planes->mean_y.v = v[1];
+  planes->along.v = v[6];
+  planes->slope_x.v = v[7];
+  planes->slope_y.v = v[8];
+  planes->most_x.v = v[7] * ((v[7] > 0.0f ? b[RS_BOUNDS_X1] : b[RS_BOUNDS_X0]) - v[0]);
+  planes->most_y.v = v[8] * ((v[8] > 0.0f ? b[RS_BOUNDS_Y1] : b[RS_BOUNDS_Y0]) - v[1]);
+  planes->limit.v = projective ? (origin2 - limit) / v[2] * 0.9999f : (gv)(0.0f);
+  planes->depth.v = b[RS_BOUNDS_DEPTH];
 }
 
-__kernel void fill_tiles(const uint count,
+// What a slope adds up to the farther edge of a tile, the product at most at the outline's end.
+float most_along(const float slope,
+                 const int tile,
+                 const float tile_size,
+                 const float centre,
+                 const float mean,
+                 const float most) {
+  const float edge = (tile + (slope > 0.0f ? 1 : 0)) * tile_size - centre;
+  const float product = slope * (edge - mean);
+  return product < most ? product : most;
+}
+
+__kernel void fill_tiles(const uint begin,
+                         const uint end,
                          __global const RsViewBounds* restrict bounds,
                          __global const RsAabb* restrict boxes,
                          __global const RsLine* restrict lines,
@@ -143,26 +208,48 @@ __kernel void fill_tiles(const uint count,
                          __global const uint* restrict offsets,
                          __global uint* restrict keys,
                          __global uint* restrict values) {
-  const uint i = get_global_id(0);
-  if (i >= count || offsets[i] == offsets[i + 1]) return;
+  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  if (i >= end || offsets[i] == offsets[i + VECTOR]) return;
   const RsCamera camera = camera_argument;
-  const RsViewBounds b = bounds[i];
-  const TileRange range = tile_range(&b, &camera, row, rows);
-  const bool unbounded = is_unbounded(&b);
-  const RsAabb box = boxes[i];
+  gv b[8];
+  load_records8((__global const float*)(bounds + i), b);
+  TileRanges range;
+  tile_ranges(b, &camera, row, rows, &range);
+  DepthPlanes planes;
+  depth_planes(b, lines + i, &planes);
+  IntLanes kind;
+  kind.v = RS_AS_INT(b[RS_BOUNDS_KIND]);
+  FloatLanes outline;
+  outline.v = b[RS_BOUNDS_X0];
   const int tiles_x = (camera.width + TILE - 1) / TILE;
-  const uint value = i << 1 | (b.kind == RS_LINE_GENERAL);
-  uint cursor = offsets[i];
-  for (int y = range.y0; y <= range.y1; ++y) {
-    for (int x = range.x0; x <= range.x1; ++x) {
-      if (unbounded && box_outside(&camera, x, y, &box)) continue;
-      const uint tile = (uint)((y - row) * tiles_x + x);
-      keys[cursor] = tile << 16 | depth_key(least_depth(&b, lines[i].v, &camera, x, y));
-      values[cursor] = value;
-      ++cursor;
+  const float size_x = TILE / camera.fx, size_y = TILE / camera.fy;
+  const float centre_x = camera.cx / camera.fx, centre_y = camera.cy / camera.fy;
+  for (int lane = 0; lane < VECTOR; ++lane) {
+    uint cursor = offsets[i + lane];
+    if (cursor == offsets[i + lane + 1]) continue;
+    const uint value = (uint)(i + lane) << 1 | (kind.s[lane] == RS_LINE_GENERAL);
+    const bool unbounded = outline.s[lane] == -INFINITY;
+    const float limit = planes.limit.s[lane], depth = planes.depth.s[lane];
+    for (int y = range.y0.s[lane]; y <= range.y1.s[lane]; ++y) {
+      const float row_along =
+          planes.along.s[lane] + most_along(planes.slope_y.s[lane], y, size_y, centre_y,
+                                            planes.mean_y.s[lane], planes.most_y.s[lane]);
+      for (int x = range.x0.s[lane]; x <= range.x1.s[lane]; ++x) {
+        if (unbounded && box_outside(&camera, x, y, boxes + i + lane)) continue;
+        const float along = row_along + most_along(planes.slope_x.s[lane], x, size_x, centre_x,
+                                                   planes.mean_x.s[lane], planes.most_x.s[lane]);
+        const float plane = along > 0.0f && limit > 0.0f ? limit / along : 0.0f;
+        const uint tile = (uint)((y - row) * tiles_x + x);
+        keys[cursor] = tile << 16 | depth_key(plane > depth ? plane : depth);
+        values[cursor] = value;
+        ++cursor;
+      }
     }
   }
 }
+
+// Candidates whose bounds are fetched ahead of the one that is written.
+#define RS_GATHER_AHEAD 32
 
 // boxes holds 4 planes of `stride` floats (x0, y0, x1, y1: they are tested in vectors); limits is
 // what a candidate needs alone. tile_offsets[t] .. tile_offsets[t + 1] is the list of tile t.
@@ -177,6 +264,7 @@ __kernel void gather_candidates(const uint count,
                                 __global uint* restrict tile_offsets) {
   const uint k = get_global_id(0);
   if (k >= count) return;
+  RS_PREFETCH_READ(bounds + (values[min(k + RS_GATHER_AHEAD, count - 1)] >> 1));
   const uint key = keys[k];
   const RsViewBounds b = bounds[values[k] >> 1];
   boxes[k] = b.x0;

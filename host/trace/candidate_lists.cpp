@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t kBoxPadding = 16;
 constexpr std::size_t kBytesPerCandidate =
     2 * 2 * 4 + 4 * 4 + 8;  // keys and values twice (sort), box, limits
-constexpr std::size_t kPrepareGroup = 64;
+constexpr std::size_t kGatherGroup = 64;
 constexpr int kMaxSide = 1 << 20;
 
 std::size_t with_headroom(std::size_t count) { return count + count / 4 + 1024; }
@@ -77,7 +77,7 @@ CandidateLists::CandidateLists(Context& context, int tile_size)
     : context_(&context), tile_size_(tile_size), sort_(context), scan_(context) {
   BuildOptions build;
   build.define("TILE", tile_size);
-  count_kernel_ = context.kernel("trace/tile_lists.cl", "count_tiles", build);
+  count_kernel_ = GaussianKernel(context, "trace/tile_lists.cl", "count_tiles", build);
   gather_kernel_ = context.kernel("trace/tile_lists.cl", "gather_candidates", build);
 }
 
@@ -98,7 +98,7 @@ void CandidateLists::require_prepare_kernel(const DeviceGaussians& gaussians,
   prepare_kernel_ = GaussianKernel(*context_, "trace/prepare_view.cl", "prepare_view", build);
   BuildOptions lists;
   lists.define("TILE", tile_size_).define("PEAK_ORDER", peak ? 1 : 0);
-  fill_kernel_ = context_->kernel("trace/tile_lists.cl", "fill_tiles", lists);
+  fill_kernel_ = GaussianKernel(*context_, "trace/tile_lists.cl", "fill_tiles", lists);
   prepared_variant_ = variant;
 }
 
@@ -129,13 +129,12 @@ bool CandidateLists::build(const Buffer<RsAabb>& boxes,
                            std::uint32_t rows,
                            std::size_t budget) {
   const std::uint32_t tiles = tiles_x_ * rows;
-  const auto count = static_cast<std::uint32_t>(count_);
   tile_offsets_.ensure(*context_, tiles + 1, "tile offsets");
   offsets_.ensure(*context_, count_ + 1, "candidate offsets");
   candidates_ = 0;
-  if (count > 0) {
-    count_kernel_.launch(Range::linear(count_, kPrepareGroup), count, bounds_, boxes, camera,
-                         static_cast<std::int32_t>(row), static_cast<std::int32_t>(rows), offsets_);
+  if (count_ > 0) {
+    count_kernel_.launch(count_, bounds_, boxes, camera, static_cast<std::int32_t>(row),
+                         static_cast<std::int32_t>(rows), offsets_);
     scan_.exclusive(offsets_, count_);
     candidates_ = offsets_.read(count_);
   }
@@ -154,11 +153,10 @@ bool CandidateLists::build(const Buffer<RsAabb>& boxes,
     tile_offsets_.clear();
     return true;
   }
-  fill_kernel_.launch(Range::linear(count_, kPrepareGroup), count, bounds_, boxes, lines_, camera,
-                      static_cast<std::int32_t>(row), static_cast<std::int32_t>(rows), offsets_,
-                      keys_, values_);
+  fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, static_cast<std::int32_t>(row),
+                      static_cast<std::int32_t>(rows), offsets_, keys_, values_);
   sort_.sort(keys_, values_, candidates_, 16 + std::bit_width(tiles - 1));
-  gather_kernel_.launch(Range::linear(candidates_, kPrepareGroup),
+  gather_kernel_.launch(Range::linear(candidates_, kGatherGroup),
                         static_cast<std::uint32_t>(candidates_), stride_, tiles, keys_, values_,
                         bounds_, boxes_, limits_, tile_offsets_);
   return true;

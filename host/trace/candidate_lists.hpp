@@ -61,8 +61,8 @@ class CandidateLists {
   int tile_size_;
   GaussianKernel prepare_kernel_;
   int prepared_variant_ = -1;
-  Kernel count_kernel_;
-  Kernel fill_kernel_;
+  GaussianKernel count_kernel_;
+  GaussianKernel fill_kernel_;
   Kernel gather_kernel_;
   RadixSort sort_;
   Scan scan_;
