@@ -17,19 +17,6 @@
 // 7 of 16.
 #define RS_WIDE_STACK 128
 
-// rs_lane_bits, by the mask registers where the compiler has a word for them.
-#if PACKET == 16 && defined(__AVX512DQ__) && defined(__has_builtin)
-#if __has_builtin(__builtin_ia32_cvtd2mask512)
-#define RS_MASK_REGISTERS 1
-#endif
-#endif
-#ifdef RS_MASK_REGISTERS
-typedef int rs_mask_lanes __attribute__((vector_size(64)));
-#define ray_lane_bits(mask) ((uint)(ushort)__builtin_ia32_cvtd2mask512((rs_mask_lanes)(mask)))
-#else
-#define ray_lane_bits(mask) rs_lane_bits(mask)
-#endif
-
 typedef union {
   fv v;
   float s[PACKET];
@@ -42,14 +29,18 @@ typedef struct {
   int side[3];  // vector of the near slab along each axis; the far one is 3 further or 3 before
 } RayData;
 
+// A ray whose numbers, or their squares, are not finite meets nothing. NaN would meet every box,
+// and those of children that do not exist.
 RayData ray_data(float8 ray) {
   RayData out;
-  out.o = ray.s012;
-  out.d = ray.s456;
-  out.t_min = fmax(ray.s3, 0.0f);
+  const bool sound = dot(ray.s012, ray.s012) + dot(ray.s456, ray.s456) <= FLT_MAX;
+  out.o = sound ? ray.s012 : (float3)(0.0f, 0.0f, 0.0f);
+  out.d = sound ? ray.s456 : (float3)(0.0f, 0.0f, 1.0f);
+  out.t_min = sound ? fmax(ray.s3, 0.0f) : INFINITY;
   // Finite, so that an origin on a slab of a zero component gives about 0 and never NaN.
   out.inverse = clamp(1.0f / out.d, -1e24f, 1e24f);
-  out.shift = out.o * out.inverse;
+  // Finite too: missing children reach to infinity, and the difference would be NaN.
+  out.shift = clamp(out.o * out.inverse, -FLT_MAX, FLT_MAX);
   out.side[0] = out.inverse.x < 0.0f ? 3 : 0;
   out.side[1] = out.inverse.y < 0.0f ? 4 : 1;
   out.side[2] = out.inverse.z < 0.0f ? 5 : 2;
@@ -79,7 +70,7 @@ uint ray_meets_boxes(const RayData* ray, __global const fv* node, float t_end, f
   const fv near = max(max(nx, ny), max(nz, (fv)(ray->t_min * 0.999999f)));
   const fv far = min(min(fx, fy), min(fz, (fv)(t_end))) * 1.0000004f;
   *entry = near;
-  return ray_lane_bits(RS_MASK(near <= far));
+  return rs_lane_bits(RS_MASK(near <= far));
 }
 
 // Writes box `lane` of a node.

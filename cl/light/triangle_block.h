@@ -77,7 +77,7 @@ uint ray_meets_triangles(const ShearedRay* ray,
   meeting->t.v = (a * az + b * bz + c * cz) * ray->sz * reciprocal;
   meeting->u.v = b * reciprocal;
   meeting->v.v = c * reciprocal;
-  return ray_lane_bits(inside & RS_MASK(sum != 0.0f) & RS_MASK(meeting->t.v > t_min) &
+  return rs_lane_bits(inside & RS_MASK(sum != 0.0f) & RS_MASK(meeting->t.v > t_min) &
                        RS_MASK(meeting->t.v <= t_max));
 }
 

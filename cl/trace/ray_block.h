@@ -53,9 +53,9 @@ uint ray_meets_block(const RayData* ray, __global const fv* block, BlockMeeting*
   meeting->along.v = along;
   meeting->origin2.v = origin2;
 #if PEAK_ORDER
-  return ray_lane_bits(inside & RS_MASK(along <= 0.0f));
+  return rs_lane_bits(inside & RS_MASK(along <= 0.0f));
 #else
-  return ray_lane_bits(inside & RS_MASK(along < 0.0f) & RS_MASK(origin2 >= 1.0f));
+  return rs_lane_bits(inside & RS_MASK(along < 0.0f) & RS_MASK(origin2 >= 1.0f));
 #endif
 }
 

@@ -118,7 +118,7 @@ float pending_evaluate(Pending* pending,
     RS_PENDING_STORE(pending->peak, i, peak);
     const int count = min(PACKET, pending->size - i);
     const uint all = 0xffffffffu >> (32 - count);
-    const uint bits = ray_lane_bits(good) & all;
+    const uint bits = rs_lane_bits(good) & all;
     if (bits == all && to == i && !range->ties) {
       for (int k = i; k < i + count; ++k) remaining *= 1.0f - pending->alpha[k];
       to += count;

@@ -207,7 +207,7 @@ TEST_CASE("trees of every depth and fill are sound") {
   }
 }
 
-TEST_CASE("no ray leaves a closed mesh, through its edges and corners neither [small]") {
+TEST_CASE("no ray leaves a closed mesh, through its edges and corners neither") {
   Context context = make_test_context();
   struct Body {
     Mesh mesh;
