@@ -1,28 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/interrupt.hpp"
 
+#include <atomic>
 #include <csignal>
 
 namespace raysplats {
 namespace {
 
-// A signal handler can reach nothing but a variable of static storage.
-volatile std::sig_atomic_t interrupted = 0;
+// A signal handler can reach nothing but a variable of static storage. It runs in any thread, the
+// driver's own among them.
+std::atomic<bool> interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler must not take locks");
 
 // The second signal ends the process at once, whichever of the two it is: delivered again when the
 // handler returns, it meets the default action.
 extern "C" void mark_interrupt(int signal) {
-  if (interrupted != 0) {
+  if (interrupted.exchange(true)) {
     std::signal(signal, SIG_DFL);
     std::raise(signal);
   }
-  interrupted = 1;
 }
 
 }  // namespace
 
 InterruptGuard::InterruptGuard() {
-  interrupted = 0;
+  interrupted = false;
   struct sigaction action {};
   action.sa_handler = mark_interrupt;
   sigemptyset(&action.sa_mask);
@@ -36,6 +38,6 @@ InterruptGuard::~InterruptGuard() {
   sigaction(SIGTERM, &previous_term_, nullptr);
 }
 
-bool InterruptGuard::requested() const { return interrupted != 0; }
+bool InterruptGuard::requested() const { return interrupted; }
 
 }  // namespace raysplats
