@@ -99,19 +99,12 @@ void RayViewTracer::Impl::trace(const DeviceGaussians& gaussians,
                                 std::size_t first,
                                 std::size_t count) {
   camera_rays.generate(camera, Lens{}, first, count, paths.rays());
-  // Cameras without a centre show a Gaussian in the colour that their rays see.
-  const ColorDirection direction = camera.model == CameraModel::kOrthographic
-                                       ? ColorDirection::kRay
-                                       : ColorDirection::kFromOrigin;
-  paths.trace(gaussians, count, direction, background);
+  paths.trace(gaussians, count, color_direction(camera), background);
 }
 
 void RayViewTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
   Impl& self = *impl_;
-  const bool focal = camera.model != CameraModel::kEquirectangular;
-  if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
-    throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
-  }
+  require_pixels(camera);
   self.camera = camera;
   self.kept = keep;
   self.capped = 0;

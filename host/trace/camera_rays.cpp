@@ -67,6 +67,18 @@ RsLensCamera lens_camera(const Camera& camera, const Lens& lens) {
 
 }  // namespace
 
+void require_pixels(const Camera& camera) {
+  const bool focal = camera.model != CameraModel::kEquirectangular;
+  if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
+    throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
+  }
+}
+
+ColorDirection color_direction(const Camera& camera) {
+  return camera.model == CameraModel::kOrthographic ? ColorDirection::kRay
+                                                    : ColorDirection::kFromOrigin;
+}
+
 void CameraRays::generate(const Camera& camera,
                           const Lens& lens,
                           std::size_t first_pixel,

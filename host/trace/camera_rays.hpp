@@ -21,6 +21,13 @@ struct Lens {
                              ///< along the ray
 };
 
+/// Throws UsageError for a camera without pixels or focal length.
+void require_pixels(const Camera& camera);
+
+/// Where rays of the camera take the colour of Gaussians from: seen from its centre, or along each
+/// ray where there is none.
+ColorDirection color_direction(const Camera& camera);
+
 /// Makes rays of pixels on the device, for every camera model (core/camera_model.hpp has the same
 /// in double precision). Random numbers are functions of (seed, pixel, sample): dimensions 0 and 1
 /// place the ray in its pixel, 2 and 3 on the lens (cl/shared/random.h).

@@ -11,6 +11,7 @@
 
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
+#include "trace/camera_rays.hpp"
 #include "trace/candidate_lists.hpp"
 #include "trace/gaussian_kernel.hpp"
 #include "trace/gradient_sums.hpp"
@@ -132,9 +133,7 @@ void CameraTracer::update(const DeviceGaussians& gaussians) {
 
 void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits) {
   Impl& self = *impl_;
-  if (camera.width < 1 || camera.height < 1 || !(camera.fx > 0) || !(camera.fy > 0)) {
-    throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
-  }
+  require_pixels(camera);
   if (self.count != gaussians.count) {
     throw UsageError("CameraTracer::update() must follow every change of the Gaussians");
   }

@@ -41,10 +41,7 @@ Image ViewTracer::render(const DeviceGaussians& gaussians, const Camera& camera)
 }
 
 Image ViewTracer::render_rays(const DeviceGaussians& gaussians, const Camera& camera) {
-  const bool focal = camera.model != CameraModel::kEquirectangular;
-  if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
-    throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
-  }
+  require_pixels(camera);
   if (options_.near_depth > 0.0f) {
     throw UsageError(fmt::format(
         "The near plane at {} cuts for pinholes only, and the camera '{}' is none: use --near 0",
@@ -58,16 +55,12 @@ Image ViewTracer::render_rays(const DeviceGaussians& gaussians, const Camera& ca
   capped_rays_ = 0;
   image_ = Image(camera.width, camera.height, 4);
   depth_ = options_.depth ? Image(camera.width, camera.height, 3) : Image();
-  // Cameras without a centre show a Gaussian in the colour that their rays see.
-  const ColorDirection direction = camera.model == CameraModel::kOrthographic
-                                       ? ColorDirection::kRay
-                                       : ColorDirection::kFromOrigin;
   const std::size_t batch =
       std::clamp(options_.memory_budget / 4 / kRayBytes, kLeastBatch, kMostBatch);
   for (std::size_t first = 0; first < image_.pixels(); first += batch) {
     const std::size_t count = std::min(batch, image_.pixels() - first);
     generator_.generate(camera, Lens{}, first, count, rays_);
-    tracer_.trace(gaussians, rays_, count, results_, direction);
+    tracer_.trace(gaussians, rays_, count, results_, color_direction(camera));
     store(first, count, camera);
   }
   return std::move(image_);
