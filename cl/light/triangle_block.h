@@ -78,7 +78,7 @@ uint ray_meets_triangles(const ShearedRay* ray,
   meeting->u.v = b * reciprocal;
   meeting->v.v = c * reciprocal;
   return rs_lane_bits(inside & RS_MASK(sum != 0.0f) & RS_MASK(meeting->t.v > t_min) &
-                       RS_MASK(meeting->t.v <= t_max));
+                      RS_MASK(meeting->t.v <= t_max));
 }
 
 int triangle_index(__global const fv* block, uint lane) {

@@ -73,7 +73,7 @@ typedef struct {
   rs_uint splits;    // glass surfaces that did both
   rs_uint lineage;   // tells the parts of a split path apart
   rs_int blind;      // 1: the pixel sees nothing
-  rs_int direct;      // 1: straight from the camera's centre
+  rs_int direct;     // 1: straight from the camera's centre
 } RsPath;
 RS_STATIC_ASSERT_SIZE(RsPath, 48);
 

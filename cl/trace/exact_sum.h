@@ -17,7 +17,7 @@
 #define RS_EXACT_HIGH 45
 #define RS_EXACT_BIAS 0x80000000u
 
-#ifdef __OPENCL_VERSION__
+#ifdef __OPENCL_C_VERSION__
 // Sums in range keep the top word within 2^27 of the bias; a sum that was raised to the mark stays
 // above the threshold.
 #define RS_EXACT_MARK 0xf0000000u

@@ -143,6 +143,9 @@ __kernel void finalize_gradients(const uint begin,
 #if !POSE
   (void)pose;
 #endif
+#if SH_DEGREE == 0
+  (void)sh;
+#endif
   const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
   if (i >= end) return;
   const RsCamera camera = camera_argument;

@@ -25,10 +25,9 @@ RawBuffer::RawBuffer(Context& context, std::size_t bytes, const std::string& lab
   }
   try {
     owner.faults.check(Fault::kAllocation);
-    const cl::Buffer buffer =
-        owner.canaries
-            ? owner.canaries->allocate(owner.context, owner.device, owner.queue, bytes, label)
-            : cl::Buffer(owner.context, CL_MEM_READ_WRITE, bytes);
+    const cl::Buffer buffer = owner.canaries ? owner.canaries->allocate(owner.context, owner.device,
+                                                                        owner.queue, bytes, label)
+                                             : cl::Buffer(owner.context, CL_MEM_READ_WRITE, bytes);
     impl_ = std::shared_ptr<Impl>(new Impl{&owner, owner.memory, buffer, bytes, label});
   } catch (const cl::Error& error) {
     throw_cl_error(error,

@@ -22,9 +22,9 @@ struct MemoryEstimate {
       0;  ///< parameters, gradients, Adam moments, the second copy while densifying
   std::size_t tracing = 0;  ///< records per view, sums of gradients and sort buffers
   std::size_t rays = 0;     ///< views traced ray by ray: tree, sums of gradients, rays (of mirrors:
-                         ///< two segments of a path, without their meshes)
-  std::size_t images = 0;  ///< photos within their budget, and the buffers of one view
-  std::size_t hits = 0;    ///< hit streams, tile lists and private gradients: memory-budget at most
+                            ///< two segments of a path, without their meshes)
+  std::size_t images = 0;   ///< photos within their budget, and the buffers of one view
+  std::size_t hits = 0;  ///< hit streams, tile lists and private gradients: memory-budget at most
   std::size_t largest_buffer = 0;
   std::size_t total() const { return gaussians + tracing + rays + images + hits; }
 };

@@ -19,8 +19,8 @@ Gaussians read_ply(const std::filesystem::path& path);
 /// Writes an Inria-style binary little-endian 3DGS PLY atomically (temporary file, sync, rename).
 void write_ply(const std::filesystem::path& path, const Gaussians& model);
 
-/// Reads PNG, JPEG, EXR, Radiance HDR, TIFF or BMP as float; 1 to 4 channels as in the file (grey stays 1
-/// channel).
+/// Reads PNG, JPEG, EXR, Radiance HDR, TIFF or BMP as float; 1 to 4 channels as in the file (grey
+/// stays 1 channel).
 Image read_image(const std::filesystem::path& path);
 
 /// Writes .png, .jpg or .exr by the extension, atomically. 8-bit formats clamp to [0, 1] and round.
