@@ -82,7 +82,7 @@ double mib(std::size_t bytes) { return static_cast<double>(bytes) / static_cast<
 MemoryEstimate estimate_memory(const TrainOptions& options,
                                const MemoryDemand& demand,
                                const DeviceInfo& device) {
-  const auto sh = static_cast<std::size_t>(3 * sh_coefficients(options.sh_degree));
+  const auto sh = 3 * static_cast<std::size_t>(sh_coefficients(options.sh_degree));
   const std::size_t floats = 3 + 4 + 3 + 1 + sh;
   const std::size_t exact = may_sum_exactly(options, demand.gaussians, device)
                                 ? 16 * RS_EXACT_WORDS * sizeof(std::uint32_t)

@@ -46,6 +46,7 @@ void read_keys(const std::filesystem::path& path,
     });
     if (!known_table || key == keys.end()) {
       std::vector<std::string> names;
+      names.reserve(keys.size());
       for (const TrainKey& candidate : keys) names.push_back(candidate.name);
       throw UsageError(fmt::format("Unknown key '{}' in {}: did you mean '{}'?", item.fullname(),
                                    path.string(), nearest_name(item.name, names)));

@@ -64,6 +64,7 @@ std::size_t pixels_of(const Camera& camera) {
 
 std::vector<Camera> cameras_of(const Dataset& dataset, const std::vector<std::size_t>& views) {
   std::vector<Camera> cameras;
+  cameras.reserve(views.size());
   for (const std::size_t view : views) cameras.push_back(dataset.views[view].camera);
   return cameras;
 }
@@ -108,6 +109,7 @@ AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t
 
 std::vector<View> views_of(const Dataset& dataset, const std::vector<std::size_t>& indices) {
   std::vector<View> views;
+  views.reserve(indices.size());
   for (const std::size_t index : indices) views.push_back(dataset.views[index]);
   return views;
 }
