@@ -127,11 +127,9 @@ void blend_hits(const RayScene* scene,
     state->last_index = pending->index[i];
     state->stopped = state->transmittance < scene->min_transmittance;
     RS_PREFETCH_READ(state->records + (size_t)pending->index[i] * 16);
-#if !EXACT_SUMS
-    for (int k = 0; k < RS_RAY_SUMS; k += 16) {
-      RS_PREFETCH_WRITE(state->sums.lines + (size_t)pending->index[i] * RS_RAY_SUMS + k);
+    for (int line = 0; line < RS_RAY_LINES; ++line) {
+      rs_fetch_line(&state->sums, (size_t)pending->index[i] * RS_RAY_LINES + line);
     }
-#endif
   }
   const float3 gradient = state->gradient.xyz;
   float behind = state->sky;

@@ -33,7 +33,7 @@
 #define RS_BOUNDS_KIND 6
 
 typedef struct {
-  IntLanes x0, y0, x1, y1;  // first and last tile of the outline's box, empty when x0 > x1
+  IntLanes x0, y0, x1, y1;  // first and last tile of the outline's box
 } TileRanges;
 
 gi round_down(const gv v) {
