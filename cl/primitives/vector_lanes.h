@@ -59,6 +59,7 @@ typedef int16 iv;
 // Some implementations take vload apart into scalars; a vector type of float's alignment stays one
 // load.
 typedef fv rs_unaligned __attribute__((aligned(4)));
+typedef iv rs_int_unaligned __attribute__((aligned(4)));
 #define rs_store_float(p, v) (*(__global rs_unaligned*)(p) = (v))
 #endif
 
@@ -110,6 +111,23 @@ uint rs_lane_bits(iv mask) {
 #endif
 
 uint rs_lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
+
+// Writes first + i for every lane i whose bit is set, in order, and returns their number. May write
+// up to PACKET values in all.
+uint rs_append_lanes(uint* to, const uint first, uint bits) {
+#if PACKET == 1
+  *to = first;
+  return bits;
+#elif PACKET == 16 && defined(__AVX512F__) && defined(__clang__)
+  const int16 lanes = RS_LANE_INDEX + (int)first;
+  *(rs_int_unaligned*)to = __builtin_ia32_compresssi512_mask(lanes, lanes, (ushort)bits);
+  return popcount(bits);
+#else
+  uint count = 0;
+  for (; bits != 0; bits &= bits - 1) to[count++] = first + rs_lowest_bit(bits);
+  return count;
+#endif
+}
 
 // Sum, least and greatest value over the lanes.
 #if PACKET == 1

@@ -24,8 +24,9 @@
 #define TILE 32
 #endif
 // Lane i of the result is the sum of v[i] over its lanes. With 16 lanes, pairs of vectors are
-// folded into one by adding halves, then quarters, and so on: 15 additions for all sums.
-float16 sum_lanes(const fv* v) {
+// folded into one by adding halves, then quarters, and so on: 15 additions for all sums. Inlined,
+// so that the vectors stay in registers.
+__attribute__((always_inline)) float16 sum_lanes(const fv* v) {
 #if PACKET == 16
 #define RS_HALVES(x, y) ((float16)((x).lo, (y).lo) + (float16)((x).hi, (y).hi))
 #define RS_QUARTERS(x, y)                                  \
@@ -73,6 +74,49 @@ typedef struct {
   uint head, size;
 } OpenRows;
 
+// Gradient of the line but for opacity and colour, from that of the squared distance. Each form
+// meets the Gaussian by itself: behind one branch for both compilers may gather the line's numbers.
+void line_gradient_projective(const Pixels* p,
+                              __global const float* v,
+                              const fv g_distance2,
+                              fv* g) {
+  const PacketMeeting m = rs_meet_projective(v, 0.0f, p->X, p->Y);
+  const fv inverse = 1.0f / m.direction2;
+  const fv dx = p->X - v[0];
+  const fv dy = p->Y - v[1];
+  const fv gN = g_distance2 * inverse;
+  const fv gD = -gN * m.numerator * inverse;
+  const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
+  g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
+  g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
+  g[2] =
+      sqrt(g[0] * g[0] * (p->screen_x * p->screen_x) + g[1] * g[1] * (p->screen_y * p->screen_y));
+  g[3] = gNx * dx;
+  g[4] = 2.0f * gNx * dy;
+  g[5] = gNy * dy;
+  g[6] = gD;
+  g[7] = 2.0f * gDx;
+  g[8] = 2.0f * gDy;
+  g[9] = gDx * dx;
+  g[10] = 2.0f * gDx * dy;
+  g[11] = gDy * dy;
+}
+
+// g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'.
+void line_gradient_general(const Pixels* p, __global const float* v, const fv g_distance2, fv* g) {
+  const PacketMeeting m = rs_meet_general(v, 0.0f, p->X, p->Y);
+  const fv peak = m.along / m.direction2;
+  for (int k = 0; k < 3; ++k) {
+    const fv direction = v[3 * k] * p->X + v[3 * k + 1] * p->Y + v[3 * k + 2];
+    const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
+    const fv g_direction = peak * g_origin;
+    g[3 * k] = g_direction * p->X;
+    g[3 * k + 1] = g_direction * p->Y;
+    g[3 * k + 2] = g_direction;
+    g[9 + k] = g_origin;
+  }
+}
+
 // Sums one Gaussian's gradient line over the rays of the packet and adds it to memory.
 void add_gradient(const Pixels* p,
                   const uint reference,
@@ -81,47 +125,17 @@ void add_gradient(const Pixels* p,
                   const fv weight,
                   __global const RsLine* restrict lines,
                   const LineSums* sums) {
-  const bool general = reference & 1;
   __global const float* v = lines[reference >> 1].v;
-  const PacketMeeting m = rs_meet(v, general, 0.0f, p->X, p->Y);
-  const fv inverse = 1.0f / m.direction2;
   const fv g_distance2 = -0.5f * alpha * g_alpha;
   fv g[16];
   g[12] = g_alpha * (alpha / v[12]);  // the response is alpha / opacity
   g[13] = weight * p->gR;
   g[14] = weight * p->gG;
   g[15] = weight * p->gB;
-  if (!general) {
-    const fv dx = p->X - v[0];
-    const fv dy = p->Y - v[1];
-    const fv gN = g_distance2 * inverse;
-    const fv gD = -gN * m.numerator * inverse;
-    const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
-    g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
-    g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
-    g[2] =
-        sqrt(g[0] * g[0] * (p->screen_x * p->screen_x) + g[1] * g[1] * (p->screen_y * p->screen_y));
-    g[3] = gNx * dx;
-    g[4] = 2.0f * gNx * dy;
-    g[5] = gNy * dy;
-    g[6] = gD;
-    g[7] = 2.0f * gDx;
-    g[8] = 2.0f * gDy;
-    g[9] = gDx * dx;
-    g[10] = 2.0f * gDx * dy;
-    g[11] = gDy * dy;
+  if (reference & 1) {
+    line_gradient_general(p, v, g_distance2, g);
   } else {
-    // g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'.
-    const fv peak = m.along * inverse;
-    for (int k = 0; k < 3; ++k) {
-      const fv direction = v[3 * k] * p->X + v[3 * k + 1] * p->Y + v[3 * k + 2];
-      const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
-      const fv g_direction = peak * g_origin;
-      g[3 * k] = g_direction * p->X;
-      g[3 * k + 1] = g_direction * p->Y;
-      g[3 * k + 2] = g_direction;
-      g[9 + k] = g_origin;
-    }
+    line_gradient_projective(p, v, g_distance2, g);
   }
   rs_add_line(sums, reference >> 1, sum_lanes(g));
 }
@@ -150,6 +164,15 @@ fv close_row(OpenRows* rows,
   const fv g_alpha = select((fv)(0.0f), before * rows->projected[slot] - behind, mine);
   add_gradient(p, rows->reference[slot], g_alpha, alpha, weight, lines, sums);
   return rows->blended[slot];
+}
+
+// The chunks of a stream lie anywhere in the pool: the next is fetched while one is worked on.
+void fetch_chunk(const uint chunk,
+                 __global const uint2* restrict pool,
+                 __global const float* restrict pool_transmittance) {
+  const size_t first = (size_t)chunk * CHUNK;
+  for (uint n = 0; n < CHUNK; n += 8) RS_PREFETCH_READ(pool + first + n);
+  for (uint n = 1; n < CHUNK; ++n) RS_PREFETCH_READ(pool_transmittance + (first + n) * PACKET);
 }
 
 void packet_backward(const RsCamera* camera,
@@ -191,6 +214,8 @@ void packet_backward(const RsCamera* camera,
   uint used = tail.y;
   while (chunk != RS_NO_CHUNK) {
     const size_t first = (size_t)chunk * CHUNK;
+    const uint next = pool[first].x;
+    if (next != RS_NO_CHUNK) fetch_chunk(next, pool, pool_transmittance);
     for (uint n = used - 1; n > 0; --n) {
       const uint gaussian = pool[first + n].x >> 1;
       RS_PREFETCH_READ(lines + gaussian);
@@ -225,7 +250,7 @@ void packet_backward(const RsCamera* camera,
       rows.blended[slot] = mine;
       rows.behind[slot] = farther;
     }
-    chunk = pool[first].x;
+    chunk = next;
     used = CHUNK;
   }
   while (rows.size > 0) close_row(&rows, &p, T, T_last, background, lines, sums);

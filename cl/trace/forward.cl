@@ -41,69 +41,81 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
                             const uint pool_capacity,
                             volatile __global uint* restrict counters) {
   const RsCamera camera = camera_argument;
-  const int px = get_global_id(0) * PACKET_WIDTH;
-  const int band_y = get_global_id(1) * PACKET_HEIGHT;
-  const int py = band_y + tile_row * TILE;
-  if (px >= camera.width || py >= camera.height) return;
-  const uint tile = band_y / TILE * tiles_x + px / TILE;
+  const int block_x = get_global_id(0) * (BLOCK * PACKET_WIDTH);
+  const int band_y = get_global_id(1) * (BLOCK * PACKET_HEIGHT);
+  const int block_y = band_y + tile_row * TILE;
+  if (block_x >= camera.width || block_y >= camera.height) return;
+  const uint tile = band_y / TILE * tiles_x + block_x / TILE;
 
-  Candidates candidates;
-  candidates.boxes = boxes;
-  candidates.stride = stride;
-  candidates.begin = offsets[tile];
-  candidates.end = offsets[tile + 1];
-  candidates.x0 = (px + 0.5f - camera.cx) / camera.fx;
-  candidates.x1 = (px + PACKET_WIDTH - 0.5f - camera.cx) / camera.fx;
-  candidates.y0 = (py + 0.5f - camera.cy) / camera.fy;
-  candidates.y1 = (py + PACKET_HEIGHT - 0.5f - camera.cy) / camera.fy;
-
-  PacketState p;
-  p.X = ((float)px + RS_LANE_X + 0.5f - camera.cx) / camera.fx;
-  p.Y = ((float)py + RS_LANE_Y + 0.5f - camera.cy) / camera.fy;
-  p.valid = RS_MASK(RS_LANE_X + (float)px < (float)camera.width) &
-            RS_MASK(RS_LANE_Y + (float)py < (float)camera.height);
-  packet_clear(&p);
+  BlockCandidates block;
+  block_candidates_init(&block, boxes, stride, offsets[tile], offsets[tile + 1]);
+  for (int q = 0; q < RS_BLOCK_PACKETS; ++q) {
+    const int px = block_x + q % BLOCK * PACKET_WIDTH;
+    const int py = block_y + q / BLOCK * PACKET_HEIGHT;
+    block.x0[q] = (px + 0.5f - camera.cx) / camera.fx;
+    block.x1[q] = (px + PACKET_WIDTH - 0.5f - camera.cx) / camera.fx;
+    block.y0[q] = (py + 0.5f - camera.cy) / camera.fy;
+    block.y1[q] = (py + PACKET_HEIGHT - 0.5f - camera.cy) / camera.fy;
+  }
   HitStream stream;
   stream.pool = pool;
   stream.transmittance = pool_transmittance;
   stream.capacity = pool_capacity;
   stream.cursor = counters;
-  stream_restart(&stream);
-  iv capped = (iv)(0);
-  if (!trace_in_rows(&candidates, lines, references, limits, min_transmittance, max_hits, &p,
-                     &stream)) {
-    packet_clear(&p);
-    stream_restart(&stream);
-    capped = trace_sorted(&candidates, lines, references, limits, min_transmittance, max_hits, &p,
-                          &stream);
-  }
-
   const int width = camera.width, height = camera.height;
   const size_t plane = (size_t)width * height;
-  rs_store_pixels(image, width, height, px, py, p.R + p.T * background.x);
-  rs_store_pixels(image + plane, width, height, px, py, p.G + p.T * background.y);
-  rs_store_pixels(image + 2 * plane, width, height, px, py, p.B + p.T * background.z);
-  rs_store_pixels(image + 3 * plane, width, height, px, py, 1.0f - p.T);
+  uint hits = 0, capped_rays = 0;
+  for (int q = 0; q < RS_BLOCK_PACKETS; ++q) {
+    const int px = block_x + q % BLOCK * PACKET_WIDTH;
+    const int py = block_y + q / BLOCK * PACKET_HEIGHT;
+    if (px >= width || py >= height) continue;
+    Candidates candidates;
+    candidates.block = &block;
+    candidates.packet = q;
+    candidates.taken = 0;
+    candidates.end = block.end;
+    PacketState p;
+    p.X = ((float)px + RS_LANE_X + 0.5f - camera.cx) / camera.fx;
+    p.Y = ((float)py + RS_LANE_Y + 0.5f - camera.cy) / camera.fy;
+    p.valid = RS_MASK(RS_LANE_X + (float)px < (float)width) &
+              RS_MASK(RS_LANE_Y + (float)py < (float)height);
+    packet_clear(&p);
+    stream_restart(&stream);
+    iv capped = (iv)(0);
+    if (!trace_in_rows(&candidates, lines, references, limits, min_transmittance, max_hits, &p,
+                       &stream)) {
+      packet_clear(&p);
+      stream_restart(&stream);
+      capped = trace_sorted(&candidates, lines, references, limits, min_transmittance, max_hits, &p,
+                            &stream);
+    }
+
+    rs_store_pixels(image, width, height, px, py, p.R + p.T * background.x);
+    rs_store_pixels(image + plane, width, height, px, py, p.G + p.T * background.y);
+    rs_store_pixels(image + 2 * plane, width, height, px, py, p.B + p.T * background.z);
+    rs_store_pixels(image + 3 * plane, width, height, px, py, 1.0f - p.T);
 #if WITH_DEPTH
-  const fv weight = 1.0f - p.T;
-  rs_store_pixels(depth_image, width, height, px, py,
-                  select((fv)(0.0f), p.depth_sum / weight, RS_MASK(weight > 0.0f)));
-  rs_store_pixels(depth_image + plane, width, height, px, py, p.median);
-  rs_store_pixels(depth_image + 2 * plane, width, height, px, py, rs_to_float(p.hits));
+    const fv weight = 1.0f - p.T;
+    rs_store_pixels(depth_image, width, height, px, py,
+                    select((fv)(0.0f), p.depth_sum / weight, RS_MASK(weight > 0.0f)));
+    rs_store_pixels(depth_image + plane, width, height, px, py, p.median);
+    rs_store_pixels(depth_image + 2 * plane, width, height, px, py, rs_to_float(p.hits));
 #else
-  (void)depth_image;
+    (void)depth_image;
 #endif
 #if KEEP_HITS
-  const uint packets_x = (width + PACKET_WIDTH - 1) / PACKET_WIDTH;
-  stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH] =
-      (uint2)(stream.chunk, stream.used);
-  rs_store_pixels(transmittances, width, height, px, py, p.T);
-  rs_store_pixels(transmittances + plane, width, height, px, py, p.T_last);
+    const uint packets_x = (width + PACKET_WIDTH - 1) / PACKET_WIDTH;
+    stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH] =
+        (uint2)(stream.chunk, stream.used);
+    rs_store_pixels(transmittances, width, height, px, py, p.T);
+    rs_store_pixels(transmittances + plane, width, height, px, py, p.T_last);
 #else
-  (void)transmittances;
-  (void)stream_ends;
+    (void)transmittances;
+    (void)stream_ends;
 #endif
-  const uint capped_rays = popcount(rs_lane_bits(capped));
+    capped_rays += popcount(rs_lane_bits(capped));
+    hits += (uint)rs_lane_sum(rs_to_float(p.hits));
+  }
   if (capped_rays != 0) atomic_add(counters + 1, capped_rays);
-  atomic_add(counters + 2, (uint)rs_lane_sum(rs_to_float(p.hits)));
+  atomic_add(counters + 2, hits);
 }

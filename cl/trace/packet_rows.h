@@ -92,7 +92,6 @@ bool trace_in_rows(Candidates* candidates,
   fv settled = (fv)(1.0f);
   uint opened = 0;
   iv alive = p->valid;
-  candidates_restart(candidates);
   uint next = candidates_next(candidates);
   while (rs_any(alive)) {
     uint batch[RS_BATCH];

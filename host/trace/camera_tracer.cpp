@@ -56,7 +56,7 @@ struct CameraTracer::Impl {
                      std::uint32_t row,
                      std::uint32_t rows);
   void finalize(const DeviceGaussians& gaussians, GaussianGradients& gradients, bool pose);
-  Range packet_range(const Kernel& kernel, std::uint32_t row, std::uint32_t rows) const;
+  Range packet_range(const Kernel& kernel, int block, std::uint32_t row, std::uint32_t rows) const;
   void grow_pool(std::size_t chunks);
   Kernel& forward_kernel(bool keep);
   float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
@@ -187,6 +187,7 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
     BuildOptions build;
     build.define("PACKET", packet.lanes)
         .define("TILE", packet.tile)
+        .define("BLOCK", packet.block)
         .define("PENDING", packet.pending)
         .define("CHUNK", kChunkEntries)
         .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
@@ -197,15 +198,19 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
   return kernel;
 }
 
-// Rows [row, row + rows) of tiles, counted from the first row of the candidate lists or the image.
+// Rows [row, row + rows) of tiles, counted from the first row of the candidate lists or the image;
+// a work-item for every block x block packets.
 Range CameraTracer::Impl::packet_range(const Kernel& kernel,
+                                       int block,
                                        std::uint32_t row,
                                        std::uint32_t rows) const {
-  const auto group = packet_group(packet, kernel.max_work_group_size());
-  const auto tile = static_cast<std::size_t>(packet.tile / packet.height);
-  Range range =
-      Range::plane(static_cast<std::size_t>((camera.width + packet.width - 1) / packet.width),
-                   rows * tile, group[0], group[1]);
+  PacketShape item = packet;
+  item.width *= block;
+  item.height *= block;
+  const auto group = packet_group(item, kernel.max_work_group_size());
+  const auto tile = static_cast<std::size_t>(item.tile / item.height);
+  Range range = Range::plane(static_cast<std::size_t>((camera.width + item.width - 1) / item.width),
+                             rows * tile, group[0], group[1]);
   range.offset[1] = row * tile;
   return range;
 }
@@ -230,12 +235,12 @@ void in_bands(Context& context, LaunchBudget& budget, std::uint32_t rows, const 
 void CameraTracer::Impl::launch_forward(std::uint32_t row, std::uint32_t rows, bool keep) {
   Kernel& kernel = forward_kernel(keep);
   in_bands(context, forward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    kernel.launch(packet_range(kernel, first, number), lists.lines(), lists.references(),
-                  lists.boxes(), lists.box_stride(), lists.limits(), lists.offsets(), camera,
-                  lists.tiles_x(), row, options.min_transmittance, options.max_hits,
-                  background_of(options), image, depth, transmittances, stream_ends, pool,
-                  pool_transmittance, static_cast<std::uint32_t>(keep ? pool_capacity() : 0),
-                  counters);
+    kernel.launch(packet_range(kernel, packet.block, first, number), lists.lines(),
+                  lists.references(), lists.boxes(), lists.box_stride(), lists.limits(),
+                  lists.offsets(), camera, lists.tiles_x(), row, options.min_transmittance,
+                  options.max_hits, background_of(options), image, depth, transmittances,
+                  stream_ends, pool, pool_transmittance,
+                  static_cast<std::uint32_t>(keep ? pool_capacity() : 0), counters);
   });
 }
 
@@ -256,8 +261,8 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   const float limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet.lanes));
   const bool shared = !sums.is_private();
   in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    const Range range =
-        shared ? packet_range(kernel, first, number) : Range{{sums.copies(), 1, 1}, {1, 1, 1}, {}};
+    const Range range = shared ? packet_range(kernel, 1, first, number)
+                               : Range{{sums.copies(), 1, 1}, {1, 1, 1}, {}};
     // Shared sums find their rows by the offset of the launch.
     kernel.launch(range, static_cast<std::uint32_t>(count),
                   static_cast<std::uint32_t>(sums.copies()), lists.lines(), image_gradient,

@@ -20,6 +20,8 @@ PacketShape packet_shape(const DeviceInfo& device, int lanes) {
   }
   PacketShape shape;
   shape.lanes = lanes;
+  // Single rays are for devices that run many work-items at once: they have no room for queues.
+  shape.block = lanes > 1 ? 2 : 1;
   switch (lanes) {
     case 1:
       break;

@@ -14,6 +14,7 @@ struct PacketShape {
   int lanes = 1;
   int width = 1;     ///< pixels
   int height = 1;    ///< pixels
+  int block = 1;     ///< packets a side that one work-item of the forward pass traces
   int tile = 16;     ///< pixels
   int pending = 64;  ///< entries of the per-lane sorted list
   int group = 0;     ///< most work-items of a work-group; 0 = all packets of a tile

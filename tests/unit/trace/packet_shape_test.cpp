@@ -31,8 +31,8 @@ TEST_CASE("packet shape: follows the device's vectors") {
   for (const int lanes : {1, 2, 4, 8, 16}) {
     const PacketShape shape = packet_shape(cpu(16), lanes);
     CHECK(shape.width * shape.height == lanes);
-    CHECK(shape.tile % shape.width == 0);
-    CHECK(shape.tile % shape.height == 0);
+    CHECK(shape.tile % (shape.block * shape.width) == 0);
+    CHECK(shape.tile % (shape.block * shape.height) == 0);
     CHECK(shape.group == 0);
   }
 }
