@@ -171,6 +171,9 @@ void fetch_chunk(const uint chunk,
                  __global const uint2* restrict pool,
                  __global const float* restrict pool_transmittance) {
   const size_t first = (size_t)chunk * CHUNK;
+  (void)first;
+  (void)pool;
+  (void)pool_transmittance;
   for (uint n = 0; n < CHUNK; n += 8) RS_PREFETCH_READ(pool + first + n);
   for (uint n = 1; n < CHUNK; ++n) RS_PREFETCH_READ(pool_transmittance + (first + n) * PACKET);
 }
