@@ -149,7 +149,9 @@ __kernel void finalize_gradients(const uint begin,
   const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
   if (i >= end) return;
   const RsCamera camera = camera_argument;
-  const gi kind = RS_COLUMN(gi, &bounds[i].kind, 8);
+  gv box[8];
+  load_records8((__global const float*)(bounds + i), box);
+  const gi kind = RS_AS_INT(box[6]);
   gv v[16];
   gi touched = kind != RS_LINE_HIDDEN;
   if (RS_ANY_GAUSSIAN(touched)) {
@@ -178,9 +180,8 @@ __kernel void finalize_gradients(const uint begin,
   const gi general = kind == RS_LINE_GENERAL;
   if (RS_ANY_GAUSSIAN(touched & general)) general_gradient(&g, v, general, &view);
   const gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
-  store_column((touched & projective) ? slope : zero, screen + 3 * i, 3);
-  store_column((touched & projective) ? v[2] : zero, screen + 3 * i + 1, 3);
-  store_column(touched ? (gv)(1.0f) : zero, screen + 3 * i + 2, 3);
+  store_columns3((touched & projective) ? slope : zero, (touched & projective) ? v[2] : zero,
+                 touched ? (gv)(1.0f) : zero, screen + 3 * i);
 
   const float* V = camera.rotation;
   gv mean[3], gR[9];
@@ -197,11 +198,9 @@ __kernel void finalize_gradients(const uint begin,
   const gv inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
   gv n[3];
   for (int j = 0; j < 3; ++j) n[j] = d[j] * inverse;
-  gv colour[3];
-  for (int j = 0; j < 3; ++j) {
-    const gv value = load_column(lines[i].v + 13 + j, 16);
-    colour[j] = (touched & (value > 0.0f)) ? v[13 + j] : zero;
-  }
+  gv line[16], colour[3];
+  load_columns(lines[i].v, 16, 16, line);
+  for (int j = 0; j < 3; ++j) colour[j] = (touched & (line[13 + j] > 0.0f)) ? v[13 + j] : zero;
   gv basis[RS_SH_FUNCTIONS];
   rs_sh_basis(SH_DEGREE, n[0], n[1], n[2], basis);
   gv c[3 * SH_COEFFICIENTS];
@@ -221,7 +220,8 @@ __kernel void finalize_gradients(const uint begin,
   }
   for (int k = 3 * RS_SH_FUNCTIONS; k < 3 * SH_COEFFICIENTS; ++k) c[k] = zero;
   store_columns(c, 3 * SH_COEFFICIENTS, g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
-  for (int j = 0; j < 3; ++j) store_column(touched ? mean[j] : zero, g_means + 3 * i + j, 3);
+  for (int j = 0; j < 3; ++j) mean[j] = touched ? mean[j] : zero;
+  store_columns3(mean[0], mean[1], mean[2], g_means + 3 * i);
 #if POSE
   gv rotation[3];
   rotation[0] = g.m[1] * view.m[2] - g.m[2] * view.m[1];
@@ -236,7 +236,7 @@ __kernel void finalize_gradients(const uint begin,
   }
   // The mean enters only through m - c, so the centre takes the opposite.
   for (int j = 0; j < 3; ++j) {
-    store_column(touched ? -mean[j] : zero, pose + 6 * i + j, 6);
+    store_column(-mean[j], pose + 6 * i + j, 6);
     store_column(touched ? rotation[j] : zero, pose + 6 * i + 3 + j, 6);
   }
 #endif
@@ -246,12 +246,15 @@ __kernel void finalize_gradients(const uint begin,
   const gv along_q = gq[0] * g.q[0] + gq[1] * g.q[1] + gq[2] * g.q[2] + gq[3] * g.q[3];
   for (int j = 0; j < 4; ++j) {
     const gv value = (gq[j] - g.q[j] * along_q) / g.q_norm;
-    store_column(touched ? value : zero, g_quaternions + 4 * i + j, 4);
+    gq[j] = touched ? value : zero;
   }
+  store_columns4(gq, g_quaternions + 4 * i);
+  gv gs[3];
   for (int k = 0; k < 3; ++k) {
     const gi moves = touched & (g.raw_scale[k] >= g.scale[k]);
     const gv value = -view.w[k] * g.w[k] * scale_log_derivative(g.scale[k]);
-    store_column(moves ? value : zero, g_scales + 3 * i + k, 3);
+    gs[k] = moves ? value : zero;
   }
+  store_columns3(gs[0], gs[1], gs[2], g_scales + 3 * i);
   store_column(touched ? v[12] * g.opacity * (1.0f - g.opacity) : zero, g_opacities + i, 1);
 }

@@ -123,8 +123,96 @@ void transpose(const gv* from, gv* to) {
 #endif
 }
 
+// Three and four values of VECTOR Gaussians side by side, by shuffles of whole vectors: columns
+// loaded one by one become gathers.
+void load_columns3(__global const float* p, gv* columns) {
+#if VECTOR == 1
+  for (int j = 0; j < 3; ++j) columns[j] = p[j];
+#else
+  const gv a = ((__global const gv_unaligned*)p)[0];
+  const gv b = ((__global const gv_unaligned*)p)[1];
+  const gv c = ((__global const gv_unaligned*)p)[2];
+#if VECTOR == 4
+  columns[0] = (gv)(a.s03, b.s2, c.s1);
+  columns[1] = (gv)(a.s1, b.s03, c.s2);
+  columns[2] = (gv)(a.s2, b.s1, c.s03);
+#elif VECTOR == 8
+  columns[0] = (gv)(a.s036, b.s147, c.s25);
+  columns[1] = (gv)(a.s147, b.s25, c.s036);
+  columns[2] = (gv)(a.s25, b.s036, c.s147);
+#else
+  columns[0] = (gv)(a.s0369, a.scf, b.s258b, b.se, c.s147a, c.sd);
+  columns[1] = (gv)(a.s147a, a.sd, b.s0369, b.scf, c.s258b, c.se);
+  columns[2] = (gv)(a.s258b, a.se, b.s147a, b.sd, c.s0369, c.scf);
+#endif
+#endif
+}
+
+void store_columns3(const gv x, const gv y, const gv z, __global float* p) {
+#if VECTOR == 1
+  p[0] = x;
+  p[1] = y;
+  p[2] = z;
+#else
+  __global gv_unaligned* rows = (__global gv_unaligned*)p;
+#if VECTOR == 4
+  rows[0] = (gv)(x.s0, y.s0, z.s0, x.s1);
+  rows[1] = (gv)(y.s1, z.s1, x.s2, y.s2);
+  rows[2] = (gv)(z.s2, x.s3, y.s3, z.s3);
+#elif VECTOR == 8
+  rows[0] = (gv)(x.s0, y.s0, z.s0, x.s1, y.s1, z.s1, x.s2, y.s2);
+  rows[1] = (gv)(z.s2, x.s3, y.s3, z.s3, x.s4, y.s4, z.s4, x.s5);
+  rows[2] = (gv)(y.s5, z.s5, x.s6, y.s6, z.s6, x.s7, y.s7, z.s7);
+#else
+  rows[0] = (gv)(x.s0, y.s0, z.s0, x.s1, y.s1, z.s1, x.s2, y.s2, z.s2, x.s3, y.s3, z.s3, x.s4, y.s4,
+                 z.s4, x.s5);
+  rows[1] = (gv)(y.s5, z.s5, x.s6, y.s6, z.s6, x.s7, y.s7, z.s7, x.s8, y.s8, z.s8, x.s9, y.s9, z.s9,
+                 x.sa, y.sa);
+  rows[2] = (gv)(z.sa, x.sb, y.sb, z.sb, x.sc, y.sc, z.sc, x.sd, y.sd, z.sd, x.se, y.se, z.se, x.sf,
+                 y.sf, z.sf);
+#endif
+#endif
+}
+
+void load_columns4(__global const float* p, gv* columns) {
+#if VECTOR == 1
+  for (int j = 0; j < 4; ++j) columns[j] = p[j];
+#else
+  // Even and odd lanes apart, twice: the bits of (Gaussian, value) rotate to the right.
+  gv even[4];
+#pragma unroll
+  for (int k = 0; k < 2; ++k) {
+    const gv a = ((__global const gv_unaligned*)p)[2 * k];
+    const gv b = ((__global const gv_unaligned*)p)[2 * k + 1];
+    even[k] = (gv)(a.even, b.even);
+    even[k + 2] = (gv)(a.odd, b.odd);
+  }
+#pragma unroll
+  for (int k = 0; k < 2; ++k) {
+    columns[k] = (gv)(even[2 * k].even, even[2 * k + 1].even);
+    columns[k + 2] = (gv)(even[2 * k].odd, even[2 * k + 1].odd);
+  }
+#endif
+}
+
+void store_columns4(const gv* columns, __global float* p) {
+#if VECTOR == 1
+  for (int j = 0; j < 4; ++j) p[j] = columns[j];
+#else
+  gv part[4], rows[4];
+  shuffle_rows(columns, part, 4);
+  shuffle_rows(part, rows, 4);
+#pragma unroll
+  for (int k = 0; k < 4; ++k) ((__global gv_unaligned*)p)[k] = rows[k];
+#endif
+}
+
 // The first `count` columns.
 void load_columns(__global const float* p, const uint stride, const uint count, gv* columns) {
+  if (stride == 3 && count == 3) {
+    load_columns3(p, columns);
+    return;
+  }
   uint c = 0;
   for (; c + VECTOR <= count; c += VECTOR) {
     gv rows[VECTOR];
@@ -136,6 +224,10 @@ void load_columns(__global const float* p, const uint stride, const uint count, 
 }
 
 void store_columns(const gv* columns, const uint count, __global float* p, const uint stride) {
+  if (stride == 3 && count == 3) {
+    store_columns3(columns[0], columns[1], columns[2], p);
+    return;
+  }
   uint c = 0;
   for (; c + VECTOR <= count; c += VECTOR) {
     gv rows[VECTOR];

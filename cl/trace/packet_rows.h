@@ -19,8 +19,9 @@
 #define PENDING 96
 #endif
 
-// Candidates tested before the rows found are opened. Their tests depend on nothing, so a processor
-// runs several at once; a branch per candidate would make each wait for the one before.
+// Candidates tested before the rows found are opened, a multiple of RS_TOGETHER. Their tests depend
+// on nothing, so a processor runs several at once; a branch per candidate would make each wait for
+// the one before.
 #define RS_BATCH (PACKET > 1 ? 8 : 1)
 
 typedef struct {
@@ -42,6 +43,63 @@ typedef struct {
   ushort open[PENDING];
   int free_count, waiting_count, open_count;
 } Slots;
+
+// Tests `size` candidates, fewer than there are free slots; returns how many any lane of `among`
+// hits: the slots of their rows, and their nearest keys. Both take one value more than there are
+// candidates.
+__attribute__((always_inline)) int rows_find(Rows* rows,
+                                             Slots* slots,
+                                             const PacketState* p,
+                                             __global const RsLine* lines,
+                                             __global const uint* references,
+                                             __global const float2* limits,
+                                             const uint* candidates,
+                                             const int size,
+                                             const iv among,
+                                             ushort* found,
+                                             float* first_key) {
+  int count = 0;
+  for (int j = 0; j < size; j += RS_TOGETHER) {
+    uint reference[RS_TOGETHER];
+    float quantile[RS_TOGETHER];
+    uint general = 0;
+#pragma unroll
+    for (int i = 0; i < RS_TOGETHER; ++i) {
+      const uint k = candidates[min(j + i, size - 1)];  // the last again where there are no more
+      reference[i] = references[k];
+      quantile[i] = limits[k].y;
+      general |= reference[i] & 1;
+    }
+    PacketHit hits[RS_TOGETHER];
+    if (general) {
+      for (int i = 0; i < RS_TOGETHER; ++i)
+        hits[i] = packet_hit(p, lines, reference[i], quantile[i], among);
+    } else {
+      packet_hits(p, lines, reference, quantile, RS_TOGETHER, false, among, hits);
+    }
+    float first[RS_TOGETHER], last[RS_TOGETHER];
+#pragma unroll
+    for (int i = 0; i < RS_TOGETHER; ++i) {
+      last[i] = rs_lane_max(select((fv)(0.0f), hits[i].key, hits[i].hit));
+      first[i] = rs_lane_min(select((fv)(INFINITY), hits[i].key, hits[i].hit));
+    }
+#pragma unroll
+    for (int i = 0; i < RS_TOGETHER; ++i) {
+      // Kept only where a lane hits, without a branch.
+      const ushort slot = slots->free[slots->free_count - 1];
+      rows->key[slot] = rs_as_float(rs_as_int(hits[i].key) & 0x7fffffff);
+      rows->alpha[slot] = hits[i].alpha;
+      rows->last_key[slot] = last[i];
+      rows->reference[slot] = reference[i];
+      found[count] = slot;
+      first_key[count] = first[i];
+      const int kept = j + i < size && rs_any(hits[i].hit) ? 1 : 0;
+      count += kept;
+      slots->free_count -= kept;
+    }
+  }
+  return count;
+}
 
 void row_wait(Slots* slots, const ushort slot, const float first_key) {
   int i = slots->waiting_count++;
@@ -101,28 +159,11 @@ bool trace_in_rows(Candidates* candidates,
       RS_PREFETCH_READ(lines + (references[next] >> 1));
       next = candidates_next(candidates);
     }
-    if (slots.free_count < size) return false;
-    float first_key[RS_BATCH];
-    ushort found[RS_BATCH];
-    int found_count = 0;
-    for (int j = 0; j < size; ++j) {
-      const uint k = batch[j];
-      const uint reference = references[k];
-      fv key, alpha;
-      const iv hit =
-          packet_hit(p, lines[reference >> 1].v, reference & 1, limits[k].y, alive, &key, &alpha);
-      // Kept only where a lane hits, without a branch.
-      const ushort slot = slots.free[slots.free_count - 1];
-      rows.key[slot] = rs_as_float(rs_as_int(key) & 0x7fffffff);
-      rows.alpha[slot] = alpha;
-      rows.last_key[slot] = rs_lane_max(select((fv)(0.0f), key, hit));
-      rows.reference[slot] = reference;
-      found[found_count] = slot;
-      first_key[found_count] = rs_lane_min(select((fv)(INFINITY), key, hit));
-      const int hits = rs_any(hit) ? 1 : 0;
-      found_count += hits;
-      slots.free_count -= hits;
-    }
+    if (slots.free_count <= size) return false;
+    float first_key[RS_BATCH + 1];
+    ushort found[RS_BATCH + 1];
+    const int found_count = rows_find(&rows, &slots, p, lines, references, limits, batch, size,
+                                      alive, found, first_key);
     for (int j = 0; j < found_count; ++j) row_wait(&slots, found[j], first_key[j]);
     const bool draining = next == candidates->end;
     const float bound = draining ? INFINITY : limits[next].x;

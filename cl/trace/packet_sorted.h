@@ -143,12 +143,12 @@ iv trace_sorted(Candidates* candidates,
       if (draining || !rs_any(alive)) break;
 
       const uint reference = references[k];
-      fv key, alpha;
-      iv hit =
-          packet_hit(p, lines[reference >> 1].v, reference & 1, limits[k].y, alive, &key, &alpha);
+      const PacketHit found = packet_hit(p, lines, reference, limits[k].y, alive);
+      fv key = found.key;
+      iv hit = found.hit;
       if (!first_pass) hit &= ~comes_before(key, (iv)(reference), start.key, start.reference + 1);
       if (!rs_any(hit)) continue;
-      alpha = select((fv)(0.0f), alpha, hit);
+      fv alpha = select((fv)(0.0f), found.alpha, hit);
       // Later passes keep misses behind every hit, so that a full list always makes progress.
       key = select(first_pass ? fmax(key, (fv)(bound)) : (fv)(INFINITY), key, hit);
       iv id = (iv)(reference);

@@ -12,6 +12,9 @@
 #define PEAK_ORDER 0
 #endif
 
+// Candidates tested together.
+#define RS_TOGETHER (PACKET > 1 ? 4 : 1)
+
 typedef struct {
   fv X, Y;
   fv T;       // transmittance behind the last hit
@@ -62,30 +65,73 @@ void packet_blend(PacketState* p,
 #endif
 }
 
-// How the lanes of `among` meet a candidate. Returns the lanes that hit; key orders the hits.
-iv packet_hit(const PacketState* p,
-              __global const float* v,
-              const bool general,
-              const float quantile,
-              const iv among,
-              fv* key,
-              fv* alpha) {
-  const PacketMeeting m = rs_meet(v, general, quantile, p->X, p->Y);
-  iv hit = m.inside & among;
-  const fv inverse = 1.0f / m.direction2;
-  const fv distance2 = m.numerator * inverse;
+// How the lanes of a packet meet a candidate; key orders the hits.
+typedef struct {
+  iv hit;
+  fv key, alpha;  // alpha is 0 in lanes that miss
+} PacketHit;
+
+// Tests `count` candidates of one form together, step by step: while one waits for its root or its
+// division, the next ones' are close enough in the instructions to be started. (No `restrict`: what
+// inlining makes of it is unknown to Oclgrind.)
+__attribute__((always_inline)) void packet_hits(const PacketState* p,
+                                                __global const RsLine* lines,
+                                                const uint* references,
+                                                const float* quantiles,
+                                                const int count,
+                                                const bool general,
+                                                const iv among,
+                                                PacketHit* hits) {
+  PacketMeeting m[RS_TOGETHER];
+  fv inverse[RS_TOGETHER];
+#pragma unroll
+  for (int j = 0; j < count; ++j)
+    m[j] = rs_meet(lines[references[j] >> 1].v, general, quantiles[j], p->X, p->Y);
 #if PEAK_ORDER
-  *key = m.along * inverse;
-  hit &= RS_MASK(*key >= 0.0f);
+#pragma unroll
+  for (int j = 0; j < count; ++j) inverse[j] = 1.0f / m[j].direction2;
+#pragma unroll
+  for (int j = 0; j < count; ++j) {
+    hits[j].key = m[j].along * inverse[j];
+    hits[j].hit = m[j].inside & among & RS_MASK(hits[j].key >= 0.0f);
+  }
 #else
   // Near root by Viete's formula from the far one: no difference of near equals. The far root times
   // <d', d'> is `far`.
-  const fv discriminant = quantile * m.direction2 - m.numerator;
-  const fv far = m.along + sqrt(discriminant > 0.0f ? discriminant : (fv)(0.0f));
-  *key = (rs_origin_distance2(v, general) - quantile) / far;
-  hit &= RS_MASK(*key >= 0.0f) & RS_MASK(far > 0.0f);
+  fv far[RS_TOGETHER];
+#pragma unroll
+  for (int j = 0; j < count; ++j) {
+    const fv discriminant = quantiles[j] * m[j].direction2 - m[j].numerator;
+    far[j] = m[j].along + sqrt(discriminant > 0.0f ? discriminant : (fv)(0.0f));
+  }
+#pragma unroll
+  for (int j = 0; j < count; ++j) inverse[j] = 1.0f / m[j].direction2;
+#pragma unroll
+  for (int j = 0; j < count; ++j) {
+    const float origin2 = rs_origin_distance2(lines[references[j] >> 1].v, general);
+    hits[j].key = (origin2 - quantiles[j]) / far[j];
+    hits[j].hit = m[j].inside & among & RS_MASK(hits[j].key >= 0.0f) & RS_MASK(far[j] > 0.0f);
+  }
 #endif
-  *alpha = select((fv)(0.0f), v[12] * rs_exp(-0.5f * distance2), hit);
+#pragma unroll
+  for (int j = 0; j < count; ++j) {
+    const fv response = rs_exp(-0.5f * (m[j].numerator * inverse[j]));
+    hits[j].alpha = select((fv)(0.0f), lines[references[j] >> 1].v[12] * response, hits[j].hit);
+  }
+}
+
+// Of one candidate.
+PacketHit packet_hit(const PacketState* p,
+                     __global const RsLine* restrict lines,
+                     const uint reference,
+                     const float quantile,
+                     const iv among) {
+  PacketHit hit;
+  if (reference & 1) {
+    packet_hits(p, lines, &reference, &quantile, 1, true, among, &hit);
+  } else {
+    packet_hits(p, lines, &reference, &quantile, 1, false, among, &hit);
+  }
   return hit;
 }
 

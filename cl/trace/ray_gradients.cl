@@ -25,12 +25,13 @@ void load_ray_gaussian(const size_t i,
                        __global const float* quaternions,
                        __global const float* scales,
                        RayGaussian* g) {
-  for (int j = 0; j < 4; ++j) g->q[j] = load_column(quaternions + 4 * i + j, 4);
+  load_columns4(quaternions + 4 * i, g->q);
   g->q_norm = sqrt(g->q[0] * g->q[0] + g->q[1] * g->q[1] + g->q[2] * g->q[2] + g->q[3] * g->q[3]);
   for (int j = 0; j < 4; ++j) g->q[j] = g->q[j] / g->q_norm;
   gv longest = 0;
+  load_columns3(scales + 3 * i, g->raw_scale);
   for (int k = 0; k < 3; ++k) {
-    g->raw_scale[k] = activated_scale(load_column(scales + 3 * i + k, 3));
+    g->raw_scale[k] = activated_scale(g->raw_scale[k]);
     longest = larger(g->raw_scale[k], longest);
   }
   const gv floor_scale = larger(longest * 1e-7f, (gv)(1e-12f));
@@ -48,10 +49,10 @@ __kernel void ray_gradient_records(const uint begin,
   RayGaussian g;
   load_ray_gaussian(i, quaternions, scales, &g);
   gv R[9], record[16];
+  load_columns3(means + 3 * i, record + 9);
   rotation_matrix(g.q[0], g.q[1], g.q[2], g.q[3], R);
   for (int k = 0; k < 3; ++k) {
     for (int j = 0; j < 3; ++j) record[3 * k + j] = R[3 * j + k] / g.scale[k];
-    record[9 + k] = load_column(means + 3 * i + k, 3);
   }
   for (int k = 12; k < 16; ++k) record[k] = 0;
   store_columns(record, 16, records + 16 * i, 16);
@@ -135,9 +136,8 @@ __kernel void finish_ray_gradients(const uint begin,
   gv distance = 1.0f;
   if (screen.s[12] == 0.0f) distance = sqrt(distance2);
   if (screen.s[12] == 1.0f) distance = larger(along, zero);
-  store_column(touched ? sqrt(length2) * distance : zero, g_screen + 3 * i, 3);
-  store_column(touched ? v[10] * distance : zero, g_screen + 3 * i + 1, 3);
-  store_column(touched ? (gv)(1.0f) : zero, g_screen + 3 * i + 2, 3);
+  store_columns3(touched ? sqrt(length2) * distance : zero, touched ? v[10] * distance : zero,
+                 touched ? (gv)(1.0f) : zero, g_screen + 3 * i);
 
   gv c[3 * SH_COEFFICIENTS];
 #if SH_DEGREE == 0
@@ -152,29 +152,30 @@ __kernel void finish_ray_gradients(const uint begin,
 #endif
   for (int k = 3 * RS_RAY_FUNCTIONS; k < 3 * SH_COEFFICIENTS; ++k) c[k] = zero;
   store_columns(c, 3 * SH_COEFFICIENTS, g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
-  for (int j = 0; j < 3; ++j) store_column(touched ? mean[j] : zero, g_means + 3 * i + j, 3);
+  for (int j = 0; j < 3; ++j) mean[j] = touched ? mean[j] : zero;
+  store_columns3(mean[0], mean[1], mean[2], g_means + 3 * i);
 
   // delta^2 = x^T R S^-2 R^T x. With G = sum of g v v^T: d(log S_k) receives -2 G_kk; a rotation
   // R exp([w]x) receives 2 G_ij (S_j / S_i - S_i / S_j) about the third axis.
-  gv turn[3];
+  gv turn[3], gs[3];
   for (int k = 0; k < 3; ++k) {
     const gv diagonal = k == 0 ? v[3] : k == 1 ? v[6] : v[8];
     const gi moves = touched & (g.raw_scale[k] >= g.scale[k]);
     const gv value = -2.0f * diagonal * scale_log_derivative(g.scale[k]);
-    store_column(moves ? value : zero, g_scales + 3 * i + k, 3);
+    gs[k] = moves ? value : zero;
     const gv mixed = k == 0 ? v[7] : k == 1 ? v[5] : v[4];
     const gv a = g.scale[(k + 1) % 3], b = g.scale[(k + 2) % 3];
     turn[k] = 2.0f * mixed * (b / a - a / b);
   }
+  store_columns3(gs[0], gs[1], gs[2], g_scales + 3 * i);
   // q exp(w / 2) turns R by w.
   gv gq[4];
   gq[0] = -(g.q[1] * turn[0] + g.q[2] * turn[1] + g.q[3] * turn[2]);
   gq[1] = g.q[0] * turn[0] + g.q[2] * turn[2] - g.q[3] * turn[1];
   gq[2] = g.q[0] * turn[1] + g.q[3] * turn[0] - g.q[1] * turn[2];
   gq[3] = g.q[0] * turn[2] + g.q[1] * turn[1] - g.q[2] * turn[0];
-  for (int j = 0; j < 4; ++j) {
-    store_column(touched ? 2.0f * gq[j] / g.q_norm : zero, g_quaternions + 4 * i + j, 4);
-  }
+  for (int j = 0; j < 4; ++j) gq[j] = touched ? 2.0f * gq[j] / g.q_norm : zero;
+  store_columns4(gq, g_quaternions + 4 * i);
   const gv opacity = sigmoid(load_column(opacities + i, 1));
   store_column(touched ? v[9] * (1.0f - opacity) : zero, g_opacities + i, 1);
 }

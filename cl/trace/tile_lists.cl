@@ -143,8 +143,8 @@ __kernel void count_tiles(const uint begin,
 #define RS_DEPTH_BITS 12
 #define RS_DEPTH_FIRST ((127 - 10) << (23 - RS_DEPTH_BITS))
 
-uint depth_key(const float depth) {
-  return clamp((as_int(depth) >> RS_DEPTH_BITS) - RS_DEPTH_FIRST, 0, 65535);
+gi depth_key(const gv depth) {
+  return lesser(greater((RS_AS_INT(depth) >> RS_DEPTH_BITS) - RS_DEPTH_FIRST, 0), 65535);
 }
 
 float depth_bound(const uint key) {
@@ -153,11 +153,11 @@ float depth_bound(const uint key) {
 
 // What the least depth of Gaussians in a tile needs of their lines.
 typedef struct {
-  FloatLanes mean_x, mean_y;
-  FloatLanes along, slope_x, slope_y;  // <o', d'> at the mean, and its slopes
-  FloatLanes most_x, most_y;           // what a slope adds at the end of the outline
-  FloatLanes limit;                    // of that product with the point of a hit
-  FloatLanes depth;                    // no hit is nearer
+  gv mean_x, mean_y;
+  gv along, slope_x, slope_y;  // <o', d'> at the mean, and its slopes
+  gv most_x, most_y;           // what a slope adds at the end of the outline
+  gv limit;                    // of that product with the point of a hit
+  gv depth;                    // no hit is nearer
 } DepthPlanes;
 
 // Lower bound of the depth of all hits of one Gaussian in a tile: of its own least depth, and of
@@ -174,29 +174,30 @@ void depth_planes(const gv* b, __global const RsLine* lines, DepthPlanes* planes
   const gv limit = sqrt(b[RS_BOUNDS_QUANTILE] * origin2);
 #endif
   const gi projective = RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_PROJECTIVE;
-  planes->mean_x.v = v[0];
-  planes->mean_y.v = v[1];
-  planes->along.v = v[6];
-  planes->slope_x.v = v[7];
-  planes->slope_y.v = v[8];
-  planes->most_x.v = v[7] * ((v[7] > 0.0f ? b[RS_BOUNDS_X1] : b[RS_BOUNDS_X0]) - v[0]);
-  planes->most_y.v = v[8] * ((v[8] > 0.0f ? b[RS_BOUNDS_Y1] : b[RS_BOUNDS_Y0]) - v[1]);
-  planes->limit.v = projective ? (origin2 - limit) / v[2] * 0.9999f : (gv)(0.0f);
-  planes->depth.v = b[RS_BOUNDS_DEPTH];
+  planes->mean_x = v[0];
+  planes->mean_y = v[1];
+  planes->along = v[6];
+  planes->slope_x = v[7];
+  planes->slope_y = v[8];
+  planes->most_x = v[7] * ((v[7] > 0.0f ? b[RS_BOUNDS_X1] : b[RS_BOUNDS_X0]) - v[0]);
+  planes->most_y = v[8] * ((v[8] > 0.0f ? b[RS_BOUNDS_Y1] : b[RS_BOUNDS_Y0]) - v[1]);
+  planes->limit = projective ? (origin2 - limit) / v[2] * 0.9999f : (gv)(0.0f);
+  planes->depth = b[RS_BOUNDS_DEPTH];
 }
 
 // What a slope adds up to the farther edge of a tile, the product at most at the outline's end.
-float most_along(const float slope,
-                 const int tile,
-                 const float tile_size,
-                 const float centre,
-                 const float mean,
-                 const float most) {
-  const float edge = (tile + (slope > 0.0f ? 1 : 0)) * tile_size - centre;
-  const float product = slope * (edge - mean);
-  return product < most ? product : most;
+gv most_along(const gv slope,
+              const gi tile,
+              const float tile_size,
+              const float centre,
+              const gv mean,
+              const gv most) {
+  const gv edge =
+      (RS_TO_FLOAT(tile) + (slope > 0.0f ? (gv)(1.0f) : (gv)(0.0f))) * tile_size - centre;
+  return smaller(slope * (edge - mean), most);
 }
 
+// All lanes take the tiles of their range in turn, row by row.
 __kernel void fill_tiles(const uint begin,
                          const uint end,
                          __global const RsViewBounds* restrict bounds,
@@ -214,37 +215,39 @@ __kernel void fill_tiles(const uint begin,
   gv b[8];
   load_records8((__global const float*)(bounds + i), b);
   TileRanges range;
-  tile_ranges(b, &camera, row, rows, &range);
+  const gi empty = tile_ranges(b, &camera, row, rows, &range);
   DepthPlanes planes;
   depth_planes(b, lines + i, &planes);
-  IntLanes kind;
-  kind.v = RS_AS_INT(b[RS_BOUNDS_KIND]);
-  FloatLanes outline;
-  outline.v = b[RS_BOUNDS_X0];
+  IntLanes general, unbounded;
+  general.v = RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_GENERAL;
+  unbounded.v = b[RS_BOUNDS_X0] == -INFINITY;
+  const gv zero = (gv)(0.0f);
   const int tiles_x = (camera.width + TILE - 1) / TILE;
   const float size_x = TILE / camera.fx, size_y = TILE / camera.fy;
   const float centre_x = camera.cx / camera.fx, centre_y = camera.cy / camera.fy;
-  for (int lane = 0; lane < VECTOR; ++lane) {
-    uint cursor = offsets[i + lane];
-    if (cursor == offsets[i + lane + 1]) continue;
-    const uint value = (uint)(i + lane) << 1 | (kind.s[lane] == RS_LINE_GENERAL);
-    const bool unbounded = outline.s[lane] == -INFINITY;
-    const float limit = planes.limit.s[lane], depth = planes.depth.s[lane];
-    for (int y = range.y0.s[lane]; y <= range.y1.s[lane]; ++y) {
-      const float row_along =
-          planes.along.s[lane] + most_along(planes.slope_y.s[lane], y, size_y, centre_y,
-                                            planes.mean_y.s[lane], planes.most_y.s[lane]);
-      for (int x = range.x0.s[lane]; x <= range.x1.s[lane]; ++x) {
-        if (unbounded && box_outside(&camera, x, y, boxes + i + lane)) continue;
-        const float along = row_along + most_along(planes.slope_x.s[lane], x, size_x, centre_x,
-                                                   planes.mean_x.s[lane], planes.most_x.s[lane]);
-        const float plane = along > 0.0f && limit > 0.0f ? limit / along : 0.0f;
-        const uint tile = (uint)((y - row) * tiles_x + x);
-        keys[cursor] = tile << 16 | depth_key(plane > depth ? plane : depth);
-        values[cursor] = value;
-        ++cursor;
-      }
+  uint cursor[VECTOR];
+  for (int lane = 0; lane < VECTOR; ++lane) cursor[lane] = offsets[i + lane];
+  IntLanes x, y, key, left;
+  x.v = range.x0.v;
+  y.v = range.y0.v;
+  for (left.v = !empty; RS_ANY_GAUSSIAN(left.v); left.v = left.v & (y.v <= range.y1.v)) {
+    const gv along =
+        planes.along +
+        most_along(planes.slope_y, y.v, size_y, centre_y, planes.mean_y, planes.most_y) +
+        most_along(planes.slope_x, x.v, size_x, centre_x, planes.mean_x, planes.most_x);
+    const gv plane = ((along > 0.0f) & (planes.limit > 0.0f)) ? planes.limit / along : zero;
+    key.v = ((y.v - row) * tiles_x + x.v) << 16 | depth_key(larger(plane, planes.depth));
+    for (int lane = 0; lane < VECTOR; ++lane) {
+      if (left.s[lane] == 0) continue;
+      if (unbounded.s[lane] && box_outside(&camera, x.s[lane], y.s[lane], boxes + i + lane))
+        continue;
+      const uint to = cursor[lane]++;
+      keys[to] = key.s[lane];
+      values[to] = (uint)(i + lane) << 1 | (general.s[lane] != 0);
     }
+    const gi turn = x.v >= range.x1.v;
+    x.v = turn ? range.x0.v : x.v + 1;
+    y.v = turn ? y.v + 1 : y.v;
   }
 }
 

@@ -47,11 +47,12 @@ gi load_view_gaussian(const size_t i,
                       const RsCamera* camera,
                       ViewGaussian* g) {
   const float* V = camera->rotation;
-  for (int j = 0; j < 3; ++j) g->offset[j] = load_column(means + 3 * i + j, 3) - camera->center[j];
+  load_columns3(means + 3 * i, g->offset);
+  for (int j = 0; j < 3; ++j) g->offset[j] -= camera->center[j];
   for (int j = 0; j < 3; ++j) {
     g->m[j] = V[3 * j] * g->offset[0] + V[3 * j + 1] * g->offset[1] + V[3 * j + 2] * g->offset[2];
   }
-  for (int j = 0; j < 4; ++j) g->q[j] = load_column(quaternions + 4 * i + j, 4);
+  load_columns4(quaternions + 4 * i, g->q);
   g->q_norm = sqrt(g->q[0] * g->q[0] + g->q[1] * g->q[1] + g->q[2] * g->q[2] + g->q[3] * g->q[3]);
   for (int j = 0; j < 4; ++j) g->q[j] = g->q[j] / g->q_norm;
   gv R[9];
@@ -64,8 +65,9 @@ gi load_view_gaussian(const size_t i,
   const gv distance = sqrt(g->m[0] * g->m[0] + g->m[1] * g->m[1] + g->m[2] * g->m[2]);
   const gv floor_scale = larger(RS_MIN_RELATIVE_SCALE * distance, (gv)(1e-12f));
   gv sum = distance + g->q_norm;
+  load_columns3(scales + 3 * i, g->raw_scale);
   for (int k = 0; k < 3; ++k) {
-    g->raw_scale[k] = activated_scale(load_column(scales + 3 * i + k, 3));
+    g->raw_scale[k] = activated_scale(g->raw_scale[k]);
     g->scale[k] = larger(g->raw_scale[k], floor_scale);
     g->w[k] = 1.0f / g->scale[k];
     sum += g->raw_scale[k];
