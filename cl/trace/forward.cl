@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// trace_forward: colour and alpha of every pixel, exactly in depth order per ray. One work-item is
-// a packet of PACKET rays (packet.h); the packets of a tile share its candidate list, sorted by a
-// lower bound of the depth: what lies before the next candidate's bound can be blended.
-//   global size: packets in x, packet rows of the band; local: the packets of a tile (any size is
+// trace_forward: colour and alpha of every pixel, exactly in depth order per ray. One work-item
+// traces BLOCK x BLOCK packets of PACKET rays (packet.h), one after the other; the packets of a
+// tile share its candidate list, sorted by a lower bound of the depth: what lies before the next
+// candidate's bound can be blended.
+//   global size: blocks in x, rows of blocks in the band; local: the blocks of a tile (any size is
 //   correct)
-// Cost follows the candidates of the tile that meet the packet's block. Rows of Gaussians are
-// blended without sorting (packet_rows.h); packets beyond its limits start again with sorted lists
+// Cost follows the candidates of the tile that meet the packets. Rows of Gaussians are blended
+// without sorting (packet_rows.h); packets beyond its limits start again with sorted lists
 // (packet_sorted.h), which have none.
 #ifndef TILE
 #define TILE 32
@@ -69,11 +70,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
     const int px = block_x + q % BLOCK * PACKET_WIDTH;
     const int py = block_y + q / BLOCK * PACKET_HEIGHT;
     if (px >= width || py >= height) continue;
-    Candidates candidates;
-    candidates.block = &block;
-    candidates.packet = q;
-    candidates.taken = 0;
-    candidates.end = block.end;
+    Candidates candidates = {&block, q, 0, block.end};
     PacketState p;
     p.X = ((float)px + RS_LANE_X + 0.5f - camera.cx) / camera.fx;
     p.Y = ((float)py + RS_LANE_Y + 0.5f - camera.cy) / camera.fy;
