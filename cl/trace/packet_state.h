@@ -74,14 +74,14 @@ typedef struct {
 // Tests `count` candidates of one form together, step by step: while one waits for its root or its
 // division, the next ones' are close enough in the instructions to be started. (No `restrict`: what
 // inlining makes of it is unknown to Oclgrind.)
-__attribute__((always_inline)) void packet_hits(const PacketState* p,
-                                                __global const RsLine* lines,
-                                                const uint* references,
-                                                const float* quantiles,
-                                                const int count,
-                                                const bool general,
-                                                const iv among,
-                                                PacketHit* hits) {
+__attribute__((always_inline)) static void packet_hits(const PacketState* p,
+                                                       __global const RsLine* lines,
+                                                       const uint* references,
+                                                       const float* quantiles,
+                                                       const int count,
+                                                       const bool general,
+                                                       const iv among,
+                                                       PacketHit* hits) {
   PacketMeeting m[RS_TOGETHER];
   fv inverse[RS_TOGETHER];
 #pragma unroll

@@ -138,6 +138,33 @@ TEST_CASE("more pending hits than the list holds are still blended in exact orde
   }
 }
 
+TEST_CASE("packets that share a list have more candidates than their queues hold") {
+  Context context = make_test_context();
+  // 700 faint spheres in a row along the view, each in front of the whole image.
+  Gaussians model = reference::random_scene(700, 7, 0);
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    model.means[3 * i] = model.means[3 * i + 1] = 0.0f;
+    model.means[3 * i + 2] = -1.0f + 2.0f * static_cast<float>(i * 271 % 700) / 700.0f;
+    for (std::size_t k = 0; k < 3; ++k) model.log_scales[3 * i + k] = std::log(0.02f);
+    model.opacities[i] = -5.0f;
+  }
+  Camera camera = reference::cube_camera(24, 16);
+  camera.fx = camera.fy = 2400.0;
+  TraceOptions options;
+  options.max_hits = 10000;
+  options.adaptive_radius = false;
+  const reference::Render expected =
+      reference::render(reference::Parameters(model), options, camera);
+  CHECK(expected.hits == 700 * 24 * 16);
+  for (const int lanes : {1, 2, 4, 8, 16}) {
+    CAPTURE(lanes);
+    options.packet_width = lanes;
+    const Difference difference = compare(trace_image(context, model, options, camera), expected);
+    CHECK(difference.mean < 1e-4);
+    CHECK(difference.maximum < 2e-3);
+  }
+}
+
 TEST_CASE("the cap on hits is exact and counted") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(500, 6, 0);
