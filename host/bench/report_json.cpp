@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "bench/report.hpp"
 #include "io/json_file.hpp"
@@ -41,14 +44,30 @@ nlohmann::ordered_json row_json(const BenchRow& row, const Ceilings& ceilings) {
   return out;
 }
 
+// Conversions of numbers out of range would wrap or be undefined.
+template <class Whole>
+Whole whole_number(const nlohmann::json& json, const char* key) {
+  const nlohmann::json& value = json.at(key);
+  if (!value.is_number_unsigned() ||
+      value.get<std::uint64_t>() > std::numeric_limits<Whole>::max()) {
+    throw std::out_of_range(fmt::format("'{}' is no whole number in its range", key));
+  }
+  return value.get<Whole>();
+}
+
+DataError damaged(const std::filesystem::path& path, const std::exception& error) {
+  return DataError(fmt::format("{} is a damaged result of 'raysplats bench' ({}): run it again",
+                               path.string(), error.what()));
+}
+
 BenchRow row_from(const nlohmann::json& json) {
   BenchRow row;
   row.name = json.at("name").get<std::string>();
   row.scene = json.at("scene").get<std::string>();
-  row.size = json.at("size").get<std::size_t>();
+  row.size = whole_number<std::size_t>(json, "size");
   row.clock = json.at("clock").get<std::string>();
   const nlohmann::json& seconds = json.at("seconds");
-  row.seconds.samples = seconds.at("samples").get<std::size_t>();
+  row.seconds.samples = whole_number<std::size_t>(seconds, "samples");
   row.seconds.median = seconds.at("median").get<double>();
   row.seconds.deviation = seconds.at("deviation").get<double>();
   row.seconds.minimum = seconds.at("minimum").get<double>();
@@ -105,18 +124,19 @@ BenchReport read_bench_report(const std::filesystem::path& path) {
     report.device = json.at("device").get<std::string>();
     report.driver = json.at("driver").get<std::string>();
     report.platform = json.at("platform").get<std::string>();
-    report.compute_units = json.at("compute_units").get<std::uint32_t>();
+    report.compute_units = whole_number<std::uint32_t>(json, "compute_units");
     report.options = json.at("options").get<std::map<std::string, std::string>>();
     const nlohmann::json& ceilings = json.at("ceilings");
     report.ceilings.copy_bytes_per_second = ceilings.at("copy_bytes_per_second").get<double>();
     report.ceilings.fma_flops_per_second = ceilings.at("fma_flops_per_second").get<double>();
-    report.peak_process_bytes = json.at("peak_process_bytes").get<std::uint64_t>();
-    report.peak_device_bytes = json.at("peak_device_bytes").get<std::uint64_t>();
+    report.peak_process_bytes = whole_number<std::uint64_t>(json, "peak_process_bytes");
+    report.peak_device_bytes = whole_number<std::uint64_t>(json, "peak_device_bytes");
     for (const nlohmann::json& row : json.at("rows")) report.rows.push_back(row_from(row));
     return report;
   } catch (const nlohmann::json::exception& error) {
-    throw DataError(fmt::format("{} is a damaged result of 'raysplats bench' ({}): run it again",
-                                path.string(), error.what()));
+    throw damaged(path, error);
+  } catch (const std::out_of_range& error) {
+    throw damaged(path, error);
   }
 }
 

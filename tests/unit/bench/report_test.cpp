@@ -95,6 +95,11 @@ TEST_CASE("report: files that are none are refused in one sentence") {
   other = good;
   other["rows"][0]["size"] = "many";
   refuse(other.dump(), "damaged");
+  for (const double number : {5e220, -1.0, 0.5, 4294967296.0}) {
+    other = good;
+    other["compute_units"] = number;
+    refuse(other.dump(), "no whole number");
+  }
   CHECK_THROWS_AS(read_bench_report(folder.path() / "none.json"), DataError);
 }
 

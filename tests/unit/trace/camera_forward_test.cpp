@@ -224,10 +224,11 @@ TEST_CASE("empty scenes, single pixels and odd sizes [small]") {
     CHECK(image.data[4 * i + 3] == 0.0f);
   }
   const Gaussians model = reference::random_scene(100, 8, 0);
-  for (const auto& [w, h] : std::vector<std::pair<int, int>>{{1, 1}, {1, 70}, {70, 1}, {33, 2}}) {
-    CAPTURE(w);
-    CAPTURE(h);
-    check_against_reference(context, model, options, reference::cube_camera(w, h));
+  for (const auto& size : std::vector<std::pair<int, int>>{{1, 1}, {1, 70}, {70, 1}, {33, 2}}) {
+    CAPTURE(size.first);
+    CAPTURE(size.second);
+    check_against_reference(context, model, options,
+                            reference::cube_camera(size.first, size.second));
   }
   const Gaussians one = reference::random_scene(1, 9, 0);
   check_against_reference(context, one, options, reference::cube_camera(32, 32));
