@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <string>
 
@@ -24,9 +25,12 @@ Mesh transformed(const Mesh& mesh, const glm::dmat4& matrix);
 /// triangles, weighted by their angles there (Thuermer and Wuethrich 1998). Triangles share a
 /// normal at a vertex when they are connected around it by edges that bend by at most
 /// `crease_degrees`; vertices at equal positions count as one, so seams of texture coordinates do
-/// not show. Vertices on harder edges are split, the others keep their index. The mesh must have
-/// passed validate(). O(T log T).
-void add_smooth_normals(Mesh& mesh, double crease_degrees = 180.0);
+/// not show. Vertices on harder edges are split, the others keep their index. Angles and means are
+/// those of the mesh under `placement`, an invertible map that it will be put through later. The
+/// mesh must have passed validate(). O(T log T).
+void add_smooth_normals(Mesh& mesh,
+                        double crease_degrees = 180.0,
+                        const glm::dmat3& placement = glm::dmat3(1.0));
 
 /// Gives every vertex whose normal has no direction (zero length) the area-weighted mean normal of
 /// its triangles and makes the others unit vectors. Nothing happens without normals. O(V+T).

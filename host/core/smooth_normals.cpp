@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
 #include <map>
 #include <numbers>
@@ -90,13 +92,15 @@ std::vector<Edge> sorted_edges(const Mesh& mesh) {
   return edges;
 }
 
-/// Unit normals of the triangles (zero where there is no area) and the corners' angles.
+/// Outward unit normals of the placed triangles (zero where there is no area) and the corners'
+/// angles.
 struct Faces {
   std::vector<glm::dvec3> normals;
   std::vector<double> angles;
 };
 
-Faces measure(const Mesh& mesh) {
+Faces measure(const Mesh& mesh, const glm::dmat3& placement) {
+  const double side = glm::determinant(placement) < 0.0 ? -1.0 : 1.0;
   Faces faces;
   faces.normals.resize(mesh.triangle_count(), glm::dvec3(0.0));
   faces.angles.resize(mesh.triangles.size(), 0.0);
@@ -104,11 +108,11 @@ Faces measure(const Mesh& mesh) {
     std::array<glm::dvec3, 3> p;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t vertex = mesh.triangles[3 * triangle + k];
-      p[k] = {static_cast<double>(mesh.positions[3 * vertex]),
-              static_cast<double>(mesh.positions[3 * vertex + 1]),
-              static_cast<double>(mesh.positions[3 * vertex + 2])};
+      p[k] = placement * glm::dvec3(static_cast<double>(mesh.positions[3 * vertex]),
+                                    static_cast<double>(mesh.positions[3 * vertex + 1]),
+                                    static_cast<double>(mesh.positions[3 * vertex + 2]));
     }
-    const glm::dvec3 normal = glm::cross(p[1] - p[0], p[2] - p[0]);
+    const glm::dvec3 normal = side * glm::cross(p[1] - p[0], p[2] - p[0]);
     const double length = glm::length(normal);
     if (length > 0.0) faces.normals[triangle] = normal / length;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -122,8 +126,10 @@ Faces measure(const Mesh& mesh) {
 
 }  // namespace
 
-void add_smooth_normals(Mesh& mesh, double crease_degrees) {
-  const Faces faces = measure(mesh);
+void add_smooth_normals(Mesh& mesh, double crease_degrees, const glm::dmat3& placement) {
+  const Faces faces = measure(mesh, placement);
+  // A normal is placed by the inverse transpose, so the transpose takes it back.
+  const glm::dmat3 back = glm::transpose(placement);
   const std::vector<Edge> edges = sorted_edges(mesh);
   // The tolerance keeps an edge of exactly the crease angle smooth.
   const double least_cosine =
@@ -163,6 +169,7 @@ void add_smooth_normals(Mesh& mesh, double crease_degrees) {
       normal = faces.normals[corner / 3];
       set = corners + corner;
     }
+    normal = back * normal;
     const double length = glm::length(normal);
     normal = length > 0.0 ? normal / length : glm::dvec3(0.0, 0.0, 1.0);
     std::uint32_t vertex = mesh.triangles[corner];

@@ -120,9 +120,7 @@ void load_meshes(const SceneFile& file, LoadedScene& out) {
     if (entry.normals == SceneMesh::Normals::kFlat) mesh.normals.clear();
     if (entry.normals == SceneMesh::Normals::kSmooth) {
       // Edges are as sharp as they are in the world.
-      mesh = transformed(mesh, entry.transform);
-      add_smooth_normals(mesh, entry.crease_angle);
-      mesh = transformed(mesh, glm::inverse(entry.transform));
+      add_smooth_normals(mesh, entry.crease_angle, glm::dmat3(entry.transform));
     }
     out.still.push_back(std::move(mesh));
     out.placements.push_back(entry);

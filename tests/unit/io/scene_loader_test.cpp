@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <random>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -222,4 +225,98 @@ TEST_CASE("scene loader: environment, sizes and options") {
   file.width.reset();
   file.downscale = 4;
   CHECK(load_scene(file).cameras[0].width == 10);
+}
+
+TEST_CASE("scene loader: a smooth mesh can be turned, scaled and mirrored in every way") {
+  const Folder folder;
+  constexpr int kPlacements = 1000;
+  constexpr const char* kWedge =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  write_bytes(folder.scratch() / "wedge.obj", kWedge);
+  std::mt19937 random(7);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const auto factor = [&] {
+    return (uniform(0, 1) < 0.3 ? -1 : 1) * std::pow(10.0, uniform(-4, 4));
+  };
+  std::ostringstream text;
+  text.precision(17);
+  const auto place = [&](const std::string& scale, const std::string& rotate, double crease) {
+    text << "[[mesh]]\nfile = 'wedge.obj'\nnormals = 'smooth'\ncrease-angle = " << crease
+         << "\nscale = " << scale << "\nrotate = " << rotate << "\ntranslate = ["
+         << uniform(-50, 50) << ", " << uniform(-50, 50) << ", " << uniform(-50, 50) << "]\n";
+  };
+  const auto number = [](double value) {
+    std::ostringstream out;
+    out.precision(17);
+    out << value;
+    return out.str();
+  };
+  const auto triple = [&](const auto& next) {
+    std::string list = "[" + number(next()) + ", ";
+    list += number(next()) + ", ";
+    return list + number(next()) + "]";
+  };
+  place("0.004", "[0, 0, 180]", 180);
+  for (int i = 1; i < kPlacements; ++i) {
+    const std::string scale = i % 2 == 0 ? number(factor()) : triple(factor);
+    const std::string rotate =
+        i % 3 == 0   ? triple([&] { return 90.0 * std::floor(uniform(-4, 5)); })
+        : i % 3 == 1 ? triple([&] { return uniform(-360, 360); })
+                     : "{ axis = " + triple([&] { return uniform(-1, 1) + 0.001; }) +
+                           ", degrees = " + number(uniform(-720, 720)) + " }";
+    place(scale, rotate, i % 4 == 0 ? 60 : 180);
+  }
+  const LoadedScene loaded = folder.load(text.str() + kCamera);
+  REQUIRE(loaded.scene.meshes.size() == kPlacements);
+  double worst = 0.0;
+  int compared = 0;
+  for (std::size_t i = 0; i < loaded.scene.meshes.size(); ++i) {
+    const Mesh& placed = loaded.scene.meshes[i];
+    const glm::dmat4& transform = loaded.placements[i].transform;
+    REQUIRE(placed.normals.size() == placed.positions.size());
+    REQUIRE(placed.triangle_count() == 4);
+    // The mean of the unit normals of the placed faces, weighted by their angles, from the
+    // vertices of the file in double precision.
+    const std::vector<float>& corners = loaded.still[i].positions;
+    glm::dvec3 world[4];
+    glm::dvec3 middle(0.0);
+    for (int v = 0; v < 4; ++v) {
+      const std::size_t at = 3 * static_cast<std::size_t>(v);
+      world[v] = glm::dmat3(transform) * glm::dvec3(corners[at], corners[at + 1], corners[at + 2]);
+      middle += 0.25 * world[v];
+    }
+    // Split vertices have other means: at creases, and where normals of a sliver cancel out.
+    if (placed.vertex_count() != 4) continue;
+    for (int v = 0; v < 4; ++v) {
+      glm::dvec3 expected(0.0);
+      double weight = 0.0;
+      for (int skipped = 0; skipped < 4; ++skipped) {
+        if (skipped == v) continue;
+        std::vector<glm::dvec3> others;
+        for (int w = 0; w < 4; ++w) {
+          if (w != v && w != skipped) others.push_back(world[w] - world[v]);
+        }
+        glm::dvec3 normal = glm::cross(others[0], others[1]);
+        const double angle = std::atan2(glm::length(normal), glm::dot(others[0], others[1]));
+        normal = glm::normalize(normal);
+        if (glm::dot(normal, world[v] - middle) < 0.0) normal = -normal;
+        expected += angle * normal;
+        weight += angle;
+      }
+      // Where normals nearly cancel out, rounding decides.
+      if (glm::length(expected) < 0.01 * weight) continue;
+      ++compared;
+      expected = glm::normalize(expected);
+      glm::dvec3 actual;
+      for (int c = 0; c < 3; ++c) {
+        actual[c] = placed.normals[3 * static_cast<std::size_t>(v) + static_cast<std::size_t>(c)];
+      }
+      worst = std::max(worst, glm::length(actual - expected));
+    }
+  }
+  MESSAGE("largest difference of a normal: ", worst);
+  CHECK(worst < 1e-5);
+  CHECK(compared > 2 * kPlacements);
 }
