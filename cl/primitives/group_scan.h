@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exclusive prefix sum over one work-group (Hillis and Steele 1986, log2(RS_GROUP) steps). Every
+// Exclusive prefix sum over one work-group, which stops at 2^32 - 1 (Hillis and Steele 1986, log2(RS_GROUP) steps). Every
 // work-item of the group must call it; RS_GROUP is a power of two and `scratch` holds RS_GROUP
 // elements.
 #ifndef RS_PRIMITIVES_GROUP_SCAN_H
@@ -17,13 +17,13 @@ inline uint group_scan(uint value, __local uint* scratch, uint* total) {
   for (uint step = 1; step < RS_GROUP; step <<= 1) {
     const uint before = lane >= step ? scratch[lane - step] : 0;
     barrier(CLK_LOCAL_MEM_FENCE);
-    scratch[lane] += before;
+    scratch[lane] = add_sat(scratch[lane], before);
     barrier(CLK_LOCAL_MEM_FENCE);
   }
-  const uint inclusive = scratch[lane];
+  const uint exclusive = lane > 0 ? scratch[lane - 1] : 0;
   *total = scratch[RS_GROUP - 1];
   barrier(CLK_LOCAL_MEM_FENCE);  // scratch may be written again
-  return inclusive - value;
+  return exclusive;
 }
 #endif
 

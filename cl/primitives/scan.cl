@@ -2,7 +2,8 @@
 // Exclusive prefix sum, reduce-then-scan (Merrill and Grimshaw 2009): sum_chunks, scan_values over
 // the sums with one group, scan_values over the values. Launch: work-groups of RS_GROUP work-items
 // (a power of two), each walks `chunk` consecutive elements. RS_GROUP = 1 is the CPU's form: few
-// long sequential loops. Reads 2 n and writes n elements.
+// long sequential loops. Sums stop at 2^32 - 1, so that a caller can tell. Reads 2 n and writes n
+// elements.
 #include "primitives/group_scan.h"
 
 // sums[g] = sum of the elements of group g's chunk.
@@ -11,7 +12,7 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void sum_chunks(
   const uint begin = min((uint)get_group_id(0) * chunk, count);
   const uint end = min(begin + chunk, count);
   uint sum = 0;
-  for (uint i = begin + get_local_id(0); i < end; i += RS_GROUP) sum += values[i];
+  for (uint i = begin + get_local_id(0); i < end; i += RS_GROUP) sum = add_sat(sum, values[i]);
 #if RS_GROUP > 1
   __local uint scratch[RS_GROUP];
   uint total;
@@ -36,14 +37,14 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scan_values(
     const uint i = base + lane;
     uint total;
     const uint before = group_scan(i < end ? values[i] : 0, scratch, &total);
-    if (i < end) values[i] = running + before;
-    running += total;
+    if (i < end) values[i] = add_sat(running, before);
+    running = add_sat(running, total);
   }
 #else
   for (uint i = begin; i < end; ++i) {
     const uint value = values[i];
     values[i] = running;
-    running += value;
+    running = add_sat(running, value);
   }
 #endif
   if (group == get_num_groups(0) - 1 && get_local_id(0) == 0) values[count] = running;

@@ -3,8 +3,8 @@
 // traces BLOCK x BLOCK packets of PACKET rays (packet.h), one after the other; the packets of a
 // tile share its candidate list, sorted by a lower bound of the depth: what lies before the next
 // candidate's bound can be blended.
-//   global size: blocks in x, rows of blocks in the band; local: the blocks of a tile (any size is
-//   correct)
+//   global size: blocks in x and y from the window's first tile on; local: the blocks of a tile
+//   (any size is correct)
 // Cost follows the candidates of the tile that meet the packets. Rows of Gaussians are blended
 // without sorting (packet_rows.h); packets beyond its limits start again with sorted lists
 // (packet_sorted.h), which have none.
@@ -15,12 +15,14 @@
 #define KEEP_HITS 0
 #endif
 
+#include "primitives/counter.h"
 #include "trace/candidates.h"
 #include "trace/hit_stream.h"
 #include "trace/packet_rows.h"
 #include "trace/packet_sorted.h"
 #include "trace/packet_state.h"
 
+// counters: chunks wanted, rays that stopped at max_hits, hits (two words).
 __kernel void trace_forward(__global const RsLine* restrict lines,
                             __global const uint* restrict references,
                             __global const float* restrict boxes,
@@ -28,8 +30,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
                             __global const float2* restrict limits,
                             __global const uint* restrict offsets,
                             const RsCamera camera_argument,
-                            const uint tiles_x,
-                            const uint tile_row,
+                            const int4 window,
                             const float min_transmittance,
                             const int max_hits,
                             const float4 background,
@@ -42,11 +43,14 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
                             const uint pool_capacity,
                             volatile __global uint* restrict counters) {
   const RsCamera camera = camera_argument;
-  const int block_x = get_global_id(0) * (BLOCK * PACKET_WIDTH);
-  const int band_y = get_global_id(1) * (BLOCK * PACKET_HEIGHT);
-  const int block_y = band_y + tile_row * TILE;
+  const int window_x = get_global_id(0) * (BLOCK * PACKET_WIDTH);
+  const int window_y = get_global_id(1) * (BLOCK * PACKET_HEIGHT);
+  const int block_x = window_x + window.x * TILE;
+  const int block_y = window_y + window.y * TILE;
+  const int column = window_x / TILE, row = window_y / TILE;
+  if (column >= window.z || row >= window.w) return;
   if (block_x >= camera.width || block_y >= camera.height) return;
-  const uint tile = band_y / TILE * tiles_x + block_x / TILE;
+  const uint tile = row * window.z + column;
 
   BlockCandidates block;
   block_candidates_init(&block, boxes, stride, offsets[tile], offsets[tile + 1]);
@@ -114,5 +118,5 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
     hits += (uint)rs_lane_sum(rs_to_float(p.hits));
   }
   if (capped_rays != 0) atomic_add(counters + 1, capped_rays);
-  atomic_add(counters + 2, hits);
+  rs_count(counters + 2, hits);
 }

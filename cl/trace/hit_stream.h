@@ -19,6 +19,8 @@
 #define WINDOW 128
 #endif
 #define RS_NO_CHUNK 0xffffffffu
+// Demand is not counted beyond this: the cursor must not come round to chunks that are taken.
+#define RS_MOST_CHUNKS 0x80000000u
 #define RS_NO_ROW 0xffffffffu
 
 typedef struct {
@@ -34,7 +36,8 @@ typedef struct {
 // the host retries with less work or more memory.
 uint stream_push(HitStream* stream, uint reference, uint window) {
   if (stream->chunk == RS_NO_CHUNK || stream->used == CHUNK) {
-    const uint next = atomic_inc(stream->cursor);
+    const uint next =
+        *stream->cursor < RS_MOST_CHUNKS ? atomic_inc(stream->cursor) : RS_MOST_CHUNKS;
     if (next < stream->capacity) stream->pool[(size_t)next * CHUNK] = (uint2)(stream->chunk, 0);
     stream->chunk = next;
     stream->used = 1;

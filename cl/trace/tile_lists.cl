@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Candidate lists of image tiles: the Gaussians whose exact outline meets a tile, by least depth.
-//   count_tiles        counts[i] = tiles of the band that Gaussian i meets
+//   count_tiles        counts[i] = tiles of the window that Gaussian i meets
 //   fill_tiles         key = tile << 16 | quantised least depth, value = Gaussian << 1 | general
 //                      form, written at offsets[i]
 //   gather_candidates  list records in sorted order, first candidate per tile   global: candidates
@@ -8,7 +8,8 @@
 // begin is a multiple of VECTOR. Cost is O(Gaussians + candidates). An outline that the camera
 // plane makes unbounded is replaced by the box of the ellipsoid against the planes of the tile.
 // Quantised depths order the list and are a lower bound of the depth of this and every later hit of
-// the list, which is what the exact order of rays rests on.
+// the list, which is what the exact order of rays rests on. A window is a rectangle of tiles: first
+// column, first row, columns, rows; its tiles are numbered row by row.
 #include "primitives/prefetch.h"
 #include "shared/layout.h"
 #include "trace/gaussian_lanes.h"
@@ -49,21 +50,24 @@ gi last_tile(const gv pixel) { return round_down((pixel - 0.5f + RS_TILE_SLACK) 
 
 gi lesser(const gi a, const int b) { return a < b ? a : (gi)(b); }
 gi greater(const gi a, const int b) { return a > b ? a : (gi)(b); }
-// Pixels far outside would overflow integers.
-gv within_reach(const gv pixel) { return smaller(larger(pixel, (gv)(-1e6f)), (gv)(1e6f)); }
+// Pixels far outside would overflow integers; the largest picture has 2^20 a side.
+gv within_reach(const gv pixel) {
+  return smaller(larger(pixel, (gv)(-2097152.0f)), (gv)(2097152.0f));
+}
 
-// Of Gaussians with bounds b, in the tile rows [row, row + rows). Returns the lanes with an empty
-// range.
+// Of Gaussians with bounds b, in the window. Returns the lanes with an empty range.
 gi tile_ranges(
-    const gv* b, const RsCamera* camera, const int row, const int rows, TileRanges* range) {
+    const gv* b, const RsCamera* camera, const int4 window, TileRanges* range) {
   const gv x0 = within_reach(b[RS_BOUNDS_X0] * camera->fx + camera->cx);
   const gv x1 = within_reach(b[RS_BOUNDS_X1] * camera->fx + camera->cx);
   const gv y0 = within_reach(b[RS_BOUNDS_Y0] * camera->fy + camera->cy);
   const gv y1 = within_reach(b[RS_BOUNDS_Y1] * camera->fy + camera->cy);
-  range->x0.v = greater(first_tile(x0), 0);
-  range->y0.v = greater(first_tile(y0), row);
-  range->x1.v = lesser(last_tile(x1), (camera->width - 1) / TILE);
-  range->y1.v = lesser(last_tile(y1), min(row + rows, (camera->height + TILE - 1) / TILE) - 1);
+  range->x0.v = greater(first_tile(x0), window.x);
+  range->y0.v = greater(first_tile(y0), window.y);
+  range->x1.v =
+      lesser(last_tile(x1), min(window.x + window.z, (camera->width + TILE - 1) / TILE) - 1);
+  range->y1.v =
+      lesser(last_tile(y1), min(window.y + window.w, (camera->height + TILE - 1) / TILE) - 1);
   const gi kind = RS_AS_INT(b[RS_BOUNDS_KIND]);
   return (kind == RS_LINE_HIDDEN) | (x0 > camera->width - 0.5f + RS_TILE_SLACK) |
          (y0 > camera->height - 0.5f + RS_TILE_SLACK) | (range->x1.v < range->x0.v) |
@@ -115,8 +119,7 @@ __kernel void count_tiles(const uint begin,
                           __global const RsViewBounds* restrict bounds,
                           __global const RsAabb* restrict boxes,
                           const RsCamera camera_argument,
-                          const int row,
-                          const int rows,
+                          const int4 window,
                           __global uint* restrict counts) {
   const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
   if (i >= end) return;
@@ -124,7 +127,7 @@ __kernel void count_tiles(const uint begin,
   gv b[8];
   load_records8((__global const float*)(bounds + i), b);
   TileRanges range;
-  const gi empty = tile_ranges(b, &camera, row, rows, &range);
+  const gi empty = tile_ranges(b, &camera, window, &range);
   IntLanes found;
   found.v = (range.x1.v - range.x0.v + 1) * (range.y1.v - range.y0.v + 1);
   found.v = empty ? (gi)(0) : found.v;
@@ -204,8 +207,7 @@ __kernel void fill_tiles(const uint begin,
                          __global const RsAabb* restrict boxes,
                          __global const RsLine* restrict lines,
                          const RsCamera camera_argument,
-                         const int row,
-                         const int rows,
+                         const int4 window,
                          __global const uint* restrict offsets,
                          __global uint* restrict keys,
                          __global uint* restrict values) {
@@ -215,14 +217,13 @@ __kernel void fill_tiles(const uint begin,
   gv b[8];
   load_records8((__global const float*)(bounds + i), b);
   TileRanges range;
-  const gi empty = tile_ranges(b, &camera, row, rows, &range);
+  const gi empty = tile_ranges(b, &camera, window, &range);
   DepthPlanes planes;
   depth_planes(b, lines + i, &planes);
   IntLanes general, unbounded;
   general.v = RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_GENERAL;
   unbounded.v = b[RS_BOUNDS_X0] == -INFINITY;
   const gv zero = (gv)(0.0f);
-  const int tiles_x = (camera.width + TILE - 1) / TILE;
   const float size_x = TILE / camera.fx, size_y = TILE / camera.fy;
   const float centre_x = camera.cx / camera.fx, centre_y = camera.cy / camera.fy;
   uint cursor[VECTOR];
@@ -236,7 +237,7 @@ __kernel void fill_tiles(const uint begin,
         most_along(planes.slope_y, y.v, size_y, centre_y, planes.mean_y, planes.most_y) +
         most_along(planes.slope_x, x.v, size_x, centre_x, planes.mean_x, planes.most_x);
     const gv plane = ((along > 0.0f) & (planes.limit > 0.0f)) ? planes.limit / along : zero;
-    key.v = ((y.v - row) * tiles_x + x.v) << 16 | depth_key(larger(plane, planes.depth));
+    key.v = ((y.v - window.y) * window.z + (x.v - window.x)) << 16 | depth_key(larger(plane, planes.depth));
     for (int lane = 0; lane < VECTOR; ++lane) {
       if (left.s[lane] == 0) continue;
       if (unbounded.s[lane] && box_outside(&camera, x.s[lane], y.s[lane], boxes + i + lane))

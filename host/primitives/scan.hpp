@@ -17,9 +17,11 @@ class Scan {
   /// With an explicit division of the work; the result is the same for every shape.
   Scan(Context& context, const ChunkShape& shape);
 
+  static constexpr std::uint32_t kMost = 0xffffffffu;
+
   /// values[i] becomes the sum of values[0..i) for i < count; values[count] becomes the total, so
-  /// the buffer must hold count + 1 elements (UsageError when it does not). The sum must stay below
-  /// 2^32. In place; scratch is kept between calls.
+  /// the buffer must hold count + 1 elements (UsageError when it does not). Sums stop at kMost: a
+  /// total of kMost is one that may not fit. In place; scratch is kept between calls.
   void exclusive(Buffer<std::uint32_t>& values, std::size_t count);
 
  private:

@@ -42,21 +42,28 @@ struct CameraTracer::Impl {
         lists(context_in, packet.tile),
         forward_budget(options_in.launch_budget_ms, context_in.device().type),
         backward_budget(forward_budget),
-        counters(context_in, 3, "trace counters"),
+        counters(context_in, 4, "trace counters"),
         sums(context_in, "line gradients") {}
 
   void trace_rows(const DeviceGaussians& gaussians,
                   std::uint32_t row,
                   std::uint32_t rows,
                   bool keep);
-  void launch_forward(std::uint32_t row, std::uint32_t rows, bool keep);
+  void trace_window(const DeviceGaussians& gaussians, const TileWindow& window, bool keep);
+  void launch_forward(const TileWindow& window, bool keep);
   void launch_backward(const Buffer<float>& image_gradient, std::uint32_t row, std::uint32_t rows);
   void backward_rows(const DeviceGaussians& gaussians,
                      const Buffer<float>& image_gradient,
                      std::uint32_t row,
                      std::uint32_t rows);
   void finalize(const DeviceGaussians& gaussians, GaussianGradients& gradients, bool pose);
-  Range packet_range(const Kernel& kernel, int block, std::uint32_t row, std::uint32_t rows) const;
+  Range packet_range(const Kernel& kernel,
+                     int block,
+                     std::uint32_t columns,
+                     std::uint32_t row,
+                     std::uint32_t rows) const;
+  Statistics count_statistics() const;
+  std::size_t chunks_wanted();
   void grow_pool(std::size_t chunks);
   Kernel& forward_kernel(bool keep);
   float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
@@ -95,7 +102,7 @@ struct CameraTracer::Impl {
   Buffer<Stream> stream_ends;
   Buffer<Stream> pool;
   Buffer<float> pool_transmittance;
-  Buffer<std::uint32_t> counters;  // chunks wanted, capped rays, hits
+  Buffer<std::uint32_t> counters;  // chunks wanted, capped rays, hits (two words)
   std::uint64_t candidates = 0;
   Statistics saved;
   bool statistics_saved = false;
@@ -150,7 +157,7 @@ void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camer
   self.lists.prepare(gaussians, self.camera, self.options);
   self.trace_rows(gaussians, 0, self.lists.tile_rows(), keep_hits);
   if (!keep_hits) return;
-  const std::size_t wanted = self.counters.read(0);
+  const std::size_t wanted = self.chunks_wanted();
   self.hits_complete = wanted <= self.pool_capacity();
   if (self.hits_complete) return;
   self.grow_pool(wanted);
@@ -158,22 +165,29 @@ void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camer
   self.counters.clear();
   self.candidates = 0;
   self.trace_rows(gaussians, 0, self.lists.tile_rows(), true);
-  self.hits_complete = self.counters.read(0) <= self.pool_capacity();
+  self.hits_complete = self.chunks_wanted() <= self.pool_capacity();
 }
 
-// Splits the rows until the candidate lists of each part fit their share of the budget.
 void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
                                     std::uint32_t row,
                                     std::uint32_t rows,
                                     bool keep) {
-  if (rows > lists.max_rows() ||
-      !lists.build(boxes, camera, row, rows, options.memory_budget / 4)) {
-    trace_rows(gaussians, row, rows / 2, keep);
-    trace_rows(gaussians, row + rows / 2, rows - rows / 2, keep);
+  trace_window(gaussians,
+               {0, static_cast<std::int32_t>(row), static_cast<std::int32_t>(lists.tiles_x()),
+                static_cast<std::int32_t>(rows)},
+               keep);
+}
+
+// Splits the window until the candidate lists of each part fit their share of the budget.
+void CameraTracer::Impl::trace_window(const DeviceGaussians& gaussians,
+                                      const TileWindow& window,
+                                      bool keep) {
+  if (!lists.build(boxes, camera, window, options.memory_budget / 4)) {
+    for (const TileWindow& half : window.halves()) trace_window(gaussians, half, keep);
     return;
   }
   candidates += lists.candidates();
-  launch_forward(row, rows, keep);
+  launch_forward(window, keep);
 }
 
 Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
@@ -198,10 +212,11 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
   return kernel;
 }
 
-// Rows [row, row + rows) of tiles, counted from the first row of the candidate lists or the image;
-// a work-item for every block x block packets.
+// Rows [row, row + rows) of `columns` tiles, counted from the first tile of the candidate lists or
+// the image; a work-item for every block x block packets.
 Range CameraTracer::Impl::packet_range(const Kernel& kernel,
                                        int block,
+                                       std::uint32_t columns,
                                        std::uint32_t row,
                                        std::uint32_t rows) const {
   PacketShape item = packet;
@@ -209,8 +224,10 @@ Range CameraTracer::Impl::packet_range(const Kernel& kernel,
   item.height *= block;
   const auto group = packet_group(item, kernel.max_work_group_size());
   const auto tile = static_cast<std::size_t>(item.tile / item.height);
-  Range range = Range::plane(static_cast<std::size_t>((camera.width + item.width - 1) / item.width),
-                             rows * tile, group[0], group[1]);
+  const std::size_t across =
+      std::min(columns * static_cast<std::size_t>(item.tile / item.width),
+               static_cast<std::size_t>((camera.width + item.width - 1) / item.width));
+  Range range = Range::plane(across, rows * tile, group[0], group[1]);
   range.offset[1] = row * tile;
   return range;
 }
@@ -232,16 +249,31 @@ void in_bands(Context& context, LaunchBudget& budget, std::uint32_t rows, const 
   }
 }
 
-void CameraTracer::Impl::launch_forward(std::uint32_t row, std::uint32_t rows, bool keep) {
+void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
   Kernel& kernel = forward_kernel(keep);
+  const auto rows = static_cast<std::uint32_t>(window.rows);
+  const auto columns = static_cast<std::uint32_t>(window.columns);
   in_bands(context, forward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    kernel.launch(packet_range(kernel, packet.block, first, number), lists.lines(),
+    kernel.launch(packet_range(kernel, packet.block, columns, first, number), lists.lines(),
                   lists.references(), lists.boxes(), lists.box_stride(), lists.limits(),
-                  lists.offsets(), camera, lists.tiles_x(), row, options.min_transmittance,
-                  options.max_hits, background_of(options), image, depth, transmittances,
-                  stream_ends, pool, pool_transmittance,
-                  static_cast<std::uint32_t>(keep ? pool_capacity() : 0), counters);
+                  lists.offsets(), camera, window, options.min_transmittance, options.max_hits,
+                  background_of(options), image, depth, transmittances, stream_ends, pool,
+                  pool_transmittance, static_cast<std::uint32_t>(keep ? pool_capacity() : 0),
+                  counters);
   });
+}
+
+CameraTracer::Statistics CameraTracer::Impl::count_statistics() const {
+  const std::vector<std::uint32_t> words = counters.download();
+  const std::uint64_t hits = std::uint64_t{words[3]} << 32 | words[2];
+  return {words[1], candidates, hits, words[0] * chunk_bytes()};
+}
+
+// Of the pass just enqueued, whose statistics stay: waits for the device.
+std::size_t CameraTracer::Impl::chunks_wanted() {
+  saved = count_statistics();
+  statistics_saved = true;
+  return saved.stream_bytes / chunk_bytes();
 }
 
 void CameraTracer::Impl::grow_pool(std::size_t chunks) {
@@ -261,7 +293,7 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   const float limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet.lanes));
   const bool shared = !sums.is_private();
   in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    const Range range = shared ? packet_range(kernel, 1, first, number)
+    const Range range = shared ? packet_range(kernel, 1, lists.tiles_x(), first, number)
                                : Range{{sums.copies(), 1, 1}, {1, 1, 1}, {}};
     // Shared sums find their rows by the offset of the launch.
     kernel.launch(range, static_cast<std::uint32_t>(count),
@@ -328,8 +360,6 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
     throw UsageError(
         "CameraTracer::backward() must follow forward(keep_hits = true) of the same Gaussians");
   }
-  self.saved = statistics();
-  self.statistics_saved = true;
   self.sums.prepare(GradientSumChoice::of(self.options, self.context.device(), gaussians.count,
                                           self.options.memory_budget / 4, kCopiesPerUnit),
                     gaussians.count);
@@ -366,9 +396,7 @@ CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& ga
 }
 
 CameraTracer::Statistics CameraTracer::statistics() const {
-  if (impl_->statistics_saved) return impl_->saved;
-  const std::vector<std::uint32_t> counters = impl_->counters.download();
-  return {counters[1], impl_->candidates, counters[2], counters[0] * impl_->chunk_bytes()};
+  return impl_->statistics_saved ? impl_->saved : impl_->count_statistics();
 }
 
 namespace {

@@ -58,6 +58,7 @@ class CameraTracer {
   /// After backward(): the gradient for the pose of the view.
   PoseGradient pose_gradient(const DeviceGaussians& gaussians);
 
+  /// Of the last forward(); waits for the device unless that one kept its hits.
   Statistics statistics() const;
   TraceOptions& options();
 

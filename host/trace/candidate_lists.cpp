@@ -21,6 +21,10 @@ constexpr std::size_t kBytesPerCandidate =
     2 * 2 * 4 + 4 * 4 + 8;  // keys and values twice (sort), box, limits
 constexpr std::size_t kGatherGroup = 64;
 constexpr int kMaxSide = 1 << 20;
+// Tile numbers have 16 bits.
+constexpr std::size_t kMaxTiles = 65535;
+// What the sort takes; a sum that does not fit 32 bits reads as Scan::kMost, which is more.
+constexpr std::size_t kMaxCandidates = (std::size_t{1} << 31) - 1;
 
 std::size_t with_headroom(std::size_t count) { return count + count / 4 + 1024; }
 
@@ -71,6 +75,21 @@ RsCamera device_camera(const Camera& camera, float near_depth) {
   out.near_depth = near_depth;
   check_camera(camera, out);
   return out;
+}
+
+std::array<TileWindow, 2> TileWindow::halves() const {
+  TileWindow first = *this;
+  TileWindow second = *this;
+  if (rows > 1) {
+    first.rows = rows / 2;
+    second.row += first.rows;
+    second.rows -= first.rows;
+  } else {
+    first.columns = columns / 2;
+    second.column += first.columns;
+    second.columns -= first.columns;
+  }
+  return {first, second};
 }
 
 CandidateLists::CandidateLists(Context& context, int tile_size)
@@ -125,22 +144,21 @@ void CandidateLists::prepare(const DeviceGaussians& gaussians,
 
 bool CandidateLists::build(const Buffer<RsAabb>& boxes,
                            const RsCamera& camera,
-                           std::uint32_t row,
-                           std::uint32_t rows,
+                           const TileWindow& window,
                            std::size_t budget) {
-  const std::uint32_t tiles = tiles_x_ * rows;
+  if (window.tiles() > kMaxTiles) return false;
+  const auto tiles = static_cast<std::uint32_t>(window.tiles());
   tile_offsets_.ensure(*context_, tiles + 1, "tile offsets");
   offsets_.ensure(*context_, count_ + 1, "candidate offsets");
   candidates_ = 0;
   if (count_ > 0) {
-    count_kernel_.launch(count_, bounds_, boxes, camera, static_cast<std::int32_t>(row),
-                         static_cast<std::int32_t>(rows), offsets_);
+    count_kernel_.launch(count_, bounds_, boxes, camera, window, offsets_);
     scan_.exclusive(offsets_, count_);
     candidates_ = offsets_.read(count_);
   }
-  const std::size_t allowed =
-      std::min<std::size_t>(budget / kBytesPerCandidate, context_->device().max_allocation / 16);
-  if (candidates_ > allowed && rows > 1) return false;
+  const std::size_t allowed = std::min<std::size_t>(
+      {budget / kBytesPerCandidate, context_->device().max_allocation / 16, kMaxCandidates});
+  if (candidates_ > allowed && tiles > 1) return false;
   stride_ = static_cast<std::uint32_t>(candidates_ + kBoxPadding);
   if (keys_.size() < candidates_ || keys_.size() == 0) {
     const std::size_t room = std::min(with_headroom(candidates_), std::max(allowed, candidates_));
@@ -153,8 +171,7 @@ bool CandidateLists::build(const Buffer<RsAabb>& boxes,
     tile_offsets_.clear();
     return true;
   }
-  fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, static_cast<std::int32_t>(row),
-                      static_cast<std::int32_t>(rows), offsets_, keys_, values_);
+  fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, keys_, values_);
   sort_.sort(keys_, values_, candidates_, 16 + std::bit_width(tiles - 1));
   gather_kernel_.launch(Range::linear(candidates_, kGatherGroup),
                         static_cast<std::uint32_t>(candidates_), stride_, tiles, keys_, values_,

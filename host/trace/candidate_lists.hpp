@@ -20,6 +20,20 @@ namespace raysplats {
 /// The record of a camera that kernels read.
 RsCamera device_camera(const Camera& camera, float near_depth);
 
+/// A rectangle of tiles, as kernels take it.
+struct TileWindow {
+  std::int32_t column = 0;  ///< of the first tile
+  std::int32_t row = 0;
+  std::int32_t columns = 0;
+  std::int32_t rows = 0;
+
+  std::size_t tiles() const {
+    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  }
+  /// Its rows, or where there is one its columns, in two parts. It must have more than one tile.
+  std::array<TileWindow, 2> halves() const;
+};
+
 /// What the tiles of one view may hit: the line of every visible Gaussian and, per tile, the list
 /// of candidates whose outline meets the tile, sorted by a lower bound of the hit depth.
 class CandidateLists {
@@ -31,19 +45,16 @@ class CandidateLists {
                const RsCamera& camera,
                const TraceOptions& options);
 
-  /// Lists of the tile rows [row, row + rows). `boxes` are the world boxes of the confidence
-  /// ellipsoids, for those that the camera plane cuts. Returns false, having made nothing, when
-  /// they would take more than `budget` bytes and there is more than one row.
+  /// Lists of the tiles of a window. `boxes` are the world boxes of the confidence ellipsoids, for
+  /// those that the camera plane cuts. Returns false, having made nothing, when there is more than
+  /// one tile and they would take more than `budget` bytes or are more than can be numbered.
   bool build(const Buffer<RsAabb>& boxes,
              const RsCamera& camera,
-             std::uint32_t row,
-             std::uint32_t rows,
+             const TileWindow& window,
              std::size_t budget);
 
   std::uint32_t tiles_x() const { return tiles_x_; }
   std::uint32_t tile_rows() const { return tile_rows_; }
-  /// Most tile rows one build() accepts: tile numbers are 16 bits wide.
-  std::uint32_t max_rows() const { return 65535u / tiles_x_; }
   std::size_t candidates() const { return candidates_; }
 
   const Buffer<RsLine>& lines() const { return lines_; }

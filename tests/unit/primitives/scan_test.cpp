@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "base/rng.hpp"
@@ -61,6 +62,26 @@ TEST_CASE("scan: few elements in both forms [small] [tiny]") {
       CAPTURE(groups);
       Scan scan(context, ChunkShape{groups, size, 1});
       for (const std::size_t count : {0u, 1u, 5u, 64u, 131u}) check_scan(context, scan, count, 8);
+    }
+  }
+}
+
+TEST_CASE("scan: sums past 32 bits stop at the largest number in every shape [small]") {
+  Context context(select_device(""));
+  for (const std::size_t size : {1u, 2u, 16u}) {
+    for (const std::size_t groups : {1u, 3u, 300u}) {
+      CAPTURE(size);
+      CAPTURE(groups);
+      Scan scan(context, ChunkShape{groups, size, 1});
+      constexpr std::size_t kCount = 70;
+      const std::vector<std::uint32_t> input(kCount + 1, 100000001u);
+      Buffer<std::uint32_t> buffer(context, input.size(), "scan test");
+      buffer.upload(input);
+      scan.exclusive(buffer, kCount);
+      const std::vector<std::uint32_t> output = buffer.download();
+      for (std::uint64_t i = 0; i <= kCount; ++i) {
+        CHECK(output[i] == std::min<std::uint64_t>(i * 100000001u, Scan::kMost));
+      }
     }
   }
 }

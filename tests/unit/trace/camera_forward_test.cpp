@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <array>
+#include <glm/matrix.hpp>
+
 #include "raysplats/error.hpp"
+#include "trace/candidate_lists.hpp"
 #include "trace_fixture.hpp"
 
 using namespace raysplats;
@@ -313,4 +317,91 @@ TEST_CASE("bands of tile rows give the same image as the whole") {
   options.memory_budget = 20000;
   const Image banded = trace_image(context, model, options, camera);
   CHECK(whole.data == banded.data);
+}
+
+TEST_CASE("tiles of a row whose lists are too long are traced apart") {
+  Context context = make_test_context();
+  // 1500 faint Gaussians over the whole of a picture of one row of tiles.
+  Gaussians model = reference::random_scene(1500, 16, 0);
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) model.log_scales[3 * i + k] = std::log(0.8f);
+    model.opacities[i] = -5.0f;
+  }
+  const Camera camera = reference::cube_camera(200, 20);
+  TraceOptions options;
+  options.max_hits = 10000;
+  for (const int lanes : {1, 8, 16}) {
+    CAPTURE(lanes);
+    options.packet_width = lanes;
+    options.memory_budget = std::size_t{1} << 30;
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+    CameraTracer whole(context, options);
+    whole.update(gaussians);
+    whole.forward(gaussians, camera);
+    options.memory_budget = 1000;
+    CameraTracer parts(context, options);
+    parts.update(gaussians);
+    parts.forward(gaussians, camera);
+    CHECK(whole.download_image().data == parts.download_image().data);
+    CHECK(whole.statistics().candidates == parts.statistics().candidates);
+    CHECK(whole.statistics().hits == parts.statistics().hits);
+  }
+}
+
+TEST_CASE("lists that 32 bits cannot count are refused before anything is written") {
+  Context context = make_test_context();
+  // Every Gaussian meets every tile of one pixel: 65800 x 65280 = 2^32 + 456704.
+  constexpr std::size_t kCount = 65800;
+  Gaussians model = reference::random_scene(kCount, 17, 0);
+  for (std::size_t i = 0; i < kCount; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      model.means[3 * i + k] = 0.0f;
+      model.log_scales[3 * i + k] = 0.0f;
+    }
+  }
+  Camera camera = reference::cube_camera(256, 255);
+  camera.fx = camera.fy = 2000.0;
+  const TraceOptions options;
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const Buffer<RsAabb> boxes(context, kCount, "boxes");
+  const RsCamera converted = device_camera(camera, 0.0f);
+  CandidateLists lists(context, 1);
+  lists.prepare(gaussians, converted, options);
+  CHECK_FALSE(lists.build(boxes, converted, {0, 0, 256, 255}, std::size_t{1} << 30));
+  CHECK(lists.candidates() == Scan::kMost);
+  REQUIRE(lists.build(boxes, converted, {200, 7, 3, 2}, std::size_t{1} << 30));
+  CHECK(lists.candidates() == 6 * kCount);
+}
+
+TEST_CASE("pictures as wide as can be are traced to their last pixel") {
+  Context context = make_test_context();
+  DeviceTuning tuning;
+  tuning.packet_width = 4;
+  tuning.tile = 16;
+  context.set_tuning(tuning);
+  Gaussians model = reference::random_scene(3, 18, 0);
+  constexpr int kWidth = 1 << 20;
+  Camera camera = reference::cube_camera(kWidth, 1);
+  camera.fx = camera.fy = 2e5;
+  // In the first, a middle and the last columns.
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const double pixel = std::array<double, 3>{40.0, 600000.0, kWidth - 40.0}[i];
+    const glm::dvec3 seen{5.0 * (pixel - camera.cx) / camera.fx, 0.0, 5.0};
+    const glm::dvec3 mean = camera.center() + glm::transpose(camera.rotation) * seen;
+    for (int k = 0; k < 3; ++k) {
+      model.means[3 * i + static_cast<std::size_t>(k)] = static_cast<float>(mean[k]);
+      model.log_scales[3 * i + static_cast<std::size_t>(k)] = std::log(1e-3f);
+    }
+    model.opacities[i] = 4.0f;
+  }
+  const Image image = trace_image(context, model, {}, camera);
+  for (const int pixel : {40, 600000, kWidth - 40}) {
+    CAPTURE(pixel);
+    CHECK(image.data[4 * static_cast<std::size_t>(pixel) + 3] > 0.5f);
+  }
+  for (const int pixel : {4000, 1000000, kWidth - 4000}) {
+    CAPTURE(pixel);
+    CHECK(image.data[4 * static_cast<std::size_t>(pixel) + 3] == 0.0f);
+  }
 }
