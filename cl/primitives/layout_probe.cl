@@ -48,6 +48,15 @@ __kernel void layout_probe(__global uint* layout) {
   RS_FIELD(RsCamera, near_depth);
   RS_FIELD(RsCamera, padding);
 
+  RS_PUT(sizeof(RsFootprintView));
+  RS_FIELD(RsFootprintView, rotation);
+  RS_FIELD(RsFootprintView, center);
+  RS_FIELD(RsFootprintView, low);
+  RS_FIELD(RsFootprintView, high);
+  RS_FIELD(RsFootprintView, spacing);
+  RS_FIELD(RsFootprintView, kind);
+  RS_FIELD(RsFootprintView, padding);
+
   RS_PUT(sizeof(RsLensCamera));
   RS_FIELD(RsLensCamera, rotation);
   RS_FIELD(RsLensCamera, center);

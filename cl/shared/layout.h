@@ -62,6 +62,22 @@ typedef struct {
 } RsCamera;
 RS_STATIC_ASSERT_SIZE(RsCamera, 80);
 
+// What decides how large a pixel of one view is at a point.
+typedef struct {
+  rs_float rotation[9];  // world to camera, row-major
+  rs_float center[3];    // world
+  rs_float low[2];       // of x/z and y/z that the picture shows, with a margin (RS_FOOTPRINT_DEPTH)
+  rs_float high[2];
+  rs_float spacing;  // size of a pixel at unit depth or distance, or anywhere
+  rs_int kind;       // RS_FOOTPRINT_*
+  rs_int padding[2];
+} RsFootprintView;
+RS_STATIC_ASSERT_SIZE(RsFootprintView, 80);
+
+#define RS_FOOTPRINT_DEPTH 0     // grows with depth, seen within the limits: pinholes and lenses
+#define RS_FOOTPRINT_DISTANCE 1  // grows with distance, seen all around: fisheye, panorama
+#define RS_FOOTPRINT_CONSTANT 2  // the same everywhere: orthographic
+
 // Camera of any model with a lens, and the sample that is taken of each pixel.
 typedef struct {
   rs_float rotation[9];  // world to camera, row-major

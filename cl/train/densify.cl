@@ -17,6 +17,17 @@
 #define ROLE_KEEP 0u
 #define ROLE_CLONE 1u
 #define ROLE_FIRST_CHILD 2u
+#define ROLE_FIRST_HALF 4u
+
+// Halves of a split along the longest axis (Feng et al. 2025, "Improved-GS", with the constants of
+// LichtFeld Studio's IGS+): offset in standard deviations, what is left of the longest and of the
+// other axes, and of the opacity.
+#ifndef HALF_OFFSET
+#define HALF_OFFSET 0.5f
+#define HALF_LONGEST 0.5f
+#define HALF_OTHERS 0.85f
+#define HALF_OPACITY 0.6f
+#endif
 
 // statistics: 2 N, {sum of the signal, number of views that saw the Gaussian}; signal 0 = screen, 1
 // = absolute. A signal that is not finite is left out; a guard word that is not 0 turns all off.
@@ -85,8 +96,15 @@ float scale_parameter(float value) {
 #endif
 }
 
+// The parameter of an opacity of HALF_OPACITY times that of `logit`.
+float half_opacity(float logit) {
+  const float opacity = HALF_OPACITY / (1.0f + exp(-logit));
+  return log(opacity / (1.0f - opacity));
+}
+
 // Gaussian i of the new set comes from source[i] of the old one in the role role[i]. The two
-// children of a split are drawn from the parent's own distribution and are smaller by split_factor.
+// children of a split are drawn from the parent's own distribution and are smaller by split_factor;
+// the two halves lie side by side along the parent's longest axis.
 kernel void gather_gaussians(uint count,
                              uint key_low,
                              uint key_high,
@@ -110,7 +128,19 @@ kernel void gather_gaussians(uint count,
   float3 mean = vload3(from, means);
   const float4 quaternion = vload4(from, quaternions);
   float3 scale = vload3(from, scales);
-  if (role[i] >= ROLE_FIRST_CHILD) {
+  float opacity = opacities[from];
+  if (role[i] >= ROLE_FIRST_HALF) {
+    float3 s = (float3)(scale_value(scale.x), scale_value(scale.y), scale_value(scale.z));
+    const float longest = fmax(s.x, fmax(s.y, s.z));
+    const float3 axis = s.x == longest   ? (float3)(1.0f, 0.0f, 0.0f)
+                        : s.y == longest ? (float3)(0.0f, 1.0f, 0.0f)
+                                         : (float3)(0.0f, 0.0f, 1.0f);
+    const float side = role[i] == ROLE_FIRST_HALF ? HALF_OFFSET : -HALF_OFFSET;
+    mean += rotate(quaternion, side * longest * axis);
+    s *= HALF_OTHERS + (HALF_LONGEST - HALF_OTHERS) * axis;
+    scale = (float3)(scale_parameter(s.x), scale_parameter(s.y), scale_parameter(s.z));
+    opacity = half_opacity(opacity);
+  } else if (role[i] >= ROLE_FIRST_CHILD) {
     const float3 s = (float3)(scale_value(scale.x), scale_value(scale.y), scale_value(scale.z));
     mean += rotate(quaternion,
                    s * child_offset(key_low, key_high, (uint)from, role[i] - ROLE_FIRST_CHILD));
@@ -121,7 +151,7 @@ kernel void gather_gaussians(uint count,
   vstore3(mean, to, new_means);
   vstore4(quaternion, to, new_quaternions);
   vstore3(scale, to, new_scales);
-  new_opacities[to] = opacities[from];
+  new_opacities[to] = opacity;
   for (uint k = 0; k < 3 * SH_COEFFICIENTS; ++k) {
     new_sh[to * 3 * SH_COEFFICIENTS + k] = sh[from * 3 * SH_COEFFICIENTS + k];
   }
@@ -131,4 +161,13 @@ kernel void gather_gaussians(uint count,
 kernel void limit_opacity(uint count, float limit, global float* opacities) {
   const uint i = get_global_id(0);
   if (i < count) opacities[i] = fmin(opacities[i], limit);
+}
+
+// Lowers every opacity by `amount`, down to `lowest` at most.
+kernel void fade_opacity(uint count, float amount, float lowest, global float* opacities) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  const float opacity = 1.0f / (1.0f + exp(-opacities[i]));
+  const float faded = fmax(opacity - amount, fmin(opacity, lowest));
+  if (faded < opacity) opacities[i] = log(faded / (1.0f - faded));
 }

@@ -114,11 +114,12 @@ void SceneBench::Impl::make_gradients() {
 void SceneBench::Impl::make_density() {
   if (density) return;
   TrainOptions rules;
+  rules.strategy = DensityStrategy::kAdc;
   rules.densify_grad_threshold = 0.5;
   rules.densify_size = 0.01;
   rules.prune_scale = 0.0;
   rules.max_gaussians = static_cast<std::int64_t>(2 * count());
-  density.emplace(context, rules, 1.0);
+  density.emplace(context, rules, 1.0, 1);
   density_signal.resize(2 * count());
   for (std::size_t i = 0; i < count(); ++i) {
     density_signal[2 * i] = i % kDensifyEvery == 0 ? 1.0f : 0.0f;

@@ -243,6 +243,12 @@ void read_images_text(const fs::path& path, ColmapModel& model) {
   }
 }
 
+void add_track(PointCloud& points, std::uint64_t length, double error) {
+  points.track_lengths.push_back(
+      static_cast<std::uint32_t>(std::min<std::uint64_t>(length, 1u << 30)));
+  points.errors.push_back(static_cast<float>(error));
+}
+
 void read_points_binary(const fs::path& path, PointCloud& points) {
   const auto bytes = read_file(path);
   ByteReader reader(bytes, path);
@@ -257,9 +263,11 @@ void read_points_binary(const fs::path& path, PointCloud& points) {
       position[axis] = reader.read<double>("a point's coordinate");
     std::array<double, 3> rgb;
     for (double& value : rgb) value = reader.read<std::uint8_t>("a point's colour");
-    reader.skip(8, "the error of a point");
+    const auto error = reader.read<double>("the error of a point");
     add_point(points, position, rgb, fail);
-    reader.skip(8 * reader.count("track length", 8), "the track of a point");
+    const std::uint64_t length = reader.count("track length", 8);
+    reader.skip(8 * length, "the track of a point");
+    add_track(points, length, error);
   }
 }
 
@@ -275,6 +283,10 @@ void read_points_text(const fs::path& path, PointCloud& points) {
     for (double& value : rgb)
       value = static_cast<double>(reader.unsigned_integer("a point's colour"));
     add_point(points, position, rgb, fail);
+    const double error = reader.number("the error of a point");
+    std::istringstream track{std::string(reader.rest())};
+    const auto words = std::distance(std::istream_iterator<std::string>(track), {});
+    add_track(points, static_cast<std::uint64_t>(words) / 2, error);
   }
 }
 

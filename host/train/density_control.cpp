@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/rng.hpp"
@@ -15,15 +16,44 @@ constexpr char kProgram[] = "train/densify.cl";
 constexpr std::size_t kGroup = 64;
 constexpr std::uint64_t kSplitStream = 0x73706c6974;
 
+constexpr std::int64_t kLeastPeriod = 50;   // iterations between passes
+constexpr double kPeriodShare = 0.01;       // of the run
+constexpr double kLongestPassShare = 0.05;  // longer passes over the photos are not waited for
+constexpr double kLeastOpacity = 0.004;     // that fading leaves
+
+// Iterations between two passes when the options leave them open.
+std::int64_t fitted_period(std::int64_t iterations, std::int64_t views) {
+  const auto share = [iterations](double s) {
+    return std::llround(s * static_cast<double>(iterations));
+  };
+  const std::int64_t least = std::max<std::int64_t>(kLeastPeriod, share(kPeriodShare));
+  const std::int64_t whole = (least + views - 1) / views * views;
+  return whole <= std::max(2 * least, static_cast<std::int64_t>(share(kLongestPassShare))) ? whole
+                                                                                           : least;
+}
+
 std::uint32_t low_word(std::uint64_t bits) { return static_cast<std::uint32_t>(bits); }
 
 }  // namespace
 
-DensityControl::DensityControl(Context& context, const TrainOptions& options, double extent)
+DensityControl::DensityControl(Context& context,
+                               const TrainOptions& options,
+                               double extent,
+                               std::size_t views)
     : context_(context),
       options_(options),
       extent_(extent),
+      limit_(static_cast<std::size_t>(options.max_gaussians)),
+      first_(options.densify_from.of(options.iterations)),
+      growth_end_(options.densify_until.of(options.iterations)),
+      last_(growth_end_),
+      period_(options.densify_every.of(options.iterations)),
       open_guard_(context, 1, "density guard") {
+  const auto pass = static_cast<std::int64_t>(std::max<std::size_t>(views, 1));
+  if (period_ == 0) period_ = fitted_period(options.iterations, pass);
+  whole_passes_ = period_ % pass == 0;
+  if (options.strategy == DensityStrategy::kBudget && growth_end_ > 0)
+    last_ = std::max(last_, options.replace_until.of(options.iterations));
   open_guard_.clear();
 }
 
@@ -34,35 +64,66 @@ void DensityControl::accumulate(const DeviceGaussians& gaussians,
     statistics_ = Buffer<float>(context_, 2 * gaussians.count, "density statistics");
     statistics_.clear();
   }
-  const std::uint32_t signal = options_.densify_signal == DensifySignal::kAbsolute ? 1u : 0u;
+  const DensifySignal signal_choice =
+      options_.densify_signal != DensifySignal::kAuto ? options_.densify_signal
+      : options_.strategy == DensityStrategy::kBudget ? DensifySignal::kAbsolute
+                                                      : DensifySignal::kScreen;
+  const std::uint32_t signal = signal_choice == DensifySignal::kAbsolute ? 1u : 0u;
   context_.kernel(kProgram, "accumulate_screen")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               signal, gradients.screen, guard != nullptr ? *guard : open_guard_, statistics_);
 }
 
 bool DensityControl::refines_at(std::int64_t iteration) const {
-  return iteration >= options_.densify_from && iteration <= options_.densify_until &&
-         iteration % options_.densify_every == 0;
+  return iteration >= first_ && iteration <= last_ && iteration % period_ == 0;
 }
 
 bool DensityControl::resets_at(std::int64_t iteration) const {
-  return options_.opacity_reset_every > 0 && iteration <= options_.densify_until &&
+  return options_.opacity_reset_every > 0 && iteration <= growth_end_ &&
          iteration % options_.opacity_reset_every == 0;
 }
 
-DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iteration) {
+// The count after this pass: of the way to the limit, (1 - x)^2 is left at the share x of the time
+// for growth (Mallick et al. 2024, "Taming 3DGS"), wherever this pass finds the model.
+std::size_t DensityControl::target(std::size_t count, std::int64_t iteration) const {
+  if (count >= limit_) return limit_;
+  if (iteration > growth_end_) return count;
+  const auto left = [this](std::int64_t at) {
+    const auto span = static_cast<double>(growth_end_ - first_);
+    return std::clamp(static_cast<double>(growth_end_ - at) / span, 0.0, 1.0);
+  };
+  const double before = left(iteration - period_), now = left(iteration);
+  const double rest = static_cast<double>(limit_ - count) * now * now / (before * before);
+  return limit_ - static_cast<std::size_t>(rest);
+}
+
+DensityPlan DensityControl::plan(const DeviceGaussians& gaussians, std::int64_t iteration) const {
+  std::vector<float> statistics(2 * gaussians.count, 0.0f);
+  const bool known = statistics_.size() == statistics.size();
+  if (known) statistics_.download(statistics);
+  const std::vector<float> means = gaussians.means.download();
+  const std::vector<float> scales = gaussians.scales.download();
+  const std::vector<float> opacities = gaussians.opacities.download();
+  if (options_.strategy == DensityStrategy::kBudget) {
+    BudgetRules rules;
+    rules.target = target(gaussians.count, iteration);
+    rules.min_opacity = options_.prune_opacity;
+    rules.remove_unseen = known && whole_passes_ && iteration >= first_ + period_;
+    return plan_budget(means, scales, opacities, statistics, rules);
+  }
   DensityRules rules;
   rules.gradient = options_.densify_grad_threshold;
   rules.split_size = options_.densify_size * extent_;
   rules.min_opacity = options_.prune_opacity;
   rules.max_size = options_.prune_scale * extent_;
   rules.min_size = options_.prune_scale_min * extent_;
-  rules.max_count = static_cast<std::size_t>(options_.max_gaussians);
+  rules.max_count = limit_;
   rules.activation = gaussians.activation;
-  std::vector<float> statistics(2 * gaussians.count, 0.0f);
-  if (statistics_.size() == statistics.size()) statistics_.download(statistics);
-  DensityPlan plan = plan_density(gaussians.means.download(), gaussians.scales.download(),
-                                  gaussians.opacities.download(), statistics, rules);
+  return plan_density(means, scales, opacities, statistics, rules);
+}
+
+DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iteration) {
+  DensityPlan plan = this->plan(gaussians, iteration);
   if (plan.source.empty()) {
     throw Error(ErrorCode::kRuntime, fmt::format("Density control at iteration {} would remove all "
                                                  "{} Gaussians: lower --prune-opacity or "
@@ -70,6 +131,8 @@ DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iter
                                                  iteration, gaussians.count));
   }
   if (plan.changes()) gather(gaussians, plan, iteration);
+  if (options_.strategy == DensityStrategy::kBudget && options_.opacity_decay > 0)
+    fade_opacities(gaussians);
   // Without changes the statistics start anew all the same, as in 3DGS.
   if (statistics_.size() == 2 * gaussians.count) {
     statistics_.clear();
@@ -109,6 +172,13 @@ void DensityControl::gather(DeviceGaussians& gaussians,
               gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
               gaussians.sh, next.means, next.quaternions, next.scales, next.opacities, next.sh);
   gaussians = std::move(next);
+}
+
+void DensityControl::fade_opacities(DeviceGaussians& gaussians) {
+  context_.kernel(kProgram, "fade_opacity")
+      .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
+              static_cast<float>(options_.opacity_decay), static_cast<float>(kLeastOpacity),
+              gaussians.opacities);
 }
 
 void DensityControl::reset_opacities(DeviceGaussians& gaussians) {

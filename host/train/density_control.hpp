@@ -15,14 +15,21 @@ namespace raysplats {
 /// random depends on the seed, the iteration and the Gaussian's index alone.
 class DensityControl {
  public:
-  /// `extent` is the scene extent that the relative sizes of the options refer to.
-  DensityControl(Context& context, const TrainOptions& options, double extent);
+  /// `extent` is the scene extent that the relative sizes of the options refer to, `views` the
+  /// number of training views.
+  DensityControl(Context& context, const TrainOptions& options, double extent, std::size_t views);
+
+  /// The count that max-gaussians = 0 stands for.
+  void set_limit(std::size_t limit) { limit_ = limit; }
 
   /// Adds the statistics of one view; enqueues without waiting. A `guard` whose first word is not 0
   /// keeps them as they are.
   void accumulate(const DeviceGaussians& gaussians,
                   const GaussianGradients& gradients,
                   const Buffer<std::uint32_t>* guard = nullptr);
+
+  /// Whether the statistics of a step are of use.
+  bool accumulates_at(std::int64_t iteration) const { return iteration < last_; }
 
   /// Whether refine() is due after `iteration` (counted from 1), or resetting the opacities is.
   bool refines_at(std::int64_t iteration) const;
@@ -42,11 +49,17 @@ class DensityControl {
   void restore_statistics(std::span<const float> statistics);
 
  private:
+  DensityPlan plan(const DeviceGaussians& gaussians, std::int64_t iteration) const;
+  std::size_t target(std::size_t count, std::int64_t iteration) const;
+  void fade_opacities(DeviceGaussians& gaussians);
   void gather(DeviceGaussians& gaussians, const DensityPlan& plan, std::int64_t iteration);
 
   Context& context_;
   TrainOptions options_;
   double extent_;
+  std::size_t limit_;
+  std::int64_t first_, growth_end_, last_, period_;  // iterations
+  bool whole_passes_;                                // a period sees every view
   Buffer<float> statistics_;
   Buffer<std::uint32_t> open_guard_;
 };

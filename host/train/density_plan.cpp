@@ -9,7 +9,7 @@
 namespace raysplats {
 namespace {
 
-enum class Fate : std::uint8_t { kKeep, kClone, kSplit, kPrune };
+enum class Fate : std::uint8_t { kKeep, kClone, kSplit, kHalve, kPrune };
 
 double sigmoid(double x) { return 1.0 / (1.0 + std::exp(-x)); }
 
@@ -17,6 +17,61 @@ struct Candidate {
   float score;
   std::uint32_t index;
 };
+
+// A sum is finite when all of its terms are.
+bool is_finite(std::span<const float> means,
+               std::span<const float> scales,
+               std::span<const float> opacities,
+               std::size_t i) {
+  return std::isfinite(means[3 * i] + means[3 * i + 1] + means[3 * i + 2] + scales[3 * i] +
+                       scales[3 * i + 1] + scales[3 * i + 2] + opacities[i]);
+}
+
+// The first `room` candidates by score; the others keep their fate.
+void choose(std::vector<Candidate>& candidates,
+            std::size_t room,
+            std::vector<Fate>& fates,
+            DensityPlan& plan) {
+  if (candidates.size() <= room) return;
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.score != b.score ? a.score > b.score : a.index < b.index;
+  });
+  plan.refused = candidates.size() - room;
+  for (std::size_t k = room; k < candidates.size(); ++k) fates[candidates[k].index] = Fate::kKeep;
+  candidates.resize(room);
+}
+
+// Writes the new set along the Morton curve of the means.
+void arrange(std::span<const float> means, const std::vector<Fate>& fates, DensityPlan& plan) {
+  const auto add = [&plan](std::uint32_t index, DensityRole role) {
+    plan.source.push_back(index);
+    plan.role.push_back(static_cast<std::uint32_t>(role));
+  };
+  for (const std::uint32_t i : morton_order(means)) {
+    switch (fates[i]) {
+      case Fate::kPrune:
+        break;
+      case Fate::kKeep:
+        add(i, DensityRole::kKeep);
+        break;
+      case Fate::kClone:
+        add(i, DensityRole::kKeep);
+        add(i, DensityRole::kClone);
+        ++plan.cloned;
+        break;
+      case Fate::kSplit:
+        add(i, DensityRole::kFirstChild);
+        add(i, DensityRole::kSecondChild);
+        ++plan.split;
+        break;
+      case Fate::kHalve:
+        add(i, DensityRole::kFirstHalf);
+        add(i, DensityRole::kSecondHalf);
+        ++plan.split;
+        break;
+    }
+  }
+}
 
 }  // namespace
 
@@ -42,10 +97,8 @@ DensityPlan plan_density(std::span<const float> means,
     const double size = rules.activation == ScaleActivation::kExp
                             ? std::exp(static_cast<double>(parameter))
                             : sigmoid(parameter);
-    // A sum is finite when all of its terms are.
-    const float sum = means[3 * i] + means[3 * i + 1] + means[3 * i + 2] + scales[3 * i] +
-                      scales[3 * i + 1] + scales[3 * i + 2] + opacities[i];
-    const bool keep = std::isfinite(sum) && sigmoid(opacities[i]) >= rules.min_opacity &&
+    const bool keep = is_finite(means, scales, opacities, i) &&
+                      sigmoid(opacities[i]) >= rules.min_opacity &&
                       (rules.max_size <= 0 || size <= rules.max_size) &&
                       (rules.min_size <= 0 || size >= rules.min_size);
     if (!keep) {
@@ -63,40 +116,38 @@ DensityPlan plan_density(std::span<const float> means,
 
   const std::size_t survivors = count - plan.pruned;
   const std::size_t room = rules.max_count > survivors ? rules.max_count - survivors : 0;
-  if (candidates.size() > room) {
-    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-      return a.score != b.score ? a.score > b.score : a.index < b.index;
-    });
-    plan.refused = candidates.size() - room;
-    for (std::size_t k = room; k < candidates.size(); ++k) fates[candidates[k].index] = Fate::kKeep;
-    candidates.resize(room);
-  }
+  choose(candidates, room, fates, plan);
+  arrange(means, fates, plan);
+  return plan;
+}
 
-  plan.source.reserve(survivors + candidates.size());
-  plan.role.reserve(survivors + candidates.size());
-  const auto add = [&plan](std::uint32_t index, DensityRole role) {
-    plan.source.push_back(index);
-    plan.role.push_back(static_cast<std::uint32_t>(role));
-  };
-  for (const std::uint32_t i : morton_order(means)) {
-    switch (fates[i]) {
-      case Fate::kPrune:
-        break;
-      case Fate::kKeep:
-        add(i, DensityRole::kKeep);
-        break;
-      case Fate::kClone:
-        add(i, DensityRole::kKeep);
-        add(i, DensityRole::kClone);
-        ++plan.cloned;
-        break;
-      case Fate::kSplit:
-        add(i, DensityRole::kFirstChild);
-        add(i, DensityRole::kSecondChild);
-        ++plan.split;
-        break;
+DensityPlan plan_budget(std::span<const float> means,
+                        std::span<const float> scales,
+                        std::span<const float> opacities,
+                        std::span<const float> statistics,
+                        const BudgetRules& rules) {
+  const std::size_t count = opacities.size();
+  DensityPlan plan;
+  std::vector<Fate> fates(count, Fate::kKeep);
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float views = statistics[2 * i + 1];
+    const bool keep = is_finite(means, scales, opacities, i) &&
+                      sigmoid(opacities[i]) >= rules.min_opacity &&
+                      (views > 0 || !rules.remove_unseen);
+    if (!keep) {
+      fates[i] = Fate::kPrune;
+      ++plan.pruned;
+      continue;
+    }
+    if (views > 0 && statistics[2 * i] > 0) {
+      candidates.push_back({statistics[2 * i] / views, static_cast<std::uint32_t>(i)});
+      fates[i] = Fate::kHalve;
     }
   }
+  const std::size_t survivors = count - plan.pruned;
+  choose(candidates, rules.target > survivors ? rules.target - survivors : 0, fates, plan);
+  arrange(means, fates, plan);
   return plan;
 }
 

@@ -11,7 +11,14 @@
 namespace raysplats {
 
 /// What becomes of a Gaussian in the new set; cl/train/densify.cl names the same values.
-enum class DensityRole : std::uint32_t { kKeep = 0, kClone = 1, kFirstChild = 2, kSecondChild = 3 };
+enum class DensityRole : std::uint32_t {
+  kKeep = 0,
+  kClone = 1,
+  kFirstChild = 2,
+  kSecondChild = 3,
+  kFirstHalf = 4,
+  kSecondHalf = 5,
+};
 
 /// Thresholds of one pass of density control, in world units.
 struct DensityRules {
@@ -23,6 +30,13 @@ struct DensityRules {
   double min_size = 0;     ///< remove below; 0 = off
   std::size_t max_count = 0;
   ScaleActivation activation = ScaleActivation::kExp;
+};
+
+/// Rules of one pass that keeps to a number of Gaussians.
+struct BudgetRules {
+  std::size_t target = 0;      ///< Gaussians after the pass; fewer when there are no candidates
+  double min_opacity = 0;      ///< remove below
+  bool remove_unseen = false;  ///< remove what no ray of any view met
 };
 
 /// The new set of Gaussians: entry i comes from source[i] in the role role[i]; ordered along the
@@ -49,5 +63,15 @@ DensityPlan plan_density(std::span<const float> means,
                          std::span<const float> opacities,
                          std::span<const float> statistics,
                          const DensityRules& rules);
+
+/// Decides by rank: removes what is transparent, not finite or unseen, and splits the Gaussians
+/// with the highest mean signals along their longest axis until there are `target` (ties: the lower
+/// index). A Gaussian is split once in a pass at most. Arguments, memory and time as
+/// plan_density().
+DensityPlan plan_budget(std::span<const float> means,
+                        std::span<const float> scales,
+                        std::span<const float> opacities,
+                        std::span<const float> statistics,
+                        const BudgetRules& rules);
 
 }  // namespace raysplats

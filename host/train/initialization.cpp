@@ -2,6 +2,7 @@
 #include "train/initialization.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +16,7 @@
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "train/photo_start.hpp"
 
 namespace raysplats {
 namespace {
@@ -23,7 +25,15 @@ constexpr std::uint64_t kPointStream =
     0x706f696e7473;  // random streams of one seed are told apart by a constant
 constexpr double kShBand0 = 0.28209479177387814;  // 1 / (2 sqrt(pi))
 constexpr double kMinScale = 1e-4;                // of the scene extent
-constexpr double kMaxScale = 0.1;
+constexpr double kMaxScale = 0.1;                 // of the distance to the nearest camera
+constexpr std::uint32_t kReliableTrack = 3;
+constexpr float kReliableError = 2.0f;
+constexpr std::size_t kEnoughPoints = 2000;
+constexpr double kStartShare = 0.5;   // of the limit that points may take
+constexpr double kPhotoShare = 0.3;   // of the limit that a start from photos takes
+constexpr double kPixelShare = 0.4;   // Gaussians per pixel of a photo in a run of kShortRun
+constexpr double kShortRun = 1000.0;  // iterations
+constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
 
 // Balanced k-d tree laid out in place: the median of a range is its node, its halves are the
@@ -119,6 +129,20 @@ class KdTree {
   std::vector<std::uint8_t> axis_;
 };
 
+void append_point(const PointCloud& from, std::size_t i, PointCloud& to) {
+  to.positions.insert(to.positions.end(), from.positions.data() + 3 * i,
+                      from.positions.data() + 3 * i + 3);
+  to.colors.insert(to.colors.end(), from.colors.data() + 3 * i, from.colors.data() + 3 * i + 3);
+}
+
+// Infinite without cameras.
+double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Camera& camera : cameras)
+    least = std::min(least, glm::distance(camera.center(), point));
+  return least;
+}
+
 glm::dvec3 view_axis(const Camera& camera) {
   return glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1);
 }
@@ -209,14 +233,12 @@ std::vector<float> neighbour_distances(std::span<const float> positions) {
 Gaussians gaussians_from_points(const PointCloud& points,
                                 int sh_degree,
                                 double opacity,
-                                double extent) {
+                                std::span<const Camera> cameras) {
   PointCloud finite;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float* p = points.positions.data() + 3 * i;
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
-    finite.positions.insert(finite.positions.end(), p, p + 3);
-    finite.colors.insert(finite.colors.end(), points.colors.data() + 3 * i,
-                         points.colors.data() + 3 * i + 3);
+    append_point(points, i, finite);
   }
   Gaussians model;
   model.sh_degree = sh_degree;
@@ -224,17 +246,35 @@ Gaussians gaussians_from_points(const PointCloud& points,
   const std::vector<float> distances = neighbour_distances(finite.positions);
   const auto stride = static_cast<std::size_t>(3 * sh_coefficients(sh_degree));
   const auto logit = static_cast<float>(std::log(opacity / (1.0 - opacity)));
+  const double least = kMinScale * scene_extent(cameras);
   for (std::size_t i = 0; i < model.size(); ++i) {
-    const double scale =
-        std::clamp(static_cast<double>(distances[i]), kMinScale * extent, kMaxScale * extent);
+    const float* p = finite.positions.data() + 3 * i;
+    const double most = kMaxScale * nearest_distance(cameras, {p[0], p[1], p[2]});
+    const double scale = std::max(std::min(static_cast<double>(distances[i]), most), least);
     for (std::size_t a = 0; a < 3; ++a) {
-      model.means[3 * i + a] = finite.positions[3 * i + a];
+      model.means[3 * i + a] = p[a];
       model.log_scales[3 * i + a] = static_cast<float>(std::log(scale));
       model.sh[stride * i + a] = static_cast<float>((finite.colors[3 * i + a] - 0.5) / kShBand0);
     }
     model.opacities[i] = logit;
   }
   return model;
+}
+
+PointCloud reliable_points(const PointCloud& points) {
+  if (points.track_lengths.size() != points.size() || points.errors.size() != points.size())
+    return points;
+  PointCloud out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points.track_lengths[i] >= kReliableTrack && points.errors[i] <= kReliableError)
+      append_point(points, i, out);
+  }
+  return out.size() >= kEnoughPoints ? out : points;
+}
+
+std::size_t fitted_limit(double pixels, std::int64_t iterations) {
+  const double growth = std::sqrt(static_cast<double>(iterations) / kShortRun);
+  return std::max(kLeastLimit, static_cast<std::size_t>(kPixelShare * pixels * growth));
 }
 
 PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed) {
@@ -255,26 +295,45 @@ PointCloud random_points(const Region& region, std::size_t count, std::uint64_t 
 
 Gaussians initial_model(const Dataset& dataset,
                         std::span<const Camera> cameras,
+                        const PhotoSource& photos,
+                        std::size_t limit,
                         const TrainOptions& options) {
-  const auto limit = static_cast<std::size_t>(options.max_gaussians);
   const bool has_points = dataset.points.size() > 0;
   if (options.init == "colmap" && !has_points) {
     throw UsageError(
-        fmt::format("The data set {} has no sparse points to start from: use --init random",
+        fmt::format("The data set {} has no sparse points to start from: use --init photos",
                     dataset.root.string()));
   }
-  if (options.init != "auto" && options.init != "colmap" && options.init != "random") {
+  const bool by_name = options.init == "auto" || options.init == "colmap" ||
+                       options.init == "random" || options.init == "photos";
+  if (!by_name) {
     return subset(with_sh_degree(read_ply(options.init), options.sh_degree), limit);
   }
-  const double extent = scene_extent(cameras);
-  if (has_points && options.init != "random") {
-    return subset(
-        gaussians_from_points(dataset.points, options.sh_degree, options.init_opacity, extent),
-        limit);
+  const auto share = [limit](double part) {
+    return std::max<std::size_t>(1, static_cast<std::size_t>(part * static_cast<double>(limit)));
+  };
+  const auto start = [&](const PointCloud& points) {
+    return gaussians_from_points(points, options.sh_degree, options.init_opacity, cameras);
+  };
+  if (has_points && (options.init == "auto" || options.init == "colmap"))
+    return subset(start(reliable_points(dataset.points)), share(kStartShare));
+
+  const std::size_t count = options.init_count > 0
+                                ? std::min(limit, static_cast<std::size_t>(options.init_count))
+                                : share(kPhotoShare);
+  const Region region = visible_region(cameras);
+  if (options.init == "random") return start(random_points(region, count, options.seed));
+  if (dataset.alpha_is_background) {
+    const PointCloud hull = carved_points(photos(), region, count, options.seed);
+    if (hull.size() > 0) return start(hull);
+    spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
+    return start(random_points(region, count, options.seed));
   }
-  const std::size_t count = std::min(limit, static_cast<std::size_t>(options.init_count));
-  return gaussians_from_points(random_points(visible_region(cameras), count, options.seed),
-                               options.sh_degree, options.init_opacity, extent);
+  std::vector<double> distances;
+  for (const Camera& camera : cameras)
+    distances.push_back(std::max(glm::distance(camera.center(), region.center), 1e-3));
+  std::sort(distances.begin(), distances.end());
+  return start(swept_points(photos(), distances[distances.size() / 2], count, options.seed));
 }
 
 }  // namespace raysplats

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/train_options.hpp"
+#include "train/photo_set.hpp"
 
 namespace raysplats {
 
@@ -34,12 +36,22 @@ Region visible_region(std::span<const Camera> cameras);
 std::vector<float> neighbour_distances(std::span<const float> positions);
 
 /// Isotropic Gaussians at the points: the scale is the mean distance of the three nearest
-/// neighbours, as in 3DGS, clamped to [1e-4, 0.1] of `extent`; band 0 holds the colours. Points
-/// that are not finite are left out.
+/// neighbours, as in 3DGS, at least 1e-4 of the cameras' extent and at most 0.1 of the distance to
+/// the nearest camera (what stands alone far away may be large, before a camera it may not); band 0
+/// holds the colours. Points that are not finite are left out.
 Gaussians gaussians_from_points(const PointCloud& points,
                                 int sh_degree,
                                 double opacity,
-                                double extent);
+                                std::span<const Camera> cameras);
+
+/// The points that can be relied on: seen by at least three photos with an error of at most 2
+/// pixels, unless fewer than 2000 are left; all of them when nothing is known about them.
+PointCloud reliable_points(const PointCloud& points);
+
+/// What Gaussians a run may have when max-gaussians leaves it open: grows with the pixels of a
+/// photo that show something and with the root of the iterations, because each Gaussian needs steps
+/// and pixels to learn from.
+std::size_t fitted_limit(double pixels, std::int64_t iterations);
 
 /// `count` points uniform in the region, mid-grey with a little noise, a function of the seed.
 PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed);
@@ -47,11 +59,16 @@ PointCloud random_points(const Region& region, std::size_t count, std::uint64_t 
 /// The Gaussians of the given indices, in their order.
 Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indices);
 
-/// The model a run starts from, by options.init, at most max_gaussians (an even subset of more).
-/// Throws UsageError when the data set has no points and `colmap` is asked for, DataError for a bad
-/// PLY.
+/// Photos of the training views, loaded when they are first asked for.
+using PhotoSource = std::function<const std::vector<SmallPhoto>&()>;
+
+/// The model a run starts from, by options.init, at most `limit` Gaussians (an even subset of more;
+/// of points and photos at most half of it, so that there is room to grow). Throws UsageError when
+/// the data set has no points and `colmap` is asked for, DataError for a bad PLY.
 Gaussians initial_model(const Dataset& dataset,
                         std::span<const Camera> cameras,
+                        const PhotoSource& photos,
+                        std::size_t limit,
                         const TrainOptions& options);
 
 }  // namespace raysplats

@@ -16,6 +16,12 @@ constexpr std::uint64_t kBackgroundStream = 0x6261636b;
 
 }  // namespace
 
+std::int64_t RunShare::of(std::int64_t iterations) const {
+  if (value <= 0) return 0;
+  if (value >= 1) return static_cast<std::int64_t>(value);
+  return std::max<std::int64_t>(1, std::llround(value * static_cast<double>(iterations)));
+}
+
 double learning_rate(const LearningRate& rate,
                      const TrainOptions& options,
                      std::int64_t iteration) {
@@ -31,16 +37,16 @@ double learning_rate(const LearningRate& rate,
 }
 
 int active_sh_degree(const TrainOptions& options, std::int64_t iteration) {
-  if (options.sh_degree_interval == 0) return options.sh_degree;
-  return static_cast<int>(
-      std::min<std::int64_t>(options.sh_degree, iteration / options.sh_degree_interval));
+  const std::int64_t interval = options.sh_degree_interval.of(options.iterations);
+  if (interval == 0) return options.sh_degree;
+  return static_cast<int>(std::min<std::int64_t>(options.sh_degree, iteration / interval));
 }
 
 int resolution_divisor(const TrainOptions& options, std::int64_t iteration) {
-  const auto& schedule = options.resolution_schedule;
-  const auto passed =
-      std::upper_bound(schedule.begin(), schedule.end(), iteration) - schedule.begin();
-  return 1 << (static_cast<std::ptrdiff_t>(schedule.size()) - passed);
+  for (const ResolutionStep& step : options.resolution_schedule) {
+    if (iteration < step.until.of(options.iterations)) return step.divisor;
+  }
+  return 1;
 }
 
 std::array<float, 3> step_background(const TrainOptions& options,

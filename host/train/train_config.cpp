@@ -135,12 +135,12 @@ void validate(const TrainOptions& options) {
     throw UsageError(
         fmt::format("The option 'packet-width' is 0, 1, 2, 4, 8 or 16, not {}", width));
   }
-  if (!std::is_sorted(options.resolution_schedule.begin(), options.resolution_schedule.end())) {
+  const auto& sizes = options.resolution_schedule;
+  const auto earlier = [&options](const ResolutionStep& a, const ResolutionStep& b) {
+    return a.until.of(options.iterations) < b.until.of(options.iterations);
+  };
+  if (!std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
     throw UsageError("The iterations of 'resolution-schedule' have to ascend");
-  }
-  if (options.resolution_schedule.size() > 6) {
-    throw UsageError(
-        "The option 'resolution-schedule' takes at most 6 iterations (1/64 of the size)");
   }
   for (const LearningRate& rate : {options.position_lr, options.rotation_lr, options.scale_lr,
                                    options.opacity_lr, options.sh_lr, options.sh_rest_lr}) {

@@ -37,6 +37,66 @@ T parse_number(const std::string& key, const std::string& text, double low, doub
   return value;
 }
 
+// A share of the run (below 1) or a whole number of iterations.
+RunShare parse_share(const std::string& key, const std::string& text, bool may_be_none) {
+  double value = -1;
+  const char* end = text.data() + text.size();
+  const auto [next, error] = std::from_chars(text.data(), end, value);
+  const bool number = error == std::errc() && next == end && std::isfinite(value);
+  const bool whole = value >= 1 && value <= kMaxCount && value == std::floor(value);
+  const bool share = value > 0 && value < 1;
+  if (!number || !(whole || share || (may_be_none && value == 0))) {
+    throw UsageError(
+        fmt::format("The option '{}' needs a share of the run below 1 or a whole number of "
+                    "iterations{}, not '{}'",
+                    key, may_be_none ? " (0 = none)" : "", text));
+  }
+  return value;
+}
+
+std::string share_text(const RunShare& share) { return fmt::format("{}", share.value); }
+
+// The values of a list, which may arrive split at its commas or not.
+std::vector<std::string> elements(const Values& values) {
+  std::vector<std::string> out;
+  for (const std::string& value : values) {
+    std::size_t begin = 0;
+    while (begin < value.size()) {
+      const std::size_t comma = std::min(value.find(',', begin), value.size());
+      out.push_back(value.substr(begin, comma - begin));
+      begin = comma + 1;
+    }
+  }
+  return out;
+}
+
+// "4:0.1": a fourth of the size up to a tenth of the run. Plain numbers halve the divisor down to
+// 1: of n entries the first starts at 2^n.
+std::vector<ResolutionStep> parse_resolutions(const std::string& key, const Values& values) {
+  const std::vector<std::string> entries = elements(values);
+  const auto named = std::count_if(entries.begin(), entries.end(), [](const std::string& entry) {
+    return entry.find(':') != std::string::npos;
+  });
+  if (named != 0 && static_cast<std::size_t>(named) != entries.size()) {
+    throw UsageError(fmt::format(
+        "The option '{}' takes either divisor:until pairs or plain iterations, not both", key));
+  }
+  if (named == 0 && entries.size() > 6) {
+    throw UsageError(
+        fmt::format("The option '{}' takes at most 6 iterations (1/64 of the size)", key));
+  }
+  std::vector<ResolutionStep> out;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const std::size_t colon = entries[i].find(':');
+    ResolutionStep step;
+    step.divisor = named > 0 ? parse_number<int>(key, entries[i].substr(0, colon), 1, 64)
+                             : 1 << (entries.size() - i);
+    step.until = parse_share(key, named > 0 ? entries[i].substr(colon + 1) : entries[i], false);
+    out.push_back(step);
+  }
+  return out;
+}
+
 const std::string& single(const std::string& key, const Values& values) {
   if (values.size() != 1) {
     throw UsageError(fmt::format("The option '{}' takes one value, not {}", key, values.size()));
@@ -123,25 +183,45 @@ class Table {
         [&target] { return fmt::format("\"{}\"", target); });
   }
 
-  void iterations(const std::string& name,
-                  std::vector<std::int64_t>& target,
-                  const std::string& help) {
+  void share(const std::string& name, RunShare& target, bool may_be_none, const std::string& help) {
+    add(
+        name, help, false,
+        [name, &target, may_be_none](const Values& values) {
+          target = parse_share(name, single(name, values), may_be_none);
+        },
+        [&target] { return share_text(target); });
+  }
+
+  void shares(const std::string& name, std::vector<RunShare>& target, const std::string& help) {
     add(
         name, help, false,
         [name, &target](const Values& values) {
-          std::vector<std::int64_t> parsed;
-          for (const std::string& value : values) {
-            std::size_t begin = 0;
-            while (begin < value.size()) {
-              const std::size_t comma = std::min(value.find(',', begin), value.size());
-              parsed.push_back(parse_number<std::int64_t>(name, value.substr(begin, comma - begin),
-                                                          1, kMaxCount));
-              begin = comma + 1;
-            }
-          }
+          std::vector<RunShare> parsed;
+          for (const std::string& entry : elements(values))
+            parsed.push_back(parse_share(name, entry, false));
           target = std::move(parsed);
         },
-        [&target] { return fmt::format("[{}]", fmt::join(target, ", ")); });
+        [&target] {
+          std::vector<std::string> texts;
+          texts.reserve(target.size());
+          for (const RunShare& entry : target) texts.push_back(share_text(entry));
+          return fmt::format("[{}]", fmt::join(texts, ", "));
+        });
+  }
+
+  void resolutions(const std::string& name,
+                   std::vector<ResolutionStep>& target,
+                   const std::string& help) {
+    add(
+        name, help, false,
+        [name, &target](const Values& values) { target = parse_resolutions(name, values); },
+        [&target] {
+          std::vector<std::string> texts;
+          texts.reserve(target.size());
+          for (const ResolutionStep& step : target)
+            texts.push_back(fmt::format("\"{}:{}\"", step.divisor, share_text(step.until)));
+          return fmt::format("[{}]", fmt::join(texts, ", "));
+        });
   }
 
   void paths(const std::string& name, std::vector<std::string>& target, const std::string& help) {
@@ -208,9 +288,11 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
          "\"random\" (another colour per iteration for cut-out photos, else black)");
   t.number("image-budget", o.image_budget, 1, 1e9,
            "MiB of photos kept on the device; the others are decoded again when their turn comes");
-  t.iterations("resolution-schedule", o.resolution_schedule,
-               "iterations at which the image size doubles: n entries start at 1/2^n of the size; "
-               "[] = full size");
+  t.resolutions(
+      "resolution-schedule", o.resolution_schedule,
+      "\"divisor:until\" pairs: photos are reduced by the divisor until that share of the "
+      "run, or iteration; plain numbers are iterations at which the size doubles up to "
+      "the full one; [] = full size");
 
   t.paths("mirrors", o.mirrors,
           "meshes (OBJ, PLY, GLB) of mirrors that are known: photos may show the scene in them");
@@ -219,18 +301,20 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
 
   t.section("Start");
   t.text("init", o.init,
-         "\"colmap\" (sparse points of the data set), \"random\" (the region that the cameras "
-         "see), the path of a "
-         "3DGS PLY, or \"auto\" (points when there are any, else random)");
-  t.number("init-count", o.init_count, 1, 1e9, "Gaussians of a random start");
+         "\"colmap\" (sparse points of the data set), \"photos\" (inside what cut-out photos show, "
+         "else where neighbouring photos agree), \"random\" (the region that the cameras see), the "
+         "path of a 3DGS PLY, or \"auto\" (points when there are any, else photos)");
+  t.number("init-count", o.init_count, 0, 1e9,
+           "Gaussians of a start without points; 0 = a share of max-gaussians");
   t.number("init-opacity", o.init_opacity, 1e-4, 0.9999,
            "opacity of the first Gaussians (not of a PLY)");
 
   t.section("Model");
   t.number("sh-degree", o.sh_degree, 0, 4,
            "degree of the spherical harmonics of colour; 0 = plain RGB");
-  t.number("sh-degree-interval", o.sh_degree_interval, 0, kMaxCount,
-           "one more band is switched on every so many iterations; 0 = all from the start");
+  t.share("sh-degree-interval", o.sh_degree_interval, true,
+          "one more band is switched on after every such share of the run, or so many iterations; "
+          "0 = all from the start");
   t.choice<ScaleActivation>(
       "scale-activation", o.scale_activation,
       {{"exp", ScaleActivation::kExp}, {"sigmoid", ScaleActivation::kSigmoid}},
@@ -295,17 +379,30 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
            "displays do not stop them; 0 = no bound, -1 = none on CPUs and 100 elsewhere");
 
   t.section("Density control");
-  t.number("densify-from", o.densify_from, 0, kMaxCount,
-           "first iteration that may add or remove Gaussians");
-  t.number("densify-until", o.densify_until, 0, kMaxCount, "last iteration that may; 0 = never");
-  t.number("densify-every", o.densify_every, 1, kMaxCount, "iterations between two passes");
+  t.choice<DensityStrategy>(
+      "strategy", o.strategy,
+      {{"budget", DensityStrategy::kBudget}, {"adc", DensityStrategy::kAdc}},
+      "budget: the count grows along a curve to max-gaussians, those with the highest signals are "
+      "split along their longest axis; adc: whatever exceeds densify-grad-threshold is cloned or "
+      "split (3DGS)");
+  t.share("densify-from", o.densify_from, true,
+          "first share of the run, or iteration, that may add or remove Gaussians");
+  t.share("densify-until", o.densify_until, true, "last one that may; 0 = never");
+  t.share("densify-every", o.densify_every, true,
+          "iterations (or share of the run) between two passes; 0 = whole passes over the photos, "
+          "at least 50 iterations and a hundredth of the run");
+  t.share("replace-until", o.replace_until, true,
+          "up to here (share of the run, or iteration) passes of the budget strategy go on without "
+          "growth: what they remove is replaced");
   t.number("densify-grad-threshold", o.densify_grad_threshold, 0, kHuge,
            "mean screen-space gradient above which a Gaussian is cloned or split");
   t.choice<DensifySignal>(
       "densify-signal", o.densify_signal,
-      {{"screen", DensifySignal::kScreen}, {"absolute", DensifySignal::kAbsolute}},
+      {{"auto", DensifySignal::kAuto},
+       {"screen", DensifySignal::kScreen},
+       {"absolute", DensifySignal::kAbsolute}},
       "that gradient summed as it is (screen, 3DGS) or in absolute value per ray (absolute, AbsGS; "
-      "wants a threshold 2 to 4 times higher)");
+      "wants a threshold 2 to 4 times higher); auto = absolute with the budget strategy");
   t.number("densify-size", o.densify_size, 0, kHuge,
            "larger ones (times the scene extent) are split, smaller ones cloned");
   t.number("split-factor", o.split_factor, 1, 100,
@@ -316,8 +413,15 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.number(
       "prune-scale-min", o.prune_scale_min, 0, kHuge,
       "Gaussians whose longest axis is below this (times the scene extent) are removed; 0 = none");
-  t.number("max-gaussians", o.max_gaussians, 1, 2e9,
-           "hard limit of the count; the strongest candidates win");
+  t.number(
+      "max-gaussians", o.max_gaussians, 0, 2e9,
+      "hard limit of the count; the strongest candidates win; 0 = from the photos' pixels, the "
+      "iterations and the device's memory");
+  t.number("opacity-decay", o.opacity_decay, 0, 0.5,
+           "taken off every opacity in each pass of the budget strategy");
+  t.number("footprint", o.footprint, 0, 10,
+           "least standard deviation of a Gaussian, in pixels of the view that resolves it best; 0 "
+           "= none");
   t.number("opacity-reset-every", o.opacity_reset_every, 0, kMaxCount,
            "opacities are lowered to opacity-reset-value every so many iterations until "
            "densify-until; 0 = never");
@@ -331,13 +435,15 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
            "iterations between rows of metrics.csv and the progress line");
   t.number("eval-every", o.eval_every, 0, kMaxCount,
            "iterations between evaluations of the test views; 0 = none");
-  t.iterations("eval-at", o.eval_at, "further iterations to evaluate at; the last one always is");
+  t.shares("eval-at", o.eval_at,
+           "further shares of the run, or iterations, to evaluate at; the last one always is");
   t.number("eval-views", o.eval_views, 0, 1e9,
            "test views of an evaluation before the last; 0 = all");
   t.number("eval-renders", o.eval_renders, 0, 1e9,
            "test views written as pictures beside the photo per evaluation");
-  t.iterations("save-at", o.save_at,
-               "iterations at which the PLY is written; after the last one it always is");
+  t.shares("save-at", o.save_at,
+           "shares of the run, or iterations, at which the PLY is written; after the last one it "
+           "always is");
   t.number("checkpoint-every", o.checkpoint_every, 0, kMaxCount,
            "iterations between checkpoints; 0 = only the last");
   t.number("keep-checkpoints", o.keep_checkpoints, 1, 1e9, "checkpoints kept in the run folder");

@@ -23,10 +23,12 @@
 #include "train/checkpoint.hpp"
 #include "train/dataset_fingerprint.hpp"
 #include "train/density_control.hpp"
+#include "train/footprint.hpp"
 #include "train/image_loss.hpp"
 #include "train/initialization.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/model_validator.hpp"
+#include "train/photo_set.hpp"
 #include "train/run_state.hpp"
 #include "train/schedule.hpp"
 #include "train/step_guard.hpp"
@@ -38,6 +40,7 @@ namespace raysplats {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
+constexpr int kSmallPhoto = 200;       // longer side of photos that the start looks at, in pixels
 constexpr std::size_t kReadAhead = 8;  // photos decoded ahead of their turn
 constexpr double kRecentViews = 20.0;  // logged views that the shown PSNR averages over
 
@@ -141,8 +144,10 @@ std::size_t host_image_budget(const TrainOptions& options, const std::vector<Cam
   }
 }
 
-bool contains(const std::vector<std::int64_t>& list, std::int64_t value) {
-  return std::find(list.begin(), list.end(), value) != list.end();
+bool contains(const std::vector<RunShare>& list, std::int64_t iterations, std::int64_t value) {
+  return std::any_of(list.begin(), list.end(), [iterations, value](const RunShare& share) {
+    return share.of(iterations) == value;
+  });
 }
 
 bool every(std::int64_t period, std::int64_t iteration) {
@@ -158,6 +163,10 @@ struct Trainer::Impl {
        std::filesystem::path run_path);
 
   void start();
+  const std::vector<SmallPhoto>& photos();
+  std::size_t limit();
+  std::size_t largest_photo() const;
+  std::size_t ray_views() const;
   void step();
   void report(Progress& progress);
   void control_density();
@@ -189,6 +198,7 @@ struct Trainer::Impl {
   ImageLoss loss;
   Adam adam;
   DensityControl density;
+  Footprint footprint;
   StepGuard guard;
   std::optional<ModelValidator> validator;  // once it is asked for
   TargetCache targets;
@@ -197,7 +207,8 @@ struct Trainer::Impl {
   DeviceGaussians gaussians;
   GaussianGradients gradients;
   Buffer<float> image_gradient;
-  std::int64_t iteration = 0;  // completed
+  std::int64_t iteration = 0;            // completed
+  std::vector<SmallPhoto> small_photos;  // once they are asked for
   bool started = false;
   bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
   std::int64_t saved = -1;  // iteration of the newest checkpoint of this run
@@ -230,7 +241,8 @@ Trainer::Impl::Impl(Context& device,
              load_mirrors(options.mirrors, options.mirror_bounces)),
       loss(device, options.pixel_loss, static_cast<float>(options.ssim_weight)),
       adam(device, adam_options_of(options)),
-      density(device, options, extent),
+      density(device, options, extent, train_views.size()),
+      footprint(device, train_cameras, options.footprint),
       guard(device),
       targets(device,
               views_of(dataset, train_views),
@@ -243,12 +255,44 @@ Trainer::Impl::Impl(Context& device,
   }
 }
 
+const std::vector<SmallPhoto>& Trainer::Impl::photos() {
+  if (small_photos.empty()) small_photos = load_small_photos(dataset, train_views, kSmallPhoto);
+  return small_photos;
+}
+
+// The most Gaussians of this run.
+std::size_t Trainer::Impl::limit() {
+  if (options.max_gaussians > 0) return static_cast<std::size_t>(options.max_gaussians);
+  double pixels = 0;
+  for (const Camera& camera : train_cameras) pixels += static_cast<double>(pixels_of(camera));
+  pixels /= static_cast<double>(train_cameras.size());
+  if (cut_out) pixels *= opaque_share(photos());
+  const MemoryDemand demand{fitted_limit(pixels, options.iterations), largest_photo(),
+                            train_views.size(), ray_views()};
+  return std::max<std::size_t>(1, gaussians_that_fit(options, demand, context.device()));
+}
+
+std::size_t Trainer::Impl::largest_photo() const {
+  std::size_t pixels = 0;
+  for (const Camera& camera : train_cameras) pixels = std::max(pixels, pixels_of(camera));
+  return pixels;
+}
+
+std::size_t Trainer::Impl::ray_views() const {
+  return static_cast<std::size_t>(
+      std::count_if(train_cameras.begin(), train_cameras.end(),
+                    [this](const Camera& camera) { return tracer.by_rays(camera); }));
+}
+
 // Makes the first model, unless resume() has brought one.
 void Trainer::Impl::start() {
+  const std::size_t most = limit();
+  density.set_limit(most);
   if (started) {
     run.begin_metrics(iteration);
   } else {
-    Gaussians model = initial_model(dataset, train_cameras, options);
+    Gaussians model = initial_model(
+        dataset, train_cameras, [this]() -> const auto& { return photos(); }, most, options);
     if (model.size() == 0) throw UsageError("The first model has no Gaussians: use --init random");
     const std::vector<std::uint32_t> along_curve = morton_order(model.means);
     gaussians =
@@ -258,18 +302,14 @@ void Trainer::Impl::start() {
     started = true;
     whole = true;
   }
-  std::size_t pixels = 0;
-  for (const Camera& camera : train_cameras) pixels = std::max(pixels, pixels_of(camera));
-  const bool grows =
-      options.densify_until >= options.densify_from && options.densify_until > iteration;
-  const std::size_t most =
-      grows ? std::max(gaussians.count, static_cast<std::size_t>(options.max_gaussians))
-            : gaussians.count;
-  const auto by_rays = std::count_if(train_cameras.begin(), train_cameras.end(),
-                                     [this](const Camera& c) { return tracer.by_rays(c); });
-  check_memory(options, {most, pixels, train_views.size(), static_cast<std::size_t>(by_rays)},
+  small_photos = {};
+  footprint.update(gaussians);
+  const bool grows = density.accumulates_at(iteration);
+  check_memory(options,
+               {grows ? std::max(gaussians.count, most) : gaussians.count, largest_photo(),
+                train_views.size(), ray_views()},
                context.device());
-  if (by_rays > 0) {
+  if (const std::size_t by_rays = ray_views(); by_rays > 0) {
     spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),
                  options.mirrors.empty() ? "their cameras are no pinholes"
                                          : "there are mirrors in the scene");
@@ -296,8 +336,9 @@ void Trainer::Impl::step() {
   guard.check_loss(partials.pixel, partials.ssim, partials.tiles);
   tracer.backward(gaussians, image_gradient, gradients);
   whole = false;
-  if (iteration < options.densify_until) density.accumulate(gaussians, gradients, &guard.mark());
+  if (density.accumulates_at(iteration)) density.accumulate(gaussians, gradients, &guard.mark());
   adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
+  footprint.apply(gaussians, guard.mark());
   guard.close(adam.refused(), gaussians.count);
   ++iteration;
   whole = true;
@@ -390,6 +431,7 @@ void Trainer::Impl::control_density() {
       device_source.upload(source);
       adam.remap(device_source, gaussians.count);
     }
+    footprint.update(gaussians);
     spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",
                   iteration, plan.cloned, plan.split, plan.pruned, plan.refused, gaussians.count);
   }
@@ -524,9 +566,9 @@ void Trainer::Impl::run_iterations(Progress& progress, const InterruptGuard& int
     if (every(options.validate_every, iteration)) pause([this] { validate_model(); });
     // Asked once: a signal that comes later is seen after the next step.
     stop = interrupt.requested();
-    const bool evaluates =
-        last || every(options.eval_every, iteration) || contains(options.eval_at, iteration);
-    const bool saves = stop || last || contains(options.save_at, iteration);
+    const bool evaluates = last || every(options.eval_every, iteration) ||
+                           contains(options.eval_at, options.iterations, iteration);
+    const bool saves = stop || last || contains(options.save_at, options.iterations, iteration);
     // Before density control, as in 3DGS: fresh clones and children have not settled yet.
     if (saves) pause([this] { save_model(); });
     if (evaluates && (last || !stop)) pause([this, last] { evaluate_views(last); });

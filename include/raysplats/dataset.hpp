@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -25,8 +26,10 @@ struct View {
 
 /// Sparse points of a COLMAP model or a PLY named by the data set.
 struct PointCloud {
-  std::vector<float> positions;  ///< 3 N, world units
-  std::vector<float> colors;     ///< 3 N, in [0, 1]
+  std::vector<float> positions;              ///< 3 N, world units
+  std::vector<float> colors;                 ///< 3 N, in [0, 1]
+  std::vector<std::uint32_t> track_lengths;  ///< N photos that show it, or empty
+  std::vector<float> errors;                 ///< N reprojection errors in pixels, or empty
   std::size_t size() const { return positions.size() / 3; }
 };
 

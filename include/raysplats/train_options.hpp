@@ -15,10 +15,37 @@ enum class PixelLoss {
   kL2,  ///< mean squared error (the paper)
 };
 
+/// How the number of Gaussians is controlled.
+enum class DensityStrategy {
+  kBudget,  ///< a curve up to a count; the Gaussians with the highest signals are split
+  kAdc,     ///< whatever exceeds a threshold is cloned or split (Kerbl et al. 2023)
+};
+
 /// Gradient statistic that decides which Gaussians are densified.
 enum class DensifySignal {
+  kAuto,      ///< kAbsolute with kBudget, kScreen with kAdc
   kScreen,    ///< norm of the summed screen-space gradient (3DGS)
   kAbsolute,  ///< norm of the sum of absolute per-ray gradients (AbsGS, Ye et al. 2024)
+};
+
+/// A moment or a span of a run: a value below 1 is a share of its iterations, any other a number of
+/// iterations; 0 = none.
+struct RunShare {
+  double value = 0;
+
+  RunShare() = default;
+  /// Implicit, so that options read as numbers.
+  RunShare(double share_or_iterations) : value(share_or_iterations) {}
+  /// In a run of so many iterations; at least 1 unless the value is 0.
+  std::int64_t of(std::int64_t iterations) const;
+  bool operator==(const RunShare&) const = default;
+};
+
+/// Photos are reduced by `divisor` until `until`.
+struct ResolutionStep {
+  int divisor = 1;
+  RunShare until;
+  bool operator==(const ResolutionStep&) const = default;
 };
 
 /// Learning rate of one parameter group: `initial` decays exponentially to `final_value`.
@@ -42,18 +69,18 @@ struct TrainOptions {
   bool undistort = true;
   std::string background = "auto";   ///< "auto", "random" or "r,g,b"
   std::int64_t image_budget = 1024;  ///< MiB
-  std::vector<std::int64_t> resolution_schedule{300, 1000};
+  std::vector<ResolutionStep> resolution_schedule{{4, 0.1}, {3, 0.18}, {2, 0.4}};
   std::vector<std::string> mirrors;  ///< mesh files of known mirrors
   int mirror_bounces = 4;            ///< mirrors that a ray may meet
 
   // Start
-  std::string init = "auto";  ///< "auto", "colmap", "random" or the path of a PLY
-  std::int64_t init_count = 50000;
+  std::string init = "auto";    ///< "auto", "colmap", "random" or the path of a PLY
+  std::int64_t init_count = 0;  ///< 0 = a share of max_gaussians
   double init_opacity = 0.1;
 
   // Model
   int sh_degree = 3;
-  std::int64_t sh_degree_interval = 500;
+  RunShare sh_degree_interval = 0.1;
   ScaleActivation scale_activation = ScaleActivation::kExp;
 
   // Loss
@@ -87,17 +114,21 @@ struct TrainOptions {
   double launch_budget_ms = -1.0;  ///< 0 = unbounded, -1 = the device's default
 
   // Density control
-  std::int64_t densify_from = 300;
-  std::int64_t densify_until = 7000;
-  std::int64_t densify_every = 100;
+  DensityStrategy strategy = DensityStrategy::kBudget;
+  RunShare densify_from = 0.04;
+  RunShare densify_until = 0.65;
+  RunShare densify_every = 0;  ///< 0 = fit to the run and the number of photos
+  RunShare replace_until = 0.85;
   double densify_grad_threshold = 4e-4;
-  DensifySignal densify_signal = DensifySignal::kScreen;
+  DensifySignal densify_signal = DensifySignal::kAuto;
   double densify_size = 0.01;  ///< times the scene extent
   double split_factor = 1.6;
   double prune_opacity = 0.005;
-  double prune_scale = 0.1;      ///< times the scene extent; 0 = off
-  double prune_scale_min = 0.0;  ///< times the scene extent; 0 = off
-  std::int64_t max_gaussians = 500000;
+  double prune_scale = 0.0;        ///< times the scene extent; 0 = off
+  double prune_scale_min = 0.0;    ///< times the scene extent; 0 = off
+  std::int64_t max_gaussians = 0;  ///< 0 = from photos, iterations and device memory
+  double opacity_decay = 0.0;      ///< taken off every opacity in each pass
+  double footprint = 0.3;          ///< least standard deviation in pixels; 0 = off
   std::int64_t opacity_reset_every = 0;
   double opacity_reset_value = 0.01;
 
@@ -105,10 +136,10 @@ struct TrainOptions {
   std::int64_t log_every = 10;
   std::int64_t validate_every = 0;
   std::int64_t eval_every = 0;
-  std::vector<std::int64_t> eval_at{1000, 3000, 7000};
+  std::vector<RunShare> eval_at{0.1, 0.3, 0.7};
   int eval_views = 0;  ///< 0 = all
   int eval_renders = 4;
-  std::vector<std::int64_t> save_at{7000};
+  std::vector<RunShare> save_at{0.7};
   std::int64_t checkpoint_every = 1000;
   int keep_checkpoints = 2;
 };

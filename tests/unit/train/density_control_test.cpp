@@ -41,6 +41,7 @@ Gaussians model_of(const std::vector<double>& sizes,
 
 TrainOptions rules() {
   TrainOptions options;
+  options.strategy = DensityStrategy::kAdc;
   options.densify_grad_threshold = 0.5;
   options.densify_size = 0.1;
   options.prune_opacity = 0.05;
@@ -72,7 +73,7 @@ TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [
   for (const DensifySignal signal : {DensifySignal::kScreen, DensifySignal::kAbsolute}) {
     TrainOptions options = rules();
     options.densify_signal = signal;
-    DensityControl control(context, options, 1.0);
+    DensityControl control(context, options, 1.0, 1);
     accumulate(context, control, gaussians, {{1, 10, 1, 2, 20, 0, 3, 30, 1}});
     accumulate(context, control, gaussians, {{4, 40, 1, 5, 50, 0, 6, 60, 0}});
     const float f = signal == DensifySignal::kScreen ? 1.0f : 10.0f;
@@ -89,7 +90,7 @@ TEST_CASE("clone, split and prune follow the thresholds [small] [tiny]") {
     TrainOptions options = rules();
     options.prune_scale = activation == ScaleActivation::kExp ? 1.0 : 0.9;
     DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
-    DensityControl control(context, options, 1.0);
+    DensityControl control(context, options, 1.0, 1);
     accumulate(context, control, gaussians,
                {{0.4f, 0, 1, 0.6f, 0, 1, 0.5f, 0, 1, 9, 0, 1, 9, 0, 1, 9, 0, 0}});
     const DensityPlan plan = control.refine(gaussians, 100);
@@ -150,7 +151,7 @@ TEST_CASE("children are drawn from their parent's distribution, reproducibly") {
   const auto refined = [&](std::int64_t iteration, std::uint64_t seed) {
     options.seed = seed;
     DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-    DensityControl control(context, options, 1.0);
+    DensityControl control(context, options, 1.0, 1);
     accumulate(context, control, gaussians, {std::vector<float>(3 * kCount, 1.0f)});
     CHECK(control.refine(gaussians, iteration).split == kCount);
     return gaussians.means.download();
@@ -223,12 +224,12 @@ TEST_CASE("Gaussians that are not finite are removed and an empty result is an e
   Gaussians model = model_of({0.05, 0.05}, {0.5, 0.5});
   model.means[1] = std::numeric_limits<float>::quiet_NaN();
   DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  DensityControl control(context, rules(), 1.0);
+  DensityControl control(context, rules(), 1.0, 1);
   CHECK(control.refine(gaussians, 1).pruned == 1);
   CHECK(gaussians.count == 1);
   TrainOptions strict = rules();
   strict.prune_opacity = 0.9;
-  DensityControl remover(context, strict, 1.0);
+  DensityControl remover(context, strict, 1.0, 1);
   CHECK_THROWS_AS(remover.refine(gaussians, 1), Error);
 }
 
@@ -240,7 +241,7 @@ TEST_CASE("opacity reset lowers and never raises [small] [tiny]") {
   options.opacity_reset_every = 300;
   options.densify_from = 500;
   options.densify_until = 700;
-  DensityControl control(context, options, 1.0);
+  DensityControl control(context, options, 1.0, 1);
   control.reset_opacities(gaussians);
   const std::vector<float> after = gaussians.opacities.download();
   CHECK(after[0] == doctest::Approx(logit(0.01)));
@@ -252,4 +253,131 @@ TEST_CASE("opacity reset lowers and never raises [small] [tiny]") {
   CHECK(control.refines_at(500));
   CHECK(!control.refines_at(400));
   CHECK(!control.refines_at(550));
+}
+
+TEST_CASE("a budget removes what is transparent or unseen and halves the highest means up to it") {
+  // 0 transparent, 1 unseen, 2 to 5 with mean signals 3, 5, 5, 1, 6 not finite.
+  std::vector<float> means(21, 0.0f), scales(21, -1.0f), opacities(7, 1.0f);
+  opacities[0] = logit(0.001);
+  scales[18] = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t i = 0; i < 7; ++i) means[3 * i] = static_cast<float>(i);
+  const std::vector<float> statistics{9, 1, 0, 0, 6, 2, 5, 1, 10, 2, 1, 1, 99, 1};
+  const auto halved = [&](const BudgetRules& rules) {
+    const DensityPlan plan = plan_budget(means, scales, opacities, statistics, rules);
+    std::multiset<std::uint32_t> out;
+    for (std::size_t i = 0; i < plan.source.size(); ++i) {
+      if (plan.role[i] == static_cast<std::uint32_t>(DensityRole::kFirstHalf))
+        out.insert(plan.source[i]);
+      CHECK(plan.source[i] != 0);
+      CHECK(plan.source[i] != 6);
+    }
+    CHECK(plan.source.size() == plan.role.size());
+    CHECK(plan.split == out.size());
+    return std::pair(plan.source.size(), out);
+  };
+  using Set = std::multiset<std::uint32_t>;
+  CHECK(halved({5, 0.005, false}) == std::pair(std::size_t{5}, Set{}));
+  CHECK(halved({6, 0.005, false}) == std::pair(std::size_t{6}, Set{3}));
+  CHECK(halved({6, 0.005, true}) == std::pair(std::size_t{6}, Set{3, 4}));
+  CHECK(halved({7, 0.005, true}) == std::pair(std::size_t{7}, Set{2, 3, 4}));
+  CHECK(halved({100, 0.005, true}) == std::pair(std::size_t{8}, Set{2, 3, 4, 5}));
+  CHECK(halved({1, 0.005, true}).first == 4);
+}
+
+TEST_CASE("the budget's count follows its curve to the limit and stays there [small]") {
+  Context context(select_device(""));
+  constexpr std::size_t kCount = 100;
+  TrainOptions options;
+  options.iterations = 1000;
+  options.densify_from = 100;
+  options.densify_until = 600;
+  options.densify_every = 100;
+  options.replace_until = 800;
+  options.max_gaussians = 300;
+  DeviceGaussians gaussians = DeviceGaussians::upload(
+      context, model_of(std::vector<double>(kCount, 0.1), std::vector<double>(kCount, 0.9)),
+      ScaleActivation::kExp);
+  DensityControl control(context, options, 1.0, 7);
+  for (std::int64_t iteration = 100; iteration <= 800; iteration += 100) {
+    CHECK(control.refines_at(iteration));
+    std::vector<float> screen(3 * gaussians.count, 1.0f);
+    accumulate(context, control, gaussians, {screen});
+    control.refine(gaussians, iteration);
+    const double left = std::clamp((600.0 - static_cast<double>(iteration)) / 500.0, 0.0, 1.0);
+    const double curve = 300.0 - 200.0 * left * left;
+    CHECK(std::abs(static_cast<double>(gaussians.count) - curve) <= 3.0);
+  }
+  CHECK(!control.refines_at(900));
+  CHECK(!control.accumulates_at(800));
+}
+
+TEST_CASE("halves lie side by side along the longest axis, fainter and smaller [small] [tiny]") {
+  Context context(select_device(""));
+  TrainOptions options;
+  options.iterations = 100;
+  options.densify_from = 10;
+  options.densify_until = 90;
+  options.densify_every = 10;
+  options.max_gaussians = 6;
+  for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
+    const Gaussians before = model_of({0.2, 0.3, 0.25}, {0.5, 0.9, 0.2});
+    DeviceGaussians gaussians = DeviceGaussians::upload(context, before, activation);
+    DensityControl control(context, options, 1.0, 1);
+    accumulate(context, control, gaussians, {std::vector<float>(9, 1.0f)});
+    const DensityPlan plan = control.refine(gaussians, 90);
+    REQUIRE(plan.split == 3);
+    const Gaussians after = gaussians.download();
+    for (std::size_t i = 0; i < 6; ++i) {
+      const std::size_t s = plan.source[i];
+      const auto opacity = [](float x) { return 1.0 / (1.0 + std::exp(-static_cast<double>(x))); };
+      CHECK(opacity(after.opacities[i]) ==
+            doctest::Approx(0.6 * opacity(before.opacities[s])).epsilon(1e-4));
+      // Axis 0 is the longest in model_of().
+      const double longest = std::exp(static_cast<double>(before.log_scales[3 * s]));
+      double squared = 0;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double size = std::exp(static_cast<double>(before.log_scales[3 * s + a]));
+        CHECK(std::exp(static_cast<double>(after.log_scales[3 * i + a])) ==
+              doctest::Approx((a == 0 ? 0.5 : 0.85) * size).epsilon(1e-4));
+        squared +=
+            std::pow(static_cast<double>(after.means[3 * i + a]) - before.means[3 * s + a], 2);
+      }
+      CHECK(std::sqrt(squared) == doctest::Approx(0.5 * longest).epsilon(1e-3));
+    }
+    // Both sides of each parent.
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t k = i + 1; k < 6; ++k) {
+        if (plan.source[i] != plan.source[k]) continue;
+        for (std::size_t a = 0; a < 3; ++a) {
+          CHECK(0.5 * (after.means[3 * i + a] + after.means[3 * k + a]) ==
+                doctest::Approx(before.means[3 * plan.source[i] + a]).epsilon(1e-3));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE(
+    "fading takes the same off every opacity but leaves what is faint already [small] [tiny]") {
+  Context context(select_device(""));
+  TrainOptions options;
+  options.iterations = 100;
+  options.densify_from = 10;
+  options.densify_until = 50;
+  options.replace_until = 90;
+  options.densify_every = 10;
+  options.max_gaussians = 3;
+  options.prune_opacity = 0;
+  options.opacity_decay = 0.1;
+  DeviceGaussians gaussians = DeviceGaussians::upload(
+      context, model_of({0.1, 0.1, 0.1}, {0.9, 0.05, 0.002}), ScaleActivation::kExp);
+  DensityControl control(context, options, 1.0, 1);
+  accumulate(context, control, gaussians, {std::vector<float>(9, 1.0f)});
+  const DensityPlan plan = control.refine(gaussians, 80);
+  CHECK(!plan.changes());
+  const std::vector<float> logits = gaussians.opacities.download();
+  const auto opacity = [&logits](std::size_t i) { return 1.0 / (1.0 + std::exp(-logits[i])); };
+  CHECK(opacity(0) == doctest::Approx(0.8).epsilon(1e-4));
+  CHECK(opacity(1) == doctest::Approx(0.004).epsilon(1e-3));
+  CHECK(opacity(2) == doctest::Approx(0.002).epsilon(1e-3));
 }

@@ -75,11 +75,14 @@ TEST_CASE("neighbour distances equal brute force") {
 }
 
 TEST_CASE("points become Gaussians with their colour, clamped scales and the opacity asked for") {
+  // Extent 20 * 1.1 about the middle of two cameras.
+  const std::vector<Camera> cameras{look_at({20, 0, 0}, {0, 0, 0}, {0, 0, 1}, 80, 80, 80),
+                                    look_at({-20, 0, 0}, {0, 0, 0}, {0, 0, 1}, 80, 80, 80)};
   PointCloud points;
   points.positions = {
       0, 0, 0, 1, 0, 0, 0, 2, 0, 50, 50, 50, std::numeric_limits<float>::quiet_NaN(), 0, 0};
   points.colors = {1, 0.5f, 0, 0, 0, 0, 1, 1, 1, 0.2f, 0.4f, 0.6f, 0, 0, 0};
-  const Gaussians model = gaussians_from_points(points, 2, 0.1, 20.0);
+  const Gaussians model = gaussians_from_points(points, 2, 0.1, cameras);
   REQUIRE(model.size() == 4);
   CHECK(model.sh.size() == 4 * 27);
   for (std::size_t i = 0; i < 4; ++i) {
@@ -90,13 +93,13 @@ TEST_CASE("points become Gaussians with their colour, clamped scales and the opa
     }
     CHECK(model.sh[27 * i + 3] == 0.0f);
   }
-  // Far from everything: a tenth of the extent at most.
-  CHECK(std::exp(model.log_scales[9]) == doctest::Approx(2.0));
+  // Far from everything: a tenth of the distance to the nearest camera at most.
+  CHECK(std::exp(model.log_scales[9]) == doctest::Approx(0.1 * std::sqrt(30.0 * 30 + 2 * 50 * 50)));
   PointCloud pair;
   pair.positions = {0, 0, 0, 0, 0, 0};
   pair.colors.assign(6, 0.5f);
-  CHECK(std::exp(gaussians_from_points(pair, 0, 0.1, 20.0).log_scales[0]) ==
-        doctest::Approx(20.0 * 1e-4));
+  CHECK(std::exp(gaussians_from_points(pair, 0, 0.1, cameras).log_scales[0]) ==
+        doctest::Approx(22.0 * 1e-4));
 }
 
 TEST_CASE(
@@ -144,6 +147,31 @@ TEST_CASE("a random start is a function of the seed and fills the region") {
   CHECK(mean == doctest::Approx(2.0).epsilon(0.02));
 }
 
+TEST_CASE("points that few photos show or that fit them badly are left out when enough remain") {
+  PointCloud points;
+  const auto add = [&points](std::uint32_t track, float error) {
+    points.positions.insert(points.positions.end(), 3, static_cast<float>(points.size()));
+    points.colors.insert(points.colors.end(), 3, 0.5f);
+    points.track_lengths.push_back(track);
+    points.errors.push_back(error);
+  };
+  for (int i = 0; i < 2500; ++i) add(3, 1.0f);
+  add(2, 0.1f);
+  add(9, 2.5f);
+  CHECK(reliable_points(points).size() == 2500);
+  PointCloud few = points;
+  few.track_lengths.assign(few.size(), 2);
+  CHECK(reliable_points(few).size() == few.size());
+  few.track_lengths.clear();
+  CHECK(reliable_points(few).size() == few.size());
+}
+
+TEST_CASE("the limit grows with pixels and the root of the iterations") {
+  CHECK(fitted_limit(100000, 1000) == 40000);
+  CHECK(fitted_limit(100000, 4000) == 80000);
+  CHECK(fitted_limit(10, 1000) == 2000);
+}
+
 TEST_CASE("the first model follows the options") {
   Dataset dataset;
   dataset.root = "somewhere";
@@ -151,21 +179,30 @@ TEST_CASE("the first model follows the options") {
   options.init_count = 50;
   options.sh_degree = 1;
   const std::vector<Camera> cameras = ring(6, 2.0, {0, 0, 0});
-  CHECK(initial_model(dataset, cameras, options).size() == 50);
+  const std::vector<SmallPhoto> none;
+  const auto first = [&](std::size_t limit) {
+    return initial_model(
+        dataset, cameras, [&none]() -> const auto& { return none; }, limit, options);
+  };
+  options.init = "random";
+  CHECK(first(1000).size() == 50);
+  options.init_count = 0;
+  CHECK(first(1000).size() == 300);
   options.init = "colmap";
-  CHECK_THROWS_AS(initial_model(dataset, cameras, options), UsageError);
+  CHECK_THROWS_AS(first(1000), UsageError);
   options.init = "auto";
   for (int i = 0; i < 90; ++i) {
     dataset.points.positions.push_back(static_cast<float>(i) * 0.01f);
     dataset.points.colors.push_back(0.5f);
   }
-  CHECK(initial_model(dataset, cameras, options).size() == 30);
-  options.max_gaussians = 7;
-  const Gaussians few = initial_model(dataset, cameras, options);
+  CHECK(first(1000).size() == 30);
+  // Half of the limit: the start leaves room to grow.
+  const Gaussians few = first(14);
   CHECK(few.size() == 7);
   CHECK(few.sh.size() == 7 * 12);
   options.init = "random";
-  CHECK(initial_model(dataset, cameras, options).size() == 7);
+  options.init_count = 50;
+  CHECK(first(7).size() == 7);
   options.init = "/nowhere/model.ply";
-  CHECK_THROWS_AS(initial_model(dataset, cameras, options), DataError);
+  CHECK_THROWS_AS(first(1000), DataError);
 }

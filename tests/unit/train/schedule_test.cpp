@@ -34,11 +34,40 @@ TEST_CASE("bands and resolution are switched on over time") {
   CHECK(active_sh_degree(options, 0) == 2);
   options.resolution_schedule = {};
   CHECK(resolution_divisor(options, 0) == 1);
-  options.resolution_schedule = {100, 300};
+  options.resolution_schedule = {{4, 100}, {2, 300}};
   CHECK(resolution_divisor(options, 0) == 4);
   CHECK(resolution_divisor(options, 99) == 4);
   CHECK(resolution_divisor(options, 100) == 2);
   CHECK(resolution_divisor(options, 300) == 1);
+}
+
+TEST_CASE("values below 1 are shares of the run, others iterations") {
+  CHECK(RunShare(0.4).of(1000) == 400);
+  CHECK(RunShare(0.4).of(10) == 4);
+  CHECK(RunShare(1e-6).of(10) == 1);
+  CHECK(RunShare(1).of(1000) == 1);
+  CHECK(RunShare(300).of(100) == 300);
+  CHECK(RunShare(0).of(100) == 0);
+}
+
+TEST_CASE(
+    "runs of every length see full-size photos, all bands and no density control at their end") {
+  for (const std::int64_t iterations : {100, 1000, 2000, 10000, 30000}) {
+    INFO(iterations);
+    TrainOptions options;
+    options.iterations = iterations;
+    CHECK(resolution_divisor(options, 0) == 4);
+    CHECK(resolution_divisor(options, iterations * 6 / 10) == 1);
+    CHECK(active_sh_degree(options, 0) == 0);
+    CHECK(active_sh_degree(options, iterations / 2) == options.sh_degree);
+    CHECK(options.densify_until.of(iterations) < iterations);
+    CHECK(options.replace_until.of(iterations) < iterations);
+    int last = 64;
+    for (std::int64_t i = 0; i < iterations; i += iterations / 100) {
+      CHECK(resolution_divisor(options, i) <= last);
+      last = resolution_divisor(options, i);
+    }
+  }
 }
 
 TEST_CASE("every pass sees every view once, in another order, and a new object continues it") {

@@ -121,7 +121,7 @@ TEST_CASE("a marked step changes neither parameters nor moments nor statistics")
   ones(gradients.screen, 3 * 130);
   Adam adam(context, {});
   TrainOptions options;
-  DensityControl density(context, options, 1.0);
+  DensityControl density(context, options, 1.0, 1);
   const AdamRates rates{1, 1, 1, 1, 1, 1};
   adam.initialize(gaussians.count, gaussians.sh_degree);
   Buffer<std::uint32_t> guard(context, 5, "guard");

@@ -108,12 +108,29 @@ TEST_CASE("an unknown key is refused with the nearest one") {
 
 TEST_CASE("values out of range and of the wrong kind are refused by name") {
   const auto path = temporary("range.toml");
-  for (const std::string line :
-       {"iterations = -1", "iterations = 1.5", "iterations = many", "ssim-weight = 1.5",
-        "ssim-weight = nan", "hit-order = \"depth\"", "adaptive-radius = 2", "background = \"red\"",
-        "background = \"1,1\"", "background = \"1,1,2\"", "packet-width = 3",
-        "resolution-schedule = [20, 10]", "eval-at = [0]", "position-lr = 0", "sh-degree = 5",
-        "iterations = [1, 2]"}) {
+  for (const std::string line : {"iterations = -1",
+                                 "iterations = 1.5",
+                                 "iterations = many",
+                                 "ssim-weight = 1.5",
+                                 "ssim-weight = nan",
+                                 "hit-order = \"depth\"",
+                                 "adaptive-radius = 2",
+                                 "background = \"red\"",
+                                 "background = \"1,1\"",
+                                 "background = \"1,1,2\"",
+                                 "packet-width = 3",
+                                 "resolution-schedule = [20, 10]",
+                                 "resolution-schedule = [\"4:10\", 20]",
+                                 "resolution-schedule = [\"0:10\"]",
+                                 "resolution-schedule = [\"4:\"]",
+                                 "eval-at = [0.5, 1.5]",
+                                 "densify-until = -0.1",
+                                 "densify-from = 2.5",
+                                 "strategy = \"grow\"",
+                                 "eval-at = [0]",
+                                 "position-lr = 0",
+                                 "sh-degree = 5",
+                                 "iterations = [1, 2]"}) {
     INFO(line);
     write_text_file(path, line + "\n");
     CHECK(message_of(path) != "");
@@ -150,7 +167,7 @@ TEST_CASE("the command line beats the file, wherever --config stands") {
     CHECK(options.iterations == 9);
     CHECK(options.seed == 5);
     CHECK(!options.adaptive_radius);
-    CHECK(options.eval_at == std::vector<std::int64_t>{1, 2});
+    CHECK(options.eval_at == std::vector<RunShare>{1, 2});
   }
   CHECK(parse({"--config", path.string(), "--adaptive-radius"}).adaptive_radius);
   CHECK(!parse({"--no-adaptive-radius"}).adaptive_radius);

@@ -89,7 +89,7 @@ TrainOptions small_options() {
   options.densify_grad_threshold = 1e-5;
   options.prune_opacity = 0.05;
   options.opacity_reset_every = 0;
-  options.resolution_schedule = {12};
+  options.resolution_schedule = {{2, 12}};
   options.log_every = 5;
   options.eval_at = {};
   options.save_at = {};

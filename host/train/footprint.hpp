@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "device/context.hpp"
+#include "raysplats/camera.hpp"
+#include "shared/layout.h"
+#include "trace/device_gaussians.hpp"
+
+namespace raysplats {
+
+/// Keeps Gaussians from becoming thinner than a share of a pixel in the view that resolves them
+/// best: see cl/train/footprint.cl. What it changes are the parameters themselves, so the model
+/// that is written needs nothing else to look as it did in training.
+class Footprint {
+ public:
+  /// `share` of a pixel as a standard deviation; 0 turns everything off.
+  Footprint(Context& context, std::span<const Camera> cameras, double share);
+
+  /// Finds the least sizes for the Gaussians' present means; enqueues without waiting.
+  void update(const DeviceGaussians& gaussians);
+
+  /// Raises what is smaller; update() has to have seen this number of Gaussians. A guard whose
+  /// first word is not 0 keeps them as they are.
+  void apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard);
+
+ private:
+  Context& context_;
+  double share_;
+  std::uint32_t views_ = 0;
+  Buffer<RsFootprintView> cameras_;
+  Buffer<float> lows_;
+};
+
+/// How large the pixels of a camera are, for the device.
+RsFootprintView footprint_view(const Camera& camera);
+
+}  // namespace raysplats

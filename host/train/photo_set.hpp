@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "io/view_loader.hpp"
+#include "raysplats/dataset.hpp"
+
+namespace raysplats {
+
+/// A reduced photo and the camera that would have taken it.
+struct SmallPhoto {
+  Camera camera;
+  std::shared_ptr<const io::PackedImage> picture;
+
+  /// Colour and alpha in [0, 1] of the pixel that contains the image point; the point has to lie
+  /// inside the picture.
+  glm::dvec4 at(const glm::dvec2& point) const;
+  /// Where a world point is seen inside the picture.
+  std::optional<glm::dvec2> sees(const glm::dvec3& world) const;
+};
+
+/// The photos of some views, reduced so that their longer side has at most `longest` pixels; for
+/// what looks at all of them before training begins. Throws the DataError of load_view_image().
+std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
+                                          std::span<const std::size_t> views,
+                                          int longest);
+
+/// Mean share of the pixels that show something: alpha at least one half.
+double opaque_share(std::span<const SmallPhoto> photos);
+
+}  // namespace raysplats

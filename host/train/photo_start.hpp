@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "raysplats/dataset.hpp"
+#include "train/initialization.hpp"
+#include "train/photo_set.hpp"
+
+namespace raysplats {
+
+/// Points to start from where the data set has none, from the photos themselves. All are functions
+/// of the seed.
+
+/// Points inside the visual hull of photos that are cut out by alpha: drawn evenly from `region`
+/// until `count` of them are seen as background by no photo (Laurentini 1994; with one pixel to
+/// spare). Their colour is the median of what the photos show there. Fewer than `count` when the
+/// hull is a small part of the region.
+PointCloud carved_points(std::span<const SmallPhoto> photos,
+                         const Region& region,
+                         std::size_t count,
+                         std::uint64_t seed);
+
+/// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
+/// sweep, Collins 1996, over single pixels with their surroundings). Of the pixels that no depth
+/// explains clearly, a quarter of `count` at most get a random depth, so that everything seen has
+/// something in front of it. `distance` is that of what the cameras look at; depths reach from a
+/// fifth of it to ten times. Colours are the photos'.
+PointCloud swept_points(std::span<const SmallPhoto> photos,
+                        double distance,
+                        std::size_t count,
+                        std::uint64_t seed);
+
+}  // namespace raysplats

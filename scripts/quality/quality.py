@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Trains on many captures with one set of options, tabulates held-out quality, compares with a stored result."""
+
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tomllib
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+
+
+def arguments():
+    parser = argparse.ArgumentParser(
+        prog="scripts/quality.sh",
+        description="Trains on each scene of scripts/quality/scenes.toml that lies below DATA with the default "
+        "settings, only size and length given, and prints PSNR, SSIM, Gaussians, seconds of training and the gap "
+        "between training and held-out views. Options after -- go to `raysplats train`. A finished run is not "
+        "repeated. Exit status 1 when a run fails or a scene ends more than 0.1 dB below --compare.",
+    )
+    parser.add_argument("data", type=pathlib.Path, help="folder with the captures (colmap/..., nerf_synthetic/...)")
+    parser.add_argument("-o", "--output", type=pathlib.Path, required=True, help="folder for runs and result.json")
+    parser.add_argument("--screen", action="store_true", help="smaller photos and shorter runs, to try a change on all")
+    parser.add_argument("--only", default="", help="comma-separated scene names")
+    parser.add_argument("--seeds", default="42", help="comma-separated; the table shows means")
+    parser.add_argument("--compare", type=pathlib.Path, help="result.json of an earlier state")
+    parser.add_argument("--raysplats", type=pathlib.Path, default=ROOT / "build/release/bin/raysplats")
+    parser.add_argument("--device", help="OpenCL device")
+    args, extra = parser.parse_known_args()
+    args.extra = [option for option in extra if option != "--"]
+    return args
+
+
+def scenes(args):
+    wanted = set(filter(None, args.only.split(",")))
+    known = tomllib.loads((HERE / "scenes.toml").read_text())["scene"]
+    names = {scene["name"] for scene in known}
+    if wanted - names:
+        sys.exit(f"quality.sh: no scene is called {', '.join(sorted(wanted - names))}; there are {', '.join(sorted(names))}")
+    for scene in known:
+        if wanted and scene["name"] not in wanted:
+            continue
+        if (args.data / scene["path"]).is_dir():
+            yield scene
+        else:
+            print(f"{scene['name']}: not below {args.data}, left out", file=sys.stderr)
+
+
+def train(args, scene, seed):
+    """Runs one training unless it is finished; returns its metrics or None."""
+    size = scene["screen" if args.screen else "full"]
+    run = args.output / f"{scene['name']}-{seed}"
+    metrics = run / "metrics.json"
+    if not metrics.exists() or not json.loads(metrics.read_text()).get("complete"):
+        command = [args.raysplats, "train", args.data / scene["path"], "-o", run, "--seed", seed, "-q",
+                   "-n", size["iterations"], "--downscale", size["downscale"], "--checkpoint-every", 0]
+        command += ["--device", args.device] if args.device else []
+        done = subprocess.run([str(part) for part in command] + args.extra, capture_output=True, text=True)
+        if done.returncode != 0:
+            print(f"{scene['name']}: {done.stderr.strip()}", file=sys.stderr)
+            return None
+    return run_result(run)
+
+
+def run_result(run):
+    metrics = json.loads((run / "metrics.json").read_text())
+    evaluations = metrics["evaluations"]
+    rows = [line.split(",") for line in (run / "metrics.csv").read_text().splitlines()]
+    column = rows[0].index("psnr")
+    seen = [float(row[column]) for row in rows[-20:]]
+    return {
+        "psnr": evaluations[-1]["psnr"],
+        "ssim": evaluations[-1]["ssim"],
+        "best": max(entry["psnr"] for entry in evaluations),
+        "gap": sum(seen) / len(seen) - evaluations[-1]["psnr"],
+        "gaussians": metrics["gaussians"],
+        "seconds": metrics["training_seconds"],
+    }
+
+
+def mean(results):
+    return {key: sum(result[key] for result in results) / len(results) for key in results[0]}
+
+
+def main():
+    args = arguments()
+    args.output.mkdir(parents=True, exist_ok=True)
+    before = json.loads(args.compare.read_text())["scenes"] if args.compare else {}
+    table, failed = {}, False
+    print(f"{'scene':18} {'PSNR':>6} {'SSIM':>7} {'gap':>6} {'below best':>10} {'Gaussians':>9} {'seconds':>8}"
+          + (f" {'change':>7}" if before else ""), flush=True)
+    for scene in scenes(args):
+        results = [train(args, scene, seed) for seed in args.seeds.split(",")]
+        if None in results:
+            failed = True
+            continue
+        row = table[scene["name"]] = mean(results)
+        line = (f"{scene['name']:18} {row['psnr']:6.2f} {row['ssim']:7.4f} {row['gap']:6.2f} "
+                f"{row['best'] - row['psnr']:10.2f} {row['gaussians']:9.0f} {row['seconds']:8.1f}")
+        if scene["name"] in before:
+            change = row["psnr"] - before[scene["name"]]["psnr"]
+            failed = failed or change < -0.1
+            line += f" {change:+7.2f}"
+        print(line, flush=True)
+    if table:
+        total = mean(list(table.values()))
+        line = f"{'mean':18} {total['psnr']:6.2f} {total['ssim']:7.4f} {total['gap']:6.2f}"
+        common = [name for name in table if name in before]
+        if common:
+            change = sum(table[name]["psnr"] - before[name]["psnr"] for name in common) / len(common)
+            line += f"   change {change:+.3f} dB"
+        print(line)
+    (args.output / "result.json").write_text(json.dumps({"options": args.extra, "screen": args.screen, "scenes": table},
+                                                        indent=1) + "\n")
+    return 1 if failed or not table else 0
+
+
+sys.exit(main())

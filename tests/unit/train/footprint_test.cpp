@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/footprint.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "base/rng.hpp"
+#include "core/camera_model.hpp"
+#include "raysplats/device.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+std::vector<Camera> cameras_of(CameraModel model) {
+  std::vector<Camera> out;
+  for (int i = 0; i < 5; ++i) {
+    const double angle = 1.3 * i;
+    out.push_back(look_at({3 * std::cos(angle), 3 * std::sin(angle), 0.5 * i}, {0, 0, 0}, {0, 0, 1},
+                          80, 60, 60.0 + 10 * i));
+    out.back().model = model;
+  }
+  return out;
+}
+
+// Size of a pixel at the point in the camera that resolves it best, in double precision; infinite
+// where no camera sees it.
+double least_pixel(const std::vector<Camera>& cameras, const glm::dvec3& world) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Camera& c : cameras) {
+    const glm::dvec3 p = c.rotation * world + c.translation;
+    const double focal = std::max(c.fx, c.fy);
+    if (c.model == CameraModel::kFisheye) least = std::min(least, glm::length(p) / focal);
+    if (c.model == CameraModel::kOrthographic) least = std::min(least, 1.0 / focal);
+    if (c.model == CameraModel::kEquirectangular)
+      least = std::min(least, glm::length(p) * 2 * std::numbers::pi / c.width);
+    if (c.model != CameraModel::kPinhole && c.model != CameraModel::kOpenCv) continue;
+    const double x = c.fx * p.x / p.z + c.cx, y = c.fy * p.y / p.z + c.cy;
+    const bool seen = p.z > 0 && x >= -0.15 * c.width && x <= 1.15 * c.width &&
+                      y >= -0.15 * c.height && y <= 1.15 * c.height;
+    if (seen) least = std::min(least, p.z / focal);
+  }
+  return least;
+}
+
+}  // namespace
+
+TEST_CASE("scales are raised to a share of the smallest pixel and left alone above it [small]") {
+  Context context(select_device(""));
+  constexpr std::size_t kCount = 200;
+  Buffer<std::uint32_t> open(context, 1, "guard");
+  open.clear();
+  for (const CameraModel model :
+       {CameraModel::kPinhole, CameraModel::kOpenCv, CameraModel::kFisheye,
+        CameraModel::kEquirectangular, CameraModel::kOrthographic}) {
+    for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
+      CounterRng rng(3, 9);
+      Gaussians before;
+      before.resize(kCount);
+      for (float& v : before.means) v = static_cast<float>(4.0 * rng.uniform() - 2.0);
+      for (float& v : before.log_scales) v = static_cast<float>(-9.0 + 8.0 * rng.uniform());
+      const std::vector<Camera> cameras = cameras_of(model);
+      DeviceGaussians gaussians = DeviceGaussians::upload(context, before, activation);
+      Footprint footprint(context, cameras, 0.4);
+      footprint.update(gaussians);
+      footprint.apply(gaussians, open);
+      const Gaussians after = gaussians.download();
+      std::size_t raised = 0, unseen = 0;
+      for (std::size_t i = 0; i < kCount; ++i) {
+        const glm::dvec3 mean(before.means[3 * i], before.means[3 * i + 1],
+                              before.means[3 * i + 2]);
+        const double least = 0.4 * least_pixel(cameras, mean);
+        unseen += std::isinf(least);
+        for (std::size_t a = 0; a < 3; ++a) {
+          const double size = std::exp(static_cast<double>(before.log_scales[3 * i + a]));
+          const double expected = std::isinf(least) ? size : std::max(size, least);
+          raised += expected > size;
+          CHECK(std::exp(static_cast<double>(after.log_scales[3 * i + a])) ==
+                doctest::Approx(expected).epsilon(1e-4));
+        }
+      }
+      CHECK(raised > kCount / 4);
+      CHECK(raised < 3 * kCount);
+      if (model == CameraModel::kPinhole) CHECK(unseen > 0);
+    }
+  }
+}
+
+TEST_CASE("a marked step, a share of 0 and NaN leave scales as they are [small] [tiny]") {
+  Context context(select_device(""));
+  Gaussians before;
+  before.resize(2);
+  before.log_scales = {-20, -20, -20, std::numeric_limits<float>::quiet_NaN(), -20, -20};
+  const std::vector<Camera> cameras = cameras_of(CameraModel::kPinhole);
+  Buffer<std::uint32_t> guard(context, 1, "guard");
+  guard.upload(std::vector<std::uint32_t>{1});
+  DeviceGaussians gaussians = DeviceGaussians::upload(context, before, ScaleActivation::kExp);
+  Footprint footprint(context, cameras, 0.4);
+  footprint.update(gaussians);
+  footprint.apply(gaussians, guard);
+  CHECK(gaussians.download().log_scales[0] == -20.0f);
+  guard.clear();
+  Footprint off(context, cameras, 0.0);
+  off.update(gaussians);
+  off.apply(gaussians, guard);
+  CHECK(gaussians.download().log_scales[0] == -20.0f);
+  footprint.apply(gaussians, guard);
+  const std::vector<float> raised = gaussians.download().log_scales;
+  CHECK(raised[0] > -10.0f);
+  CHECK(std::isnan(raised[3]));
+  CHECK(raised[4] == raised[0]);
+}

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/photo_start.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
+#include <memory>
+#include <vector>
+
+#include "core/camera_model.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+// The photo that `color` of each pixel's ray makes.
+template <class Color>
+SmallPhoto photo_of(const Camera& camera, const Color& color) {
+  auto picture = std::make_shared<io::PackedImage>();
+  picture->width = camera.width;
+  picture->height = camera.height;
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const CameraRay ray = camera_ray(camera, x + 0.5, y + 0.5);
+      const glm::dvec4 c = color(ray);
+      std::uint32_t pixel = 0;
+      for (int k = 0; k < 4; ++k)
+        pixel |= static_cast<std::uint32_t>(std::lround(255 * std::clamp(c[k], 0.0, 1.0))) << 8 * k;
+      picture->pixels.push_back(pixel);
+    }
+  }
+  return {camera, picture};
+}
+
+constexpr double kRadius = 0.5;
+const glm::dvec3 kMiddle(0.2, -0.1, 0.3);
+
+// An orange ball on transparent ground.
+glm::dvec4 ball(const CameraRay& ray) {
+  const glm::dvec3 to = kMiddle - ray.origin;
+  const glm::dvec3 off = to - glm::dot(to, ray.direction) * ray.direction;
+  return glm::length(off) < kRadius ? glm::dvec4(0.9, 0.5, 0.1, 1.0) : glm::dvec4(0.0);
+}
+
+// A wall at x = 4 with a pattern that does not repeat within a pixel's neighbourhood.
+glm::dvec4 wall(const CameraRay& ray) {
+  const double t = (4.0 - ray.origin.x) / ray.direction.x;
+  const glm::dvec3 p = ray.origin + t * ray.direction;
+  return {0.5 + 0.4 * std::sin(3.1 * p.y + 0.7 * p.z) * std::sin(1.3 * p.z),
+          0.5 + 0.4 * std::cos(2.3 * p.z - 1.1 * p.y), 0.5 + 0.4 * std::sin(4.7 * p.y - 2.9 * p.z),
+          1.0};
+}
+
+std::vector<SmallPhoto> ring_of_ball() {
+  std::vector<SmallPhoto> out;
+  for (int i = 0; i < 16; ++i) {
+    const double angle = 0.4 * i, height = i % 2 == 0 ? 1.5 : -1.2;
+    out.push_back(photo_of(look_at({3 * std::cos(angle), 3 * std::sin(angle), height}, {0, 0, 0},
+                                   {0, 0, 1}, 80, 80, 90),
+                           ball));
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("carving fills the body that the photos show, in its colour") {
+  const std::vector<SmallPhoto> photos = ring_of_ball();
+  CHECK(opaque_share(photos) > 0.05);
+  CHECK(opaque_share(photos) < 0.4);
+  const Region region{{0, 0, 0}, 1.2};
+  const PointCloud points = carved_points(photos, region, 500, 7);
+  REQUIRE(points.size() == 500);
+  CHECK(points.positions == carved_points(photos, region, 500, 7).positions);
+  CHECK(points.positions != carved_points(photos, region, 500, 8).positions);
+  double volume = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    const double distance = glm::distance(glm::dvec3(p[0], p[1], p[2]), kMiddle);
+    // A pixel is 0.04 wide there; the hull of 16 views is a little larger than the ball.
+    CHECK(distance < 1.35 * kRadius);
+    volume += distance < kRadius ? 1.0 : 0.0;
+    CHECK(points.colors[3 * i] == doctest::Approx(0.9).epsilon(0.02));
+    CHECK(points.colors[3 * i + 2] == doctest::Approx(0.1).epsilon(0.05));
+  }
+  CHECK(volume > 300);
+  CHECK(carved_points(photos, {{9, 9, 9}, 0.1}, 10, 7).size() == 0);
+}
+
+TEST_CASE("sweeping finds a textured wall and its colours") {
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 9; ++i) {
+    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
+    photos.push_back(
+        photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90), wall));
+  }
+  const PointCloud points = swept_points(photos, 3.0, 400, 5);
+  CHECK(points.positions == swept_points(photos, 3.0, 400, 5).positions);
+  REQUIRE(points.size() >= 300);
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    if (std::abs(p[0] - 4.0) > 0.5) continue;
+    ++near;
+  }
+  MESSAGE(near << " of " << points.size() << " points on the wall");
+  CHECK(near > points.size() * 6 / 10);
+}
+
+TEST_CASE("photos without a common view give no sure points and do not fail") {
+  std::vector<SmallPhoto> one{photo_of(look_at({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 40, 30, 40), wall)};
+  const PointCloud points = swept_points(one, 2.0, 100, 1);
+  CHECK(points.size() == 25);
+  for (const float p : points.positions) CHECK(std::isfinite(p));
+}
