@@ -10,7 +10,6 @@
 #include "base/atomic_file.hpp"
 #include "bench/bench.hpp"
 #include "bench/compare.hpp"
-#include "device/profiler.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -123,7 +122,7 @@ void run(const Options& options) {
   fmt::print("{}", bench_table(report));
   if (!options.json.empty()) write_text_file(options.json, bench_json(report));
   if (!options.csv.empty()) write_text_file(options.csv, bench_csv(report));
-  if (options.device.profile) fmt::print("{}", context.profiler().table());
+  if (options.device.profile) fmt::print("{}", context.profile_table());
 }
 
 void compare(const CompareOptions& options) {

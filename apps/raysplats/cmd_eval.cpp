@@ -10,12 +10,11 @@
 #include "base/output_directory.hpp"
 #include "base/progress.hpp"
 #include "core/morton_order.hpp"
-#include "device/profiler.hpp"
 #include "eval/evaluator.hpp"
+#include "light/view_tracer.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "trace/view_tracer.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats::cli {
@@ -45,7 +44,6 @@ void run(const Options& options, const GlobalOptions& global) {
   const std::unique_ptr<Context> context = open_context(options.device);
   const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
   ViewTracer tracer(*context, trace);
-  tracer.update(gaussians);
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), views);
 
@@ -55,7 +53,8 @@ void run(const Options& options, const GlobalOptions& global) {
   std::uint64_t rays = 0;
   std::uint64_t capped = 0;
   const auto render = [&](const Camera& camera) {
-    Image image = tracer.render(gaussians, camera);
+    tracer.forward(gaussians, camera);
+    Image image = tracer.download_image();
     rays += image.pixels();
     capped += tracer.capped_rays();
     return image;
@@ -76,7 +75,7 @@ void run(const Options& options, const GlobalOptions& global) {
   }
   warn_of_capped_rays(capped, rays, trace);
   fmt::print("{}", report.table());
-  if (options.device.profile) fmt::print("{}", context->profiler().table());
+  if (options.device.profile) fmt::print("{}", context->profile_table());
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include "base/progress.hpp"
 #include "core/morton_order.hpp"
 #include "core/orbit.hpp"
-#include "device/profiler.hpp"
 #include "eval/frame_writer.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
@@ -132,7 +131,6 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   const std::unique_ptr<Context> context = open_context(options.device);
   const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
   ViewTracer tracer(*context, trace);
-  tracer.update(gaussians);
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), cameras.size());
 
@@ -155,7 +153,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   fmt::print("{} frames in {} ({:.2f} s of tracing, {:.2f} million rays per second)\n",
              report.frames, options.output, report.trace_seconds,
              1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
-  if (options.device.profile) fmt::print("{}", context->profiler().table());
+  if (options.device.profile) fmt::print("{}", context->profile_table());
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "base/progress.hpp"
-#include "device/profiler.hpp"
 #include "options.hpp"
 #include "train/train_config.hpp"
 #include "train/trainer.hpp"
@@ -49,7 +48,7 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
     fmt::print("PSNR {:.2f} dB, SSIM {:.4f} on {} held-out views\n", last.psnr, last.ssim,
                last.views);
   }
-  if (options.device.profile) fmt::print("{}", context->profiler().table());
+  if (options.device.profile) fmt::print("{}", context->profile_table());
 }
 
 }  // namespace

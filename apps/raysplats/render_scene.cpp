@@ -10,7 +10,6 @@
 #include "base/interrupt.hpp"
 #include "base/output_directory.hpp"
 #include "base/progress.hpp"
-#include "device/profiler.hpp"
 #include "eval/scene_frames.hpp"
 #include "io/scene_loader.hpp"
 #include "light/light_tracer.hpp"
@@ -178,7 +177,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
                  loaded.scene.render.max_bounces);
   }
   print_summary(report, flags.output);
-  if (flags.device.profile) fmt::print("{}", context->profiler().table());
+  if (flags.device.profile) fmt::print("{}", context->profile_table());
 }
 
 }  // namespace raysplats::cli

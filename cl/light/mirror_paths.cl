@@ -139,6 +139,24 @@ __kernel void store_picture(const uint count,
   image[3 * (size_t)pixels + first + i] = value.w;
 }
 
+// Depths and hits of the same rays as planes; results: as rays.cl makes them. Rays have unit
+// length: `axis` is what depth is counted along, or zero for along the ray.
+__kernel void store_depth(const uint count,
+                          const uint first,
+                          const uint pixels,
+                          const float4 axis,
+                          __global const float8* restrict rays,
+                          __global const float8* restrict results,
+                          __global float* restrict depth) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  const float cosine = any(axis != 0.0f) ? dot(axis.xyz, rays[i].s456) : 1.0f;
+  const float8 result = results[i];
+  depth[first + i] = cosine * result.s4;
+  depth[(size_t)pixels + first + i] = cosine * result.s5;
+  depth[2 * (size_t)pixels + first + i] = (float)as_uint(result.s6);
+}
+
 // The other way round.
 __kernel void load_gradients(const uint count,
                              const uint first,

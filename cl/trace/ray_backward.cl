@@ -11,6 +11,10 @@
 // min_transmittance): that difference costs up to eps / T of relative accuracy. Cost: that of
 // trace_rays plus O(1) per hit.
 //
+// RAY_SLOPES 1 also yields the gradients of the rays themselves. Moving the origin moves every
+// residual as moving the mean back does; with t_p, the parameter of the point nearest to the mean,
+// a change of the direction moves that point by t_p times as much.
+//
 // Launch: `items` work-items; each takes every items-th chunk of `chunk` rays in the order given.
 //   PRIVATE_COPIES 1: work-item i adds to copy i of `sums`: no atomics, the same sum every time
 //   EXACT_SUMS 1:     one copy of long integers (exact_sum.h): the same sum in any order
@@ -18,6 +22,10 @@
 #include "trace/line_sum.h"
 #include "trace/ray_color.h"
 #include "trace/ray_sums.h"
+
+#ifndef RAY_SLOPES
+#define RAY_SLOPES 0
+#endif
 
 // Lines of sums per Gaussian.
 #define RS_RAY_LINES (RS_RAY_SUMS / 16)
@@ -38,6 +46,9 @@ typedef struct {
   float last_key;
   uint last_index;
   float blended;
+#if RAY_SLOPES
+  float3 by_origin, by_direction;
+#endif
 } RayState;
 
 // Adds what one hit contributes: `by_alpha` = dL/dalpha, `by_color` = dL/dcolour, zero where the
@@ -49,7 +60,7 @@ void add_hit(const RayScene* scene,
              const float alpha,
              const float by_alpha,
              const float3 by_color,
-             const RayState* state) {
+             RayState* state) {
   const float16 record = *(__global const float16*)(state->records + (size_t)index * 16);
   const float3 x = record.s012, y = record.s345, z = record.s678;  // rows of M = S^-1 R^T
   const float3 offset = ray->o - record.s9ab;
@@ -62,6 +73,10 @@ void add_hit(const RayScene* scene,
   const float g = -0.5f * alpha * by_alpha;
   const float3 by_v = 2.0f * g * v;
   const float3 by_mean = -(by_v.x * x + by_v.y * y + by_v.z * z);
+#if RAY_SLOPES
+  state->by_origin -= by_mean;
+  state->by_direction += dot(o, d) / dot(d, d) * by_mean;
+#endif
   const float16 s = state->screen;
   const float3 on_screen =
       (float3)(dot(s.s012, by_mean), dot(s.s345, by_mean), dot(s.s678, by_mean));
@@ -93,7 +108,23 @@ void add_hit(const RayScene* scene,
     rs_sh_gradient(SH_DEGREE, n.x, n.y, n.z, along, slope);
     const float3 by_n = (float3)(slope[0], slope[1], slope[2]);
     sum.sbcd = (by_n - n * dot(by_n, n)) * inverse;
+#if RAY_SLOPES
+    state->by_origin -= sum.sbcd;
+#endif
   }
+#if RAY_SLOPES
+  if (!scene->color_from_origin) {
+    const float inverse = rsqrt(fmax(dot(ray->d, ray->d), 1e-38f));
+    const float3 n = inverse * ray->d;
+    float along[RS_RAY_FUNCTIONS];
+    __global const float* c = scene->sh + (size_t)index * 3 * scene->sh_coefficients;
+    for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) along[k] = dot(vload3(k, c), by_color);
+    float slope[3];
+    rs_sh_gradient(SH_DEGREE, n.x, n.y, n.z, along, slope);
+    const float3 by_n = (float3)(slope[0], slope[1], slope[2]);
+    state->by_direction += (by_n - n * dot(by_n, n)) * inverse;
+  }
+#endif
   const size_t first = (size_t)index * RS_RAY_SUMS + RS_RAY_SH;
   for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) {
     rs_add_sum(&state->sums, first + k, basis[k] * by_color.x);
@@ -160,7 +191,8 @@ void blend_hits(const RayScene* scene,
 // rays, results, tree and order as in rays.cl; gradients: dL/d(R, G, B, alpha) per ray; records:
 // whitening matrix and mean of every Gaussian (ray_gradients.cl); screen: a 3 x 3 matrix in 0..8,
 // row-major, from the gradient of a mean to its share on the screen for a mean at distance 1; limit
-// and sums: as for LineSums.
+// and sums: as for LineSums; slopes: with RAY_SLOPES of every ray the gradients of its origin and
+// direction, four floats each, zeros at first.
 __kernel void ray_backward(const uint ray_count,
                            const uint chunk,
                            const uint items,
@@ -184,7 +216,8 @@ __kernel void ray_backward(const uint ray_count,
                            __global const float4* restrict gradients,
                            __global const float* restrict records,
                            const float limit,
-                           __global float* restrict sums) {
+                           __global float* restrict sums,
+                           __global float8* restrict slopes) {
   const uint item = get_global_id(0);
   if (item >= items) return;
   const RayScene scene = {level_begin, nodes,
@@ -199,6 +232,9 @@ __kernel void ray_backward(const uint ray_count,
   sums += (size_t)item * gaussians * RS_RAY_SUMS;
 #else
   (void)gaussians;
+#endif
+#if !RAY_SLOPES
+  (void)slopes;
 #endif
   state.sums.lines = sums;
   state.sums.limit = limit;
@@ -225,7 +261,13 @@ __kernel void ray_backward(const uint ray_count,
       state.last_key = -1.0f;
       state.last_index = 0;
       state.blended = 0.0f;
+#if RAY_SLOPES
+      state.by_origin = state.by_direction = (float3)(0.0f);
+#endif
       walk_ray(&scene, raw.s7, basis, &ray, &state);
+#if RAY_SLOPES
+      slopes[id] = (float8)(state.by_origin, 0.0f, state.by_direction, 0.0f);
+#endif
     }
   }
 }

@@ -198,7 +198,7 @@ BenchOperation SceneBench::Impl::iteration() {
           },
           {},
           [this] {
-            CameraTracer& rays = tracer();
+            CameraTracer& rays = *camera_tracer;
             DeviceGaussians& g = gaussians();
             rays.update(g);
             rays.forward(g, model.camera, true);

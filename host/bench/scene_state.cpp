@@ -62,10 +62,9 @@ const Buffer<RsAabb>& SceneBench::Impl::boxes() {
 }
 
 CameraTracer& SceneBench::Impl::tracer() {
-  if (!camera_tracer) {
-    camera_tracer = std::make_unique<CameraTracer>(context, options.trace);
-    camera_tracer->update(gaussians());
-  }
+  if (!camera_tracer) camera_tracer = std::make_unique<CameraTracer>(context, options.trace);
+  if (traced_revision != gaussians().revision) camera_tracer->update(gaussians());
+  traced_revision = gaussians().revision;
   return *camera_tracer;
 }
 
@@ -172,6 +171,7 @@ DeviceGaussians SceneBench::Impl::copy_of_gaussians() {
   out.sh_degree = from.sh_degree;
   out.active_sh_degree = from.active_sh_degree;
   out.activation = from.activation;
+  out.changed(context);
   const auto copy = [this](const Buffer<float>& source, const char* label) {
     Buffer<float> target(context, source.size(), label);
     target.copy_from(source, source.size());

@@ -95,6 +95,7 @@ struct SceneBench::Impl {
   Buffer<std::uint32_t> unsorted, keys, values;
   std::optional<Lbvh> tree;
   std::unique_ptr<CameraTracer> camera_tracer;
+  std::uint64_t traced_revision = 0;  // of the Gaussians at its last update()
   CameraTracer::Statistics view_statistics, kept_statistics;
   std::unique_ptr<RayTracer> ray_tracer;
   std::vector<Ray> ray_list;

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "device/context_impl.hpp"
 #include "raysplats/error.hpp"
 
@@ -34,8 +32,7 @@ RawBuffer::RawBuffer(Context& context, std::size_t bytes, const std::string& lab
                    fmt::format("Allocating {:.1f} MiB for '{}' on {}",
                                static_cast<double>(bytes) / (1 << 20), label, owner.info.name));
   }
-  owner.memory->allocated += bytes;
-  owner.memory->peak = std::max(owner.memory->peak, owner.memory->allocated);
+  owner.memory->add(bytes);
 }
 
 RawBuffer::Impl& RawBuffer::checked() const {

@@ -113,6 +113,16 @@ Kernel Context::kernel(const std::string& program,
   return Kernel(kernel);
 }
 
+Kernel Context::kernel(const std::string& program, const std::string& name) {
+  return kernel(program, name, BuildOptions());
+}
+
+std::uint64_t Context::new_revision() { return ++impl_->revisions; }
+
+std::unique_lock<std::recursive_mutex> Context::lock() const {
+  return std::unique_lock(impl_->mutex);
+}
+
 void Context::finish() {
   try {
     impl_->queue.finish();
@@ -125,6 +135,8 @@ Profiler& Context::profiler() {
   impl_->collect_profile();
   return impl_->profiler;
 }
+
+std::string Context::profile_table() { return profiler().table(); }
 
 std::vector<LaunchTime> Context::take_launches() {
   impl_->collect_profile();

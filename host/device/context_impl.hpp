@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -14,10 +17,16 @@
 
 namespace raysplats {
 
-/// Bytes in buffers; shared with them, so that one may go after its context.
+/// Bytes in buffers; shared with them, so that one may go after its context, in any thread.
 struct MemoryCount {
-  std::size_t allocated = 0;
-  std::size_t peak = 0;
+  std::atomic<std::size_t> allocated = 0;
+  std::atomic<std::size_t> peak = 0;
+  void add(std::size_t bytes) {
+    const std::size_t now = allocated += bytes;
+    std::size_t most = peak;
+    while (most < now && !peak.compare_exchange_weak(most, now)) {
+    }
+  }
 };
 
 /// A launch whose time is not read yet.
@@ -40,6 +49,9 @@ struct Context::Impl {
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;
   std::shared_ptr<MemoryCount> memory = std::make_shared<MemoryCount>();
+
+  std::recursive_mutex mutex;
+  std::uint64_t revisions = 0;
 
   cl::Program& program(const std::string& path, const BuildOptions& build);
   /// What an enqueue call takes for its event: null unless launches are timed.

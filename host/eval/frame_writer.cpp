@@ -165,9 +165,12 @@ FrameReport write_frames(ViewTracer& tracer,
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Camera camera = downscaled(cameras[i], 1.0 / options.supersample);
     const auto start = std::chrono::steady_clock::now();
-    const Image samples = tracer.render(gaussians, camera);
+    tracer.forward(gaussians, camera);
+    const Image samples = tracer.download_image();
     Image depth;
-    if (options.depth) depth = average_depth(tracer.depth(), samples, options.supersample);
+    if (options.depth) {
+      depth = average_depth(tracer.download_depth(), samples, options.supersample);
+    }
     report.trace_seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     report.capped_rays += tracer.capped_rays();

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "light/view_tracer.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
 #include "trace/device_gaussians.hpp"
-#include "trace/view_tracer.hpp"
 
 namespace raysplats {
 
@@ -56,8 +56,8 @@ void write_frame(const std::filesystem::path& stem,
                  const FrameOptions& options);
 
 /// Traces every camera and writes its files to `folder`, which exists. `done` hears the number of
-/// finished frames and returns false to stop early. The tracer is up to date with the Gaussians,
-/// and made with the option depth when options.depth is set. Throws UsageError for a supersampling
+/// finished frames and returns false to stop early. The tracer was
+/// made with the option depth when options.depth is set. Throws UsageError for a supersampling
 /// factor outside 1..16, DataError when a file fails.
 FrameReport write_frames(ViewTracer& tracer,
                          const DeviceGaussians& gaussians,

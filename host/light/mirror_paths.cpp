@@ -101,7 +101,14 @@ void MirrorPaths::trace(const DeviceGaussians& gaussians,
   }
 }
 
-void MirrorPaths::backward(const DeviceGaussians& gaussians, RayBackward& sums) {
+void MirrorPaths::backward(const DeviceGaussians& gaussians,
+                           RayBackward& sums,
+                           Buffer<RayBackward::Slopes>* slopes) {
+  if (slopes != nullptr && has_mirrors()) {
+    throw UsageError(
+        "Gradients of rays and poses do not go through mirrors: leave the mirrors out, or the "
+        "gradient of the pose");
+  }
   for (std::size_t number = 0; number < used_; ++number) {
     Level& level = levels_[number];
     const bool goes_on = number + 1 < used_;
@@ -118,7 +125,7 @@ void MirrorPaths::backward(const DeviceGaussians& gaussians, RayBackward& sums) 
                 goes_on ? levels_[number + 1].seen : no_colors_, level.results, level.gradients,
                 goes_on ? levels_[number + 1].gradients : no_colors_);
     sums.add(gaussians, level.rays, level.count, level.results, level.gradients,
-             number == 0 ? direction_ : ColorDirection::kRay);
+             number == 0 ? direction_ : ColorDirection::kRay, slopes);
   }
 }
 

@@ -43,12 +43,18 @@ class MirrorPaths {
              const std::array<float, 3>& background);
   /// What the rays saw: colour with the background, and coverage.
   const Buffer<std::array<float, 4>>& seen() const { return levels_[0].seen; }
+  /// What they met before the first mirror, over black.
+  const Buffer<RayResult>& results() const { return levels_[0].results; }
 
   /// Gradients of seen(), `count` of them, to be filled by the caller before backward().
   Buffer<RayBackward::Gradient>& gradients() { return levels_[0].gradients; }
-  /// Adds the gradients of the last trace() to `sums`.
-  void backward(const DeviceGaussians& gaussians, RayBackward& sums);
+  /// Adds the gradients of the last trace() to `sums`. `slopes`: as RayBackward::add(), for rays()
+  /// as they are made; UsageError with mirrors.
+  void backward(const DeviceGaussians& gaussians,
+                RayBackward& sums,
+                Buffer<RayBackward::Slopes>* slopes = nullptr);
 
+  bool has_mirrors() const { return surfaces_ != nullptr; }
   /// Most rays that come of one: itself and its reflections.
   std::size_t segments() const { return levels_.size(); }
   /// Rays of the last trace() that stopped because of max_hits; blocks.
@@ -66,7 +72,6 @@ class MirrorPaths {
     Buffer<RayBackward::Gradient> gradients;
   };
 
-  bool has_mirrors() const { return surfaces_ != nullptr; }
   std::size_t find_mirrors(std::size_t level);
   Kernel kernel(const char* name) const;
 

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
 #include "shared/layout.h"
@@ -71,6 +73,15 @@ void require_pixels(const Camera& camera) {
   const bool focal = camera.model != CameraModel::kEquirectangular;
   if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
     throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
+  }
+  double sum = camera.cx + camera.cy + camera.fx + camera.fy;
+  for (int k = 0; k < 3; ++k) {
+    sum += camera.translation[k];
+    for (int row = 0; row < 3; ++row) sum += camera.rotation[k][row];
+  }
+  if (!std::isfinite(sum)) {
+    throw UsageError(fmt::format(
+        "Camera '{}' has a pose or a lens that is not finite: correct its numbers", camera.name));
   }
 }
 

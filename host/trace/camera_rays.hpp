@@ -21,7 +21,8 @@ struct Lens {
                              ///< along the ray
 };
 
-/// Throws UsageError for a camera without pixels or focal length.
+/// Throws UsageError for a camera without pixels or focal length, or with a number that is not
+/// finite.
 void require_pixels(const Camera& camera);
 
 /// Where rays of the camera take the colour of Gaussians from: seen from its centre, or along each

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "bvh/gaussian_bounds.hpp"
+#include "core/planes.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/candidate_lists.hpp"
@@ -88,7 +89,8 @@ struct CameraTracer::Impl {
   Context& context;
   TraceOptions options;
   PacketShape packet;
-  std::size_t count = 0;  // Gaussians of the last update()
+  std::size_t count = 0;       // Gaussians of the last update()
+  std::uint64_t revision = 0;  // of their parameters
   Buffer<RsAabb> boxes;
   CandidateLists lists;
   LaunchBudget forward_budget;
@@ -136,12 +138,13 @@ void CameraTracer::update(const DeviceGaussians& gaussians) {
   bounds.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
                  gaussians.count, self.options.quantile, self.boxes);
   self.count = gaussians.count;
+  self.revision = gaussians.revision;
 }
 
 void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits) {
   Impl& self = *impl_;
   require_pixels(camera);
-  if (self.count != gaussians.count) {
+  if (self.count != gaussians.count || self.revision != gaussians.revision) {
     throw UsageError("CameraTracer::update() must follow every change of the Gaussians");
   }
   self.camera = device_camera(camera, self.options.near_depth);
@@ -356,7 +359,7 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
                             const Buffer<float>& image_gradient,
                             GaussianGradients& gradients) {
   Impl& self = *impl_;
-  if (!self.hits_kept || self.count != gaussians.count) {
+  if (!self.hits_kept || self.count != gaussians.count || self.revision != gaussians.revision) {
     throw UsageError(
         "CameraTracer::backward() must follow forward(keep_hits = true) of the same Gaussians");
   }
@@ -381,7 +384,7 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
   self.sums.settle();
 }
 
-CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& gaussians) {
+PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& gaussians) {
   Impl& self = *impl_;
   self.finalize(gaussians, self.pose_scratch, true);
   const std::vector<float> parts = self.pose.download();
@@ -398,20 +401,6 @@ CameraTracer::PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& ga
 CameraTracer::Statistics CameraTracer::statistics() const {
   return impl_->statistics_saved ? impl_->saved : impl_->count_statistics();
 }
-
-namespace {
-
-Image interleaved(const std::vector<float>& planes, int width, int height, int channels) {
-  Image out(width, height, channels);
-  const std::size_t pixels = out.pixels();
-  const auto n = static_cast<std::size_t>(channels);
-  for (std::size_t c = 0; c < n; ++c) {
-    for (std::size_t i = 0; i < pixels; ++i) out.data[i * n + c] = planes[c * pixels + i];
-  }
-  return out;
-}
-
-}  // namespace
 
 Image CameraTracer::download_image() const {
   return interleaved(impl_->image.download(), impl_->camera.width, impl_->camera.height, 4);

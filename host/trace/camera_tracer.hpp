@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 
 #include "device/context.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
+#include "raysplats/pose_gradient.hpp"
 #include "raysplats/trace_options.hpp"
 #include "trace/device_gaussians.hpp"
 
@@ -22,12 +22,6 @@ class CameraTracer {
     std::uint64_t candidates = 0;    ///< (tile, Gaussian) pairs tested
     std::uint64_t hits = 0;          ///< blended (ray, Gaussian) pairs
     std::uint64_t stream_bytes = 0;  ///< hit lists that keep_hits made or would have made
-  };
-  /// Gradient of the loss for the camera's pose: translation of the centre (world axes) and a small
-  /// rotation vector applied on the left of the world-to-camera rotation (camera axes).
-  struct PoseGradient {
-    std::array<double, 3> center{};
-    std::array<double, 3> rotation{};
   };
 
   CameraTracer(Context& context, const TraceOptions& options);

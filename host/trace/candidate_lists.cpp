@@ -55,7 +55,7 @@ RsCamera device_camera(const Camera& camera, float near_depth) {
   if (camera.model != CameraModel::kPinhole) {
     throw UsageError(
         fmt::format("The camera '{}' is no pinhole, and packets of rays are made for pinholes "
-                    "only: trace its rays one by one (ViewTracer), or undistort it",
+                    "only: trace its rays one by one, or undistort it",
                     camera.name));
   }
   RsCamera out{};

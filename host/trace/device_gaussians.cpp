@@ -42,6 +42,7 @@ DeviceGaussians DeviceGaussians::upload(Context& context,
   out.scales = to_device(context, scales, "scales");
   out.opacities = to_device(context, model.opacities, "opacities");
   out.sh = to_device(context, model.sh, "spherical harmonics");
+  out.changed(context);
   return out;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
@@ -19,6 +20,9 @@ struct DeviceGaussians {
   int active_sh_degree =
       0;  ///< bands above this are not evaluated (they are switched on over time)
   ScaleActivation activation = ScaleActivation::kExp;
+  /// Of the parameters as they are, from Context::new_revision(). What is made of them (boxes,
+  /// trees) remembers it, and is stale when it differs.
+  std::uint64_t revision = 0;
   Buffer<float> means;        ///< 3 N
   Buffer<float> quaternions;  ///< 4 N
   Buffer<float> scales;       ///< 3 N
@@ -30,6 +34,8 @@ struct DeviceGaussians {
                                 const Gaussians& model,
                                 ScaleActivation activation);
   Gaussians download() const;
+  /// To be called by whoever writes to the buffers.
+  void changed(Context& context) { revision = context.new_revision(); }
 };
 
 /// Gradient of the loss for every parameter, laid out as DeviceGaussians, and what densification

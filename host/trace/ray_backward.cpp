@@ -47,7 +47,11 @@ RayScreen RayScreen::of(const Camera& camera) {
 }
 
 RayBackward::RayBackward(Context& context, const RayTracer& tracer)
-    : context_(&context), tracer_(&tracer), order_(context), sums_(context, "ray gradient sums") {}
+    : context_(&context),
+      tracer_(&tracer),
+      order_(context),
+      no_slopes_(context, 1, "no gradients of rays"),
+      sums_(context, "ray gradient sums") {}
 
 // RS_RAY_SUMS / 16 of ray_sums.h.
 std::size_t RayBackward::sum_lines(int degree) {
@@ -66,9 +70,7 @@ GradientSumChoice RayBackward::sum_choice(const TraceOptions& options,
 void RayBackward::begin(const DeviceGaussians& gaussians,
                         const RayScreen& screen,
                         std::size_t rays) {
-  if (tracer_->tree().tree().size() != gaussians.count) {
-    throw UsageError("RayTracer::update() must follow every change of the Gaussians");
-  }
+  tracer_->require_current(gaussians);
   for (std::size_t k = 0; k < 3; ++k) {
     for (std::size_t j = 0; j < 3; ++j) screen_[3 * k + j] = static_cast<float>(screen.rows[k][j]);
     screen_[9 + k] = static_cast<float>(screen.center[k]);
@@ -77,6 +79,7 @@ void RayBackward::begin(const DeviceGaussians& gaussians,
   screen_[12] = static_cast<float>(screen.distance);
   degree_ = gaussians.active_sh_degree;
   count_ = gaussians.count;
+  revision_ = gaussians.revision;
   rays_ = rays;
   taken_ = 0;
   begun_ = false;
@@ -96,12 +99,11 @@ void RayBackward::add(const DeviceGaussians& gaussians,
                       std::size_t count,
                       const Buffer<RayResult>& results,
                       const Buffer<Gradient>& gradients,
-                      ColorDirection color_direction) {
-  if (!begun_ || count_ != gaussians.count || degree_ != gaussians.active_sh_degree) {
+                      ColorDirection color_direction,
+                      Buffer<Slopes>* slopes) {
+  if (!begun_ || count_ != gaussians.count || revision_ != gaussians.revision ||
+      degree_ != gaussians.active_sh_degree) {
     throw UsageError("RayBackward::begin() must come before add(), for the same Gaussians");
-  }
-  if (color_direction == ColorDirection::kPerRay) {
-    throw UsageError("Gradients of rays with flags of their own are not taken: pass one direction");
   }
   if (rays.size() < count || results.size() < count || gradients.size() < count) {
     throw UsageError(
@@ -116,6 +118,10 @@ void RayBackward::add(const DeviceGaussians& gaussians,
                     rays_, taken_, count));
   }
   taken_ += count;
+  if (slopes != nullptr) {
+    slopes->ensure(*context_, count, "gradients of rays");
+    slopes->clear();
+  }
   if (count == 0 || gaussians.count == 0) return;
   const DeviceInfo& device = context_->device();
   const TraceOptions& options = tracer_->options();
@@ -123,7 +129,7 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   const bool cpu = device.type == DeviceType::kCpu;
   const bool ordered = order_.compute(tree, rays, count);
   BuildOptions build = ray_walk_build(device, options, tree.lanes());
-  sums_.define(build.define("SH_DEGREE", degree_));
+  sums_.define(build.define("SH_DEGREE", degree_).define("RAY_SLOPES", slopes != nullptr ? 1 : 0));
   const std::size_t chunk = cpu ? kCpuChunk : 1;
   const std::size_t items = sums_.is_private() ? sums_.copies() : (count + chunk - 1) / chunk;
   const std::array<float, 4> background{options.background[0], options.background[1],
@@ -135,11 +141,11 @@ void RayBackward::add(const DeviceGaussians& gaussians,
               color_direction == ColorDirection::kFromOrigin ? 1 : 0, options.quantile,
               options.min_transmittance, options.max_hits, background, screen_, rays,
               ordered ? 1 : 0, order_.indices(), results, gradients, records_,
-              GradientSums::limit(rays_), sums_.target());
+              GradientSums::limit(rays_), sums_.target(), slopes != nullptr ? *slopes : no_slopes_);
 }
 
 void RayBackward::finish(const DeviceGaussians& gaussians, GaussianGradients& gradients) {
-  if (!begun_ || count_ != gaussians.count) {
+  if (!begun_ || count_ != gaussians.count || revision_ != gaussians.revision) {
     throw UsageError("RayBackward::begin() must come before finish(), for the same Gaussians");
   }
   const std::size_t n = gaussians.count;

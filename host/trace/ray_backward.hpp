@@ -42,6 +42,9 @@ struct RayScreen {
 class RayBackward {
  public:
   using Gradient = std::array<float, 4>;  ///< of a ray: dL/d(R, G, B) of its colour, dL/dalpha
+  /// Of a ray: dL/dorigin in 0..2, dL/ddirection in 4..6 (of the direction as it is, which need not
+  /// have unit length), zeros. The ends t_min and t_max stay where they are along the ray.
+  using Slopes = std::array<float, 8>;
 
   /// `tracer` is not owned.
   RayBackward(Context& context, const RayTracer& tracer);
@@ -55,15 +58,16 @@ class RayBackward {
              const RayScreen& screen = {},
              std::size_t rays = kMostRays);
   /// The first `count` of `rays` again, with the `results` that the tracer gave them (background
-  /// included) and the gradients of those. Enqueues and returns. Throws UsageError without begin(),
-  /// for more rays than it was told, for buffers that are too small, and for
-  /// ColorDirection::kPerRay.
+  /// included) and the gradients of those. With `slopes`, which grows as needed, the first `count`
+  /// of these become the gradients of the rays. Enqueues and returns. Throws UsageError without
+  /// begin(), for more rays than it was told, and for buffers that are too small.
   void add(const DeviceGaussians& gaussians,
            const Buffer<Ray>& rays,
            std::size_t count,
            const Buffer<RayResult>& results,
            const Buffer<Gradient>& gradients,
-           ColorDirection color_direction);
+           ColorDirection color_direction,
+           Buffer<Slopes>* slopes = nullptr);
   /// Overwrites `gradients`, growing its buffers as needed.
   void finish(const DeviceGaussians& gaussians, GaussianGradients& gradients);
 
@@ -82,9 +86,11 @@ class RayBackward {
   int degree_ = 0;
   std::array<float, 16> screen_{};
   std::size_t count_ = 0;  // Gaussians of begin()
+  std::uint64_t revision_ = 0;
   std::size_t rays_ = 0;   // that begin() was told
   std::size_t taken_ = 0;  // of these
   Buffer<float> records_;
+  Buffer<Slopes> no_slopes_;
   GradientSums sums_;
 };
 

@@ -24,17 +24,13 @@ static_assert(sizeof(Ray) == 32 && sizeof(RayResult) == 32,
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 // color_from_origin of rays.cl.
+constexpr std::int32_t kFlagPerRay = 2;
 std::int32_t color_mode(ColorDirection direction) {
-  switch (direction) {
-    case ColorDirection::kFromOrigin:
-      return 1;
-    case ColorDirection::kPerRay:
-      return 2;
-    case ColorDirection::kRay:
-      break;
-  }
-  return 0;
+  return direction == ColorDirection::kFromOrigin ? 1 : 0;
 }
+
+// Changes after which the tree is built anew: in between it is refitted.
+constexpr int kRefits = 32;
 
 }  // namespace
 
@@ -49,6 +45,8 @@ struct RayTracer::Impl {
   Context& context;
   TraceOptions options;
   RayTree tree;
+  std::uint64_t revision = 0;  // of the Gaussians in it
+  int refits = 0;              // since it was built
   RayOrder order;
   Buffer<std::uint32_t> no_flags;
   Buffer<Ray> rays;
@@ -59,19 +57,41 @@ RayTracer::RayTracer(Context& context, const TraceOptions& options, int lanes)
     : impl_(std::make_unique<Impl>(context, options, lanes)) {}
 RayTracer::~RayTracer() = default;
 
-void RayTracer::update(const DeviceGaussians& gaussians) { impl_->tree.build(gaussians); }
+void RayTracer::update(const DeviceGaussians& gaussians) {
+  impl_->tree.build(gaussians);
+  impl_->revision = gaussians.revision;
+  impl_->refits = 0;
+}
 
-void RayTracer::refit(const DeviceGaussians& gaussians) { impl_->tree.refit(gaussians); }
+void RayTracer::refit(const DeviceGaussians& gaussians) {
+  impl_->tree.refit(gaussians);
+  impl_->revision = gaussians.revision;
+}
+
+void RayTracer::follow(const DeviceGaussians& gaussians) {
+  Impl& self = *impl_;
+  const bool same_count = self.revision > 0 && gaussians.count == self.tree.tree().size();
+  if (same_count && gaussians.revision == self.revision) return;
+  if (same_count && self.refits < kRefits) {
+    refit(gaussians);
+    ++self.refits;
+  } else {
+    update(gaussians);
+  }
+}
+
+void RayTracer::require_current(const DeviceGaussians& gaussians) const {
+  if (impl_->tree.tree().size() != gaussians.count || impl_->revision != gaussians.revision) {
+    throw UsageError("RayTracer::update() must follow every change of the Gaussians");
+  }
+}
 
 void RayTracer::trace(const DeviceGaussians& gaussians,
                       const Buffer<Ray>& rays,
                       std::size_t count,
                       Buffer<RayResult>& results,
                       ColorDirection color_direction) {
-  if (color_direction == ColorDirection::kPerRay) {
-    throw UsageError("Colours by the ray need a flag for each: pass their buffer");
-  }
-  launch(gaussians, rays, count, results, color_direction, impl_->no_flags);
+  launch(gaussians, rays, count, results, color_mode(color_direction), impl_->no_flags);
 }
 
 void RayTracer::trace(const DeviceGaussians& gaussians,
@@ -82,19 +102,17 @@ void RayTracer::trace(const DeviceGaussians& gaussians,
   if (from_origin.size() < count) {
     throw UsageError(fmt::format("{} rays need as many flags, not {}", count, from_origin.size()));
   }
-  launch(gaussians, rays, count, results, ColorDirection::kPerRay, from_origin);
+  launch(gaussians, rays, count, results, kFlagPerRay, from_origin);
 }
 
 void RayTracer::launch(const DeviceGaussians& gaussians,
                        const Buffer<Ray>& rays,
                        std::size_t count,
                        Buffer<RayResult>& results,
-                       ColorDirection color_direction,
+                       std::int32_t color_mode,
                        const Buffer<std::uint32_t>& from_origin) {
   Impl& self = *impl_;
-  if (self.tree.tree().size() != gaussians.count) {
-    throw UsageError("RayTracer::update() must follow every change of the Gaussians");
-  }
+  require_current(gaussians);
   if (rays.size() < count) {
     throw UsageError(fmt::format("{} rays cannot be traced from a buffer of {}: pass a larger one",
                                  count, rays.size()));
@@ -113,9 +131,9 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
       .launch(Range::linear((count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup),
               u32(count), u32(rays_per_item), tree.levels(), tree.level_begin(), tree.nodes(),
               self.tree.blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
-              gaussians.active_sh_degree, color_mode(color_direction), from_origin,
-              options.quantile, options.min_transmittance, options.max_hits, background, rays,
-              ordered ? 1 : 0, self.order.indices(), results);
+              gaussians.active_sh_degree, color_mode, from_origin, options.quantile,
+              options.min_transmittance, options.max_hits, background, rays, ordered ? 1 : 0,
+              self.order.indices(), results);
 }
 
 void RayTracer::set_background(const std::array<float, 3>& background) {

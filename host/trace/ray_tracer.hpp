@@ -9,35 +9,12 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
+#include "raysplats/rays.hpp"
 #include "raysplats/trace_options.hpp"
 #include "trace/device_gaussians.hpp"
 #include "trace/ray_tree.hpp"
 
 namespace raysplats {
-
-/// One ray o + t d, t in [t_min, t_max]; d need not be normalised and t is in units of |d|.
-struct Ray {
-  float origin[3];
-  float t_min;
-  float direction[3];
-  float t_max;
-};
-
-/// Direction in which a Gaussian's colour is evaluated for a ray.
-enum class ColorDirection {
-  kRay,         ///< the ray's own direction (secondary rays, cameras without a centre)
-  kFromOrigin,  ///< from the ray's origin to the mean (what camera rays use)
-  kPerRay,      ///< one or the other, as a buffer says
-};
-
-struct RayResult {
-  float color[3];  ///< background blended
-  float alpha;     ///< 1 - transmittance
-  float expected_depth;
-  float median_depth;
-  std::uint32_t hits;
-  std::uint32_t capped;  ///< 1 when the ray stopped because of max_hits
-};
 
 /// Traces arbitrary rays: any origins and directions, without coherence. The order of hits is exact
 /// per ray; near_depth and depth of the options have no meaning here.
@@ -52,6 +29,8 @@ class RayTracer {
   /// Cheaper than update() for Gaussians that moved little; the results are the same, rays are
   /// slower the farther they moved. Throws UsageError when their number changed.
   void refit(const DeviceGaussians& gaussians);
+  /// update() or refit() where the Gaussians changed since, else nothing.
+  void follow(const DeviceGaussians& gaussians);
 
   std::vector<RayResult> trace(const DeviceGaussians& gaussians,
                                std::span<const Ray> rays,
@@ -74,6 +53,8 @@ class RayTracer {
   /// Colour behind the Gaussians from the next trace() on.
   void set_background(const std::array<float, 3>& background);
   const TraceOptions& options() const;
+  /// Throws UsageError unless the tree is that of these Gaussians as they are now.
+  void require_current(const DeviceGaussians& gaussians) const;
   /// The tree of the last update() or refit().
   const RayTree& tree() const;
 
@@ -82,7 +63,7 @@ class RayTracer {
               const Buffer<Ray>& rays,
               std::size_t count,
               Buffer<RayResult>& results,
-              ColorDirection color_direction,
+              std::int32_t color_mode,
               const Buffer<std::uint32_t>& from_origin);
 
   struct Impl;

@@ -75,6 +75,7 @@ void Adam::step(DeviceGaussians& gaussians,
   }
   ++steps_;
   if (count_ == 0) return;
+  gaussians.changed(context_);
   const double bias1 = 1.0 - std::pow(options_.beta1, static_cast<double>(steps_));
   const double bias2 = 1.0 - std::pow(options_.beta2, static_cast<double>(steps_));
   const auto rate = [&](double learning_rate) { return static_cast<float>(learning_rate / bias1); };

@@ -172,6 +172,7 @@ void DensityControl::gather(DeviceGaussians& gaussians,
               gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
               gaussians.sh, next.means, next.quaternions, next.scales, next.opacities, next.sh);
   gaussians = std::move(next);
+  gaussians.changed(context_);
 }
 
 void DensityControl::fade_opacities(DeviceGaussians& gaussians) {
@@ -187,6 +188,7 @@ void DensityControl::reset_opacities(DeviceGaussians& gaussians) {
   context_.kernel(kProgram, "limit_opacity")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               limit, gaussians.opacities);
+  gaussians.changed(context_);
 }
 
 void DensityControl::restore_statistics(std::span<const float> statistics) {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string>
 
-#include "light/ray_view_tracer.hpp"
+#include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/gaussians.hpp"
 #include "shared/layout.h"
@@ -70,8 +70,8 @@ std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels) {
       options.mirrors.empty() ? 0 : sizeof(RsSurfaceHit) + sizeof(std::uint32_t);
   const bool reflects = mirrors > 0 && options.mirror_bounces > 0;
   const std::size_t reflected = reflects ? segment + mirrors + sizeof(RsPath) : 0;
-  const std::size_t rays = std::min(
-      pixels, RayViewTracer::batch(static_cast<std::size_t>(options.memory_budget) * kMiB));
+  const std::size_t rays =
+      std::min(pixels, ViewTracer::batch(static_cast<std::size_t>(options.memory_budget) * kMiB));
   return rays * (segment + order + mirrors + reflected);
 }
 

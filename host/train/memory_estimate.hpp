@@ -13,7 +13,7 @@ struct MemoryDemand {
   std::size_t gaussians = 0;  ///< most that it may reach
   std::size_t pixels = 0;     ///< of the largest view
   std::size_t views = 0;      ///< photos to train on
-  std::size_t ray_views = 0;  ///< of these, traced ray by ray (StepTracer::by_rays())
+  std::size_t ray_views = 0;  ///< of these, traced ray by ray (ViewTracer::by_rays())
 };
 
 /// Device memory that a training run will need, in bytes.

@@ -111,6 +111,7 @@ void restore_state(Context& context,
     adam.restore(group, section(checkpoint, name + ".first", size),
                  section(checkpoint, name + ".second", size));
   }
+  gaussians.changed(context);
   adam.set_steps(checkpoint.optimiser_steps);
   const auto statistics = checkpoint.sections.find("density");
   const bool accumulated = statistics != checkpoint.sections.end() && !statistics->second.empty();

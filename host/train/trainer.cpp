@@ -17,6 +17,7 @@
 #include "base/progress.hpp"
 #include "core/morton_order.hpp"
 #include "eval/evaluator.hpp"
+#include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "train/adam.hpp"
@@ -27,12 +28,12 @@
 #include "train/image_loss.hpp"
 #include "train/initialization.hpp"
 #include "train/memory_estimate.hpp"
+#include "train/mirror_meshes.hpp"
 #include "train/model_validator.hpp"
 #include "train/photo_set.hpp"
 #include "train/run_state.hpp"
 #include "train/schedule.hpp"
 #include "train/step_guard.hpp"
-#include "train/step_tracer.hpp"
 #include "train/target_cache.hpp"
 #include "train/train_config.hpp"
 
@@ -194,7 +195,7 @@ struct Trainer::Impl {
   bool cut_out;
   std::string fingerprint;
   std::array<float, 3> background;
-  StepTracer tracer;
+  ViewTracer tracer;
   ImageLoss loss;
   Adam adam;
   DensityControl density;
@@ -328,7 +329,6 @@ void Trainer::Impl::step() {
   const std::array<float, 3> behind = step_background(options, cut_out, background, iteration);
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
   tracer.set_background(behind);
-  tracer.update();
   tracer.forward(gaussians, camera, true);
   loss.evaluate(tracer.image(), targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
@@ -447,7 +447,6 @@ void Trainer::Impl::evaluate_views(bool last) {
   if (test_views.empty()) return;
   evaluating.start();
   tracer.set_background(background);
-  tracer.update();
   const auto render = [this](const Camera& camera) {
     tracer.forward(gaussians, camera);
     return tracer.download_image();

@@ -12,6 +12,7 @@
 
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "trace/camera_tracer.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;
@@ -93,7 +94,6 @@ TEST_CASE("frames hold what the tracer saw") {
   ViewTracer tracer(context, trace);
   const DeviceGaussians gaussians =
       DeviceGaussians::upload(context, red_balls(), ScaleActivation::kExp);
-  tracer.update(gaussians);
   Camera camera = look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, 33, 21, 30.0);
   camera.name = "views/ball.png";
   const std::vector<Camera> cameras{camera};

@@ -213,7 +213,7 @@ TEST_CASE("pose gradient equals the double reference") {
   gradient.upload(image_gradient);
   GaussianGradients out;
   tracer.backward(gaussians, gradient, out);
-  const CameraTracer::PoseGradient pose = tracer.pose_gradient(gaussians);
+  const PoseGradient pose = tracer.pose_gradient(gaussians);
   for (int j = 0; j < 3; ++j) {
     const auto k = static_cast<std::size_t>(j);
     CHECK(pose.center[k] == doctest::Approx(expected.center[j]).epsilon(2e-3));

@@ -380,9 +380,6 @@ TEST_CASE("several batches of rays add up, and a new begin starts from zero") {
       CHECK_THROWS_AS(backward.add(gaussians, batch.rays, 3001, batch.results, batch.gradients,
                                    ColorDirection::kRay),
                       UsageError);
-      CHECK_THROWS_AS(backward.add(gaussians, batch.rays, 3000, batch.results, batch.gradients,
-                                   ColorDirection::kPerRay),
-                      UsageError);
       backward.add(gaussians, batch.rays, 3000, batch.results, batch.gradients,
                    ColorDirection::kRay);
     }

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "light/ray_view_tracer.hpp"
+#include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
@@ -58,10 +58,9 @@ std::size_t bytes_of_rays(const Gaussians& model,
   Buffer<float> image_gradient(context, 4 * pixels, "image gradient");
   image_gradient.clear();
   const std::size_t before = context.allocated_bytes();
-  RayViewTracer tracer(context, options, mirrors);
+  ViewTracer tracer(context, options, mirrors);
   GaussianGradients gradients;
-  tracer.update(gaussians);
-  tracer.forward(gaussians, reference::cube_camera(width, width), true);
+  tracer.forward_rays(gaussians, reference::cube_camera(width, width), true);
   tracer.backward(gaussians, image_gradient, gradients);
   const std::size_t known =
       4 * (model.size() * (3 + 4 + 3 + 1 + 3) + model.sh.size()) + sizeof(float) * 4 * pixels;

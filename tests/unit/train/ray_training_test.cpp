@@ -8,10 +8,11 @@
 
 #include "base/atomic_file.hpp"
 #include "base/rng.hpp"
+#include "light/view_tracer.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "train/step_tracer.hpp"
+#include "train/mirror_meshes.hpp"
 #include "train/trainer.hpp"
 
 using namespace raysplats;
@@ -54,7 +55,7 @@ struct Photos {
   void take(const Gaussians& truth, const std::vector<Camera>& cameras, const Mirrors& mirrors) {
     const DeviceGaussians gaussians =
         DeviceGaussians::upload(context, truth, ScaleActivation::kExp);
-    StepTracer tracer(context, TraceOptions{}, mirrors);
+    ViewTracer tracer(context, TraceOptions{}, mirrors);
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       View view;
       view.camera = cameras[i];

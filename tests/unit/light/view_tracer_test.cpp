@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "light/ray_view_tracer.hpp"
+#include "light/view_tracer.hpp"
 
 #include <doctest/doctest.h>
 
@@ -9,6 +9,7 @@
 
 #include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
+#include "trace/camera_tracer.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
@@ -46,14 +47,18 @@ struct Traced {
   Host gradients;
 };
 
-template <class Tracer>
+// `by_rays`: whatever the model of the camera.
 Traced trace_and_differentiate(Context& context,
-                               Tracer& tracer,
+                               ViewTracer& tracer,
                                const DeviceGaussians& gaussians,
                                const Camera& camera,
-                               const std::vector<float>& image_gradient) {
-  tracer.update(gaussians);
-  tracer.forward(gaussians, camera, true);
+                               const std::vector<float>& image_gradient,
+                               bool by_rays = false) {
+  if (by_rays) {
+    tracer.forward_rays(gaussians, camera, true);
+  } else {
+    tracer.forward(gaussians, camera, true);
+  }
   Buffer<float> gradient(context, image_gradient.size(), "image gradient");
   gradient.upload(image_gradient);
   GaussianGradients out;
@@ -196,7 +201,7 @@ void check_lens(Context& context, const Gaussians& model, CameraModel lens, int 
       wide.push_back(gradient[c * pixels + i]);
     }
   }
-  RayViewTracer tracer(context, options);
+  ViewTracer tracer(context, options);
   const Traced got = trace_and_differentiate(context, tracer, gaussians, camera, gradient);
   std::size_t compared = 0;
   for (std::size_t i = 0; i < pixels; ++i) {
@@ -213,9 +218,15 @@ void check_lens(Context& context, const Gaussians& model, CameraModel lens, int 
                   1e-3);
 }
 
+Camera view_of(CameraModel model, int width, int height, double focal) {
+  Camera camera = look_at({0.4, -0.3, -2.6}, {0, 0, 0}, {0, -1, 0}, width, height, focal);
+  camera.model = model;
+  return camera;
+}
+
 }  // namespace
 
-TEST_CASE("a pinhole's picture and gradients are those of the camera tracer") {
+TEST_CASE("a pinhole's gradients ray by ray are those of packets") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(800, 91, 2);
   const Camera camera = look_at({0.4, -0.6, -4.0}, {0, 0, 0}, {0, 1, 0}, 66, 58, 80);
@@ -228,10 +239,9 @@ TEST_CASE("a pinhole's picture and gradients are those of the camera tracer") {
     if (render.margin[i] >= 1e-4) continue;
     for (std::size_t c = 0; c < 4; ++c) gradient[c * render.pixels() + i] = 0.0f;
   }
-  CameraTracer packets(context, options);
-  RayViewTracer rays(context, options);
+  ViewTracer packets(context, options), rays(context, options);
   const Traced expected = trace_and_differentiate(context, packets, gaussians, camera, gradient);
-  const Traced got = trace_and_differentiate(context, rays, gaussians, camera, gradient);
+  const Traced got = trace_and_differentiate(context, rays, gaussians, camera, gradient, true);
   CHECK(compare(got.image, render, 1e-4).maximum < 2e-3);
   check_gradients(got.gradients, expected.gradients, 1e-3);
 
@@ -240,16 +250,16 @@ TEST_CASE("a pinhole's picture and gradients are those of the camera tracer") {
   const std::vector<float> noise = random_image_gradient(110 * 90, 6);
   TraceOptions tight = options;
   tight.memory_budget = 1000;
-  RayViewTracer batches(context, tight);
-  const Traced whole = trace_and_differentiate(context, rays, gaussians, large, noise);
-  const Traced parts = trace_and_differentiate(context, batches, gaussians, large, noise);
+  ViewTracer batches(context, tight);
+  const Traced whole = trace_and_differentiate(context, rays, gaussians, large, noise, true);
+  const Traced parts = trace_and_differentiate(context, batches, gaussians, large, noise, true);
   CHECK(whole.image.data == parts.image.data);
   check_gradients(parts.gradients, whole.gradients, 1e-4);
   // Exact sums do not notice the batches.
   options.gradient_sum = tight.gradient_sum = GradientSum::kExact;
-  RayViewTracer exact(context, options), exact_batches(context, tight);
-  CHECK(trace_and_differentiate(context, exact, gaussians, large, noise).gradients ==
-        trace_and_differentiate(context, exact_batches, gaussians, large, noise).gradients);
+  ViewTracer exact(context, options), exact_batches(context, tight);
+  CHECK(trace_and_differentiate(context, exact, gaussians, large, noise, true).gradients ==
+        trace_and_differentiate(context, exact_batches, gaussians, large, noise, true).gradients);
 }
 
 TEST_CASE("pictures and gradients of distorted cameras equal the double reference [small]") {
@@ -277,7 +287,7 @@ TEST_CASE("gradients through mirrors in exact sums are those in copies, in any b
     TraceOptions options;
     options.gradient_sum = sum;
     options.memory_budget = budget;
-    RayViewTracer tracer(context, options, mirrors_of(panels, 3));
+    ViewTracer tracer(context, options, mirrors_of(panels, 3));
     return trace_and_differentiate(context, tracer, gaussians, camera, noise).gradients;
   };
   const std::size_t large = std::size_t{1} << 28;
@@ -325,7 +335,7 @@ TEST_CASE("gradients through mirrors equal finite differences of a double refere
     CHECK((reflected > 40) == (bounces > 0));
     CHECK((twice > 4) == (bounces > 1));
 
-    RayViewTracer tracer(context, options, mirrors_of(panels, bounces));
+    ViewTracer tracer(context, options, mirrors_of(panels, bounces));
     const Traced got = trace_and_differentiate(context, tracer, gaussians, camera, gradient);
     for (std::size_t i = 0; i < pixels; ++i) {
       if (at[i].margin < 1e-4) continue;
@@ -365,18 +375,23 @@ TEST_CASE("what a tracer of rays refuses, and a tree that is refitted") {
   Context context = make_test_context();
   TraceOptions near;
   near.near_depth = 0.5f;
-  CHECK_THROWS_AS(RayViewTracer(context, near), UsageError);
+  TraceOptions deep;
+  deep.depth = true;
+  CHECK_THROWS_AS(
+      ViewTracer(context, deep, mirrors_of({{{-2, -2, 1}, {4, 0, 0}, {0, 4, 0}, {1, 1, 1}}}, 1)),
+      UsageError);
   Mirrors endless;
   endless.max_bounces = -1;
-  CHECK_THROWS_AS(RayViewTracer(context, {}, endless), UsageError);
-  RayViewTracer tracer(context, {});
+  CHECK_THROWS_AS(ViewTracer(context, {}, endless), UsageError);
+  ViewTracer tracer(context, {});
   Gaussians model = reference::random_scene(300, 94, 0);
   const Camera camera = fisheye_camera(30, 30);
   Buffer<float> gradient(context, 4 * 900, "image gradient");
   gradient.clear();
   GaussianGradients out;
   DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  tracer.update(gaussians);
+  ViewTracer cut(context, near);
+  CHECK_THROWS_AS(cut.forward(gaussians, camera), UsageError);
   tracer.forward(gaussians, camera);
   CHECK_THROWS_AS(tracer.backward(gaussians, gradient, out), UsageError);
   CHECK(tracer.capped_rays() == 0);
@@ -385,11 +400,145 @@ TEST_CASE("what a tracer of rays refuses, and a tree that is refitted") {
   for (int round = 0; round < 40; ++round) {
     for (float& x : model.means) x += static_cast<float>(0.01 * rng.normal());
     gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-    tracer.update(gaussians);
+    tracer.forward(gaussians, camera, true);
   }
-  tracer.forward(gaussians, camera);
-  RayViewTracer fresh(context, {});
-  fresh.update(gaussians);
+  ViewTracer fresh(context, {});
   fresh.forward(gaussians, camera);
   CHECK(fresh.download_image().data == tracer.download_image().data);
+
+  // The same count with other parameters is another model.
+  tracer.backward(gaussians, gradient, out);
+  gaussians.opacities.fill(0);
+  gaussians.changed(context);
+  CHECK_THROWS_AS(tracer.backward(gaussians, gradient, out), UsageError);
+  Camera pinhole = camera;
+  pinhole.model = CameraModel::kPinhole;
+  tracer.forward(gaussians, pinhole, true);
+  gaussians.changed(context);
+  CHECK_THROWS_AS(tracer.backward(gaussians, gradient, out), UsageError);
+  tracer.forward(gaussians, pinhole, true);
+  Buffer<float> small(context, 8, "small");
+  CHECK_THROWS_AS(tracer.backward(gaussians, small, out), UsageError);
+  CHECK_NOTHROW(tracer.backward(gaussians, gradient, out));
+}
+
+TEST_CASE("a pinhole's picture ray by ray equals the one of packets, depth and all [small]") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(600, 41, 2);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    CAPTURE(static_cast<int>(order));
+    TraceOptions options;
+    options.hit_order = order;
+    options.background = {0.1f, 0.3f, 0.5f};
+    options.depth = true;
+    // So little that the rays come in several batches.
+    options.memory_budget = 1 << 20;
+    ViewTracer tracer(context, options);
+    const Camera camera = view_of(CameraModel::kPinhole, 120, 90, 100);
+    tracer.forward(gaussians, camera);
+    const Image packets = tracer.download_image();
+    const Image packet_depth = tracer.download_depth();
+    tracer.forward_rays(gaussians, camera);
+    const Image rays = tracer.download_image();
+    const Image ray_depth = tracer.download_depth();
+    REQUIRE(rays.data.size() == packets.data.size());
+    REQUIRE(ray_depth.data.size() == packet_depth.data.size());
+    double mean = 0;
+    std::size_t other = 0, other_depth = 0, other_hits = 0, covered = 0;
+    for (std::size_t i = 0; i < packets.pixels(); ++i) {
+      float worst = 0;
+      for (std::size_t c = 0; c < 4; ++c) {
+        const float difference = std::abs(rays.data[4 * i + c] - packets.data[4 * i + c]);
+        worst = std::max(worst, difference);
+        mean += static_cast<double>(difference) / static_cast<double>(packets.data.size());
+      }
+      other += worst > 1e-3f ? 1 : 0;
+      const float a = ray_depth.data[3 * i], b = packet_depth.data[3 * i];
+      other_depth += std::abs(a - b) > 1e-3f * std::max(a, b) ? 1 : 0;
+      other_hits += ray_depth.data[3 * i + 2] == packet_depth.data[3 * i + 2] ? 0 : 1;
+      covered += packets.data[4 * i + 3] > 0.5f ? 1 : 0;
+    }
+    // Single precision decides near-ties in order and at outlines either way.
+    CHECK(mean < 1e-5);
+    CHECK(other * 500 < packets.pixels());
+    CHECK(other_depth * 500 < packets.pixels());
+    CHECK(other_hits * 500 < packets.pixels());
+    CHECK(covered > 1000);
+  }
+}
+
+TEST_CASE("pictures of other cameras equal the double reference ray by ray [small]") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(300, 42, 2);
+  const reference::Parameters parameters(model);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  TraceOptions options;
+  options.background = {0.1f, 0.3f, 0.5f};
+  options.depth = true;
+  ViewTracer tracer(context, options);
+  Camera opencv = view_of(CameraModel::kOpenCv, 28, 21, 22);
+  opencv.distortion = {-0.1, 0.02, 0, 0.002, -0.003, 0};
+  Camera panorama = view_of(CameraModel::kEquirectangular, 40, 20, 1);
+  panorama.translation = {0, 0, 0.2};
+  for (const Camera& camera : {opencv, view_of(CameraModel::kFisheye, 30, 30, 6), panorama,
+                               view_of(CameraModel::kOrthographic, 28, 21, 10)}) {
+    CAPTURE(static_cast<int>(camera.model));
+    tracer.forward(gaussians, camera);
+    const Image image = tracer.download_image();
+    const Image depth = tracer.download_depth();
+    const bool orthographic = camera.model == CameraModel::kOrthographic;
+    const glm::dvec3 axis(camera.rotation[0][2], camera.rotation[1][2], camera.rotation[2][2]);
+    std::size_t compared = 0, hit = 0, wrong = 0;
+    for (std::size_t i = 0; i < image.pixels(); ++i) {
+      const auto width = static_cast<std::size_t>(camera.width);
+      const CameraRay ray = camera_ray(camera, static_cast<double>(i % width) + 0.5,
+                                       static_cast<double>(i / width) + 0.5);
+      if (!ray.valid) {
+        wrong += image.data[4 * i] == 0.1f && image.data[4 * i + 3] == 0.0f ? 0 : 1;
+        continue;
+      }
+      const reference::RayTrace expected = reference::trace_ray(
+          parameters, options, ray.origin, ray.direction, 0.0, 1e30,
+          orthographic ? reference::ColorMode::kAlongRay : reference::ColorMode::kFromOrigin);
+      if (expected.margin < 1e-4) continue;
+      ++compared;
+      hit += expected.hits.empty() ? 0 : 1;
+      double worst = std::abs(static_cast<double>(image.data[4 * i + 3]) - expected.alpha);
+      for (int c = 0; c < 3; ++c) {
+        worst = std::max(
+            worst, std::abs(static_cast<double>(image.data[4 * i + static_cast<std::size_t>(c)]) -
+                            expected.color[c]));
+      }
+      const double along =
+          camera.model == CameraModel::kOpenCv ? glm::dot(axis, ray.direction) : 1.0;
+      const double far = along * expected.expected_depth;
+      wrong +=
+          worst < 2e-3 && std::abs(static_cast<double>(depth.data[3 * i]) - far) <= 2e-3 * (1 + far)
+              ? 0
+              : 1;
+    }
+    CHECK(wrong == 0);
+    CHECK(compared * 2 > image.pixels());
+    CHECK(hit > 50);
+  }
+}
+
+TEST_CASE("cameras that a view cannot be traced from are refused") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(20, 43, 0);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  TraceOptions options;
+  ViewTracer tracer(context, options);
+  Camera camera = view_of(CameraModel::kFisheye, 8, 8, 0);
+  CHECK_THROWS_AS(tracer.forward(gaussians, camera), UsageError);
+  camera.model = CameraModel::kEquirectangular;
+  CHECK_NOTHROW(tracer.forward(gaussians, camera));
+  options.near_depth = 0.5f;
+  ViewTracer near(context, options);
+  CHECK_THROWS_AS(near.forward(gaussians, camera), UsageError);
+  CHECK_NOTHROW(near.forward(gaussians, view_of(CameraModel::kPinhole, 8, 8, 9)));
+  CameraTracer packets(context, TraceOptions{});
+  packets.update(gaussians);
+  CHECK_THROWS_AS(packets.forward(gaussians, view_of(CameraModel::kOpenCv, 8, 8, 9)), UsageError);
 }

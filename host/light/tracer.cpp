@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raysplats/tracer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/planes.hpp"
+#include "light/view_tracer.hpp"
+#include "raysplats/error.hpp"
+#include "trace/model_impl.hpp"
+#include "trace/ray_backward.hpp"
+#include "trace/ray_tracer.hpp"
+
+namespace raysplats {
+namespace {
+
+// Of a ray on the device, with its result and gradients.
+constexpr std::size_t kRayBytes =
+    sizeof(Ray) + sizeof(RayResult) + sizeof(RayBackward::Gradient) + sizeof(RayBackward::Slopes);
+constexpr std::size_t kLeastBatch = 4096;
+static_assert(sizeof(RayGradient) == sizeof(RayBackward::Gradient));
+
+bool finite(const float (&v)[3]) {
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
+
+// As the kernels take it: an infinite end is the largest number.
+Ray checked(const Ray& ray, std::size_t number) {
+  const float* d = ray.direction;
+  const char* fault = nullptr;
+  if (!finite(ray.origin) || !finite(ray.direction) || std::isnan(ray.t_max) ||
+      !std::isfinite(ray.t_min)) {
+    fault = "has a number that is not finite";
+  } else if (!(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] >= std::numeric_limits<float>::min())) {
+    fault = "has a direction of length 0";
+  } else if (!(ray.t_min >= 0.0f)) {
+    fault = "begins before its origin";
+  } else if (ray.t_min > ray.t_max) {
+    fault = "ends before it begins";
+  }
+  if (fault != nullptr) {
+    throw UsageError(fmt::format(
+        "Ray {} (origin {} {} {}, direction {} {} {}, t from {} to {}) {}: rays need finite "
+        "numbers, a direction and 0 <= t_min <= t_max",
+        number, ray.origin[0], ray.origin[1], ray.origin[2], d[0], d[1], d[2], ray.t_min, ray.t_max,
+        fault));
+  }
+  Ray out = ray;
+  out.t_max = std::min(out.t_max, std::numeric_limits<float>::max());
+  return out;
+}
+
+Gaussians downloaded(const GaussianGradients& gradients, int sh_degree) {
+  Gaussians out;
+  out.sh_degree = sh_degree;
+  out.means = gradients.means.download();
+  out.quaternions = gradients.quaternions.download();
+  out.log_scales = gradients.scales.download();
+  out.opacities = gradients.opacities.download();
+  out.sh = gradients.sh.download();
+  return out;
+}
+
+}  // namespace
+
+struct Tracer::Impl {
+  Impl(Context& context_in, const TraceOptions& options_in)
+      : context(context_in),
+        options(options_in),
+        views(context_in, options_in),
+        tracer(context_in, options_in),
+        sums(context_in, tracer) {}
+
+  std::size_t batch() const {
+    return std::max(kLeastBatch, std::min<std::size_t>(options.memory_budget / 4 / kRayBytes,
+                                                       context.device().max_allocation /
+                                                           sizeof(RayBackward::Slopes)));
+  }
+  void trace_batch(const DeviceGaussians& gaussians, std::size_t first, std::size_t count);
+  RaysGradients backward(const DeviceGaussians& gaussians,
+                         std::span<const RayBackward::Gradient> gradients);
+
+  Context& context;
+  TraceOptions options;
+  ViewTracer views;
+  RayTracer tracer;
+  RayBackward sums;
+  // The last picture.
+  int width = 0;
+  int height = 0;
+  // The last rays.
+  std::vector<Ray> rays;
+  ColorDirection direction = ColorDirection::kRay;
+  std::uint64_t revision = 0;  // of the model that they met; 0 = not differentiable
+  Buffer<Ray> device_rays;
+  Buffer<RayResult> results;
+  std::uint64_t capped = 0;
+  bool last_was_picture = true;
+  // Of backward().
+  GaussianGradients gradients;
+  Buffer<float> image_gradient;
+  Buffer<RayBackward::Gradient> ray_gradients;
+  Buffer<RayBackward::Slopes> slopes;
+};
+
+Tracer::Tracer(Context& context, const TraceOptions& options) {
+  const auto lock = context.lock();
+  impl_ = std::make_unique<Impl>(context, options);
+}
+Tracer::~Tracer() = default;
+Tracer::Tracer(Tracer&&) noexcept = default;
+Tracer& Tracer::operator=(Tracer&&) noexcept = default;
+
+Image Tracer::render(const Model& model, const Camera& camera, bool differentiable) {
+  Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  self.width = self.height = 0;
+  self.views.forward(gaussians_of(model, self.context), camera, differentiable);
+  self.width = camera.width;
+  self.height = camera.height;
+  self.last_was_picture = true;
+  return self.views.download_image();
+}
+
+Image Tracer::depth() const {
+  const Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  if (self.width == 0) throw UsageError("There is no picture yet: call Tracer::render() first");
+  return self.views.download_depth();
+}
+
+ViewGradients Tracer::backward(const Model& model, const Image& gradient) {
+  Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  const DeviceGaussians& gaussians = gaussians_of(model, self.context);
+  if (gradient.width != self.width || gradient.height != self.height || gradient.channels != 4 ||
+      gradient.data.size() != 4 * gradient.pixels()) {
+    throw UsageError(
+        fmt::format("The gradient of a picture of {} x {} pixels and 4 channels has {} x {} and "
+                    "{}: give one of "
+                    "the picture's size",
+                    self.width, self.height, gradient.width, gradient.height, gradient.channels));
+  }
+  if (!std::all_of(gradient.data.begin(), gradient.data.end(),
+                   [](float value) { return std::isfinite(value); })) {
+    throw UsageError("The gradient of the picture has a number that is not finite: check the loss");
+  }
+  self.image_gradient.ensure(self.context, gradient.data.size(), "image gradient");
+  self.image_gradient.upload(planes_of(gradient));
+  ViewGradients out;
+  self.views.backward(gaussians, self.image_gradient, self.gradients, &out.pose);
+  out.parameters = downloaded(self.gradients, gaussians.sh_degree);
+  return out;
+}
+
+void Tracer::Impl::trace_batch(const DeviceGaussians& gaussians,
+                               std::size_t first,
+                               std::size_t count) {
+  device_rays.ensure(context, count, "rays");
+  device_rays.upload(std::span<const Ray>(rays).subspan(first, count));
+  tracer.trace(gaussians, device_rays, count, results, direction);
+}
+
+std::vector<RayResult> Tracer::trace(const Model& model,
+                                     std::span<const Ray> rays,
+                                     ColorDirection direction,
+                                     bool differentiable) {
+  Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  const DeviceGaussians& gaussians = gaussians_of(model, self.context);
+  if (self.options.near_depth > 0.0f) {
+    throw UsageError(fmt::format(
+        "TraceOptions::near_depth is {}, but single rays have no camera that could be near: use 0",
+        self.options.near_depth));
+  }
+  std::vector<Ray> sound;
+  sound.reserve(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) sound.push_back(checked(rays[i], i));
+  self.revision = 0;
+  self.last_was_picture = false;
+  self.capped = 0;
+  self.rays = std::move(sound);
+  self.direction = direction;
+  std::vector<RayResult> out(self.rays.size());
+  self.tracer.follow(gaussians);
+  self.tracer.set_background(self.options.background);
+  for (std::size_t first = 0; first < out.size(); first += self.batch()) {
+    const std::size_t count = std::min(self.batch(), out.size() - first);
+    self.trace_batch(gaussians, first, count);
+    self.results.download(std::span<RayResult>(out).subspan(first, count));
+  }
+  for (const RayResult& result : out) self.capped += result.capped;
+  if (differentiable) {
+    self.revision = gaussians.revision;
+  } else {
+    self.rays.clear();
+  }
+  return out;
+}
+
+RaysGradients Tracer::backward(const Model& model, std::span<const RayGradient> gradients) {
+  Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  const DeviceGaussians& gaussians = gaussians_of(model, self.context);
+  if (self.revision == 0 || self.revision != gaussians.revision) {
+    throw UsageError(
+        "Tracer::backward() must follow trace(differentiable = true) of the same model, unchanged");
+  }
+  if (gradients.size() != self.rays.size()) {
+    throw UsageError(
+        fmt::format("There are {} gradients for the {} rays that were traced: give one for each",
+                    gradients.size(), self.rays.size()));
+  }
+  std::vector<RayBackward::Gradient> numbers(gradients.size());
+  for (std::size_t i = 0; i < gradients.size(); ++i) {
+    const RayGradient& g = gradients[i];
+    if (!finite(g.color) || !std::isfinite(g.alpha)) {
+      throw UsageError(
+          fmt::format("The gradient of ray {} has a number that is not finite: check the loss", i));
+    }
+    numbers[i] = {g.color[0], g.color[1], g.color[2], g.alpha};
+  }
+  return self.backward(gaussians, numbers);
+}
+
+RaysGradients Tracer::Impl::backward(const DeviceGaussians& gaussians,
+                                     std::span<const RayBackward::Gradient> of_rays) {
+  RaysGradients out;
+  out.rays.resize(rays.size());
+  sums.begin(gaussians, {}, rays.size());
+  std::vector<RayBackward::Slopes> host_slopes;
+  for (std::size_t first = 0; first < rays.size(); first += batch()) {
+    const std::size_t count = std::min(batch(), rays.size() - first);
+    if (count < rays.size()) trace_batch(gaussians, first, count);
+    ray_gradients.ensure(context, count, "ray gradients");
+    ray_gradients.upload(of_rays.subspan(first, count));
+    sums.add(gaussians, device_rays, count, results, ray_gradients, direction, &slopes);
+    host_slopes.resize(count);
+    slopes.download(std::span<RayBackward::Slopes>(host_slopes));
+    for (std::size_t i = 0; i < count; ++i) {
+      const RayBackward::Slopes& s = host_slopes[i];
+      out.rays[first + i] = {{s[0], s[1], s[2]}, {s[4], s[5], s[6]}};
+    }
+  }
+  sums.finish(gaussians, gradients);
+  out.parameters = downloaded(gradients, gaussians.sh_degree);
+  return out;
+}
+
+std::uint64_t Tracer::capped_rays() const {
+  const Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  if (!self.last_was_picture) return self.capped;
+  return self.width == 0 ? 0 : self.views.capped_rays();
+}
+
+const TraceOptions& Tracer::options() const { return impl_->options; }
+
+void Tracer::set_background(const std::array<float, 3>& background) {
+  Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  self.options.background = background;
+  self.views.set_background(background);
+}
+
+}  // namespace raysplats

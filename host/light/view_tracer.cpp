@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "light/view_tracer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/planes.hpp"
+#include "raysplats/error.hpp"
+#include "trace/camera_rays.hpp"
+#include "trace/camera_tracer.hpp"
+#include "trace/ray_backward.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kGroup = 64;
+// A ray with its result, surface hit and gradients, and once more for a reflected one.
+constexpr std::size_t kPathBytes = 2 * (sizeof(Ray) + sizeof(RayResult) + sizeof(RsSurfaceHit) +
+                                        sizeof(RsPath) + 2 * sizeof(RayBackward::Gradient) + 4);
+constexpr std::size_t kLeastBatch = 4096;
+
+std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
+
+TraceOptions ray_options(TraceOptions options) {
+  if (options.near_depth > 0.0f) {
+    throw UsageError(
+        fmt::format("The near plane at {} cuts for pinholes only, and rays are traced one by one "
+                    "here: use --near 0",
+                    options.near_depth));
+  }
+  options.background = {0.0f, 0.0f, 0.0f};  // MirrorPaths adds it
+  return options;
+}
+
+std::size_t pixels_of(const Camera& camera) {
+  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+}
+
+// What the depth of a picture is counted along; zero for along every ray.
+std::array<float, 4> depth_axis(const Camera& camera) {
+  if (camera.model != CameraModel::kPinhole && camera.model != CameraModel::kOpenCv) return {};
+  std::array<float, 4> axis{};
+  for (int k = 0; k < 3; ++k) {
+    axis[static_cast<std::size_t>(k)] = static_cast<float>(camera.rotation[k][2]);
+  }
+  return axis;
+}
+
+glm::dvec3 vector(const float* v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace
+
+// Views ray by ray.
+struct ViewTracer::Rays {
+  Rays(Context& context, const TraceOptions& options, const Mirrors& mirrors)
+      : tracer(context, ray_options(options)),
+        generator(context),
+        paths(context, tracer, mirrors),
+        sums(context, tracer) {}
+
+  void add_pose(const Camera& camera, std::size_t count, PoseGradient& pose);
+
+  RayTracer tracer;
+  CameraRays generator;
+  MirrorPaths paths;
+  RayBackward sums;
+  std::uint64_t capped = 0;  // of the batches before the last
+  Buffer<RayBackward::Slopes> slopes;
+};
+
+struct ViewTracer::Impl {
+  Impl(Context& context_in, const TraceOptions& options_in, Mirrors mirrors_in)
+      : context(context_in),
+        options(options_in),
+        background(options_in.background),
+        mirrors(std::move(mirrors_in)),
+        packets(context_in, options_in) {}
+
+  Rays& single_rays() {
+    if (!rays) rays.emplace(context, options, mirrors);
+    return *rays;
+  }
+  std::size_t batch() const { return ViewTracer::batch(options.memory_budget); }
+  Kernel kernel(const char* name) { return context.kernel("light/mirror_paths.cl", name); }
+  void trace_batch(const DeviceGaussians& gaussians, std::size_t first, std::size_t count);
+  void forward_rays(const DeviceGaussians& gaussians);
+  void backward_rays(const DeviceGaussians& gaussians,
+                     const Buffer<float>& image_gradient,
+                     GaussianGradients& gradients,
+                     PoseGradient* pose);
+
+  Context& context;
+  TraceOptions options;
+  std::array<float, 3> background;  // of the next view; options have that of the last
+  Mirrors mirrors;
+  CameraTracer packets;
+  std::uint64_t packets_revision = 0;
+  std::optional<Rays> rays;  // once a view needs it
+  // The last view.
+  bool by_rays = false;
+  bool kept = false;
+  std::uint64_t revision = 0;  // of its Gaussians
+  Camera camera;
+  Buffer<float> image;
+  Buffer<float> depth;
+};
+
+std::size_t ViewTracer::batch(std::size_t memory_budget) {
+  return std::max(kLeastBatch, memory_budget / 4 / kPathBytes);
+}
+
+ViewTracer::ViewTracer(Context& context, const TraceOptions& options, Mirrors mirrors)
+    : impl_(std::make_unique<Impl>(context, options, std::move(mirrors))) {
+  if (impl_->mirrors.meshes.empty() && impl_->mirrors.max_bounces >= 0) return;
+  if (options.depth) {
+    throw UsageError("A picture with mirrors has no single depth: leave out TraceOptions::depth");
+  }
+  impl_->single_rays();
+}
+ViewTracer::~ViewTracer() = default;
+
+bool ViewTracer::by_rays(const Camera& camera) const {
+  return camera.model != CameraModel::kPinhole || !impl_->mirrors.meshes.empty();
+}
+
+void ViewTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
+  Impl& self = *impl_;
+  if (by_rays(camera)) {
+    forward_rays(gaussians, camera, keep);
+    return;
+  }
+  self.kept = false;
+  if (self.packets_revision != gaussians.revision) self.packets.update(gaussians);
+  self.packets_revision = gaussians.revision;
+  self.packets.options().background = self.options.background = self.background;
+  self.packets.forward(gaussians, camera, keep);
+  self.by_rays = false;
+  self.camera = camera;
+  self.kept = keep;
+  self.revision = gaussians.revision;
+}
+
+void ViewTracer::forward_rays(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
+  Impl& self = *impl_;
+  require_pixels(camera);
+  self.kept = false;
+  self.by_rays = true;
+  self.camera = camera;
+  self.options.background = self.background;
+  self.single_rays().tracer.follow(gaussians);
+  self.forward_rays(gaussians);
+  self.kept = keep;
+  self.revision = gaussians.revision;
+}
+
+void ViewTracer::Impl::trace_batch(const DeviceGaussians& gaussians,
+                                   std::size_t first,
+                                   std::size_t count) {
+  rays->generator.generate(camera, Lens{}, first, count, rays->paths.rays());
+  rays->paths.trace(gaussians, count, color_direction(camera), options.background);
+}
+
+void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians) {
+  MirrorPaths& paths = rays->paths;
+  rays->capped = 0;
+  const std::size_t pixels = pixels_of(camera);
+  image.ensure(context, 4 * pixels, "image");
+  if (options.depth) depth.ensure(context, 3 * pixels, "depth");
+  for (std::size_t first = 0; first < pixels; first += batch()) {
+    if (first > 0) rays->capped += paths.capped_rays();
+    const std::size_t count = std::min(batch(), pixels - first);
+    trace_batch(gaussians, first, count);
+    kernel("store_picture")
+        .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), paths.seen(),
+                image);
+    if (!options.depth) continue;
+    kernel("store_depth")
+        .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels),
+                depth_axis(camera), paths.rays(), paths.results(), depth);
+  }
+}
+
+const Buffer<float>& ViewTracer::image() const {
+  return impl_->by_rays ? impl_->image : impl_->packets.image();
+}
+
+const Buffer<float>& ViewTracer::depth() const {
+  return impl_->by_rays ? impl_->depth : impl_->packets.depth();
+}
+
+Image ViewTracer::download_image() const {
+  const Impl& self = *impl_;
+  if (!self.by_rays) return self.packets.download_image();
+  return interleaved(self.image.download(), self.camera.width, self.camera.height, 4);
+}
+
+Image ViewTracer::download_depth() const {
+  const Impl& self = *impl_;
+  if (!self.by_rays) return self.packets.download_depth();
+  if (!self.options.depth) throw UsageError("Depth was not traced: set TraceOptions::depth");
+  return interleaved(self.depth.download(), self.camera.width, self.camera.height, 3);
+}
+
+void ViewTracer::backward(const DeviceGaussians& gaussians,
+                          const Buffer<float>& image_gradient,
+                          GaussianGradients& gradients,
+                          PoseGradient* pose) {
+  Impl& self = *impl_;
+  if (!self.kept || self.revision != gaussians.revision) {
+    throw UsageError(
+        "ViewTracer::backward() must follow forward(keep = true) of the same Gaussians, unchanged");
+  }
+  if (image_gradient.size() < 4 * pixels_of(self.camera)) {
+    throw UsageError(fmt::format(
+        "The gradient of a picture of {} numbers has {}: give one for every channel of every pixel",
+        4 * pixels_of(self.camera), image_gradient.size()));
+  }
+  if (self.by_rays) {
+    self.backward_rays(gaussians, image_gradient, gradients, pose);
+    return;
+  }
+  self.packets.backward(gaussians, image_gradient, gradients);
+  if (pose != nullptr) *pose = self.packets.pose_gradient(gaussians);
+}
+
+void ViewTracer::Impl::backward_rays(const DeviceGaussians& gaussians,
+                                     const Buffer<float>& image_gradient,
+                                     GaussianGradients& gradients,
+                                     PoseGradient* pose) {
+  MirrorPaths& paths = rays->paths;
+  if (pose != nullptr) *pose = {};
+  const std::size_t pixels = pixels_of(camera);
+  rays->sums.begin(gaussians, RayScreen::of(camera), pixels * paths.segments());
+  for (std::size_t first = 0; first < pixels; first += batch()) {
+    const std::size_t count = std::min(batch(), pixels - first);
+    if (batch() < pixels) trace_batch(gaussians, first, count);
+    paths.gradients().ensure(context, count, "ray gradients");
+    kernel("load_gradients")
+        .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), image_gradient,
+                paths.gradients());
+    paths.backward(gaussians, rays->sums, pose != nullptr ? &rays->slopes : nullptr);
+    if (pose != nullptr) rays->add_pose(camera, count, *pose);
+  }
+  rays->sums.finish(gaussians, gradients);
+}
+
+// Moving the centre moves every origin; a turn moves directions, and origins that are not the
+// centre.
+void ViewTracer::Rays::add_pose(const Camera& camera,
+                                std::size_t count_of_rays,
+                                PoseGradient& pose) {
+  std::vector<Ray> traced(count_of_rays);
+  std::vector<RayBackward::Slopes> by_ray(count_of_rays);
+  paths.rays().download(std::span<Ray>(traced));
+  slopes.download(std::span<RayBackward::Slopes>(by_ray));
+  const glm::dvec3 center = camera.center();
+  glm::dvec3 by_center(0.0), turn(0.0);
+  for (std::size_t i = 0; i < count_of_rays; ++i) {
+    const glm::dvec3 by_origin = vector(by_ray[i].data());
+    by_center += by_origin;
+    turn += glm::cross(vector(traced[i].direction), vector(by_ray[i].data() + 4)) +
+            glm::cross(vector(traced[i].origin) - center, by_origin);
+  }
+  // A turn w of the world-to-camera rotation turns rays by -w.
+  const glm::dvec3 rotation = -(camera.rotation * turn);
+  for (int k = 0; k < 3; ++k) {
+    pose.center[static_cast<std::size_t>(k)] += by_center[k];
+    pose.rotation[static_cast<std::size_t>(k)] += rotation[k];
+  }
+}
+
+void ViewTracer::set_background(const std::array<float, 3>& background) {
+  impl_->background = background;
+}
+
+std::uint64_t ViewTracer::capped_rays() const {
+  const Impl& self = *impl_;
+  return self.by_rays ? self.rays->capped + self.rays->paths.capped_rays()
+                      : self.packets.statistics().capped_rays;
+}
+
+}  // namespace raysplats

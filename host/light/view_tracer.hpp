@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "device/context.hpp"
+#include "light/mirror_paths.hpp"
+#include "raysplats/camera.hpp"
+#include "raysplats/image.hpp"
+#include "raysplats/pose_gradient.hpp"
+#include "raysplats/trace_options.hpp"
+#include "trace/device_gaussians.hpp"
+
+namespace raysplats {
+
+/// Pictures of Gaussians from cameras of every model, forward and backward: pinholes in packets of
+/// rays (CameraTracer), other cameras and scenes with mirrors ray by ray (RayTracer, MirrorPaths).
+/// Boxes and trees follow the revision of the Gaussians and are made when a view first needs them.
+class ViewTracer {
+ public:
+  /// Rays of camera pixels that are traced at once where they are traced one by one.
+  static std::size_t batch(std::size_t memory_budget);
+
+  /// Throws UsageError for options out of range, for a negative number of bounces, and for
+  /// options.depth with mirrors.
+  ViewTracer(Context& context, const TraceOptions& options, Mirrors mirrors = {});
+  ~ViewTracer();
+
+  /// Whether a view of this camera is traced ray by ray.
+  bool by_rays(const Camera& camera) const;
+
+  /// Traces one view. With `keep` backward() may follow; what it needs stays where the memory
+  /// budget has room and is traced again where not. Throws UsageError for a camera without pixels
+  /// or focal length, and for options.near_depth where rays are traced one by one.
+  void forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep = false);
+  /// The same ray by ray, whatever the camera's model.
+  void forward_rays(const DeviceGaussians& gaussians, const Camera& camera, bool keep = false);
+
+  /// Result of the last forward(): planar R, G, B (background blended), A; 4 x height x width. A is
+  /// the share of light that does not come from the background. Pixels that a lens does not see
+  /// show the background.
+  const Buffer<float>& image() const;
+  /// With options.depth: planar expected depth, median depth, hits per ray; 3 x height x width.
+  /// Depth is along z for kPinhole, kOpenCv and kOrthographic, along the ray for the others.
+  const Buffer<float>& depth() const;
+  /// The same as interleaved host images; UsageError for a depth that was not traced.
+  Image download_image() const;
+  Image download_depth() const;
+
+  /// Gradients of the last forward(keep = true) view from `image_gradient` (planar dL/dR, dL/dG,
+  /// dL/dB, dL/dA; 4 x height x width). Overwrites `gradients`, growing its buffers as needed. With
+  /// `pose` also the gradient for the camera's pose. Throws UsageError when the Gaussians changed
+  /// since, and for the pose of a camera that looks into mirrors.
+  void backward(const DeviceGaussians& gaussians,
+                const Buffer<float>& image_gradient,
+                GaussianGradients& gradients,
+                PoseGradient* pose = nullptr);
+
+  /// Colour behind everything from the next forward() on.
+  void set_background(const std::array<float, 3>& background);
+  /// Rays of the last view that stopped because of max_hits; blocks.
+  std::uint64_t capped_rays() const;
+
+ private:
+  struct Rays;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/mirror_meshes.hpp"
+
+#include <utility>
+
+#include "io/mesh_file.hpp"
+
+namespace raysplats {
+
+Mirrors load_mirrors(const std::vector<std::string>& paths, int max_bounces) {
+  Mirrors out;
+  out.max_bounces = max_bounces;
+  for (const std::string& path : paths) {
+    io::MeshFile file = io::read_mesh(path);
+    const auto first = static_cast<std::uint32_t>(out.materials.size());
+    for (std::uint32_t& material : file.mesh.materials) material += first;
+    for (Material& material : file.materials) {
+      if (material.kind != Material::Kind::kMirror) material.color = {1.0f, 1.0f, 1.0f};
+      material.kind = Material::Kind::kMirror;
+      out.materials.push_back(material);
+    }
+    out.meshes.push_back(std::move(file.mesh));
+  }
+  return out;
+}
+
+}  // namespace raysplats

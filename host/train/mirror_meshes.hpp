@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "light/mirror_paths.hpp"
+
+namespace raysplats {
+
+/// Known mirrors from mesh files (io::read_mesh). Materials that are mirrors keep their colour, all
+/// others reflect everything.
+Mirrors load_mirrors(const std::vector<std::string>& paths, int max_bounces);
+
+}  // namespace raysplats

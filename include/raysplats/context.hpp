@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "raysplats/device.hpp"
+
+namespace raysplats {
+
+class BuildOptions;
+class Kernel;
+class Profiler;
+
+struct ContextOptions {
+  bool profile = false;         ///< time every launch by device events
+  bool keep_launches = false;   ///< with profile: also keep each time for take_launches()
+  bool kernel_cache = true;     ///< keep compiled programs in the user's cache directory
+  bool tuning = true;           ///< use what `raysplats tune` stored for the device
+  std::string cache_directory;  ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
+};
+
+/// Device time of one launch. Fills and copies of buffers have no program and are named "(fill)"
+/// and "(copy)".
+struct LaunchTime {
+  std::string program;  ///< file below cl/
+  std::string kernel;
+  double seconds = 0;
+};
+
+/// One device with an in-order queue and its compiled programs. Models and tracers are made with a
+/// context, belong to it alone, and have to go before it does.
+///
+/// Threads: Model, Tracer, PathTracer and Trainer lock their context while they work, so threads
+/// that share one take turns; what several calls do together (forward and backward) is held
+/// together by lock(). For work at the same time take a context per thread. Everything else here,
+/// and the making of contexts from the same device, is for one thread at a time.
+class Context {
+ public:
+  /// Opens a device of list_devices() or select_device(). Throws DeviceError when the driver does
+  /// not give it.
+  explicit Context(const DeviceInfo& device, const ContextOptions& options = {});
+  ~Context();
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+
+  const DeviceInfo& device() const;
+  /// Replaces the tuning in use; tracers made later follow it.
+  void set_tuning(const std::optional<DeviceTuning>& tuning);
+
+  /// Blocks until everything enqueued has finished; errors of earlier launches surface here.
+  void finish();
+
+  /// Keeps other threads from using the context until the lock goes. A thread may lock it again.
+  [[nodiscard]] std::unique_lock<std::recursive_mutex> lock() const;
+
+  /// With profile: calls and device time of every kernel so far, as a table; blocks.
+  std::string profile_table();
+  /// With keep_launches: what has run since the last call, in order; blocks. Else nothing.
+  std::vector<LaunchTime> take_launches();
+
+  /// Bytes in live buffers of this context, and the most there have been.
+  std::size_t allocated_bytes() const;
+  std::size_t peak_allocated_bytes() const;
+
+  // What follows serves the library itself; its types are not installed.
+
+  /// The kernel `name` of the file `program` below cl/, built with `options` (memory, then disk
+  /// cache, then compiler). Throws DeviceError with the compiler's log when the build fails.
+  Kernel kernel(const std::string& program, const std::string& name, const BuildOptions& options);
+  Kernel kernel(const std::string& program, const std::string& name);
+  Profiler& profiler();
+  /// A number that this context has not given before.
+  std::uint64_t new_revision();
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/context.hpp"
+#include "raysplats/gaussians.hpp"
+#include "raysplats/image.hpp"
+#include "raysplats/model.hpp"
+#include "raysplats/pose_gradient.hpp"
+#include "raysplats/rays.hpp"
+#include "raysplats/trace_options.hpp"
+
+namespace raysplats {
+
+/// Gradients of a loss over a picture.
+struct ViewGradients {
+  /// dL/d(parameter), laid out as the model's: means, quaternions, log_scales, opacities (logits),
+  /// sh.
+  Gaussians parameters;
+  PoseGradient pose;  ///< of the camera
+};
+
+/// Gradients of a loss over rays.
+struct RaysGradients {
+  Gaussians parameters;  ///< as in ViewGradients
+  std::vector<RaySlope> rays;
+};
+
+/// Traces Gaussians, forward and backward: pictures of cameras of every model, and rays of your
+/// own. What is computed is in docs/model.md; the hits of every ray are blended in exact order
+/// (Byrski et al. 2025). The gradients hold the set and the order of the hits fixed.
+///
+/// Units: world units for positions and depths, pixels for focal lengths; colours as they were
+/// trained, usually display values in [0, 1]. A tracer notices by itself when a model has changed.
+/// Threads: as Context. A tracer remembers its last picture and its last rays: threads that want
+/// gradients of their own take tracers of their own, or hold Context::lock() from the forward to
+/// the backward pass.
+class Tracer {
+ public:
+  /// Throws UsageError for options out of range.
+  explicit Tracer(Context& context, const TraceOptions& options = {});
+  ~Tracer();
+  Tracer(Tracer&&) noexcept;
+  Tracer& operator=(Tracer&&) noexcept;
+
+  /// RGBA at the camera's size: background blended in, A = 1 - transmittance. `differentiable`
+  /// keeps what backward() needs, within options.memory_budget. Throws UsageError for a camera
+  /// without pixels or with a number that is not finite, for a model of another context, and for
+  /// options.near_depth with a camera that is no pinhole.
+  Image render(const Model& model, const Camera& camera, bool differentiable = false);
+  /// Of the last picture, with options.depth: expected depth, median depth and number of hits per
+  /// pixel. Depth is along the viewing axis for kPinhole, kOpenCv and kOrthographic, along the ray
+  /// for other models; 0 where nothing is. Throws UsageError without options.depth.
+  Image depth() const;
+  /// Gradients of the last picture from dL/d(R, G, B, A), of its size with 4 channels. Throws
+  /// UsageError when that was not rendered differentiable, when the model has changed since or is
+  /// another one, and for a gradient of another size or with a number that is not finite.
+  ViewGradients backward(const Model& model, const Image& gradient);
+
+  /// Rays of any origins and directions. Throws UsageError, naming the ray, for a number that is
+  /// not finite (t_max may be infinite), a direction of length 0, and ends that are not
+  /// 0 <= t_min <= t_max; for a model of another context; and for options.near_depth, which belongs
+  /// to cameras.
+  std::vector<RayResult> trace(const Model& model,
+                               std::span<const Ray> rays,
+                               ColorDirection direction = ColorDirection::kRay,
+                               bool differentiable = false);
+  /// Gradients of the last rays, one gradient for each of them. Throws as the other backward().
+  RaysGradients backward(const Model& model, std::span<const RayGradient> gradients);
+
+  /// Rays of the last render() or trace() that stopped because of options.max_hits.
+  std::uint64_t capped_rays() const;
+  const TraceOptions& options() const;
+  /// Colour behind everything from the next render() or trace() on.
+  void set_background(const std::array<float, 3>& background);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats
