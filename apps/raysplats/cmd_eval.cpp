@@ -10,10 +10,10 @@
 #include "base/output_directory.hpp"
 #include "base/progress.hpp"
 #include "core/morton_order.hpp"
-#include "eval/evaluator.hpp"
 #include "light/view_tracer.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/evaluation.hpp"
 #include "raysplats/io.hpp"
 #include "train/model_source.hpp"
 

@@ -7,8 +7,8 @@
 
 #include "base/progress.hpp"
 #include "options.hpp"
+#include "raysplats/trainer.hpp"
 #include "train/train_config.hpp"
-#include "train/trainer.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -12,8 +12,8 @@
 #include "base/progress.hpp"
 #include "eval/scene_frames.hpp"
 #include "io/scene_loader.hpp"
-#include "light/light_tracer.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/path_tracer.hpp"
 #include "render_flags.hpp"
 #include "train/model_source.hpp"
 
@@ -149,7 +149,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   const auto [first, last] = parse_frames(flags.frames, loaded.cameras.size());
 
   const std::unique_ptr<Context> context = open_context(flags.device);
-  LightTracer tracer(*context, loaded.scene);
+  PathTracer tracer(*context, loaded.scene);
   make_output_directory(flags.output);
   spdlog::info("{}: {} Gaussians, {} meshes, {} lights, {} frames", flags.model,
                loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
@@ -169,7 +169,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
                 fmt::format("Interrupted after {} of {} frames: what is in {} is whole",
                             report.frames, last - first, flags.output));
   }
-  const LightTracer::Statistics& rays = report.rays;
+  const PathTracer::Statistics& rays = report.rays;
   warn_of_capped_rays(rays.capped_rays, rays.camera_rays + rays.continued_rays + rays.shadow_rays,
                       loaded.scene.trace);
   if (rays.ended_by_bounces > 0) {

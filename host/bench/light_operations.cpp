@@ -72,14 +72,14 @@ void SceneBench::Impl::make_light_tracer(std::size_t triangles, Material::Kind k
     }
     scene.lights = {light};
   }
-  light_tracer = std::make_unique<LightTracer>(context, scene);
+  light_tracer = std::make_unique<PathTracer>(context, scene);
 }
 
 BenchOperation SceneBench::Impl::light(const char* row,
                                        std::size_t triangles,
                                        Material::Kind kind,
                                        bool lights) {
-  const auto statistics = std::make_shared<LightTracer::Statistics>();
+  const auto statistics = std::make_shared<PathTracer::Statistics>();
   return {[=, this] { make_light_tracer(triangles, kind, lights); },
           {},
           [=, this] {
@@ -87,7 +87,7 @@ BenchOperation SceneBench::Impl::light(const char* row,
             *statistics = light_tracer->statistics();
           },
           {{row, {}, false, [statistics] {
-              const LightTracer::Statistics& s = *statistics;
+              const PathTracer::Statistics& s = *statistics;
               const auto paths = static_cast<double>(s.camera_rays + s.continued_rays);
               const auto shadows = static_cast<double>(s.shadow_rays);
               BenchWork work{{{"rays", paths + shadows}},

@@ -10,9 +10,9 @@
 #include "bench/scene_bench.hpp"
 #include "bvh/gaussian_bounds.hpp"
 #include "bvh/lbvh.hpp"
-#include "light/light_tracer.hpp"
 #include "light/triangle_tracer.hpp"
 #include "primitives/radix_sort.hpp"
+#include "raysplats/path_tracer.hpp"
 #include "raysplats/scene.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/ray_tracer.hpp"
@@ -66,7 +66,7 @@ struct SceneBench::Impl {
   BenchOperation densify();
   BenchOperation iteration();
   BenchOperation surfaces(const char* row, std::size_t triangles, bool camera_rays);
-  /// One image by LightTracer; no body for 0 triangles.
+  /// One image by PathTracer; no body for 0 triangles.
   BenchOperation light(const char* row, std::size_t triangles, Material::Kind kind, bool lights);
 
   BenchWork bounds_work() const;
@@ -112,7 +112,7 @@ struct SceneBench::Impl {
   std::unique_ptr<TriangleTracer> triangle_tracer;
   Buffer<Ray> surface_rays;
   Buffer<RsSurfaceHit> surface_hits;
-  std::unique_ptr<LightTracer> light_tracer;
+  std::unique_ptr<PathTracer> light_tracer;
 };
 
 /// Bytes and flops of both, items of the first.

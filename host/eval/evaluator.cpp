@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "eval/evaluator.hpp"
+#include "raysplats/evaluation.hpp"
 
 #include <fmt/format.h>
 

@@ -8,7 +8,7 @@
 namespace raysplats {
 namespace {
 
-void add(LightTracer::Statistics& sum, const LightTracer::Statistics& frame) {
+void add(PathTracer::Statistics& sum, const PathTracer::Statistics& frame) {
   sum.camera_rays += frame.camera_rays;
   sum.continued_rays += frame.continued_rays;
   sum.shadow_rays += frame.shadow_rays;
@@ -18,7 +18,7 @@ void add(LightTracer::Statistics& sum, const LightTracer::Statistics& frame) {
 
 }  // namespace
 
-SceneReport write_scene_frames(LightTracer& tracer,
+SceneReport write_scene_frames(PathTracer& tracer,
                                const LoadedScene& scene,
                                std::size_t first,
                                std::size_t last,

@@ -7,20 +7,20 @@
 
 #include "eval/frame_writer.hpp"
 #include "io/scene_loader.hpp"
-#include "light/light_tracer.hpp"
+#include "raysplats/path_tracer.hpp"
 
 namespace raysplats {
 
 struct SceneReport {
   std::size_t frames = 0;
-  LightTracer::Statistics rays;  ///< of all frames
-  double trace_seconds = 0;      ///< placing meshes, tracing and download, without the files
+  PathTracer::Statistics rays;  ///< of all frames
+  double trace_seconds = 0;     ///< placing meshes, tracing and download, without the files
 };
 
 /// Draws the frames from `first` up to but without `last` and writes them to `folder`, which
 /// exists, named as their cameras (frame_names()). `done` hears the number of finished frames and
 /// returns false to stop early. Throws what the tracer throws, DataError when a file fails.
-SceneReport write_scene_frames(LightTracer& tracer,
+SceneReport write_scene_frames(PathTracer& tracer,
                                const LoadedScene& scene,
                                std::size_t first,
                                std::size_t last,

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_file.hpp"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,14 +15,13 @@
 #include "base/atomic_file.hpp"
 #include "io/byte_reader.hpp"
 #include "io/exr_header.hpp"
+#include "io/image_codec.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
 namespace raysplats {
 namespace {
 
-constexpr int kMaxSide = 32768;
-constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
 constexpr std::string_view kPngStart = "\x89PNG\r\n\x1a\n";
 constexpr const char* kFormats = "PNG, JPEG, EXR, HDR, TIFF or BMP";
 
@@ -50,11 +47,6 @@ std::string_view format_of(std::string_view magic) {
     if (magic.starts_with(start)) return "tiff";
   }
   return "";
-}
-
-std::string reason(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text.empty() ? "its data are damaged" : text;
 }
 
 /// The end-of-image marker ends every whole JPEG. The decoder fills the rest of a truncated one
@@ -126,40 +118,9 @@ bool has_whole_png_chunks(std::string_view bytes, bool header_only) {
   throw DataError(fmt::format("The image {} is truncated or damaged: copy it again", name));
 }
 
-/// Opens the decoder of a format and checks the picture's size. `name` is the path, or stands for
-/// it where the content comes from `memory`, which has to outlive the decoder.
-std::unique_ptr<OIIO::ImageInput> open_decoder(std::string_view format,
-                                               const std::string& name,
-                                               OIIO::Filesystem::IOProxy* memory) {
-  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(std::string(format));
-  if (!input || (memory != nullptr && !input->set_ioproxy(memory))) {
-    throw DataError(
-        fmt::format("The image {} cannot be read: OpenImageIO is built without {}", name, format));
-  }
-  // Straight alpha as in the file: OpenImageIO multiplies it into PNG and TIFF colours otherwise.
-  OIIO::ImageSpec config;
-  config.attribute("oiio:UnassociatedAlpha", 1);
-  OIIO::ImageSpec spec;
-  if (!input->open(name, spec, config)) {
-    throw DataError(
-        fmt::format("The image {} cannot be read: {}", name, reason(input->geterror())));
-  }
-  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep) {
-    throw DataError(fmt::format("The image {} is not a flat picture with pixels", name));
-  }
-  if (spec.width > kMaxSide || spec.height > kMaxSide ||
-      static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height) >
-          kMaxPixels) {
-    throw DataError(fmt::format(
-        "The image {} has {} x {} pixels, more than {} a side or {} million: make it smaller", name,
-        spec.width, spec.height, kMaxSide, kMaxPixels >> 20));
-  }
-  return input;
-}
-
 /// Opens an image, its size checked before anything is decoded. `for_pixels`: checks that the file
 /// is whole.
-std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, bool for_pixels) {
+std::unique_ptr<io::ImageDecoder> open_image(const std::filesystem::path& path, bool for_pixels) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
     throw DataError(
@@ -191,32 +152,8 @@ std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path, 
     whole = has_whole_png_chunks(start, true);
   }
   if (!whole) fail_damaged(path.string());
-  if (format == "openexr") io::check_exr_header(path, kMaxSide);
-  return open_decoder(format, path.string(), nullptr);
-}
-
-Image decode(OIIO::ImageInput& input, const std::string& name) {
-  const OIIO::ImageSpec& spec = input.spec();
-  Image image(spec.width, spec.height, std::min(spec.nchannels, 4));
-  if (!input.read_image(0, 0, 0, image.channels, OIIO::TypeFloat, image.data.data())) {
-    throw DataError(
-        fmt::format("The image {} cannot be decoded: {}", name, reason(input.geterror())));
-  }
-  return image;
-}
-
-std::vector<std::uint8_t> to_bytes(const Image& image, int channels) {
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(image.pixels() * static_cast<std::size_t>(channels));
-  for (std::size_t pixel = 0; pixel < image.pixels(); ++pixel) {
-    const float* values = &image.data[pixel * static_cast<std::size_t>(image.channels)];
-    for (int c = 0; c < channels; ++c) {
-      // Written so that NaN becomes 0.
-      const float value = values[c] > 0.0f ? std::min(values[c], 1.0f) : 0.0f;
-      bytes.push_back(static_cast<std::uint8_t>(value * 255.0f + 0.5f));
-    }
-  }
-  return bytes;
+  if (format == "openexr") io::check_exr_header(path, io::kMaxImageSide);
+  return io::image_codec().open(std::string(format), path.string(), {});
 }
 
 std::vector<std::string> exr_channel_names(const Image& image,
@@ -243,7 +180,7 @@ bool has_image_extension(const std::filesystem::path& path) {
 
 ImageSize image_size(const std::filesystem::path& path) {
   const auto input = open_image(path, false);
-  return {input->spec().width, input->spec().height};
+  return {input->width(), input->height()};
 }
 
 Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
@@ -255,17 +192,12 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
   if (format == "png" ? !has_whole_png_chunks(text, false) : !is_whole_jpeg(bytes)) {
     fail_damaged(name);
   }
-  OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
-  const auto input = open_decoder(format, name, &memory);
-  return decode(*input, name);
+  return image_codec().open(std::string(format), name, bytes)->decode();
 }
 
 }  // namespace io
 
-Image read_image(const std::filesystem::path& path) {
-  const auto input = open_image(path, true);
-  return decode(*input, path.string());
-}
+Image read_image(const std::filesystem::path& path) { return open_image(path, true)->decode(); }
 
 void write_image(const std::filesystem::path& path,
                  const Image& image,
@@ -286,38 +218,11 @@ void write_image(const std::filesystem::path& path,
                     "named) do not fit the format",
                     path.string(), image.width, image.height, image.channels, extra));
   }
-  // JPEG has neither alpha nor grey with alpha.
-  const int channels = jpeg ? (image.channels >= 3 ? 3 : 1) : image.channels;
-  OIIO::ImageSpec spec(image.width, image.height, channels,
-                       exr ? OIIO::TypeFloat : OIIO::TypeUInt8);
-  spec.attribute("oiio:UnassociatedAlpha", 1);
-  if (jpeg) {
-    spec.attribute("Compression", "jpeg:95");
-    spec.attribute("jpeg:subsampling", "4:4:4");
-  }
-  if (exr) {
-    spec.attribute("compression", "zip");
-    spec.channelnames = exr_channel_names(image, extra_channels);
-  }
-  // Encoded in memory: OpenImageIO's encoders miss a full disk, and libjpeg ends the process on
-  // one.
-  const std::string format = exr ? "openexr" : (jpeg ? "jpeg" : "png");
-  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(format);
-  OIIO::Filesystem::IOVecOutput encoded;
-  bool written = output && output->set_ioproxy(&encoded) && output->open(path.string(), spec);
-  if (written && exr) {
-    written = output->write_image(OIIO::TypeFloat, image.data.data());
-  } else if (written) {
-    written = output->write_image(OIIO::TypeUInt8, to_bytes(image, channels).data());
-  }
-  written = written && output->close();
-  if (!written) {
-    throw DataError(
-        fmt::format("The image {} cannot be written: {}", path.string(),
-                    output ? reason(output->geterror()) : "OpenImageIO lacks the format"));
-  }
+  io::ImageEncoding encoding{exr ? "openexr" : (jpeg ? "jpeg" : "png"), {}};
+  if (exr) encoding.channel_names = exr_channel_names(image, extra_channels);
+  const std::vector<unsigned char> encoded = io::image_codec().encode(path, image, encoding);
   AtomicFile file(path);
-  file.write(encoded.buffer().data(), encoded.buffer().size());
+  file.write(encoded.data(), encoded.size());
   file.commit();
 }
 

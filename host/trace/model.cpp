@@ -27,7 +27,9 @@ void check_array(const char* name, const std::vector<float>& values, std::size_t
   }
 }
 
-void check(const Gaussians& gaussians) {
+}  // namespace
+
+void check_gaussians(const Gaussians& gaussians) {
   if (gaussians.sh_degree < 0 || gaussians.sh_degree > 4) {
     throw UsageError(
         fmt::format("The Gaussians have SH degree {}: 0 to 4 are possible", gaussians.sh_degree));
@@ -41,8 +43,10 @@ void check(const Gaussians& gaussians) {
               3 * n * static_cast<std::size_t>(sh_coefficients(gaussians.sh_degree)));
 }
 
+namespace {
+
 DeviceGaussians upload(Context& context, const Gaussians& gaussians) {
-  check(gaussians);
+  check_gaussians(gaussians);
   const auto lock = context.lock();
   return DeviceGaussians::upload(context, gaussians, ScaleActivation::kExp);
 }

@@ -13,6 +13,7 @@
 #include "raysplats/camera.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/train_options.hpp"
+#include "raysplats/trainer.hpp"
 
 namespace raysplats {
 
@@ -24,16 +25,6 @@ struct TrainRow {
   double psnr = 0;  ///< of the view just trained
   std::size_t gaussians = 0;
   double iterations_per_second = 0;
-};
-
-/// Mean over the test views at one iteration.
-struct EvaluationRow {
-  std::int64_t iteration = 0;
-  double training_seconds = 0;
-  double psnr = 0;
-  double ssim = 0;
-  std::size_t views = 0;
-  std::size_t gaussians = 0;
 };
 
 /// The folder of one training run: config.toml, cameras.json, metrics.csv, metrics.json,

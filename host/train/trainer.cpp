@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/trainer.hpp"
+#include "raysplats/trainer.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <new>
@@ -16,9 +17,9 @@
 #include "base/interrupt.hpp"
 #include "base/progress.hpp"
 #include "core/morton_order.hpp"
-#include "eval/evaluator.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/evaluation.hpp"
 #include "raysplats/io.hpp"
 #include "train/adam.hpp"
 #include "train/checkpoint.hpp"
@@ -31,6 +32,7 @@
 #include "train/mirror_meshes.hpp"
 #include "train/model_validator.hpp"
 #include "train/photo_set.hpp"
+#include "train/run_folder.hpp"
 #include "train/run_state.hpp"
 #include "train/schedule.hpp"
 #include "train/step_guard.hpp"
@@ -181,8 +183,17 @@ struct Trainer::Impl {
   void write_dump();
   std::string rescue();
   void write_metrics(bool complete);
-  void run_iterations(Progress& progress, const InterruptGuard& interrupt);
+  void run_iterations(std::int64_t until,
+                      bool scheduled,
+                      Progress& progress,
+                      const std::function<bool()>& interrupted);
+  void advance(std::int64_t until,
+               bool scheduled,
+               bool show_progress,
+               const std::function<bool()>& interrupted);
   TrainSummary train(bool show_progress);
+  bool train_some(std::int64_t count);
+  void prepare();
 
   Context& context;
   Dataset dataset;
@@ -220,6 +231,43 @@ struct Trainer::Impl {
   std::optional<double> recent_psnr;
   std::int64_t row_iteration = 0;
   double row_seconds = 0;
+
+  std::function<void(const TrainProgress&)> callback;
+  std::atomic<bool> stop_asked = false;
+  std::atomic<bool> save_asked = false;
+  std::atomic<bool> busy = false;  // in run() or step()
+  bool stepped = false;            // since this object was made
+  bool prepared = false;           // for steps of the caller's own
+  std::optional<FileLock> folder_lock;
+
+  // Marks the trainer as busy while it lives.
+  struct Busy {
+    explicit Busy(Impl& impl) : busy(impl.busy) {
+      if (busy.exchange(true)) {
+        throw UsageError(
+            "The trainer is training already: wait for its run() or step(), and call neither from "
+            "its callback");
+      }
+      impl.stop_asked = false;
+    }
+    ~Busy() { busy = false; }
+    Busy(const Busy&) = delete;
+    Busy& operator=(const Busy&) = delete;
+    std::atomic<bool>& busy;
+  };
+  // Keeps other runs out of the folder while it lives.
+  struct FolderUse {
+    explicit FolderUse(Impl& impl_in) : impl(impl_in), own(!impl.folder_lock) {
+      if (own) impl.folder_lock.emplace(impl.run.lock());
+    }
+    ~FolderUse() {
+      if (own) impl.folder_lock.reset();
+    }
+    FolderUse(const FolderUse&) = delete;
+    FolderUse& operator=(const FolderUse&) = delete;
+    Impl& impl;
+    bool own;
+  };
 };
 
 Trainer::Impl::Impl(Context& device,
@@ -342,6 +390,7 @@ void Trainer::Impl::step() {
   guard.close(adam.refused(), gaussians.count);
   ++iteration;
   whole = true;
+  stepped = true;
 }
 
 // Stops the run when the guard has stopped the steps; waits for the device.
@@ -454,8 +503,8 @@ void Trainer::Impl::evaluate_views(bool last) {
   EvaluationOptions choice;
   choice.max_views = last ? 0 : static_cast<std::size_t>(options.eval_views);
   choice.max_pictures = static_cast<std::size_t>(options.eval_renders);
-  const EvaluationReport report =
-      evaluate(render, dataset, Split::kTest, background, run.evaluation_folder(iteration), choice);
+  const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
+                                                      run.evaluation_folder(iteration), choice);
   run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
               report.images.size(), gaussians.count});
   write_metrics(false);
@@ -490,6 +539,7 @@ void Trainer::Impl::save_checkpoint() {
 // After a failure: saves the last whole state, if the device still gives it. Returns what the user
 // can do then.
 std::string Trainer::Impl::rescue() {
+  const auto turn = context.lock();
   if (whole && saved != iteration) {
     try {
       context.finish();
@@ -548,7 +598,12 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"device", context.device().name}});
 }
 
-void Trainer::Impl::run_iterations(Progress& progress, const InterruptGuard& interrupt) {
+// Up to `until` completed iterations; with `scheduled` also the evaluations and files of the
+// options.
+void Trainer::Impl::run_iterations(std::int64_t until,
+                                   bool scheduled,
+                                   Progress& progress,
+                                   const std::function<bool()>& interrupted) {
   const auto pause = [&](const auto& work) {
     context.finish();
     training.stop();
@@ -558,48 +613,78 @@ void Trainer::Impl::run_iterations(Progress& progress, const InterruptGuard& int
     training.start();
   };
   bool stop = false;
-  while (iteration < options.iterations && !stop) {
+  while (iteration < until && !stop) {
+    const auto turn = context.lock();
     step();
     const bool last = iteration == options.iterations;
     if (last || every(options.log_every, iteration)) report(progress);
     if (every(options.validate_every, iteration)) pause([this] { validate_model(); });
+    if (callback) {
+      const auto hear = callback;  // it may be replaced meanwhile
+      try {
+        pause([&] { hear({iteration, options.iterations, gaussians.count}); });
+      } catch (...) {
+        if (!last) control_density();  // what is saved then has this iteration complete
+        throw;
+      }
+    }
     // Asked once: a signal that comes later is seen after the next step.
-    stop = interrupt.requested();
+    stop = interrupted() || stop_asked;
     const bool evaluates = last || every(options.eval_every, iteration) ||
                            contains(options.eval_at, options.iterations, iteration);
     const bool saves = stop || last || contains(options.save_at, options.iterations, iteration);
     // Before density control, as in 3DGS: fresh clones and children have not settled yet.
-    if (saves) pause([this] { save_model(); });
-    if (evaluates && (last || !stop)) pause([this, last] { evaluate_views(last); });
+    if (scheduled && saves) pause([this] { save_model(); });
+    if (scheduled && evaluates && (last || !stop)) pause([this, last] { evaluate_views(last); });
     if (!last) control_density();
-    if (stop || last || every(options.checkpoint_every, iteration))
+    const bool asked = save_asked.exchange(false);
+    if (asked && !(scheduled && saves)) pause([this] { save_model(); });
+    if (asked || (scheduled && (stop || last || every(options.checkpoint_every, iteration))))
       pause([this] { save_checkpoint(); });
   }
   context.finish();
 }
 
-TrainSummary Trainer::Impl::train(bool show_progress) {
-  const InterruptGuard interrupt;
-  const FileLock lock = run.lock();
-  start();
+// Runs them with the folder locked. What fails is saved as far as it goes.
+void Trainer::Impl::advance(std::int64_t until,
+                            bool scheduled,
+                            bool show_progress,
+                            const std::function<bool()>& interrupted) {
   Progress progress("Training", options.iterations, iteration, show_progress ? stderr : nullptr);
   row_iteration = iteration;
   row_seconds = training.seconds();
   training.start();
   try {
-    run_iterations(progress, interrupt);
+    run_iterations(until, scheduled, progress, interrupted);
   } catch (const Error& error) {
+    training.stop();
     if (error.code() == ErrorCode::kRuntime) throw;  // the model itself is at fault
     throw_with(error, rescue());
   } catch (const std::bad_alloc&) {
+    training.stop();
     throw_with(ResourceError("The host has no memory left: use smaller images (--downscale) or a "
                              "smaller --image-budget"),
                rescue());
+  } catch (...) {  // of a callback
+    training.stop();
+    spdlog::warn("a callback failed after iteration {}: {}", iteration, rescue());
+    throw;
   }
   training.stop();
   progress.finish();
+}
+
+TrainSummary Trainer::Impl::train(bool show_progress) {
+  const Busy busy(*this);
+  const InterruptGuard interrupt;
+  const FolderUse folder(*this);
+  {
+    const auto turn = context.lock();
+    start();
+  }
+  advance(options.iterations, true, show_progress, [&] { return interrupt.requested(); });
   write_metrics(iteration == options.iterations);
-  if (iteration < options.iterations) {
+  if (iteration < options.iterations && !stop_asked) {
     throw Error(
         ErrorCode::kInterrupted,
         fmt::format("Interrupted at iteration {}; everything is saved: continue with --resume {}",
@@ -615,6 +700,27 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   return summary;
 }
 
+bool Trainer::Impl::train_some(std::int64_t count) {
+  if (count < 1) {
+    throw UsageError(
+        fmt::format("Trainer::step() cannot make {} iterations: ask for 1 or more", count));
+  }
+  const Busy busy(*this);
+  prepare();
+  const std::int64_t left = std::max<std::int64_t>(options.iterations - iteration, 0);
+  advance(iteration + std::min(count, left), false, false, [] { return false; });
+  return iteration < options.iterations;
+}
+
+// For steps of the caller's own: the folder stays locked until the trainer goes.
+void Trainer::Impl::prepare() {
+  if (prepared) return;
+  const auto turn = context.lock();
+  if (!folder_lock) folder_lock.emplace(run.lock());
+  start();
+  prepared = true;
+}
+
 Trainer::Trainer(Context& context,
                  Dataset dataset,
                  const TrainOptions& options,
@@ -622,9 +728,60 @@ Trainer::Trainer(Context& context,
     : impl_(std::make_unique<Impl>(context, std::move(dataset), options, std::move(run_folder))) {}
 Trainer::~Trainer() = default;
 
-void Trainer::resume(const std::filesystem::path& source) { impl_->resume(source); }
+void Trainer::resume(const std::filesystem::path& source) {
+  const auto turn = impl_->context.lock();
+  impl_->resume(source);
+}
 
 TrainSummary Trainer::run(bool show_progress) { return impl_->train(show_progress); }
+
+bool Trainer::step(std::int64_t count) { return impl_->train_some(count); }
+
+void Trainer::on_step(std::function<void(const TrainProgress&)> callback) {
+  const auto turn = impl_->context.lock();
+  impl_->callback = std::move(callback);
+}
+
+void Trainer::stop() { impl_->stop_asked = true; }
+
+EvaluationRow Trainer::evaluate() {
+  Impl& self = *impl_;
+  const auto turn = self.context.lock();
+  if (self.test_views.empty()) {
+    throw UsageError(fmt::format("The data set {} has no test views: set TrainOptions::test_every",
+                                 self.dataset.root.string()));
+  }
+  if (!self.busy) self.prepare();
+  self.evaluate_views(true);
+  return self.run.evaluations().back();
+}
+
+void Trainer::save() {
+  Impl& self = *impl_;
+  if (self.busy) {
+    self.save_asked = true;
+    return;
+  }
+  const auto turn = self.context.lock();
+  self.prepare();
+  self.context.finish();
+  self.save_model();
+  self.save_checkpoint();
+  self.write_metrics(self.iteration == self.options.iterations);
+}
+
+TrainLoss Trainer::loss() {
+  Impl& self = *impl_;
+  const auto turn = self.context.lock();
+  if (!self.stepped) throw UsageError("There is no loss before the first step");
+  const ImageLoss::Value value = self.loss.value();
+  return {value.total, value.psnr};
+}
+
+Gaussians Trainer::model() const {
+  const auto turn = impl_->context.lock();
+  return impl_->started ? impl_->gaussians.download() : Gaussians();
+}
 
 const DeviceGaussians& Trainer::gaussians() const { return impl_->gaussians; }
 std::int64_t Trainer::iteration() const { return impl_->iteration; }

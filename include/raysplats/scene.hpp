@@ -100,7 +100,7 @@ struct RenderSettings {
   ShadowSettings shadows;
 };
 
-/// Everything that LightTracer draws, in world units.
+/// Everything that PathTracer draws, in world units.
 struct Scene {
   Gaussians gaussians;       ///< all models together
   std::vector<Mesh> meshes;  ///< `materials` index the scene's

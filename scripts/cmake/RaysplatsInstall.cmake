@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-# The install target: program, static libraries, public headers, configurations and the package that
-# find_package(raysplats) reads. The reference module and the tests stay in the build folder.
+# The install target: program, static libraries, the library of pictures, public headers, configurations and the package that
+# find_package(raysplats) reads. The modules of benchmarks and tests stay in the build
+# folder.
 include(CMakePackageConfigHelpers)
 
 set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/raysplats)
 
+set(images_archive "")
+if(RAYSPLATS_IMAGES_STATIC)
+  set(images_archive raysplats_images)
+else()
+  install(TARGETS raysplats_images LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endif()
 install(
   TARGETS raysplats
           raysplats_base
@@ -17,8 +24,7 @@ install(
           raysplats_io
           raysplats_eval
           raysplats_train
-          raysplats_synth
-          raysplats_bench
+          ${images_archive}
   EXPORT raysplatsTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS raysplats_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
@@ -28,6 +34,9 @@ install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/raysplats)
 
 install(EXPORT raysplatsTargets NAMESPACE raysplats:: DESTINATION ${package_directory})
 set(RAYSPLATS_USES_OPENCV ${OpenCV_FOUND})
+if(NOT RAYSPLATS_IMAGES_STATIC)
+  set(RAYSPLATS_USES_OPENCV FALSE)
+endif()
 configure_package_config_file(
   scripts/cmake/raysplatsConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/package/raysplatsConfig.cmake
   INSTALL_DESTINATION ${package_directory} NO_SET_AND_CHECK_MACRO)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // An LPIPS network: loaded, and run on two tiny images.
-#include "eval/lpips.hpp"
 #include "fuzz/fuzz_target.hpp"
 #include "raysplats/image.hpp"
+#include "raysplats/lpips.hpp"
 
 namespace raysplats::fuzz {
 namespace {

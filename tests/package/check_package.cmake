@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Run by cmake -P from the test: installs BUILD below WORK, then configures, builds and runs SOURCE against it.
+# Run by cmake -P from the test: installs BUILD below WORK, then configures, builds and runs SOURCE and EXAMPLES
+# against it.
 
 function(run what)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
@@ -11,7 +12,7 @@ function(run what)
 endfunction()
 
 set(prefix ${WORK}/prefix)
-file(REMOVE_RECURSE ${prefix} ${WORK}/consumer)
+file(REMOVE_RECURSE ${prefix} ${WORK}/consumer ${WORK}/examples)
 run("install" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix} --config ${CONFIG})
 
 foreach(file bin/raysplats include/raysplats/device.hpp share/raysplats/configs)
@@ -28,9 +29,19 @@ set(flags "")
 if(SANITIZE)
   set(flags -fsanitize=${SANITIZE})
 endif()
-run("configure" ${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/consumer -G ${GENERATOR} -DCMAKE_BUILD_TYPE=${CONFIG}
-    -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
-    -DCMAKE_CXX_FLAGS=${flags} -DEXPECTED_VERSION=${VERSION})
+set(choices -G ${GENERATOR} -DCMAKE_BUILD_TYPE=${CONFIG} -DCMAKE_PREFIX_PATH=${prefix}
+            -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -DCMAKE_CXX_FLAGS=${flags})
+run("configure" ${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/consumer ${choices} -DEXPECTED_VERSION=${VERSION})
 run("build" ${CMAKE_COMMAND} --build ${WORK}/consumer --config ${CONFIG})
 run("run" ${WORK}/consumer/consumer)
 message(STATUS "${output}")
+
+# The examples check the numbers they print.
+run("configure examples" ${CMAKE_COMMAND} -S ${EXAMPLES} -B ${WORK}/examples ${choices})
+run("build examples" ${CMAKE_COMMAND} --build ${WORK}/examples --config ${CONFIG})
+file(GLOB examples RELATIVE ${EXAMPLES} ${EXAMPLES}/*.cpp)
+foreach(example IN LISTS examples)
+  cmake_path(REMOVE_EXTENSION example)
+  run("example ${example}" ${CMAKE_COMMAND} -E chdir ${WORK}/examples ${WORK}/examples/${example})
+  message(STATUS "${output}")
+endforeach()

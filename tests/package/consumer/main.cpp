@@ -2,13 +2,24 @@
 // Uses the installed library from outside: every public header, a device query and a file written
 // and read back.
 #include <raysplats/camera.hpp>
+#include <raysplats/context.hpp>
 #include <raysplats/dataset.hpp>
 #include <raysplats/device.hpp>
 #include <raysplats/error.hpp>
+#include <raysplats/evaluation.hpp>
 #include <raysplats/gaussians.hpp>
 #include <raysplats/image.hpp>
 #include <raysplats/io.hpp>
+#include <raysplats/lpips.hpp>
+#include <raysplats/model.hpp>
+#include <raysplats/path_tracer.hpp>
+#include <raysplats/pose_gradient.hpp>
+#include <raysplats/rays.hpp>
+#include <raysplats/scene.hpp>
 #include <raysplats/trace_options.hpp>
+#include <raysplats/tracer.hpp>
+#include <raysplats/train_options.hpp>
+#include <raysplats/trainer.hpp>
 
 #include <cstdio>
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "eval/lpips.hpp"
+#include "raysplats/lpips.hpp"
 
 #include <doctest/doctest.h>
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "light/light_tracer.hpp"
+#include "raysplats/path_tracer.hpp"
 #include "reference/light.hpp"
 #include "reference/light_scenes.hpp"
 #include "reference/scenes.hpp"
@@ -43,7 +43,7 @@ inline void add_mesh(Scene& scene, Mesh mesh, const Material& material) {
 }
 
 inline Image render_on_device(Context& context, const Scene& scene, const Camera& camera) {
-  return LightTracer(context, scene).render(camera);
+  return PathTracer(context, scene).render(camera);
 }
 
 /// RGBA means over the picture.

@@ -134,7 +134,7 @@ TEST_CASE("poison: any number in a scene makes a clean picture or an error") {
 
 TEST_CASE("poison: any number in a camera of a scene makes a clean picture or an error") {
   Context context = make_test_context();
-  LightTracer tracer(context, small_scene());
+  PathTracer tracer(context, small_scene());
   const auto renders = [&](const Camera& camera) {
     return is_clean([&] { return tracer.render(camera); });
   };

@@ -164,7 +164,7 @@ TEST_CASE("a seed reproduces its picture, another differs, set_meshes equals a n
   add_mesh(scene, ball({0, 0, 0}, 0.7, 8, 0, true), glass(1.5f));
   add_mesh(scene, rectangle({0, 1.1, 0}, {3, 0, 0}, {0, 0.1, 3}, 0), Material{});
   scene.render.samples = 3;
-  LightTracer tracer(context, scene);
+  PathTracer tracer(context, scene);
   const Image first = tracer.render(kCamera);
   CHECK(largest_difference(first, tracer.render(kCamera)) == 0.0);
   CHECK(largest_difference(first, render_on_device(context, scene, kCamera)) == 0.0);
@@ -175,7 +175,7 @@ TEST_CASE("a seed reproduces its picture, another differs, set_meshes equals a n
   Scene moved = scene;
   moved.render.bias = scene.render.bias = 0.01f;
   moved.meshes[0] = ball({0.3, -0.2, 0}, 0.5, 6, 0, false);
-  LightTracer animated(context, scene);
+  PathTracer animated(context, scene);
   animated.set_meshes(moved.meshes);
   CHECK(largest_difference(animated.render(kCamera), render_on_device(context, moved, kCamera)) ==
         0.0);
@@ -365,7 +365,7 @@ TEST_CASE("rays are counted") {
   sun.direction = {0, 0, 1};
   scene.lights = {sun};
   add_mesh(scene, rectangle({0, 0, 0}, {9, 0, 0}, {0, 9, 0}, 0), Material{});
-  LightTracer lit(context, scene);
+  PathTracer lit(context, scene);
   lit.render(kCamera);
   CHECK(lit.statistics().camera_rays == 576);
   CHECK(lit.statistics().shadow_rays == 576);
@@ -373,13 +373,13 @@ TEST_CASE("rays are counted") {
   CHECK(lit.statistics().ended_by_bounces == 0);
   scene.materials[0].kind = Material::Kind::kMirror;
   scene.render.samples = 2;
-  LightTracer reflecting(context, scene);
+  PathTracer reflecting(context, scene);
   reflecting.render(kCamera);
   CHECK(reflecting.statistics().camera_rays == 2 * 576);
   CHECK(reflecting.statistics().continued_rays == 2 * 576);
   CHECK(reflecting.statistics().shadow_rays == 0);
   scene.render.max_bounces = 1;
-  LightTracer ended(context, scene);
+  PathTracer ended(context, scene);
   ended.render(kCamera);
   CHECK(ended.statistics().continued_rays == 0);
   CHECK(ended.statistics().ended_by_bounces == 2 * 576);
@@ -392,7 +392,7 @@ TEST_CASE("settings and meshes that make no sense are refused") {
   const auto usage = [&](auto&& change) {
     Scene scene = sound;
     change(scene);
-    CHECK_THROWS_AS(LightTracer(context, scene), UsageError);
+    CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
   };
   usage([](Scene& s) { s.render.samples = 0; });
   usage([](Scene& s) { s.render.max_bounces = 0; });
@@ -404,9 +404,19 @@ TEST_CASE("settings and meshes that make no sense are refused") {
   const auto data = [&](auto&& change) {
     Scene scene = sound;
     change(scene);
-    CHECK_THROWS_AS(LightTracer(context, scene), DataError);
+    CHECK_THROWS_AS(PathTracer(context, scene), DataError);
   };
   data([](Scene& s) { s.meshes[0].positions[4] = std::numeric_limits<float>::quiet_NaN(); });
   data([](Scene& s) { s.meshes[0].triangles[5] = 100000; });
   data([](Scene& s) { s.meshes[0].materials[2] = 1; });
+  data([](Scene& s) { s.gaussians.means[1] = std::numeric_limits<float>::quiet_NaN(); });
+  usage([](Scene& s) { s.gaussians.opacities.pop_back(); });
+  usage([](Scene& s) {
+    s.lights.resize(1);
+    s.lights[0].position[2] = std::numeric_limits<float>::infinity();
+  });
+  PathTracer tracer(context, sound);
+  Camera camera = kCamera;
+  camera.translation.x = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_AS(tracer.render(camera), UsageError);
 }

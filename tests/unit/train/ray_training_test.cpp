@@ -12,8 +12,8 @@
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "raysplats/trainer.hpp"
 #include "train/mirror_meshes.hpp"
-#include "train/trainer.hpp"
 
 using namespace raysplats;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/trainer.hpp"
+#include "raysplats/trainer.hpp"
 
 #include <doctest/doctest.h>
 #include <unistd.h>

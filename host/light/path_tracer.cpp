@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "light/light_tracer.hpp"
+#include "raysplats/path_tracer.hpp"
 
 #include <fmt/format.h>
 
@@ -12,6 +12,7 @@
 #include "primitives/scan.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
+#include "trace/model_impl.hpp"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
@@ -46,6 +47,19 @@ void check(const RenderSettings& s) {
   }
 }
 
+void check(const std::vector<Light>& lights) {
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const Light& light = lights[i];
+    float sum = light.radius;
+    for (std::size_t k = 0; k < 3; ++k) {
+      sum += light.position[k] + light.direction[k] + light.color[k];
+    }
+    if (!std::isfinite(sum)) {
+      throw UsageError(fmt::format("Light {} has a number that is not finite: correct it", i));
+    }
+  }
+}
+
 struct Box {
   std::array<float, 3> lo, hi;
 
@@ -77,7 +91,7 @@ Box box_of(const Gaussians& gaussians) {
 
 }  // namespace
 
-struct LightTracer::Impl {
+struct PathTracer::Impl {
   Impl(Context& context_in, const Scene& scene)
       : context(context_in),
         settings((check(scene.render), scene.render)),
@@ -135,19 +149,19 @@ struct LightTracer::Impl {
 };
 
 // A thousandth of the scene unless the settings say otherwise.
-void LightTracer::Impl::choose_bias(const std::vector<Mesh>& meshes) {
+void PathTracer::Impl::choose_bias(const std::vector<Mesh>& meshes) {
   Box box = means_box;
   for (const Mesh& mesh : meshes) box.add(mesh.positions);
   bias = settings.bias > 0 ? settings.bias : static_cast<float>(1e-3 * box.diagonal());
 }
 
-std::size_t LightTracer::Impl::batch_size() const {
+std::size_t PathTracer::Impl::batch_size() const {
   const std::size_t room = std::min(options.memory_budget / 2 / kPathBytes,
                                     context.device().max_allocation / sizeof(RsSurface) / 2);
   return std::clamp<std::size_t>(room / kPathsPerPixel, kGroup, kMaxBatch);
 }
 
-RsWave LightTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pixel) const {
+RsWave PathTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pixel) const {
   RsWave wave{};
   wave.seed_lo = static_cast<std::uint32_t>(settings.seed);
   wave.seed_hi = static_cast<std::uint32_t>(settings.seed >> 32);
@@ -165,10 +179,10 @@ RsWave LightTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pi
   return wave;
 }
 
-void LightTracer::Impl::trace_sample(const Camera& camera,
-                                     std::uint32_t sample,
-                                     std::size_t first,
-                                     std::size_t count) {
+void PathTracer::Impl::trace_sample(const Camera& camera,
+                                    std::uint32_t sample,
+                                    std::size_t first,
+                                    std::size_t count) {
   Lens lens;
   lens.sample = sample;
   lens.jitter = settings.samples > 1;
@@ -188,7 +202,7 @@ void LightTracer::Impl::trace_sample(const Camera& camera,
   }
 }
 
-std::size_t LightTracer::Impl::trace_wave(const RsWave& wave, std::size_t count) {
+std::size_t PathTracer::Impl::trace_wave(const RsWave& wave, std::size_t count) {
   const Range each = Range::linear(count, kGroup);
   hits.ensure(context, count, "surface hits");
   met.ensure(context, count, "surfaces");
@@ -230,7 +244,7 @@ std::size_t LightTracer::Impl::trace_wave(const RsWave& wave, std::size_t count)
   return live;
 }
 
-void LightTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool from_gaussians) {
+void PathTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool from_gaussians) {
   const Range each = Range::linear(count, kGroup);
   const ShadowSettings& shadows = settings.shadows;
   const bool use_triangles = shadows.strength > 0 && surfaces.triangles().size() > 0 &&
@@ -265,7 +279,7 @@ void LightTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool
   }
 }
 
-void LightTracer::Impl::add_tallies(std::size_t count) {
+void PathTracer::Impl::add_tallies(std::size_t count) {
   const std::size_t chunks = (count + kTallyChunk - 1) / kTallyChunk;
   partials.ensure(context, chunks, "tally sums");
   kernel("sum_tallies")
@@ -277,20 +291,26 @@ void LightTracer::Impl::add_tallies(std::size_t count) {
   }
 }
 
-LightTracer::LightTracer(Context& context, const Scene& scene)
-    : impl_(std::make_unique<Impl>(context, scene)) {}
-LightTracer::~LightTracer() = default;
+PathTracer::PathTracer(Context& context, const Scene& scene) {
+  check_gaussians(scene.gaussians);
+  check(scene.lights);
+  const auto turn = context.lock();
+  impl_ = std::make_unique<Impl>(context, scene);
+}
+PathTracer::~PathTracer() = default;
+PathTracer::PathTracer(PathTracer&&) noexcept = default;
+PathTracer& PathTracer::operator=(PathTracer&&) noexcept = default;
 
-void LightTracer::set_meshes(const std::vector<Mesh>& meshes) {
+void PathTracer::set_meshes(const std::vector<Mesh>& meshes) {
+  const auto turn = impl_->context.lock();
   impl_->surfaces.set_meshes(meshes);
   impl_->choose_bias(meshes);
 }
 
-Image LightTracer::render(const Camera& camera) {
+Image PathTracer::render(const Camera& camera) {
   Impl& self = *impl_;
-  if (camera.width < 1 || camera.height < 1) {
-    throw UsageError(fmt::format("Camera '{}' has no pixels", camera.name));
-  }
+  const auto turn = self.context.lock();
+  require_pixels(camera);
   self.statistics = {};
   Image out(camera.width, camera.height, 4);
   const std::size_t batch = self.batch_size();
@@ -312,6 +332,6 @@ Image LightTracer::render(const Camera& camera) {
   return out;
 }
 
-LightTracer::Statistics LightTracer::statistics() const { return impl_->statistics; }
+PathTracer::Statistics PathTracer::statistics() const { return impl_->statistics; }
 
 }  // namespace raysplats

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "eval/lpips.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/image.hpp"
+#include "raysplats/lpips.hpp"
 
 namespace raysplats {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "light/light_tracer.hpp"
+#include "raysplats/path_tracer.hpp"
 
 #include "light_fixture.hpp"
 #include "trace/camera_tracer.hpp"
@@ -286,7 +286,7 @@ TEST_CASE("a scene without meshes is what the packet tracer draws") {
     TraceOptions options = scene.trace;
     options.background = scene.environment.color;
     const Camera camera = cube_camera(24, 20);
-    const Image image = LightTracer(context, scene).render(camera);
+    const Image image = PathTracer(context, scene).render(camera);
     const DeviceGaussians gaussians =
         DeviceGaussians::upload(context, scene.gaussians, ScaleActivation::kExp);
     CameraTracer packets(context, options);

@@ -5,16 +5,17 @@
 #include <memory>
 #include <vector>
 
-#include "device/context.hpp"
 #include "raysplats/camera.hpp"
+#include "raysplats/context.hpp"
 #include "raysplats/image.hpp"
 #include "raysplats/scene.hpp"
 
 namespace raysplats {
 
-/// Draws a scene of Gaussians and meshes after docs/light.md: paths advance one surface at a time,
-/// all of a picture's together, as waves of rays without the ones that have ended.
-class LightTracer {
+/// Draws a scene of Gaussians, meshes, materials, lights and an environment by path tracing
+/// (docs/light.md): paths advance one surface at a time, all of a picture's together, as waves of
+/// rays without the ones that have ended (Laine, Karras and Aila 2013). Threads: as Context.
+class PathTracer {
  public:
   /// Rays of the last render().
   struct Statistics {
@@ -25,16 +26,20 @@ class LightTracer {
     std::uint64_t ended_by_bounces = 0;  ///< paths that max_bounces ended
   };
 
-  /// Uploads the scene and builds both trees. Throws UsageError for settings out of range,
-  /// DataError for meshes with a non-finite number or an index out of range.
-  LightTracer(Context& context, const Scene& scene);
-  ~LightTracer();
+  /// Uploads the scene and builds both trees. Throws UsageError for settings out of range and
+  /// Gaussians whose arrays do not fit each other, DataError for meshes with a number that is not
+  /// finite or an index out of range and for Gaussians with a number that is not finite.
+  PathTracer(Context& context, const Scene& scene);
+  ~PathTracer();
+  PathTracer(PathTracer&&) noexcept;
+  PathTracer& operator=(PathTracer&&) noexcept;
 
   /// The same materials and Gaussians with other meshes (an animation's next frame).
   void set_meshes(const std::vector<Mesh>& meshes);
 
   /// RGBA: the background or environment is blended, alpha is the share of light that did not come
-  /// from there. Any camera model.
+  /// from there. Any camera model. Throws UsageError for a camera without pixels or with a number
+  /// that is not finite.
   Image render(const Camera& camera);
 
   Statistics statistics() const;

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/morton_order.hpp"
+#include "io/ray_file.hpp"
+#include "options.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "raysplats/tracer.hpp"
+#include "train/model_source.hpp"
+
+namespace raysplats::cli {
+namespace {
+
+struct Options {
+  std::string model;
+  std::string rays;
+  std::string output;
+  std::string color_direction = "ray";
+  TraceFlags trace;
+  DeviceFlags device;
+};
+
+void run(const Options& options) {
+  const ModelSource source = find_model(options.model);
+  const io::RayList list = io::read_rays(options.rays);
+  const Gaussians gaussians = in_morton_order(read_ply(source.ply));
+  const TraceOptions trace = options.trace.over(trace_options(source, false));
+  const std::unique_ptr<Context> context = open_context(options.device);
+  const Model model(*context, gaussians);
+  Tracer tracer(*context, trace);
+  const auto direction =
+      options.color_direction == "origin" ? ColorDirection::kFromOrigin : ColorDirection::kRay;
+  const auto start = std::chrono::steady_clock::now();
+  const std::vector<RayResult> results = tracer.trace(model, list.rays, direction);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  io::write_ray_results(options.output, list.shape, results);
+  warn_of_capped_rays(tracer.capped_rays(), results.size(), trace);
+  fmt::print("{} rays in {} ({:.2f} s of building and tracing)\n", results.size(), options.output,
+             seconds);
+  if (options.device.profile) fmt::print("{}", context->profile_table());
+}
+
+}  // namespace
+
+Command add_trace_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("trace", "Trace rays of your own through a model");
+  auto options = std::make_shared<Options>();
+  command->add_option("MODEL", options->model, "3DGS PLY, or the folder of a training run")
+      ->required()
+      ->type_name("");
+  command
+      ->add_option("--rays", options->rays,
+                   "Array (..., 6) of origins and directions, or (..., 8) with t_min and t_max, of "
+                   "32-bit or 64-bit floats")
+      ->required()
+      ->type_name("FILE.npy");
+  command
+      ->add_option("-o,--output", options->output,
+                   "Arrays color, alpha, depth, median_depth and hits, as the rays are shaped")
+      ->required()
+      ->type_name("FILE.npz");
+  command
+      ->add_option(
+          "--color-direction", options->color_direction,
+          "Colours are seen along the ray, or from its origin as cameras see them (origin)")
+      ->check(one_of({"ray", "origin"}))
+      ->capture_default_str();
+  add_trace_flags(*command, options->trace);
+  add_device_flags(*command, options->device);
+  return {command, [options] { run(*options); }};
+}
+
+}  // namespace raysplats::cli

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// The library raysplats-images: pictures by OpenImageIO.
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "images/network.hpp"
+#include "io/image_codec.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+std::string reason(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text.empty() ? "its data are damaged" : text;
+}
+
+std::vector<std::uint8_t> to_bytes(const Image& image, int channels) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(image.pixels() * static_cast<std::size_t>(channels));
+  for (std::size_t pixel = 0; pixel < image.pixels(); ++pixel) {
+    const float* values = &image.data[pixel * static_cast<std::size_t>(image.channels)];
+    for (int c = 0; c < channels; ++c) {
+      // Written so that NaN becomes 0.
+      const float value = values[c] > 0.0f ? std::min(values[c], 1.0f) : 0.0f;
+      bytes.push_back(static_cast<std::uint8_t>(value * 255.0f + 0.5f));
+    }
+  }
+  return bytes;
+}
+
+class OiioDecoder : public ImageDecoder {
+ public:
+  OiioDecoder(const std::string& format, std::string name, std::span<const std::byte> memory)
+      : name_(std::move(name)), input_(OIIO::ImageInput::create(format)) {
+    if (!memory.empty()) {
+      memory_ = std::make_unique<OIIO::Filesystem::IOMemReader>(memory.data(), memory.size());
+    }
+    if (!input_ || (memory_ && !input_->set_ioproxy(memory_.get()))) {
+      throw DataError(fmt::format("The image {} cannot be read: OpenImageIO is built without {}",
+                                  name_, format));
+    }
+    // Straight alpha as in the file: OpenImageIO multiplies it into PNG and TIFF colours otherwise.
+    OIIO::ImageSpec config;
+    config.attribute("oiio:UnassociatedAlpha", 1);
+    OIIO::ImageSpec spec;
+    if (!input_->open(name_, spec, config)) {
+      throw DataError(
+          fmt::format("The image {} cannot be read: {}", name_, reason(input_->geterror())));
+    }
+    if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep) {
+      throw DataError(fmt::format("The image {} is not a flat picture with pixels", name_));
+    }
+    if (spec.width > kMaxImageSide || spec.height > kMaxImageSide ||
+        static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height) >
+            kMaxImagePixels) {
+      throw DataError(fmt::format(
+          "The image {} has {} x {} pixels, more than {} a side or {} million: make it smaller",
+          name_, spec.width, spec.height, kMaxImageSide, kMaxImagePixels >> 20));
+    }
+  }
+
+  int width() const override { return input_->spec().width; }
+  int height() const override { return input_->spec().height; }
+  Image decode() override {
+    Image image(width(), height(), std::min(input_->spec().nchannels, 4));
+    if (!input_->read_image(0, 0, 0, image.channels, OIIO::TypeFloat, image.data.data())) {
+      throw DataError(
+          fmt::format("The image {} cannot be decoded: {}", name_, reason(input_->geterror())));
+    }
+    return image;
+  }
+
+ private:
+  std::string name_;
+  std::unique_ptr<OIIO::Filesystem::IOMemReader> memory_;  // outlives the input
+  std::unique_ptr<OIIO::ImageInput> input_;
+};
+
+class OiioCodec : public ImageCodec {
+ public:
+  std::unique_ptr<ImageDecoder> open(const std::string& format,
+                                     const std::string& name,
+                                     std::span<const std::byte> memory) const override {
+    return std::make_unique<OiioDecoder>(format, name, memory);
+  }
+  std::vector<unsigned char> encode(const std::filesystem::path& path,
+                                    const Image& image,
+                                    const ImageEncoding& encoding) const override {
+    const bool jpeg = encoding.format == "jpeg", exr = encoding.format == "openexr";
+    // JPEG has neither alpha nor grey with alpha.
+    const int channels = jpeg ? (image.channels >= 3 ? 3 : 1) : image.channels;
+    OIIO::ImageSpec spec(image.width, image.height, channels,
+                         exr ? OIIO::TypeFloat : OIIO::TypeUInt8);
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    if (jpeg) {
+      spec.attribute("Compression", "jpeg:95");
+      spec.attribute("jpeg:subsampling", "4:4:4");
+    }
+    if (exr) {
+      spec.attribute("compression", "zip");
+      spec.channelnames = encoding.channel_names;
+    }
+    // Encoded in memory: OpenImageIO's encoders miss a full disk, and libjpeg ends the process on
+    // one.
+    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(encoding.format);
+    OIIO::Filesystem::IOVecOutput encoded;
+    bool written = output && output->set_ioproxy(&encoded) && output->open(path.string(), spec);
+    if (written && exr) {
+      written = output->write_image(OIIO::TypeFloat, image.data.data());
+    } else if (written) {
+      written = output->write_image(OIIO::TypeUInt8, to_bytes(image, channels).data());
+    }
+    written = written && output->close();
+    if (!written) {
+      throw DataError(
+          fmt::format("The image {} cannot be written: {}", path.string(),
+                      output ? reason(output->geterror()) : "OpenImageIO lacks the format"));
+    }
+    return encoded.buffer();
+  }
+  bool has_networks() const override { return networks_available(); }
+  std::unique_ptr<PerceptualNetwork> open_network(
+      const std::filesystem::path& path) const override {
+    return load_network(path);
+  }
+};
+
+}  // namespace
+}  // namespace raysplats::io
+
+extern "C" const char* raysplats_images_version() { return RAYSPLATS_VERSION; }
+
+extern "C" const raysplats::io::ImageCodec* raysplats_images_codec() {
+  static const raysplats::io::OiioCodec codec;
+  return &codec;
+}

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/image_codec.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <string_view>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+
+#ifdef RAYSPLATS_IMAGES_STATIC
+
+const ImageCodec& image_codec() { return *raysplats_images_codec(); }
+
+#else
+
+namespace {
+
+constexpr const char* kLibrary = "libraysplats-images.so";
+
+[[noreturn]] void fail(const std::string& what) {
+  throw Error(
+      ErrorCode::kRuntime,
+      fmt::format("Pictures cannot be read or written: {}; set RAYSPLATS_IMAGES to the path "
+                  "of {} of version {}",
+                  what, kLibrary, RAYSPLATS_VERSION));
+}
+
+// Found along the run path of the program, as any library of it; it stays loaded to the end.
+const ImageCodec* load() {
+  const char* chosen = std::getenv("RAYSPLATS_IMAGES");
+  void* library = ::dlopen(chosen != nullptr ? chosen : kLibrary, RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) fail(::dlerror());
+  const auto version = reinterpret_cast<decltype(&raysplats_images_version)>(
+      ::dlsym(library, "raysplats_images_version"));
+  const auto codec = reinterpret_cast<decltype(&raysplats_images_codec)>(
+      ::dlsym(library, "raysplats_images_codec"));
+  if (version == nullptr || codec == nullptr) {
+    fail(fmt::format("{} is not the library of this program",
+                     chosen != nullptr ? chosen : kLibrary));
+  }
+  if (std::string_view(version()) != RAYSPLATS_VERSION) {
+    fail(fmt::format("{} is of version {}", chosen != nullptr ? chosen : kLibrary, version()));
+  }
+  return codec();
+}
+
+}  // namespace
+
+const ImageCodec& image_codec() {
+  static const ImageCodec* const codec = load();
+  return *codec;
+}
+
+#endif
+
+}  // namespace raysplats::io

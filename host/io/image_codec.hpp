@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "raysplats/image.hpp"
+
+namespace raysplats::io {
+
+/// An opened picture.
+class ImageDecoder {
+ public:
+  virtual ~ImageDecoder() = default;
+  virtual int width() const = 0;
+  virtual int height() const = 0;
+  /// Straight alpha as in the file, at most 4 channels. Throws DataError.
+  virtual Image decode() = 0;
+};
+
+/// A network that compares pictures; see Lpips.
+class PerceptualNetwork {
+ public:
+  virtual ~PerceptualNetwork() = default;
+  virtual double distance(const Image& image, const Image& photo) = 0;
+};
+
+/// How a picture is stored.
+struct ImageEncoding {
+  std::string format;                      ///< "png", "jpeg" or "openexr"
+  std::vector<std::string> channel_names;  ///< of "openexr"; empty = the codec's own
+};
+
+/// What the library raysplats-images does: formats of pictures and networks. Everything behind it
+/// (OpenImageIO, OpenEXR, OpenCV) drags in some hundreds of shared libraries, so it lies in a
+/// library of its own that is loaded when the first picture is opened.
+class ImageCodec {
+ public:
+  virtual ~ImageCodec() = default;
+  /// `format`: "png", "jpeg", "openexr", "bmp", "hdr" or "tiff". `name` is the path, or stands for
+  /// it in errors where `memory`, which has to outlive the decoder, is not empty. Throws DataError
+  /// for what is no flat picture of a bearable size.
+  virtual std::unique_ptr<ImageDecoder> open(const std::string& format,
+                                             const std::string& name,
+                                             std::span<const std::byte> memory) const = 0;
+  /// The bytes of a file, 8-bit for "png" and "jpeg". Throws DataError that names `path`.
+  virtual std::vector<unsigned char> encode(const std::filesystem::path& path,
+                                            const Image& image,
+                                            const ImageEncoding& encoding) const = 0;
+  /// Whether networks can be run, and one of an ONNX file. Throws DataError, UsageError.
+  virtual bool has_networks() const = 0;
+  virtual std::unique_ptr<PerceptualNetwork> open_network(
+      const std::filesystem::path& path) const = 0;
+};
+
+/// The codec, loaded by the first call. Throws Error(kRuntime) when the library is not there or is
+/// of another version.
+const ImageCodec& image_codec();
+
+/// Most pixels along a side, and of a picture.
+constexpr int kMaxImageSide = 32768;
+constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
+
+}  // namespace raysplats::io
+
+/// What raysplats-images exports: the version that it was built with, and the codec.
+extern "C" const char* raysplats_images_version();
+extern "C" const raysplats::io::ImageCodec* raysplats_images_codec();

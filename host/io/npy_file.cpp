@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/npy_file.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "base/atomic_file.hpp"
+#include "io/byte_reader.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+constexpr std::string_view kMagic = "\x93NUMPY";
+constexpr std::size_t kMostHeader = std::size_t{1} << 16;
+constexpr std::size_t kAlignment = 64;  // of the data behind the header
+
+/// What the header's dictionary says.
+struct Description {
+  std::optional<std::string> type;
+  std::optional<bool> fortran;
+  std::optional<std::vector<std::size_t>> shape;
+};
+
+/// Reads a Python dictionary of a string, a boolean and a tuple of whole numbers: all that a .npy
+/// header may hold.
+class HeaderParser {
+ public:
+  explicit HeaderParser(std::string_view text) : text_(text) {}
+
+  /// Nothing when the text is no such dictionary.
+  std::optional<Description> parse() {
+    Description out;
+    if (!take('{')) return std::nullopt;
+    while (!take('}')) {
+      const std::optional<std::string> key = string();
+      if (!key || !take(':') || !value(*key, out)) return std::nullopt;
+      if (take(',')) continue;
+      if (!take('}')) return std::nullopt;
+      break;
+    }
+    skip_space();
+    if (!text_.empty() || !out.type || !out.fortran || !out.shape) return std::nullopt;
+    return out;
+  }
+
+ private:
+  void skip_space() {
+    while (!text_.empty() && (text_.front() == ' ' || text_.front() == '\n')) {
+      text_.remove_prefix(1);
+    }
+  }
+  bool take(char c) {
+    skip_space();
+    if (text_.empty() || text_.front() != c) return false;
+    text_.remove_prefix(1);
+    return true;
+  }
+  bool take(std::string_view word) {
+    skip_space();
+    if (!text_.starts_with(word)) return false;
+    text_.remove_prefix(word.size());
+    return true;
+  }
+  std::optional<std::string> string() {
+    skip_space();
+    if (text_.empty() || (text_.front() != '\'' && text_.front() != '"')) return std::nullopt;
+    const std::size_t end = text_.find(text_.front(), 1);
+    if (end == std::string_view::npos) return std::nullopt;
+    std::string out(text_.substr(1, end - 1));
+    text_.remove_prefix(end + 1);
+    return out;
+  }
+  std::optional<std::vector<std::size_t>> tuple() {
+    std::vector<std::size_t> out;
+    if (!take('(')) return std::nullopt;
+    while (!take(')')) {
+      skip_space();
+      std::size_t number = 0;
+      const auto [end, error] = std::from_chars(text_.data(), text_.data() + text_.size(), number);
+      if (error != std::errc()) return std::nullopt;
+      text_.remove_prefix(static_cast<std::size_t>(end - text_.data()));
+      out.push_back(number);
+      if (take(',')) continue;
+      if (!take(')')) return std::nullopt;
+      break;
+    }
+    return out;
+  }
+  bool value(const std::string& key, Description& out) {
+    if (key == "descr") return (out.type = string()).has_value();
+    if (key == "shape") return (out.shape = tuple()).has_value();
+    if (key != "fortran_order") return false;
+    if (take("True")) return (out.fortran = true).has_value();
+    return take("False") && (out.fortran = false).has_value();
+  }
+
+  std::string_view text_;
+};
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what) {
+  throw DataError(fmt::format("{} {}", path.string(), what));
+}
+
+/// Bytes of a number of the type; only little-endian floats are taken.
+std::size_t float_bytes(const std::filesystem::path& path, const std::string& type) {
+  if (type == "<f4") return 4;
+  if (type == "<f8") return 8;
+  if (type == ">f4" || type == ">f8") {
+    fail(path, fmt::format("holds big-endian numbers ('{}'): save it little-endian, as "
+                           "array.astype('<f4')",
+                           type));
+  }
+  fail(path, fmt::format("holds numbers of the type '{}', not 32-bit or 64-bit floats: save "
+                         "array.astype('<f4')",
+                         type));
+}
+
+std::string header_of(const NpzMember& member) {
+  std::string shape;
+  for (const std::size_t size : member.shape) shape += fmt::format("{}, ", size);
+  if (member.shape.size() > 1) shape.resize(shape.size() - 2);
+  if (member.shape.size() == 1) shape.resize(shape.size() - 1);
+  std::string text =
+      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", member.type, shape);
+  constexpr std::size_t before = kMagic.size() + 4;
+  text.resize((before + text.size() + 1 + kAlignment - 1) / kAlignment * kAlignment - before - 1,
+              ' ');
+  text += '\n';
+  std::string out(kMagic);
+  out +=
+      {'\x01', '\x00', static_cast<char>(text.size() & 0xff), static_cast<char>(text.size() >> 8)};
+  return out + text;
+}
+
+/// Little-endian fields of a zip archive.
+class Record {
+ public:
+  Record& u16(std::size_t value) { return add(value, 2); }
+  Record& u32(std::size_t value) { return add(value, 4); }
+  Record& text(std::string_view value) {
+    bytes_ += value;
+    return *this;
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  Record& add(std::size_t value, int bytes) {
+    for (int i = 0; i < bytes; ++i) bytes_ += static_cast<char>(value >> (8 * i) & 0xff);
+    return *this;
+  }
+  std::string bytes_;
+};
+
+std::size_t checksum(const std::string& header, std::span<const std::byte> data) {
+  uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(header.data()), header.size());
+  crc = crc32_z(crc, reinterpret_cast<const Bytef*>(data.data()), data.size());
+  return crc;
+}
+
+}  // namespace
+
+NpyArray read_npy(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = read_file(path);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (!text.starts_with(kMagic)) fail(path, "is no .npy file: save one with numpy.save()");
+  ByteReader reader(bytes, path);
+  reader.skip(kMagic.size(), "the magic bytes");
+  const auto version = reader.read<std::uint8_t>("the version");
+  reader.read<std::uint8_t>("the version");
+  if (version < 1 || version > 3) {
+    fail(path, fmt::format("is a .npy file of version {}: 1 to 3 are known", version));
+  }
+  const std::size_t length = version == 1 ? reader.read<std::uint16_t>("the header's length")
+                                          : reader.read<std::uint32_t>("the header's length");
+  if (length > kMostHeader || length > reader.remaining()) {
+    fail(path, "has a .npy header longer than the file or 64 KiB: it is damaged, save it again");
+  }
+  const std::optional<Description> description =
+      HeaderParser(text.substr(reader.offset(), length)).parse();
+  if (!description) fail(path, "has a damaged .npy header: save it again with numpy.save()");
+  reader.skip(length, "the header");
+  const std::size_t width = float_bytes(path, *description->type);
+  if (*description->fortran) {
+    fail(path, "is in Fortran order: save numpy.ascontiguousarray(array)");
+  }
+  NpyArray out;
+  out.shape = *description->shape;
+  std::uint64_t count = 1;
+  for (const std::size_t size : out.shape) count = saturating_product(count, size);
+  if (saturating_product(count, width) != reader.remaining()) {
+    fail(path, fmt::format("has {} bytes of numbers where its shape ({}) needs {} of {} bytes: it "
+                           "is damaged, save it again",
+                           reader.remaining(), fmt::join(out.shape, ", "), count, width));
+  }
+  out.data.resize(count);
+  if (width == 4) {
+    for (float& value : out.data) value = reader.read<float>("a number");
+  } else {
+    for (float& value : out.data) value = static_cast<float>(reader.read<double>("a number"));
+  }
+  return out;
+}
+
+void write_npz(const std::filesystem::path& path, std::span<const NpzMember> members) {
+  std::vector<std::string> headers;
+  std::uint64_t total = 0;
+  for (const NpzMember& member : members) {
+    headers.push_back(header_of(member));
+    total += headers.back().size() + member.data.size() + 256;
+  }
+  if (total > std::numeric_limits<std::uint32_t>::max()) {
+    throw DataError(
+        fmt::format("{} would have {:.1f} GiB, more than an .npz file of 4 GiB can hold: trace the "
+                    "rays in parts",
+                    path.string(), static_cast<double>(total) / (1 << 30)));
+  }
+  // The zip format (PKWARE APPNOTE, 4.3): local headers with the files, then the directory.
+  constexpr std::size_t kVersion = 20, kDate = 0x21;  // the first of January 1980
+  AtomicFile file(path);
+  Record directory;
+  std::size_t offset = 0;
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    const NpzMember& member = members[i];
+    const std::string name = member.name + ".npy";
+    const std::size_t bytes = headers[i].size() + member.data.size();
+    const auto described = [&](Record& record) -> Record& {
+      return record.u16(0)
+          .u16(0)
+          .u16(0)
+          .u16(kDate)
+          .u32(checksum(headers[i], member.data))
+          .u32(bytes)
+          .u32(bytes)
+          .u16(name.size())
+          .u16(0);
+    };
+    Record local;
+    local.text("PK\x03\x04").u16(kVersion);
+    described(local).text(name);
+    directory.text("PK\x01\x02").u16(kVersion).u16(kVersion);
+    described(directory).u16(0).u16(0).u16(0).u32(0).u32(offset).text(name);
+    file.write(local.bytes());
+    file.write(headers[i]);
+    file.write(member.data.data(), member.data.size());
+    offset += local.bytes().size() + bytes;
+  }
+  file.write(directory.bytes());
+  Record end;
+  end.text(std::string_view("PK\x05\x06", 4))
+      .u16(0)
+      .u16(0)
+      .u16(members.size())
+      .u16(members.size())
+      .u32(directory.bytes().size())
+      .u32(offset)
+      .u16(0);
+  file.write(end.bytes());
+  file.commit();
+}
+
+}  // namespace raysplats::io

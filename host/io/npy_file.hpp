@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace raysplats::io {
+
+/// Numbers of a .npy file in C order: the last index of `shape` runs fastest.
+struct NpyArray {
+  std::vector<std::size_t> shape;
+  std::vector<float> data;
+};
+
+/// Reads a .npy file (NumPy Enhancement Proposal 1, versions 1 to 3) of little-endian 32-bit or
+/// 64-bit floats in C order; 64-bit numbers are rounded. Throws DataError that names the file and
+/// what is wrong: another type or byte order, Fortran order, a damaged header, a file that is
+/// shorter or longer than its shape says.
+NpyArray read_npy(const std::filesystem::path& path);
+
+/// An array of a .npz file.
+struct NpzMember {
+  std::string name;                ///< without .npy
+  std::string type;                ///< NumPy's, for example "<f4" or "<u4"
+  std::vector<std::size_t> shape;  ///< C order
+  std::span<const std::byte> data;
+};
+
+/// Writes the arrays as numpy.savez() does: a zip archive of .npy files, not compressed.
+/// Atomically. Throws DataError when the file cannot be written or would be larger than such an
+/// archive can be (4 GiB).
+void write_npz(const std::filesystem::path& path, std::span<const NpzMember> members);
+
+}  // namespace raysplats::io

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "raysplats/context.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/gaussians.hpp"
+#include "raysplats/train_options.hpp"
+
+namespace raysplats {
+
+struct DeviceGaussians;
+
+/// Mean over the test views at one iteration.
+struct EvaluationRow {
+  std::int64_t iteration = 0;
+  double training_seconds = 0;
+  double psnr = 0;  ///< decibels
+  double ssim = 0;
+  std::size_t views = 0;
+  std::size_t gaussians = 0;
+};
+
+struct TrainSummary {
+  std::int64_t iterations = 0;
+  std::size_t gaussians = 0;
+  double loss = 0;              ///< of the last view reported
+  double training_seconds = 0;  ///< evaluation and files excluded
+  double evaluation_seconds = 0;
+  std::vector<EvaluationRow>
+      evaluations;  ///< the last one is that of the final model, when there are test views
+};
+
+/// Where a run is after a step.
+struct TrainProgress {
+  std::int64_t iteration = 0;   ///< completed
+  std::int64_t iterations = 0;  ///< of the whole run
+  std::size_t gaussians = 0;
+};
+
+/// The view that the last step was made with.
+struct TrainLoss {
+  double total = 0;
+  double psnr = 0;  ///< decibels
+};
+
+/// Trains a model of a data set and writes a run folder (Kerbl et al. 2023 with the gradients of
+/// Byrski et al. 2025; docs/model.md). A run is a function of data set, options and device: resumed
+/// from a checkpoint it continues bit for bit. Either run() does everything that the options'
+/// schedule says, or step(), evaluate() and save() are called in a loop of one's own.
+///
+/// Threads: as Context, iteration by iteration; stop() may be called from any thread. A trainer
+/// that is in run() or step() refuses another one, from another thread or from its own callback.
+class Trainer {
+ public:
+  /// Throws UsageError for options that cannot be trained, ResourceError when the device has too
+  /// little memory, DataError when the run folder cannot be written to.
+  Trainer(Context& context,
+          Dataset dataset,
+          const TrainOptions& options,
+          std::filesystem::path run_folder);
+  ~Trainer();
+
+  /// Continues from the newest valid checkpoint of a run folder, or from a checkpoint file, instead
+  /// of starting anew; "latest" is the run's own folder, and starts anew while that holds none.
+  /// Throws UsageError when it does not fit the options or was made with other data, DataError when
+  /// there is none that is whole or another run has the folder.
+  void resume(const std::filesystem::path& source);
+
+  /// Trains up to options.iterations. SIGINT and SIGTERM finish the iteration, save a checkpoint
+  /// and the model and throw Error(kInterrupted). Ten steps in a row that are not finite
+  /// (StepGuard) leave RUN/dump and throw Error(kRuntime) naming the iteration. After other
+  /// failures, and after an exception from a callback, the last whole state is saved when the
+  /// device still gives it, and the error says which iteration that is; what a callback throws
+  /// comes out as it is. Throws DataError when another run has the folder.
+  TrainSummary run(bool show_progress = true);
+
+  /// At most `count` iterations more, without the evaluations and files of the schedule; returns
+  /// whether options.iterations are still to come. Throws UsageError for a count below 1, and what
+  /// run() throws for a model that is damaged.
+  bool step(std::int64_t count = 1);
+  /// `callback` hears of every iteration of run() and step(), in their thread, before density
+  /// control; nullptr ends that. It may use this trainer's loss(), model(), evaluate(), save() and
+  /// stop().
+  void on_step(std::function<void(const TrainProgress&)> callback);
+  /// Ends run() or step() after the iteration that is under way. run() then saves as it does for a
+  /// signal, and returns: its summary has fewer iterations than the options.
+  void stop();
+
+  /// Traces the test views, writes RUN/eval and RUN/metrics.json. Throws UsageError when the data
+  /// set has no test views.
+  EvaluationRow evaluate();
+  /// Writes the model and a checkpoint into the run folder, from which resume() goes on. While
+  /// run() or step() is under way: at the end of its iteration.
+  void save();
+
+  /// Loss and PSNR of the last step's view; blocks. Throws UsageError before the first step.
+  TrainLoss loss();
+  /// The model as it is now; without Gaussians before the first step.
+  Gaussians model() const;
+  /// Completed iterations.
+  std::int64_t iteration() const;
+
+  /// Of the library itself; its type is not installed.
+  const DeviceGaussians& gaussians() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats

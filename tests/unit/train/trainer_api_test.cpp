@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/rng.hpp"
+#include "device/context.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "raysplats/tracer.hpp"
+#include "raysplats/trainer.hpp"
+#include "train/checkpoint.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+// A few coloured balls photographed from ten places, in a folder that goes with the object.
+struct Photos {
+  std::filesystem::path folder;
+  Context context{select_device("")};
+  Dataset dataset;
+
+  Photos()
+      : folder(std::filesystem::temp_directory_path() /
+               ("raysplats_trainer_api_" + std::to_string(::getpid()))) {
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directories(folder / "images");
+    dataset.root = folder;
+    CounterRng rng(21, 3);
+    Gaussians truth;
+    truth.resize(40);
+    for (std::size_t i = 0; i < 3 * truth.size(); ++i) {
+      truth.means[i] = static_cast<float>(1.2 * rng.uniform() - 0.6);
+      truth.log_scales[i] = static_cast<float>(std::log(0.05 + 0.15 * rng.uniform()));
+      truth.sh[i] = static_cast<float>(3.0 * rng.uniform() - 1.5);
+    }
+    const Model model(context, truth);
+    Tracer tracer(context);
+    for (int i = 0; i < 10; ++i) {
+      const double angle = 0.628 * i;
+      View view;
+      view.camera = look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0}, {0, 0, 0}, {0, 0, 1},
+                            32, 28, 36);
+      view.camera.name = "view_" + std::to_string(i) + ".png";
+      view.source_camera = view.camera;
+      view.image_path = folder / "images" / view.camera.name;
+      view.test = i % 5 == 0;
+      const Image traced = tracer.render(model, view.camera);
+      Image rgb(traced.width, traced.height, 3);
+      for (std::size_t p = 0; p < rgb.pixels(); ++p) {
+        for (std::size_t c = 0; c < 3; ++c) rgb.data[3 * p + c] = traced.data[4 * p + c];
+      }
+      write_image(view.image_path, rgb);
+      dataset.views.push_back(view);
+    }
+  }
+  ~Photos() { std::filesystem::remove_all(folder); }
+};
+
+TrainOptions small_options() {
+  TrainOptions options;
+  options.iterations = 24;
+  options.init_count = 150;
+  options.sh_degree = 0;
+  options.densify_from = 5;
+  options.densify_until = 20;
+  options.densify_every = 5;
+  options.densify_grad_threshold = 1e-6;
+  options.max_gaussians = 400;
+  options.resolution_schedule = {};
+  options.log_every = 10;
+  options.eval_at = {};
+  options.save_at = {};
+  options.checkpoint_every = 0;
+  options.memory_budget = 64;
+  return options;
+}
+
+struct Stop : std::runtime_error {
+  Stop() : std::runtime_error("enough") {}
+};
+
+}  // namespace
+
+TEST_CASE("steps of one's own train as a run does") {
+  Photos photos;
+  const TrainOptions options = small_options();
+  Trainer run(photos.context, photos.dataset, options, photos.folder / "run");
+  std::vector<std::int64_t> heard;
+  run.on_step([&](const TrainProgress& progress) {
+    heard.push_back(progress.iteration);
+    CHECK(progress.iterations == 24);
+    CHECK(progress.gaussians == run.model().size());
+    CHECK(run.loss().total > 0.0);
+  });
+  const TrainSummary summary = run.run(false);
+  CHECK(heard.size() == 24);
+  CHECK(heard.back() == 24);
+
+  Trainer steps(photos.context, photos.dataset, options, photos.folder / "steps");
+  CHECK(steps.model().size() == 0);
+  CHECK_THROWS_AS(steps.loss(), UsageError);
+  CHECK_THROWS_AS(steps.step(0), UsageError);
+  int calls = 0;
+  while (steps.step(5)) ++calls;
+  CHECK(calls == 4);
+  CHECK(!steps.step());
+  CHECK(steps.iteration() == 24);
+  const Gaussians a = run.model(), b = steps.model();
+  CHECK(a.size() == summary.gaussians);
+  if (photos.context.device().type == DeviceType::kCpu) {
+    CHECK(a.means == b.means);
+    CHECK(a.sh == b.sh);
+  }
+  const EvaluationRow row = steps.evaluate();
+  CHECK(row.views == 2);
+  CHECK(row.psnr == doctest::Approx(summary.evaluations.back().psnr).epsilon(0.01));
+}
+
+TEST_CASE("what is saved in a callback is what a run goes on from") {
+  Photos photos;
+  const TrainOptions options = small_options();
+  Trainer whole(photos.context, photos.dataset, options, photos.folder / "whole");
+  while (whole.step(100)) {
+  }
+  {
+    Trainer first(photos.context, photos.dataset, options, photos.folder / "parts");
+    first.on_step([&](const TrainProgress& progress) {
+      // At a step after which density control changes the model.
+      if (progress.iteration != 10) return;
+      first.save();
+      first.stop();
+    });
+    const TrainSummary summary = first.run(false);
+    CHECK(summary.iterations == 10);
+  }
+  Trainer second(photos.context, photos.dataset, options, photos.folder / "parts");
+  second.resume("latest");
+  CHECK(second.iteration() == 10);
+  second.run(false);
+  if (photos.context.device().type == DeviceType::kCpu) {
+    CHECK(second.model().means == whole.model().means);
+  }
+}
+
+TEST_CASE("a trainer refuses to train twice at a time, and lets a callback's exception out") {
+  Photos photos;
+  Trainer trainer(photos.context, photos.dataset, small_options(), photos.folder / "run");
+  trainer.on_step([&](const TrainProgress&) { CHECK_THROWS_AS(trainer.step(), UsageError); });
+  trainer.step();
+  trainer.on_step([&](const TrainProgress& progress) {
+    if (progress.iteration == 4) throw Stop();
+  });
+  CHECK_THROWS_AS(trainer.run(false), Stop);
+  CHECK(trainer.iteration() == 4);
+  // The state is saved, and the trainer goes on.
+  CHECK(load_latest_checkpoint(photos.folder / "run").iteration == 4);
+  trainer.on_step(nullptr);
+  CHECK(trainer.step(2));
+  CHECK(trainer.iteration() == 6);
+
+  // From another thread.
+  std::thread other;
+  bool refused = false;
+  trainer.on_step([&](const TrainProgress& progress) {
+    if (progress.iteration != 8) return;
+    other = std::thread([&] {
+      try {
+        trainer.run(false);
+      } catch (const UsageError&) {
+        refused = true;
+      }
+      trainer.stop();
+    });
+    other.join();
+  });
+  const TrainSummary summary = trainer.run(false);
+  CHECK(refused);
+  CHECK(summary.iterations == 8);
+
+  // Another trainer of the same folder.
+  Trainer second(photos.context, photos.dataset, small_options(), photos.folder / "run");
+  CHECK_THROWS_AS(second.step(), DataError);
+
+  Dataset untested = photos.dataset;
+  for (View& view : untested.views) view.test = false;
+  Trainer blind(photos.context, untested, small_options(), photos.folder / "blind");
+  CHECK_THROWS_AS(blind.evaluate(), UsageError);
+}
