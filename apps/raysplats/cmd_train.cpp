@@ -28,7 +28,7 @@ void keep_run_options(CLI::App& command, Options& options) {
   if (!std::filesystem::is_directory(run)) run = run.parent_path().parent_path();
   const std::filesystem::path config = run / "config.toml";
   if (!std::filesystem::exists(config)) return;
-  apply_config_file(command, options.train, config);
+  apply_run_config(command, options.train, config);
   validate(options.train);
 }
 

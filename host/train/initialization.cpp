@@ -29,10 +29,11 @@ constexpr double kMaxScale = 0.1;                 // of the distance to the near
 constexpr std::uint32_t kReliableTrack = 3;
 constexpr float kReliableError = 2.0f;
 constexpr std::size_t kEnoughPoints = 2000;
-constexpr double kStartShare = 0.5;   // of the limit that points may take
-constexpr double kPhotoShare = 0.3;   // of the limit that a start from photos takes
-constexpr double kPixelShare = 0.4;   // Gaussians per pixel of a photo in a run of kShortRun
-constexpr double kShortRun = 1000.0;  // iterations
+constexpr double kStartShare = 0.5;                 // of the limit that points may take
+constexpr double kPhotoShare = 0.3;                 // of the limit that a start from photos takes
+constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of such a start, times the typical one
+constexpr double kUnsureShare = 0.25;  // of a start from photos alone: points at a random depth
+constexpr double kLimitFactor = 4.5;   // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
 
@@ -141,6 +142,16 @@ double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point
   for (const Camera& camera : cameras)
     least = std::min(least, glm::distance(camera.center(), point));
   return least;
+}
+
+double median_distance(std::span<const Camera> cameras, const glm::dvec3& point) {
+  std::vector<double> distances;
+  distances.reserve(cameras.size());
+  for (const Camera& camera : cameras)
+    distances.push_back(std::max(glm::distance(camera.center(), point), 1e-6));
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
 }
 
 glm::dvec3 view_axis(const Camera& camera) {
@@ -273,8 +284,8 @@ PointCloud reliable_points(const PointCloud& points) {
 }
 
 std::size_t fitted_limit(double pixels, std::int64_t iterations) {
-  const double growth = std::sqrt(static_cast<double>(iterations) / kShortRun);
-  return std::max(kLeastLimit, static_cast<std::size_t>(kPixelShare * pixels * growth));
+  const double root = std::sqrt(pixels * static_cast<double>(iterations));
+  return std::max(kLeastLimit, static_cast<std::size_t>(std::llround(kLimitFactor * root)));
 }
 
 PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed) {
@@ -329,11 +340,9 @@ Gaussians initial_model(const Dataset& dataset,
     spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
     return start(random_points(region, count, options.seed));
   }
-  std::vector<double> distances;
-  for (const Camera& camera : cameras)
-    distances.push_back(std::max(glm::distance(camera.center(), region.center), 1e-3));
-  std::sort(distances.begin(), distances.end());
-  return start(swept_points(photos(), distances[distances.size() / 2], count, options.seed));
+  const double distance = median_distance(cameras, region.center);
+  return start(swept_points(photos(), {kNearest * distance, distance, kFarthest * distance}, count,
+                            kUnsureShare, options.seed));
 }
 
 }  // namespace raysplats

@@ -25,10 +25,10 @@ constexpr std::size_t kTriesPerPoint = 200;
 
 constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
 constexpr std::size_t kDepths = 48;
-constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of a sweep, times the distance
-constexpr double kAgreement = 0.012;  // largest mean squared difference of what agrees
-constexpr double kClear = 0.5;        // and the best depth's share of the median one
-constexpr double kFogShare = 0.25;    // of the points: those with a random depth
+constexpr double kAgreement = 0.012;   // largest mean squared difference of what agrees
+constexpr double kClear = 0.5;         // and the best depth's share of the median one
+constexpr double kUnique = 0.7;        // and of the best one elsewhere: patterns repeat
+constexpr std::size_t kElsewhere = 3;  // depth steps from the best one
 
 void append(PointCloud& cloud, const glm::dvec3& position, const glm::dvec3& color) {
   for (int a = 0; a < 3; ++a) {
@@ -106,9 +106,12 @@ double difference(const Patch& a, const Patch& b) {
   return sum / static_cast<double>(3 * a.colors.size());
 }
 
-double depth_of(std::size_t step, double distance) {
-  const double share = static_cast<double>(step) / (kDepths - 1);
-  return distance * kNearest * std::pow(kFarthest / kNearest, share);
+double depth_at(double share, const DepthRange& depths) {
+  return depths.nearest * std::pow(depths.farthest / depths.nearest, share);
+}
+
+double depth_of(std::size_t step, const DepthRange& depths) {
+  return depth_at(static_cast<double>(step) / (kDepths - 1), depths);
 }
 
 // The depth along the ray at which the neighbours agree with the photo, if there is one.
@@ -116,12 +119,12 @@ std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
                                    std::span<const std::size_t> neighbours,
                                    const CameraRay& ray,
                                    const Patch& reference,
-                                   double distance) {
+                                   const DepthRange& depths) {
   std::array<double, kDepths> costs{};
   std::vector<double> differences;
   std::vector<double> known;
   for (std::size_t step = 0; step < kDepths; ++step) {
-    const glm::dvec3 world = ray.origin + depth_of(step, distance) * ray.direction;
+    const glm::dvec3 world = ray.origin + depth_of(step, depths) * ray.direction;
     differences.clear();
     for (const std::size_t i : neighbours) {
       if (const auto point = photos[i].sees(world))
@@ -146,7 +149,11 @@ std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
     if (costs[step] >= 0 && (best == kDepths || costs[step] < costs[best])) best = step;
   }
   if (costs[best] > kAgreement || costs[best] > kClear * *middle) return std::nullopt;
-  return depth_of(best, distance);
+  for (std::size_t step = 0; step < kDepths; ++step) {
+    const bool elsewhere = step + kElsewhere < best || step > best + kElsewhere;
+    if (elsewhere && costs[step] >= 0 && costs[best] > kUnique * costs[step]) return std::nullopt;
+  }
+  return depth_of(best, depths);
 }
 
 struct Sample {
@@ -156,7 +163,7 @@ struct Sample {
 
 Sample sweep_pixel(std::span<const SmallPhoto> photos,
                    const std::vector<std::vector<std::size_t>>& neighbours,
-                   double distance,
+                   const DepthRange& depths,
                    std::uint64_t seed,
                    std::size_t index) {
   CounterRng rng(seed, kSweepStream, 8 * index);
@@ -169,10 +176,9 @@ Sample sweep_pixel(std::span<const SmallPhoto> photos,
   Sample out;
   out.color = glm::dvec3(color);
   if (!ray.valid || color.w < 0.5) return out;
-  const auto depth = agreed_depth(photos, neighbours[view], ray, patch_at(photo, pixel), distance);
+  const auto depth = agreed_depth(photos, neighbours[view], ray, patch_at(photo, pixel), depths);
   out.agreed = depth.has_value();
-  const double along =
-      depth ? *depth : distance * std::pow(kFarthest, jitter) * (jitter < 0.2 ? 0.5 + jitter : 1.0);
+  const double along = depth ? *depth : depth_at(0.4 + 0.6 * jitter, depths);
   out.position = ray.origin + along * ray.direction;
   return out;
 }
@@ -206,12 +212,13 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
 }
 
 PointCloud swept_points(std::span<const SmallPhoto> photos,
-                        double distance,
+                        const DepthRange& depths,
                         std::size_t count,
+                        double unsure,
                         std::uint64_t seed) {
   std::vector<std::vector<std::size_t>> neighbours(photos.size());
   for (std::size_t i = 0; i < photos.size(); ++i)
-    neighbours[i] = neighbours_of(photos, i, distance);
+    neighbours[i] = neighbours_of(photos, i, depths.typical);
   const std::size_t tries = 4 * count;
   std::vector<Sample> samples(tries);
   {
@@ -220,11 +227,11 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
     for (std::size_t t = 0; t < threads; ++t) {
       workers.emplace_back([&, t] {
         for (std::size_t i = t; i < tries; i += threads)
-          samples[i] = sweep_pixel(photos, neighbours, distance, seed, i);
+          samples[i] = sweep_pixel(photos, neighbours, depths, seed, i);
       });
     }
   }
-  const auto fog = static_cast<std::size_t>(kFogShare * static_cast<double>(count));
+  const auto fog = static_cast<std::size_t>(unsure * static_cast<double>(count));
   PointCloud out;
   std::size_t agreed = 0, random = 0;
   for (const Sample& sample : samples) {

@@ -23,14 +23,22 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
                          std::size_t count,
                          std::uint64_t seed);
 
+/// Where a sweep looks, as distances from the cameras.
+struct DepthRange {
+  double nearest = 0;
+  double typical = 0;  ///< of what most cameras look at
+  double farthest = 0;
+};
+
 /// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
 /// sweep, Collins 1996, over single pixels with their surroundings). Of the pixels that no depth
-/// explains clearly, a quarter of `count` at most get a random depth, so that everything seen has
-/// something in front of it. `distance` is that of what the cameras look at; depths reach from a
-/// fifth of it to ten times. Colours are the photos'.
+/// explains clearly, the share `unsure` of `count` at most get a random depth, so that everything
+/// seen has something in front of it. `distance` is that of what the cameras look at; depths reach
+/// from a fifth of it to ten times. Colours are the photos'.
 PointCloud swept_points(std::span<const SmallPhoto> photos,
-                        double distance,
+                        const DepthRange& depths,
                         std::size_t count,
+                        double unsure,
                         std::uint64_t seed);
 
 }  // namespace raysplats

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <fstream>
 #include <functional>
+#include <set>
 #include <sstream>
 #include <string_view>
 
@@ -19,10 +20,10 @@ namespace {
 
 constexpr std::size_t kCommentWidth = 110;
 
-// Sets every key of the file for which `skip` is false.
-void read_keys(const std::filesystem::path& path,
-               TrainOptions& options,
-               const std::function<bool(const std::string&)>& skip) {
+// Sets every key of the file for which `skip` is false; returns the names of all.
+std::set<std::string> read_keys(const std::filesystem::path& path,
+                                TrainOptions& options,
+                                const std::function<bool(const std::string&)>& skip) {
   std::ifstream stream(path);
   if (!stream.good()) {
     throw UsageError(
@@ -36,6 +37,7 @@ void read_keys(const std::filesystem::path& path,
                                  error.what()));
   }
   const std::vector<TrainKey> keys = train_keys(options);
+  std::set<std::string> names_found;
   for (const CLI::ConfigItem& item : items) {
     if (item.name == "++" || item.name == "--")
       continue;  // CLI11's marks for the begin and end of a table
@@ -51,6 +53,7 @@ void read_keys(const std::filesystem::path& path,
       throw UsageError(fmt::format("Unknown key '{}' in {}: did you mean '{}'?", item.fullname(),
                                    path.string(), nearest_name(item.name, names)));
     }
+    names_found.insert(item.name);
     if (skip(item.name)) continue;
     try {
       key->set(item.inputs);
@@ -58,6 +61,7 @@ void read_keys(const std::filesystem::path& path,
       throw UsageError(fmt::format("{} ({})", error.what(), path.string()));
     }
   }
+  return names_found;
 }
 
 // The text in lines of comment.
@@ -108,6 +112,17 @@ void add_train_options(CLI::App& app, TrainOptions& options) {
 void apply_config_file(CLI::App& app, TrainOptions& options, const std::filesystem::path& path) {
   read_keys(path, options,
             [&app](const std::string& key) { return app.get_option("--" + key)->count() > 0; });
+}
+
+void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesystem::path& path) {
+  const auto given = [&app](const std::string& key) {
+    return app.get_option("--" + key)->count() > 0;
+  };
+  const std::set<std::string> found = read_keys(path, options, given);
+  if (found.count("strategy") > 0) return;
+  // The run is older than these keys: it goes on as it began.
+  if (!given("strategy")) options.strategy = DensityStrategy::kAdc;
+  if (!given("footprint")) options.footprint = 0;
 }
 
 void read_train_config(const std::filesystem::path& path, TrainOptions& options) {

@@ -23,6 +23,10 @@ void add_train_options(CLI::App& app, TrainOptions& options);
 /// naming the nearest known one.
 void apply_config_file(CLI::App& app, TrainOptions& options, const std::filesystem::path& path);
 
+/// The same with the config.toml of a run that is resumed. What a run of an older version could not
+/// name keeps the value that it had then.
+void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesystem::path& path);
+
 /// Reads a configuration file into `options`.
 void read_train_config(const std::filesystem::path& path, TrainOptions& options);
 

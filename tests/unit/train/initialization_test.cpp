@@ -166,9 +166,10 @@ TEST_CASE("points that few photos show or that fit them badly are left out when 
   CHECK(reliable_points(few).size() == few.size());
 }
 
-TEST_CASE("the limit grows with pixels and the root of the iterations") {
-  CHECK(fitted_limit(100000, 1000) == 40000);
-  CHECK(fitted_limit(100000, 4000) == 80000);
+TEST_CASE("the limit grows with the roots of pixels and iterations") {
+  CHECK(fitted_limit(100000, 1000) == 45000);
+  CHECK(fitted_limit(100000, 4000) == 90000);
+  CHECK(fitted_limit(400000, 1000) == 90000);
   CHECK(fitted_limit(10, 1000) == 2000);
 }
 

@@ -98,8 +98,8 @@ TEST_CASE("sweeping finds a textured wall and its colours") {
     photos.push_back(
         photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90), wall));
   }
-  const PointCloud points = swept_points(photos, 3.0, 400, 5);
-  CHECK(points.positions == swept_points(photos, 3.0, 400, 5).positions);
+  const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5);
+  CHECK(points.positions == swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5).positions);
   REQUIRE(points.size() >= 300);
   std::size_t near = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -113,7 +113,7 @@ TEST_CASE("sweeping finds a textured wall and its colours") {
 
 TEST_CASE("photos without a common view give no sure points and do not fail") {
   std::vector<SmallPhoto> one{photo_of(look_at({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 40, 30, 40), wall)};
-  const PointCloud points = swept_points(one, 2.0, 100, 1);
+  const PointCloud points = swept_points(one, {0.4, 2.0, 20.0}, 100, 0.25, 1);
   CHECK(points.size() == 25);
   for (const float p : points.positions) CHECK(std::isfinite(p));
 }

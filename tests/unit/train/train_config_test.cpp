@@ -175,3 +175,27 @@ TEST_CASE("the command line beats the file, wherever --config stands") {
   CHECK_THROWS_AS(parse({"--iterations", "x"}), UsageError);
   std::filesystem::remove(path);
 }
+
+TEST_CASE("a resumed run that is older than a key goes on as it began") {
+  const auto path = temporary("old_run.toml");
+  const auto options_of = [&path](const std::string& text, const std::vector<std::string>& words) {
+    write_text_file(path, text);
+    TrainOptions options;
+    CLI::App app;
+    add_train_options(app, options);
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+    apply_run_config(app, options, path);
+    return options;
+  };
+  const TrainOptions old = options_of("resolution-schedule = [300, 1000]\nsave-at = [7000]\n", {});
+  CHECK(old.strategy == DensityStrategy::kAdc);
+  CHECK(old.footprint == 0.0);
+  CHECK(old.resolution_schedule == std::vector<ResolutionStep>{{4, 300}, {2, 1000}});
+  const TrainOptions asked = options_of("save-at = [7000]\n", {"--strategy", "budget"});
+  CHECK(asked.strategy == DensityStrategy::kBudget);
+  CHECK(asked.footprint == 0.0);
+  const TrainOptions now = options_of("strategy = \"budget\"\nfootprint = 0.5\n", {});
+  CHECK(now.strategy == DensityStrategy::kBudget);
+  CHECK(now.footprint == 0.5);
+  std::filesystem::remove(path);
+}
