@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+#include "raysplats/io.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+// A .npy file of 32-bit floats.
+void write_rays(const std::string& path,
+                const std::string& order,
+                const std::string& shape,
+                const std::vector<float>& numbers) {
+  const std::string header =
+      "{'descr': '<f4', 'fortran_order': " + order + ", 'shape': " + shape + ", }\n";
+  std::ofstream stream(path, std::ios::binary);
+  stream << std::string("\x93NUMPY\x01\x00", 8) << static_cast<char>(header.size()) << '\0'
+         << header;
+  stream.write(reinterpret_cast<const char*>(numbers.data()),
+               static_cast<std::streamsize>(numbers.size() * sizeof(float)));
+}
+
+}  // namespace
+
+TEST_CASE("rays of a file are traced into a file") {
+  const TemporaryFolder folder;
+  // A white ball of opacity one half at the origin.
+  Gaussians model;
+  model.resize(1);
+  model.log_scales.assign(3, std::log(0.2f));
+  model.sh.assign(3, 1.7724539f);
+  write_ply(folder / "model.ply", model);
+  write_rays(folder / "rays.npy", "False", "(2, 6)", {0, 0, -3, 0, 0, 1, 5, 0, -3, 0, 0, 1});
+  const std::vector<std::string> arguments{
+      "trace", folder / "model.ply", "--rays",       folder / "rays.npy",
+      "-o",    folder / "seen.npz",  "--background", "0,0,1",
+      "-q"};
+  const Outcome outcome = raysplats_program(arguments);
+  CAPTURE(outcome.err);
+  CHECK(outcome.code == 0);
+  CHECK(outcome.out.find("2 rays") == 0);
+  std::ifstream stream(folder / "seen.npz", std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+  const std::size_t name = bytes.find("alpha.npy");
+  const std::size_t end = bytes.find('\n', name);
+  REQUIRE(end != std::string::npos);
+  float alpha[2];
+  std::memcpy(alpha, bytes.data() + end + 1, sizeof(alpha));
+  CHECK(alpha[0] == doctest::Approx(0.5).epsilon(1e-4));
+  CHECK(alpha[1] == 0.0f);
+
+  const auto refused = [&](const std::string& order, const std::string& shape, std::size_t count) {
+    write_rays(folder / "rays.npy", order, shape, std::vector<float>(count));
+    std::filesystem::remove(folder / "seen.npz");
+    const Outcome bad = raysplats_program(arguments);
+    CHECK(bad.code != 0);
+    CHECK(!std::filesystem::exists(folder / "seen.npz"));
+    CHECK(bad.err.find('\n') == bad.err.size() - 1);
+    return bad.err;
+  };
+  CHECK(refused("True", "(2, 6)", 12).find("Fortran") != std::string::npos);
+  CHECK(refused("False", "(3, 4)", 12).find("(3, 4)") != std::string::npos);
+  CHECK(refused("False", "(2, 6)", 11).find("44 bytes") != std::string::npos);
+  // Zeros are no directions.
+  CHECK(refused("False", "(2, 6)", 12).find("Ray 0") != std::string::npos);
+}
