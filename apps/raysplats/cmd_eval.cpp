@@ -93,6 +93,7 @@ Command add_eval_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("NETWORK");
   add_data_flags(*command, options->data)->required();
   add_trace_flags(*command, options->trace);
+  add_traversal_flag(*command, options->trace);
   add_device_flags(*command, options->device);
   return {command, [options, &global] { run(*options, global); }};
 }

@@ -234,6 +234,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
   command->add_flag("--depth", options->depth,
                     "Also expected depth: channel Z of an EXR, or NAME_depth.png");
   add_trace_flags(*command, options->trace);
+  add_traversal_flag(*command, options->trace);
   add_device_flags(*command, options->device);
   return {command, [options, &global] { run(*options, global); }};
 }

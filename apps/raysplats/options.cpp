@@ -114,6 +114,12 @@ void add_trace_flags(CLI::App& app, TraceFlags& flags) {
       ->check(at_least(1));
 }
 
+void add_traversal_flag(CLI::App& app, TraceFlags& flags) {
+  app.add_option("--traversal", flags.traversal,
+                 "How camera rays find Gaussians: tiles, bvh, or auto (as tuned, else tiles)")
+      ->check(one_of({"auto", "tiles", "bvh"}));
+}
+
 TraceOptions TraceFlags::over(TraceOptions base) const {
   if (quantile) base.quantile = *quantile;
   if (min_transmittance) base.min_transmittance = *min_transmittance;
@@ -121,6 +127,11 @@ TraceOptions TraceFlags::over(TraceOptions base) const {
   if (hit_order) base.hit_order = *hit_order == "peak" ? HitOrder::kPeak : HitOrder::kEntry;
   if (adaptive_radius) base.adaptive_radius = *adaptive_radius;
   if (near_depth) base.near_depth = *near_depth;
+  if (traversal) {
+    base.traversal = *traversal == "bvh"     ? Traversal::kBvh
+                     : *traversal == "tiles" ? Traversal::kTiles
+                                             : Traversal::kAuto;
+  }
   if (background) {
     const std::array<double, 3> color = parse_triple(*background);
     std::transform(color.begin(), color.end(), base.background.begin(),
@@ -330,8 +341,9 @@ std::pair<int, int> parse_resolution(const std::string& text) {
 
 std::string describe(const DeviceTuning& tuning) {
   const std::string group = tuning.group == 0 ? "whole tiles" : std::to_string(tuning.group);
-  return fmt::format("packet width {}, tiles of {}, pending {}, groups of {}", tuning.packet_width,
-                     tuning.tile, tuning.pending, group);
+  return fmt::format("packet width {}, tiles of {}, pending {}, groups of {}{}",
+                     tuning.packet_width, tuning.tile, tuning.pending, group,
+                     tuning.bvh ? ", bvh" : "");
 }
 
 std::string readable_bytes(std::uint64_t bytes) {

@@ -59,6 +59,7 @@ struct TraceFlags {
   std::optional<std::string> hit_order;
   std::optional<bool> adaptive_radius;
   std::optional<float> near_depth;
+  std::optional<std::string> traversal;  // commands that know it: add_traversal_flag()
   std::optional<std::string> background;
   std::optional<int> packet_width;
   std::optional<std::size_t> memory_budget;  ///< MiB
@@ -66,6 +67,8 @@ struct TraceFlags {
   TraceOptions over(TraceOptions base) const;
 };
 void add_trace_flags(CLI::App& app, TraceFlags& flags);
+/// --traversal, for commands that trace cameras by either way.
+void add_traversal_flag(CLI::App& app, TraceFlags& flags);
 
 /// One warning line when rays stopped at the cap on hits.
 void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOptions& options);

@@ -1,55 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a tree costs to walk, after the surface-area heuristic (Goldsmith and Salmon 1987): the area
-// of the boxes of inner nodes and of leaves. Launch: groups of RS_GROUP work-items (1 or a power of
-// two), each walks `chunk` consecutive nodes. Reads every node once: bound by memory.
-#include "shared/layout.h"
+// What a tree costs to walk, after the surface-area heuristic (Goldsmith and Salmon 1987): the
+// areas of the boxes of all nodes and blocks (sum_node_areas) and of what the tree is over
+// (sum_box_areas), each clipped to the window of the grid (curve.cl), so that a few far boxes do
+// not hide what happens among the others. Launch: groups of RS_GROUP work-items (1 or a power of
+// two), each group walks `chunk` consecutive nodes or boxes and writes one sum. Reads everything
+// once: bound by memory.
+#include "bvh/lbvh_node.h"
 
 #ifndef RS_GROUP
 #define RS_GROUP 1
 #endif
-// Nodes whose areas are summed before they are added to the sum of all: keeps float sums exact
-// enough.
+// What is summed before it is added to the sum of all: keeps float sums exact enough.
 #define RS_RUN 256
 
-// Half the area; 0 for an empty box and where it overflows.
-inline float half_area(float4 lo, float4 hi) {
-  const float4 side = hi - lo;
-  const float area = side.x * side.y + side.y * side.z + side.z * side.x;
-  return side.x >= 0.0f && side.y >= 0.0f && side.z >= 0.0f && area <= FLT_MAX ? area : 0.0f;
-}
+// Half the area of what lies in the window, of PACKET boxes or of one; 0 for empty boxes.
+#define RS_CLIPPED_SIDE(lo, hi, axis) \
+  (min((hi), 2.0f * window[11 + (axis)]) - max((lo), 2.0f * window[8 + (axis)]))
 
-// sums[group] = {area of the children that are inner nodes, of those that are leaves}, halves.
-__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void sum_areas(
-    __global const RsBvhNode* nodes, __global float2* sums, uint count, uint chunk) {
-  const uint begin = min((uint)get_group_id(0) * chunk, count);
-  const uint end = min(begin + chunk, count);
-  float2 sum = (float2)(0.0f);
-  for (uint run = begin; run < end; run += RS_RUN * RS_GROUP) {
-    const uint stop = min(run + RS_RUN * RS_GROUP, end);
-    float2 part = (float2)(0.0f);
-    for (uint i = run + get_local_id(0); i < stop; i += RS_GROUP) {
-      __global const float* p = (__global const float*)(nodes + i);
-      const float4 a = vload4(0, p);
-      const float4 b = vload4(1, p);
-      const float4 c = vload4(2, p);
-      const float left = half_area(a, (float4)(a.w, b.xy, 0.0f));
-      const float right = half_area((float4)(b.zw, c.x, 0.0f), c.yzww);
-      part.x += (nodes[i].left < 0 ? 0.0f : left) + (nodes[i].right < 0 ? 0.0f : right);
-      part.y += (nodes[i].left < 0 ? left : 0.0f) + (nodes[i].right < 0 ? right : 0.0f);
-    }
-    sum += part;
-  }
+// The sum over a group; the result is that of its first work-item.
+inline float group_sum(float own, __local float* scratch) {
 #if RS_GROUP > 1
-  __local float2 scratch[RS_GROUP];
   const uint lane = get_local_id(0);
-  scratch[lane] = sum;
+  scratch[lane] = own;
   for (uint half_size = RS_GROUP / 2; half_size > 0; half_size /= 2) {
     barrier(CLK_LOCAL_MEM_FENCE);
     if (lane < half_size) {
-      sum += scratch[lane + half_size];
-      scratch[lane] = sum;
+      own += scratch[lane + half_size];
+      scratch[lane] = own;
     }
   }
+#else
+  (void)scratch;
 #endif
+  return own;
+}
+
+float node_area(__global const fv* node, __global const float* window) {
+  const fv x = RS_CLIPPED_SIDE(node[0], node[3], 0);
+  const fv y = RS_CLIPPED_SIDE(node[1], node[4], 1);
+  const fv z = RS_CLIPPED_SIDE(node[2], node[5], 2);
+  const fv area = x * y + y * z + z * x;
+  const iv counts =
+      RS_MASK(x >= 0.0f) & RS_MASK(y >= 0.0f) & RS_MASK(z >= 0.0f) & RS_MASK(area <= FLT_MAX);
+  return rs_lane_sum(select((fv)(0.0f), area, counts));
+}
+
+float box_area(__global const RsAabb* box, __global const float* window) {
+  const float x = RS_CLIPPED_SIDE(box->lo[0], box->hi[0], 0);
+  const float y = RS_CLIPPED_SIDE(box->lo[1], box->hi[1], 1);
+  const float z = RS_CLIPPED_SIDE(box->lo[2], box->hi[2], 2);
+  const float area = x * y + y * z + z * x;
+  return x >= 0.0f && y >= 0.0f && z >= 0.0f && area <= FLT_MAX ? area : 0.0f;
+}
+
+// `window` is the grid that choose_grid made.
+__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void sum_node_areas(
+    __global const fv* nodes,
+    __global const float* window,
+    __global float* sums,
+    uint count,
+    uint chunk) {
+  __local float scratch[RS_GROUP];
+  const uint begin = min((uint)get_group_id(0) * chunk, count);
+  const uint end = min(begin + chunk, count);
+  float sum = 0.0f;
+  for (uint run = begin; run < end; run += RS_RUN * RS_GROUP) {
+    float part = 0.0f;
+    for (uint i = run + get_local_id(0); i < min(run + RS_RUN * RS_GROUP, end); i += RS_GROUP)
+      part += node_area(nodes + (size_t)i * RS_NODE_VECTORS, window);
+    sum += part;
+  }
+  sum = group_sum(sum, scratch);
+  if (get_local_id(0) == 0) sums[get_group_id(0)] = sum;
+}
+
+__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void sum_box_areas(
+    __global const RsAabb* boxes,
+    __global const float* window,
+    __global float* sums,
+    uint count,
+    uint chunk) {
+  __local float scratch[RS_GROUP];
+  const uint begin = min((uint)get_group_id(0) * chunk, count);
+  const uint end = min(begin + chunk, count);
+  float sum = 0.0f;
+  for (uint run = begin; run < end; run += RS_RUN * RS_GROUP) {
+    float part = 0.0f;
+    for (uint i = run + get_local_id(0); i < min(run + RS_RUN * RS_GROUP, end); i += RS_GROUP)
+      part += box_area(boxes + i, window);
+    sum += part;
+  }
+  sum = group_sum(sum, scratch);
   if (get_local_id(0) == 0) sums[get_group_id(0)] = sum;
 }

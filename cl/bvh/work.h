@@ -11,24 +11,20 @@
 // lengths 15, half-widths 12, corners 6.
 #define RS_WORK_BOUNDS_FLOPS 107
 
-// Box read for the grid (24) and for the code (24), two code words and the index written (12), high
-// word read to find runs (4).
-#define RS_WORK_MORTON_BYTES 64
-// Centre 6 and its bounds 6, centre 6 again, cell 9.
-#define RS_WORK_MORTON_FLOPS 27
+// Order: box read for the grid, for the code and for its group (72), two code words and the index
+// written (12), high word read to find runs (4), index read and written for its group (8).
+#define RS_WORK_ORDER_BYTES 96
+// Centre 6 and its bounds 6, centre 6 again, cell 9; in its group centre and keys 12, and the
+// unions of a sweep along three axes on four levels 72.
+#define RS_WORK_ORDER_FLOPS 111
 // Passes of the sort by the high word.
-#define RS_WORK_MORTON_SORT_PASSES 4
+#define RS_WORK_ORDER_SORT_PASSES 4
 
-// High word read (4), prefix length written and read (2), leaf index (4), box (24), state of the
-// split written and read (8), node written (64).
-#define RS_WORK_HIERARCHY_BYTES 106
-// Union of two boxes per node 6, box of the leaf's block 6.
-#define RS_WORK_HIERARCHY_FLOPS 12
-
-// Leaf index (4), box (24), prefix length (1), state of the split (4) read; bounds of a node (48)
-// written.
-#define RS_WORK_REFIT_BYTES 81
-// As for the hierarchy.
-#define RS_WORK_REFIT_FLOPS 12
+// Blocks and nodes, per Gaussian: index (4), box (24), parameters (44), colour (12) read; its lanes
+// of the block written (60). The boxes of nodes are few.
+#define RS_WORK_NODES_BYTES 144
+// Rotation 36, unit quaternion 12, scales and opacity 15, whitening triangle 75, union of boxes 6,
+// colour 6.
+#define RS_WORK_NODES_FLOPS 150
 
 #endif

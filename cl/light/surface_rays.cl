@@ -10,8 +10,8 @@
 #define RS_DARK 1e-4f
 
 typedef struct {
-  float entry[RS_WIDE_STACK];
-  uint node[RS_WIDE_STACK];  // level in the lowest four bits
+  float entry[RS_NODE_STACK];
+  uint node[RS_NODE_STACK];  // level in the lowest four bits
   int top;
 } WalkStack;
 

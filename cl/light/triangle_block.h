@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One ray against a leaf block of the tree over triangles (bvh/wide_node.h): PACKET triangles at
+// One ray against a leaf block of the tree over triangles (bvh/lbvh_node.h): PACKET triangles at
 // once. Watertight: Woop, Benthin and Wald 2013, with edge functions whose signs are right in
 // single precision by the difference of products of Kahan (Jeannerod, Louvet and Muller 2013), so
 // that neighbours always agree about a shared edge.
@@ -7,7 +7,7 @@
 #define RS_LIGHT_TRIANGLE_BLOCK_H
 
 #define RS_EXACT_SLABS
-#include "bvh/wide_node.h"
+#include "bvh/lbvh_node.h"
 #include "shared/light_layout.h"
 
 // A block: x y z of the first, second and third corners, one vector each (NaN in lanes without a

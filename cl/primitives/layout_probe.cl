@@ -13,16 +13,6 @@ __kernel void layout_probe(__global uint* layout) {
   RS_FIELD(RsAabb, lo);
   RS_FIELD(RsAabb, hi);
 
-  RS_PUT(sizeof(RsBvhNode));
-  RS_FIELD(RsBvhNode, left_lo);
-  RS_FIELD(RsBvhNode, left_hi);
-  RS_FIELD(RsBvhNode, right_lo);
-  RS_FIELD(RsBvhNode, right_hi);
-  RS_FIELD(RsBvhNode, left);
-  RS_FIELD(RsBvhNode, right);
-  RS_FIELD(RsBvhNode, first);
-  RS_FIELD(RsBvhNode, last);
-
   RS_PUT(sizeof(RsLine));
   RS_FIELD(RsLine, v);
 
@@ -80,5 +70,15 @@ __kernel void layout_probe(__global uint* layout) {
   RS_FIELD(RsLensCamera, sample);
   RS_FIELD(RsLensCamera, seed_lo);
   RS_FIELD(RsLensCamera, seed_hi);
+
+  RS_PUT(sizeof(RsLensTile));
+  RS_FIELD(RsLensTile, x0);
+  RS_FIELD(RsLensTile, y0);
+  RS_FIELD(RsLensTile, x1);
+  RS_FIELD(RsLensTile, y1);
+  RS_FIELD(RsLensTile, face);
+  RS_FIELD(RsLensTile, cosine);
+  RS_FIELD(RsLensTile, padding);
+
   layout[0] = next;
 }

@@ -14,20 +14,6 @@ typedef struct {
 } RsAabb;
 RS_STATIC_ASSERT_SIZE(RsAabb, 24);
 
-// Inner node of the LBVH, one cache line: the boxes of both children beside their references.
-// A reference >= 0 is an inner node, ~reference is a position in the sorted leaf order.
-typedef struct {
-  rs_float left_lo[3];
-  rs_float left_hi[3];
-  rs_float right_lo[3];
-  rs_float right_hi[3];
-  rs_int left;
-  rs_int right;
-  rs_int first;  // the node covers the sorted leaves first..last
-  rs_int last;
-} RsBvhNode;
-RS_STATIC_ASSERT_SIZE(RsBvhNode, 64);
-
 // What one view needs of one Gaussian, one cache line (docs/model.md, "The camera line").
 // Projective form: x0 y0 m_z a | b c D0 e_x | e_y C00 C01 C11 | opacity r g b.
 // General form: whitening matrix in camera axes, rows M0 M1 M2 (9), whitened origin o' (3), opacity
@@ -66,7 +52,7 @@ RS_STATIC_ASSERT_SIZE(RsCamera, 80);
 typedef struct {
   rs_float rotation[9];  // world to camera, row-major
   rs_float center[3];    // world
-  rs_float low[2];       // of x/z and y/z that the picture shows, with a margin (RS_FOOTPRINT_DEPTH)
+  rs_float low[2];  // of x/z and y/z that the picture shows, with a margin (RS_FOOTPRINT_DEPTH)
   rs_float high[2];
   rs_float spacing;  // size of a pixel at unit depth or distance, or anywhere
   rs_int kind;       // RS_FOOTPRINT_*
@@ -94,6 +80,19 @@ typedef struct {
   rs_uint seed_lo, seed_hi;
 } RsLensCamera;
 RS_STATIC_ASSERT_SIZE(RsLensCamera, 128);
+
+// A tile of a picture taken through a lens, seen by the pinhole of one face of a cube around the
+// camera (cl/trace/lens_tiles.cl).
+typedef struct {
+  rs_float x0, y0, x1, y1;  // box of its rays in tangent coordinates of the face; x0 > x1: no ray
+  rs_int face;
+  rs_float cosine;  // least of its rays to the axis of the face
+  rs_int padding[2];
+} RsLensTile;
+RS_STATIC_ASSERT_SIZE(RsLensTile, 32);
+
+// Faces of that cube: the first looks forward.
+#define RS_FACES 6
 
 #define RS_CAMERA_PINHOLE 0
 #define RS_CAMERA_OPENCV 1

@@ -74,6 +74,15 @@ typedef struct {
   uint head, size;
 } OpenRows;
 
+#if LENS == 2
+// Length of a gradient with respect to the angle in which the mean at (x, y) is seen, from that
+// with respect to its tangent coordinates.
+fv rs_angular_length(const float x, const float y, const fv gx, const fv gy) {
+  const fv radial = x * gx + y * gy;
+  return sqrt((1.0f + x * x + y * y) * (gx * gx + gy * gy + radial * radial));
+}
+#endif
+
 // Gradient of the line but for opacity and colour, from that of the squared distance. Each form
 // meets the Gaussian by itself: behind one branch for both compilers may gather the line's numbers.
 void line_gradient_projective(const Pixels* p,
@@ -89,8 +98,12 @@ void line_gradient_projective(const Pixels* p,
   const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
   g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
   g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
+#if LENS == 2
+  g[2] = rs_angular_length(v[0], v[1], g[0], g[1]) * p->screen_x;
+#else
   g[2] =
       sqrt(g[0] * g[0] * (p->screen_x * p->screen_x) + g[1] * g[1] * (p->screen_y * p->screen_y));
+#endif
   g[3] = gNx * dx;
   g[4] = 2.0f * gNx * dy;
   g[5] = gNy * dy;
@@ -179,6 +192,7 @@ void fetch_chunk(const uint chunk,
 }
 
 void packet_backward(const RsCamera* camera,
+                     __global const float* restrict tangents,
                      const int px,
                      const int py,
                      __global const RsLine* restrict lines,
@@ -196,8 +210,9 @@ void packet_backward(const RsCamera* camera,
   const uint2 tail = stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH];
   if (tail.x == RS_NO_CHUNK) return;
   Pixels p;
-  p.X = ((float)px + RS_LANE_X + 0.5f - camera->cx) / camera->fx;
-  p.Y = ((float)py + RS_LANE_Y + 0.5f - camera->cy) / camera->fy;
+  const PacketRays rays = rs_packet_rays(camera, tangents, px, py);
+  p.X = rays.X;
+  p.Y = rays.Y;
   p.screen_x = screen_x;
   p.screen_y = screen_y;
   const size_t plane = (size_t)width * height;
@@ -275,7 +290,10 @@ __kernel void trace_backward(const uint count,
                              const float screen_x,
                              const float screen_y,
                              const float limit,
-                             __global float* restrict gradients) {
+                             __global float* restrict gradients,
+                             const int face,
+                             __global const RsLensTile* restrict tiles,
+                             __global const float* restrict tangents) {
   const RsCamera camera = camera_argument;
   LineSums sums;
   sums.lines = gradients;
@@ -286,24 +304,25 @@ __kernel void trace_backward(const uint count,
   sums.lines += (size_t)group * count * 16;
   const uint first = tile_row * tiles_x, end = first + tile_rows * tiles_x;
   for (uint tile = first + (group + groups - first % groups) % groups; tile < end; tile += groups) {
+    if (!rs_on_face(tiles, face, tile)) continue;
     const int x0 = tile % tiles_x * TILE;
     const int y0 = tile / tiles_x * TILE;
     for (int y = y0; y < min(y0 + TILE, camera.height); y += PACKET_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += PACKET_WIDTH) {
-        packet_backward(&camera, x, y, lines, image_gradient, transmittances, stream_ends, pool,
-                        pool_transmittance, background, screen_x, screen_y, &sums);
+        packet_backward(&camera, tangents, x, y, lines, image_gradient, transmittances, stream_ends,
+                        pool, pool_transmittance, background, screen_x, screen_y, &sums);
       }
     }
   }
 #else
   (void)count;
   (void)groups;
-  (void)tiles_x;
   (void)tile_rows;
   const int x = get_global_id(0) * PACKET_WIDTH;
   const int y = get_global_id(1) * PACKET_HEIGHT + tile_row * TILE;
   if (x >= camera.width || y >= camera.height) return;
-  packet_backward(&camera, x, y, lines, image_gradient, transmittances, stream_ends, pool,
+  if (!rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE)) return;
+  packet_backward(&camera, tangents, x, y, lines, image_gradient, transmittances, stream_ends, pool,
                   pool_transmittance, background, screen_x, screen_y, &sums);
 #endif
 }

@@ -12,6 +12,14 @@
 #ifndef POSE
 #define POSE 0
 #endif
+// Adds to the gradients of the parameters, for the second and further faces of a lens.
+#ifndef ACCUMULATE
+#define ACCUMULATE 0
+#endif
+// The screen gradient counts the angle in which the mean is seen (LENS 2 of packet.h).
+#ifndef ANGULAR
+#define ANGULAR 0
+#endif
 
 typedef struct {
   gv m[3];
@@ -118,6 +126,16 @@ gi sum_copies(__global float* gradients, const size_t copy_floats, const uint co
   return touched != 0.0f;
 }
 
+#if ACCUMULATE
+// The values of VECTOR Gaussians as they lie in memory, and adding them to what has been written.
+void load_rows(__global const float* p, const uint stride, gv* rows) {
+  for (uint k = 0; k < stride; ++k) rows[k] = *(__global const gv_unaligned*)(p + k * VECTOR);
+}
+void add_rows(__global float* p, const uint stride, const gv* rows) {
+  for (uint k = 0; k < stride; ++k) *(__global gv_unaligned*)(p + k * VECTOR) += rows[k];
+}
+#endif
+
 __kernel void finalize_gradients(const uint begin,
                                  const uint end,
                                  const uint count,
@@ -158,6 +176,9 @@ __kernel void finalize_gradients(const uint begin,
     touched = sum_copies(line_gradients + 16 * i, (size_t)count * 16, copies, v);
   }
   if (!RS_ANY_GAUSSIAN(touched)) {
+#if ACCUMULATE
+    return;
+#endif
     clear_columns(g_means + 3 * i, 3);
     clear_columns(g_quaternions + 4 * i, 4);
     clear_columns(g_scales + 3 * i, 3);
@@ -179,9 +200,32 @@ __kernel void finalize_gradients(const uint begin,
   const gi projective = kind == RS_LINE_PROJECTIVE;
   const gi general = kind == RS_LINE_GENERAL;
   if (RS_ANY_GAUSSIAN(touched & general)) general_gradient(&g, v, general, &view);
-  const gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
-  store_columns3((touched & projective) ? slope : zero, (touched & projective) ? v[2] : zero,
-                 touched ? (gv)(1.0f) : zero, screen + 3 * i);
+#if ANGULAR
+  (void)screen_y;
+  const gv x0 = g.m[0] / g.m[2], y0 = g.m[1] / g.m[2];
+  const gv across = x0 * v[0] + y0 * v[1];
+  gv slope =
+      screen_x * sqrt((1.0f + x0 * x0 + y0 * y0) * (v[0] * v[0] + v[1] * v[1] + across * across));
+#else
+  gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
+#endif
+  slope = (touched & projective) ? slope : zero;
+  gv absolute = (touched & projective) ? v[2] : zero;
+  gv met = touched ? (gv)(1.0f) : zero;
+#if ACCUMULATE
+  gv before[3], old_means[3], old_quaternions[4], old_scales[3], old_opacities[1];
+  gv old_sh[3 * SH_COEFFICIENTS];
+  load_columns3(screen + 3 * i, before);
+  load_rows(g_means + 3 * i, 3, old_means);
+  load_rows(g_quaternions + 4 * i, 4, old_quaternions);
+  load_rows(g_scales + 3 * i, 3, old_scales);
+  load_rows(g_opacities + i, 1, old_opacities);
+  load_rows(g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS, old_sh);
+  slope += before[0];
+  absolute += before[1];
+  met = larger(met, before[2]);
+#endif
+  store_columns3(slope, absolute, met, screen + 3 * i);
 
   const float* V = camera.rotation;
   gv mean[3], gR[9];
@@ -257,4 +301,11 @@ __kernel void finalize_gradients(const uint begin,
   }
   store_columns3(gs[0], gs[1], gs[2], g_scales + 3 * i);
   store_column(touched ? v[12] * g.opacity * (1.0f - g.opacity) : zero, g_opacities + i, 1);
+#if ACCUMULATE
+  add_rows(g_means + 3 * i, 3, old_means);
+  add_rows(g_quaternions + 4 * i, 4, old_quaternions);
+  add_rows(g_scales + 3 * i, 3, old_scales);
+  add_rows(g_opacities + i, 1, old_opacities);
+  add_rows(g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS, old_sh);
+#endif
 }

@@ -5,6 +5,7 @@
 // candidate's bound can be blended.
 //   global size: blocks in x and y from the window's first tile on; local: the blocks of a tile
 //   (any size is correct)
+// With LENS a launch traces the tiles of one face (lens_tiles.cl) and leaves the others.
 // Cost follows the candidates of the tile that meet the packets. Rows of Gaussians are blended
 // without sorting (packet_rows.h); packets beyond its limits start again with sorted lists
 // (packet_sorted.h), which have none.
@@ -41,7 +42,10 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
                             __global uint2* restrict pool,
                             __global float* restrict pool_transmittance,
                             const uint pool_capacity,
-                            volatile __global uint* restrict counters) {
+                            volatile __global uint* restrict counters,
+                            const int face,
+                            __global const RsLensTile* restrict tiles,
+                            __global const float* restrict tangents) {
   const RsCamera camera = camera_argument;
   const int window_x = get_global_id(0) * (BLOCK * PACKET_WIDTH);
   const int window_y = get_global_id(1) * (BLOCK * PACKET_HEIGHT);
@@ -51,16 +55,26 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
   if (column >= window.z || row >= window.w) return;
   if (block_x >= camera.width || block_y >= camera.height) return;
   const uint tile = row * window.z + column;
+  const uint picture_tiles_x = (camera.width + TILE - 1) / TILE;
+  if (!rs_on_face(tiles, face, (row + window.y) * picture_tiles_x + column + window.x)) return;
 
   BlockCandidates block;
   block_candidates_init(&block, boxes, stride, offsets[tile], offsets[tile + 1]);
   for (int q = 0; q < RS_BLOCK_PACKETS; ++q) {
     const int px = block_x + q % BLOCK * PACKET_WIDTH;
     const int py = block_y + q / BLOCK * PACKET_HEIGHT;
+#if LENS
+    const PacketRays rays = rs_packet_rays(&camera, tangents, px, py);
+    block.x0[q] = rs_lane_min(select((fv)(INFINITY), rays.X, rays.valid));
+    block.x1[q] = rs_lane_max(select((fv)(-INFINITY), rays.X, rays.valid));
+    block.y0[q] = rs_lane_min(select((fv)(INFINITY), rays.Y, rays.valid));
+    block.y1[q] = rs_lane_max(select((fv)(-INFINITY), rays.Y, rays.valid));
+#else
     block.x0[q] = (px + 0.5f - camera.cx) / camera.fx;
     block.x1[q] = (px + PACKET_WIDTH - 0.5f - camera.cx) / camera.fx;
     block.y0[q] = (py + 0.5f - camera.cy) / camera.fy;
     block.y1[q] = (py + PACKET_HEIGHT - 0.5f - camera.cy) / camera.fy;
+#endif
   }
   HitStream stream;
   stream.pool = pool;
@@ -76,10 +90,10 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
     if (px >= width || py >= height) continue;
     Candidates candidates = {&block, q, 0, block.end};
     PacketState p;
-    p.X = ((float)px + RS_LANE_X + 0.5f - camera.cx) / camera.fx;
-    p.Y = ((float)py + RS_LANE_Y + 0.5f - camera.cy) / camera.fy;
-    p.valid = RS_MASK(RS_LANE_X + (float)px < (float)width) &
-              RS_MASK(RS_LANE_Y + (float)py < (float)height);
+    const PacketRays rays = rs_packet_rays(&camera, tangents, px, py);
+    p.X = rays.X;
+    p.Y = rays.Y;
+    p.valid = rays.valid;
     packet_clear(&p);
     stream_restart(&stream);
     iv capped = (iv)(0);
@@ -97,9 +111,14 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
     rs_store_pixels(image + 3 * plane, width, height, px, py, 1.0f - p.T);
 #if WITH_DEPTH
     const fv weight = 1.0f - p.T;
+#if LENS == 2
+    const fv length = sqrt(1.0f + p.X * p.X + p.Y * p.Y);
+#else
+    const fv length = (fv)(1.0f);
+#endif
     rs_store_pixels(depth_image, width, height, px, py,
-                    select((fv)(0.0f), p.depth_sum / weight, RS_MASK(weight > 0.0f)));
-    rs_store_pixels(depth_image + plane, width, height, px, py, p.median);
+                    select((fv)(0.0f), length * p.depth_sum / weight, RS_MASK(weight > 0.0f)));
+    rs_store_pixels(depth_image + plane, width, height, px, py, length * p.median);
     rs_store_pixels(depth_image + 2 * plane, width, height, px, py, rs_to_float(p.hits));
 #else
     (void)depth_image;

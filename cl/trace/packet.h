@@ -71,6 +71,53 @@ fv rs_load_pixels(__global const float* plane, int width, int height, int x, int
 #endif
 }
 
+// How rays get to their places in the image plane. 0: the grid of a pinhole. The others read them
+// from a buffer that lens_tiles.cl made, 1 for a lens whose depths lie along its axis, 2 for one
+// that looks around and has depths along its rays.
+#ifndef LENS
+#define LENS 0
+#endif
+
+// Tangent coordinates of the packet whose first pixel is (x, y), and the lanes that see something.
+typedef struct {
+  fv X, Y;
+  iv valid;
+} PacketRays;
+
+PacketRays rs_packet_rays(const RsCamera* camera,
+                          __global const float* tangents,
+                          const int x,
+                          const int y) {
+  PacketRays rays;
+  rays.valid = RS_MASK(RS_LANE_X + (float)x < (float)camera->width) &
+               RS_MASK(RS_LANE_Y + (float)y < (float)camera->height);
+#if LENS
+  const size_t plane = (size_t)camera->width * camera->height;
+  rays.X = rs_load_pixels(tangents, camera->width, camera->height, x, y);
+  rays.Y = rs_load_pixels(tangents + plane, camera->width, camera->height, x, y);
+  rays.valid &= RS_MASK(rays.X == rays.X);
+  rays.X = select((fv)(0.0f), rays.X, rays.valid);
+  rays.Y = select((fv)(0.0f), rays.Y, rays.valid);
+#else
+  (void)tangents;
+  rays.X = ((float)x + RS_LANE_X + 0.5f - camera->cx) / camera->fx;
+  rays.Y = ((float)y + RS_LANE_Y + 0.5f - camera->cy) / camera->fy;
+#endif
+  return rays;
+}
+
+// Whether the launch for one face of a lens traces tile `tile` of the picture.
+bool rs_on_face(__global const RsLensTile* tiles, const int face, const uint tile) {
+#if LENS
+  return tiles[tile].face == face;
+#else
+  (void)tiles;
+  (void)face;
+  (void)tile;
+  return true;
+#endif
+}
+
 // How the packet's rays pass a Gaussian.
 typedef struct {
   iv inside;      // squared whitened distance of the line at most Q

@@ -10,6 +10,11 @@
 #define PEAK_ORDER 0
 #endif
 
+// What near_depth counts: depth along z, or the distance of the mean.
+#ifndef NEAR_DISTANCE
+#define NEAR_DISTANCE 0
+#endif
+
 // Slack for float rounding in the closed-form outline, in units of the tangent coordinate.
 #define RS_OUTLINE_SLACK 2e-6f
 
@@ -140,9 +145,13 @@ __kernel void prepare_view(const uint begin,
     whitened += o * o;
   }
   const gv reach = sqrt(larger(Q, (gv)(0.0f)) * szz) * 1.00001f;
-  const float nearest = camera.near_depth > 0.0f ? camera.near_depth : -INFINITY;
-  gi visible =
-      finite & (Q > 0.0f) & (g.opacity > 0.0f) & (g.m[2] + reach > 0.0f) & (g.m[2] >= nearest);
+#if NEAR_DISTANCE
+  const gi far_enough =
+      g.m[0] * g.m[0] + g.m[1] * g.m[1] + g.m[2] * g.m[2] >= camera.near_depth * camera.near_depth;
+#else
+  const gi far_enough = g.m[2] >= (camera.near_depth > 0.0f ? camera.near_depth : -INFINITY);
+#endif
+  gi visible = finite & (Q > 0.0f) & (g.opacity > 0.0f) & (g.m[2] + reach > 0.0f) & far_enough;
   gv least = g.m[2] - reach;
 #if PEAK_ORDER
   least = larger(least_peak(&g, Q, szz, whitened), least);

@@ -207,6 +207,7 @@ __kernel void ray_backward(const uint ray_count,
                            const float quantile,
                            const float min_transmittance,
                            const int max_hits,
+                           const float4 near,
                            const float4 background,
                            const float16 screen,
                            __global const float8* restrict rays,
@@ -225,7 +226,7 @@ __kernel void ray_backward(const uint ray_count,
                           levels,      sh_coefficients,
                           SH_DEGREE,   color_from_origin,
                           quantile,    min_transmittance,
-                          max_hits};
+                          max_hits,    near};
   RayState state;
   state.records = records;
 #if PRIVATE_COPIES

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// One ray against a leaf block of the tree over Gaussians (bvh/wide_node.h): PACKET Gaussians at
+// One ray against a leaf block of the tree over Gaussians (bvh/lbvh_node.h): PACKET Gaussians at
 // once.
 #ifndef RS_TRACE_RAY_BLOCK_H
 #define RS_TRACE_RAY_BLOCK_H
 
-#include "bvh/wide_node.h"
+#include "bvh/lbvh_node.h"
 #include "shared/layout.h"
 
 #ifndef ADAPTIVE_RADIUS
@@ -12,6 +12,11 @@
 #endif
 #ifndef PEAK_ORDER
 #define PEAK_ORDER 0
+#endif
+// Gaussians whose means are too near are not met: 1 by their depth along an axis, 2 by their
+// distance.
+#ifndef NEAR_PLANE
+#define NEAR_PLANE 0
 #endif
 
 // A block, all that its Gaussians need while they are traced in one place: the upper triangles
@@ -33,8 +38,12 @@ typedef struct {
 } BlockMeeting;
 
 // Gaussians whose ellipsoids the ray's line meets, without those that it cannot hit because of its
-// origin; one bit each. cross2 / direction2 is the squared distance of the line: no division.
-uint ray_meets_block(const RayData* ray, __global const fv* block, BlockMeeting* meeting) {
+// origin; one bit each. near: axis and depth from the origin that means have to reach, for
+// NEAR_PLANE. cross2 / direction2 is the squared distance of the line: no division.
+uint ray_meets_block(const RayData* ray,
+                     const float4 near,
+                     __global const fv* block,
+                     BlockMeeting* meeting) {
   const fv a = block[0], b = block[1], c = block[2], d = block[3], e = block[4], f = block[5];
   const fv x = ray->o.x - block[6], y = ray->o.y - block[7], z = ray->o.z - block[8];
   const fv ox = a * x + b * y + c * z, oy = d * y + e * z, oz = f * z;
@@ -44,7 +53,14 @@ uint ray_meets_block(const RayData* ray, __global const fv* block, BlockMeeting*
   const fv dd = dx * dx + dy * dy + dz * dz;
   const fv cx = oy * dz - oz * dy, cy = oz * dx - ox * dz, cz = ox * dy - oy * dx;
   const fv cc = cx * cx + cy * cy + cz * cz;
+#if NEAR_PLANE == 1
+  const iv inside = RS_MASK(cc <= dd) & RS_MASK(-(near.x * x + near.y * y + near.z * z) >= near.w);
+#elif NEAR_PLANE == 2
+  const iv inside = RS_MASK(cc <= dd) & RS_MASK(x * x + y * y + z * z >= near.w * near.w);
+#else
+  (void)near;
   const iv inside = RS_MASK(cc <= dd);
+#endif
   if (!rs_any(inside)) return 0;
   const fv along = ox * dx + oy * dy + oz * dz;
   const fv origin2 = ox * ox + oy * oy + oz * oz;

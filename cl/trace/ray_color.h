@@ -23,6 +23,7 @@ typedef struct {
   float quantile;
   float min_transmittance;
   int max_hits;
+  float4 near;  // of ray_meets_block()
 } RayScene;
 
 // The basis along the ray, for colours that do not come from its origin.

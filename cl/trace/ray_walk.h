@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The walk of one arbitrary ray: finds its hits and hands them over in order, in batches.
 //
-// A ray walks the tree of bvh/wide_node.h near child first and collects hits in no order. Once the
+// A ray walks the tree of bvh/lbvh_node.h near child first and collects hits in no order. Once the
 // product of all 1 - alpha collected falls below the least transmittance, the hits found so far are
 // enough to stop the ray: they are sorted, and the key at which they do becomes the end of the ray.
 // What is found later can only move that end nearer. So opaque scenes cost little more than a
@@ -54,8 +54,8 @@ void walk_ray(
     float remaining = state->transmittance;  // behind all evaluated hits
     float hopeful = remaining;               // no more than is left behind all hits
     int sorted = 0;                          // size after the last sort
-    float stack_entry[RS_WIDE_STACK];
-    uint stack_node[RS_WIDE_STACK];  // level in the lowest four bits
+    float stack_entry[RS_NODE_STACK];
+    uint stack_node[RS_NODE_STACK];  // level in the lowest four bits
     int top = 1;
     stack_entry[0] = ray->t_min;
     stack_node[0] = (uint)scene->levels;
@@ -87,7 +87,8 @@ void walk_ray(
         const uint number_of_block = number * PACKET + rs_lowest_bit(bits);
         __global const fv* block = scene->blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
         BlockMeeting meeting;
-        for (uint hits = ray_meets_block(ray, block, &meeting); hits != 0; hits &= hits - 1) {
+        for (uint hits = ray_meets_block(ray, scene->near, block, &meeting); hits != 0;
+             hits &= hits - 1) {
           const uint lane = rs_lowest_bit(hits);
           pending_append(&pending, &meeting, block, number_of_block * PACKET + lane, lane);
           prefetch_color(scene, pending.index[pending.size - 1]);

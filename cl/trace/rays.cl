@@ -63,6 +63,7 @@ __kernel void trace_rays(const uint ray_count,
                          const float quantile,
                          const float min_transmittance,
                          const int max_hits,
+                         const float4 near,
                          const float4 background,
                          __global const float8* restrict rays,
                          const int ordered,
@@ -75,7 +76,7 @@ __kernel void trace_rays(const uint ray_count,
                     levels,        sh_coefficients,
                     active_degree, color_from_origin,
                     quantile,      min_transmittance,
-                    max_hits};
+                    max_hits,      near};
   for (uint position = first; position < last; ++position) {
     const size_t id = ordered ? ray_order[position] : position;
     const float8 raw = rays[id];

@@ -20,6 +20,11 @@
 #ifndef PEAK_ORDER
 #define PEAK_ORDER 0
 #endif
+// 0: the tiles of a pinhole, a regular grid in tangent coordinates. 1: those of a lens, each with a
+// box around its rays on one face of a cube (lens_tiles.cl); a launch fills the tiles of one face.
+#ifndef LENS
+#define LENS 0
+#endif
 
 // Pixel centres count as this much wider, for rounding.
 #define RS_TILE_SLACK 0.01f
@@ -55,9 +60,39 @@ gv within_reach(const gv pixel) {
   return smaller(larger(pixel, (gv)(-2097152.0f)), (gv)(2097152.0f));
 }
 
+#if LENS
+// Where the tiles of a face are.
+typedef struct {
+  __global const RsLensTile* tiles;
+  __global const float4* spans;  // box around each row of tiles, then around each column
+  int face, tiles_x, tile_rows;
+} LensTiles;
+
+// Lanes whose outline's box meets a box (x0, y0, x1, y1).
+gi outline_meets(const gv* b, const float4 box) {
+  return (b[RS_BOUNDS_X0] <= box.z) & (b[RS_BOUNDS_X1] >= box.x) & (b[RS_BOUNDS_Y0] <= box.w) &
+         (b[RS_BOUNDS_Y1] >= box.y);
+}
+
+gi tile_ranges(const gv* b, const LensTiles* lens, const int4 window, TileRanges* range) {
+  range->x0.v = range->y0.v = (gi)(0x7fffffff);
+  range->x1.v = range->y1.v = (gi)(-1);
+  for (int y = window.y; y < min(window.y + window.w, lens->tile_rows); ++y) {
+    const gi meets = outline_meets(b, lens->spans[y]);
+    range->y0.v = (meets & (range->y0.v > y)) ? (gi)(y) : range->y0.v;
+    range->y1.v = meets ? (gi)(y) : range->y1.v;
+  }
+  for (int x = window.x; x < min(window.x + window.z, lens->tiles_x); ++x) {
+    const gi meets = outline_meets(b, lens->spans[lens->tile_rows + x]);
+    range->x0.v = (meets & (range->x0.v > x)) ? (gi)(x) : range->x0.v;
+    range->x1.v = meets ? (gi)(x) : range->x1.v;
+  }
+  return (RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_HIDDEN) | (range->x1.v < range->x0.v) |
+         (range->y1.v < range->y0.v);
+}
+#else
 // Of Gaussians with bounds b, in the window. Returns the lanes with an empty range.
-gi tile_ranges(
-    const gv* b, const RsCamera* camera, const int4 window, TileRanges* range) {
+gi tile_ranges(const gv* b, const RsCamera* camera, const int4 window, TileRanges* range) {
   const gv x0 = within_reach(b[RS_BOUNDS_X0] * camera->fx + camera->cx);
   const gv x1 = within_reach(b[RS_BOUNDS_X1] * camera->fx + camera->cx);
   const gv y0 = within_reach(b[RS_BOUNDS_Y0] * camera->fy + camera->cy);
@@ -74,19 +109,23 @@ gi tile_ranges(
          (range->y1.v < range->y0.v);
 }
 
+#endif
+
+// Box of a tile in tangent coordinates: x0, y0, x1, y1.
+float4 tile_box(const RsCamera* camera, const int tile_x, const int tile_y) {
+  return (float4)((tile_x * TILE + 0.5f - RS_TILE_SLACK - camera->cx) / camera->fx,
+                  (tile_y * TILE + 0.5f - RS_TILE_SLACK - camera->cy) / camera->fy,
+                  (min((tile_x + 1) * TILE, camera->width) - 0.5f + RS_TILE_SLACK - camera->cx) /
+                      camera->fx,
+                  (min((tile_y + 1) * TILE, camera->height) - 0.5f + RS_TILE_SLACK - camera->cy) /
+                      camera->fy);
+}
+
 // Whether the planes of a tile's frustum keep the box out; it may still be outside when not.
-bool box_outside(const RsCamera* camera,
-                 const int tile_x,
-                 const int tile_y,
-                 __global const RsAabb* box) {
-  const float x0 = (tile_x * TILE + 0.5f - RS_TILE_SLACK - camera->cx) / camera->fx;
-  const float x1 =
-      (min((tile_x + 1) * TILE, camera->width) - 0.5f + RS_TILE_SLACK - camera->cx) / camera->fx;
-  const float y0 = (tile_y * TILE + 0.5f - RS_TILE_SLACK - camera->cy) / camera->fy;
-  const float y1 =
-      (min((tile_y + 1) * TILE, camera->height) - 0.5f + RS_TILE_SLACK - camera->cy) / camera->fy;
+bool box_outside(const RsCamera* camera, const float4 tile, __global const RsAabb* box) {
   // Inward normals in camera axes: left, right, top, bottom, front.
-  const float n[5][3] = {{1, 0, -x0}, {-1, 0, x1}, {0, 1, -y0}, {0, -1, y1}, {0, 0, 1}};
+  const float n[5][3] = {
+      {1, 0, -tile.x}, {-1, 0, tile.z}, {0, 1, -tile.y}, {0, -1, tile.w}, {0, 0, 1}};
   for (int p = 0; p < 5; ++p) {
     float most = 0.0f, scale = 0.0f;  // distance of the box's farthest corner along the normal
     for (int j = 0; j < 3; ++j) {
@@ -102,6 +141,58 @@ bool box_outside(const RsCamera* camera,
   return false;
 }
 
+#if LENS
+// Whether a tile belongs to the face and its box meets the outline, of which lane `lane` is asked.
+bool lens_tile_meets(const LensTiles* lens,
+                     const int x,
+                     const int y,
+                     const FloatLanes* outline,
+                     const int lane,
+                     const RsCamera* camera,
+                     __global const RsAabb* box) {
+  const RsLensTile tile = lens->tiles[y * lens->tiles_x + x];
+  if (tile.face != lens->face || !(outline[RS_BOUNDS_X0].s[lane] <= tile.x1) ||
+      !(outline[RS_BOUNDS_X1].s[lane] >= tile.x0) || !(outline[RS_BOUNDS_Y0].s[lane] <= tile.y1) ||
+      !(outline[RS_BOUNDS_Y1].s[lane] >= tile.y0))
+    return false;
+  return outline[RS_BOUNDS_X0].s[lane] != -INFINITY ||
+         !box_outside(camera, (float4)(tile.x0, tile.y0, tile.x1, tile.y1), box);
+}
+
+__kernel void count_tiles(const uint begin,
+                          const uint end,
+                          __global const RsViewBounds* restrict bounds,
+                          __global const RsAabb* restrict boxes,
+                          const RsCamera camera_argument,
+                          const int4 window,
+                          __global uint* restrict counts,
+                          const int face,
+                          __global const RsLensTile* restrict tiles,
+                          __global const float4* restrict spans) {
+  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  if (i >= end) return;
+  const RsCamera camera = camera_argument;
+  const LensTiles lens = {tiles, spans, face, (camera.width + TILE - 1) / TILE,
+                          (camera.height + TILE - 1) / TILE};
+  FloatLanes outline[8];
+  gv b[8];
+  load_records8((__global const float*)(bounds + i), b);
+  for (int k = 0; k < 4; ++k) outline[k].v = b[k];
+  TileRanges range;
+  IntLanes empty;
+  empty.v = tile_ranges(b, &lens, window, &range);
+  for (int lane = 0; lane < VECTOR; ++lane) {
+    uint found = 0;
+    if (empty.s[lane] == 0) {
+      for (int y = range.y0.s[lane]; y <= range.y1.s[lane]; ++y) {
+        for (int x = range.x0.s[lane]; x <= range.x1.s[lane]; ++x)
+          found += lens_tile_meets(&lens, x, y, outline, lane, &camera, boxes + i + lane);
+      }
+    }
+    counts[i + lane] = found;
+  }
+}
+#else
 uint tiles_of_box(const TileRanges* range,
                   const int lane,
                   const RsCamera* camera,
@@ -109,7 +200,7 @@ uint tiles_of_box(const TileRanges* range,
   uint found = 0;
   for (int y = range->y0.s[lane]; y <= range->y1.s[lane]; ++y) {
     for (int x = range->x0.s[lane]; x <= range->x1.s[lane]; ++x)
-      found += !box_outside(camera, x, y, box);
+      found += !box_outside(camera, tile_box(camera, x, y), box);
   }
   return found;
 }
@@ -141,6 +232,8 @@ __kernel void count_tiles(const uint begin,
   }
   *(__global gi_unaligned*)(counts + i) = found.v;
 }
+
+#endif
 
 // Depths from 2^-10 to 2^22 in 2048 steps an octave: the upper bits of a float.
 #define RS_DEPTH_BITS 12
@@ -189,14 +282,8 @@ void depth_planes(const gv* b, __global const RsLine* lines, DepthPlanes* planes
 }
 
 // What a slope adds up to the farther edge of a tile, the product at most at the outline's end.
-gv most_along(const gv slope,
-              const gi tile,
-              const float tile_size,
-              const float centre,
-              const gv mean,
-              const gv most) {
-  const gv edge =
-      (RS_TO_FLOAT(tile) + (slope > 0.0f ? (gv)(1.0f) : (gv)(0.0f))) * tile_size - centre;
+gv most_along(const gv slope, const gv low, const gv high, const gv mean, const gv most) {
+  const gv edge = slope > 0.0f ? high : low;
   return smaller(slope * (edge - mean), most);
 }
 
@@ -209,6 +296,11 @@ __kernel void fill_tiles(const uint begin,
                          const RsCamera camera_argument,
                          const int4 window,
                          __global const uint* restrict offsets,
+#if LENS
+                         const int face,
+                         __global const RsLensTile* restrict tiles,
+                         __global const float4* restrict spans,
+#endif
                          __global uint* restrict keys,
                          __global uint* restrict values) {
   const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
@@ -217,31 +309,64 @@ __kernel void fill_tiles(const uint begin,
   gv b[8];
   load_records8((__global const float*)(bounds + i), b);
   TileRanges range;
+#if LENS
+  const int tiles_x = (camera.width + TILE - 1) / TILE;
+  const LensTiles lens = {tiles, spans, face, tiles_x, (camera.height + TILE - 1) / TILE};
+  FloatLanes outline[8];
+  for (int k = 0; k < 4; ++k) outline[k].v = b[k];
+  const gi empty = tile_ranges(b, &lens, window, &range);
+#else
   const gi empty = tile_ranges(b, &camera, window, &range);
-  DepthPlanes planes;
-  depth_planes(b, lines + i, &planes);
-  IntLanes general, unbounded;
-  general.v = RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_GENERAL;
-  unbounded.v = b[RS_BOUNDS_X0] == -INFINITY;
-  const gv zero = (gv)(0.0f);
   const float size_x = TILE / camera.fx, size_y = TILE / camera.fy;
   const float centre_x = camera.cx / camera.fx, centre_y = camera.cy / camera.fy;
+  IntLanes unbounded;
+  unbounded.v = b[RS_BOUNDS_X0] == -INFINITY;
+#endif
+  DepthPlanes planes;
+  depth_planes(b, lines + i, &planes);
+  IntLanes general;
+  general.v = RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_GENERAL;
+  const gv zero = (gv)(0.0f);
   uint cursor[VECTOR];
   for (int lane = 0; lane < VECTOR; ++lane) cursor[lane] = offsets[i + lane];
   IntLanes x, y, key, left;
   x.v = range.x0.v;
   y.v = range.y0.v;
   for (left.v = !empty; RS_ANY_GAUSSIAN(left.v); left.v = left.v & (y.v <= range.y1.v)) {
-    const gv along =
-        planes.along +
-        most_along(planes.slope_y, y.v, size_y, centre_y, planes.mean_y, planes.most_y) +
-        most_along(planes.slope_x, x.v, size_x, centre_x, planes.mean_x, planes.most_x);
+#if LENS
+    FloatLanes edge[4];
+    for (int lane = 0; lane < VECTOR; ++lane) {
+      edge[0].s[lane] = edge[1].s[lane] = edge[2].s[lane] = edge[3].s[lane] = 0.0f;
+      if (left.s[lane] == 0) continue;
+      const RsLensTile tile = tiles[y.s[lane] * tiles_x + x.s[lane]];
+      edge[0].s[lane] = tile.x0;
+      edge[1].s[lane] = tile.y0;
+      edge[2].s[lane] = tile.x1;
+      edge[3].s[lane] = tile.y1;
+    }
+    const gv low_x = edge[0].v, low_y = edge[1].v, high_x = edge[2].v, high_y = edge[3].v;
+#else
+    const gv low_x = RS_TO_FLOAT(x.v) * size_x - centre_x;
+    const gv low_y = RS_TO_FLOAT(y.v) * size_y - centre_y;
+    const gv high_x = (RS_TO_FLOAT(x.v) + 1.0f) * size_x - centre_x;
+    const gv high_y = (RS_TO_FLOAT(y.v) + 1.0f) * size_y - centre_y;
+#endif
+    const gv along = planes.along +
+                     most_along(planes.slope_y, low_y, high_y, planes.mean_y, planes.most_y) +
+                     most_along(planes.slope_x, low_x, high_x, planes.mean_x, planes.most_x);
     const gv plane = ((along > 0.0f) & (planes.limit > 0.0f)) ? planes.limit / along : zero;
-    key.v = ((y.v - window.y) * window.z + (x.v - window.x)) << 16 | depth_key(larger(plane, planes.depth));
+    key.v = ((y.v - window.y) * window.z + (x.v - window.x)) << 16 |
+            depth_key(larger(plane, planes.depth));
     for (int lane = 0; lane < VECTOR; ++lane) {
       if (left.s[lane] == 0) continue;
-      if (unbounded.s[lane] && box_outside(&camera, x.s[lane], y.s[lane], boxes + i + lane))
+#if LENS
+      if (!lens_tile_meets(&lens, x.s[lane], y.s[lane], outline, lane, &camera, boxes + i + lane))
         continue;
+#else
+      if (unbounded.s[lane] &&
+          box_outside(&camera, tile_box(&camera, x.s[lane], y.s[lane]), boxes + i + lane))
+        continue;
+#endif
       const uint to = cursor[lane]++;
       keys[to] = key.s[lane];
       values[to] = (uint)(i + lane) << 1 | (general.s[lane] != 0);

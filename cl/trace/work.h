@@ -54,11 +54,6 @@
 // One SH coefficient: its gradient 3, the colour along it 6, direction 6.
 #define RS_WORK_FINALIZE_SH_FLOPS 15
 
-// Records of arbitrary rays, per Gaussian: parameters 44 read, record 64 written.
-#define RS_WORK_RECORD_BYTES 108
-// Rotation 36, unit quaternion 12, scales and opacity 15, whitening matrix 9.
-#define RS_WORK_RECORD_FLOPS 72
-
 // Arbitrary rays, per ray: ray 32 read, result 32 written.
 #define RS_WORK_RAY_BYTES 64
 // Per hit: record 64, a node 64, leaf index 4.

@@ -90,8 +90,8 @@ std::uint64_t peak_process_bytes() {
 std::string tuning_text(const DeviceInfo& device) {
   if (!device.tuning) return "none";
   const DeviceTuning& tuning = *device.tuning;
-  return fmt::format("packet width {}, tile {}, pending {}, group {}", tuning.packet_width,
-                     tuning.tile, tuning.pending, tuning.group);
+  return fmt::format("packet width {}, tile {}, pending {}, group {}{}", tuning.packet_width,
+                     tuning.tile, tuning.pending, tuning.group, tuning.bvh ? ", bvh" : "");
 }
 
 std::map<std::string, std::string> option_texts(const Context& context,
@@ -139,14 +139,15 @@ const std::vector<BenchRowInfo>& bench_rows() {
   static const std::vector<BenchRowInfo> rows{
       {"sort", "pairs", "radix sort of random 32-bit keys with values"},
       {"bounds", "boxes", "boxes of the Gaussians"},
-      {"morton", "boxes", "Morton codes, within a build"},
-      {"hierarchy", "boxes", "nodes and their bounds, within a build"},
-      {"build", "boxes", "LBVH: codes, sort, hierarchy"},
-      {"refit", "boxes", "new bounds for an LBVH"},
+      {"order", "boxes", "codes along the curve, sort, groups, within a build"},
+      {"nodes", "boxes", "blocks and nodes with their boxes, within a build"},
+      {"build", "boxes", "LBVH of the Gaussians, all that rays need: bounds, order, nodes"},
+      {"refit", "boxes", "the same LBVH for Gaussians that moved: bounds, nodes"},
       {"prepare-view", "Gaussians", "lines and outlines of all Gaussians for a camera"},
       {"tile-lists", "candidates", "candidates of every tile, sorted"},
       {"forward", "rays", "camera rays through their lists"},
       {"view", "rays", "one image: prepare-view, tile-lists, forward"},
+      {"view-bvh", "rays", "the same image, every ray through the LBVH"},
       {"backward", "rays", "hit streams to gradient lines, clearing them included"},
       {"finalize", "Gaussians", "gradient lines to gradients of parameters"},
       {"loss-value", "pixels", "L1 and SSIM"},
@@ -155,7 +156,7 @@ const std::vector<BenchRowInfo>& bench_rows() {
       {"density-sums", "Gaussians", "statistics of density control"},
       {"densify", "Gaussians", "density control of every tenth Gaussian, planned on the host"},
       {"iteration", "iterations", "training: bounds, forward, loss, backward, sums, Adam"},
-      {"rays-update", "Gaussians", "records and tree for arbitrary rays"},
+      {"iteration-bvh", "iterations", "the same, every ray through the LBVH, refit included"},
       {"rays", "rays", "incoherent rays between random points"},
       {"surfaces-small", "rays", "camera rays to a closed body of a tenth of --triangles"},
       {"surfaces-large", "rays", "camera rays to a closed body of --triangles"},

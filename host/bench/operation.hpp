@@ -14,7 +14,7 @@ namespace raysplats {
 /// One row that an operation yields.
 struct BenchStage {
   std::string name;
-  /// Starts of "program:kernel" ("bvh/morton.cl", "train/loss_ssim.cl:loss_gradient", ":(fill)");
+  /// Starts of "program:kernel" ("bvh/curve.cl", "train/loss_ssim.cl:loss_gradient", ":(fill)");
   /// none means all launches, and the host's clock is reported beside the device's.
   std::vector<std::string> launches;
   bool wall = false;  ///< the host's clock counts: the host does part of the work

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/rng.hpp"
 #include "bench/scene_state.hpp"
-#include "bvh/work.h"
 #include "primitives/work.h"
 #include "trace/work.h"
 
@@ -44,42 +43,36 @@ BenchOperation SceneBench::Impl::sort() {
             }}}};
 }
 
+// What RayTracer needs before its first ray, of a model as commands load it (in_morton_order).
 BenchOperation SceneBench::Impl::build() {
   return {[this] {
-            boxes();
-            if (!tree) tree.emplace(context);
+            if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, options.trace);
+            gaussians();
           },
           {},
-          [this] { tree->build(boxes(), count()); },
-          {{"morton",
-            {"bvh/morton.cl"},
+          [this] { ray_tracer->update(gaussians()); },
+          {{"order",
+            {"bvh/curve.cl", "bvh/lbvh.cl:order_groups", "primitives/"},
             false,
-            [this] {
-              const double n = gaussians_count();
-              return BenchWork{{{"boxes", n}}, RS_WORK_MORTON_BYTES * n, RS_WORK_MORTON_FLOPS * n};
-            }},
-           {"hierarchy",
-            {"bvh/hierarchy.cl"},
+            [this] { return order_work(); }},
+           {"nodes",
+            {"trace/gaussian_blocks.cl", "bvh/lbvh.cl:merge_nodes"},
             false,
-            [this] {
-              const double n = gaussians_count();
-              return BenchWork{
-                  {{"boxes", n}}, RS_WORK_HIERARCHY_BYTES * n, RS_WORK_HIERARCHY_FLOPS * n};
-            }},
-           {"build", {}, false, [this] { return build_work(); }}}};
+            [this] { return nodes_work(); }},
+           {"build", {}, false, [this] {
+              return together(order_work(), together(bounds_work(), nodes_work()));
+            }}}};
 }
 
 BenchOperation SceneBench::Impl::refit() {
   return {[this] {
-            if (!tree) tree.emplace(context);
-            tree->build(boxes(), count());
+            if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, options.trace);
+            gaussians();
+            ray_tracer->update(gaussians());
           },
           {},
-          [this] { tree->refit(boxes()); },
-          {{"refit", {}, false, [this] {
-              const double n = gaussians_count();
-              return BenchWork{{{"boxes", n}}, RS_WORK_REFIT_BYTES * n, RS_WORK_REFIT_FLOPS * n};
-            }}}};
+          [this] { ray_tracer->refit(gaussians()); },
+          {{"refit", {}, false, [this] { return together(bounds_work(), nodes_work()); }}}};
 }
 
 BenchOperation SceneBench::Impl::view() {
@@ -100,6 +93,15 @@ BenchOperation SceneBench::Impl::view() {
             }}}};
 }
 
+BenchOperation SceneBench::Impl::view_by_bvh() {
+  return {[this] { view_tracer(); },
+          {},
+          [this] { view_tracer().forward(gaussians(), model.camera); },
+          {{"view-bvh", {}, false, [this] {
+              return BenchWork{{{"rays", pixels()}}, RS_WORK_RAY_BYTES * pixels(), 0};
+            }}}};
+}
+
 BenchOperation SceneBench::Impl::backward() {
   return {
       [this] {
@@ -112,21 +114,6 @@ BenchOperation SceneBench::Impl::backward() {
       [this] { tracer().backward(gaussians(), image_gradient, gradients); },
       {{"backward", {"trace/backward.cl", ":(fill)"}, false, [this] { return backward_work(); }},
        {"finalize", {"trace/finalize_gradients.cl"}, false, [this] { return finalize_work(); }}}};
-}
-
-BenchOperation SceneBench::Impl::rays_update() {
-  return {[this] {
-            if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, options.trace);
-            gaussians();
-          },
-          {},
-          [this] { ray_tracer->update(gaussians()); },
-          {{"rays-update", {}, false, [this] {
-              const double n = gaussians_count();
-              const BenchWork records{
-                  {{"Gaussians", n}}, RS_WORK_RECORD_BYTES * n, RS_WORK_RECORD_FLOPS * n};
-              return together(records, together(bounds_work(), build_work()));
-            }}}};
 }
 
 BenchOperation SceneBench::Impl::rays() {
@@ -211,6 +198,29 @@ BenchOperation SceneBench::Impl::iteration() {
           {{"iteration", {}, true, [this] { return iteration_work(); }}}};
 }
 
+BenchOperation SceneBench::Impl::iteration_by_bvh() {
+  return {[this] {
+            make_loss();
+            make_gradients();
+            make_density();
+            density->restore_statistics({});
+          },
+          {},
+          [this] {
+            ViewTracer& rays = view_tracer();
+            DeviceGaussians& g = gaussians();
+            rays.forward(g, model.camera, true);
+            image_loss->evaluate(rays.image(), photo, false, {0, 0, 0}, model.camera.width,
+                                 model.camera.height, image_gradient);
+            rays.backward(g, image_gradient, gradients);
+            density->accumulate(g, gradients);
+            adam->step(g, gradients, AdamRates{});
+          },
+          {{"iteration-bvh", {}, true, [this] {
+              return BenchWork{{{"iterations", 1.0}, {"rays", pixels()}}, 0, 0};
+            }}}};
+}
+
 SceneBench::SceneBench(Context& context, const BenchModel& model, const BenchOptions& options)
     : impl_(std::make_unique<Impl>(context, model, options)) {}
 SceneBench::~SceneBench() = default;
@@ -224,13 +234,14 @@ std::vector<BenchOperation> SceneBench::operations() {
           self.build(),
           self.refit(),
           self.view(),
+          self.view_by_bvh(),
           self.backward(),
           self.loss(),
           self.adam_step(),
           self.density_statistics(),
           self.densify(),
           self.iteration(),
-          self.rays_update(),
+          self.iteration_by_bvh(),
           self.rays(),
           self.surfaces("surfaces-small", small, true),
           self.surfaces("surfaces-large", large, true),

@@ -68,6 +68,16 @@ CameraTracer& SceneBench::Impl::tracer() {
   return *camera_tracer;
 }
 
+ViewTracer& SceneBench::Impl::view_tracer() {
+  if (!tree_view_tracer) {
+    TraceOptions trace = options.trace;
+    trace.traversal = Traversal::kBvh;
+    tree_view_tracer = std::make_unique<ViewTracer>(context, trace);
+    tree_view_tracer->forward(gaussians(), model.camera);
+  }
+  return *tree_view_tracer;
+}
+
 void SceneBench::Impl::forward_with_hits() {
   tracer().forward(gaussians(), model.camera, true);
   kept_statistics = view_statistics = tracer().statistics();

@@ -9,8 +9,8 @@
 
 #include "bench/scene_bench.hpp"
 #include "bvh/gaussian_bounds.hpp"
-#include "bvh/lbvh.hpp"
 #include "light/triangle_tracer.hpp"
+#include "light/view_tracer.hpp"
 #include "primitives/radix_sort.hpp"
 #include "raysplats/path_tracer.hpp"
 #include "raysplats/scene.hpp"
@@ -35,6 +35,7 @@ struct SceneBench::Impl {
   DeviceGaussians& gaussians();
   const Buffer<RsAabb>& boxes();  ///< of the Gaussians
   CameraTracer& tracer();         ///< with an up-to-date tree
+  ViewTracer& view_tracer();      ///< the same of every ray's walk through the tree
   void forward_with_hits();
   void make_loss();
   void make_gradients();
@@ -57,8 +58,9 @@ struct SceneBench::Impl {
   BenchOperation build();
   BenchOperation refit();
   BenchOperation view();
+  BenchOperation view_by_bvh();
   BenchOperation backward();
-  BenchOperation rays_update();
+  BenchOperation iteration_by_bvh();
   BenchOperation rays();
   BenchOperation loss();
   BenchOperation adam_step();
@@ -70,7 +72,8 @@ struct SceneBench::Impl {
   BenchOperation light(const char* row, std::size_t triangles, Material::Kind kind, bool lights);
 
   BenchWork bounds_work() const;
-  BenchWork build_work() const;
+  BenchWork order_work() const;
+  BenchWork nodes_work() const;
   BenchWork prepare_work() const;
   BenchWork lists_work() const;
   BenchWork forward_work() const;
@@ -93,9 +96,9 @@ struct SceneBench::Impl {
   Buffer<RsAabb> box_buffer;
   std::optional<RadixSort> sorter;
   Buffer<std::uint32_t> unsorted, keys, values;
-  std::optional<Lbvh> tree;
   std::unique_ptr<CameraTracer> camera_tracer;
   std::uint64_t traced_revision = 0;  // of the Gaussians at its last update()
+  std::unique_ptr<ViewTracer> tree_view_tracer;
   CameraTracer::Statistics view_statistics, kept_statistics;
   std::unique_ptr<RayTracer> ray_tracer;
   std::vector<Ray> ray_list;

@@ -25,11 +25,15 @@ BenchWork SceneBench::Impl::bounds_work() const {
   return {{{"boxes", n}}, RS_WORK_BOUNDS_BYTES * n, RS_WORK_BOUNDS_FLOPS * n};
 }
 
-BenchWork SceneBench::Impl::build_work() const {
+BenchWork SceneBench::Impl::order_work() const {
   const double n = gaussians_count();
-  const double bytes = RS_WORK_MORTON_BYTES + RS_WORK_HIERARCHY_BYTES +
-                       RS_WORK_MORTON_SORT_PASSES * RS_WORK_SORT_PASS_BYTES;
-  return {{{"boxes", n}}, bytes * n, (RS_WORK_MORTON_FLOPS + RS_WORK_HIERARCHY_FLOPS) * n};
+  const double bytes = RS_WORK_ORDER_BYTES + RS_WORK_ORDER_SORT_PASSES * RS_WORK_SORT_PASS_BYTES;
+  return {{{"boxes", n}}, bytes * n, RS_WORK_ORDER_FLOPS * n};
+}
+
+BenchWork SceneBench::Impl::nodes_work() const {
+  const double n = gaussians_count();
+  return {{{"boxes", n}}, RS_WORK_NODES_BYTES * n, RS_WORK_NODES_FLOPS * n};
 }
 
 BenchWork SceneBench::Impl::prepare_work() const {

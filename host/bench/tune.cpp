@@ -6,9 +6,9 @@
 #include <limits>
 #include <memory>
 
+#include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
-#include "trace/camera_tracer.hpp"
 #include "trace/packet_shape.hpp"
 
 namespace raysplats {
@@ -32,6 +32,7 @@ class Course {
                                            bench_scene(options.scene, options.size, options.seed),
                                            ScaleActivation::kExp)) {
     options_.packet_width = 0;
+    options_.traversal = Traversal::kAuto;  // the tuning's
     const std::size_t pixels =
         static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
     // A gradient without structure: all pixels pull, none alike.
@@ -43,16 +44,15 @@ class Course {
     image_gradient_.upload(gradient);
   }
 
-  std::unique_ptr<CameraTracer> tracer(const DeviceTuning& tuning) {
+  std::unique_ptr<ViewTracer> tracer(const DeviceTuning& tuning) {
     context_.set_tuning(tuning);
-    auto out = std::make_unique<CameraTracer>(context_, options_);
-    out->update(gaussians_);
+    auto out = std::make_unique<ViewTracer>(context_, options_);
     run(*out);  // compiles and allocates
     return out;
   }
 
   // Device seconds of both passes.
-  double run(CameraTracer& tracer) {
+  double run(ViewTracer& tracer) {
     context_.take_launches();
     tracer.forward(gaussians_, camera_, true);
     tracer.backward(gaussians_, image_gradient_, gradients_);
@@ -76,7 +76,7 @@ std::vector<TuneTrial> race(Course& course,
                             const std::vector<DeviceTuning>& candidates,
                             int repeat) {
   std::vector<TuneTrial> trials;
-  std::vector<std::unique_ptr<CameraTracer>> tracers;
+  std::vector<std::unique_ptr<ViewTracer>> tracers;
   for (const DeviceTuning& candidate : candidates) {
     TuneTrial trial{axis, candidate, std::numeric_limits<double>::infinity(), ""};
     try {
@@ -126,11 +126,12 @@ DeviceTuning default_tuning(const DeviceInfo& device) {
   DeviceInfo plain = device;
   plain.tuning.reset();
   const PacketShape shape = packet_shape(plain, 0);
-  return {shape.lanes, shape.tile, shape.pending, shape.group};
+  return {shape.lanes, shape.tile, shape.pending, shape.group, false};
 }
 
 const std::vector<std::string>& tune_axes() {
-  static const std::vector<std::string> axes{"packet-width", "tile", "pending", "group"};
+  static const std::vector<std::string> axes{"packet-width", "tile", "pending", "group",
+                                             "traversal"};
   return axes;
 }
 
@@ -143,7 +144,11 @@ std::vector<DeviceTuning> tune_candidates(const std::string& axis,
     candidate.*member = value;
     if (candidate != current) out.push_back(candidate);
   };
-  if (axis == "packet-width") {
+  if (axis == "traversal") {
+    DeviceTuning candidate = current;
+    candidate.bvh = !current.bvh;
+    out.push_back(candidate);
+  } else if (axis == "packet-width") {
     for (const int width : kWidths) add(&DeviceTuning::packet_width, width);
   } else if (axis == "tile") {
     for (const int tile : kTiles) add(&DeviceTuning::tile, tile);

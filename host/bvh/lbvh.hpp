@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
+#include <vector>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
@@ -13,75 +15,79 @@
 
 namespace raysplats {
 
-/// Linear bounding volume hierarchy over boxes, built and refitted on the device: 64-bit Morton
-/// codes of the box centres (ties broken by index; a few boxes far from the others do not coarsen
-/// the others' grid), stable radix sort, hierarchy after Karras 2012
-/// with its node numbers. No atomics: the result does not depend on scheduling, on the device or on
-/// how the work is divided.
+/// Lanes of the vectors that arbitrary rays are traced with: children of a node and things in a
+/// leaf block. `lanes` of 4, 8 or 16; 0 chooses the device's float vector width on CPUs (at least
+/// 4) and 4 elsewhere. Throws UsageError for other widths.
+int ray_lanes(const DeviceInfo& device, int lanes);
+
+/// Linear bounding volume hierarchy over boxes (Lauterbach et al. 2009), made on the device and
+/// walked by all rays (cl/bvh/lbvh_node.h): boxes along a Hilbert curve (64-bit codes of their
+/// centres; a few boxes far from the others do not coarsen the others' grid), groups of them
+/// ordered again by the surface area heuristic, then blocks of `lanes` and nodes of `lanes`
+/// children by position alone. There are no pointers, every block but the last is full, and a refit
+/// keeps the order. Gaussians and triangles use the same tree; what a block holds is theirs.
+///
+/// A build is: order(); a kernel of the owner's that fills the blocks and stores their boxes as the
+/// children of level 1, padded_blocks() of them from node 0 on; merge(). A refit is the last two.
 class Lbvh {
  public:
-  explicit Lbvh(Context& context);
-  /// With an explicit division of the work for sorting and for building. A group size of 1 makes
-  /// subtrees in sequential chunks (CPUs), larger ones search every node's range in parallel.
-  Lbvh(Context& context, const ChunkShape& shape);
+  Lbvh(Context& context, int lanes);
+  /// With an explicit division of the work for ordering.
+  Lbvh(Context& context, int lanes, const ChunkShape& shape);
 
-  /// Builds over boxes[0..count). Empty boxes (lo > hi) and non-finite ones become leaves with
-  /// empty bounds (lo = FLT_MAX, hi = -FLT_MAX) at the end of the order. Throws UsageError when the
-  /// buffer is shorter.
-  void build(const Buffer<RsAabb>& boxes, std::size_t count);
-  /// New bounds for the tree of the last build(); `boxes` must hold as many boxes.
-  void refit(const Buffer<RsAabb>& boxes);
+  /// Order and shape of the tree over boxes[0..count). Boxes that are empty or not finite come
+  /// last. Throws UsageError for 2^31 boxes and when the buffer is shorter.
+  void order(const Buffer<RsAabb>& boxes, std::size_t count);
+  /// Boxes of all levels above the first.
+  void merge();
 
-  /// What the tree costs to walk: inner nodes that a random line meets for every leaf box it meets
-  /// (area of the inner boxes over area of the leaf boxes, after Goldsmith and Salmon 1987). It
-  /// grows while the boxes move away from the order of the last build(); compare with the value
-  /// right after that. 0 where all boxes are empty. One pass over the nodes; waits for the device.
-  double cost();
+  /// What the tree costs to walk after the surface area heuristic (Goldsmith and Salmon 1987):
+  /// nodes and blocks that a random line through the grid's window meets for every box of
+  /// boxes[0..size()) that it meets. It grows while boxes move away from the order of the last
+  /// order(); compare with the value right after that. 0 where all boxes are empty. One pass over
+  /// nodes and boxes; waits for the device.
+  double cost(const Buffer<RsAabb>& boxes);
 
   std::size_t size() const { return count_; }
-  /// Reference of the root: 0, or ~0 for a single leaf. There is no root when size() is 0.
-  std::int32_t root() const { return count_ == 1 ? ~0 : 0; }
-  /// size() - 1 inner nodes.
-  const Buffer<RsBvhNode>& nodes() const { return nodes_; }
-  /// Box index of every leaf, in Morton order.
-  const Buffer<std::uint32_t>& leaves() const { return leaves_; }
+  int lanes() const { return lanes_; }
+  /// Positions along the curve that are ordered again together.
+  std::size_t order_group() const;
+  std::size_t block_count() const;
+  /// Blocks rounded up to whole nodes: lanes of nodes without a block must become empty boxes.
+  std::size_t padded_blocks() const;
+  /// Levels of nodes; 0 for an empty tree.
+  int levels() const { return static_cast<int>(level_sizes_.size()); }
+  /// Nodes of level l = 1..levels() at [l - 1].
+  const std::vector<std::size_t>& level_sizes() const { return level_sizes_; }
+  /// First node of level l = 1..levels() at [l]; level 1 has blocks as children.
+  const Buffer<std::uint32_t>& level_begin() const { return level_begin_; }
+  /// Behind the root, at scene_node(), lane 0 of a further node holds the box of everything.
+  const Buffer<float>& nodes() const { return nodes_; }
+  std::uint32_t scene_node() const { return scene_node_; }
+  /// Box index of every slot (block times lanes plus lane).
+  const Buffer<std::uint32_t>& slots() const { return order_; }
 
  private:
-  void sort_by_code(const Buffer<RsAabb>& boxes);
-  void bound_leaves(const Buffer<RsAabb>& boxes, bool refit);
-  void bound_spanning(const Buffer<RsAabb>& boxes);
-  bool sequential() const { return shape_.group_size == 1; }
-  std::size_t block() const;  // leaves per block of the box tree
-  std::size_t chunk() const;  // leaves per work-item of spread()
-  Range spread() const;
+  void sort_along_curve(const Buffer<RsAabb>& boxes);
+  Kernel kernel(std::string_view program, const char* name) const;
 
   Context* context_;
+  int lanes_;
   ChunkShape shape_;
   RadixSort sort_;
-  Kernel center_bounds_;
-  Kernel choose_grid_;
-  Kernel morton_codes_;
-  Kernel sort_runs_;
-  Kernel gather_words_;
-  Kernel compute_deltas_;
-  Kernel build_chunks_;
-  Kernel bound_blocks_;
-  Kernel merge_blocks_;
-  Kernel find_spanning_;
-  Kernel bound_spanning_;
-  Kernel sum_areas_;
   std::size_t count_ = 0;
-  Buffer<RsBvhNode> nodes_;
-  Buffer<std::uint32_t> leaves_;
+  std::vector<std::size_t> level_sizes_;  // from level 1
+  std::uint32_t scene_node_ = 0;
   Buffer<RsAabb> partials_;
   Buffer<float> grid_;
   Buffer<std::uint32_t> high_;      // sorted high words of the codes
   Buffer<std::uint32_t> low_;       // low words by box
   Buffer<std::uint32_t> too_long_;  // a run of equal high words was not repaired in place
-  Buffer<std::uint8_t> delta_;
-  Buffer<std::uint32_t> spanning_;
-  Buffer<RsAabb> blocks_;
-  Buffer<std::array<float, 2>> areas_;
+  Buffer<std::uint32_t> scratch_;
+  Buffer<std::uint32_t> order_;
+  Buffer<std::uint32_t> level_begin_;
+  Buffer<float> nodes_;
+  Buffer<float> areas_;
 };
 
 }  // namespace raysplats

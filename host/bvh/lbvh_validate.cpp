@@ -7,7 +7,8 @@
 #include <array>
 #include <cfloat>
 #include <cmath>
-#include <numeric>
+#include <limits>
+#include <utility>
 
 namespace raysplats {
 namespace {
@@ -37,23 +38,10 @@ bool equal(const RsAabb& a, const RsAabb& b) {
   return std::equal(a.lo, a.lo + 3, b.lo) && std::equal(a.hi, a.hi + 3, b.hi);
 }
 
-RsAabb child_box(const RsBvhNode& node, bool right) {
-  RsAabb box;
-  std::copy_n(right ? node.right_lo : node.left_lo, 3, box.lo);
-  std::copy_n(right ? node.right_hi : node.left_hi, 3, box.hi);
-  return box;
-}
-
 std::array<float, 3> center(const RsAabb& box) {
   std::array<float, 3> c{};
   for (std::size_t axis = 0; axis < 3; ++axis) c[axis] = 0.5f * box.lo[axis] + 0.5f * box.hi[axis];
   return c;
-}
-
-std::uint64_t spread_bits(std::uint32_t x) {
-  std::uint64_t out = 0;
-  for (int bit = 0; bit < 21; ++bit) out |= static_cast<std::uint64_t>(x >> bit & 1u) << (3 * bit);
-  return out;
 }
 
 // Halves of the centres' range, as all lengths of the grid.
@@ -118,49 +106,96 @@ Window main_window(std::span<const RsAabb> boxes, const Window& whole) {
   return 16 * window.longest() < whole.longest() ? window : whole;
 }
 
-double area(const RsAabb& box) {
-  double e[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    e[axis] = static_cast<double>(box.hi[axis]) - static_cast<double>(box.lo[axis]);
-    if (e[axis] < 0) return 0;
+// Position of a cell along a Hilbert curve of 21 bits per axis, by transposed axes (Skilling 2004).
+std::uint64_t hilbert_code(const std::array<std::uint32_t, 3>& cell) {
+  std::array<std::uint32_t, 3> x = cell;
+  constexpr std::uint32_t kTop = 1u << 20;
+  for (std::uint32_t bit = kTop; bit > 1; bit >>= 1) {
+    for (std::uint32_t& coordinate : x) {
+      if ((coordinate & bit) != 0) {
+        x[0] ^= bit - 1;
+        continue;
+      }
+      const std::uint32_t swapped = (x[0] ^ coordinate) & (bit - 1);
+      x[0] ^= swapped;
+      coordinate ^= swapped;
+    }
   }
-  return 2 * (e[0] * e[1] + e[1] * e[2] + e[2] * e[0]);
+  for (std::size_t axis = 1; axis < 3; ++axis) x[axis] ^= x[axis - 1];
+  std::uint32_t parity = 0;
+  for (std::uint32_t bit = kTop; bit > 1; bit >>= 1) {
+    if ((x[2] & bit) != 0) parity ^= bit - 1;
+  }
+  std::uint64_t code = 0;
+  for (int bit = 20; bit >= 0; --bit) {
+    for (const std::uint32_t coordinate : x) code = code << 1 | ((coordinate ^ parity) >> bit & 1);
+  }
+  return code;
 }
 
-// "" when leaves[] is a permutation in the wanted order.
-std::string check_leaves(const std::vector<std::uint32_t>& leaves,
-                         std::span<const RsAabb> boxes,
-                         LeafOrder order) {
-  std::vector<bool> seen(leaves.size(), false);
-  for (std::size_t i = 0; i < leaves.size(); ++i) {
-    if (leaves[i] >= leaves.size())
-      return fmt::format("Leaf {} names box {} of {}", i, leaves[i], leaves.size());
-    if (seen[leaves[i]])
-      return fmt::format("Box {} is the leaf of two places, the second is {}", leaves[i], i);
-    seen[leaves[i]] = true;
+// "" when slots is a permutation in the wanted order.
+std::string check_slots(const LbvhCopy& tree, std::span<const RsAabb> boxes, LeafOrder order) {
+  std::vector<bool> seen(tree.count, false);
+  if (tree.slots.size() < tree.count)
+    return fmt::format("The tree has {} slots for {} boxes", tree.slots.size(), tree.count);
+  for (std::size_t i = 0; i < tree.count; ++i) {
+    const std::uint32_t box = tree.slots[i];
+    if (box >= tree.count) return fmt::format("Slot {} names box {} of {}", i, box, tree.count);
+    if (seen[box]) return fmt::format("Box {} is in two slots, the second is {}", box, i);
+    seen[box] = true;
   }
   if (order == LeafOrder::kAny) return "";
-  const std::vector<std::uint64_t> codes = morton_codes(boxes);
-  for (std::size_t i = 1; i < leaves.size(); ++i) {
-    const std::uint64_t before = codes[leaves[i - 1]];
-    const std::uint64_t here = codes[leaves[i]];
-    if (before > here || (before == here && leaves[i - 1] > leaves[i])) {
-      return fmt::format("Leaves {} and {} are out of Morton order", i - 1, i);
+  const std::vector<std::uint64_t> codes = curve_codes(boxes);
+  std::uint64_t before = 0;  // largest code of the groups before
+  for (std::size_t begin = 0; begin < tree.count; begin += tree.group) {
+    const std::size_t end = std::min(begin + tree.group, tree.count);
+    std::uint64_t largest = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint64_t code = codes[tree.slots[i]];
+      if (code < before)
+        return fmt::format("Slot {} belongs before its group of {} along the curve", i, tree.group);
+      largest = std::max(largest, code);
     }
+    before = largest;
   }
   return "";
 }
 
-struct Visit {
-  std::int32_t reference;
-  std::int32_t first;
-  std::int32_t last;
-  RsAabb bounds;  // what the parent says
-};
+// Union of the boxes in a block.
+RsAabb block_box(const LbvhCopy& tree, std::span<const RsAabb> boxes, std::size_t block) {
+  RsAabb sum = kEmpty;
+  const std::size_t end = std::min((block + 1) * tree.lanes, tree.count);
+  for (std::size_t slot = block * tree.lanes; slot < end; ++slot) {
+    const RsAabb& box = boxes[tree.slots[slot]];
+    if (valid(box)) sum = united(sum, box);
+  }
+  return sum;
+}
+
+RsAabb node_box(const LbvhCopy& tree, std::size_t node) {
+  RsAabb sum = kEmpty;
+  for (std::size_t lane = 0; lane < tree.lanes; ++lane) sum = united(sum, tree.child(node, lane));
+  return sum;
+}
+
+// Depth interval of a ray in a box.
+bool meets(const RsAabb& box, const double* origin, const double* direction) {
+  double near = 0;
+  double far = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (box.lo[axis] > box.hi[axis]) return false;
+    double t0 = (static_cast<double>(box.lo[axis]) - origin[axis]) / direction[axis];
+    double t1 = (static_cast<double>(box.hi[axis]) - origin[axis]) / direction[axis];
+    if (t0 > t1) std::swap(t0, t1);
+    near = std::max(near, t0);
+    far = std::min(far, t1);
+  }
+  return near <= far;
+}
 
 }  // namespace
 
-std::vector<std::uint64_t> morton_codes(std::span<const RsAabb> boxes) {
+std::vector<std::uint64_t> curve_codes(std::span<const RsAabb> boxes) {
   Window whole{{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
   for (const RsAabb& box : boxes) {
     if (!valid(box)) continue;
@@ -187,93 +222,95 @@ std::vector<std::uint64_t> morton_codes(std::span<const RsAabb> boxes) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       inside = inside && 0.5f * c[axis] >= window.lo[axis] && 0.5f * c[axis] <= window.hi[axis];
     }
-    codes[i] = inside ? 0 : std::uint64_t{1} << 63;
+    std::array<std::uint32_t, 3> cell{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float cell = inside ? (0.5f * c[axis] - window.lo[axis]) * fine
-                                : (0.5f * c[axis] - middle[axis]) * coarse + 1048576.0f;
-      const float last = inside ? 2097151.0f : 2097150.0f;
-      const auto number = static_cast<std::uint32_t>(std::clamp(cell, 0.0f, last));
-      codes[i] |= spread_bits(inside && fine == 0 ? 0 : number) << (2 - axis);
+      const float at = inside ? (0.5f * c[axis] - window.lo[axis]) * fine
+                              : (0.5f * c[axis] - middle[axis]) * coarse + 1048576.0f;
+      if (inside && fine == 0) continue;
+      cell[axis] =
+          static_cast<std::uint32_t>(std::clamp(at, 0.0f, inside ? 2097151.0f : 2097150.0f));
     }
+    codes[i] = (inside ? 0 : std::uint64_t{1} << 63) | hilbert_code(cell);
   }
   return codes;
 }
 
-std::string validate_lbvh(const Lbvh& tree, std::span<const RsAabb> boxes, LeafOrder order) {
-  const std::size_t count = tree.size();
-  if (boxes.size() != count)
-    return fmt::format("The tree has {} leaves for {} boxes", count, boxes.size());
-  if (count == 0) return "";
-  const std::vector<std::uint32_t> leaves = tree.leaves().download();
-  if (std::string fault = check_leaves(leaves, boxes, order); !fault.empty()) return fault;
-  if (count == 1) return "";
-  const std::vector<RsBvhNode> nodes = tree.nodes().download();
-  std::vector<bool> reached(nodes.size(), false);
-  std::size_t reached_count = 0;
-  const RsBvhNode& top = nodes[0];
-  std::vector<Visit> stack{{0, 0, static_cast<std::int32_t>(count) - 1,
-                            united(child_box(top, false), child_box(top, true))}};
-  while (!stack.empty()) {
-    const Visit visit = stack.back();
-    stack.pop_back();
-    if (visit.reference < 0) {
-      const std::int32_t leaf = ~visit.reference;
-      if (leaf != visit.first || leaf != visit.last) {
-        return fmt::format("Leaf {} stands for the range {}..{}", leaf, visit.first, visit.last);
+LbvhCopy LbvhCopy::of(const Lbvh& tree) {
+  LbvhCopy out;
+  out.count = tree.size();
+  out.lanes = static_cast<std::size_t>(tree.lanes());
+  out.group = tree.order_group();
+  out.level_sizes = tree.level_sizes();
+  if (out.count == 0) return out;
+  out.level_begin = tree.level_begin().download();
+  out.slots = tree.slots().download();
+  out.nodes = tree.nodes().download();
+  return out;
+}
+
+RsAabb LbvhCopy::child(std::size_t node, std::size_t lane) const {
+  RsAabb box;
+  const std::size_t from = node * 6 * lanes + lane;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.lo[axis] = nodes[from + axis * lanes];
+    box.hi[axis] = nodes[from + (3 + axis) * lanes];
+  }
+  return box;
+}
+
+std::string validate_lbvh(const LbvhCopy& tree, std::span<const RsAabb> boxes, LeafOrder order) {
+  if (boxes.size() != tree.count)
+    return fmt::format("The tree has {} slots for {} boxes", tree.count, boxes.size());
+  if (tree.count == 0) return "";
+  if (std::string fault = check_slots(tree, boxes, order); !fault.empty()) return fault;
+  std::size_t children = (tree.count + tree.lanes - 1) / tree.lanes;
+  std::size_t begin = 0;
+  for (std::size_t level = 1; level <= tree.level_sizes.size(); ++level) {
+    const std::size_t size = tree.level_sizes[level - 1];
+    if (size != (children + tree.lanes - 1) / tree.lanes || tree.level_begin[level] != begin) {
+      return fmt::format("Level {} has {} nodes from {} over {} children", level, size,
+                         tree.level_begin[level], children);
+    }
+    for (std::size_t child = 0; child < size * tree.lanes; ++child) {
+      const RsAabb box = tree.child(begin + child / tree.lanes, child % tree.lanes);
+      RsAabb expected = kEmpty;
+      if (child < children) {
+        expected = level == 1 ? block_box(tree, boxes, child)
+                              : node_box(tree, begin - tree.level_sizes[level - 2] + child);
       }
-      const RsAabb& box = boxes[leaves[static_cast<std::size_t>(leaf)]];
-      if (!equal(visit.bounds, valid(box) ? box : kEmpty))
-        return fmt::format("Leaf {} has other bounds than its box", leaf);
-      continue;
+      if (!equal(box, expected)) {
+        return fmt::format(
+            "Child {} of level {} has another box than {}", child, level,
+            child >= children ? "the empty one of a missing child" : "what it holds together");
+      }
     }
-    const auto number = static_cast<std::size_t>(visit.reference);
-    if (number >= nodes.size())
-      return fmt::format("A child refers to node {} of {}", number, nodes.size());
-    if (reached[number]) return fmt::format("Node {} has two parents", number);
-    reached[number] = true;
-    ++reached_count;
-    const RsBvhNode& node = nodes[number];
-    if (node.first != visit.first || node.last != visit.last) {
-      return fmt::format("Node {} covers {}..{}, its parent says {}..{}", number, node.first,
-                         node.last, visit.first, visit.last);
-    }
-    const std::int32_t split = node.left < 0 ? ~node.left : node.left;
-    if (split < node.first || split >= node.last)
-      return fmt::format("Node {} splits outside its range", number);
-    const RsAabb left = child_box(node, false);
-    const RsAabb right = child_box(node, true);
-    if (!equal(visit.bounds, united(left, right))) {
-      return fmt::format("Node {} has other bounds than its children together", number);
-    }
-    stack.push_back({node.left, node.first, split, left});
-    stack.push_back({node.right, split + 1, node.last, right});
+    children = size;
+    begin += size;
   }
-  if (reached_count != nodes.size()) {
-    return fmt::format("{} of {} nodes are not in the tree", nodes.size() - reached_count,
-                       nodes.size());
-  }
+  if (children != 1) return fmt::format("The tree has {} roots", children);
+  if (!equal(tree.child(begin, 0), node_box(tree, begin - 1)))
+    return "The box of the scene is not the root's";
   return "";
 }
 
-LbvhQuality lbvh_quality(const Lbvh& tree) {
-  LbvhQuality quality;
-  if (tree.size() < 2) return quality;
-  const std::vector<RsBvhNode> nodes = tree.nodes().download();
-  double sum = 0;
-  for (const RsBvhNode& node : nodes)
-    sum += area(child_box(node, false)) + area(child_box(node, true));
-  const double root = area(united(child_box(nodes[0], false), child_box(nodes[0], true)));
-  quality.sah_cost = root > 0 ? 1 + sum / root : 0;
-  std::vector<std::pair<std::int32_t, int>> stack{{0, 1}};
+LbvhVisits count_visits(const LbvhCopy& tree, const double* origin, const double* direction) {
+  LbvhVisits visits;
+  if (tree.count == 0) return visits;
+  std::vector<std::array<std::size_t, 2>> stack{{tree.level_sizes.size(), 0}};
   while (!stack.empty()) {
-    const auto [number, depth] = stack.back();
+    const auto [level, number] = stack.back();
     stack.pop_back();
-    quality.depth = std::max(quality.depth, depth);
-    const RsBvhNode& node = nodes[static_cast<std::size_t>(number)];
-    if (node.left >= 0) stack.emplace_back(node.left, depth + 1);
-    if (node.right >= 0) stack.emplace_back(node.right, depth + 1);
+    ++visits.nodes;
+    for (std::size_t lane = 0; lane < tree.lanes; ++lane) {
+      if (!meets(tree.child(tree.level_begin[level] + number, lane), origin, direction)) continue;
+      if (level == 1) {
+        ++visits.blocks;
+      } else {
+        stack.push_back({level - 1, number * tree.lanes + lane});
+      }
+    }
   }
-  return quality;
+  return visits;
 }
 
 }  // namespace raysplats

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -11,34 +12,49 @@
 
 namespace raysplats {
 
-/// Morton codes of the box centres as Lbvh computes them: 63 bits on a power-of-two grid for all
-/// axes over the centres of the valid boxes. Where all but the tails of a sample fit a window of
-/// less than a sixteenth of that, the grid covers the window, and the boxes outside get bit 63 and
+/// 64-bit codes of the box centres as Lbvh orders by: 21 bits per axis on a power-of-two grid along
+/// a Hilbert curve. Where all but the tails of a sample fit a window of less than a sixteenth of
+/// the range of all valid centres, the grid covers the window, and the boxes outside get bit 63 and
 /// a code on a coarse grid around its middle. Boxes that are empty or not finite get the largest
 /// code.
-std::vector<std::uint64_t> morton_codes(std::span<const RsAabb> boxes);
+std::vector<std::uint64_t> curve_codes(std::span<const RsAabb> boxes);
 
-/// What validate_lbvh() compares the order of the leaves with.
+/// A tree read back from the device.
+struct LbvhCopy {
+  std::size_t count = 0;
+  std::size_t lanes = 0;
+  std::size_t group = 0;                   ///< boxes ordered together
+  std::vector<std::size_t> level_sizes;    ///< from level 1
+  std::vector<std::uint32_t> level_begin;  ///< of level l at [l]
+  std::vector<std::uint32_t> slots;
+  std::vector<float> nodes;
+
+  static LbvhCopy of(const Lbvh& tree);
+  /// Box of child `lane` of a node, numbered through all levels.
+  RsAabb child(std::size_t node, std::size_t lane) const;
+};
+
+/// What validate_lbvh() compares the order of the boxes with.
 enum class LeafOrder {
-  kMorton,  ///< after build(): codes ascend, equal codes by index
-  kAny,     ///< after refit() to boxes that moved
+  kCurve,  ///< after order(): groups of order_group() positions ascend along the curve
+  kAny,    ///< after a refit to boxes that moved
 };
 
-/// Checks a tree against the boxes it was last built over or refitted to: every box is one leaf,
-/// every node is reached once, ranges are contiguous, child bounds are exactly the union of what is
-/// below, leaves are in Morton order. Returns "" or one sentence about the first fault. Reads the
-/// whole tree back; O(n log n) on the host.
-std::string validate_lbvh(const Lbvh& tree,
+/// Checks a tree against the boxes it was last built over or refitted to: every box has one slot,
+/// the order, and that the box of every block, node and the scene is exactly the union of what is
+/// below, as a rebuild in the same order would make it. Returns "" or one sentence about the first
+/// fault. O(n log n).
+std::string validate_lbvh(const LbvhCopy& tree,
                           std::span<const RsAabb> boxes,
-                          LeafOrder order = LeafOrder::kMorton);
+                          LeafOrder order = LeafOrder::kCurve);
 
-struct LbvhQuality {
-  double sah_cost =
-      0;  ///< expected visits of a random line that meets the root: area of all boxes / root area
-  int depth = 0;  ///< inner nodes on the longest path
+/// What rays meet on their way through the whole tree.
+struct LbvhVisits {
+  std::size_t nodes = 0;
+  std::size_t blocks = 0;
 };
 
-/// Surface-area cost (Goldsmith and Salmon 1987) and depth; zeros for fewer than two leaves.
-LbvhQuality lbvh_quality(const Lbvh& tree);
+/// Of the ray origin + t direction, t >= 0; computed in double precision.
+LbvhVisits count_visits(const LbvhCopy& tree, const double* origin, const double* direction);
 
 }  // namespace raysplats

@@ -6,7 +6,7 @@
 
 namespace raysplats {
 
-/// Every file below cl/ by its path there ("bvh/hierarchy.cl"), embedded at build time.
+/// Every file below cl/ by its path there ("bvh/curve.cl"), embedded at build time.
 const std::map<std::string, std::string>& kernel_sources();
 
 }  // namespace raysplats

@@ -56,6 +56,7 @@ Entry entry_from(const nlohmann::json& json) {
   entry.tuning.tile = whole_number(json, "tile");
   entry.tuning.pending = whole_number(json, "pending");
   entry.tuning.group = whole_number(json, "group");
+  entry.tuning.bvh = json.value("bvh", false);  // files of older versions have none
   if (!is_valid(entry.tuning)) throw DataError("a value is out of range");
   return entry;
 }
@@ -97,7 +98,8 @@ void write_entries(const std::filesystem::path& path, const std::vector<Entry>& 
                        {"packet_width", entry.tuning.packet_width},
                        {"tile", entry.tuning.tile},
                        {"pending", entry.tuning.pending},
-                       {"group", entry.tuning.group}});
+                       {"group", entry.tuning.group},
+                       {"bvh", entry.tuning.bvh}});
   }
   const nlohmann::ordered_json json{
       {"schema", kSchema}, {"schema_version", kSchemaVersion}, {"devices", devices}};

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "bvh/wide_tree.hpp"
+#include "bvh/lbvh.hpp"
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "raysplats/scene.hpp"
@@ -54,7 +54,7 @@ class TriangleTracer {
   Range spread(std::size_t count, std::uint32_t* rays_per_item) const;
 
   Context* context_;
-  WideTree tree_;
+  Lbvh tree_;
   Buffer<float> corners_;
   Buffer<RsAabb> boxes_;
   Buffer<float> blocks_;

@@ -29,14 +29,24 @@ constexpr std::size_t kLeastBatch = 4096;
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 TraceOptions ray_options(TraceOptions options) {
-  if (options.near_depth > 0.0f) {
-    throw UsageError(
-        fmt::format("The near plane at {} cuts for pinholes only, and rays are traced one by one "
-                    "here: use --near 0",
-                    options.near_depth));
-  }
   options.background = {0.0f, 0.0f, 0.0f};  // MirrorPaths adds it
   return options;
+}
+
+void require_no_more_than_mirrors_show(const TraceOptions& options) {
+  if (options.depth) {
+    throw UsageError("A picture with mirrors has no single depth: leave out TraceOptions::depth");
+  }
+  if (options.near_depth > 0.0f) {
+    throw UsageError(
+        fmt::format("The near plane at {} would cut what mirrors show as well: use --near 0",
+                    options.near_depth));
+  }
+  if (options.traversal == Traversal::kTiles) {
+    throw UsageError(
+        "Scenes with mirrors cannot be traced by tiles: choose traversal auto or bvh, or leave out "
+        "the mirrors");
+  }
 }
 
 std::size_t pixels_of(const Camera& camera) {
@@ -81,6 +91,7 @@ struct ViewTracer::Impl {
         options(options_in),
         background(options_in.background),
         mirrors(std::move(mirrors_in)),
+        tree(walks_tree(options_in, context_in.device())),
         packets(context_in, options_in) {}
 
   Rays& single_rays() {
@@ -100,6 +111,7 @@ struct ViewTracer::Impl {
   TraceOptions options;
   std::array<float, 3> background;  // of the next view; options have that of the last
   Mirrors mirrors;
+  bool tree;  // rays walk it though they could be traced by tiles
   CameraTracer packets;
   std::uint64_t packets_revision = 0;
   std::optional<Rays> rays;  // once a view needs it
@@ -119,19 +131,20 @@ std::size_t ViewTracer::batch(std::size_t memory_budget) {
 ViewTracer::ViewTracer(Context& context, const TraceOptions& options, Mirrors mirrors)
     : impl_(std::make_unique<Impl>(context, options, std::move(mirrors))) {
   if (impl_->mirrors.meshes.empty() && impl_->mirrors.max_bounces >= 0) return;
-  if (options.depth) {
-    throw UsageError("A picture with mirrors has no single depth: leave out TraceOptions::depth");
-  }
+  require_no_more_than_mirrors_show(options);
   impl_->single_rays();
 }
 ViewTracer::~ViewTracer() = default;
 
 bool ViewTracer::by_rays(const Camera& camera) const {
-  return camera.model != CameraModel::kPinhole || !impl_->mirrors.meshes.empty();
+  Impl& self = *impl_;
+  if (!self.mirrors.meshes.empty() || self.tree) return true;
+  return self.options.traversal != Traversal::kTiles && !self.packets.traces(camera);
 }
 
 void ViewTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
   Impl& self = *impl_;
+  require_pixels(camera);
   if (by_rays(camera)) {
     forward_rays(gaussians, camera, keep);
     return;
@@ -163,6 +176,7 @@ void ViewTracer::forward_rays(const DeviceGaussians& gaussians, const Camera& ca
 void ViewTracer::Impl::trace_batch(const DeviceGaussians& gaussians,
                                    std::size_t first,
                                    std::size_t count) {
+  rays->tracer.set_near(RayNear::of(camera, options.near_depth));
   rays->generator.generate(camera, Lens{}, first, count, rays->paths.rays());
   rays->paths.trace(gaussians, count, color_direction(camera), options.background);
 }
@@ -226,8 +240,7 @@ void ViewTracer::backward(const DeviceGaussians& gaussians,
     self.backward_rays(gaussians, image_gradient, gradients, pose);
     return;
   }
-  self.packets.backward(gaussians, image_gradient, gradients);
-  if (pose != nullptr) *pose = self.packets.pose_gradient(gaussians);
+  self.packets.backward(gaussians, image_gradient, gradients, pose);
 }
 
 void ViewTracer::Impl::backward_rays(const DeviceGaussians& gaussians,

@@ -16,16 +16,17 @@
 
 namespace raysplats {
 
-/// Pictures of Gaussians from cameras of every model, forward and backward: pinholes in packets of
-/// rays (CameraTracer), other cameras and scenes with mirrors ray by ray (RayTracer, MirrorPaths).
-/// Boxes and trees follow the revision of the Gaussians and are made when a view first needs them.
+/// Pictures of Gaussians from cameras of every model, forward and backward: in packets of rays
+/// where the camera has a centre (CameraTracer); with Traversal::kBvh, other cameras and scenes
+/// with mirrors ray by ray (RayTracer, MirrorPaths). Boxes and trees follow the revision of the
+/// Gaussians and are made when a view first needs them.
 class ViewTracer {
  public:
   /// Rays of camera pixels that are traced at once where they are traced one by one.
   static std::size_t batch(std::size_t memory_budget);
 
   /// Throws UsageError for options out of range, for a negative number of bounces, and for
-  /// options.depth with mirrors.
+  /// options.depth, options.near_depth or Traversal::kTiles with mirrors.
   ViewTracer(Context& context, const TraceOptions& options, Mirrors mirrors = {});
   ~ViewTracer();
 
@@ -34,7 +35,7 @@ class ViewTracer {
 
   /// Traces one view. With `keep` backward() may follow; what it needs stays where the memory
   /// budget has room and is traced again where not. Throws UsageError for a camera without pixels
-  /// or focal length, and for options.near_depth where rays are traced one by one.
+  /// or focal length, and for one that Traversal::kTiles cannot trace.
   void forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep = false);
   /// The same ray by ray, whatever the camera's model.
   void forward_rays(const DeviceGaussians& gaussians, const Camera& camera, bool keep = false);

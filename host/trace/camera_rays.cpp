@@ -14,7 +14,9 @@ namespace {
 
 constexpr std::size_t kGroup = 64;
 
-int model_number(CameraModel model) {
+}  // namespace
+
+int camera_model_number(CameraModel model) {
   switch (model) {
     case CameraModel::kPinhole:
       return RS_CAMERA_PINHOLE;
@@ -67,8 +69,6 @@ RsLensCamera lens_camera(const Camera& camera, const Lens& lens) {
   return out;
 }
 
-}  // namespace
-
 void require_pixels(const Camera& camera) {
   const bool focal = camera.model != CameraModel::kEquirectangular;
   if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
@@ -106,7 +106,7 @@ void CameraRays::generate(const Camera& camera,
   if (rays.size() < count) rays.ensure(context_, count, "camera rays");
   context_
       .kernel("trace/camera_rays.cl", "camera_rays",
-              BuildOptions().define("CAMERA_MODEL", model_number(camera.model)))
+              BuildOptions().define("CAMERA_MODEL", camera_model_number(camera.model)))
       .launch(Range::linear(count, kGroup), lens_camera(camera, lens),
               static_cast<std::uint32_t>(first_pixel), static_cast<std::uint32_t>(count), rays);
 }

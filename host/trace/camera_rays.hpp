@@ -7,6 +7,7 @@
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "raysplats/camera.hpp"
+#include "shared/layout.h"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
@@ -20,6 +21,10 @@ struct Lens {
   float focus_distance = 1;  ///< depth of what is sharp: along z for kPinhole and kOpenCv, else
                              ///< along the ray
 };
+
+/// The records of a camera that kernels read (cl/trace/lens.h): its model and the rest.
+int camera_model_number(CameraModel model);
+RsLensCamera lens_camera(const Camera& camera, const Lens& lens);
 
 /// Throws UsageError for a camera without pixels or focal length, or with a number that is not
 /// finite.

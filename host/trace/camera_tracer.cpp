@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <glm/matrix.hpp>
 #include <limits>
 
 #include "bvh/gaussian_bounds.hpp"
@@ -29,6 +30,8 @@ constexpr std::size_t kCopiesPerUnit = 2;
 constexpr std::uint32_t kChunkEntries =
     16;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
 
+const std::vector<int> kFront{0};
+
 std::array<float, 4> background_of(const TraceOptions& options) {
   return {options.background[0], options.background[1], options.background[2], 0.0f};
 }
@@ -41,11 +44,21 @@ struct CameraTracer::Impl {
         options(options_in),
         packet(packet_shape(context_in.device(), options_in.packet_width)),
         lists(context_in, packet.tile),
+        lens(context_in, packet.tile),
+        no_tiles(context_in, 1, "no tiles of a lens"),
+        no_tangents(context_in, 1, "no tangents of a lens"),
         forward_budget(options_in.launch_budget_ms, context_in.device().type),
         backward_budget(forward_budget),
         counters(context_in, 4, "trace counters"),
         sums(context_in, "line gradients") {}
 
+  void set_face(const DeviceGaussians& gaussians, int face);
+  void trace_faces(const DeviceGaussians& gaussians, bool keep);
+  const std::vector<int>& faces() const { return lens_kind > 0 ? lens.faces() : kFront; }
+  const Buffer<RsLensTile>& tiles() const { return lens_kind > 0 ? lens.tiles() : no_tiles; }
+  const Buffer<float>& tangents() const { return lens_kind > 0 ? lens.tangents() : no_tangents; }
+  void add_pose(const DeviceGaussians& gaussians, PoseGradient& sum);
+  void backward_face(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient);
   void trace_rows(const DeviceGaussians& gaussians,
                   std::uint32_t row,
                   std::uint32_t rows,
@@ -57,7 +70,10 @@ struct CameraTracer::Impl {
                      const Buffer<float>& image_gradient,
                      std::uint32_t row,
                      std::uint32_t rows);
-  void finalize(const DeviceGaussians& gaussians, GaussianGradients& gradients, bool pose);
+  void finalize(const DeviceGaussians& gaussians,
+                GaussianGradients& gradients,
+                bool accumulate,
+                bool pose);
   Range packet_range(const Kernel& kernel,
                      int block,
                      std::uint32_t columns,
@@ -93,9 +109,15 @@ struct CameraTracer::Impl {
   std::uint64_t revision = 0;  // of their parameters
   Buffer<RsAabb> boxes;
   CandidateLists lists;
+  LensTiles lens;
+  Buffer<RsLensTile> no_tiles;  // what kernels take for pinholes
+  Buffer<float> no_tangents;
   LaunchBudget forward_budget;
   LaunchBudget backward_budget;
-  RsCamera camera{};
+  Camera view;  // of the last forward()
+  int lens_kind = 0;
+  int face = 0;
+  RsCamera camera{};                      // of the face that is being traced
   std::array<Kernel, 2> forward_kernels;  // without and with kept hits
   int forward_variant = -1;
   Buffer<float> image;
@@ -148,6 +170,14 @@ void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camer
     throw UsageError("CameraTracer::update() must follow every change of the Gaussians");
   }
   self.camera = device_camera(camera, self.options.near_depth);
+  if (!traces(camera)) {
+    throw UsageError(
+        fmt::format("The camera '{}' sees too much in a tile of {} pixels for packets of rays: "
+                    "trace its rays one by one, traversal auto or bvh",
+                    camera.name, self.packet.tile));
+  }
+  self.view = camera;
+  self.lens_kind = lens_kind(camera);
   self.image.ensure(self.context, 4 * self.pixels(), "image");
   self.depth.ensure(self.context, self.options.depth ? 3 * self.pixels() : 1, "depth");
   self.transmittances.ensure(self.context, keep_hits ? 2 * self.pixels() : 1, "transmittances");
@@ -157,8 +187,7 @@ void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camer
   self.statistics_saved = false;
   self.candidates = 0;
   self.counters.clear();
-  self.lists.prepare(gaussians, self.camera, self.options);
-  self.trace_rows(gaussians, 0, self.lists.tile_rows(), keep_hits);
+  self.trace_faces(gaussians, keep_hits);
   if (!keep_hits) return;
   const std::size_t wanted = self.chunks_wanted();
   self.hits_complete = wanted <= self.pool_capacity();
@@ -167,8 +196,28 @@ void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camer
   if (wanted > self.pool_limit()) return;  // backward() traces again, band by band
   self.counters.clear();
   self.candidates = 0;
-  self.trace_rows(gaussians, 0, self.lists.tile_rows(), true);
+  self.trace_faces(gaussians, true);
   self.hits_complete = self.chunks_wanted() <= self.pool_capacity();
+}
+
+bool CameraTracer::traces(const Camera& camera) {
+  if (camera.model == CameraModel::kOrthographic) return false;
+  require_pixels(camera);
+  return lens_kind(camera) == 0 || impl_->lens.prepare(camera);
+}
+
+// Lines and outlines of all Gaussians as the face sees them.
+void CameraTracer::Impl::set_face(const DeviceGaussians& gaussians, int number) {
+  face = number;
+  camera = device_camera(view, options.near_depth, number);
+  lists.prepare(gaussians, camera, {lens_kind, number, lens_kind > 0 ? &lens : nullptr}, options);
+}
+
+void CameraTracer::Impl::trace_faces(const DeviceGaussians& gaussians, bool keep) {
+  for (const int number : faces()) {
+    set_face(gaussians, number);
+    trace_rows(gaussians, 0, lists.tile_rows(), keep);
+  }
 }
 
 void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
@@ -194,7 +243,8 @@ void CameraTracer::Impl::trace_window(const DeviceGaussians& gaussians,
 }
 
 Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
-  const int variant = (options.depth ? 1 : 0) | (options.hit_order == HitOrder::kPeak ? 2 : 0);
+  const int variant =
+      (options.depth ? 1 : 0) | (options.hit_order == HitOrder::kPeak ? 2 : 0) | lens_kind << 2;
   if (variant != forward_variant) {
     forward_variant = variant;
     forward_kernels = {};
@@ -207,6 +257,7 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
         .define("BLOCK", packet.block)
         .define("PENDING", packet.pending)
         .define("CHUNK", kChunkEntries)
+        .define("LENS", lens_kind)
         .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
         .define("WITH_DEPTH", options.depth ? 1 : 0)
         .define("KEEP_HITS", keep ? 1 : 0);
@@ -262,7 +313,7 @@ void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
                   lists.offsets(), camera, window, options.min_transmittance, options.max_hits,
                   background_of(options), image, depth, transmittances, stream_ends, pool,
                   pool_transmittance, static_cast<std::uint32_t>(keep ? pool_capacity() : 0),
-                  counters);
+                  counters, face, tiles(), tangents());
   });
 }
 
@@ -290,7 +341,10 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
   BuildOptions build;
-  build.define("PACKET", packet.lanes).define("TILE", packet.tile).define("CHUNK", kChunkEntries);
+  build.define("PACKET", packet.lanes)
+      .define("TILE", packet.tile)
+      .define("CHUNK", kChunkEntries)
+      .define("LENS", lens_kind);
   Kernel kernel = context.kernel("trace/backward.cl", "trace_backward", sums.define(build));
   // No ray meets a Gaussian twice.
   const float limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet.lanes));
@@ -303,7 +357,7 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                   static_cast<std::uint32_t>(sums.copies()), lists.lines(), image_gradient,
                   transmittances, stream_ends, pool, pool_transmittance, camera, lists.tiles_x(),
                   shared ? row : row + first, number, background_of(options), screen_x(),
-                  screen_y(), limit, sums.target());
+                  screen_y(), limit, sums.target(), face, tiles(), tangents());
   });
 }
 
@@ -333,6 +387,7 @@ void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
 
 void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
                                   GaussianGradients& gradients,
+                                  bool accumulate,
                                   bool with_pose) {
   const std::size_t n = gaussians.count;
   gradients.means.ensure(context, 3 * n, "mean gradients");
@@ -345,6 +400,8 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
   BuildOptions build;
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("POSE", with_pose ? 1 : 0)
+      .define("ACCUMULATE", accumulate ? 1 : 0)
+      .define("ANGULAR", lens_kind == 2 ? 1 : 0)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
   GaussianKernel kernel(context, "trace/finalize_gradients.cl", "finalize_gradients", build);
@@ -357,45 +414,64 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
 
 void CameraTracer::backward(const DeviceGaussians& gaussians,
                             const Buffer<float>& image_gradient,
-                            GaussianGradients& gradients) {
+                            GaussianGradients& gradients,
+                            PoseGradient* pose) {
   Impl& self = *impl_;
   if (!self.hits_kept || self.count != gaussians.count || self.revision != gaussians.revision) {
     throw UsageError(
         "CameraTracer::backward() must follow forward(keep_hits = true) of the same Gaussians");
   }
-  self.sums.prepare(GradientSumChoice::of(self.options, self.context.device(), gaussians.count,
-                                          self.options.memory_budget / 4, kCopiesPerUnit),
-                    gaussians.count);
-  if (self.hits_complete) {
-    self.launch_backward(image_gradient, 0, self.lists.tile_rows());
-  } else {
-    // Bands whose hits should fit, so that few are traced only to find that they do not.
-    const std::size_t wanted = self.saved.stream_bytes / self.chunk_bytes();
-    const std::size_t all = self.lists.tile_rows();
-    const auto band = static_cast<std::uint32_t>(
-        std::max<std::size_t>(1, all * self.pool_capacity() * 3 / 4 / wanted));
-    for (std::uint32_t row = 0; row < all; row += band) {
-      self.backward_rows(gaussians, image_gradient, row,
-                         std::min(band, static_cast<std::uint32_t>(all) - row));
+  bool further = false;
+  for (const int number : self.faces()) {
+    if (self.faces().size() > 1) self.set_face(gaussians, number);
+    self.backward_face(gaussians, image_gradient);
+    self.sums.round();
+    self.finalize(gaussians, gradients, further, false);
+    self.sums.settle();
+    if (pose != nullptr) {
+      if (!further) *pose = {};
+      self.add_pose(gaussians, *pose);
     }
+    further = true;
   }
-  self.sums.round();
-  self.finalize(gaussians, gradients, false);
-  self.sums.settle();
 }
 
-PoseGradient CameraTracer::pose_gradient(const DeviceGaussians& gaussians) {
-  Impl& self = *impl_;
-  self.finalize(gaussians, self.pose_scratch, true);
-  const std::vector<float> parts = self.pose.download();
-  PoseGradient sum;
-  for (std::size_t i = 0; i + 6 <= parts.size(); i += 6) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      sum.center[j] += parts[i + j];
-      sum.rotation[j] += parts[i + 3 + j];
-    }
+// Gradients of the lines of one face.
+void CameraTracer::Impl::backward_face(const DeviceGaussians& gaussians,
+                                       const Buffer<float>& image_gradient) {
+  sums.prepare(GradientSumChoice::of(options, context.device(), gaussians.count,
+                                     options.memory_budget / 4, kCopiesPerUnit),
+               gaussians.count);
+  if (hits_complete) {
+    launch_backward(image_gradient, 0, lists.tile_rows());
+    return;
   }
-  return sum;
+  // Bands whose hits should fit, so that few are traced only to find that they do not.
+  const std::size_t wanted = saved.stream_bytes / chunk_bytes();
+  const std::size_t all = lists.tile_rows();
+  const auto band =
+      static_cast<std::uint32_t>(std::max<std::size_t>(1, all * pool_capacity() * 3 / 4 / wanted));
+  for (std::uint32_t row = 0; row < all; row += band) {
+    backward_rows(gaussians, image_gradient, row,
+                  std::min(band, static_cast<std::uint32_t>(all) - row));
+  }
+}
+
+// What the lines of one face, whose sums are still there, say of the pose.
+void CameraTracer::Impl::add_pose(const DeviceGaussians& gaussians, PoseGradient& sum) {
+  finalize(gaussians, pose_scratch, false, true);
+  const std::vector<float> parts = pose.download();
+  std::array<double, 6> total{};
+  for (std::size_t i = 0; i + 6 <= parts.size(); i += 6) {
+    for (std::size_t j = 0; j < 6; ++j) total[j] += static_cast<double>(parts[i + j]);
+  }
+  // A turn in camera axes is the same turn in the axes of the face.
+  const glm::dvec3 turn =
+      glm::transpose(LensTiles::rotation(face)) * glm::dvec3(total[3], total[4], total[5]);
+  for (std::size_t j = 0; j < 3; ++j) {
+    sum.center[j] += total[j];
+    sum.rotation[j] += turn[static_cast<int>(j)];
+  }
 }
 
 CameraTracer::Statistics CameraTracer::statistics() const {

@@ -13,8 +13,9 @@
 
 namespace raysplats {
 
-/// Traces the rays of a pinhole camera in packets (docs/model.md, "The camera line"), forward and
-/// backward.
+/// Traces the rays of a central camera in packets (docs/model.md, "The camera line"), forward and
+/// backward: a pinhole, or a lens whose tiles are seen by pinholes on the faces of a cube around it
+/// (LensTiles).
 class CameraTracer {
  public:
   struct Statistics {
@@ -27,6 +28,10 @@ class CameraTracer {
   CameraTracer(Context& context, const TraceOptions& options);
   ~CameraTracer();
 
+  /// Whether forward() takes a camera. Not an orthographic one, and not a small picture all around
+  /// whose tiles see too much; may wait for the device when the lens is a new one.
+  bool traces(const Camera& camera);
+
   /// Boxes of the Gaussians as they are now. forward() needs it after every parameter change.
   void update(const DeviceGaussians& gaussians);
 
@@ -38,6 +43,7 @@ class CameraTracer {
   /// width.
   const Buffer<float>& image() const;
   /// With options.depth: planar expected depth, median depth, hits per ray; 3 x height x width.
+  /// Depth is along z for kPinhole and kOpenCv, along the ray for the others.
   const Buffer<float>& depth() const;
   /// The same as interleaved host images.
   Image download_image() const;
@@ -45,12 +51,11 @@ class CameraTracer {
 
   /// Gradients of the last forward(keep_hits = true) view from `image_gradient` (planar dL/dR,
   /// dL/dG, dL/dB, dL/dA; 4 x height x width). Overwrites `gradients`, growing its buffers as
-  /// needed.
+  /// needed; with `pose` also the gradient for the pose of the view.
   void backward(const DeviceGaussians& gaussians,
                 const Buffer<float>& image_gradient,
-                GaussianGradients& gradients);
-  /// After backward(): the gradient for the pose of the view.
-  PoseGradient pose_gradient(const DeviceGaussians& gaussians);
+                GaussianGradients& gradients,
+                PoseGradient* pose = nullptr);
 
   /// Of the last forward(); waits for the device unless that one kept its hits.
   Statistics statistics() const;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <numbers>
 
 #include "raysplats/error.hpp"
 
@@ -51,23 +52,31 @@ void check_camera(const Camera& camera, const RsCamera& converted) {
 
 }  // namespace
 
-RsCamera device_camera(const Camera& camera, float near_depth) {
-  if (camera.model != CameraModel::kPinhole) {
-    throw UsageError(
-        fmt::format("The camera '{}' is no pinhole, and packets of rays are made for pinholes "
-                    "only: trace its rays one by one, or undistort it",
-                    camera.name));
+int lens_kind(const Camera& camera) {
+  if (camera.model == CameraModel::kPinhole) return 0;
+  return camera.model == CameraModel::kOpenCv ? 1 : 2;
+}
+
+RsCamera device_camera(const Camera& camera, float near_depth, int face) {
+  if (camera.model == CameraModel::kOrthographic) {
+    throw UsageError(fmt::format(
+        "The camera '{}' is orthographic, and packets of rays are made for cameras with "
+        "a centre: trace its rays one by one, traversal auto or bvh",
+        camera.name));
   }
   RsCamera out{};
+  const glm::dmat3 rotation = LensTiles::rotation(face) * camera.rotation;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
-      out.rotation[3 * row + column] = static_cast<float>(camera.rotation[column][row]);
+      out.rotation[3 * row + column] = static_cast<float>(rotation[column][row]);
     }
   }
   const glm::dvec3 center = camera.center();
   for (int j = 0; j < 3; ++j) out.center[j] = static_cast<float>(center[j]);
-  out.fx = static_cast<float>(camera.fx);
-  out.fy = static_cast<float>(camera.fy);
+  // A panorama has no focal length: an angle of 1 is width / (2 pi) pixels.
+  const bool around = camera.model == CameraModel::kEquirectangular;
+  out.fx = static_cast<float>(around ? camera.width / (2 * std::numbers::pi) : camera.fx);
+  out.fy = static_cast<float>(around ? camera.height / std::numbers::pi : camera.fy);
   out.cx = static_cast<float>(camera.cx);
   out.cy = static_cast<float>(camera.cy);
   out.width = camera.width;
@@ -96,47 +105,54 @@ CandidateLists::CandidateLists(Context& context, int tile_size)
     : context_(&context), tile_size_(tile_size), sort_(context), scan_(context) {
   BuildOptions build;
   build.define("TILE", tile_size);
-  count_kernel_ = GaussianKernel(context, "trace/tile_lists.cl", "count_tiles", build);
   gather_kernel_ = context.kernel("trace/tile_lists.cl", "gather_candidates", build);
 }
 
 void CandidateLists::require_prepare_kernel(const DeviceGaussians& gaussians,
+                                            const ViewFace& face,
                                             const TraceOptions& options) {
   const bool sigmoid = gaussians.activation == ScaleActivation::kSigmoid;
   const bool peak = options.hit_order == HitOrder::kPeak;
   const int coefficients = sh_coefficients(gaussians.sh_degree);
   const int variant = (sigmoid ? 1 : 0) | (peak ? 2 : 0) | (options.adaptive_radius ? 4 : 0) |
-                      gaussians.active_sh_degree << 3 | coefficients << 8;
+                      gaussians.active_sh_degree << 3 | coefficients << 8 | face.lens << 16;
   if (variant == prepared_variant_) return;
   BuildOptions build;
   build.define("SIGMOID_SCALE", sigmoid ? 1 : 0)
       .define("PEAK_ORDER", peak ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
+      .define("NEAR_DISTANCE", face.lens == 2 ? 1 : 0)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", coefficients);
   prepare_kernel_ = GaussianKernel(*context_, "trace/prepare_view.cl", "prepare_view", build);
   BuildOptions lists;
-  lists.define("TILE", tile_size_).define("PEAK_ORDER", peak ? 1 : 0);
+  lists.define("TILE", tile_size_)
+      .define("PEAK_ORDER", peak ? 1 : 0)
+      .define("LENS", face.lens > 0 ? 1 : 0);
+  count_kernel_ = GaussianKernel(*context_, "trace/tile_lists.cl", "count_tiles", lists);
   fill_kernel_ = GaussianKernel(*context_, "trace/tile_lists.cl", "fill_tiles", lists);
   prepared_variant_ = variant;
 }
 
 void CandidateLists::prepare(const DeviceGaussians& gaussians,
                              const RsCamera& camera,
+                             const ViewFace& face,
                              const TraceOptions& options) {
   if (gaussians.count >= (std::size_t{1} << 31)) {
     throw ResourceError(fmt::format(
         "{} Gaussians are more than the 2^31 - 1 that one scene can hold", gaussians.count));
   }
-  require_prepare_kernel(gaussians, options);
+  require_prepare_kernel(gaussians, face, options);
+  face_ = face;
   count_ = gaussians.count;
   tiles_x_ = static_cast<std::uint32_t>((camera.width + tile_size_ - 1) / tile_size_);
   tile_rows_ = static_cast<std::uint32_t>((camera.height + tile_size_ - 1) / tile_size_);
   lines_.ensure(*context_, count_, "lines of the view");
   bounds_.ensure(*context_, count_, "bounds of the view");
-  const std::array<float, 4> window{-camera.cx / camera.fx, -camera.cy / camera.fy,
-                                    (static_cast<float>(camera.width) - camera.cx) / camera.fx,
-                                    (static_cast<float>(camera.height) - camera.cy) / camera.fy};
+  std::array<float, 4> window{-camera.cx / camera.fx, -camera.cy / camera.fy,
+                              (static_cast<float>(camera.width) - camera.cx) / camera.fx,
+                              (static_cast<float>(camera.height) - camera.cy) / camera.fy};
+  if (face.tiles != nullptr) window = face.tiles->window(face.face);
   prepare_kernel_.launch(count_, gaussians.means, gaussians.quaternions, gaussians.scales,
                          gaussians.opacities, gaussians.sh, camera, options.quantile, window,
                          lines_, bounds_);
@@ -152,7 +168,12 @@ bool CandidateLists::build(const Buffer<RsAabb>& boxes,
   offsets_.ensure(*context_, count_ + 1, "candidate offsets");
   candidates_ = 0;
   if (count_ > 0) {
-    count_kernel_.launch(count_, bounds_, boxes, camera, window, offsets_);
+    if (face_.tiles != nullptr) {
+      count_kernel_.launch(count_, bounds_, boxes, camera, window, offsets_, face_.face,
+                           face_.tiles->tiles(), face_.tiles->spans(face_.face));
+    } else {
+      count_kernel_.launch(count_, bounds_, boxes, camera, window, offsets_);
+    }
     scan_.exclusive(offsets_, count_);
     candidates_ = offsets_.read(count_);
   }
@@ -171,7 +192,12 @@ bool CandidateLists::build(const Buffer<RsAabb>& boxes,
     tile_offsets_.clear();
     return true;
   }
-  fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, keys_, values_);
+  if (face_.tiles != nullptr) {
+    fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, face_.face,
+                        face_.tiles->tiles(), face_.tiles->spans(face_.face), keys_, values_);
+  } else {
+    fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, keys_, values_);
+  }
   sort_.sort(keys_, values_, candidates_, 16 + std::bit_width(tiles - 1));
   gather_kernel_.launch(Range::linear(candidates_, kGatherGroup),
                         static_cast<std::uint32_t>(candidates_), stride_, tiles, keys_, values_,

@@ -14,11 +14,17 @@
 #include "shared/layout.h"
 #include "trace/device_gaussians.hpp"
 #include "trace/gaussian_kernel.hpp"
+#include "trace/lens_tiles.hpp"
 
 namespace raysplats {
 
-/// The record of a camera that kernels read.
-RsCamera device_camera(const Camera& camera, float near_depth);
+/// The record of a pinhole, or of one face of another central camera, that kernels read. Throws
+/// UsageError for orthographic cameras, whose rays share no origin.
+RsCamera device_camera(const Camera& camera, float near_depth, int face = 0);
+
+/// What LENS of cl/trace/packet.h is for a camera: 0 for pinholes, 1 for lenses whose depths and
+/// near plane lie along z, 2 for those that look around and count distances.
+int lens_kind(const Camera& camera);
 
 /// A rectangle of tiles, as kernels take it.
 struct TileWindow {
@@ -34,6 +40,13 @@ struct TileWindow {
   std::array<TileWindow, 2> halves() const;
 };
 
+/// Which pinhole the lists of a view are for.
+struct ViewFace {
+  int lens = 0;  ///< lens_kind()
+  int face = 0;
+  const LensTiles* tiles = nullptr;  ///< of a lens
+};
+
 /// What the tiles of one view may hit: the line of every visible Gaussian and, per tile, the list
 /// of candidates whose outline meets the tile, sorted by a lower bound of the hit depth.
 class CandidateLists {
@@ -43,6 +56,7 @@ class CandidateLists {
   /// Lines and culling records of all Gaussians for a view.
   void prepare(const DeviceGaussians& gaussians,
                const RsCamera& camera,
+               const ViewFace& face,
                const TraceOptions& options);
 
   /// Lists of the tiles of a window. `boxes` are the world boxes of the confidence ellipsoids, for
@@ -66,12 +80,15 @@ class CandidateLists {
   const Buffer<std::array<float, 2>>& limits() const { return limits_; }
 
  private:
-  void require_prepare_kernel(const DeviceGaussians& gaussians, const TraceOptions& options);
+  void require_prepare_kernel(const DeviceGaussians& gaussians,
+                              const ViewFace& face,
+                              const TraceOptions& options);
 
   Context* context_;
   int tile_size_;
   GaussianKernel prepare_kernel_;
   int prepared_variant_ = -1;
+  ViewFace face_;  // of the last prepare()
   GaussianKernel count_kernel_;
   GaussianKernel fill_kernel_;
   Kernel gather_kernel_;

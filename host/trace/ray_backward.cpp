@@ -27,7 +27,7 @@ RayScreen RayScreen::of(const Camera& camera) {
   const glm::dvec3 center = camera.center();
   const bool flat = camera.model == CameraModel::kPinhole || camera.model == CameraModel::kOpenCv;
   const bool around = camera.model == CameraModel::kEquirectangular;
-  const double x = around ? 1.0 / std::numbers::pi : camera.width / (2.0 * camera.fx);
+  const double x = around ? std::numbers::pi : camera.width / (2.0 * camera.fx);
   const double y = camera.height / (2.0 * camera.fy);
   if (flat) out.distance = Distance::kDepth;
   if (camera.model == CameraModel::kOrthographic) out.distance = Distance::kNone;
@@ -125,10 +125,10 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   if (count == 0 || gaussians.count == 0) return;
   const DeviceInfo& device = context_->device();
   const TraceOptions& options = tracer_->options();
-  const WideTree& tree = tracer_->tree().tree();
+  const Lbvh& tree = tracer_->tree().tree();
   const bool cpu = device.type == DeviceType::kCpu;
   const bool ordered = order_.compute(tree, rays, count);
-  BuildOptions build = ray_walk_build(device, options, tree.lanes());
+  BuildOptions build = ray_walk_build(device, options, tracer_->near(), tree.lanes());
   sums_.define(build.define("SH_DEGREE", degree_).define("RAY_SLOPES", slopes != nullptr ? 1 : 0));
   const std::size_t chunk = cpu ? kCpuChunk : 1;
   const std::size_t items = sums_.is_private() ? sums_.copies() : (count + chunk - 1) / chunk;
@@ -139,8 +139,8 @@ void RayBackward::add(const DeviceGaussians& gaussians,
               u32(gaussians.count), tree.levels(), tree.level_begin(), tree.nodes(),
               tracer_->tree().blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
               color_direction == ColorDirection::kFromOrigin ? 1 : 0, options.quantile,
-              options.min_transmittance, options.max_hits, background, screen_, rays,
-              ordered ? 1 : 0, order_.indices(), results, gradients, records_,
+              options.min_transmittance, options.max_hits, tracer_->near().plane, background,
+              screen_, rays, ordered ? 1 : 0, order_.indices(), results, gradients, records_,
               GradientSums::limit(rays_), sums_.target(), slopes != nullptr ? *slopes : no_slopes_);
 }
 

@@ -15,9 +15,31 @@ constexpr std::size_t kOrderedRays = 4096;
 
 }  // namespace
 
-BuildOptions ray_walk_build(const DeviceInfo& device, const TraceOptions& options, int lanes) {
+bool walks_tree(const TraceOptions& options, const DeviceInfo& device) {
+  if (options.traversal == Traversal::kAuto) return device.tuning && device.tuning->bvh;
+  return options.traversal == Traversal::kBvh;
+}
+
+RayNear RayNear::of(const Camera& camera, float near_depth) {
+  RayNear out;
+  if (!(near_depth > 0.0f)) return out;
+  const bool around =
+      camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular;
+  out.kind = around ? 2 : 1;
+  for (int k = 0; k < 3; ++k) {
+    out.plane[static_cast<std::size_t>(k)] = static_cast<float>(camera.rotation[k][2]);
+  }
+  out.plane[3] = near_depth;
+  return out;
+}
+
+BuildOptions ray_walk_build(const DeviceInfo& device,
+                            const TraceOptions& options,
+                            const RayNear& near,
+                            int lanes) {
   return BuildOptions()
       .define("PACKET", lanes)
+      .define("NEAR_PLANE", near.kind)
       .define("PENDING", device.type == DeviceType::kCpu ? kCpuPending : kPending)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
       .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
@@ -27,7 +49,7 @@ RayOrder::RayOrder(Context& context) : context_(&context), sort_(context) {
   indices_ = Buffer<std::uint32_t>(context, 1, "ray order");
 }
 
-bool RayOrder::compute(const WideTree& tree, const Buffer<Ray>& rays, std::size_t count) {
+bool RayOrder::compute(const Lbvh& tree, const Buffer<Ray>& rays, std::size_t count) {
   if (count < kOrderedRays || tree.levels() == 0) return false;
   indices_.ensure(*context_, count, "ray order");
   keys_.ensure(*context_, count, "ray keys");

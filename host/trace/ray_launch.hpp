@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
-#include "bvh/wide_tree.hpp"
+#include "bvh/lbvh.hpp"
 #include "device/buffer.hpp"
 #include "device/build_options.hpp"
 #include "device/context.hpp"
 #include "primitives/radix_sort.hpp"
+#include "raysplats/camera.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/trace_options.hpp"
 
@@ -16,8 +18,24 @@ namespace raysplats {
 
 struct Ray;
 
+/// Whether the rays of cameras walk the tree where they could be traced by tiles as well.
+bool walks_tree(const TraceOptions& options, const DeviceInfo& device);
+
+/// Gaussians whose means are too near to a ray's origin are not met: what TraceOptions::near_depth
+/// is for the rays of a camera.
+struct RayNear {
+  int kind = 0;                  ///< NEAR_PLANE of cl/trace/ray_block.h
+  std::array<float, 4> plane{};  ///< axis and depth
+
+  /// Depth along the axis of a camera that looks forward, distance for one that looks around.
+  static RayNear of(const Camera& camera, float near_depth);
+};
+
 /// Build options of a kernel that walks rays through Gaussians (cl/trace/ray_walk.h).
-BuildOptions ray_walk_build(const DeviceInfo& device, const TraceOptions& options, int lanes);
+BuildOptions ray_walk_build(const DeviceInfo& device,
+                            const TraceOptions& options,
+                            const RayNear& near,
+                            int lanes);
 
 /// The order in which a launch takes its rays, so that neighbours cross the same part of the scene.
 class RayOrder {
@@ -25,7 +43,7 @@ class RayOrder {
   explicit RayOrder(Context& context);
 
   /// False when the rays are taken as they come: there are too few for a sort to pay.
-  bool compute(const WideTree& tree, const Buffer<Ray>& rays, std::size_t count);
+  bool compute(const Lbvh& tree, const Buffer<Ray>& rays, std::size_t count);
   /// Ray of every position, after a compute() that returned true.
   const Buffer<std::uint32_t>& indices() const { return indices_; }
 

@@ -7,8 +7,6 @@
 #include <array>
 
 #include "raysplats/error.hpp"
-#include "trace/ray_launch.hpp"
-#include "trace/ray_tree.hpp"
 
 namespace raysplats {
 namespace {
@@ -29,9 +27,6 @@ std::int32_t color_mode(ColorDirection direction) {
   return direction == ColorDirection::kFromOrigin ? 1 : 0;
 }
 
-// Changes after which the tree is built anew: in between it is refitted.
-constexpr int kRefits = 32;
-
 }  // namespace
 
 struct RayTracer::Impl {
@@ -44,9 +39,9 @@ struct RayTracer::Impl {
 
   Context& context;
   TraceOptions options;
+  RayNear near;
   RayTree tree;
   std::uint64_t revision = 0;  // of the Gaussians in it
-  int refits = 0;              // since it was built
   RayOrder order;
   Buffer<std::uint32_t> no_flags;
   Buffer<Ray> rays;
@@ -60,7 +55,6 @@ RayTracer::~RayTracer() = default;
 void RayTracer::update(const DeviceGaussians& gaussians) {
   impl_->tree.build(gaussians);
   impl_->revision = gaussians.revision;
-  impl_->refits = 0;
 }
 
 void RayTracer::refit(const DeviceGaussians& gaussians) {
@@ -70,14 +64,9 @@ void RayTracer::refit(const DeviceGaussians& gaussians) {
 
 void RayTracer::follow(const DeviceGaussians& gaussians) {
   Impl& self = *impl_;
-  const bool same_count = self.revision > 0 && gaussians.count == self.tree.tree().size();
-  if (same_count && gaussians.revision == self.revision) return;
-  if (same_count && self.refits < kRefits) {
-    refit(gaussians);
-    ++self.refits;
-  } else {
-    update(gaussians);
-  }
+  if (self.revision > 0 && gaussians.revision == self.revision) return;
+  self.tree.follow(gaussians);
+  self.revision = gaussians.revision;
 }
 
 void RayTracer::require_current(const DeviceGaussians& gaussians) const {
@@ -120,25 +109,29 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   if (results.size() < count) results.ensure(self.context, count, "ray results");
   const TraceOptions& options = self.options;
   const bool cpu = self.context.device().type == DeviceType::kCpu;
-  const WideTree& tree = self.tree.tree();
+  const Lbvh& tree = self.tree.tree();
   const bool ordered = self.order.compute(tree, rays, count);
   const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
   const std::array<float, 4> background{options.background[0], options.background[1],
                                         options.background[2], 0.0f};
   self.context
       .kernel("trace/rays.cl", "trace_rays",
-              ray_walk_build(self.context.device(), options, tree.lanes()))
+              ray_walk_build(self.context.device(), options, self.near, tree.lanes()))
       .launch(Range::linear((count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup),
               u32(count), u32(rays_per_item), tree.levels(), tree.level_begin(), tree.nodes(),
               self.tree.blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
               gaussians.active_sh_degree, color_mode, from_origin, options.quantile,
-              options.min_transmittance, options.max_hits, background, rays, ordered ? 1 : 0,
-              self.order.indices(), results);
+              options.min_transmittance, options.max_hits, self.near.plane, background, rays,
+              ordered ? 1 : 0, self.order.indices(), results);
 }
 
 void RayTracer::set_background(const std::array<float, 3>& background) {
   impl_->options.background = background;
 }
+
+void RayTracer::set_near(const RayNear& near) { impl_->near = near; }
+
+const RayNear& RayTracer::near() const { return impl_->near; }
 
 const TraceOptions& RayTracer::options() const { return impl_->options; }
 

@@ -12,24 +12,26 @@
 #include "raysplats/rays.hpp"
 #include "raysplats/trace_options.hpp"
 #include "trace/device_gaussians.hpp"
+#include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
 
 namespace raysplats {
 
 /// Traces arbitrary rays: any origins and directions, without coherence. The order of hits is exact
-/// per ray; near_depth and depth of the options have no meaning here.
+/// per ray; near_depth and depth of the options have no meaning here, but see set_near().
 class RayTracer {
  public:
   /// `lanes` of 4, 8 or 16 vectors' lanes; 0 chooses by the device (ray_lanes()).
   RayTracer(Context& context, const TraceOptions& options, int lanes = 0);
   ~RayTracer();
 
-  /// Builds the tree. It or refit() must follow every change of the Gaussians.
+  /// Builds the tree. It, refit() or follow() must come after every change of the Gaussians.
   void update(const DeviceGaussians& gaussians);
   /// Cheaper than update() for Gaussians that moved little; the results are the same, rays are
   /// slower the farther they moved. Throws UsageError when their number changed.
   void refit(const DeviceGaussians& gaussians);
-  /// update() or refit() where the Gaussians changed since, else nothing.
+  /// update() or refit(), whichever the measured growth of the tree asks for (RayTree::follow()),
+  /// where the Gaussians changed since, else nothing.
   void follow(const DeviceGaussians& gaussians);
 
   std::vector<RayResult> trace(const DeviceGaussians& gaussians,
@@ -52,6 +54,9 @@ class RayTracer {
 
   /// Colour behind the Gaussians from the next trace() on.
   void set_background(const std::array<float, 3>& background);
+  /// What rays do not meet from the next trace() on; RayBackward follows.
+  void set_near(const RayNear& near);
+  const RayNear& near() const;
   const TraceOptions& options() const;
   /// Throws UsageError unless the tree is that of these Gaussians as they are now.
   void require_current(const DeviceGaussians& gaussians) const;

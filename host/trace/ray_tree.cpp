@@ -28,6 +28,7 @@ void RayTree::build(const DeviceGaussians& gaussians) {
   blocks_.ensure(*context_, tree_.block_count() * vectors * static_cast<std::size_t>(tree_.lanes()),
                  "ray blocks");
   fill(gaussians);
+  built_cost_ = -1;
 }
 
 void RayTree::refit(const DeviceGaussians& gaussians) {
@@ -37,6 +38,16 @@ void RayTree::refit(const DeviceGaussians& gaussians) {
   }
   if (gaussians.count > 0) compute_boxes(gaussians);
   fill(gaussians);
+}
+
+bool RayTree::follow(const DeviceGaussians& gaussians) {
+  if (gaussians.count == tree_.size() && gaussians.count > 0) {
+    if (built_cost_ < 0) built_cost_ = tree_.cost(boxes_);
+    refit(gaussians);
+    if (tree_.cost(boxes_) <= kGrowth * built_cost_) return false;
+  }
+  build(gaussians);
+  return true;
 }
 
 void RayTree::compute_boxes(const DeviceGaussians& gaussians) {

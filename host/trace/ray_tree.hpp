@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "bvh/wide_tree.hpp"
+#include "bvh/lbvh.hpp"
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "raysplats/trace_options.hpp"
@@ -10,8 +10,8 @@
 
 namespace raysplats {
 
-/// Tree over Gaussians for rays without coherence: a WideTree with the Gaussians themselves, ready
-/// to be traced, in its leaf blocks (cl/trace/ray_block.h).
+/// The tree over Gaussians that rays walk: an Lbvh with the Gaussians themselves, ready to be
+/// traced, in its leaf blocks (cl/trace/ray_block.h).
 class RayTree {
  public:
   RayTree(Context& context, const TraceOptions& options, int lanes);
@@ -19,9 +19,19 @@ class RayTree {
   void build(const DeviceGaussians& gaussians);
   /// For Gaussians that changed but kept their number since build(). Throws UsageError otherwise.
   void refit(const DeviceGaussians& gaussians);
+  /// For Gaussians that changed in any way: refit(), and build() where their number changed or the
+  /// cost of walking the refitted tree has grown by more than kGrowth since the last build().
+  /// Returns true after a build(). Waits for the device.
+  bool follow(const DeviceGaussians& gaussians);
 
-  const WideTree& tree() const { return tree_; }
+  /// Growth of the cost at which a build pays. Rays take longer in proportion.
+  static constexpr double kGrowth = 1.1;
+
+  const Lbvh& tree() const { return tree_; }
   const Buffer<float>& blocks() const { return blocks_; }
+  /// Of the Gaussians, by their numbers.
+  const Buffer<RsAabb>& boxes() const { return boxes_; }
+  const TraceOptions& options() const { return options_; }
 
  private:
   void compute_boxes(const DeviceGaussians& gaussians);
@@ -29,9 +39,10 @@ class RayTree {
 
   Context* context_;
   TraceOptions options_;
-  WideTree tree_;
+  Lbvh tree_;
   Buffer<RsAabb> boxes_;
   Buffer<float> blocks_;
+  double built_cost_ = -1;  // right after build(), once follow() has asked for it
 };
 
 }  // namespace raysplats

@@ -98,6 +98,7 @@ TraceOptions trace_options(const ModelSource& source, bool cut_out) {
   out.hit_order = trained.hit_order;
   out.adaptive_radius = trained.adaptive_radius;
   out.near_depth = static_cast<float>(trained.near_depth);
+  out.traversal = trained.traversal;
   out.background = background_color(trained, cut_out);
   out.packet_width = trained.packet_width;
   out.memory_budget = static_cast<std::size_t>(trained.memory_budget) << 20;

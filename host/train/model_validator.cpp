@@ -6,8 +6,8 @@
 #include <array>
 #include <vector>
 
-#include "bvh/lbvh_validate.hpp"
 #include "raysplats/gaussians.hpp"
+#include "trace/ray_tree_validate.hpp"
 
 namespace raysplats {
 namespace {
@@ -49,15 +49,11 @@ const Buffer<float>& values_of(const DeviceGaussians& gaussians, ParameterGroup 
 
 }  // namespace
 
-ModelValidator::ModelValidator(Context& context,
-                               ScaleActivation activation,
-                               const TraceOptions& options)
+ModelValidator::ModelValidator(Context& context, const TraceOptions& options)
     : context_(context),
-      quantile_(options.quantile),
       chunk_(context.device().type == DeviceType::kCpu ? kCpuChunk : kGpuChunk),
       kernel_(context.kernel("train/validate.cl", "find_non_finite")),
-      bounds_(context, activation == ScaleActivation::kSigmoid, options.adaptive_radius),
-      tree_(context),
+      tree_(context, options, 0),
       found_(context, 2, "validation") {}
 
 std::string ModelValidator::find_non_finite(const Buffer<float>& values,
@@ -75,28 +71,6 @@ std::string ModelValidator::find_non_finite(const Buffer<float>& values,
                      found[0], name, found[1]);
 }
 
-// Every Gaussian whose numbers are finite and whose quaternion is not zero has a box around its
-// mean, and the tree over the boxes holds together.
-std::string ModelValidator::check_boxes(const DeviceGaussians& gaussians) {
-  bounds_.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
-                  gaussians.count, quantile_, boxes_);
-  std::vector<RsAabb> boxes(gaussians.count);
-  boxes_.download(std::span<RsAabb>(boxes));
-  const std::vector<float> means = gaussians.means.download();
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    const RsAabb& box = boxes[i];
-    if (box.lo[0] > box.hi[0] && box.lo[1] > box.hi[1] && box.lo[2] > box.hi[2]) continue;  // empty
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float mean = means[3 * i + axis];
-      if (box.lo[axis] <= mean && mean <= box.hi[axis]) continue;
-      return fmt::format("the box of Gaussian {} from {} to {} leaves out its mean {} on axis {}",
-                         i, box.lo[axis], box.hi[axis], mean, axis);
-    }
-  }
-  tree_.build(boxes_, gaussians.count);
-  return validate_lbvh(tree_, boxes);
-}
-
 std::string ModelValidator::find_fault(const DeviceGaussians& gaussians, const Adam& adam) {
   if (gaussians.count == 0) return "";
   for (const ParameterGroup group : kParameterGroups) {
@@ -110,7 +84,9 @@ std::string ModelValidator::find_fault(const DeviceGaussians& gaussians, const A
       if (!fault.empty()) return fault;
     }
   }
-  return check_boxes(gaussians);
+  const bool built = tree_.follow(gaussians);
+  return validate_ray_tree(RayTreeCopy::of(tree_), gaussians.download(),
+                           built ? LeafOrder::kCurve : LeafOrder::kAny);
 }
 
 }  // namespace raysplats

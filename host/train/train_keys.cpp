@@ -360,6 +360,13 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
          "shrink the ellipsoids to where they contribute at least 1/255");
   t.number("near", o.near_depth, 0, kHuge,
            "Gaussians nearer to the camera plane are skipped; 0 = off");
+  t.choice<Traversal>(
+      "traversal", o.traversal,
+      {{"auto", Traversal::kAuto}, {"tiles", Traversal::kTiles}, {"bvh", Traversal::kBvh}},
+      "how camera rays find Gaussians: tiles (packets share the list of their tile), bvh (each ray "
+      "walks the hierarchy, the paper) or auto (as 'raysplats tune' found, else tiles); scenes "
+      "with "
+      "mirrors and orthographic cameras need rays one by one");
   t.number("packet-width", o.packet_width, 0, 16,
            "rays per work-item: 1, 2, 4, 8 or 16; 0 = fit to the device");
   t.number("memory-budget", o.memory_budget, 1, 1e9,

@@ -83,6 +83,7 @@ TraceOptions trace_options_of(const TrainOptions& options, const std::array<floa
   trace.hit_order = options.hit_order;
   trace.adaptive_radius = options.adaptive_radius;
   trace.near_depth = static_cast<float>(options.near_depth);
+  trace.traversal = options.traversal;
   trace.background = background;
   trace.packet_width = options.packet_width;
   trace.gradient_sum = options.gradient_sum;
@@ -360,8 +361,10 @@ void Trainer::Impl::start() {
                context.device());
   if (const std::size_t by_rays = ray_views(); by_rays > 0) {
     spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),
-                 options.mirrors.empty() ? "their cameras are no pinholes"
-                                         : "there are mirrors in the scene");
+                 !options.mirrors.empty() ? "there are mirrors in the scene"
+                 : options.traversal == Traversal::kBvh
+                     ? "traversal is bvh"
+                     : "as tuned for the device, or their cameras have no tiles");
   }
   run.write_config(options);
   run.write_cameras(train_cameras);
@@ -415,7 +418,7 @@ void Trainer::Impl::check_guard() {
 // Stops the run at a fault that no step may leave behind.
 void Trainer::Impl::validate_model() {
   if (!validator) {
-    validator.emplace(context, options.scale_activation, trace_options_of(options, background));
+    validator.emplace(context, trace_options_of(options, background));
   }
   const std::string fault = validator->find_fault(gaussians, adam);
   if (fault.empty()) return;

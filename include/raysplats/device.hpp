@@ -17,6 +17,7 @@ struct DeviceTuning {
   int tile = 16;         ///< pixels along a side of the tiles that share a candidate list
   int pending = 48;      ///< entries of a ray's sorted list
   int group = 0;         ///< most work-items of a work-group; 0 = all packets of a tile
+  bool bvh = false;      ///< camera rays walk the hierarchy one by one instead
 
   bool operator==(const DeviceTuning&) const = default;
 };

@@ -13,6 +13,14 @@ enum class HitOrder {
   kPeak,   ///< depth of the maximum response; an origin inside is allowed
 };
 
+/// How the rays of a camera find the Gaussians they meet. Pictures and gradients are the same
+/// within rounding.
+enum class Traversal {
+  kAuto,   ///< what the device's tuning says, else tiles; rays one by one where tiles cannot be
+  kTiles,  ///< packets of rays share the candidate list of their tile of the picture
+  kBvh,    ///< every ray walks the bounding volume hierarchy (the paper)
+};
+
 /// Function from the trained scale parameter to the standard deviation.
 enum class ScaleActivation { kExp, kSigmoid };
 
@@ -35,6 +43,7 @@ struct TraceOptions {
   float near_depth =
       0.0f;  ///< Gaussians whose mean is nearer along the view axis are skipped; 0 = off
   std::array<float, 3> background{0.0f, 0.0f, 0.0f};
+  Traversal traversal = Traversal::kAuto;  ///< of camera rays
   bool depth = false;    ///< camera rays also yield expected depth, median depth and hit count
   int packet_width = 0;  ///< rays per work-item: 1, 2, 4, 8 or 16; 0 = the device's own
   GradientSum gradient_sum = GradientSum::kAuto;

@@ -52,7 +52,7 @@ class Tracer {
   /// RGBA at the camera's size: background blended in, A = 1 - transmittance. `differentiable`
   /// keeps what backward() needs, within options.memory_budget. Throws UsageError for a camera
   /// without pixels or with a number that is not finite, for a model of another context, and for
-  /// options.near_depth with a camera that is no pinhole.
+  /// a camera that Traversal::kTiles cannot trace.
   Image render(const Model& model, const Camera& camera, bool differentiable = false);
   /// Of the last picture, with options.depth: expected depth, median depth and number of hits per
   /// pixel. Depth is along the viewing axis for kPinhole, kOpenCv and kOrthographic, along the ray

@@ -108,6 +108,7 @@ struct TrainOptions {
   int max_hits = 512;
   bool adaptive_radius = true;
   double near_depth = 0.0;
+  Traversal traversal = Traversal::kAuto;
   int packet_width = 0;
   std::int64_t memory_budget = 1024;  ///< MiB
   GradientSum gradient_sum = GradientSum::kAuto;

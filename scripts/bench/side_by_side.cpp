@@ -7,8 +7,6 @@
 #include <cstring>
 #include <glm/matrix.hpp>
 
-#include "bvh/gaussian_bounds.hpp"
-#include "bvh/lbvh.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/ray_tracer.hpp"
 
@@ -101,22 +99,12 @@ struct OurTracer::Impl {
       : context(select_device(selector)),
         gaussians(DeviceGaussians::upload(context, model, ScaleActivation::kExp)),
         camera_tracer(context, options),
-        ray_tracer(context, options),
-        bounds(context, false, options.adaptive_radius),
-        tree(context),
-        quantile(options.quantile) {
-    bounds.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
-                   gaussians.count, quantile, boxes);
-  }
+        ray_tracer(context, options) {}
 
   Context context;
   DeviceGaussians gaussians;
   CameraTracer camera_tracer;
   RayTracer ray_tracer;
-  GaussianBounds bounds;
-  Lbvh tree;
-  float quantile;
-  Buffer<RsAabb> boxes;
   bool camera_ready = false;
   bool rays_ready = false;
 };
@@ -173,18 +161,19 @@ Outcome OurTracer::build() {
   Impl& my = *impl_;
   Outcome outcome;
   outcome.seconds = seconds_of([&] {
-    my.tree.build(my.boxes, my.gaussians.count);
+    my.ray_tracer.update(my.gaussians);
     my.context.finish();
   });
+  my.rays_ready = true;
   return outcome;
 }
 
 Outcome OurTracer::refit() {
   Impl& my = *impl_;
-  if (my.tree.size() == 0) build();
+  if (!my.rays_ready) build();
   Outcome outcome;
   outcome.seconds = seconds_of([&] {
-    my.tree.refit(my.boxes);
+    my.ray_tracer.refit(my.gaussians);
     my.context.finish();
   });
   return outcome;

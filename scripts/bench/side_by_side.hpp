@@ -62,7 +62,7 @@ class OurTracer {
   Outcome camera(const Camera& camera);
   /// Transfer of the rays, tracing, transfer of the results.
   Outcome rays(std::span<const BenchRay> rays);
-  /// Lbvh::build and Lbvh::refit over boxes that lie on the device.
+  /// The tree that rays walk, from the Gaussians on the device: RayTracer::update() and refit().
   Outcome build();
   Outcome refit();
 

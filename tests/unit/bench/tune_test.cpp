@@ -27,7 +27,7 @@ TEST_CASE("tune: candidates are valid, differ in one axis and begin with the cur
       const DeviceTuning& c = candidates[i];
       CHECK(is_valid(c));
       CHECK((c.packet_width != start.packet_width) + (c.tile != start.tile) +
-                (c.pending != start.pending) + (c.group != start.group) ==
+                (c.pending != start.pending) + (c.group != start.group) + (c.bvh != start.bvh) ==
             1);
       CHECK(c.group <= 64);
       CHECK(std::count(candidates.begin(), candidates.end(), c) == 1);
@@ -44,7 +44,7 @@ TEST_CASE("tune: measures the axes and leaves the winner in the context") {
   options.size = 200;
   options.width = options.height = 32;
   options.repeat = 1;
-  options.axes = {"tile", "group"};
+  options.axes = {"tile", "group", "traversal"};
   std::size_t heard = 0;
   const TuneResult result = tune_device(context, options, [&](const TuneTrial&) { ++heard; });
   CHECK(heard == result.trials.size());

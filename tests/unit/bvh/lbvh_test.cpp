@@ -5,14 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cfloat>
 #include <cmath>
-#include <cstring>
+#include <cstdlib>
 #include <limits>
 #include <numeric>
 #include <set>
-#include <utility>
 #include <vector>
 
 #include "base/rng.hpp"
@@ -25,7 +23,12 @@ namespace {
 
 using Boxes = std::vector<RsAabb>;
 
-const ChunkShape kShapes[] = {{1, 1, 1}, {3, 1, 16}, {64, 1, 1}, {8, 64, 64}};
+const ChunkShape kShapes[] = {{1, 1, 1}, {3, 1, 16}, {8, 64, 64}};
+
+Context device_context() {
+  const char* device = std::getenv("RAYSPLATS_DEVICE");
+  return Context(select_device(device == nullptr ? "" : device));
+}
 
 RsAabb box_at(double x, double y, double z, double hx, double hy, double hz) {
   const double c[3] = {x, y, z};
@@ -54,124 +57,51 @@ Buffer<RsAabb> uploaded(Context& context, const Boxes& boxes) {
   return buffer;
 }
 
-// Recursive builder: splits where the highest differing bit of (code, position) changes.
-struct HostTree {
-  std::vector<std::uint32_t> leaves;
-  std::vector<std::uint64_t> codes;  // sorted
-  std::vector<RsBvhNode> nodes;
-  const Boxes* boxes;
+// A tree whose blocks hold nothing but their boxes.
+class Tree {
+ public:
+  Tree(Context& context, int lanes, const ChunkShape& shape)
+      : context_(&context), lbvh_(context, lanes, shape) {}
 
-  explicit HostTree(const Boxes& input) : boxes(&input) {
-    const std::vector<std::uint64_t> by_box = morton_codes(input);
-    leaves.resize(input.size());
-    std::iota(leaves.begin(), leaves.end(), 0u);
-    std::stable_sort(leaves.begin(), leaves.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return by_box[a] < by_box[b]; });
-    for (const std::uint32_t leaf : leaves) codes.push_back(by_box[leaf]);
-    if (input.size() > 1) {
-      nodes.resize(input.size() - 1);
-      RsAabb bounds;
-      make(0, input.size() - 1, 0, bounds);
-    }
+  void build(const Boxes& boxes) {
+    lbvh_.order(uploaded(*context_, boxes), boxes.size());
+    refit(boxes);
   }
+  void refit(const Boxes& boxes) {
+    if (boxes.empty()) return;
+    const std::size_t padded = lbvh_.padded_blocks();
+    context_
+        ->kernel("bvh/node_probe.cl", "box_blocks", BuildOptions().define("PACKET", lbvh_.lanes()))
+        .launch(Range::linear(padded, 1), static_cast<std::uint32_t>(boxes.size()),
+                static_cast<std::uint32_t>(padded), lbvh_.slots(), uploaded(*context_, boxes),
+                lbvh_.nodes());
+    lbvh_.merge();
+  }
+  LbvhCopy copy() const { return LbvhCopy::of(lbvh_); }
+  double cost(const Boxes& boxes) { return lbvh_.cost(uploaded(*context_, boxes)); }
+  Lbvh& lbvh() { return lbvh_; }
 
-  std::size_t split_of(std::size_t first, std::size_t last) const {
-    // Positions decide among equal codes.
-    const bool tied = codes[first] == codes[last];
-    const auto key = [&](std::size_t i) { return tied ? static_cast<std::uint64_t>(i) : codes[i]; };
-    const int bit = 63 - std::countl_zero(key(first) ^ key(last));
-    std::size_t split = first;
-    while ((key(split + 1) >> bit & 1) == 0) ++split;
-    return split;
-  }
-
-  std::int32_t make(std::size_t first, std::size_t last, std::size_t number, RsAabb& bounds) {
-    if (first == last) {
-      bounds = (*boxes)[leaves[first]];
-      bool good = true;
-      for (int a = 0; a < 3; ++a) {
-        good = good && std::isfinite(bounds.lo[a]) && std::isfinite(bounds.hi[a]) &&
-               bounds.lo[a] <= bounds.hi[a];
-      }
-      if (!good) bounds = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
-      return ~static_cast<std::int32_t>(first);
-    }
-    const std::size_t split = split_of(first, last);
-    RsBvhNode node;
-    RsAabb left;
-    RsAabb right;
-    node.left = make(first, split, split, left);
-    node.right = make(split + 1, last, split + 1, right);
-    node.first = static_cast<std::int32_t>(first);
-    node.last = static_cast<std::int32_t>(last);
-    for (int a = 0; a < 3; ++a) {
-      node.left_lo[a] = left.lo[a];
-      node.left_hi[a] = left.hi[a];
-      node.right_lo[a] = right.lo[a];
-      node.right_hi[a] = right.hi[a];
-      bounds.lo[a] = std::min(left.lo[a], right.lo[a]);
-      bounds.hi[a] = std::max(left.hi[a], right.hi[a]);
-    }
-    nodes[number] = node;
-    return static_cast<std::int32_t>(number);
-  }
+ private:
+  Context* context_;
+  Lbvh lbvh_;
 };
 
-bool same_nodes(const std::vector<RsBvhNode>& a, const std::vector<RsBvhNode>& b) {
-  return a.size() == b.size() &&
-         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(RsBvhNode)) == 0);
-}
-
-void check_tree(Context& context, Lbvh& tree, const Boxes& boxes) {
+void check_tree(Tree& tree, const Boxes& boxes) {
   CAPTURE(boxes.size());
-  tree.build(uploaded(context, boxes), boxes.size());
-  CHECK(tree.size() == boxes.size());
-  CHECK(validate_lbvh(tree, boxes) == "");
-  const HostTree expected(boxes);
-  CHECK(tree.leaves().download() == expected.leaves);
-  CHECK(same_nodes(tree.nodes().download(), expected.nodes));
-}
-
-// Boxes that the test accepts, by walking the tree on the host with the same test on child bounds.
-template <class Test>
-std::set<std::uint32_t> query(const Lbvh& tree, const Boxes& boxes, const Test& test) {
-  const std::vector<RsBvhNode> nodes = tree.nodes().download();
-  const std::vector<std::uint32_t> leaves = tree.leaves().download();
-  std::set<std::uint32_t> found;
-  std::vector<std::int32_t> stack{tree.root()};
-  while (!stack.empty()) {
-    const std::int32_t reference = stack.back();
-    stack.pop_back();
-    if (reference < 0) {
-      const std::uint32_t box = leaves[static_cast<std::size_t>(~reference)];
-      if (test(boxes[box].lo, boxes[box].hi)) found.insert(box);
-      continue;
-    }
-    const RsBvhNode& node = nodes[static_cast<std::size_t>(reference)];
-    if (test(node.left_lo, node.left_hi)) stack.push_back(node.left);
-    if (test(node.right_lo, node.right_hi)) stack.push_back(node.right);
-  }
-  return found;
-}
-
-template <class Test>
-std::set<std::uint32_t> brute_force(const Boxes& boxes, const Test& test) {
-  std::set<std::uint32_t> found;
-  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
-    if (test(boxes[i].lo, boxes[i].hi)) found.insert(i);
-  }
-  return found;
+  tree.build(boxes);
+  CHECK(tree.lbvh().size() == boxes.size());
+  CHECK(validate_lbvh(tree.copy(), boxes) == "");
 }
 
 // Boxes in dense clumps of [-1, 1]^3, the last `far` of them at distances up to `distance`.
-Boxes clumps(std::size_t count, std::size_t far, double distance) {
+Boxes clumps(std::size_t count, std::size_t far, double distance, double size = 1) {
   CounterRng rng(17, 6);
   Boxes boxes(count);
   std::vector<std::array<double, 3>> centers(40);
   for (auto& c : centers) c = {rng.uniform() * 2 - 1, rng.uniform() * 2 - 1, rng.uniform() * 2 - 1};
   for (RsAabb& box : boxes) {
     const auto& c = centers[rng.below(centers.size())];
-    const double h = 0.002 + 0.004 * rng.uniform();
+    const double h = size * (0.002 + 0.004 * rng.uniform());
     box = box_at(c[0] + 0.05 * rng.normal(), c[1] + 0.05 * rng.normal(), c[2] + 0.05 * rng.normal(),
                  h, h, h);
   }
@@ -183,103 +113,100 @@ Boxes clumps(std::size_t count, std::size_t far, double distance) {
   return boxes;
 }
 
-// Area of all boxes of the tree inside [-1, 1]^3 over the cube's: boxes that a line through the
-// cube meets there.
-double inner_cost(const Lbvh& tree) {
-  double sum = 0;
-  for (const RsBvhNode& node : tree.nodes().download()) {
-    for (const auto& [lo, hi] :
-         {std::pair(node.left_lo, node.left_hi), std::pair(node.right_lo, node.right_hi)}) {
-      double e[3];
-      for (int a = 0; a < 3; ++a) e[a] = std::min(hi[a], 1.0f) - std::max(lo[a], -1.0f);
-      if (e[0] >= 0 && e[1] >= 0 && e[2] >= 0) sum += e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
+// Of rays from all sides through the middle of [-1, 1]^3.
+LbvhVisits visits_of(const LbvhCopy& tree) {
+  CounterRng rng(23, 4);
+  LbvhVisits sum;
+  for (int i = 0; i < 200; ++i) {
+    std::array<double, 3> origin{}, direction{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      origin[a] = 2 * rng.normal();
+      direction[a] = rng.uniform() - 0.5 - origin[a];
     }
+    const LbvhVisits one = count_visits(tree, origin.data(), direction.data());
+    sum.nodes += one.nodes;
+    sum.blocks += one.blocks;
   }
-  return sum / 12;
+  return sum;
 }
 
-struct RayTest {
-  double origin[3];
-  double direction[3];
-  bool operator()(const float* lo, const float* hi) const {
-    double near = 0;
-    double far = std::numeric_limits<double>::infinity();
-    for (int a = 0; a < 3; ++a) {
-      const double t0 = ((direction[a] > 0 ? lo[a] : hi[a]) - origin[a]) / direction[a];
-      const double t1 = ((direction[a] > 0 ? hi[a] : lo[a]) - origin[a]) / direction[a];
-      near = std::max(near, t0);
-      far = std::min(far, t1);
-    }
-    return near <= far;
-  }
-};
+double half_area(const RsAabb& box) {
+  double e[3];
+  for (int a = 0; a < 3; ++a) e[a] = double(box.hi[a]) - double(box.lo[a]);
+  return e[0] < 0 ? 0 : e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
+}
 
-struct OverlapTest {
-  RsAabb box;
-  bool operator()(const float* lo, const float* hi) const {
-    for (int a = 0; a < 3; ++a) {
-      if (!(lo[a] <= box.hi[a] && hi[a] >= box.lo[a])) return false;
-    }
-    return true;
+// Sum of the areas of all children of all nodes over that of all boxes.
+double host_cost(const LbvhCopy& tree, const Boxes& boxes) {
+  double nodes = 0, leaves = 0;
+  const std::size_t count =
+      std::accumulate(tree.level_sizes.begin(), tree.level_sizes.end(), std::size_t{0});
+  for (std::size_t node = 0; node < count; ++node) {
+    for (std::size_t lane = 0; lane < tree.lanes; ++lane)
+      nodes += half_area(tree.child(node, lane));
   }
-};
-
-void check_queries(const Lbvh& tree, const Boxes& boxes, std::uint64_t seed) {
-  CounterRng rng(seed, 4);
-  std::size_t hits = 0;
-  for (int i = 0; i < 20; ++i) {
-    RayTest ray{};
-    for (int a = 0; a < 3; ++a) {
-      ray.origin[a] = 2 * rng.normal();
-      ray.direction[a] = 0.3 * rng.normal() - ray.origin[a];
-    }
-    const auto expected = brute_force(boxes, ray);
-    hits += expected.size();
-    CHECK(query(tree, boxes, ray) == expected);
-    const OverlapTest overlap{box_at(rng.normal(), rng.normal(), 0, 0.2, 0.2, 0.2)};
-    CHECK(query(tree, boxes, overlap) == brute_force(boxes, overlap));
-  }
-  CHECK(hits > 0);
+  for (const RsAabb& box : boxes) leaves += half_area(box);
+  return nodes / leaves;
 }
 
 }  // namespace
 
-TEST_CASE("lbvh: equals the recursive host builder for every size and division of the work") {
-  Context context(select_device(""));
-  for (const ChunkShape& shape : kShapes) {
-    CAPTURE(shape.groups);
-    CAPTURE(shape.group_size);
-    Lbvh tree(context, shape);
-    for (const std::size_t count : {0u, 1u, 2u, 3u, 5u, 17u, 64u, 65u, 1000u}) {
-      check_tree(context, tree, random_boxes(count, 0.1, count + 1));
+TEST_CASE("lbvh: the curve goes from cell to neighbouring cell through all of them") {
+  constexpr int kSide = 16;
+  Boxes boxes;
+  for (int x = 0; x < kSide; ++x) {
+    for (int y = 0; y < kSide; ++y) {
+      for (int z = 0; z < kSide; ++z) boxes.push_back(box_at(x, y, z, 0.1, 0.1, 0.1));
+    }
+  }
+  const std::vector<std::uint64_t> codes = curve_codes(boxes);
+  std::vector<std::size_t> order(boxes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return codes[a] < codes[b]; });
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    CHECK(codes[order[i - 1]] < codes[order[i]]);
+    double steps = 0;
+    for (int a = 0; a < 3; ++a)
+      steps += std::abs(double(boxes[order[i]].lo[a]) - double(boxes[order[i - 1]].lo[a]));
+    CHECK(steps == doctest::Approx(1));
+  }
+}
+
+TEST_CASE("lbvh: every size, width and division of the work") {
+  Context context = device_context();
+  for (const int lanes : {4, 8, 16}) {
+    for (const ChunkShape& shape : kShapes) {
+      if (lanes != 8 && shape.groups != 3) continue;
+      CAPTURE(lanes);
+      CAPTURE(shape.groups);
+      CAPTURE(shape.group_size);
+      Tree tree(context, lanes, shape);
+      for (const std::size_t count : {0u, 1u, 2u, 17u, 65u, 257u, 5000u})
+        check_tree(tree, random_boxes(count, 0.1, count + 1));
+      check_tree(tree, random_boxes(30, 0.1, 12));  // smaller after larger
     }
   }
 }
 
-TEST_CASE("lbvh: a large tree on the device's own shape, with queries") {
-  Context context(select_device(""));
-  Lbvh tree(context);
-  const Boxes boxes = random_boxes(50000, 0.03, 11);
-  check_tree(context, tree, boxes);
-  check_queries(tree, boxes, 5);
-  const LbvhQuality quality = lbvh_quality(tree);
-  CHECK(quality.depth >= 16);
-  CHECK(quality.depth <= 64);
-  CHECK(quality.sah_cost > 1);
-  check_tree(context, tree, random_boxes(30, 0.1, 12));  // smaller after larger
+TEST_CASE("lbvh: the device's own shape [small] [tiny]") {
+  Context context = device_context();
+  Tree tree(context, 0, ChunkShape::for_device(context.device()));
+  check_tree(tree, random_boxes(700, 0.1, 3));
+  check_tree(tree, clumps(70, 2, 1e5));
 }
 
 TEST_CASE("lbvh: coincident, aligned and clustered centres") {
-  Context context(select_device(""));
+  Context context = device_context();
   for (const ChunkShape& shape : kShapes) {
     CAPTURE(shape.groups);
     CAPTURE(shape.group_size);
-    Lbvh tree(context, shape);
-    check_tree(context, tree, Boxes(777, box_at(1, 2, 3, 0.5, 0.5, 0.5)));
-    check_tree(context, tree, Boxes(40, box_at(0, 0, 0, 0, 0, 0)));
+    Tree tree(context, 8, shape);
+    check_tree(tree, Boxes(777, box_at(1, 2, 3, 0.5, 0.5, 0.5)));
+    check_tree(tree, Boxes(40, box_at(0, 0, 0, 0, 0, 0)));
     Boxes line;
     for (int i = 0; i < 500; ++i) line.push_back(box_at(0, i % 50, 0, 0.1, 0, 0));  // runs of ten
-    check_tree(context, tree, line);
+    check_tree(tree, line);
     // Clusters far below a cell of the high words but above one of the low words, in short and long
     // runs.
     for (const std::size_t run : {7u, 300u}) {
@@ -292,13 +219,13 @@ TEST_CASE("lbvh: coincident, aligned and clustered centres") {
               box_at(0.0625 + cluster * 0.25 + offset, 0.1 + offset, 0.1, 1e-4, 1e-4, 1e-4));
         }
       }
-      check_tree(context, tree, clusters);
+      check_tree(tree, clusters);
     }
   }
 }
 
 TEST_CASE("lbvh: empty, non-finite, huge and tiny boxes") {
-  Context context(select_device(""));
+  Context context = device_context();
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
   Boxes boxes = random_boxes(300, 0.1, 21);
@@ -310,130 +237,173 @@ TEST_CASE("lbvh: empty, non-finite, huge and tiny boxes") {
   boxes[8] = {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
   boxes[9] = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
   for (const ChunkShape& shape : kShapes) {
-    Lbvh tree(context, shape);
-    check_tree(context, tree, boxes);
-    const std::vector<std::uint32_t> leaves = tree.leaves().download();
-    CHECK(std::set<std::uint32_t>(leaves.end() - 7, leaves.end()) ==
+    Tree tree(context, 8, shape);
+    check_tree(tree, boxes);
+    const std::vector<std::uint32_t> slots = tree.copy().slots;
+    CHECK(std::set<std::uint32_t>(slots.end() - 7, slots.end()) ==
           std::set<std::uint32_t>{3, 4, 5, 6, 7, 8, 9});
-    check_tree(context, tree, Boxes(5, boxes[4]));
+    check_tree(tree, Boxes(5, boxes[4]));
+    CHECK(tree.cost(Boxes(5, boxes[4])) == 0);
     Boxes extreme = boxes;
     extreme[10] = {{-FLT_MAX, -FLT_MAX, -FLT_MAX}, {FLT_MAX, FLT_MAX, FLT_MAX}};
     extreme[11] = {{FLT_MAX, FLT_MAX, FLT_MAX}, {FLT_MAX, FLT_MAX, FLT_MAX}};
     extreme[12] = {{-FLT_MAX, 0, 0}, {-FLT_MAX, 0, 0}};
-    check_tree(context, tree, extreme);
-    check_tree(
-        context, tree,
-        {box_at(1e-20, 0, 0, 0, 0, 0), box_at(2e-20, 1e-20, 0, 0, 0, 0), box_at(0, 0, 0, 1, 1, 1)});
+    check_tree(tree, extreme);
+    check_tree(tree, {box_at(1e-20, 0, 0, 0, 0, 0), box_at(2e-20, 1e-20, 0, 0, 0, 0),
+                      box_at(0, 0, 0, 1, 1, 1)});
   }
 }
 
-TEST_CASE("lbvh: a few boxes far away leave the order of the others as fine as it was") {
-  Context context(select_device(""));
-  Lbvh tree(context);
-  const std::size_t count = 20000;
-  check_tree(context, tree, clumps(count, 0, 0));
-  const double alone = inner_cost(tree);
-  for (const double distance : {1e2, 1e4, 1e7, 1e20}) {
-    CAPTURE(distance);
-    const Boxes boxes = clumps(count, 20, distance);
-    check_tree(context, tree, boxes);
-    CHECK(inner_cost(tree) < 1.3 * alone);
-    // Nearly all boxes have a high word of their own: sorting by it is enough.
-    std::set<std::uint64_t> words;
-    for (const std::uint64_t code : morton_codes(boxes)) words.insert(code >> 32);
-    CHECK(words.size() > count / 2);
+TEST_CASE("lbvh: a few boxes far away cost rays at most half as many visits again") {
+  Context context = device_context();
+  for (const int lanes : {4, 16}) {
+    Tree tree(context, lanes, ChunkShape::for_device(context.device()));
+    const std::size_t count = 20000;
+    // Boxes that overlap as Gaussians do: a ray meets some twenty of them.
+    constexpr double kSize = 6;
+    check_tree(tree, clumps(count, 0, 0, kSize));
+    const LbvhVisits alone = visits_of(tree.copy());
+    CHECK(alone.blocks > 1000);
+    for (const double distance : {1e2, 1e4, 1e6, 1e7, 1e20}) {
+      const Boxes boxes = clumps(count, 20, distance, kSize);
+      check_tree(tree, boxes);
+      const LbvhVisits visits = visits_of(tree.copy());
+      CAPTURE(lanes);
+      CAPTURE(distance);
+      CHECK(double(visits.nodes) <= 1.5 * double(alone.nodes));
+      CHECK(double(visits.blocks) <= 1.5 * double(alone.blocks));
+      // Nearly all boxes have a high word of their own: sorting by it is enough.
+      std::set<std::uint64_t> words;
+      for (const std::uint64_t code : curve_codes(boxes)) words.insert(code >> 32);
+      CHECK(words.size() > count / 2);
+    }
   }
 }
 
-TEST_CASE("lbvh: far boxes in every division of the work [small] [tiny]") {
-  Context context(select_device(""));
-  for (const ChunkShape& shape : {ChunkShape{3, 1, 16}, ChunkShape{2, 16, 16}}) {
-    Lbvh tree(context, shape);
-    Boxes boxes = clumps(600, 2, 1e5);
-    check_tree(context, tree, boxes);
-    check_tree(context, tree, clumps(70, 0, 0));
-    tree.refit(uploaded(context, clumps(70, 1, 10)));
-    CHECK(validate_lbvh(tree, clumps(70, 1, 10), LeafOrder::kAny) == "");
-  }
-}
-
-TEST_CASE("lbvh: refit") {
-  Context context(select_device(""));
+TEST_CASE("lbvh: a refit has the boxes of a rebuild and keeps the order") {
+  Context context = device_context();
   for (const ChunkShape& shape : kShapes) {
     CAPTURE(shape.groups);
     CAPTURE(shape.group_size);
-    Lbvh tree(context, shape);
+    Tree tree(context, 8, shape);
     for (const std::size_t count : {1u, 2u, 1500u}) {
       Boxes boxes = random_boxes(count, 0.1, 31);
-      tree.build(uploaded(context, boxes), count);
-      const std::vector<RsBvhNode> built = tree.nodes().download();
-      tree.refit(uploaded(context, boxes));
-      CHECK(same_nodes(tree.nodes().download(), built));
+      tree.build(boxes);
+      const LbvhCopy built = tree.copy();
+      tree.refit(boxes);
+      CHECK(tree.copy().nodes == built.nodes);
       // Moved boxes, one of which vanishes: bounds follow, the order stays.
-      const std::vector<std::uint32_t> leaves = tree.leaves().download();
       boxes = random_boxes(count, 0.05, 32);
       if (count > 2) boxes[2] = {{1, 1, 1}, {-1, -1, -1}};
-      tree.refit(uploaded(context, boxes));
-      CHECK(tree.leaves().download() == leaves);
-      CHECK(validate_lbvh(tree, boxes, LeafOrder::kAny) == "");
-      if (count > 2) {
-        CHECK(validate_lbvh(tree, boxes, LeafOrder::kMorton) != "");
-        check_queries(tree, boxes, 6);
-      }
+      tree.refit(boxes);
+      const LbvhCopy refitted = tree.copy();
+      CHECK(refitted.slots == built.slots);
+      CHECK(validate_lbvh(refitted, boxes, LeafOrder::kAny) == "");
+      if (count > 2) CHECK(validate_lbvh(refitted, boxes, LeafOrder::kCurve) != "");
     }
   }
 }
 
 TEST_CASE("lbvh: cost equals the sum over the nodes and tells an outdated order [small]") {
-  Context context(select_device(""));
+  Context context = device_context();
   for (const ChunkShape& shape : {ChunkShape{3, 1, 16}, ChunkShape{2, 16, 16}}) {
-    Lbvh tree(context, shape);
-    CHECK(tree.cost() == 0);
+    Tree tree(context, 8, shape);
+    CHECK(tree.cost({}) == 0);
     Boxes boxes = random_boxes(700, 0.1, 41);
+    // The window of the grid, to which boxes are clipped, holds them all.
+    boxes[0] = box_at(-8, -8, -8, 0, 0, 0);
+    boxes[1] = box_at(8, 8, 8, 0, 0, 0);
     boxes[5] = {{1, 1, 1}, {-1, -1, -1}};
-    tree.build(uploaded(context, boxes), boxes.size());
-    double inner = 0;
-    double leaves = 0;
-    const auto add = [&](const float* lo, const float* hi, std::int32_t reference) {
-      double e[3];
-      for (int a = 0; a < 3; ++a) e[a] = static_cast<double>(hi[a]) - static_cast<double>(lo[a]);
-      if (e[0] < 0) return;
-      (reference < 0 ? leaves : inner) += e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
-    };
-    for (const RsBvhNode& node : tree.nodes().download()) {
-      add(node.left_lo, node.left_hi, node.left);
-      add(node.right_lo, node.right_hi, node.right);
-    }
-    const double built = tree.cost();
-    CHECK(built == doctest::Approx(inner / leaves).epsilon(1e-5));
+    tree.build(boxes);
+    const double built = tree.cost(boxes);
+    CHECK(built == doctest::Approx(host_cost(tree.copy(), boxes)).epsilon(1e-5));
     // The same boxes in another order: refitted, the tree is far worse than built anew.
     const Boxes moved(boxes.rbegin(), boxes.rend());
-    tree.refit(uploaded(context, moved));
-    CHECK(tree.cost() > 2 * built);
-    tree.build(uploaded(context, moved), moved.size());
-    CHECK(tree.cost() == doctest::Approx(built).epsilon(0.05));
-    tree.build(uploaded(context, Boxes(3, boxes[5])), 3);
-    CHECK(tree.cost() == 0);
+    tree.refit(moved);
+    CHECK(tree.cost(moved) > 1.5 * built);
+    tree.build(moved);
+    CHECK(tree.cost(moved) == doctest::Approx(built).epsilon(0.05));
   }
 }
 
-TEST_CASE("lbvh: sizes that do not fit are refused") {
-  Context context(select_device(""));
-  Lbvh tree(context);
-  const Boxes boxes = random_boxes(10, 0.1, 1);
-  CHECK_THROWS_AS(tree.build(uploaded(context, boxes), 11), UsageError);
-  tree.build(uploaded(context, boxes), 10);
-  CHECK_THROWS_AS(tree.refit(uploaded(context, random_boxes(9, 0.1, 1))), UsageError);
+TEST_CASE("lbvh: the cost sees what happens among boxes when others are far away") {
+  Context context = device_context();
+  Tree tree(context, 8, ChunkShape::for_device(context.device()));
+  const Boxes boxes = clumps(20000, 20, 1e6);
+  tree.build(boxes);
+  const double built = tree.cost(boxes);
+  Boxes moved = boxes;
+  CounterRng rng(3, 7);
+  for (RsAabb& box : moved) {
+    if (std::abs(box.lo[0]) > 2) continue;
+    for (int a = 0; a < 3; ++a) {
+      const auto by = static_cast<float>(0.1 * rng.normal());
+      box.lo[a] += by;
+      box.hi[a] += by;
+    }
+  }
+  tree.refit(moved);
+  CHECK(tree.cost(moved) > 1.5 * built);
 }
 
-TEST_CASE("lbvh validation: faults are found") {
-  Context context(select_device(""));
-  Lbvh tree(context);
-  Boxes boxes = random_boxes(100, 0.1, 1);
-  tree.build(uploaded(context, boxes), boxes.size());
-  CHECK(validate_lbvh(tree, boxes) == "");
-  Boxes grown = boxes;
-  grown[50].hi[1] += 0.5f;
-  CHECK(validate_lbvh(tree, grown, LeafOrder::kAny) != "");
-  CHECK(validate_lbvh(tree, std::span<const RsAabb>(boxes).first(99)) != "");
+TEST_CASE("lbvh: sizes that do not fit are refused") {
+  Context context = device_context();
+  Tree tree(context, 4, ChunkShape::for_device(context.device()));
+  const Boxes boxes = random_boxes(10, 0.1, 1);
+  CHECK_THROWS_AS(tree.lbvh().order(uploaded(context, boxes), 11), UsageError);
+  tree.build(boxes);
+  CHECK_THROWS_AS(tree.cost(random_boxes(9, 0.1, 1)), UsageError);
+}
+
+TEST_CASE("lbvh validation: a fault of each kind is found") {
+  Context context = device_context();
+  Tree tree(context, 4, ChunkShape::for_device(context.device()));
+  Boxes boxes = random_boxes(1000, 0.1, 1);
+  tree.build(boxes);
+  const LbvhCopy sound = tree.copy();
+  REQUIRE(validate_lbvh(sound, boxes) == "");
+  REQUIRE(sound.level_sizes.size() >= 4);
+  LbvhCopy faulty = sound;
+  const auto fault = [&] { return validate_lbvh(faulty, boxes); };
+  const auto has = [&](const char* part) { return fault().find(part) != std::string::npos; };
+  SUBCASE("a box in two slots") {
+    faulty.slots[17] = faulty.slots[400];
+    CHECK(has("is in two slots"));
+  }
+  SUBCASE("a slot without a box") {
+    faulty.slots[17] = 1000;
+    CHECK(has("names box 1000 of 1000"));
+  }
+  SUBCASE("out of order") {
+    std::swap(faulty.slots[17], faulty.slots[900]);
+    CHECK(has("along the curve"));
+  }
+  SUBCASE("a block that leaves out a box") {
+    boxes[sound.slots[50]].hi[1] += 9.0f;
+    CHECK(validate_lbvh(sound, boxes, LeafOrder::kAny).find("of level 1") != std::string::npos);
+  }
+  SUBCASE("a node that leaves out a child, and one that is too large") {
+    const std::size_t at = sound.level_begin[2] * 6 * sound.lanes;
+    faulty.nodes[at] = std::nextafter(faulty.nodes[at], 10.0f);
+    CHECK(has("Child 0 of level 2"));
+    faulty.nodes[at] = sound.nodes[at] - 1;
+    CHECK(has("Child 0 of level 2"));
+  }
+  SUBCASE("a missing child that is not empty") {
+    const std::size_t last = sound.level_sizes[0] - 1;
+    REQUIRE(250 % sound.lanes != 0);  // blocks
+    faulty.nodes[last * 6 * sound.lanes + 3] = 0;
+    CHECK(has("the empty one of a missing child"));
+  }
+  SUBCASE("a level that begins elsewhere") {
+    ++faulty.level_begin[2];
+    CHECK(has("Level 2"));
+  }
+  SUBCASE("the scene's box") {
+    faulty.nodes[static_cast<std::size_t>(tree.lbvh().scene_node()) * 6 * sound.lanes] -= 1;
+    CHECK(has("the scene"));
+  }
+  SUBCASE("another number of boxes") {
+    CHECK(validate_lbvh(sound, std::span<const RsAabb>(boxes).first(999)) != "");
+  }
 }

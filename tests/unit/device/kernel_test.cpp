@@ -64,7 +64,7 @@ TEST_CASE("kernel source: includes are resolved once, from a folder when it is n
 }
 
 TEST_CASE("kernel source: the built-in files, and a name that is none") {
-  CHECK(contains(resolve_kernel_source("primitives/layout_probe.cl"), "RsBvhNode"));
+  CHECK(contains(resolve_kernel_source("primitives/layout_probe.cl"), "RsAabb"));
   CHECK(contains(device_error([] { resolve_kernel_source("no/such.cl"); }), "no/such.cl"));
 }
 

@@ -16,15 +16,6 @@ TEST_CASE("shared records: sizes and offsets agree between the compilers") {
   const std::vector<std::size_t> expected{sizeof(RsAabb),
                                           offsetof(RsAabb, lo),
                                           offsetof(RsAabb, hi),
-                                          sizeof(RsBvhNode),
-                                          offsetof(RsBvhNode, left_lo),
-                                          offsetof(RsBvhNode, left_hi),
-                                          offsetof(RsBvhNode, right_lo),
-                                          offsetof(RsBvhNode, right_hi),
-                                          offsetof(RsBvhNode, left),
-                                          offsetof(RsBvhNode, right),
-                                          offsetof(RsBvhNode, first),
-                                          offsetof(RsBvhNode, last),
                                           sizeof(RsLine),
                                           offsetof(RsLine, v),
                                           sizeof(RsViewBounds),
@@ -77,7 +68,15 @@ TEST_CASE("shared records: sizes and offsets agree between the compilers") {
                                           offsetof(RsLensCamera, jitter),
                                           offsetof(RsLensCamera, sample),
                                           offsetof(RsLensCamera, seed_lo),
-                                          offsetof(RsLensCamera, seed_hi)};
+                                          offsetof(RsLensCamera, seed_hi),
+                                          sizeof(RsLensTile),
+                                          offsetof(RsLensTile, x0),
+                                          offsetof(RsLensTile, y0),
+                                          offsetof(RsLensTile, x1),
+                                          offsetof(RsLensTile, y1),
+                                          offsetof(RsLensTile, face),
+                                          offsetof(RsLensTile, cosine),
+                                          offsetof(RsLensTile, padding)};
   Context context(select_device(""));
   Buffer<std::uint32_t> layout(context, 256, "layout");
   layout.clear();

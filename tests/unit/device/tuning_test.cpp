@@ -27,7 +27,7 @@ DeviceInfo device(const std::string& name, const std::string& driver = "1.0") {
   return out;
 }
 
-const DeviceTuning kTuning{8, 16, 64, 32};
+const DeviceTuning kTuning{8, 16, 64, 32, true};
 
 std::string text_of(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);

@@ -371,6 +371,49 @@ TEST_CASE("gradients through mirrors equal finite differences of a double refere
   }
 }
 
+TEST_CASE("camera rays through the tree have the picture and the gradients of the tiles") {
+  Context context = make_test_context();
+  Camera camera = look_at({0.4, -0.6, -4.0}, {0, 0, 0}, {0, 1, 0}, 60, 52, 80);
+  for (const int degree : {0, 3}) {
+    for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+      for (const float near : {0.0f, 3.7f}) {
+        CAPTURE(degree);
+        CAPTURE(static_cast<int>(order));
+        CAPTURE(near);
+        const Gaussians model = reference::random_scene(900, 78, degree);
+        const DeviceGaussians gaussians =
+            DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+        TraceOptions options;
+        options.hit_order = order;
+        options.near_depth = near;
+        options.background = {0.3f, 0.2f, 0.1f};
+        // Rays on which single precision may decide otherwise pull at nothing.
+        const reference::Render expected =
+            reference::render(reference::Parameters(model), options, camera);
+        std::vector<float> gradient = random_image_gradient(expected.pixels(), 7);
+        std::size_t compared = 0;
+        for (std::size_t i = 0; i < expected.pixels(); ++i) {
+          const bool tie = expected.margin[i] < 1e-4;
+          compared += tie ? 0 : 1;
+          for (std::size_t c = 0; c < 4 && tie; ++c) gradient[c * expected.pixels() + i] = 0.0f;
+        }
+        CHECK(2 * compared > expected.pixels());
+        options.traversal = Traversal::kTiles;
+        ViewTracer tiles(context, options);
+        options.traversal = Traversal::kBvh;
+        ViewTracer tree(context, options);
+        CHECK_FALSE(tiles.by_rays(camera));
+        CHECK(tree.by_rays(camera));
+        const Traced a = trace_and_differentiate(context, tiles, gaussians, camera, gradient);
+        const Traced b = trace_and_differentiate(context, tree, gaussians, camera, gradient);
+        CHECK(compare(a.image, expected, 1e-4).maximum < 2e-3);
+        CHECK(compare(b.image, expected, 1e-4).maximum < 2e-3);
+        check_gradients(b.gradients, a.gradients, 1e-3);
+      }
+    }
+  }
+}
+
 TEST_CASE("what a tracer of rays refuses, and a tree that is refitted") {
   Context context = make_test_context();
   TraceOptions near;
@@ -380,6 +423,9 @@ TEST_CASE("what a tracer of rays refuses, and a tree that is refitted") {
   CHECK_THROWS_AS(
       ViewTracer(context, deep, mirrors_of({{{-2, -2, 1}, {4, 0, 0}, {0, 4, 0}, {1, 1, 1}}}, 1)),
       UsageError);
+  const Panel panel{{-1, -1, 2}, {2, 0, 0}, {0, 2, 0}, glm::dvec3(1)};
+  CHECK_THROWS_AS(ViewTracer(context, near, mirrors_of({panel}, 1)), UsageError);
+  CHECK_NOTHROW(ViewTracer(context, near));
   Mirrors endless;
   endless.max_bounces = -1;
   CHECK_THROWS_AS(ViewTracer(context, {}, endless), UsageError);
@@ -390,8 +436,13 @@ TEST_CASE("what a tracer of rays refuses, and a tree that is refitted") {
   gradient.clear();
   GaussianGradients out;
   DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  ViewTracer cut(context, near);
-  CHECK_THROWS_AS(cut.forward(gaussians, camera), UsageError);
+  TraceOptions tiled;
+  tiled.traversal = Traversal::kTiles;
+  CHECK_THROWS_AS(ViewTracer(context, tiled, mirrors_of({panel}, 1)), UsageError);
+  ViewTracer tiles(context, tiled);
+  Camera flat = camera;
+  flat.model = CameraModel::kOrthographic;
+  CHECK_THROWS_AS(tiles.forward(gaussians, flat), UsageError);
   tracer.forward(gaussians, camera);
   CHECK_THROWS_AS(tracer.backward(gaussians, gradient, out), UsageError);
   CHECK(tracer.capped_rays() == 0);
@@ -468,7 +519,7 @@ TEST_CASE("a pinhole's picture ray by ray equals the one of packets, depth and a
   }
 }
 
-TEST_CASE("pictures of other cameras equal the double reference ray by ray [small]") {
+TEST_CASE("pictures of other cameras equal the double reference, by packets or rays [small]") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(300, 42, 2);
   const reference::Parameters parameters(model);
@@ -483,44 +534,51 @@ TEST_CASE("pictures of other cameras equal the double reference ray by ray [smal
   panorama.translation = {0, 0, 0.2};
   for (const Camera& camera : {opencv, view_of(CameraModel::kFisheye, 30, 30, 6), panorama,
                                view_of(CameraModel::kOrthographic, 28, 21, 10)}) {
-    CAPTURE(static_cast<int>(camera.model));
-    tracer.forward(gaussians, camera);
-    const Image image = tracer.download_image();
-    const Image depth = tracer.download_depth();
-    const bool orthographic = camera.model == CameraModel::kOrthographic;
-    const glm::dvec3 axis(camera.rotation[0][2], camera.rotation[1][2], camera.rotation[2][2]);
-    std::size_t compared = 0, hit = 0, wrong = 0;
-    for (std::size_t i = 0; i < image.pixels(); ++i) {
-      const auto width = static_cast<std::size_t>(camera.width);
-      const CameraRay ray = camera_ray(camera, static_cast<double>(i % width) + 0.5,
-                                       static_cast<double>(i / width) + 0.5);
-      if (!ray.valid) {
-        wrong += image.data[4 * i] == 0.1f && image.data[4 * i + 3] == 0.0f ? 0 : 1;
-        continue;
+    for (const bool one_by_one : {false, true}) {
+      CAPTURE(static_cast<int>(camera.model));
+      CAPTURE(one_by_one);
+      if (one_by_one) {
+        tracer.forward_rays(gaussians, camera);
+      } else {
+        tracer.forward(gaussians, camera);
       }
-      const reference::RayTrace expected = reference::trace_ray(
-          parameters, options, ray.origin, ray.direction, 0.0, 1e30,
-          orthographic ? reference::ColorMode::kAlongRay : reference::ColorMode::kFromOrigin);
-      if (expected.margin < 1e-4) continue;
-      ++compared;
-      hit += expected.hits.empty() ? 0 : 1;
-      double worst = std::abs(static_cast<double>(image.data[4 * i + 3]) - expected.alpha);
-      for (int c = 0; c < 3; ++c) {
-        worst = std::max(
-            worst, std::abs(static_cast<double>(image.data[4 * i + static_cast<std::size_t>(c)]) -
-                            expected.color[c]));
+      const Image image = tracer.download_image();
+      const Image depth = tracer.download_depth();
+      const bool orthographic = camera.model == CameraModel::kOrthographic;
+      const glm::dvec3 axis(camera.rotation[0][2], camera.rotation[1][2], camera.rotation[2][2]);
+      std::size_t compared = 0, hit = 0, wrong = 0;
+      for (std::size_t i = 0; i < image.pixels(); ++i) {
+        const auto width = static_cast<std::size_t>(camera.width);
+        const CameraRay ray = camera_ray(camera, static_cast<double>(i % width) + 0.5,
+                                         static_cast<double>(i / width) + 0.5);
+        if (!ray.valid) {
+          wrong += image.data[4 * i] == 0.1f && image.data[4 * i + 3] == 0.0f ? 0 : 1;
+          continue;
+        }
+        const reference::RayTrace expected = reference::trace_ray(
+            parameters, options, ray.origin, ray.direction, 0.0, 1e30,
+            orthographic ? reference::ColorMode::kAlongRay : reference::ColorMode::kFromOrigin);
+        if (expected.margin < 1e-4) continue;
+        ++compared;
+        hit += expected.hits.empty() ? 0 : 1;
+        double worst = std::abs(static_cast<double>(image.data[4 * i + 3]) - expected.alpha);
+        for (int c = 0; c < 3; ++c) {
+          worst = std::max(
+              worst, std::abs(static_cast<double>(image.data[4 * i + static_cast<std::size_t>(c)]) -
+                              expected.color[c]));
+        }
+        const double along =
+            camera.model == CameraModel::kOpenCv ? glm::dot(axis, ray.direction) : 1.0;
+        const double far = along * expected.expected_depth;
+        wrong += worst < 2e-3 &&
+                         std::abs(static_cast<double>(depth.data[3 * i]) - far) <= 2e-3 * (1 + far)
+                     ? 0
+                     : 1;
       }
-      const double along =
-          camera.model == CameraModel::kOpenCv ? glm::dot(axis, ray.direction) : 1.0;
-      const double far = along * expected.expected_depth;
-      wrong +=
-          worst < 2e-3 && std::abs(static_cast<double>(depth.data[3 * i]) - far) <= 2e-3 * (1 + far)
-              ? 0
-              : 1;
+      CHECK(wrong == 0);
+      CHECK(compared * 2 > image.pixels());
+      CHECK(hit > 50);
     }
-    CHECK(wrong == 0);
-    CHECK(compared * 2 > image.pixels());
-    CHECK(hit > 50);
   }
 }
 
@@ -534,11 +592,77 @@ TEST_CASE("cameras that a view cannot be traced from are refused") {
   CHECK_THROWS_AS(tracer.forward(gaussians, camera), UsageError);
   camera.model = CameraModel::kEquirectangular;
   CHECK_NOTHROW(tracer.forward(gaussians, camera));
-  options.near_depth = 0.5f;
-  ViewTracer near(context, options);
-  CHECK_THROWS_AS(near.forward(gaussians, camera), UsageError);
-  CHECK_NOTHROW(near.forward(gaussians, view_of(CameraModel::kPinhole, 8, 8, 9)));
-  CameraTracer packets(context, TraceOptions{});
-  packets.update(gaussians);
-  CHECK_THROWS_AS(packets.forward(gaussians, view_of(CameraModel::kOpenCv, 8, 8, 9)), UsageError);
+  options.traversal = Traversal::kTiles;
+  ViewTracer tiles(context, options);
+  CHECK_THROWS_AS(tiles.forward(gaussians, camera), UsageError);
+  CHECK_THROWS_AS(tiles.forward(gaussians, view_of(CameraModel::kOrthographic, 8, 8, 9)),
+                  UsageError);
+  CHECK_NOTHROW(tiles.forward(gaussians, view_of(CameraModel::kPinhole, 8, 8, 9)));
+}
+
+TEST_CASE("every traversal gives the same picture, depth and near plane [small]") {
+  Context context = make_test_context();
+  for (const int degree : {0, 3}) {
+    const Gaussians model = reference::random_scene(500, 47, degree);
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+    for (const CameraModel lens :
+         {CameraModel::kPinhole, CameraModel::kOpenCv, CameraModel::kFisheye}) {
+      for (const float near : {0.0f, 2.4f}) {
+        CAPTURE(degree);
+        CAPTURE(static_cast<int>(lens));
+        CAPTURE(near);
+        TraceOptions options;
+        options.near_depth = near;
+        options.background = {0.1f, 0.3f, 0.5f};
+        options.depth = true;
+        std::vector<Image> images, depths;
+        for (const Traversal traversal : {Traversal::kTiles, Traversal::kBvh}) {
+          options.traversal = traversal;
+          ViewTracer tracer(context, options);
+          tracer.forward(gaussians, view_of(lens, 64, 48, 40));
+          images.push_back(tracer.download_image());
+          depths.push_back(tracer.download_depth());
+        }
+        double mean = 0, covered = 0;
+        std::size_t other = 0;
+        for (std::size_t i = 0; i < images[0].pixels(); ++i) {
+          float worst = 0;
+          for (std::size_t c = 0; c < 4; ++c) {
+            const float a = images[0].data[4 * i + c], b = images[1].data[4 * i + c];
+            worst = std::max(worst, std::abs(a - b));
+          }
+          const float a = depths[0].data[3 * i], b = depths[1].data[3 * i];
+          other += worst > 1e-3f || std::abs(a - b) > 1e-3f * std::max(a, b) ? 1 : 0;
+          mean += static_cast<double>(worst);
+          covered += images[0].data[4 * i + 3] > 0.5f ? 1 : 0;
+        }
+        const auto pixels = static_cast<double>(images[0].pixels());
+        CHECK(mean / pixels < 2e-5);
+        CHECK(static_cast<double>(other) * 500 < pixels);
+        CHECK(covered * 10 > pixels);
+      }
+    }
+  }
+}
+
+TEST_CASE("traversal auto is what the tuning says [small]") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(100, 48, 0);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const Camera camera = view_of(CameraModel::kPinhole, 24, 24, 20);
+  const auto picture = [&](Traversal traversal) {
+    TraceOptions options;
+    options.traversal = traversal;
+    ViewTracer tracer(context, options);
+    tracer.forward(gaussians, camera);
+    return tracer.download_image().data;
+  };
+  const std::vector<float> tiles = picture(Traversal::kTiles), bvh = picture(Traversal::kBvh);
+  REQUIRE(tiles != bvh);  // in their last bits
+  CHECK(picture(Traversal::kAuto) == tiles);
+  DeviceTuning tuning;
+  tuning.bvh = true;
+  context.set_tuning(tuning);
+  CHECK(picture(Traversal::kAuto) == bvh);
 }

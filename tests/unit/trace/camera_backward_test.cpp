@@ -212,8 +212,8 @@ TEST_CASE("pose gradient equals the double reference") {
   Buffer<float> gradient(context, image_gradient.size(), "image gradient");
   gradient.upload(image_gradient);
   GaussianGradients out;
-  tracer.backward(gaussians, gradient, out);
-  const PoseGradient pose = tracer.pose_gradient(gaussians);
+  PoseGradient pose;
+  tracer.backward(gaussians, gradient, out, &pose);
   for (int j = 0; j < 3; ++j) {
     const auto k = static_cast<std::size_t>(j);
     CHECK(pose.center[k] == doctest::Approx(expected.center[j]).epsilon(2e-3));

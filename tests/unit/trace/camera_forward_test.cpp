@@ -367,7 +367,7 @@ TEST_CASE("lists that 32 bits cannot count are refused before anything is writte
   const Buffer<RsAabb> boxes(context, kCount, "boxes");
   const RsCamera converted = device_camera(camera, 0.0f);
   CandidateLists lists(context, 1);
-  lists.prepare(gaussians, converted, options);
+  lists.prepare(gaussians, converted, {}, options);
   CHECK_FALSE(lists.build(boxes, converted, {0, 0, 256, 255}, std::size_t{1} << 30));
   CHECK(lists.candidates() == Scan::kMost);
   REQUIRE(lists.build(boxes, converted, {200, 7, 3, 2}, std::size_t{1} << 30));

@@ -19,7 +19,7 @@ struct Fixture {
       std::getenv("RAYSPLATS_DEVICE") == nullptr ? "" : std::getenv("RAYSPLATS_DEVICE"))};
   Gaussians model = reference::random_scene(70, 4, 1);
   Adam adam{context, {}};
-  ModelValidator validator{context, ScaleActivation::kExp, {}};
+  ModelValidator validator{context, {}};
 
   Fixture() { adam.initialize(model.size(), model.sh_degree); }
   std::string fault() {

@@ -86,6 +86,7 @@ TEST_CASE("the configurations of the project are valid and the default one docum
   TrainOptions paper;
   read_train_config(folder / "paper.toml", paper);
   CHECK(paper.hit_order == HitOrder::kEntry);
+  CHECK(paper.traversal == Traversal::kBvh);
   CHECK(paper.scale_activation == ScaleActivation::kSigmoid);
   CHECK(paper.sh_degree == 0);
   CHECK(paper.pixel_loss == PixelLoss::kL2);

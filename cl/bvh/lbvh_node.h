@@ -4,8 +4,8 @@
 // implicit: things in `order`, blocks of PACKET consecutive ones, level-1 nodes over PACKET
 // consecutive blocks, and so on up to one root. Wide nodes as slabs per lane: Dammertz et al. 2008,
 // Wald et al. 2008.
-#ifndef RS_BVH_WIDE_NODE_H
-#define RS_BVH_WIDE_NODE_H
+#ifndef RS_BVH_LBVH_NODE_H
+#define RS_BVH_LBVH_NODE_H
 
 #include "bvh/box.h"
 #include "primitives/vector_lanes.h"
@@ -15,7 +15,7 @@
 #define RS_NODE_VECTORS 6
 // A child of every level stays behind: PACKET - 1 per level, and 2^31 things have 15 levels of 4 or
 // 7 of 16.
-#define RS_WIDE_STACK 128
+#define RS_NODE_STACK 128
 
 typedef union {
   fv v;

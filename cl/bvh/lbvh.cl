@@ -1,130 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Builds the implicit tree of wide_node.h over boxes. All O(n).
-//   bound_centers  box of the centres in chunks, then finish_grid: the curve's cells
-//   hilbert_codes  position of every box's centre on a Hilbert curve
-//   order_groups   after a sort by code: things of GROUP consecutive positions ordered again, so
-//                  that blocks of PACKET get small boxes
+// Makes the implicit tree of lbvh_node.h over boxes in the order of curve.cl. All O(n).
+//   order_groups   things of GROUP consecutive positions ordered again, so that blocks of PACKET
+//                  get small boxes
 //   merge_nodes    boxes of the nodes of one level
 // What lies in the blocks is written by others, who also store the blocks' boxes in the nodes of
-// level 1. A refit repeats that and merge_nodes. Hilbert codes by transposed axes: Skilling 2004.
-// Splits by the surface area heuristic: Goldsmith and Salmon 1987, MacDonald and Booth 1990.
-#include "bvh/wide_node.h"
+// level 1. A refit repeats that and merge_nodes. Splits by the surface area heuristic: Goldsmith
+// and Salmon 1987, MacDonald and Booth 1990.
+#include "bvh/lbvh_node.h"
 
 // Boxes that order_groups orders together, a multiple of PACKET and at most 256.
 #ifndef GROUP
 #define GROUP 64
 #endif
 #define GROUP_BLOCKS (GROUP / PACKET)
-#define CODE_BITS 21
-#define RS_LAST_CELL 2097151.0f
-
-// partials[g] = box of the centres of the valid boxes in chunk g. Launch: one work-item per chunk.
-__kernel void bound_centers(__global const RsAabb* boxes,
-                            __global RsAabb* partials,
-                            const uint count,
-                            const uint chunk) {
-  const uint begin = min((uint)get_global_id(0) * chunk, count);
-  const uint end = min(begin + chunk, count);
-  RsBox sum = box_empty();
-  for (uint i = begin; i < end; ++i) {
-    const RsBox box = box_load(boxes, i);
-    if (!box_valid(box)) continue;
-    RsBox center;
-    center.lo = center.hi = box_center(box);
-    sum = box_union(sum, center);
-  }
-  box_store(sum, partials, get_global_id(0));
-}
-
-// grid = {half the origin (3), cells per half unit}: one cell size for all axes, so that the curve
-// keeps its shape. Launch: one work-item.
-__kernel void finish_grid(__global const RsAabb* partials, const uint count, __global float* grid) {
-  RsBox sum = box_empty();
-  for (uint i = 0; i < count; ++i) sum = box_union(sum, box_load(partials, i));
-  const float4 extent = 0.5f * sum.hi - 0.5f * sum.lo;
-  const float longest = fmax(extent.x, fmax(extent.y, extent.z));
-  const bool flat = !(longest > 1e-30f);
-  vstore3(flat ? (float3)(0.0f) : 0.5f * sum.lo.xyz, 0, grid);
-  grid[3] = flat ? 0.0f : RS_LAST_CELL / longest;
-}
-
-// The 21 low bits of x, two zeros after each.
-ulong spread_bits(uint x) {
-  ulong v = x & 0x1fffff;
-  v = (v | v << 32) & 0x001f00000000ffffUL;
-  v = (v | v << 16) & 0x001f0000ff0000ffUL;
-  v = (v | v << 8) & 0x100f00f00f00f00fUL;
-  v = (v | v << 4) & 0x10c30c30c30c30c3UL;
-  v = (v | v << 2) & 0x1249249249249249UL;
-  return v;
-}
-
-// high (31 bits), low (32 bits) = code of box i, indices[i] = i. Boxes that are not valid come
-// last. Launch: at least ceil(count / PACKET) work-items, PACKET boxes
-// each.
-__kernel void hilbert_codes(__global const RsAabb* boxes,
-                            __global const float* grid,
-                            __global uint* high,
-                            __global uint* low,
-                            __global uint* indices,
-                            const uint count) {
-  const uint begin = (uint)get_global_id(0) * PACKET;
-  if (begin >= count) return;
-  const uint size = min((uint)PACKET, count - begin);
-  union {
-    iv v[3];
-    int s[3][PACKET];
-  } cell;
-  bool valid[PACKET];
-  for (uint k = 0; k < PACKET; ++k) {
-    const RsBox box = box_load(boxes, begin + min(k, size - 1));
-    valid[k] = box_valid(box);
-    const float4 at =
-        clamp((0.5f * box_center(box) - vload4(0, grid)) * grid[3], 0.0f, RS_LAST_CELL);
-    cell.s[0][k] = valid[k] ? (int)at.x : 0;
-    cell.s[1][k] = valid[k] ? (int)at.y : 0;
-    cell.s[2][k] = valid[k] ? (int)at.z : 0;
-  }
-  iv x = cell.v[0], y = cell.v[1], z = cell.v[2];
-  for (int bit = 1 << (CODE_BITS - 1); bit > 1; bit >>= 1) {
-    const iv low_bits = (iv)(bit - 1);
-    x ^= low_bits & RS_MASK((x & bit) != 0);
-    const iv flip_y = RS_MASK((y & bit) != 0);
-    iv swap = (x ^ y) & low_bits & ~flip_y;
-    x ^= (low_bits & flip_y) | swap;
-    y ^= swap;
-    const iv flip_z = RS_MASK((z & bit) != 0);
-    swap = (x ^ z) & low_bits & ~flip_z;
-    x ^= (low_bits & flip_z) | swap;
-    z ^= swap;
-  }
-  y ^= x;
-  z ^= y;
-  iv parity = (iv)(0);
-  for (int bit = 1 << (CODE_BITS - 1); bit > 1; bit >>= 1) {
-    parity ^= (iv)(bit - 1) & RS_MASK((z & bit) != 0);
-  }
-  cell.v[0] = x ^ parity;
-  cell.v[1] = y ^ parity;
-  cell.v[2] = z ^ parity;
-  for (uint k = 0; k < size; ++k) {
-    const ulong code = valid[k] ? spread_bits(cell.s[0][k]) << 2 | spread_bits(cell.s[1][k]) << 1 |
-                                      spread_bits(cell.s[2][k])
-                                : 0x7fffffffffffffffUL;
-    high[begin + k] = (uint)(code >> 32);
-    low[begin + k] = (uint)code;
-    indices[begin + k] = begin + k;
-  }
-}
-
-// keys[i] = words[order[i]]. Launch: at least count work-items.
-__kernel void gather_codes(__global const uint* words,
-                           __global const uint* order,
-                           __global uint* keys,
-                           const uint count) {
-  const uint i = get_global_id(0);
-  if (i < count) keys[i] = words[order[i]];
-}
 
 float half_area(RsBox box) {
   const float4 e = max(box.hi - box.lo, 0.0f);

@@ -39,7 +39,7 @@ std::vector<std::uint32_t> meet_node(Context& context,
   Buffer<float> device_node(context, node.size(), "node");
   device_node.upload(node);
   Buffer<std::uint32_t> met(context, rays.size(), "met");
-  context.kernel("bvh/wide_probe.cl", "meet_node", build)
+  context.kernel("bvh/node_probe.cl", "meet_node", build)
       .launch(Range::linear(rays.size(), 1), static_cast<std::uint32_t>(rays.size()), device_rays,
               device_node, met);
   return met.download();

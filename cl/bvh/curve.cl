@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Morton order of boxes: bounds of the centres (center_bounds, then choose_grid), 64-bit codes of
-// the centres (morton_codes), and the repair of short runs of equal high words after a sort by the
-// high word alone (sort_runs). All O(n). Codes: Morton 1966, as used by Lauterbach et al. 2009.
+// Order of boxes along a Hilbert curve: bounds of the centres (center_bounds, then choose_grid),
+// 64-bit codes of the centres (curve_codes), and the repair of short runs of equal high words after
+// a sort by the high word alone (sort_runs). All O(n). Codes by transposed axes: Skilling 2004.
 //
-// A grid has one cell size for all axes, a power of two: codes are exact and equal on every device,
-// and the longest axis is split first. A few boxes far away would leave the others in few cells.
+// A grid has one cell size for all axes, a power of two: the curve keeps its shape, and codes are
+// exact and equal on every device. A few boxes far away would leave the others in few cells.
 // choose_grid therefore looks for a window that holds all but the tails of a sample; where it is
 // much smaller than the whole it gets a grid of its own, and the boxes outside get codes behind all
 // others (bit 63) on a coarse grid around the middle of the window: their first split is by
 // octants, so that few of their nodes cover the window.
 #include "bvh/box.h"
+#include "primitives/vector_lanes.h"
 
 #ifndef RS_GROUP
 #define RS_GROUP 1
@@ -26,11 +27,40 @@
 #define RS_ROUNDS 32
 // A window is used when it is smaller than the whole by this factor.
 #define RS_MIN_GAIN 16.0f
+// Bits per axis of a code.
+#define RS_CODE_BITS 21
+
+// Union over the work-items of a group, the same for all of them; `scratch` holds 2 RS_GROUP.
+inline RsBox group_union(RsBox own, __local float4* scratch) {
+#if RS_GROUP > 1
+  const uint lane = get_local_id(0);
+  scratch[2 * lane] = own.lo;
+  scratch[2 * lane + 1] = own.hi;
+  for (uint half_size = RS_GROUP / 2; half_size > 0; half_size /= 2) {
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (lane < half_size) {
+      RsBox other;
+      other.lo = scratch[2 * (lane + half_size)];
+      other.hi = scratch[2 * (lane + half_size) + 1];
+      own = box_union(own, other);
+      scratch[2 * lane] = own.lo;
+      scratch[2 * lane + 1] = own.hi;
+    }
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  own.lo = scratch[0];
+  own.hi = scratch[1];
+#else
+  (void)scratch;
+#endif
+  return own;
+}
 
 // partials[g] = box of the centres of the valid boxes in group g's chunk.
 // Launch: groups of RS_GROUP work-items (1 or a power of two).
 __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void center_bounds(
     __global const RsAabb* boxes, __global RsAabb* partials, uint count, uint chunk) {
+  __local float4 scratch[2 * RS_GROUP];
   const uint begin = min((uint)get_group_id(0) * chunk, count);
   const uint end = min(begin + chunk, count);
   RsBox sum = box_empty();
@@ -42,24 +72,7 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void center_bound
       sum = box_union(sum, center);
     }
   }
-#if RS_GROUP > 1
-  __local float4 lo[RS_GROUP];
-  __local float4 hi[RS_GROUP];
-  const uint lane = get_local_id(0);
-  lo[lane] = sum.lo;
-  hi[lane] = sum.hi;
-  for (uint half_size = RS_GROUP / 2; half_size > 0; half_size /= 2) {
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (lane < half_size) {
-      RsBox other;
-      other.lo = lo[lane + half_size];
-      other.hi = hi[lane + half_size];
-      sum = box_union(sum, other);
-      lo[lane] = sum.lo;
-      hi[lane] = sum.hi;
-    }
-  }
-#endif
+  sum = group_union(sum, scratch);
   if (get_local_id(0) == 0) box_store(sum, partials, get_group_id(0));
 }
 
@@ -78,7 +91,7 @@ inline float longest_side(RsBox box) {
 // All lengths are halves of the true ones, which cannot overflow. grid = {origin (3), cells per
 // unit} of the window, {origin in the middle (3), cells per unit} of what is outside, the window's
 // lower and upper corner (3 and 3).
-// Launch: one group of RS_GROUP work-items.
+// Launch: one group of RS_GROUP work-items, which share the partial boxes and the sample.
 __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void choose_grid(
     __global const RsAabb* boxes,
     __global const RsAabb* partials,
@@ -86,9 +99,11 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void choose_grid(
     uint groups,
     __global float* grid) {
   __local uint bins[3][RS_BINS];
+  __local float4 scratch[2 * RS_GROUP];
   const uint lane = get_local_id(0);
   RsBox whole = box_empty();
-  for (uint i = 0; i < groups; ++i) whole = box_union(whole, box_load(partials, i));
+  for (uint i = lane; i < groups; i += RS_GROUP) whole = box_union(whole, box_load(partials, i));
+  whole = group_union(whole, scratch);
   whole.lo *= 0.5f;
   whole.hi *= 0.5f;
   RsBox window = whole;
@@ -159,72 +174,79 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void choose_grid(
   }
 }
 
-// The 10 low bits of x, two zeros after each.
-inline uint spread_bits(uint x) {
-  x &= 0x3ff;
-  x = (x | x << 16) & 0x030000ff;
-  x = (x | x << 8) & 0x0300f00f;
-  x = (x | x << 4) & 0x030c30c3;
-  x = (x | x << 2) & 0x09249249;
-  return x;
-}
-
-// Bits first..first + 9 of three coordinates in turn.
-inline uint interleave(uint x, uint y, uint z, int first) {
-  return spread_bits(x >> first) << 2 | spread_bits(y >> first) << 1 | spread_bits(z >> first);
-}
-
-inline uint grid_cell(float half_center, float origin, float scale, float first, float last) {
-  const float cell = (half_center - origin) * scale + first;
-  return (uint)(cell > 0.0f ? (cell < last ? cell : last) : 0.0f);
-}
-
-inline float half_center(float lo, float hi) { return 0.5f * (0.5f * lo + 0.5f * hi); }
-
-inline int finite_interval(float lo, float hi) {
-  return (lo <= hi) & (lo >= -FLT_MAX) & (hi <= FLT_MAX);
+// The 21 low bits of x, two zeros after each.
+inline ulong spread_bits(uint x) {
+  ulong v = x & 0x1fffff;
+  v = (v | v << 32) & 0x001f00000000ffffUL;
+  v = (v | v << 16) & 0x001f0000ff0000ffUL;
+  v = (v | v << 8) & 0x100f00f00f00f00fUL;
+  v = (v | v << 4) & 0x10c30c30c30c30c3UL;
+  v = (v | v << 2) & 0x1249249249249249UL;
+  return v;
 }
 
 // high, low (32 bits each) = code of box i, indices[i] = i. Boxes that are not valid sort last.
-// Launch: work-items of `chunk` consecutive boxes each; without branches and in 32-bit words, so
-// that compilers make vectors of the loop.
-__kernel void morton_codes(__global const float* restrict boxes,
-                           __global const float* restrict grid,
-                           __global uint* restrict high,
-                           __global uint* restrict low,
-                           __global uint* restrict indices,
-                           uint count,
-                           uint chunk) {
-  const uint begin = min((uint)get_global_id(0) * chunk, count);
-  const uint end = min(begin + chunk, count);
+// Launch: at least ceil(count / PACKET) work-items, PACKET boxes each.
+__kernel void curve_codes(__global const RsAabb* boxes,
+                          __global const float* grid,
+                          __global uint* high,
+                          __global uint* low,
+                          __global uint* indices,
+                          const uint count) {
+  const uint begin = (uint)get_global_id(0) * PACKET;
+  if (begin >= count) return;
+  const uint size = min((uint)PACKET, count - begin);
   const float4 fine = vload4(0, grid);
   const float4 coarse = vload4(1, grid);
-  const float3 lo = vload3(0, grid + 8);
-  const float3 hi = vload3(0, grid + 11);
-  for (uint i = begin; i < end; ++i) {
-    __global const float* box = boxes + 6 * (size_t)i;
-    const int valid = finite_interval(box[0], box[3]) & finite_interval(box[1], box[4]) &
-                      finite_interval(box[2], box[5]);
-    const float cx = half_center(box[0], box[3]);
-    const float cy = half_center(box[1], box[4]);
-    const float cz = half_center(box[2], box[5]);
-    const bool inside =
-        (cx >= lo.x) & (cx <= hi.x) & (cy >= lo.y) & (cy <= hi.y) & (cz >= lo.z) & (cz <= hi.z);
-    const float scale = inside ? fine.w : coarse.w;
-    const float first = inside ? 0.0f : 1048576.0f;
-    // The last cell of the coarse grid is left to boxes that are not valid.
-    const float last = inside ? 2097151.0f : 2097150.0f;
-    const uint x = grid_cell(cx, inside ? fine.x : coarse.x, scale, first, last);
-    const uint y = grid_cell(cy, inside ? fine.y : coarse.y, scale, first, last);
-    const uint z = grid_cell(cz, inside ? fine.z : coarse.z, scale, first, last);
-    // 63 bits: three of bit 20, thirty of bits 10..19, thirty of bits 0..9.
-    const uint top = (x >> 20) << 2 | (y >> 20) << 1 | z >> 20;
-    const uint middle = interleave(x, y, z, 10);
-    const uint bottom = interleave(x, y, z, 0);
-    const uint outside = inside ? 0u : 0x80000000u;
-    high[i] = valid ? outside | top << 28 | middle >> 2 : 0xffffffffu;
-    low[i] = valid ? middle << 30 | bottom : 0xffffffffu;
-    indices[i] = i;
+  const float4 lo = (float4)(vload3(0, grid + 8), -FLT_MAX);
+  const float4 hi = (float4)(vload3(0, grid + 11), FLT_MAX);
+  union {
+    iv v[3];
+    int s[3][PACKET];
+  } cell;
+  bool valid[PACKET], inside[PACKET];
+  for (uint k = 0; k < PACKET; ++k) {
+    const RsBox box = box_load(boxes, begin + min(k, size - 1));
+    valid[k] = box_valid(box);
+    const float4 center = 0.5f * box_center(box);
+    inside[k] = all(center >= lo && center <= hi);
+    // The last cells of the coarse grid are left to boxes that are not valid.
+    const float4 at = inside[k]
+                          ? clamp((center - fine) * fine.w, 0.0f, 2097151.0f)
+                          : clamp((center - coarse) * coarse.w + 1048576.0f, 0.0f, 2097150.0f);
+    cell.s[0][k] = valid[k] ? (int)at.x : 0;
+    cell.s[1][k] = valid[k] ? (int)at.y : 0;
+    cell.s[2][k] = valid[k] ? (int)at.z : 0;
+  }
+  iv x = cell.v[0], y = cell.v[1], z = cell.v[2];
+  for (int bit = 1 << (RS_CODE_BITS - 1); bit > 1; bit >>= 1) {
+    const iv low_bits = (iv)(bit - 1);
+    x ^= low_bits & RS_MASK((x & bit) != 0);
+    const iv flip_y = RS_MASK((y & bit) != 0);
+    iv swap = (x ^ y) & low_bits & ~flip_y;
+    x ^= (low_bits & flip_y) | swap;
+    y ^= swap;
+    const iv flip_z = RS_MASK((z & bit) != 0);
+    swap = (x ^ z) & low_bits & ~flip_z;
+    x ^= (low_bits & flip_z) | swap;
+    z ^= swap;
+  }
+  y ^= x;
+  z ^= y;
+  iv parity = (iv)(0);
+  for (int bit = 1 << (RS_CODE_BITS - 1); bit > 1; bit >>= 1) {
+    parity ^= (iv)(bit - 1) & RS_MASK((z & bit) != 0);
+  }
+  cell.v[0] = x ^ parity;
+  cell.v[1] = y ^ parity;
+  cell.v[2] = z ^ parity;
+  for (uint k = 0; k < size; ++k) {
+    const ulong code =
+        spread_bits(cell.s[0][k]) << 2 | spread_bits(cell.s[1][k]) << 1 | spread_bits(cell.s[2][k]);
+    const uint outside = inside[k] ? 0u : 0x80000000u;
+    high[begin + k] = valid[k] ? outside | (uint)(code >> 32) : 0xffffffffu;
+    low[begin + k] = valid[k] ? (uint)code : 0xffffffffu;
+    indices[begin + k] = begin + k;
   }
 }
 
