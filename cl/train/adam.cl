@@ -85,14 +85,19 @@ void adam_run_sh(AdamGroup group,
   for (; i < end; ++i) adam_scalar(group, i, rates[phase++], k);
 }
 
-// 0 when all gradients of the run are finite, else NaN.
-float poison(const __global float* gradient, size_t begin, size_t end) {
-  lanes sum = (lanes)(0.0f);
-  float rest = 0.0f;
+// Exponent of infinity and NaN. Compilers may take zero times anything for zero, so numbers that
+// are not finite are known by their bits.
+#define RS_EXPONENT 0x7f800000u
+
+// Whether a gradient of the run is not finite.
+bool poisoned(const __global float* gradient, size_t begin, size_t end) {
+  const __global uint* words = (const __global uint*)gradient;
+  lane_words most = (lane_words)(0u);
+  uint rest = 0;
   size_t i = begin;
-  for (; i + VECTOR <= end; i += VECTOR) sum += 0.0f * rs_load(gradient + i);
-  for (; i < end; ++i) rest += 0.0f * gradient[i];
-  return rest + rs_lanes_sum(sum);
+  for (; i + VECTOR <= end; i += VECTOR) most = max(most, rs_load_words(words + i) & RS_EXPONENT);
+  for (; i < end; ++i) rest = max(rest, words[i] & RS_EXPONENT);
+  return rest == RS_EXPONENT || rs_any_lane(most == RS_EXPONENT);
 }
 
 __kernel void adam_step(__global float* means,
@@ -150,11 +155,12 @@ __kernel void adam_step(__global float* means,
     phase = phase + 1 == sh_floats ? 0 : phase + 1;
   }
 
-#define RS_POISON(from, to)                                                                   \
-  (poison(means_gradient, 3 * (from), 3 * (to)) +                                             \
-   poison(quaternions_gradient, 4 * (from), 4 * (to)) +                                       \
-   poison(scales_gradient, 3 * (from), 3 * (to)) + poison(opacities_gradient, (from), (to)) + \
-   poison(sh_gradient, sh_floats * (from), sh_floats * (to)))
+#define RS_POISONED(from, to)                              \
+  (poisoned(means_gradient, 3 * (from), 3 * (to)) ||       \
+   poisoned(quaternions_gradient, 4 * (from), 4 * (to)) || \
+   poisoned(scales_gradient, 3 * (from), 3 * (to)) ||      \
+   poisoned(opacities_gradient, (from), (to)) ||           \
+   poisoned(sh_gradient, sh_floats * (from), sh_floats * (to)))
 #define RS_UPDATE(from, to)                                               \
   adam_run(mean_group, 3 * (from), 3 * (to), means_rate, &k);             \
   adam_run(quaternion_group, 4 * (from), 4 * (to), quaternions_rate, &k); \
@@ -165,14 +171,14 @@ __kernel void adam_step(__global float* means,
   uint visible = 0;
   for (size_t i = first; i < last; ++i) visible += !visible_only || screen[3 * i + 2] != 0.0f;
   if (visible == 0) return;
-  if (visible == last - first && RS_POISON(first, last) == 0.0f) {
+  if (visible == last - first && !RS_POISONED(first, last)) {
     RS_UPDATE(first, last);
     return;
   }
   uint bad = 0;
   for (size_t i = first; i < last; ++i) {
     if (visible_only && screen[3 * i + 2] == 0.0f) continue;
-    if (RS_POISON(i, i + 1) == 0.0f) {
+    if (!RS_POISONED(i, i + 1)) {
       RS_UPDATE(i, i + 1);
     } else {
       ++bad;

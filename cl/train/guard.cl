@@ -15,11 +15,13 @@ __kernel void guard_loss(const __global float4* pixel_partials,
                          int tiles,
                          volatile __global uint* state) {
   const int items = get_global_size(0);
-  // Zero times a number is zero, unless the number is not finite.
-  float poison = 0.0f;
-  for (int i = get_global_id(0); i < tiles; i += items) poison += 0.0f * pixel_partials[i].x;
-  for (int i = get_global_id(0); i < 3 * tiles; i += items) poison += 0.0f * ssim_partials[i];
-  if (!(poison == 0.0f)) atomic_or(state, 1u);
+  // By the bits of the exponent: compilers may take zero times anything for zero.
+  uint poisoned = 0;
+  for (int i = get_global_id(0); i < tiles; i += items)
+    poisoned |= (as_uint(pixel_partials[i].x) & 0x7f800000u) == 0x7f800000u;
+  for (int i = get_global_id(0); i < 3 * tiles; i += items)
+    poisoned |= (as_uint(ssim_partials[i]) & 0x7f800000u) == 0x7f800000u;
+  if (poisoned != 0) atomic_or(state, 1u);
 }
 
 __kernel void guard_close(const __global uint* refused,

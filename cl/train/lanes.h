@@ -50,6 +50,13 @@ typedef lane_words unaligned_words __attribute__((aligned(4)));
 
 #define rs_pick(condition, yes, no) ((condition) ? (lanes)(yes) : (lanes)(no))
 
+// Whether a comparison holds in any lane.
+#if VECTOR == 1
+#define rs_any_lane(mask) (mask)
+#else
+#define rs_any_lane(mask) any(mask)
+#endif
+
 // Sum over the lanes, always in the same order.
 float rs_lanes_sum(lanes v) {
 #if VECTOR == 1

@@ -4,6 +4,10 @@
 namespace raysplats {
 namespace {
 
+// Work-items of a group: at least a whole wave of a GPU (64 on AMD's), or a few vectors of a CPU.
+constexpr std::size_t kGpuGroup = 64;
+constexpr std::size_t kCpuGroup = 16;
+
 std::size_t gaussians_per_item(const DeviceInfo& device) {
   // GPUs run one Gaussian per lane of their own accord.
   if (device.type != DeviceType::kCpu) return 1;
@@ -21,7 +25,8 @@ GaussianKernel::GaussianKernel(Context& context,
       file_(file),
       name_(name),
       build_(build),
-      width_(gaussians_per_item(context.device())) {
+      width_(gaussians_per_item(context.device())),
+      group_(context.device().type == DeviceType::kCpu ? kCpuGroup : kGpuGroup) {
   BuildOptions wide = build;
   wide_ = context.kernel(file, name, wide.define("VECTOR", width_));
 }

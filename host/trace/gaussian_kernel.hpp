@@ -27,18 +27,16 @@ class GaussianKernel {
   void launch(std::size_t count, const Arguments&... arguments) {
     const std::size_t whole = count / width_ * width_;
     if (whole > 0) {
-      wide_.launch(Range::linear(whole / width_, kGroup), std::uint32_t{0},
+      wide_.launch(Range::linear(whole / width_, group_), std::uint32_t{0},
                    static_cast<std::uint32_t>(whole), arguments...);
     }
     if (count > whole) {
-      single().launch(Range::linear(count - whole, kGroup), static_cast<std::uint32_t>(whole),
+      single().launch(Range::linear(count - whole, group_), static_cast<std::uint32_t>(whole),
                       static_cast<std::uint32_t>(count), arguments...);
     }
   }
 
  private:
-  static constexpr std::size_t kGroup = 16;
-
   Kernel& single();
 
   Context* context_ = nullptr;
@@ -46,6 +44,7 @@ class GaussianKernel {
   std::string name_;
   BuildOptions build_;
   std::size_t width_ = 1;
+  std::size_t group_ = 1;  // work-items
   Kernel wide_;
   Kernel single_;
 };
