@@ -15,6 +15,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/evaluation.hpp"
 #include "raysplats/io.hpp"
+#include "train/mirror_meshes.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats::cli {
@@ -43,7 +44,7 @@ void run(const Options& options, const GlobalOptions& global) {
   const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   const std::unique_ptr<Context> context = open_context(options.device);
   const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
-  ViewTracer tracer(*context, trace);
+  ViewTracer tracer(*context, trace, mirrors_of(source));
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), views);
 

@@ -1,17 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/model_summary.hpp"
+#include "io/mesh_file.hpp"
+#include "io/ply_file.hpp"
+#include "io/scene_file.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "render_flags.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats::cli {
@@ -47,6 +57,121 @@ const char* kind_name(DatasetKind kind) {
   return "nerfstudio";
 }
 
+const char* model_name(CameraModel model) {
+  switch (model) {
+    case CameraModel::kOpenCv:
+      return "opencv";
+    case CameraModel::kFisheye:
+      return "fisheye";
+    case CameraModel::kEquirectangular:
+      return "equirectangular";
+    case CameraModel::kOrthographic:
+      return "orthographic";
+    case CameraModel::kPinhole:
+      break;
+  }
+  return "pinhole";
+}
+
+const char* kind_name(Material::Kind kind) {
+  switch (kind) {
+    case Material::Kind::kMirror:
+      return "mirror";
+    case Material::Kind::kGlass:
+      return "glass";
+    case Material::Kind::kTransparent:
+      return "transparent";
+    case Material::Kind::kEmissive:
+      return "emissive";
+    case Material::Kind::kDiffuse:
+      break;
+  }
+  return "diffuse";
+}
+
+const char* kind_name(Light::Kind kind) {
+  switch (kind) {
+    case Light::Kind::kDirectional:
+      return "directional";
+    case Light::Kind::kSphere:
+      return "sphere";
+    case Light::Kind::kPoint:
+      break;
+  }
+  return "point";
+}
+
+const char* source_name(SceneCamera::Source source) {
+  switch (source) {
+    case SceneCamera::Source::kPlaced:
+      return "placed";
+    case SceneCamera::Source::kFile:
+      return "file";
+    case SceneCamera::Source::kData:
+      return "data set";
+    case SceneCamera::Source::kOrbit:
+      return "orbit";
+    case SceneCamera::Source::kNone:
+      break;
+  }
+  return "none";
+}
+
+Json describe(const TraceOptions& trace) {
+  return {{"hit_order", trace.hit_order == HitOrder::kPeak ? "peak" : "entry"},
+          {"quantile", trace.quantile},
+          {"adaptive_radius", trace.adaptive_radius},
+          {"near_depth", trace.near_depth},
+          {"min_transmittance", trace.min_transmittance},
+          {"max_hits", trace.max_hits}};
+}
+
+Json describe(const io::MeshFile& file) {
+  std::array<float, 3> low{}, high{};
+  for (std::size_t i = 0; i < file.mesh.positions.size(); ++i) {
+    const float x = file.mesh.positions[i];
+    low[i % 3] = i < 3 ? x : std::min(low[i % 3], x);
+    high[i % 3] = i < 3 ? x : std::max(high[i % 3], x);
+  }
+  Json materials = Json::array();
+  for (const Material& material : file.materials) {
+    materials.push_back({{"name", material.name}, {"kind", kind_name(material.kind)}});
+  }
+  return {{"triangles", file.mesh.triangle_count()},
+          {"vertices", file.mesh.vertex_count()},
+          {"bounds", {low, high}},
+          {"normals", !file.mesh.normals.empty()},
+          {"texture_coordinates", !file.mesh.uvs.empty()},
+          {"textures", file.textures.size()},
+          {"materials", materials}};
+}
+
+Json describe(const SceneFile& scene) {
+  Json models = Json::array(), meshes = Json::array(), materials = Json::array();
+  Json lights = Json::array();
+  for (const SceneModel& model : scene.models) models.push_back(model.file.string());
+  for (const SceneMesh& mesh : scene.meshes) {
+    meshes.push_back({{"file", mesh.file.string()}, {"moves", mesh.moves()}});
+  }
+  for (const SceneMaterial& each : scene.materials) {
+    materials.push_back({{"name", each.material.name}, {"kind", kind_name(each.material.kind)}});
+  }
+  for (const Light& light : scene.lights) lights.push_back(kind_name(light.kind));
+  Json camera{{"source", source_name(scene.camera.source)},
+              {"model", model_name(scene.camera.model)}};
+  if (!scene.camera.file.empty()) camera["file"] = scene.camera.file.string();
+  if (scene.camera.frames) camera["frames"] = *scene.camera.frames;
+  Json out{{"models", models},
+           {"meshes", meshes},
+           {"materials", materials},
+           {"lights", lights},
+           {"camera", camera},
+           {"samples", scene.render.samples},
+           {"max_bounces", scene.render.max_bounces}};
+  if (scene.frames) out["animation_frames"] = *scene.frames;
+  return out;
+}
+
 Json describe(const Dataset& dataset) {
   std::map<std::pair<int, int>, std::size_t> sizes;
   for (const View& view : dataset.views) ++sizes[{view.camera.width, view.camera.height}];
@@ -57,12 +182,23 @@ Json describe(const Dataset& dataset) {
   const bool distorted =
       std::any_of(dataset.views.begin(), dataset.views.end(),
                   [](const View& view) { return view.source_camera.distortion.any(); });
+  // Loading leaves the lenses that it cannot take out.
+  const bool undistorted =
+      std::any_of(dataset.views.begin(), dataset.views.end(), [](const View& view) {
+        return view.source_camera.distortion.any() && !view.camera.distortion.any();
+      });
+  std::map<std::string, std::size_t> models;
+  for (const View& view : dataset.views) ++models[model_name(view.camera.model)];
+  Json model_list = Json::object();
+  for (const auto& [name, count] : models) model_list[name] = count;
   return {{"kind", kind_name(dataset.kind)},
           {"views", dataset.views.size()},
           {"train_views", dataset.indices(Split::kTrain).size()},
           {"test_views", dataset.indices(Split::kTest).size()},
           {"sizes", size_list},
+          {"camera_models", model_list},
           {"distorted", distorted},
+          {"undistorted_when_loaded", undistorted},
           {"alpha_is_background", dataset.alpha_is_background},
           {"points", dataset.points.size()}};
 }
@@ -96,8 +232,16 @@ void print(const ModelSummary& model) {
 }
 
 void print_dataset(const Json& dataset) {
-  fmt::print("data set         {}{}\n", dataset["kind"].get<std::string>(),
-             dataset["distorted"].get<bool>() ? ", lens distortion (undistorted when loaded)" : "");
+  const char* lenses = "";
+  if (dataset["undistorted_when_loaded"].get<bool>()) {
+    lenses = ", lens distortion (undistorted when loaded)";
+  } else if (dataset["distorted"].get<bool>()) {
+    lenses = ", lens distortion (photos are kept as they are)";
+  }
+  fmt::print("data set         {}{}\n", dataset["kind"].get<std::string>(), lenses);
+  for (const auto& [name, count] : dataset["camera_models"].items()) {
+    fmt::print("cameras          {} ({} views)\n", name, count.get<std::size_t>());
+  }
   fmt::print("views            {}: {} to train, {} to test\n", dataset["views"].get<std::size_t>(),
              dataset["train_views"].get<std::size_t>(), dataset["test_views"].get<std::size_t>());
   for (const Json& size : dataset["sizes"]) {
@@ -105,6 +249,59 @@ void print_dataset(const Json& dataset) {
                size["height"].get<int>(), size["views"].get<std::size_t>());
   }
   fmt::print("points           {}\n", dataset["points"].get<std::size_t>());
+}
+
+std::string named_kinds(const Json& materials) {
+  std::vector<std::string> parts;
+  for (const Json& material : materials) {
+    const std::string name = material["name"];
+    parts.push_back(fmt::format("{} ({})", name.empty() ? "unnamed" : name,
+                                material["kind"].get<std::string>()));
+  }
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+void print_mesh(const Json& mesh) {
+  const auto corner = [&](std::size_t i) {
+    const Json& v = mesh["bounds"][i];
+    return fmt::format("({:.4g}, {:.4g}, {:.4g})", v[0].get<float>(), v[1].get<float>(),
+                       v[2].get<float>());
+  };
+  fmt::print("mesh             {} triangles, {} vertices\n", mesh["triangles"].get<std::size_t>(),
+             mesh["vertices"].get<std::size_t>());
+  fmt::print("bounds           {} to {}\n", corner(0), corner(1));
+  fmt::print("normals          {}\n", mesh["normals"].get<bool>() ? "of the file" : "none: flat");
+  fmt::print("texture          {} pictures, {} coordinates\n", mesh["textures"].get<std::size_t>(),
+             mesh["texture_coordinates"].get<bool>() ? "with" : "without");
+  fmt::print("materials        {}\n", named_kinds(mesh["materials"]));
+}
+
+void print_scene(const Json& scene) {
+  for (const Json& model : scene["models"]) {
+    fmt::print("model            {}\n", model.get<std::string>());
+  }
+  for (const Json& mesh : scene["meshes"]) {
+    fmt::print("mesh             {}{}\n", mesh["file"].get<std::string>(),
+               mesh["moves"].get<bool>() ? " (moves)" : "");
+  }
+  if (!scene["materials"].empty()) {
+    fmt::print("materials        {}\n", named_kinds(scene["materials"]));
+  }
+  fmt::print(
+      "lights           {}\n",
+      scene["lights"].empty()
+          ? "none"
+          : fmt::format("{}", fmt::join(scene["lights"].get<std::vector<std::string>>(), ", ")));
+  const Json& camera = scene["camera"];
+  fmt::print(
+      "camera           {}, {}{}\n", camera["source"].get<std::string>(),
+      camera["model"].get<std::string>(),
+      camera.contains("frames") ? fmt::format(", {} frames", camera["frames"].get<int>()) : "");
+  if (scene.contains("animation_frames")) {
+    fmt::print("animation        {} frames\n", scene["animation_frames"].get<int>());
+  }
+  fmt::print("samples          {} a pixel, {} bounces at most\n", scene["samples"].get<int>(),
+             scene["max_bounces"].get<int>());
 }
 
 void print_json(const Json& json) {
@@ -120,6 +317,7 @@ void info_model(const Options& options) {
         {"type", run ? "run" : "model"}, {"path", options.path}, {"model", source.ply.string()}};
     if (source.iteration) json["iteration"] = *source.iteration;
     if (source.trained) json["iterations"] = source.trained->iterations;
+    if (source.header) json["trace"] = describe(*source.header);
     json.update(describe(summary));
     print_json(json);
     return;
@@ -132,6 +330,47 @@ void info_model(const Options& options) {
                  source.trained->iterations);
   }
   print(summary);
+  if (source.header) {
+    fmt::print("traced           in {} order, quantile {:.4g}, {} radius\n",
+               source.header->hit_order == HitOrder::kPeak ? "peak" : "entry",
+               source.header->quantile, source.header->adaptive_radius ? "adaptive" : "whole");
+  }
+}
+
+// A PLY with faces and without opacities.
+bool is_mesh_ply(const std::filesystem::path& path) {
+  const io::PlyFile file(path);
+  constexpr std::array<std::string_view, 2> kCorners{"vertex_indices", "vertex_index"};
+  return !file.column("opacity") &&
+         file.for_each_list("face", kCorners, [](std::size_t, std::span<const double>) {});
+}
+
+bool is_mesh(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".ply") return is_mesh_ply(path);
+  return extension == ".obj" || extension == ".gltf" || extension == ".glb";
+}
+
+void info_mesh(const Options& options) {
+  Json json{{"type", "mesh"}, {"path", options.path}};
+  json.update(describe(io::read_mesh(options.path)));
+  if (options.json) {
+    print_json(json);
+  } else {
+    print_mesh(json);
+  }
+}
+
+void info_scene(const Options& options) {
+  Json json{{"type", "scene"}, {"path", options.path}};
+  json.update(describe(read_scene_file(options.path)));
+  if (options.json) {
+    print_json(json);
+  } else {
+    print_scene(json);
+  }
 }
 
 void info_dataset(const Options& options) {
@@ -148,11 +387,16 @@ void info_dataset(const Options& options) {
 void run(const Options& options) {
   const std::filesystem::path path = options.path;
   if (!std::filesystem::exists(path)) {
-    throw DataError(
-        fmt::format("{} does not exist: name a PLY, a data set or a run", path.string()));
+    throw DataError(fmt::format(
+        "{} does not exist: name a PLY, a mesh, a scene file, a data set or a run", path.string()));
   }
-  if (std::filesystem::is_directory(path) && !is_run_folder(path)) {
+  const bool folder = std::filesystem::is_directory(path);
+  if (folder && !is_run_folder(path)) {
     info_dataset(options);
+  } else if (!folder && is_scene_file(options.path)) {
+    info_scene(options);
+  } else if (!folder && is_mesh(path)) {
+    info_mesh(options);
   } else {
     info_model(options);
   }
@@ -161,9 +405,10 @@ void run(const Options& options) {
 }  // namespace
 
 Command add_info_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("info", "Describe a model, a data set or a training run");
+  CLI::App* command = app.add_subcommand(
+      "info", "Describe a model, a mesh, a scene file, a data set or a training run");
   auto options = std::make_shared<Options>();
-  command->add_option("PATH", options->path, "3DGS PLY, data set or run folder")
+  command->add_option("PATH", options->path, "3DGS PLY, mesh, scene file, data set or run folder")
       ->required()
       ->type_name("");
   command->add_flag("--json", options->json, "Print JSON");

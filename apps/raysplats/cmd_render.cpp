@@ -16,12 +16,14 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render_flags.hpp"
+#include "train/mirror_meshes.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats::cli {
 namespace {
 
 void check(const RenderFlags& options) {
+  options.frame_options();
   const std::pair<const char*, bool> of_scenes[] = {
       {"--samples", options.samples.has_value()},
       {"--max-bounces", options.max_bounces.has_value()},
@@ -130,29 +132,30 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   trace.depth = options.depth;
   const std::unique_ptr<Context> context = open_context(options.device);
   const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
-  ViewTracer tracer(*context, trace);
+  ViewTracer tracer(*context, trace, mirrors_of(source));
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), cameras.size());
 
   const InterruptGuard interrupt;
   Progress progress("rendering", static_cast<std::int64_t>(cameras.size()), 0,
                     global.quiet ? nullptr : stderr);
-  const FrameReport report = write_frames(
-      tracer, gaussians, cameras, options.output,
-      {options.frame_format(), options.supersample, options.depth}, [&](std::size_t done) {
-        progress.update(static_cast<std::int64_t>(done), "");
-        return !interrupt.requested();
-      });
+  const FrameReport report = write_frames(tracer, gaussians, cameras, options.output,
+                                          options.frame_options(), [&](std::size_t done) {
+                                            progress.update(static_cast<std::int64_t>(done), "");
+                                            return !interrupt.requested();
+                                          });
   progress.finish();
-  if (report.frames < cameras.size()) {
+  if (interrupt.requested()) {
     throw Error(ErrorCode::kInterrupted,
                 fmt::format("Interrupted after {} of {} frames: what is in {} is whole",
                             report.frames, cameras.size(), options.output));
   }
   warn_of_capped_rays(report.capped_rays, report.rays, trace);
-  fmt::print("{} frames in {} ({:.2f} s of tracing, {:.2f} million rays per second)\n",
-             report.frames, options.output, report.trace_seconds,
-             1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
+  const std::string speed =
+      fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,
+                  1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
+  fmt::print("{} frames in {} ({})\n", report.frames, options.output,
+             with_compiling(speed, context->build_seconds()));
   if (options.device.profile) fmt::print("{}", context->profile_table());
 }
 
@@ -170,10 +173,14 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
   command->add_option("-o,--output", options->output, "Folder for the frames")
       ->required()
       ->type_name("DIR");
-  command
-      ->add_option("--format", options->format, "exr (linear float RGBA), png or jpg (8-bit RGB)")
+  command->add_option("--format", options->format, "exr (float RGBA), png or jpg (8-bit RGB)")
       ->check(one_of({"exr", "png", "jpg"}))
       ->capture_default_str();
+  command
+      ->add_option("--exr", options->exr,
+                   "Numbers of an EXR: linear (default), as other programs expect, or display, the "
+                   "values as trained that PNG and JPG hold")
+      ->check(one_of({"linear", "display"}));
 
   add_data_flags(*command, options->data);
   const std::string where = "Other cameras";

@@ -41,8 +41,10 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   if (!options.resume.empty()) trainer.resume(options.resume);
   const TrainSummary summary = trainer.run(!global.quiet);
 
-  fmt::print("{} iterations in {} of training: {} Gaussians in {}\n", summary.iterations,
-             format_duration(summary.training_seconds), summary.gaussians, options.output);
+  fmt::print("{} iterations in {}: {} Gaussians in {}\n", summary.iterations,
+             with_compiling(format_duration(summary.training_seconds) + " of training",
+                            summary.kernel_build_seconds),
+             summary.gaussians, options.output);
   if (!summary.evaluations.empty()) {
     const EvaluationRow& last = summary.evaluations.back();
     fmt::print("PSNR {:.2f} dB, SSIM {:.4f} on {} held-out views\n", last.psnr, last.ssim,

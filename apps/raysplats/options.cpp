@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <string_view>
 #include <utility>
 
@@ -76,8 +78,25 @@ void add_device_flags(CLI::App& app, DeviceFlags& flags) {
   app.add_flag("--no-kernel-cache", flags.no_kernel_cache, "Compile every kernel again");
 }
 
+namespace {
+
+// What is seen of compiling: a line that is redrawn on a terminal, one line elsewhere.
+void show_compiling(std::size_t number, const std::string& program) {
+  if (!spdlog::should_log(spdlog::level::info)) return;
+  if (::isatty(2) == 1) {
+    fmt::print(stderr, "\r\x1b[K{}",
+               program.empty() ? "" : fmt::format("compiling kernels: {} ({})", number, program));
+    std::fflush(stderr);
+  } else if (number == 1 && !program.empty()) {
+    spdlog::info("compiling kernels for the device: they are kept for the next time");
+  }
+}
+
+}  // namespace
+
 std::unique_ptr<Context> open_context(const DeviceFlags& flags) {
   ContextOptions options;
+  options.compiling = show_compiling;
   options.profile = flags.profile;
   options.kernel_cache = !flags.no_kernel_cache;
   const DeviceInfo device = select_device(flags.device);
@@ -112,6 +131,9 @@ void add_trace_flags(CLI::App& app, TraceFlags& flags) {
       ->check(one_of({"0", "1", "2", "4", "8", "16"}));
   app.add_option("--memory-budget", flags.memory_budget, "MiB for hit lists on the device")
       ->check(at_least(1));
+  app.add_option("--launch-budget-ms", flags.launch_budget_ms,
+                 "Time of one launch; 0 = no bound, -1 = none on CPUs and 100 elsewhere")
+      ->check(between(-1, 1e9));
 }
 
 void add_traversal_flag(CLI::App& app, TraceFlags& flags) {
@@ -139,7 +161,13 @@ TraceOptions TraceFlags::over(TraceOptions base) const {
   }
   if (packet_width) base.packet_width = *packet_width;
   if (memory_budget) base.memory_budget = *memory_budget << 20;
+  if (launch_budget_ms) base.launch_budget_ms = *launch_budget_ms;
   return base;
+}
+
+std::string with_compiling(const std::string& text, double seconds) {
+  if (seconds < 0.1) return text;
+  return fmt::format("{}, besides {:.1f} s of compiling kernels", text, seconds);
 }
 
 void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOptions& options) {

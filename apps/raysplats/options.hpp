@@ -63,12 +63,16 @@ struct TraceFlags {
   std::optional<std::string> background;
   std::optional<int> packet_width;
   std::optional<std::size_t> memory_budget;  ///< MiB
+  std::optional<double> launch_budget_ms;
 
   TraceOptions over(TraceOptions base) const;
 };
 void add_trace_flags(CLI::App& app, TraceFlags& flags);
 /// --traversal, for commands that trace cameras by either way.
 void add_traversal_flag(CLI::App& app, TraceFlags& flags);
+
+/// `text`, and how long kernels were compiled where that is worth mentioning.
+std::string with_compiling(const std::string& text, double seconds);
 
 /// One warning line when rays stopped at the cap on hits.
 void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOptions& options);

@@ -18,6 +18,7 @@ struct RenderFlags {
   std::optional<int> orbit;
   std::string output;
   std::string format = "png";
+  std::string exr;  ///< "linear", "display" or "" = not given
   int supersample = 1;
   bool depth = false;
   std::optional<int> width;
@@ -34,7 +35,8 @@ struct RenderFlags {
   TraceFlags trace;
   DeviceFlags device;
 
-  FrameFormat frame_format() const;
+  /// Throws UsageError for options that do not go with the format.
+  FrameOptions frame_options() const;
 };
 
 /// Whether the first argument of `render` is a scene file: its name ends in .toml.

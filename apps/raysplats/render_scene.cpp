@@ -23,6 +23,7 @@ namespace {
 using Source = SceneCamera::Source;
 
 void check(const RenderFlags& flags) {
+  flags.frame_options();
   if (flags.depth) {
     throw UsageError(
         "--depth is for models alone: a scene with mirrors and glass has no single depth");
@@ -112,23 +113,31 @@ std::pair<std::size_t, std::size_t> parse_frames(const std::string& text, std::s
   return {first, last};
 }
 
-void print_summary(const SceneReport& report, const std::string& output) {
+void print_summary(const SceneReport& report, const std::string& output, double compiling) {
   const auto millions = [&](std::uint64_t rays) {
     return 1e-6 * static_cast<double>(rays) / report.trace_seconds;
   };
-  fmt::print(
-      "{} frames in {} ({:.2f} s of tracing; million rays per second: {:.2f} camera, {:.2f} "
-      "continued, {:.2f} shadow)\n",
-      report.frames, output, report.trace_seconds, millions(report.rays.camera_rays),
-      millions(report.rays.continued_rays), millions(report.rays.shadow_rays));
+  const std::string speed = fmt::format(
+      "{:.2f} s of tracing; million rays per second: {:.2f} camera, {:.2f} continued, {:.2f} "
+      "shadow",
+      report.trace_seconds, millions(report.rays.camera_rays), millions(report.rays.continued_rays),
+      millions(report.rays.shadow_rays));
+  fmt::print("{} frames in {} ({})\n", report.frames, output, with_compiling(speed, compiling));
 }
 
 }  // namespace
 
-FrameFormat RenderFlags::frame_format() const {
-  if (format == "exr") return FrameFormat::kExr;
-  if (format == "jpg") return FrameFormat::kJpg;
-  return FrameFormat::kPng;
+FrameOptions RenderFlags::frame_options() const {
+  FrameOptions out;
+  if (format == "exr") out.format = FrameFormat::kExr;
+  if (format == "jpg") out.format = FrameFormat::kJpg;
+  if (!exr.empty() && format != "exr") {
+    throw UsageError(fmt::format("--exr {} is for --format exr, not {}", exr, format));
+  }
+  out.linear_exr = exr != "display";
+  out.supersample = supersample;
+  out.depth = depth;
+  return out;
 }
 
 bool is_scene_file(const std::string& model) {
@@ -158,13 +167,21 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   const InterruptGuard interrupt;
   Progress progress("rendering", static_cast<std::int64_t>(last - first), 0,
                     global.quiet ? nullptr : stderr);
+  std::size_t frames = 0;
   const SceneReport report = write_scene_frames(
-      tracer, loaded, first, last, flags.output, flags.frame_format(), [&](std::size_t done) {
+      tracer, loaded, first, last, flags.output, flags.frame_options(),
+      [&](std::size_t done) {
+        frames = done;
         progress.update(static_cast<std::int64_t>(done), "");
+        return !interrupt.requested();
+      },
+      [&](double share) {
+        progress.update(static_cast<std::int64_t>(frames),
+                        fmt::format("{:.0f} % of this frame", 100.0 * share));
         return !interrupt.requested();
       });
   progress.finish();
-  if (report.frames < last - first) {
+  if (interrupt.requested()) {
     throw Error(ErrorCode::kInterrupted,
                 fmt::format("Interrupted after {} of {} frames: what is in {} is whole",
                             report.frames, last - first, flags.output));
@@ -176,7 +193,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
     spdlog::info("{} paths ended after --max-bounces {}", rays.ended_by_bounces,
                  loaded.scene.render.max_bounces);
   }
-  print_summary(report, flags.output);
+  print_summary(report, flags.output, context->build_seconds());
   if (flags.device.profile) fmt::print("{}", context->profile_table());
 }
 

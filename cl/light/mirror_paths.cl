@@ -7,6 +7,7 @@
 // black and 1 behind a mirror that is the last one allowed, the background and 0 where there is
 // none. Launch: one work-item per ray or pixel, any group size, O(1) each.
 #include "light/shading.h"
+#include "primitives/counter.h"
 
 // Whether the mirror at `hit` is left again.
 bool goes_on(__global const uint* starts, uint i) { return starts[i + 1] != starts[i]; }
@@ -47,9 +48,10 @@ __kernel void reflect_rays(const uint count,
   shading = length2 > 1e-12f ? shading * rsqrt(length2) : normal;
   float3 direction = reflected(d, shading);
   if (dot(direction, normal) <= 0.0f) direction = reflected(d, normal);
-  const float3 p = off_surface(w * a + hit.u * b + hit.v * c, normal);
+  const float3 p = w * a + hit.u * b + hit.v * c;
+  const float3 start = start_off_surface(p, normal, direction, surface_offset(p, a, b, c));
   const uint to = starts[i];
-  next_rays[to] = (float8)(p, 0.0f, direction, 3.402823466e38f);
+  next_rays[to] = (float8)(start, 0.0f, direction, 3.402823466e38f);
   next_paths[to].skip = hit.triangle;
 }
 
@@ -80,7 +82,8 @@ Behind behind_of(const uint i,
   return out;
 }
 
-// results: eight words a ray, of which the first four are C and A. seen: V, alpha.
+// results: eight words a ray: first C and A, last whether it stopped at the cap on hits, which
+// `capped` counts. seen: V, alpha.
 __kernel void gather_light(const uint count,
                            const int mirrors,
                            const float4 background,
@@ -90,7 +93,8 @@ __kernel void gather_light(const uint count,
                            __global const RsMaterial* restrict materials,
                            __global const float4* restrict next_seen,
                            __global const float8* restrict results,
-                           __global float4* restrict seen) {
+                           __global float4* restrict seen,
+                           volatile __global uint* restrict capped) {
   const uint i = get_global_id(0);
   if (i >= count) return;
   const Behind behind =
@@ -98,6 +102,7 @@ __kernel void gather_light(const uint count,
   const float8 result = results[i];
   const float passed = 1.0f - result.s3;
   seen[i] = (float4)(result.s012 + passed * behind.color, 1.0f - passed * (1.0f - behind.alpha));
+  if (as_uint(result.s7) != 0) rs_count(capped, 1);
 }
 
 // gradients: of V and alpha; they become those of C and A. next_gradients: of the continued rays.
@@ -122,6 +127,12 @@ __kernel void spread_gradients(const uint count,
   if (behind.continued) {
     next_gradients[starts[i]] = passed * (float4)(g.xyz * behind.tint, g.w);
   }
+}
+
+// Adds a count of 64 bits to another. One work-item.
+__kernel void move_count(__global const uint* restrict from, volatile __global uint* restrict to) {
+  rs_count(to, from[0]);
+  to[1] += from[1];
 }
 
 // What the rays of the pixels from `first` on saw, as planes of a picture of `pixels`.

@@ -105,11 +105,19 @@ float innermost_ior(const Media* media, __global const RsMaterial* materials) {
   return media->body[0] != 0 ? materials[media->body[0] - 1].ior : 1.0f;
 }
 
-// A point moved off a surface towards the side of n, so that rays from it do not meet that surface
-// again: by a few units in the last place of the coordinates (after Waechter and Binder 2019).
-float3 off_surface(float3 p, float3 n) {
-  const float reach = fmax(fmax(fabs(p.x), fabs(p.y)), fmax(fabs(p.z), 1e-3f));
-  return p + n * (reach * 1.5e-6f);
+float largest(float3 v) { return fmax(fmax(fabs(v.x), fabs(v.y)), fabs(v.z)); }
+
+// How far a ray from a point p of the triangle a, b, c has to start off it not to meet its
+// neighbours: a few units in the last place of what p is made of (after Waechter and Binder 2019).
+float surface_offset(float3 p, float3 a, float3 b, float3 c) {
+  return fmax(1.5e-6f * largest(p), 3e-7f * fmax(largest(a), fmax(largest(b), largest(c))));
+}
+
+// Start of a ray from p along the unit vector d, to the side of the unit normal n that d points to.
+// It is half the offset back: where another surface meets this one at an angle, rounding may put p
+// behind that one.
+float3 start_off_surface(float3 p, float3 n, float3 d, float offset) {
+  return p + offset * (n - 0.5f * d);
 }
 
 float3 environment_light(__global const RsEnvironment* environment, float3 n) {

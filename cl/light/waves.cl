@@ -66,6 +66,7 @@ __kernel void load_surfaces(const uint count,
   s.triangle = hit.triangle;
   s.material = -1;
   s.entering = 0;
+  s.offset = 0.0f;
   for (int k = 0; k < 3; ++k) s.position[k] = s.shading[k] = s.normal[k] = s.color[k] = 0.0f;
   if (hit.triangle >= 0 && !paths[i].blind) {
     __global const float* v = vertices + (size_t)hit.triangle * 24;
@@ -80,6 +81,7 @@ __kernel void load_surfaces(const uint count,
     shading = length2 > 1e-12f ? shading * rsqrt(length2) : normal;
     if (dot(shading, normal) < 0.0f) shading = -shading;
     const float3 p = w * a + hit.u * b + hit.v * c;
+    s.offset = surface_offset(p, a, b, c);
     s.material = (int)materials_of[hit.triangle];
     float3 color = vload3(0, materials[s.material].color);
     const int texture = materials[s.material].texture;
@@ -161,7 +163,7 @@ __kernel void shadow_rays(const uint count,
       const float3 e = light_at(lights + number, p, &direction, &distance);
       wanted = max3(e) > 0.0f && dot(load3(s.shading), direction) > 0.0f;
       const float3 normal = load3(s.normal);
-      p = off_surface(p, dot(normal, direction) >= 0.0f ? normal : -normal);
+      p += dot(normal, direction) >= 0.0f ? s.offset * normal : -s.offset * normal;
       skipped = s.triangle;
     }
   }
@@ -270,9 +272,10 @@ Continuation new_direction(const RsPath* path,
   out.path.skip = s->triangle;
   vstore3(throughput, 0, out.path.throughput);
   const float3 normal = load3(s->normal);
-  const float3 p =
-      off_surface(load3(s->position), dot(direction, normal) >= 0.0f ? normal : -normal);
-  out.ray = (float8)(p, 0.0f, normalize(direction), RS_FAR);
+  const float3 d = normalize(direction), from = load3(s->position);
+  const bool back = dot(d, normal) >= 0.0f;  // to where it came from
+  const float3 p = back ? start_off_surface(from, normal, d, s->offset) : from - s->offset * normal;
+  out.ray = (float8)(p, 0.0f, d, RS_FAR);
   return out;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exclusive prefix sum over one work-group, which stops at 2^32 - 1 (Hillis and Steele 1986, log2(RS_GROUP) steps). Every
-// work-item of the group must call it; RS_GROUP is a power of two and `scratch` holds RS_GROUP
-// elements.
+// Exclusive prefix sum over one work-group, which stops at 2^32 - 1 (Hillis and Steele 1986,
+// log2(RS_GROUP) steps). Every work-item of the group must call it; RS_GROUP is a power of two and
+// `scratch` holds RS_GROUP elements.
 #ifndef RS_PRIMITIVES_GROUP_SCAN_H
 #define RS_PRIMITIVES_GROUP_SCAN_H
 

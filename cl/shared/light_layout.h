@@ -87,8 +87,9 @@ typedef struct {
   rs_int triangle;
   rs_float color[3];
   rs_float t;
+  rs_float offset;  // of rays that start on it
 } RsSurface;
-RS_STATIC_ASSERT_SIZE(RsSurface, 64);
+RS_STATIC_ASSERT_SIZE(RsSurface, 68);
 
 // What all kernels of a wave must know.
 typedef struct {

@@ -188,12 +188,14 @@ void blend_hits(const RayScene* scene,
 
 #include "trace/ray_walk.h"
 
-// rays, results, tree and order as in rays.cl; gradients: dL/d(R, G, B, alpha) per ray; records:
+// Of the rays [first, last) in their order. rays, results, tree and order as in rays.cl; gradients:
+// dL/d(R, G, B, alpha) per ray; records:
 // whitening matrix and mean of every Gaussian (ray_gradients.cl); screen: a 3 x 3 matrix in 0..8,
 // row-major, from the gradient of a mean to its share on the screen for a mean at distance 1; limit
 // and sums: as for LineSums; slopes: with RAY_SLOPES of every ray the gradients of its origin and
 // direction, four floats each, zeros at first.
-__kernel void ray_backward(const uint ray_count,
+__kernel void ray_backward(const uint first,
+                           const uint last,
                            const uint chunk,
                            const uint items,
                            const uint gaussians,
@@ -240,8 +242,8 @@ __kernel void ray_backward(const uint ray_count,
   state.sums.lines = sums;
   state.sums.limit = limit;
   state.screen = screen;
-  for (size_t begin = (size_t)item * chunk; begin < ray_count; begin += (size_t)items * chunk) {
-    const size_t end = min(begin + chunk, (size_t)ray_count);
+  for (size_t begin = first + (size_t)item * chunk; begin < last; begin += (size_t)items * chunk) {
+    const size_t end = min(begin + chunk, (size_t)last);
     for (size_t position = begin; position < end; ++position) {
       const size_t id = ordered ? ray_order[position] : position;
       const float4 gradient = gradients[id];

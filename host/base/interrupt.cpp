@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/interrupt.hpp"
 
+#include <unistd.h>
+
 #include <atomic>
+#include <cerrno>
 #include <csignal>
+#include <string_view>
 
 namespace raysplats {
 namespace {
@@ -10,6 +14,7 @@ namespace {
 // A signal handler can reach nothing but a variable of static storage. It runs in any thread, the
 // driver's own among them.
 std::atomic<bool> interrupted{false};
+std::atomic<bool> announced{false};  // whether somebody sees what the handler says
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler must not take locks");
 
 // The second signal ends the process at once, whichever of the two it is: delivered again when the
@@ -18,13 +23,22 @@ extern "C" void mark_interrupt(int signal) {
   if (interrupted.exchange(true)) {
     std::signal(signal, SIG_DFL);
     std::raise(signal);
+    return;
   }
+  if (!announced) return;
+  constexpr std::string_view kText =
+      "\nInterrupted: stopping as soon as what is done can be kept; once more stops at once\n";
+  const int error = errno;
+  // There is nothing to do where it fails.
+  if (::write(STDERR_FILENO, kText.data(), kText.size()) < 0) errno = error;
+  errno = error;
 }
 
 }  // namespace
 
 InterruptGuard::InterruptGuard() {
   interrupted = false;
+  announced = ::isatty(STDERR_FILENO) == 1;
   struct sigaction action {};
   action.sa_handler = mark_interrupt;
   sigemptyset(&action.sa_mask);

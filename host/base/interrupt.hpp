@@ -5,8 +5,8 @@
 
 namespace raysplats {
 
-/// While one lives, SIGINT and SIGTERM only set a mark that long work polls; a second signal ends
-/// the process as usual. At most one at a time.
+/// While one lives, SIGINT and SIGTERM only set a mark that long work polls, and say so at once on
+/// a terminal; a second signal ends the process as usual. At most one at a time.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
@@ -18,6 +19,11 @@ namespace raysplats {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
+
+constexpr double kShown = 0.98;  // share of the opacity within the extent
+constexpr double kReach = 2.0;   // standard deviations of a Gaussian that are to be seen
+constexpr double kMargin = 1.05;
+constexpr double kFarAway = 4.0;  // times the median: what reaches further is background
 
 double median(std::vector<double> values) {
   const double half = 0.5;
@@ -59,17 +65,39 @@ void check(const OrbitOptions& options) {
   }
 }
 
+// Standard deviation of a Gaussian along a direction, the largest of its three for none; 0 for one
+// that is not finite.
+double deviation_along(const Gaussians& model, std::size_t i, const glm::dvec3& direction) {
+  const float* q = &model.quaternions[4 * i];
+  const glm::dquat rotation = glm::normalize(glm::dquat(q[0], q[1], q[2], q[3]));
+  const double length = glm::length(direction);
+  const glm::dvec3 local =
+      length > 0.0 ? glm::inverse(rotation) * (direction / length) : glm::dvec3(1.0);
+  double square = 0.0;
+  double largest = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double scale = std::exp(static_cast<double>(model.log_scales[3 * i + k]));
+    const double part = local[static_cast<int>(k)] * scale;
+    square += part * part;
+    largest = std::max(largest, scale);
+  }
+  const double deviation = length > 0.0 ? std::sqrt(square) : largest;
+  return std::isfinite(deviation) ? deviation : 0.0;
+}
+
 }  // namespace
 
 SceneExtent scene_extent(const Gaussians& model) {
   std::array<std::vector<double>, 3> axes;
   std::vector<double> weights;
+  std::vector<std::size_t> indices;
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* mean = &model.means[3 * i];
     if (!std::isfinite(mean[0]) || !std::isfinite(mean[1]) || !std::isfinite(mean[2])) continue;
     const double opacity = 1.0 / (1.0 + std::exp(-static_cast<double>(model.opacities[i])));
     for (std::size_t k = 0; k < 3; ++k) axes[k].push_back(static_cast<double>(mean[k]));
     weights.push_back(std::isfinite(opacity) ? opacity : 0.0);
+    indices.push_back(i);
   }
   SceneExtent extent;
   if (weights.empty()) return extent;
@@ -78,11 +106,13 @@ SceneExtent scene_extent(const Gaussians& model) {
                    weighted_quantile(axes[2], weights, 0.5)};
   std::vector<double> distances(weights.size());
   for (std::size_t i = 0; i < weights.size(); ++i) {
-    distances[i] = glm::length(glm::dvec3(axes[0][i], axes[1][i], axes[2][i]) - extent.center);
+    const glm::dvec3 arm = glm::dvec3(axes[0][i], axes[1][i], axes[2][i]) - extent.center;
+    distances[i] = glm::length(arm) + kReach * deviation_along(model, indices[i], arm);
   }
   const double middle = weighted_quantile(distances, weights, 0.5);
+  const double most = weighted_quantile(distances, weights, kShown);
   const double far = weighted_quantile(distances, weights, 0.9);
-  extent.radius = middle > 0.0 ? std::min(far, 2.0 * middle) : far;
+  extent.radius = kMargin * (most <= kFarAway * middle ? most : std::min(far, 2.0 * middle));
   if (!(extent.radius > 0.0)) extent.radius = 1.0;
   return extent;
 }

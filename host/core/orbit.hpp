@@ -17,9 +17,11 @@ struct SceneExtent {
   double radius = 1.0;
 };
 
-/// Opacity-weighted median of the means, and the 0.9 quantile of the distance to it, but at most
-/// twice its median (backgrounds of outdoor captures reach hundreds of times further than the
-/// subject). Non-finite means are left out. An empty model gives the unit sphere.
+/// Opacity-weighted median of the means, and the radius around it that holds 98 % of the weight,
+/// each Gaussian with two standard deviations outwards, and a margin. Where that is more than four
+/// times the median (backgrounds of outdoor captures reach hundreds of times further than the
+/// subject), the radius of 90 %, at most twice the median. Gaussians that are not finite are left
+/// out. An empty model gives the unit sphere.
 SceneExtent scene_extent(const Gaussians& model);
 
 /// The world direction that points up in most of the photos: the mean of the cameras' up axes,

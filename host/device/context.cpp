@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <chrono>
 #include <utility>
 
 #include "device/context_impl.hpp"
@@ -17,6 +18,15 @@ namespace {
 
 // Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not.
 constexpr const char* kCompilerOptions = "-cl-std=CL1.2 -cl-mad-enable";
+
+// Compilers print warnings, or how many there were, to the terminal behind our back: they are for
+// those who ask for them.
+std::string compiler_flags(const BuildOptions& build) {
+  std::string flags = kCompilerOptions;
+  if (!spdlog::should_log(spdlog::level::debug)) flags += " -w";
+  if (!build.text().empty()) flags += " " + build.text();
+  return flags;
+}
 
 // Nothing when the driver has none.
 std::string build_log(const cl::Program& program, const cl::Device& device) {
@@ -32,6 +42,11 @@ cl::Program compile(Context::Impl& context,
                     const std::string& source,
                     const std::string& options) {
   cl::Program program(context.context, source);
+  const auto tell = [&](const std::string& what) {
+    if (context.options.compiling) context.options.compiling(context.compiled, what);
+  };
+  ++context.compiled;
+  tell(path);
   try {
     context.faults.check(Fault::kBuild);
     program.build({context.device}, options.c_str());
@@ -42,6 +57,11 @@ cl::Program compile(Context::Impl& context,
         "--device{}{}",
         path, context.info.name, options, cl_error_name(error.err()), log.empty() ? "" : "\n",
         log));
+  }
+  tell("");
+  if (spdlog::should_log(spdlog::level::debug)) {
+    const std::string log = build_log(program, context.device);
+    if (!log.empty()) spdlog::debug("kernel file {} with '{}': {}", path, options, log);
   }
   return program;
 }
@@ -143,18 +163,25 @@ std::vector<LaunchTime> Context::take_launches() {
   return std::exchange(impl_->launches, {});
 }
 
+double Context::build_seconds() const { return impl_->build_seconds; }
+
 std::size_t Context::allocated_bytes() const { return impl_->memory->allocated; }
 std::size_t Context::peak_allocated_bytes() const { return impl_->memory->peak; }
 
 cl::Program& Context::Impl::program(const std::string& path, const BuildOptions& build) {
   const std::string key = path + " " + build.text();
   if (const auto found = programs.find(key); found != programs.end()) return found->second;
+  const auto begin = std::chrono::steady_clock::now();
+  cl::Program made = make_program(path, build);
+  build_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return programs[key] = made;
+}
+
+cl::Program Context::Impl::make_program(const std::string& path, const BuildOptions& build) {
   const std::string source = resolve_kernel_source(path);
-  const std::string flags = build.text().empty()
-                                ? kCompilerOptions
-                                : fmt::format("{} {}", kCompilerOptions, build.text());
+  const std::string flags = compiler_flags(build);
   if (!options.kernel_cache || faults.due(Fault::kBuild))
-    return programs[key] = compile(*this, path, source, flags);
+    return compile(*this, path, source, flags);
 
   const ProgramCache cache(options.cache_directory);
   const std::string cache_key = ProgramCache::key(source, flags, info);
@@ -175,11 +202,11 @@ cl::Program& Context::Impl::program(const std::string& path, const BuildOptions&
       program = compile(*this, path, source, flags);
       const cl::Program::Binaries binaries = program->getInfo<CL_PROGRAM_BINARIES>();
       if (binaries.size() == 1 && !binaries[0].empty()) cache.store(cache_key, binaries[0]);
-      return programs[key] = *program;
+      return *program;
     }
   }
   faults.check(Fault::kBuild);
-  return programs[key] = *program;
+  return *program;
 }
 
 void Context::Impl::timed(const std::string& path,

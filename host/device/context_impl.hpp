@@ -48,12 +48,15 @@ struct Context::Impl {
   std::map<std::string, cl::Program> programs;  // by program path and build options
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;
+  std::size_t compiled = 0;  // programs that the compiler made
+  double build_seconds = 0;
   std::shared_ptr<MemoryCount> memory = std::make_shared<MemoryCount>();
 
   std::recursive_mutex mutex;
   std::uint64_t revisions = 0;
 
   cl::Program& program(const std::string& path, const BuildOptions& build);
+  cl::Program make_program(const std::string& path, const BuildOptions& build);
   /// What an enqueue call takes for its event: null unless launches are timed.
   cl::Event* next_event(cl::Event& event) { return options.profile ? &event : nullptr; }
   void timed(const std::string& program, const std::string& kernel, const cl::Event& event);

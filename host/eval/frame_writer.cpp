@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <set>
@@ -14,6 +15,13 @@
 
 namespace raysplats {
 namespace {
+
+// The inverse of the sRGB curve; numbers below 0 keep their sign, those above 1 follow the curve.
+float linear_from_display(float value) {
+  const float size = std::abs(value);
+  const float linear = size <= 0.04045f ? size / 12.92f : std::pow((size + 0.055f) / 1.055f, 2.4f);
+  return std::copysign(linear, value);
+}
 
 constexpr int kMaxSupersample = 16;
 
@@ -137,13 +145,16 @@ void write_frame(const std::filesystem::path& stem,
     return path;
   };
   if (options.format == FrameFormat::kExr) {
-    if (!options.depth) {
-      write_image(file("", extension(options.format)), rgba);
-      return;
+    const std::size_t count = options.depth ? 5 : 4;
+    Image channels = with_channels(rgba, static_cast<int>(count));
+    for (std::size_t i = 0; i < channels.pixels(); ++i) {
+      if (options.depth) channels.data[5 * i + 4] = depth.data[i];
+      for (std::size_t c = 0; c < 3 && options.linear_exr; ++c) {
+        channels.data[count * i + c] = linear_from_display(channels.data[count * i + c]);
+      }
     }
-    Image channels = with_channels(rgba, 5);
-    for (std::size_t i = 0; i < channels.pixels(); ++i) channels.data[5 * i + 4] = depth.data[i];
-    write_image(file("", extension(options.format)), channels, {"Z"});
+    write_image(file("", extension(options.format)), channels,
+                options.depth ? std::vector<std::string>{"Z"} : std::vector<std::string>{});
     return;
   }
   write_image(file("", extension(options.format)), with_channels(rgba, 3));
@@ -164,6 +175,7 @@ FrameReport write_frames(ViewTracer& tracer,
   FrameReport report;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Camera camera = downscaled(cameras[i], 1.0 / options.supersample);
+    const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
     tracer.forward(gaussians, camera);
     const Image samples = tracer.download_image();
@@ -172,7 +184,8 @@ FrameReport write_frames(ViewTracer& tracer,
       depth = average_depth(tracer.download_depth(), samples, options.supersample);
     }
     report.trace_seconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
+        (tracer.context().build_seconds() - built);
     report.capped_rays += tracer.capped_rays();
     report.rays += samples.pixels();
     write_frame(folder / names[i], box_average(samples, options.supersample), depth, options);

@@ -17,7 +17,7 @@
 namespace raysplats {
 
 enum class FrameFormat {
-  kExr,  ///< float R, G, B (background blended), A = 1 - T, and Z with depth
+  kExr,  ///< float R, G, B (background blended), A = 1 - T, and Z with depth; see linear_exr
   kPng,  ///< 8-bit RGB, values as trained
   kJpg,
 };
@@ -27,13 +27,15 @@ struct FrameOptions {
   int supersample = 1;  ///< rays per pixel side; the samples are box-averaged
   bool depth =
       false;  ///< EXR: channel Z; PNG and JPG: a file NAME_depth.png, near white, far black
+  bool linear_exr = true;  ///< EXR: proportional to light, as other programs expect; false = the
+                           ///< values as trained, which PNG and JPG hold
 };
 
 struct FrameReport {
   std::size_t frames = 0;
   std::uint64_t rays = 0;
   std::uint64_t capped_rays = 0;  ///< rays that stopped because of max_hits
-  double trace_seconds = 0;       ///< tracing and download, without the files
+  double trace_seconds = 0;       ///< tracing and download, without files and compiling kernels
 };
 
 /// One file name without extension and folder per camera: the stem of the image name; where stems

@@ -23,18 +23,22 @@ SceneReport write_scene_frames(PathTracer& tracer,
                                std::size_t first,
                                std::size_t last,
                                const std::filesystem::path& folder,
-                               FrameFormat format,
-                               const std::function<bool(std::size_t)>& done) {
+                               const FrameOptions& options,
+                               const std::function<bool(std::size_t)>& done,
+                               const std::function<bool(double)>& within) {
   const std::vector<std::string> names = frame_names(scene.cameras);
   SceneReport report;
   for (std::size_t i = first; i < last; ++i) {
+    const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
     if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<int>(i)));
-    const Image rgba = tracer.render(scene.cameras[i]);
+    const Image rgba = tracer.render(scene.cameras[i], within);
     report.trace_seconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
+        (tracer.context().build_seconds() - built);
     add(report.rays, tracer.statistics());
-    write_frame(folder / names[i], rgba, {}, {format, 1, false});
+    if (rgba.pixels() == 0) break;
+    write_frame(folder / names[i], rgba, {}, options);
     ++report.frames;
     if (done && !done(report.frames)) break;
   }

@@ -19,13 +19,15 @@ struct SceneReport {
 
 /// Draws the frames from `first` up to but without `last` and writes them to `folder`, which
 /// exists, named as their cameras (frame_names()). `done` hears the number of finished frames and
-/// returns false to stop early. Throws what the tracer throws, DataError when a file fails.
+/// returns false to stop early; so does `within` with the share of the frame that is being drawn,
+/// which is not written then. Throws what the tracer throws, DataError when a file fails.
 SceneReport write_scene_frames(PathTracer& tracer,
                                const LoadedScene& scene,
                                std::size_t first,
                                std::size_t last,
                                const std::filesystem::path& folder,
-                               FrameFormat format,
-                               const std::function<bool(std::size_t)>& done = {});
+                               const FrameOptions& options,
+                               const std::function<bool(std::size_t)>& done = {},
+                               const std::function<bool(double)>& within = {});
 
 }  // namespace raysplats

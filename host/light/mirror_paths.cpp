@@ -31,6 +31,7 @@ MirrorPaths::MirrorPaths(Context& context, RayTracer& tracer, const Mirrors& mir
     Scene scene;
     scene.meshes = mirrors.meshes;
     scene.materials = mirrors.materials;
+    scene.trace.launch_budget_ms = tracer.options().launch_budget_ms;
     // Only their colour counts here.
     for (Material& material : scene.materials) material.texture = -1;
     surfaces_ = std::make_unique<SurfaceStore>(context, scene);
@@ -74,7 +75,8 @@ std::size_t MirrorPaths::find_mirrors(std::size_t number) {
 void MirrorPaths::trace(const DeviceGaussians& gaussians,
                         std::size_t count,
                         ColorDirection direction,
-                        const std::array<float, 3>& background) {
+                        const std::array<float, 3>& background,
+                        const Buffer<std::uint32_t>& capped) {
   direction_ = direction;
   background_ = {background[0], background[1], background[2], 0.0f};
   used_ = 0;
@@ -97,7 +99,7 @@ void MirrorPaths::trace(const DeviceGaussians& gaussians,
                 has_mirrors() ? surfaces_->triangle_materials() : no_words_,
                 has_mirrors() ? surfaces_->materials() : no_materials_,
                 number + 1 < used_ ? levels_[number + 1].seen : no_colors_, level.results,
-                level.seen);
+                level.seen, capped);
   }
 }
 
@@ -127,16 +129,6 @@ void MirrorPaths::backward(const DeviceGaussians& gaussians,
     sums.add(gaussians, level.rays, level.count, level.results, level.gradients,
              number == 0 ? direction_ : ColorDirection::kRay, slopes);
   }
-}
-
-std::uint64_t MirrorPaths::capped_rays() const {
-  std::uint64_t sum = 0;
-  for (std::size_t number = 0; number < used_; ++number) {
-    std::vector<RayResult> results(levels_[number].count);
-    levels_[number].results.download(std::span<RayResult>(results));
-    for (const RayResult& result : results) sum += result.capped;
-  }
-  return sum;
 }
 
 }  // namespace raysplats

@@ -36,11 +36,13 @@ class MirrorPaths {
   /// Rays of the batch that comes next: to be filled by the caller, their ends move to the mirrors.
   Buffer<Ray>& rays() { return levels_[0].rays; }
   /// Traces the first `count` of rays(). `direction` is that of colours before the first mirror;
-  /// behind it they follow the ray.
+  /// behind it they follow the ray. `capped`, a 64-bit count in two words
+  /// (cl/primitives/counter.h), grows by the rays that stopped because of max_hits.
   void trace(const DeviceGaussians& gaussians,
              std::size_t count,
              ColorDirection direction,
-             const std::array<float, 3>& background);
+             const std::array<float, 3>& background,
+             const Buffer<std::uint32_t>& capped);
   /// What the rays saw: colour with the background, and coverage.
   const Buffer<std::array<float, 4>>& seen() const { return levels_[0].seen; }
   /// What they met before the first mirror, over black.
@@ -57,8 +59,6 @@ class MirrorPaths {
   bool has_mirrors() const { return surfaces_ != nullptr; }
   /// Most rays that come of one: itself and its reflections.
   std::size_t segments() const { return levels_.size(); }
-  /// Rays of the last trace() that stopped because of max_hits; blocks.
-  std::uint64_t capped_rays() const;
 
  private:
   struct Level {

@@ -12,6 +12,7 @@
 #include "primitives/scan.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
+#include "trace/memory_shares.hpp"
 #include "trace/model_impl.hpp"
 #include "trace/ray_tracer.hpp"
 
@@ -26,6 +27,8 @@ constexpr std::size_t kTallyChunk = 1024;
 constexpr std::size_t kPathBytes = 512;
 constexpr std::size_t kPathsPerPixel = 4;
 constexpr std::size_t kMaxBatch = std::size_t{1} << 20;
+// CPUs are busy with fewer, and a picture in more parts tells how far it is.
+constexpr std::size_t kMaxCpuBatch = std::size_t{1} << 17;
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
@@ -156,9 +159,10 @@ void PathTracer::Impl::choose_bias(const std::vector<Mesh>& meshes) {
 }
 
 std::size_t PathTracer::Impl::batch_size() const {
-  const std::size_t room = std::min(options.memory_budget / 2 / kPathBytes,
+  const std::size_t room = std::min(MemoryShares(options.memory_budget).paths() / kPathBytes,
                                     context.device().max_allocation / sizeof(RsSurface) / 2);
-  return std::clamp<std::size_t>(room / kPathsPerPixel, kGroup, kMaxBatch);
+  const bool cpu = context.device().type == DeviceType::kCpu;
+  return std::clamp<std::size_t>(room / kPathsPerPixel, kGroup, cpu ? kMaxCpuBatch : kMaxBatch);
 }
 
 RsWave PathTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pixel) const {
@@ -307,7 +311,7 @@ void PathTracer::set_meshes(const std::vector<Mesh>& meshes) {
   impl_->choose_bias(meshes);
 }
 
-Image PathTracer::render(const Camera& camera) {
+Image PathTracer::render(const Camera& camera, const std::function<bool(double)>& within) {
   Impl& self = *impl_;
   const auto turn = self.context.lock();
   require_pixels(camera);
@@ -321,6 +325,10 @@ Image PathTracer::render(const Camera& camera) {
     self.sums.clear(count);
     for (int sample = 0; sample < self.settings.samples; ++sample) {
       self.trace_sample(camera, static_cast<std::uint32_t>(sample), first, count);
+      const double share = (static_cast<double>(first) +
+                            static_cast<double>(count) * (sample + 1) / self.settings.samples) /
+                           static_cast<double>(out.pixels());
+      if (within && !within(share)) return Image();
     }
     const std::vector<std::array<float, 4>> sums = self.sums.download();
     for (std::size_t i = 0; i < count; ++i) {
@@ -331,6 +339,8 @@ Image PathTracer::render(const Camera& camera) {
   }
   return out;
 }
+
+const Context& PathTracer::context() const { return impl_->context; }
 
 PathTracer::Statistics PathTracer::statistics() const { return impl_->statistics; }
 

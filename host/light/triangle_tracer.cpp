@@ -44,8 +44,11 @@ std::vector<float> corners_of(std::span<const Mesh> meshes) {
 
 }  // namespace
 
-TriangleTracer::TriangleTracer(Context& context, int lanes)
-    : context_(&context), tree_(context, lanes), no_skip_(context, 1, "no triangle to skip") {}
+TriangleTracer::TriangleTracer(Context& context, int lanes, double launch_budget_ms)
+    : context_(&context),
+      tree_(context, lanes),
+      budget_(launch_budget_ms, context.device().type),
+      no_skip_(context, 1, "no triangle to skip") {}
 
 void TriangleTracer::build(std::span<const Mesh> meshes) {
   const std::vector<float> corners = corners_of(meshes);
@@ -70,11 +73,17 @@ void TriangleTracer::build(std::span<const Mesh> meshes) {
   tree_.merge();
 }
 
-Range TriangleTracer::spread(std::size_t count, std::uint32_t* rays_per_item) const {
+template <class... Arguments>
+void TriangleTracer::launch_rays(const char* kernel,
+                                 std::size_t count,
+                                 const Arguments&... arguments) {
   const bool cpu = context_->device().type == DeviceType::kCpu;
   const std::size_t each = cpu ? kCpuRaysPerItem : 1;
-  *rays_per_item = u32(each);
-  return Range::linear((count + each - 1) / each, cpu ? 1 : kGroup);
+  launch_in_bands(*context_, budget_,
+                  context_->kernel("light/surface_rays.cl", kernel,
+                                   BuildOptions().define("PACKET", tree_.lanes())),
+                  (count + each - 1) / each, cpu ? 1 : kGroup, u32(count), u32(each),
+                  tree_.levels(), tree_.level_begin(), tree_.nodes(), blocks_, arguments...);
 }
 
 template <class Skip>
@@ -84,13 +93,7 @@ void TriangleTracer::launch_nearest(const Buffer<Ray>& rays,
                                     std::size_t count,
                                     Buffer<RsSurfaceHit>& hits) {
   if (hits.size() < count) hits.ensure(*context_, count, "surface hits");
-  std::uint32_t each = 0;
-  const Range range = spread(count, &each);
-  context_
-      ->kernel("light/surface_rays.cl", "nearest_surface",
-               BuildOptions().define("PACKET", tree_.lanes()))
-      .launch(range, u32(count), each, tree_.levels(), tree_.level_begin(), tree_.nodes(), blocks_,
-              rays, skip, skip_stride, hits);
+  launch_rays("nearest_surface", count, rays, skip, skip_stride, hits);
 }
 
 void TriangleTracer::nearest(const Buffer<Ray>& rays,
@@ -112,13 +115,7 @@ void TriangleTracer::light_through(const Buffer<Ray>& rays,
                                    std::size_t count,
                                    Buffer<float>& passes) {
   if (passes.size() < count) passes.ensure(*context_, count, "light that passes");
-  std::uint32_t each = 0;
-  const Range range = spread(count, &each);
-  context_
-      ->kernel("light/surface_rays.cl", "light_through",
-               BuildOptions().define("PACKET", tree_.lanes()))
-      .launch(range, u32(count), each, tree_.levels(), tree_.level_begin(), tree_.nodes(), blocks_,
-              rays, skip, 1u, shadow, passes);
+  launch_rays("light_through", count, rays, skip, 1u, shadow, passes);
 }
 
 }  // namespace raysplats

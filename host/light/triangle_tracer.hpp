@@ -11,6 +11,7 @@
 #include "device/context.hpp"
 #include "raysplats/scene.hpp"
 #include "shared/light_layout.h"
+#include "trace/launch_budget.hpp"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
@@ -19,8 +20,9 @@ namespace raysplats {
 /// Watertight: a ray through an edge or corner that triangles share meets at least one of them.
 class TriangleTracer {
  public:
-  /// `lanes` of 4, 8 or 16; 0 chooses by the device (ray_lanes()).
-  explicit TriangleTracer(Context& context, int lanes = 0);
+  /// `lanes` of 4, 8 or 16; 0 chooses by the device (ray_lanes()). `launch_budget_ms` as in
+  /// TraceOptions.
+  explicit TriangleTracer(Context& context, int lanes = 0, double launch_budget_ms = -1.0);
 
   /// Builds the tree. Degenerate triangles are never met. Throws DataError for a position that is
   /// not finite and an index out of range.
@@ -28,7 +30,8 @@ class TriangleTracer {
   std::size_t size() const { return tree_.size(); }
 
   /// The first triangle of each of the first `count` rays with t in (t_min, t_max], either side; of
-  /// several at the same t the one with the lowest number. Enqueues and returns.
+  /// several at the same t the one with the lowest number. Enqueues and returns, unless launches
+  /// are bounded.
   void nearest(const Buffer<Ray>& rays, std::size_t count, Buffer<RsSurfaceHit>& hits);
   /// The same; ray i does not meet the triangle paths[i].skip.
   void nearest(const Buffer<Ray>& rays,
@@ -51,10 +54,12 @@ class TriangleTracer {
                       std::uint32_t skip_stride,
                       std::size_t count,
                       Buffer<RsSurfaceHit>& hits);
-  Range spread(std::size_t count, std::uint32_t* rays_per_item) const;
+  template <class... Arguments>
+  void launch_rays(const char* kernel, std::size_t count, const Arguments&... arguments);
 
   Context* context_;
   Lbvh tree_;
+  LaunchBudget budget_;
   Buffer<float> corners_;
   Buffer<RsAabb> boxes_;
   Buffer<float> blocks_;

@@ -15,6 +15,7 @@
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer.hpp"
+#include "trace/memory_shares.hpp"
 #include "trace/ray_backward.hpp"
 
 namespace raysplats {
@@ -63,6 +64,11 @@ std::array<float, 4> depth_axis(const Camera& camera) {
   return axis;
 }
 
+std::uint64_t count_of(const Buffer<std::uint32_t>& counter) {
+  const std::vector<std::uint32_t> words = counter.download();
+  return std::uint64_t{words[1]} << 32 | words[0];
+}
+
 glm::dvec3 vector(const float* v) { return {v[0], v[1], v[2]}; }
 
 }  // namespace
@@ -73,7 +79,14 @@ struct ViewTracer::Rays {
       : tracer(context, ray_options(options)),
         generator(context),
         paths(context, tracer, mirrors),
-        sums(context, tracer) {}
+        sums(context, tracer),
+        capped(context, 2, "capped rays"),
+        capped_before(context, 2, "capped rays of views before"),
+        traced_again(context, 2, "capped rays that are counted already") {
+    capped.clear();
+    capped_before.clear();
+    traced_again.clear();
+  }
 
   void add_pose(const Camera& camera, std::size_t count, PoseGradient& pose);
 
@@ -81,7 +94,11 @@ struct ViewTracer::Rays {
   CameraRays generator;
   MirrorPaths paths;
   RayBackward sums;
-  std::uint64_t capped = 0;  // of the batches before the last
+  // Rays that stopped because of max_hits, as counters of 64 bits in two words.
+  Buffer<std::uint32_t> capped;         // of the last view
+  Buffer<std::uint32_t> capped_before;  // of the views before it that were kept
+  Buffer<std::uint32_t> traced_again;
+  bool last_kept = false;
   Buffer<RayBackward::Slopes> slopes;
 };
 
@@ -100,8 +117,11 @@ struct ViewTracer::Impl {
   }
   std::size_t batch() const { return ViewTracer::batch(options.memory_budget); }
   Kernel kernel(const char* name) { return context.kernel("light/mirror_paths.cl", name); }
-  void trace_batch(const DeviceGaussians& gaussians, std::size_t first, std::size_t count);
-  void forward_rays(const DeviceGaussians& gaussians);
+  void trace_batch(const DeviceGaussians& gaussians,
+                   std::size_t first,
+                   std::size_t count,
+                   const Buffer<std::uint32_t>& counter);
+  void forward_rays(const DeviceGaussians& gaussians, bool keep);
   void backward_rays(const DeviceGaussians& gaussians,
                      const Buffer<float>& image_gradient,
                      GaussianGradients& gradients,
@@ -114,7 +134,8 @@ struct ViewTracer::Impl {
   bool tree;  // rays walk it though they could be traced by tiles
   CameraTracer packets;
   std::uint64_t packets_revision = 0;
-  std::optional<Rays> rays;  // once a view needs it
+  std::uint64_t packets_capped = 0;  // of views that were kept
+  std::optional<Rays> rays;          // once a view needs it
   // The last view.
   bool by_rays = false;
   bool kept = false;
@@ -125,7 +146,7 @@ struct ViewTracer::Impl {
 };
 
 std::size_t ViewTracer::batch(std::size_t memory_budget) {
-  return std::max(kLeastBatch, memory_budget / 4 / kPathBytes);
+  return std::max(kLeastBatch, MemoryShares(memory_budget).ray_batch() / kPathBytes);
 }
 
 ViewTracer::ViewTracer(Context& context, const TraceOptions& options, Mirrors mirrors)
@@ -154,6 +175,7 @@ void ViewTracer::forward(const DeviceGaussians& gaussians, const Camera& camera,
   self.packets_revision = gaussians.revision;
   self.packets.options().background = self.options.background = self.background;
   self.packets.forward(gaussians, camera, keep);
+  if (keep) self.packets_capped += self.packets.statistics().capped_rays;
   self.by_rays = false;
   self.camera = camera;
   self.kept = keep;
@@ -168,29 +190,31 @@ void ViewTracer::forward_rays(const DeviceGaussians& gaussians, const Camera& ca
   self.camera = camera;
   self.options.background = self.background;
   self.single_rays().tracer.follow(gaussians);
-  self.forward_rays(gaussians);
+  self.forward_rays(gaussians, keep);
   self.kept = keep;
   self.revision = gaussians.revision;
 }
 
 void ViewTracer::Impl::trace_batch(const DeviceGaussians& gaussians,
                                    std::size_t first,
-                                   std::size_t count) {
+                                   std::size_t count,
+                                   const Buffer<std::uint32_t>& counter) {
   rays->tracer.set_near(RayNear::of(camera, options.near_depth));
   rays->generator.generate(camera, Lens{}, first, count, rays->paths.rays());
-  rays->paths.trace(gaussians, count, color_direction(camera), options.background);
+  rays->paths.trace(gaussians, count, color_direction(camera), options.background, counter);
 }
 
-void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians) {
+void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep) {
   MirrorPaths& paths = rays->paths;
-  rays->capped = 0;
+  if (rays->last_kept) kernel("move_count").launch(Range{}, rays->capped, rays->capped_before);
+  rays->last_kept = keep;
+  rays->capped.clear();
   const std::size_t pixels = pixels_of(camera);
   image.ensure(context, 4 * pixels, "image");
   if (options.depth) depth.ensure(context, 3 * pixels, "depth");
   for (std::size_t first = 0; first < pixels; first += batch()) {
-    if (first > 0) rays->capped += paths.capped_rays();
     const std::size_t count = std::min(batch(), pixels - first);
-    trace_batch(gaussians, first, count);
+    trace_batch(gaussians, first, count, rays->capped);
     kernel("store_picture")
         .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), paths.seen(),
                 image);
@@ -253,7 +277,7 @@ void ViewTracer::Impl::backward_rays(const DeviceGaussians& gaussians,
   rays->sums.begin(gaussians, RayScreen::of(camera), pixels * paths.segments());
   for (std::size_t first = 0; first < pixels; first += batch()) {
     const std::size_t count = std::min(batch(), pixels - first);
-    if (batch() < pixels) trace_batch(gaussians, first, count);
+    if (batch() < pixels) trace_batch(gaussians, first, count, rays->traced_again);
     paths.gradients().ensure(context, count, "ray gradients");
     kernel("load_gradients")
         .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), image_gradient,
@@ -295,8 +319,17 @@ void ViewTracer::set_background(const std::array<float, 3>& background) {
 
 std::uint64_t ViewTracer::capped_rays() const {
   const Impl& self = *impl_;
-  return self.by_rays ? self.rays->capped + self.rays->paths.capped_rays()
-                      : self.packets.statistics().capped_rays;
+  return self.by_rays ? count_of(self.rays->capped) : self.packets.statistics().capped_rays;
 }
+
+std::uint64_t ViewTracer::kept_capped_rays() const {
+  const Impl& self = *impl_;
+  std::uint64_t sum = self.packets_capped;
+  if (!self.rays) return sum;
+  sum += count_of(self.rays->capped_before);
+  return self.rays->last_kept ? sum + count_of(self.rays->capped) : sum;
+}
+
+const Context& ViewTracer::context() const { return impl_->context; }
 
 }  // namespace raysplats

@@ -64,6 +64,10 @@ class ViewTracer {
   void set_background(const std::array<float, 3>& background);
   /// Rays of the last view that stopped because of max_hits; blocks.
   std::uint64_t capped_rays() const;
+  /// Of every forward(keep = true) so far; blocks where any was traced ray by ray, else the device
+  /// has told already.
+  std::uint64_t kept_capped_rays() const;
+  const Context& context() const;
 
  private:
   struct Rays;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <glm/matrix.hpp>
 #include <limits>
@@ -18,6 +17,7 @@
 #include "trace/gaussian_kernel.hpp"
 #include "trace/gradient_sums.hpp"
 #include "trace/launch_budget.hpp"
+#include "trace/memory_shares.hpp"
 #include "trace/packet_shape.hpp"
 
 namespace raysplats {
@@ -97,7 +97,7 @@ struct CameraTracer::Impl {
   std::size_t chunk_bytes() const { return kChunkEntries * (sizeof(Stream) + row_bytes()); }
   std::size_t pool_limit() const {
     return std::min<std::size_t>(
-        {options.memory_budget / 2 / chunk_bytes(),
+        {MemoryShares(options.memory_budget).hit_streams() / chunk_bytes(),
          context.device().max_allocation / (kChunkEntries * std::max(sizeof(Stream), row_bytes())),
          std::numeric_limits<std::uint32_t>::max() / kChunkEntries});
   }
@@ -234,7 +234,7 @@ void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
 void CameraTracer::Impl::trace_window(const DeviceGaussians& gaussians,
                                       const TileWindow& window,
                                       bool keep) {
-  if (!lists.build(boxes, camera, window, options.memory_budget / 4)) {
+  if (!lists.build(boxes, camera, window, MemoryShares(options.memory_budget).tile_lists())) {
     for (const TileWindow& half : window.halves()) trace_window(gaussians, half, keep);
     return;
   }
@@ -284,23 +284,6 @@ Range CameraTracer::Impl::packet_range(const Kernel& kernel,
   Range range = Range::plane(across, rows * tile, group[0], group[1]);
   range.offset[1] = row * tile;
   return range;
-}
-
-// Calls launch(first, number) for all `rows`, as many at once as the budget of time allows.
-template <class Launch>
-void in_bands(Context& context, LaunchBudget& budget, std::uint32_t rows, const Launch& launch) {
-  for (std::uint32_t row = 0; row < rows;) {
-    const std::uint32_t now = budget.rows(rows - row);
-    if (budget.bounded()) context.finish();
-    const auto begin = std::chrono::steady_clock::now();
-    launch(row, now);
-    if (budget.bounded()) {
-      context.finish();
-      budget.record(
-          now, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-    }
-    row += now;
-  }
 }
 
 void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
@@ -439,9 +422,10 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
 // Gradients of the lines of one face.
 void CameraTracer::Impl::backward_face(const DeviceGaussians& gaussians,
                                        const Buffer<float>& image_gradient) {
-  sums.prepare(GradientSumChoice::of(options, context.device(), gaussians.count,
-                                     options.memory_budget / 4, kCopiesPerUnit),
-               gaussians.count);
+  sums.prepare(
+      GradientSumChoice::of(options, context.device(), gaussians.count,
+                            MemoryShares(options.memory_budget).packet_gradients(), kCopiesPerUnit),
+      gaussians.count);
   if (hits_complete) {
     launch_backward(image_gradient, 0, lists.tile_rows());
     return;

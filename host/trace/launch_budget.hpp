@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 
+#include "device/context.hpp"
 #include "raysplats/device.hpp"
 
 namespace raysplats {
 
-/// How many rows of tiles one launch may do, so that it ends within a time: the watchdogs of GPUs
-/// that also draw a screen stop kernels after some seconds, and a long kernel freezes the screen.
-/// The size follows the times of the launches before.
+/// How many rows (of tiles, or of rays) one launch may do, so that it ends within a time: the
+/// watchdogs of GPUs that also draw a screen stop kernels after some seconds, and a long kernel
+/// freezes the screen. The size follows the times of the launches before.
 class LaunchBudget {
  public:
   /// `milliseconds` per launch; 0 = no bound, negative = none on CPUs and kDefault elsewhere.
@@ -27,5 +29,40 @@ class LaunchBudget {
   double seconds_;
   std::uint32_t rows_ = 4;
 };
+
+/// Calls launch(first, number) until all `rows` are done, as many at once as the budget of time
+/// allows; waits for each where there is one.
+template <class Launch>
+void in_bands(Context& context, LaunchBudget& budget, std::uint32_t rows, const Launch& launch) {
+  for (std::uint32_t row = 0; row < rows;) {
+    const std::uint32_t now = budget.rows(rows - row);
+    if (budget.bounded()) context.finish();
+    const auto begin = std::chrono::steady_clock::now();
+    launch(row, now);
+    if (budget.bounded()) {
+      context.finish();
+      budget.record(
+          now, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    }
+    row += now;
+  }
+}
+
+/// The same for a kernel of one dimension whose work-items go by their global id: `items` of them
+/// in groups of `group`, a row.
+template <class... Arguments>
+void launch_in_bands(Context& context,
+                     LaunchBudget& budget,
+                     Kernel kernel,
+                     std::size_t items,
+                     std::size_t group,
+                     const Arguments&... arguments) {
+  const auto groups = static_cast<std::uint32_t>((items + group - 1) / group);
+  in_bands(context, budget, groups, [&](std::uint32_t first, std::uint32_t number) {
+    Range range = Range::linear(number * group, group);
+    range.offset[0] = first * group;
+    kernel.launch(range, arguments...);
+  });
+}
 
 }  // namespace raysplats

@@ -9,6 +9,8 @@
 
 #include "raysplats/error.hpp"
 #include "trace/gaussian_kernel.hpp"
+#include "trace/launch_budget.hpp"
+#include "trace/memory_shares.hpp"
 
 namespace raysplats {
 namespace {
@@ -51,7 +53,8 @@ RayBackward::RayBackward(Context& context, const RayTracer& tracer)
       tracer_(&tracer),
       order_(context),
       no_slopes_(context, 1, "no gradients of rays"),
-      sums_(context, "ray gradient sums") {}
+      sums_(context, "ray gradient sums"),
+      budget_(tracer.options().launch_budget_ms, context.device().type) {}
 
 // RS_RAY_SUMS / 16 of ray_sums.h.
 std::size_t RayBackward::sum_lines(int degree) {
@@ -64,7 +67,7 @@ GradientSumChoice RayBackward::sum_choice(const TraceOptions& options,
                                           std::size_t gaussians,
                                           int degree) {
   return GradientSumChoice::of(options, device, gaussians * sum_lines(degree),
-                               options.memory_budget / 2, 1);
+                               MemoryShares(options.memory_budget).ray_gradients(), 1);
 }
 
 void RayBackward::begin(const DeviceGaussians& gaussians,
@@ -131,17 +134,27 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   BuildOptions build = ray_walk_build(device, options, tracer_->near(), tree.lanes());
   sums_.define(build.define("SH_DEGREE", degree_).define("RAY_SLOPES", slopes != nullptr ? 1 : 0));
   const std::size_t chunk = cpu ? kCpuChunk : 1;
-  const std::size_t items = sums_.is_private() ? sums_.copies() : (count + chunk - 1) / chunk;
+  // Rays that all work-items, or a group of them, take in one turn: bands of whole rows leave every
+  // ray with the copy that it would go to without.
+  const std::size_t group = cpu ? 1 : kGroup;
+  const std::size_t row = chunk * (sums_.is_private() ? sums_.copies() : group);
   const std::array<float, 4> background{options.background[0], options.background[1],
                                         options.background[2], 0.0f};
-  context_->kernel("trace/ray_backward.cl", "ray_backward", build)
-      .launch(Range::linear(items, cpu ? 1 : kGroup), u32(count), u32(chunk), u32(items),
-              u32(gaussians.count), tree.levels(), tree.level_begin(), tree.nodes(),
-              tracer_->tree().blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
-              color_direction == ColorDirection::kFromOrigin ? 1 : 0, options.quantile,
-              options.min_transmittance, options.max_hits, tracer_->near().plane, background,
-              screen_, rays, ordered ? 1 : 0, order_.indices(), results, gradients, records_,
-              GradientSums::limit(rays_), sums_.target(), slopes != nullptr ? *slopes : no_slopes_);
+  Kernel kernel = context_->kernel("trace/ray_backward.cl", "ray_backward", build);
+  in_bands(*context_, budget_, u32((count + row - 1) / row), [&](std::size_t at, std::size_t rows) {
+    const std::size_t first = at * row;
+    const std::size_t last = std::min(count, first + rows * row);
+    const std::size_t items =
+        sums_.is_private() ? sums_.copies() : (last - first + chunk - 1) / chunk;
+    kernel.launch(Range::linear(items, group), u32(first), u32(last), u32(chunk), u32(items),
+                  u32(gaussians.count), tree.levels(), tree.level_begin(), tree.nodes(),
+                  tracer_->tree().blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
+                  color_direction == ColorDirection::kFromOrigin ? 1 : 0, options.quantile,
+                  options.min_transmittance, options.max_hits, tracer_->near().plane, background,
+                  screen_, rays, ordered ? 1 : 0, order_.indices(), results, gradients, records_,
+                  GradientSums::limit(rays_), sums_.target(),
+                  slopes != nullptr ? *slopes : no_slopes_);
+  });
 }
 
 void RayBackward::finish(const DeviceGaussians& gaussians, GaussianGradients& gradients) {

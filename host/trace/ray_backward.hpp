@@ -10,6 +10,7 @@
 #include "raysplats/camera.hpp"
 #include "trace/device_gaussians.hpp"
 #include "trace/gradient_sums.hpp"
+#include "trace/launch_budget.hpp"
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tracer.hpp"
 
@@ -92,6 +93,7 @@ class RayBackward {
   Buffer<float> records_;
   Buffer<Slopes> no_slopes_;
   GradientSums sums_;
+  LaunchBudget budget_;
 };
 
 }  // namespace raysplats

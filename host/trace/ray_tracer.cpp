@@ -7,6 +7,10 @@
 #include <array>
 
 #include "raysplats/error.hpp"
+#include "trace/launch_budget.hpp"
+#include "trace/memory_shares.hpp"
+#include "trace/ray_launch.hpp"
+#include "trace/ray_tree.hpp"
 
 namespace raysplats {
 namespace {
@@ -35,6 +39,7 @@ struct RayTracer::Impl {
         options(options_in),
         tree(context_in, options_in, lanes),
         order(context_in),
+        budget(options_in.launch_budget_ms, context_in.device().type),
         no_flags(context_in, 1, "no flags of rays") {}
 
   Context& context;
@@ -43,6 +48,7 @@ struct RayTracer::Impl {
   RayTree tree;
   std::uint64_t revision = 0;  // of the Gaussians in it
   RayOrder order;
+  LaunchBudget budget;
   Buffer<std::uint32_t> no_flags;
   Buffer<Ray> rays;
   Buffer<RayResult> results;
@@ -114,15 +120,15 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
   const std::array<float, 4> background{options.background[0], options.background[1],
                                         options.background[2], 0.0f};
-  self.context
-      .kernel("trace/rays.cl", "trace_rays",
-              ray_walk_build(self.context.device(), options, self.near, tree.lanes()))
-      .launch(Range::linear((count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup),
-              u32(count), u32(rays_per_item), tree.levels(), tree.level_begin(), tree.nodes(),
-              self.tree.blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
-              gaussians.active_sh_degree, color_mode, from_origin, options.quantile,
-              options.min_transmittance, options.max_hits, self.near.plane, background, rays,
-              ordered ? 1 : 0, self.order.indices(), results);
+  launch_in_bands(
+      self.context, self.budget,
+      self.context.kernel("trace/rays.cl", "trace_rays",
+                          ray_walk_build(self.context.device(), options, self.near, tree.lanes())),
+      (count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup, u32(count), u32(rays_per_item),
+      tree.levels(), tree.level_begin(), tree.nodes(), self.tree.blocks(), gaussians.sh,
+      sh_coefficients(gaussians.sh_degree), gaussians.active_sh_degree, color_mode, from_origin,
+      options.quantile, options.min_transmittance, options.max_hits, self.near.plane, background,
+      rays, ordered ? 1 : 0, self.order.indices(), results);
 }
 
 void RayTracer::set_background(const std::array<float, 3>& background) {
@@ -142,8 +148,9 @@ std::vector<RayResult> RayTracer::trace(const DeviceGaussians& gaussians,
                                         ColorDirection color_direction) {
   Impl& self = *impl_;
   const std::size_t batch = std::max<std::size_t>(
-      kGroup, std::min<std::size_t>(self.options.memory_budget / 2 / kRayBytes,
-                                    self.context.device().max_allocation / sizeof(Ray)));
+      kGroup,
+      std::min<std::size_t>(MemoryShares(self.options.memory_budget).host_rays() / kRayBytes,
+                            self.context.device().max_allocation / sizeof(Ray)));
   std::vector<RayResult> out(rays.size());
   for (std::size_t begin = 0; begin < rays.size(); begin += batch) {
     const std::size_t count = std::min(batch, rays.size() - begin);

@@ -38,7 +38,7 @@ class RayTracer {
                                std::span<const Ray> rays,
                                ColorDirection color_direction = ColorDirection::kRay);
   /// The first `count` of `rays`, already on the device, into the first of `results`, which grows
-  /// when it is smaller. Enqueues and returns.
+  /// when it is smaller. Enqueues and returns, unless the options bound the time of a launch.
   void trace(const DeviceGaussians& gaussians,
              const Buffer<Ray>& rays,
              std::size_t count,

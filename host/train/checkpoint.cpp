@@ -94,6 +94,8 @@ nlohmann::json header_of(const Checkpoint& c) {
           {"dataset", c.dataset},
           {"bad_steps", c.bad_steps},
           {"bad_steps_in_a_row", c.bad_steps_in_a_row},
+          {"traced_rays", c.traced_rays},
+          {"capped_rays", c.capped_rays},
           {"config", c.config}};
 }
 
@@ -124,6 +126,10 @@ Checkpoint parse_header(const std::string& text, std::uint32_t version) {
     json.at("dataset").get_to(c.dataset);
     get_whole<std::uint32_t>(json, "bad_steps", 0, UINT32_MAX, c.bad_steps);
     get_whole<std::uint32_t>(json, "bad_steps_in_a_row", 0, UINT32_MAX, c.bad_steps_in_a_row);
+  }
+  if (json.contains("capped_rays")) {
+    get_whole<std::uint64_t>(json, "traced_rays", 0, UINT64_MAX, c.traced_rays);
+    get_whole<std::uint64_t>(json, "capped_rays", 0, UINT64_MAX, c.capped_rays);
   }
   json.at("config").get_to(c.config);
   return c;

@@ -27,7 +27,9 @@ struct Checkpoint {
   std::string dataset;          ///< dataset_fingerprint(); empty in files of version 1
   std::uint32_t bad_steps = 0;  ///< StepGuard::Counts
   std::uint32_t bad_steps_in_a_row = 0;
-  std::string config;                                  ///< configuration of the run, TOML
+  std::uint64_t traced_rays = 0;  ///< of all training views so far; 0 in older files, as the next
+  std::uint64_t capped_rays = 0;  ///< of them, those that stopped because of max_hits
+  std::string config;             ///< configuration of the run, TOML
   std::map<std::string, std::vector<float>> sections;  ///< names of at most 31 characters
 };
 

@@ -13,6 +13,7 @@
 #include "shared/light_layout.h"
 #include "trace/exact_sum.h"
 #include "trace/gradient_sums.hpp"
+#include "trace/memory_shares.hpp"
 #include "trace/ray_backward.hpp"
 
 namespace raysplats {
@@ -33,8 +34,9 @@ TraceOptions sum_options_of(const TrainOptions& options) {
 // of memory-budget become that, too.
 bool may_sum_exactly(const TrainOptions& options, std::size_t gaussians, const DeviceInfo& device) {
   const TraceOptions trace = sum_options_of(options);
-  return GradientSumChoice::of(trace, device, gaussians, trace.memory_budget / 4, 1).sum ==
-         GradientSum::kExact;
+  return GradientSumChoice::of(trace, device, gaussians,
+                               MemoryShares(trace.memory_budget).packet_gradients(), 1)
+             .sum == GradientSum::kExact;
 }
 
 // What views that are traced ray by ray hold per Gaussian, and in their largest buffer.

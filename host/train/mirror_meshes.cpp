@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/mirror_meshes.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <utility>
 
 #include "io/mesh_file.hpp"
@@ -22,6 +24,12 @@ Mirrors load_mirrors(const std::vector<std::string>& paths, int max_bounces) {
     out.meshes.push_back(std::move(file.mesh));
   }
   return out;
+}
+
+Mirrors mirrors_of(const ModelSource& source) {
+  if (!source.trained || source.trained->mirrors.empty()) return {};
+  spdlog::info("{} was trained with mirrors: its rays are traced one by one", source.ply.string());
+  return load_mirrors(source.trained->mirrors, source.trained->mirror_bounces);
 }
 
 }  // namespace raysplats

@@ -5,11 +5,15 @@
 #include <vector>
 
 #include "light/mirror_paths.hpp"
+#include "train/model_source.hpp"
 
 namespace raysplats {
 
 /// Known mirrors from mesh files (io::read_mesh). Materials that are mirrors keep their colour, all
 /// others reflect everything.
 Mirrors load_mirrors(const std::vector<std::string>& paths, int max_bounces);
+
+/// The mirrors that a model was trained with; none for a PLY that is in no run.
+Mirrors mirrors_of(const ModelSource& source);
 
 }  // namespace raysplats

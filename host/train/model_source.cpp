@@ -2,6 +2,7 @@
 #include "train/model_source.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <charconv>
 #include <string>
@@ -9,6 +10,7 @@
 #include <system_error>
 
 #include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
 #include "train/train_config.hpp"
 
 namespace raysplats {
@@ -34,6 +36,10 @@ void read_options(ModelSource& source, const std::filesystem::path& run) {
   read_train_config(config_of(run), *source.trained);
 }
 
+void read_header(ModelSource& source) {
+  if (!source.trained) source.header = read_ply_options(source.ply);
+}
+
 }  // namespace
 
 bool is_run_folder(const std::filesystem::path& path) {
@@ -56,6 +62,7 @@ ModelSource find_model(const std::filesystem::path& path) {
     if (source.iteration && folder.parent_path().filename() == "point_cloud") {
       read_options(source, folder.parent_path().parent_path());
     }
+    read_header(source);
     return source;
   }
   for (std::filesystem::directory_iterator entry(path / "point_cloud", error), end;
@@ -75,6 +82,7 @@ ModelSource find_model(const std::filesystem::path& path) {
                     path.string()));
   }
   read_options(source, path);
+  read_header(source);
   return source;
 }
 
@@ -90,7 +98,15 @@ DatasetOptions dataset_options(const ModelSource& source) {
 
 TraceOptions trace_options(const ModelSource& source, bool cut_out) {
   TraceOptions out;
-  if (!source.trained) return out;
+  if (!source.trained && source.header) return *source.header;
+  if (!source.trained) {
+    spdlog::info(
+        "{} does not say how it is traced: hits are taken in peak order, as rasterisers do",
+        source.ply.string());
+    out.hit_order = HitOrder::kPeak;
+    out.adaptive_radius = true;
+    return out;
+  }
   const TrainOptions& trained = *source.trained;
   out.quantile = static_cast<float>(trained.quantile);
   out.min_transmittance = static_cast<float>(trained.min_transmittance);
@@ -106,14 +122,15 @@ TraceOptions trace_options(const ModelSource& source, bool cut_out) {
 }
 
 void find_models(SceneFile& scene) {
-  bool known = false;
+  std::optional<ModelSource> first;  // that tells, or else of all
   for (SceneModel& model : scene.models) {
     const ModelSource source = find_model(model.file);
     model.file = source.ply;
-    if (known || !source.trained) continue;
-    scene.trained = trace_options(source, false);
-    known = true;
+    const bool tells = source.trained || source.header;
+    const bool told = first && (first->trained || first->header);
+    if (!first || (tells && !told)) first = source;
   }
+  if (first) scene.trained = trace_options(*first, false);
 }
 
 }  // namespace raysplats

@@ -17,6 +17,7 @@ struct ModelSource {
   std::filesystem::path ply;
   std::optional<TrainOptions>
       trained;  ///< of the run folder it is in; none for a PLY from elsewhere
+  std::optional<TraceOptions> header;     ///< of a PLY that is in no run: what its header says
   std::optional<std::int64_t> iteration;  ///< of RUN/point_cloud/iteration_N
 };
 
@@ -34,11 +35,12 @@ ModelSource find_model(const std::filesystem::path& path);
 DatasetOptions dataset_options(const ModelSource& source);
 
 /// What a model has to be traced with to look as in training; `cut_out` as for background_color().
-/// The defaults of TraceOptions when nothing is known.
+/// Without a run the header of the PLY tells. Models of other programs, which rasterise, are shown
+/// right in peak order and where they reach 1/255: that is taken, and said, when nothing is known.
 TraceOptions trace_options(const ModelSource& source, bool cut_out);
 
 /// Replaces run folders among a scene's models by their newest PLY, and makes the options of the
-/// first model that is in a run what the scene's [trace] goes over. Throws as find_model().
+/// first model that tells them what the scene's [trace] goes over. Throws as find_model().
 void find_models(SceneFile& scene);
 
 }  // namespace raysplats

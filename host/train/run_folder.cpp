@@ -87,9 +87,11 @@ void RunFolder::write_cameras(std::span<const Camera> cameras) const {
   write_text_file(path_ / "cameras.json", list.dump() + "\n");
 }
 
-void RunFolder::write_model(const Gaussians& model, std::int64_t iteration) const {
+void RunFolder::write_model(const Gaussians& model,
+                            const TraceOptions& trace,
+                            std::int64_t iteration) const {
   write_ply(path_ / "point_cloud" / fmt::format("iteration_{}", iteration) / "point_cloud.ply",
-            model);
+            model, trace);
 }
 
 void RunFolder::begin_metrics(std::int64_t iteration) {
@@ -136,7 +138,7 @@ void RunFolder::write_metrics(const nlohmann::json& summary) const {
   nlohmann::json json = summary;
   json["evaluations"] = nlohmann::json::array();
   for (const EvaluationRow& row : evaluations_) json["evaluations"].push_back(to_json(row));
-  json["note"] = "training_seconds exclude evaluation";
+  json["note"] = "training_seconds exclude evaluation and compiling kernels";
   write_text_file(path_ / "metrics.json", json.dump(2) + "\n");
 }
 

@@ -12,6 +12,7 @@
 #include "base/file_lock.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/gaussians.hpp"
+#include "raysplats/trace_options.hpp"
 #include "raysplats/train_options.hpp"
 #include "raysplats/trainer.hpp"
 
@@ -42,7 +43,8 @@ class RunFolder {
   /// cameras.json as the viewers of 3DGS read it: centre and camera-to-world rotation of every
   /// view.
   void write_cameras(std::span<const Camera> cameras) const;
-  void write_model(const Gaussians& model, std::int64_t iteration) const;
+  /// `trace` goes into the header, for those who take the model elsewhere.
+  void write_model(const Gaussians& model, const TraceOptions& trace, std::int64_t iteration) const;
 
   /// Keeps other runs out of the folder until the lock goes, and removes temporary files that a
   /// killed run left. Throws DataError when another run has the folder.

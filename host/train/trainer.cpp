@@ -45,22 +45,29 @@ namespace {
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 constexpr int kSmallPhoto = 200;       // longer side of photos that the start looks at, in pixels
 constexpr std::size_t kReadAhead = 8;  // photos decoded ahead of their turn
-constexpr double kRecentViews = 20.0;  // logged views that the shown PSNR averages over
+constexpr double kManyCapped = 1e-3;   // share of rays at which the cap on hits gets a warning
 
-// A clock that can be stopped.
+// A clock that can be stopped, and stands while kernels are compiled.
 class Stopwatch {
  public:
-  void start() { begun_ = std::chrono::steady_clock::now(); }
+  explicit Stopwatch(const Context& context) : context_(&context) {}
+  void start() {
+    begun_ = std::chrono::steady_clock::now();
+    built_ = context_->build_seconds();
+  }
   void stop() { seconds_ = seconds(), begun_.reset(); }
   void set(double seconds) { seconds_ = seconds; }
   double seconds() const {
     if (!begun_) return seconds_;
     return seconds_ +
-           std::chrono::duration<double>(std::chrono::steady_clock::now() - *begun_).count();
+           std::chrono::duration<double>(std::chrono::steady_clock::now() - *begun_).count() -
+           (context_->build_seconds() - built_);
   }
 
  private:
+  const Context* context_;
   double seconds_ = 0;
+  double built_ = 0;  // build_seconds() at the start
   std::optional<std::chrono::steady_clock::time_point> begun_;
 };
 
@@ -183,6 +190,9 @@ struct Trainer::Impl {
   void validate_model();
   void write_dump();
   std::string rescue();
+  std::uint64_t capped_rays() const { return capped_before + tracer.kept_capped_rays(); }
+  std::string capped_share();
+  void warn_of_capped_rays() const;
   void write_metrics(bool complete);
   void run_iterations(std::int64_t until,
                       bool scheduled,
@@ -226,10 +236,12 @@ struct Trainer::Impl {
   bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
   std::int64_t saved = -1;  // iteration of the newest checkpoint of this run
   std::uint32_t reported_bad_steps = 0;
-  Stopwatch training;
-  Stopwatch evaluating;
+  std::uint64_t traced_rays = 0;    // of all training views of the run
+  std::uint64_t capped_before = 0;  // rays that stopped at max-hits before it was resumed
+  bool cap_reported = false;
+  Stopwatch training{context};
+  Stopwatch evaluating{context};
   double last_loss = 0;
-  std::optional<double> recent_psnr;
   std::int64_t row_iteration = 0;
   double row_seconds = 0;
 
@@ -381,6 +393,7 @@ void Trainer::Impl::step() {
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
   tracer.set_background(behind);
   tracer.forward(gaussians, camera, true);
+  traced_rays += pixels_of(camera);
   loss.evaluate(tracer.image(), targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
   const ImageLoss::Partials partials = loss.partials();
@@ -457,15 +470,34 @@ void Trainer::Impl::report(Progress& progress) {
   check_guard();
   last_loss = value.total;
   const double psnr = std::min(value.psnr, 100.0);
-  recent_psnr = recent_psnr ? *recent_psnr + (psnr - *recent_psnr) / kRecentViews : psnr;
   const double seconds = training.seconds();
   const double elapsed = seconds - row_seconds;
   run.append({iteration, seconds, value.total, psnr, gaussians.count,
               elapsed > 0 ? static_cast<double>(iteration - row_iteration) / elapsed : 0.0});
   row_iteration = iteration;
   row_seconds = seconds;
-  progress.update(iteration, fmt::format("loss {:.4f}, PSNR {:.2f}, {} Gaussians", value.total,
-                                         *recent_psnr, gaussians.count));
+  progress.update(iteration, fmt::format("loss {:.4f}, PSNR {:.2f} of this view, {} Gaussians{}",
+                                         value.total, psnr, gaussians.count, capped_share()));
+}
+
+// What the progress line says of rays that the cap on hits cut off; the first time that they are
+// many, a warning does too.
+std::string Trainer::Impl::capped_share() {
+  const std::uint64_t capped = capped_rays();
+  if (capped == 0) return "";
+  const double share = static_cast<double>(capped) / static_cast<double>(traced_rays);
+  if (share >= kManyCapped && !cap_reported) {
+    cap_reported = true;
+    warn_of_capped_rays();
+  }
+  return fmt::format(", {:.2g} % of rays capped", 100.0 * share);
+}
+
+void Trainer::Impl::warn_of_capped_rays() const {
+  spdlog::warn(
+      "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
+      "behind: raise it",
+      iteration, capped_rays(), traced_rays, options.max_hits);
 }
 
 // What happens between this step and the next one: density control.
@@ -517,7 +549,9 @@ void Trainer::Impl::evaluate_views(bool last) {
                format_duration(training.seconds()));
 }
 
-void Trainer::Impl::save_model() { run.write_model(gaussians.download(), iteration); }
+void Trainer::Impl::save_model() {
+  run.write_model(gaussians.download(), trace_options_of(options, background), iteration);
+}
 
 Checkpoint Trainer::Impl::state() {
   Checkpoint checkpoint;
@@ -529,6 +563,8 @@ Checkpoint Trainer::Impl::state() {
   const StepGuard::Counts counts = guard.counts();
   checkpoint.bad_steps = counts.bad_steps;
   checkpoint.bad_steps_in_a_row = counts.in_a_row;
+  checkpoint.traced_rays = traced_rays;
+  checkpoint.capped_rays = capped_rays();
   store_state(gaussians, adam, density, checkpoint);
   return checkpoint;
 }
@@ -579,6 +615,8 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   restore_state(context, checkpoint, options, gaussians, adam, density);
   guard.restore({checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false});
   reported_bad_steps = checkpoint.bad_steps;
+  traced_rays = checkpoint.traced_rays;
+  capped_before = checkpoint.capped_rays;
   iteration = checkpoint.iteration;
   const bool file = !std::filesystem::is_directory(place);
   training.set(recorded_seconds(file ? place.parent_path().parent_path() : place, iteration));
@@ -594,7 +632,9 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"loss", last_loss},
                      {"training_seconds", training.seconds()},
                      {"evaluation_seconds", evaluating.seconds()},
-                     {"capped_rays", tracer.capped_rays()},
+                     {"kernel_build_seconds", context.build_seconds()},
+                     {"traced_rays", traced_rays},
+                     {"capped_rays", capped_rays()},
                      {"skipped_updates", adam.skipped()},
                      {"bad_steps", guard.counts().bad_steps},
                      {"peak_device_bytes", context.peak_allocated_bytes()},
@@ -687,6 +727,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   }
   advance(options.iterations, true, show_progress, [&] { return interrupt.requested(); });
   write_metrics(iteration == options.iterations);
+  if (capped_rays() > 0) warn_of_capped_rays();
   if (iteration < options.iterations && !stop_asked) {
     throw Error(
         ErrorCode::kInterrupted,
@@ -699,6 +740,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   summary.loss = last_loss;
   summary.training_seconds = training.seconds();
   summary.evaluation_seconds = evaluating.seconds();
+  summary.kernel_build_seconds = context.build_seconds();
   summary.evaluations = run.evaluations();
   return summary;
 }

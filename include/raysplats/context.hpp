@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -23,6 +24,9 @@ struct ContextOptions {
   bool kernel_cache = true;     ///< keep compiled programs in the user's cache directory
   bool tuning = true;           ///< use what `raysplats tune` stored for the device
   std::string cache_directory;  ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
+  /// Hears of every program that the compiler, not the cache, makes: before (its number from 1, its
+  /// file below cl/), and when it is done (its number, "").
+  std::function<void(std::size_t number, const std::string& program)> compiling;
 };
 
 /// Device time of one launch. Fills and copies of buffers have no program and are named "(fill)"
@@ -55,6 +59,10 @@ class Context {
 
   /// Blocks until everything enqueued has finished; errors of earlier launches surface here.
   void finish();
+
+  /// What making programs has taken so far, from the cache or by the compiler: it is no part of any
+  /// work, and happens once.
+  double build_seconds() const;
 
   /// Keeps other threads from using the context until the lock goes. A thread may lock it again.
   [[nodiscard]] std::unique_lock<std::recursive_mutex> lock() const;

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "raysplats/camera.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/image.hpp"
+#include "raysplats/trace_options.hpp"
 
 namespace raysplats {
 
@@ -17,7 +19,16 @@ namespace raysplats {
 Gaussians read_ply(const std::filesystem::path& path);
 
 /// Writes an Inria-style binary little-endian 3DGS PLY atomically (temporary file, sync, rename).
-void write_ply(const std::filesystem::path& path, const Gaussians& model);
+/// `trace` is how the model wants to be traced; the options of it that change the picture (order,
+/// quantile, adaptive radius, near depth, transmittance, cap on hits, background) go into the
+/// header as comments, which other programs skip.
+void write_ply(const std::filesystem::path& path,
+               const Gaussians& model,
+               const std::optional<TraceOptions>& trace = std::nullopt);
+
+/// The options in the header of a PLY that write_ply() was given them for, the others as
+/// TraceOptions has them; nothing for other files. Throws DataError for a value out of range.
+std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path);
 
 /// Reads PNG, JPEG, EXR, Radiance HDR, TIFF or BMP as float; 1 to 4 channels as in the file (grey
 /// stays 1 channel).

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -38,11 +39,13 @@ class PathTracer {
   void set_meshes(const std::vector<Mesh>& meshes);
 
   /// RGBA: the background or environment is blended, alpha is the share of light that did not come
-  /// from there. Any camera model. Throws UsageError for a camera without pixels or with a number
-  /// that is not finite.
-  Image render(const Camera& camera);
+  /// from there. Any camera model. `within` hears the share of the picture that is done, after
+  /// every sample of a batch of pixels, and returns false to stop; then the picture is empty.
+  /// Throws UsageError for a camera without pixels or with a number that is not finite.
+  Image render(const Camera& camera, const std::function<bool(double share)>& within = {});
 
   Statistics statistics() const;
+  const Context& context() const;
 
  private:
   struct Impl;

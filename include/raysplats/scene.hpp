@@ -87,9 +87,9 @@ struct ShadowSettings {
 };
 
 struct RenderSettings {
-  int samples = 1;                ///< rays per pixel; above 1 they are jittered over the pixel
-  int max_bounces = 8;            ///< surfaces that a path may meet
-  float min_throughput = 0.005f;  ///< a path that carries less ends
+  int samples = 1;                 ///< rays per pixel; above 1 they are jittered over the pixel
+  int max_bounces = 8;             ///< surfaces that a path may meet
+  float min_throughput = 0.0005f;  ///< a path that carries less ends; no pixel loses more by it
   std::uint64_t seed = 0;
   Rgb ambient{0.2f, 0.2f, 0.2f};  ///< light on diffuse surfaces besides lights and environment
   bool indirect = false;          ///< diffuse surfaces gather light by rays instead of `ambient`

@@ -31,8 +31,9 @@ struct TrainSummary {
   std::int64_t iterations = 0;
   std::size_t gaussians = 0;
   double loss = 0;              ///< of the last view reported
-  double training_seconds = 0;  ///< evaluation and files excluded
+  double training_seconds = 0;  ///< evaluation, files and compiling kernels excluded
   double evaluation_seconds = 0;
+  double kernel_build_seconds = 0;  ///< of the context so far
   std::vector<EvaluationRow>
       evaluations;  ///< the last one is that of the final model, when there are test views
 };

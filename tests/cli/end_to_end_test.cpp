@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -119,4 +120,46 @@ TEST_CASE("generate, train, evaluate, render, resume") {
   CHECK(state.at("type") == "run");
   CHECK(state.at("iteration") == 150);
   CHECK(state.at("gaussians") == 1500);
+}
+
+TEST_CASE("a run with mirrors is evaluated and rendered with them") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  const std::string run = folder / "run";
+  succeed({"generate", data, "--size", "32", "--train-views", "6", "--test-views", "3"});
+  write_file(folder / "mirror.obj",
+             "v -4 -4 -1.2\nv 4 -4 -1.2\nv 4 4 -1.2\nv -4 4 -1.2\nf 1 2 3\nf 1 3 4\n");
+  succeed({"train", data, "-o", run, "-n", "20", "--init-count", "500", "--mirror",
+           folder / "mirror.obj", "-q"});
+  const nlohmann::json metrics = nlohmann::json::parse(read_file(fs::path(run) / "metrics.json"));
+  const double trained = metrics.at("evaluations").back().at("psnr").get<double>();
+  CHECK(psnr_of(run, data, folder / "eval") == doctest::Approx(trained).epsilon(1e-4));
+  // The same model out of its run has no mirrors.
+  fs::copy_file(model_of(run, 20), folder / "model.ply");
+  CHECK(std::abs(psnr_of(folder / "model.ply", data, folder / "eval_model") - trained) > 0.05);
+  succeed({"render", run, "--data", data, "-o", folder / "with", "-q"});
+  succeed({"render", folder / "model.ply", "--data", data, "-o", folder / "without", "-q"});
+  CHECK(read_file(folder / "with/r_0.png") != read_file(folder / "without/r_0.png"));
+  const Outcome depth =
+      raysplats_program({"render", run, "--data", data, "-o", folder / "depth", "--depth", "-q"});
+  CHECK(depth.code == 2);
+  CHECK(one_sentence(depth));
+}
+
+TEST_CASE("a PLY that leaves its run shows what the run shows") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  const std::string run = folder / "run";
+  succeed({"generate", data, "--size", "32", "--train-views", "6", "--test-views", "3"});
+  succeed({"train", data, "-o", run, "-n", "20", "--init-count", "500", "--hit-order", "entry",
+           "--quantile", "6", "--no-adaptive-radius", "--background", "0.2,0.4,0.9", "-q"});
+  fs::copy_file(model_of(run, 20), folder / "model.ply");
+  succeed({"render", run, "--data", data, "-o", folder / "run_frames", "-q"});
+  succeed({"render", folder / "model.ply", "--data", data, "-o", folder / "ply_frames", "-q"});
+  CHECK(read_file(folder / "run_frames/r_0.png") == read_file(folder / "ply_frames/r_0.png"));
+  // A model of another program is shown as rasterisers show it, which is said.
+  write_file(folder / "foreign.ply", ply_file(3));
+  const Outcome foreign = succeed({"render", folder / "foreign.ply", "--orbit", "1", "--width",
+                                   "16", "-o", folder / "foreign"});
+  CHECK(foreign.err.find("peak order") != std::string::npos);
 }

@@ -54,6 +54,8 @@ RunningProgram::~RunningProgram() {
   ::waitpid(process_, nullptr, 0);
 }
 
+std::string RunningProgram::errors() const { return read_file(folder_ / "err"); }
+
 bool RunningProgram::runs() {
   if (!ended_) ended_ = ::waitpid(process_, &status_, WNOHANG) == process_;
   return !ended_;
@@ -65,6 +67,7 @@ Outcome RunningProgram::wait() {
   ended_ = true;
   Outcome outcome;
   outcome.code = WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_);
+  outcome.signal = WIFSIGNALED(status_) ? WTERMSIG(status_) : 0;
   outcome.out = read_file(folder_ / "out");
   outcome.err = read_file(folder_ / "err");
   return outcome;

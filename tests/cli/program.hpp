@@ -15,6 +15,7 @@ struct Outcome {
   int code = -1;    ///< exit code; 128 + signal when a signal ended it
   std::string out;  ///< standard output
   std::string err;  ///< standard error
+  int signal = 0;   ///< that ended it; 0 when it ended by itself
 };
 
 struct Surroundings {
@@ -52,6 +53,8 @@ class RunningProgram {
   RunningProgram& operator=(const RunningProgram&) = delete;
 
   pid_t process() const { return process_; }
+  /// What it has written to standard error so far.
+  std::string errors() const;
   /// Whether it has not ended yet.
   bool runs();
   Outcome wait();

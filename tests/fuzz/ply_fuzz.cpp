@@ -21,6 +21,7 @@ void parse(std::span<const std::uint8_t> input) {
   const std::filesystem::path copy = scratch().path() / "copy.ply";
   write_ply(copy, model);
   if (read_ply(copy).size() != model.size()) std::abort();
+  read_ply_options(path);
 }
 
 }  // namespace

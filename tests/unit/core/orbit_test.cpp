@@ -24,6 +24,7 @@ Gaussians sphere_model(const glm::dvec3& center, std::size_t count) {
         center + 2.0 * glm::normalize(glm::dvec3(rng.normal(), rng.normal(), rng.normal()));
     for (int k = 0; k < 3; ++k)
       model.means[3 * i + static_cast<std::size_t>(k)] = static_cast<float>(point[k]);
+    for (std::size_t k = 0; k < 3; ++k) model.log_scales[3 * i + k] = -6.0f;
     model.opacities[i] = 4.0f;
   }
   return model;
@@ -50,6 +51,64 @@ TEST_CASE("the extent ignores stray, transparent and non-finite Gaussians") {
   CHECK(glm::length(extent.center - center) < 0.2);
   CHECK(extent.radius == doctest::Approx(2.0).epsilon(0.1));
   CHECK(scene_extent(Gaussians{}).radius == 1.0);
+}
+
+TEST_CASE("orbits show 98 % of a model, whatever its shape and the camera's model") {
+  CounterRng rng(8, 0);
+  for (const glm::dvec3& shape :
+       {glm::dvec3(1, 1, 1), glm::dvec3(8, 0.2, 0.3), glm::dvec3(4, 0.1, 4), glm::dvec3(0)}) {
+    CAPTURE(shape.x);
+    // Boxes of flat Gaussians that lie along them.
+    Gaussians model;
+    model.resize(1500);
+    for (std::size_t i = 0; i < model.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        model.means[3 * i + k] =
+            static_cast<float>(5.0 + shape[static_cast<int>(k)] * (2.0 * rng.uniform() - 1.0));
+        model.log_scales[3 * i + k] = std::log(k == 1 ? 0.01f : 0.2f);
+      }
+      model.opacities[i] = static_cast<float>(2.0 * rng.normal());
+    }
+    const SceneExtent extent = scene_extent(model);
+    for (const CameraModel lens :
+         {CameraModel::kPinhole, CameraModel::kFisheye, CameraModel::kOrthographic}) {
+      CAPTURE(static_cast<int>(lens));
+      OrbitOptions options;
+      options.frames = 7;
+      options.width = 90;
+      options.height = 60;
+      options.model = lens;
+      for (const Camera& camera : orbit_cameras(extent, options)) {
+        double seen = 0, all = 0;
+        for (std::size_t i = 0; i < model.size(); ++i) {
+          const double opacity = 1.0 / (1.0 + std::exp(-model.opacities[i]));
+          all += opacity;
+          // Two deviations to all sides, which lie within the square of the smaller side.
+          bool inside = true;
+          for (int k = 0; k < 6; ++k) {
+            glm::dvec3 point(model.means[3 * i], model.means[3 * i + 1], model.means[3 * i + 2]);
+            point[k / 2] += (k % 2 == 0 ? 2.0 : -2.0) * (k / 2 == 1 ? 0.01 : 0.2);
+            const glm::dvec3 p = to_camera(camera, point);
+            double x = p.x, y = p.y;
+            if (lens == CameraModel::kPinhole) {
+              x /= p.z;
+              y /= p.z;
+            }
+            if (lens == CameraModel::kFisheye) {
+              const double across = std::hypot(p.x, p.y);
+              const double angle = std::atan2(across, p.z);
+              x *= across > 0 ? angle / across : 0;
+              y *= across > 0 ? angle / across : 0;
+            }
+            inside = inside && std::abs(camera.fx * x) < 30.0 && std::abs(camera.fy * y) < 30.0;
+          }
+          seen += inside ? opacity : 0;
+        }
+        CHECK(seen > 0.98 * all);
+        CHECK(extent.radius < 3.0 * glm::length(shape) + 1.0);  // and not from far away
+      }
+    }
+  }
 }
 
 TEST_CASE("a far background does not inflate the radius") {

@@ -2,7 +2,11 @@
 #include "device/kernel.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
+#include <unistd.h>
 
+#include <chrono>
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -36,6 +40,25 @@ std::string device_error(const Action& action) {
 
 bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
+}
+
+// What other code writes to standard error while `action` runs.
+template <class Action>
+std::string standard_error(const Action& action) {
+  std::FILE* file = std::tmpfile();
+  REQUIRE(file != nullptr);
+  std::fflush(stderr);
+  const int terminal = ::dup(2);
+  ::dup2(::fileno(file), 2);
+  action();
+  std::fflush(stderr);
+  ::dup2(terminal, 2);
+  ::close(terminal);
+  std::rewind(file);
+  std::string text;
+  for (int c = std::fgetc(file); c != EOF; c = std::fgetc(file)) text += static_cast<char>(c);
+  std::fclose(file);
+  return text;
 }
 
 const char* const kScale =
@@ -172,4 +195,30 @@ TEST_CASE("profiler: launches are counted and the table has them") {
   CHECK(table.find("kernel") < table.find("long"));
   CHECK(table.find("long") < table.find("short"));
   CHECK(contains(table, "75.0%"));
+}
+
+TEST_CASE("compilers that warn are not heard") {
+  const TemporaryDirectory folder;
+  const ScopedVariable variable("RAYSPLATS_KERNEL_DIR", folder.path().string());
+  // A loop that cannot be unrolled is what a compiler warns of late, when its log is made up.
+  folder.write("noisy.cl",
+               "void turn(const float* from, float* to, const int rows) {\n"
+               "  #pragma unroll\n"
+               "  for (int i = 0; i < rows / 2; ++i) to[i] = from[i + rows / 2] * RS_RUN;\n"
+               "}\n"
+               "__kernel void noisy(__global float* data) {\n"
+               "  float a[8], b[8];\n"
+               "  for (int i = 0; i < 8; ++i) a[i] = data[i];\n"
+               "  turn(a, b, 8);\n"
+               "  for (int i = 0; i < 4; ++i) data[i] = b[i];\n"
+               "}\n");
+  Context context(select_device(""), uncached());
+  const auto build = [&](int run) {
+    // Drivers have caches of their own: every run of the test has another source.
+    const auto now = std::chrono::system_clock::now().time_since_epoch().count();
+    BuildOptions options;
+    options.define("RS_RUN", fmt::format("{}.{}f", now % 1000000007, run));
+    return standard_error([&] { context.kernel("noisy.cl", "noisy", options); });
+  };
+  CHECK(build(1) == "");
 }

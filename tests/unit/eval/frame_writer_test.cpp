@@ -100,6 +100,7 @@ TEST_CASE("frames hold what the tracer saw") {
 
   FrameOptions options;
   options.format = FrameFormat::kExr;
+  options.linear_exr = false;
   options.depth = true;
   options.supersample = 2;
   std::size_t heard = 0;
@@ -137,6 +138,19 @@ TEST_CASE("frames hold what the tracer saw") {
   CHECK(exr.at(16, 10, 3) > 0.9f);
   CHECK(exr.at(0, 0, 2) == doctest::Approx(1.0f));
   CHECK(exr.at(0, 0, 3) == doctest::Approx(0.0f));
+
+  // Proportional to light: what is 0.5 on the screen is a fifth of the light of 1.
+  options.linear_exr = true;
+  write_frames(tracer, gaussians, cameras, folder.path, options);
+  const Image linear = read_image(folder.path / "ball.exr");
+  worst = 0.0;
+  for (std::size_t i = 0; i < linear.data.size(); ++i) {
+    const double v = expected.data[i];
+    const double light = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+    worst = std::max(worst, std::abs(linear.data[i] - (i % 4 == 3 ? v : light)));
+  }
+  CHECK(worst < 1e-5);
+  options.linear_exr = false;
 
   options.format = FrameFormat::kPng;
   options.depth = true;

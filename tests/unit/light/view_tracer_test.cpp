@@ -666,3 +666,34 @@ TEST_CASE("traversal auto is what the tuning says [small]") {
   context.set_tuning(tuning);
   CHECK(picture(Traversal::kAuto) == bvh);
 }
+
+TEST_CASE("rays that stop at the cap on hits are counted over all views that are kept") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(400, 96, 0);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const Camera camera = fisheye_camera(90, 80);
+  const Camera pinhole = reference::cube_camera(50, 40);
+  TraceOptions options;
+  options.max_hits = 3;
+  options.memory_budget = 1 << 16;  // several batches of rays, which backward() traces again
+  REQUIRE(ViewTracer::batch(options.memory_budget) < 90 * 80);
+  ViewTracer tracer(context, options);
+  tracer.forward(gaussians, camera);
+  const std::uint64_t by_rays = tracer.capped_rays();
+  tracer.forward(gaussians, pinhole);
+  const std::uint64_t by_packets = tracer.capped_rays();
+  CHECK(by_rays > 200);
+  CHECK(by_packets > 200);
+  CHECK(tracer.kept_capped_rays() == 0);
+  Buffer<float> gradient(context, 4 * 90 * 80, "image gradient");
+  gradient.clear();
+  GaussianGradients out;
+  for (std::uint64_t view = 1; view <= 3; ++view) {
+    tracer.forward(gaussians, camera, true);
+    tracer.backward(gaussians, gradient, out);
+    CHECK(tracer.capped_rays() == by_rays);
+    tracer.forward(gaussians, camera);  // of an evaluation
+    tracer.forward(gaussians, pinhole, true);
+    CHECK(tracer.kept_capped_rays() == view * (by_rays + by_packets));
+  }
+}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include "trace/gradient_sums.hpp"
 #include "trace_fixture.hpp"
 
 using namespace raysplats;
@@ -160,8 +161,7 @@ TEST_CASE("gradients from a camera inside the scene") {
   }
 }
 
-TEST_CASE(
-    "packet widths, private copies, atomic adds and recomputed hits give the same gradients") {
+TEST_CASE("packet widths, every way of adding and recomputed hits give the same gradients") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(8000, 25, 1);
   const Camera camera = reference::cube_camera(70, 66);
@@ -191,8 +191,20 @@ TEST_CASE(
   TraceOptions tight = options;
   tight.memory_budget = 4200000;  // two private copies, hit lists in bands
   check(tight, "memory budget");
-  tight.memory_budget = 3900000;  // too little for private copies: atomic adds
-  check(tight, "smaller memory budget");
+  const auto sum_of = [&](const TraceOptions& variant) {
+    return GradientSumChoice::of(variant, context.device(), model.size(), variant.memory_budget / 4,
+                                 2)
+        .sum;
+  };
+  tight.gradient_sum = GradientSum::kCopies;
+  tight.memory_budget = 3900000;
+  REQUIRE(sum_of(tight) == GradientSum::kExact);
+  check(tight, "too little for private copies: exact sums");
+  tight.gradient_sum = GradientSum::kAtomic;
+  REQUIRE(sum_of(tight) == GradientSum::kAtomic);
+  check(tight, "atomic adds, hit lists in bands");
+  tight.memory_budget = options.memory_budget;
+  check(tight, "atomic adds");
 }
 
 TEST_CASE("pose gradient equals the double reference") {

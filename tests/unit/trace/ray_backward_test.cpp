@@ -3,6 +3,8 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
@@ -474,6 +476,41 @@ TEST_CASE("gradients of rays are the same to the bit but for atomics, exact ones
   std::reverse(rays.begin(), rays.end());
   std::reverse(gradients.begin(), gradients.end());
   CHECK(run() == exact);
+}
+
+TEST_CASE("launches of rays keep to a budget of time and give the same bits") {
+  ContextOptions watched;
+  watched.profile = watched.keep_launches = true;
+  const char* selector = std::getenv("RAYSPLATS_DEVICE");
+  Context context(select_device(selector == nullptr ? "" : selector), watched);
+  const Gaussians model = reference::random_scene(500, 82, 1);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const std::vector<Ray> rays = random_rays(6000, 32);
+  const Gradients gradients = random_gradients(rays.size(), 7);
+  const auto launches_of = [&](const char* kernel, const std::vector<LaunchTime>& launches) {
+    return std::count_if(launches.begin(), launches.end(),
+                         [&](const LaunchTime& launch) { return launch.kernel == kernel; });
+  };
+  for (const GradientSum sum : {GradientSum::kCopies, GradientSum::kExact}) {
+    CAPTURE(static_cast<int>(sum));
+    TraceOptions options;
+    options.gradient_sum = sum;
+    const auto run = [&](double milliseconds) {
+      options.launch_budget_ms = milliseconds;
+      return gradients_on_device(context, gaussians, options, rays, gradients,
+                                 ColorDirection::kFromOrigin);
+    };
+    const Host whole = run(0);
+    std::vector<LaunchTime> launches = context.take_launches();
+    CHECK(launches_of("trace_rays", launches) == 1);
+    CHECK(launches_of("ray_backward", launches) == 1);
+    // No launch is this short: each does the least there is.
+    CHECK(run(1e-6) == whole);
+    launches = context.take_launches();
+    CHECK(launches_of("trace_rays", launches) > 20);
+    CHECK(launches_of("ray_backward", launches) > 5);
+    CHECK(run(1e6) == whole);
+  }
 }
 
 TEST_CASE("gradients of rays beyond the range of exact sums are refused, others are not touched") {

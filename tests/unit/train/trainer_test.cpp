@@ -117,7 +117,8 @@ std::vector<std::string> lines_of(const std::filesystem::path& path) {
 
 TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
   Scene scene;
-  const TrainOptions options = small_options();
+  TrainOptions options = small_options();
+  options.deterministic = true;  // elsewhere than on CPUs gradients are atomic sums otherwise
   Trainer straight(scene.context, scene.dataset, options, scene.folder / "straight");
   const TrainSummary summary = straight.run(false);
   CHECK(summary.iterations == 40);
@@ -157,6 +158,40 @@ TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
   other.sh_degree = 2;
   Trainer misfit(scene.context, scene.dataset, other, broken);
   CHECK_THROWS_AS(misfit.resume(broken), UsageError);
+}
+
+TEST_CASE("rays that reach the cap on hits are counted over the whole run, resumed ones included") {
+  Scene scene;
+  TrainOptions options = small_options();
+  options.max_hits = 25;
+  const auto metrics_of = [](const std::filesystem::path& run) {
+    return nlohmann::json::parse(std::ifstream(run / "metrics.json"));
+  };
+  const auto straight = scene.folder / "straight";
+  Trainer(scene.context, scene.dataset, options, straight).run(false);
+  // Half the pixels a side up to iteration 12.
+  constexpr std::uint64_t kPixels = kWidth * kHeight;
+  constexpr std::uint64_t kRays = 12 * kPixels / 4 + 28 * kPixels;
+  const std::uint64_t capped = metrics_of(straight).at("capped_rays");
+  CHECK(metrics_of(straight).at("traced_rays") == kRays);
+  CHECK(capped > 4 * kPixels);  // more than any view has
+  CHECK(capped < kRays);
+
+  const auto broken = scene.folder / "broken";
+  TrainOptions half = options;
+  half.checkpoint_every = 20;
+  half.keep_checkpoints = 5;
+  Trainer(scene.context, scene.dataset, half, broken).run(false);
+  std::filesystem::remove(checkpoint_path(broken, 40));
+  for (int round = 0; round < 2; ++round) {  // at 20, then with nothing left to do
+    CAPTURE(round);
+    Trainer again(scene.context, scene.dataset, options, broken);
+    again.resume(broken);
+    CHECK(again.iteration() == (round == 0 ? 20 : 40));
+    again.run(false);
+    CHECK(metrics_of(broken).at("capped_rays") == capped);
+    CHECK(metrics_of(broken).at("traced_rays") == kRays);
+  }
 }
 
 TEST_CASE("training improves held-out views and leaves the files of a run") {

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/ply_options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <string_view>
+
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::string_view kPrefix = "comment raysplats ";
+constexpr std::size_t kMaxHeaderLines = 4096;
+constexpr std::size_t kMaxLine = 4096;
+
+// A line without its end, cut off where no header would be as long. False at the end of the file.
+bool next_line(std::istream& stream, std::string& line) {
+  line.clear();
+  for (int c = stream.get(); c != '\n'; c = stream.get()) {
+    if (c == std::istream::traits_type::eof() || line.size() == kMaxLine) return false;
+    line.push_back(static_cast<char>(c));
+  }
+  if (!line.empty() && line.back() == '\r') line.pop_back();
+  return true;
+}
+
+template <class T>
+bool parse(std::string_view text, T& value) {
+  const char* end = text.data() + text.size();
+  const auto [next, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && next == end;
+}
+
+bool parse_color(std::string_view text, std::array<float, 3>& color) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t comma = k < 2 ? text.find(',') : text.size();
+    if (comma == std::string_view::npos || !parse(text.substr(0, comma), color[k]) ||
+        !std::isfinite(color[k])) {
+      return false;
+    }
+    text.remove_prefix(std::min(comma + 1, text.size()));
+  }
+  return true;
+}
+
+// False for a value that the option cannot have. Keys that are unknown, of a later version perhaps,
+// are left alone.
+bool set_option(std::string_view key, std::string_view value, TraceOptions& out) {
+  if (key == "hit_order") {
+    out.hit_order = value == "entry" ? HitOrder::kEntry : HitOrder::kPeak;
+    return value == "entry" || value == "peak";
+  }
+  if (key == "adaptive_radius") {
+    out.adaptive_radius = value == "true";
+    return value == "true" || value == "false";
+  }
+  if (key == "quantile") {
+    return parse(value, out.quantile) && out.quantile > 0 && std::isfinite(out.quantile);
+  }
+  if (key == "min_transmittance") {
+    return parse(value, out.min_transmittance) && out.min_transmittance >= 0 &&
+           out.min_transmittance < 1;
+  }
+  if (key == "near_depth") {
+    return parse(value, out.near_depth) && out.near_depth >= 0 && std::isfinite(out.near_depth);
+  }
+  if (key == "max_hits") return parse(value, out.max_hits) && out.max_hits >= 1;
+  if (key == "background") return parse_color(value, out.background);
+  return true;
+}
+
+}  // namespace
+
+std::string io::ply_option_comments(const TraceOptions& options) {
+  const auto& background = options.background;
+  std::string out;
+  const auto add = [&](std::string_view key, const auto& value) {
+    out += fmt::format("{}{} {}\n", kPrefix, key, value);
+  };
+  add("hit_order", options.hit_order == HitOrder::kPeak ? "peak" : "entry");
+  add("quantile", options.quantile);
+  add("adaptive_radius", options.adaptive_radius);
+  add("near_depth", options.near_depth);
+  add("min_transmittance", options.min_transmittance);
+  add("max_hits", options.max_hits);
+  add("background", fmt::format("{},{},{}", background[0], background[1], background[2]));
+  return out;
+}
+
+std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::string line;
+  if (!next_line(stream, line) || line != "ply") return std::nullopt;
+  std::optional<TraceOptions> out;
+  for (std::size_t n = 0; n < kMaxHeaderLines && next_line(stream, line); ++n) {
+    if (line == "end_header") break;
+    if (!line.starts_with(kPrefix)) continue;
+    const std::string_view text = std::string_view(line).substr(kPrefix.size());
+    const std::size_t space = text.find(' ');
+    const std::string_view value =
+        space == std::string_view::npos ? std::string_view() : text.substr(space + 1);
+    if (!out) out.emplace();
+    if (!set_option(text.substr(0, space), value, *out)) {
+      throw DataError(fmt::format(
+          "{}: '{}' is no option of a trace: correct the line of the header, or remove it",
+          path.string(), line));
+    }
+  }
+  return out;
+}
+
+}  // namespace raysplats

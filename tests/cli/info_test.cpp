@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "program.hpp"
+#include "raysplats/io.hpp"
+
+namespace {
+
+std::string told(const std::string& path) {
+  const Outcome outcome = raysplats_program({"info", path});
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  return outcome.out;
+}
+
+nlohmann::json json_of(const std::string& path) {
+  const Outcome outcome = raysplats_program({"info", path, "--json"});
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  return nlohmann::json::parse(outcome.out);
+}
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// A COLMAP model of two photos by one camera.
+void write_photos(const TemporaryFolder& folder, const std::string& camera) {
+  write_file(folder / "sparse/0/cameras.txt", "1 " + camera + "\n");
+  write_file(folder / "sparse/0/images.txt",
+             "1 1 0 0 0 0 0 4 1 a.png\n\n2 1 0 0 0 0.1 0 4 1 b.png\n\n");
+  write_file(folder / "sparse/0/points3D.txt", "1 0 0 0 255 0 0 0.5 1 0 2 0\n");
+  for (const char* name : {"images/a.png", "images/b.png"}) {
+    raysplats::write_image(folder / name, raysplats::Image(8, 6, 3, 0.5f));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("info says which lenses loading takes out and which it keeps") {
+  const std::string undistorted = "undistorted when loaded";
+  {
+    const TemporaryFolder folder;
+    write_photos(folder, "OPENCV_FISHEYE 8 6 10 10 4 3 0.1 0.02 0 0");
+    const std::string text = told(folder / "");
+    CHECK(has(text, "fisheye (2 views)"));
+    CHECK(has(text, "kept as they are"));
+    CHECK_FALSE(has(text, undistorted));
+    const nlohmann::json json = json_of(folder / "");
+    CHECK(json.at("camera_models") == nlohmann::json{{"fisheye", 2}});
+    CHECK(json.at("distorted") == true);
+    CHECK(json.at("undistorted_when_loaded") == false);
+  }
+  {
+    const TemporaryFolder folder;
+    write_photos(folder, "OPENCV 8 6 10 10 4 3 0.1 0.02 0 0");
+    CHECK(has(told(folder / ""), undistorted));
+    CHECK(json_of(folder / "").at("camera_models") == nlohmann::json{{"pinhole", 2}});
+  }
+  {
+    const TemporaryFolder folder;
+    write_photos(folder, "PINHOLE 8 6 10 10 4 3");
+    CHECK_FALSE(has(told(folder / ""), "distort"));
+  }
+}
+
+TEST_CASE("info describes meshes, scene files and the header of a model") {
+  const TemporaryFolder folder;
+  write_file(folder / "wall.obj", "v 0 0 0\nv 2 0 0\nv 0 3 0\nv 2 3 1\nf 1 2 3\nf 2 4 3\n");
+  CHECK(has(told(folder / "wall.obj"), "2 triangles, 4 vertices"));
+  const nlohmann::json mesh = json_of(folder / "wall.obj");
+  CHECK(mesh.at("type") == "mesh");
+  CHECK(mesh.at("triangles") == 2);
+  CHECK(mesh.at("bounds") == nlohmann::json::parse("[[0, 0, 0], [2, 3, 1]]"));
+  CHECK(mesh.at("normals") == false);
+  write_file(folder / "wall.ply",
+             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+             "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+             "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  CHECK(json_of(folder / "wall.ply").at("triangles") == 1);
+
+  write_file(folder / "balls.ply", ply_file(3));
+  CHECK(json_of(folder / "balls.ply").at("type") == "model");
+  CHECK_FALSE(json_of(folder / "balls.ply").contains("trace"));
+  raysplats::TraceOptions trace;
+  trace.quantile = 5.5f;
+  raysplats::write_ply(folder / "shown.ply", raysplats::read_ply(folder / "balls.ply"), trace);
+  CHECK(json_of(folder / "shown.ply").at("trace").at("quantile") == 5.5);
+  CHECK(has(told(folder / "shown.ply"), "entry order, quantile 5.5"));
+
+  write_file(folder / "scene.toml",
+             "[[model]]\nfile = \"balls.ply\"\n[[mesh]]\nfile = \"wall.obj\"\n"
+             "material = \"chrome\"\n[[material]]\nname = \"chrome\"\nkind = \"mirror\"\n"
+             "[[light]]\nkind = \"sphere\"\nposition = [0, 1, 2]\nradius = 0.1\n"
+             "[camera]\norbit = { frames = 7 }\n[render]\nsamples = 9\n");
+  const std::string text = told(folder / "scene.toml");
+  for (const char* part :
+       {"balls.ply", "wall.obj", "chrome (mirror)", "sphere", "7 frames", "9 a"}) {
+    CAPTURE(part);
+    CHECK(has(text, part));
+  }
+  const nlohmann::json scene = json_of(folder / "scene.toml");
+  CHECK(scene.at("type") == "scene");
+  CHECK(scene.at("camera").at("source") == "orbit");
+  CHECK(scene.at("lights") == nlohmann::json{"sphere"});
+}
