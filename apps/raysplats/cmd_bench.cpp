@@ -89,12 +89,32 @@ BenchModel load_model(const Options& options, const ModelSource& source) {
   return model;
 }
 
-void run(const Options& options) {
+/// Options that say nothing about what is measured are mistakes.
+void check_used(const CLI::App& command, const Options& options) {
+  const bool model = !options.model.empty();
+  for (const char* name : {"--sizes", "--large", "--scene", "--sh-degree"}) {
+    if (model && command.get_option(name)->count() > 0) {
+      throw UsageError(
+          fmt::format("{} is about generated scenes: leave it out with --model", name));
+    }
+  }
+  if (!model && command.get_option("--view")->count() > 0) {
+    throw UsageError("--view goes with --model");
+  }
+}
+
+void check_result_file(const std::string& path) {
+  if (!path.empty()) AtomicFile probe(path);
+}
+
+void run(const CLI::App& command, const Options& options) {
+  check_used(command, options);
   BenchOptions bench = options.bench;
   bench.sizes.clear();
   for (const std::string& text : parts_of(options.sizes))
     bench.sizes.push_back(parse_count("--sizes", text));
   if (options.large) bench.sizes.push_back(kLargeSize);
+  if (bench.sizes.empty()) throw UsageError("--sizes names nothing, as in 10k,100k");
   bench.scenes = options.scenes == "all" ? bench_scene_names()
                                          : names_of("--scene", options.scenes, bench_scene_names());
   if (options.resolution) {
@@ -114,6 +134,9 @@ void run(const Options& options) {
     for (const std::string& id : bench_ids(bench, chosen)) fmt::print("{}\n", id);
     return;
   }
+  // Before anything is measured: a result without a place to go is lost.
+  check_result_file(options.json);
+  check_result_file(options.csv);
   ContextOptions timed;
   timed.profile = timed.keep_launches = true;
   timed.kernel_cache = !options.device.no_kernel_cache;
@@ -153,25 +176,26 @@ Command add_bench_command(CLI::App& app) {
                    "With --model: transforms.json or folder of a data set")
       ->type_name("PATH");
   command->add_option("--view", options->view, "With --model: which of the cameras, from 0")
+      ->transform(whole_between(0, 1e9))
       ->capture_default_str();
   command->add_option("--resolution", options->resolution, "Pixels (800x800, or the camera's)")
       ->type_name("WxH");
   command->add_option("--sh-degree", options->bench.sh_degree, "Of the generated scenes")
-      ->check(between(0, 4))
+      ->transform(whole_between(0, 4))
       ->capture_default_str();
   command->add_option("--rays", options->bench.rays, "Arbitrary rays, at most")
-      ->check(at_least(1))
+      ->transform(whole_between(1, 1e9))
       ->capture_default_str();
   command
       ->add_option("--triangles", options->bench.triangles,
                    "Of the larger mesh; the smaller has a tenth")
-      ->check(between(100, 1e8))
+      ->transform(whole_between(100, 1e8))
       ->capture_default_str();
   command->add_option("--filter", options->bench.filter, "Only ids row/scene/size that match this")
       ->type_name("REGEX");
   command->add_flag("--list", options->list, "Print the ids and stop");
   command->add_option("--repeat", options->bench.repeat, "Repetitions of every row")
-      ->check(between(1, 1000))
+      ->transform(whole_between(1, 1000))
       ->capture_default_str();
   command->add_option("--json", options->json, "Also write the result as JSON")->type_name("FILE");
   command->add_option("--csv", options->csv, "Also write the result as CSV")->type_name("FILE");
@@ -183,11 +207,11 @@ Command add_bench_command(CLI::App& app) {
   auto files = std::make_shared<CompareOptions>();
   comparison->add_option("A", files->before, "Result before")->required();
   comparison->add_option("B", files->after, "Result after")->required();
-  return {command, [options, files, comparison] {
+  return {command, [command, options, files, comparison] {
             if (comparison->parsed()) {
               compare(*files);
             } else {
-              run(*options);
+              run(*command, *options);
             }
           }};
 }

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "base/interrupt.hpp"
 #include "base/output_directory.hpp"
 #include "base/progress.hpp"
 #include "core/morton_order.hpp"
+#include "eval/output_check.hpp"
 #include "light/view_tracer.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
@@ -25,6 +27,7 @@ struct Options {
   std::string model;
   std::string output;
   std::string lpips;
+  bool overwrite = false;
   DataFlags data;
   TraceFlags trace;
   DeviceFlags device;
@@ -35,9 +38,18 @@ void run(const Options& options, const GlobalOptions& global) {
   const Gaussians model = in_morton_order(read_ply(source.ply));
   const Dataset dataset =
       load_dataset(options.data.data, options.data.over(dataset_options(source)));
-  const Split split = parse_split(options.data.split);
+  const Split split = options.data.chosen_split();
   const std::size_t views = dataset.indices(split).size();
   if (views == 0) throw no_views(options.data);
+  if (is_run_folder(options.output)) {
+    throw UsageError(fmt::format(
+        "The output folder {} is a run, whose metrics.json would be lost: choose another, such as "
+        "{}",
+        options.output, (std::filesystem::path(options.output) / "eval").string()));
+  }
+  check_not_data(options.output, dataset);
+  check_leftovers(options.output, evaluated_names(dataset, split), FrameFormat::kPng,
+                  options.overwrite);
   std::unique_ptr<Lpips> lpips;
   if (!options.lpips.empty()) lpips = std::make_unique<Lpips>(options.lpips);
 
@@ -92,6 +104,7 @@ Command add_eval_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("DIR");
   command->add_option("--lpips", options->lpips, "ONNX network of LPIPS, for that measure too")
       ->type_name("NETWORK");
+  add_overwrite_flag(*command, options->overwrite);
   add_data_flags(*command, options->data)->required();
   add_trace_flags(*command, options->trace);
   add_traversal_flag(*command, options->trace);

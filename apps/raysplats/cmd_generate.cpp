@@ -11,11 +11,12 @@ namespace {
 
 struct Options {
   std::string directory;
+  bool overwrite = false;
   SyntheticOptions data;
 };
 
 void run(const Options& options) {
-  generate_dataset(options.directory, options.data);
+  generate_dataset(options.directory, options.data, options.overwrite);
   fmt::print("{} training and {} test views of {}x{} in {}\n", options.data.train_views,
              options.data.test_views, options.data.size, options.data.size, options.directory);
 }
@@ -31,17 +32,18 @@ Command add_generate_command(CLI::App& app) {
       ->required()
       ->type_name("");
   command->add_option("--size", data.size, "Width and height of the images")
-      ->check(between(8, 4096))
+      ->transform(whole_between(8, 4096))
       ->capture_default_str();
   command->add_option("--train-views", data.train_views, "Images to train on")
-      ->check(between(1, 10000))
+      ->transform(whole_between(1, 10000))
       ->capture_default_str();
   command->add_option("--test-views", data.test_views, "Images held out")
-      ->check(between(1, 10000))
+      ->transform(whole_between(1, 10000))
       ->capture_default_str();
   command->add_option("--seed", data.seed, "Varies textures and cameras")
-      ->check(at_least(0))
+      ->transform(seed())
       ->capture_default_str();
+  add_overwrite_flag(*command, options->overwrite);
   return {command, [options] { run(*options); }};
 }
 

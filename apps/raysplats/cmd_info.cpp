@@ -200,6 +200,8 @@ Json describe(const Dataset& dataset) {
           {"distorted", distorted},
           {"undistorted_when_loaded", undistorted},
           {"alpha_is_background", dataset.alpha_is_background},
+          {"masks", std::count_if(dataset.views.begin(), dataset.views.end(),
+                                  [](const View& view) { return !view.mask_path.empty(); })},
           {"points", dataset.points.size()}};
 }
 
@@ -247,6 +249,9 @@ void print_dataset(const Json& dataset) {
   for (const Json& size : dataset["sizes"]) {
     fmt::print("size             {}x{} ({} views)\n", size["width"].get<int>(),
                size["height"].get<int>(), size["views"].get<std::size_t>());
+  }
+  if (const auto masks = dataset["masks"].get<std::size_t>(); masks > 0) {
+    fmt::print("masks            {}: what is black there does not count\n", masks);
   }
   fmt::print("points           {}\n", dataset["points"].get<std::size_t>());
 }

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -12,6 +14,7 @@
 #include "core/morton_order.hpp"
 #include "core/orbit.hpp"
 #include "eval/frame_writer.hpp"
+#include "eval/output_check.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -53,6 +56,11 @@ void check(const RenderFlags& options) {
         "--width, --height, --fov, --elevation, --distance, --up and --camera-model shape an "
         "orbit: add --orbit N");
   }
+  options.data.check_used(options.orbit.has_value());
+  if (options.fov && options.camera_model == "equirectangular") {
+    throw UsageError(
+        "--fov is for other camera models: an equirectangular picture shows everything around");
+  }
 }
 
 CameraModel camera_model(const std::string& name) {
@@ -89,9 +97,14 @@ std::vector<Camera> orbit(const RenderFlags& options,
     shape.fov_degrees = field_of_view(first);
   }
   shape.model = camera_model(options.camera_model.value_or("pinhole"));
-  if (options.height) shape.height = *options.height;
   if (shape.model == CameraModel::kEquirectangular) shape.width = 2 * shape.height;
+  // One side alone keeps the picture's shape.
+  const double aspect = static_cast<double>(shape.width) / shape.height;
+  const auto rounded = [](double side) { return std::max(1, static_cast<int>(std::lround(side))); };
   if (options.width) shape.width = *options.width;
+  if (options.width && !options.height) shape.height = rounded(*options.width / aspect);
+  if (options.height) shape.height = *options.height;
+  if (options.height && !options.width) shape.width = rounded(*options.height * aspect);
   if (options.fov) shape.fov_degrees = *options.fov;
   if (options.elevation) shape.elevation_degrees = *options.elevation;
   if (options.distance) shape.distance = *options.distance;
@@ -124,9 +137,12 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
       cameras.push_back(downscaled(camera, options.data.downscale.value_or(1.0)));
     }
   } else {
-    cameras = cameras_of(dataset, parse_split(options.data.split));
+    cameras = cameras_of(dataset, options.data.chosen_split());
   }
   if (cameras.empty()) throw no_views(options.data);
+  if (!options.data.data.empty()) check_not_data(options.output, dataset);
+  if (!options.cameras.empty()) check_not_data(options.output, options.cameras);
+  check_leftovers(options.output, frame_names(cameras), options.frame_options().format, options.overwrite);
 
   TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   trace.depth = options.depth;
@@ -173,6 +189,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
   command->add_option("-o,--output", options->output, "Folder for the frames")
       ->required()
       ->type_name("DIR");
+  add_overwrite_flag(*command, options->overwrite);
   command->add_option("--format", options->format, "exr (float RGBA), png or jpg (8-bit RGB)")
       ->check(one_of({"exr", "png", "jpg"}))
       ->capture_default_str();
@@ -191,27 +208,32 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->add_option("--orbit", options->orbit,
                    "N cameras on a circle around the model (with --data: as its cameras)")
       ->group(where)
-      ->check(at_least(1))
+      ->transform(whole_between(1, 1e6))
       ->type_name("N");
 
   const std::string orbit = "Orbit";
-  command->add_option("--width", options->width, "Pixels (800, or the data set's)")
+  command
+      ->add_option("--width", options->width,
+                   "Pixels (800, or the data set's; one side alone keeps the shape)")
       ->group(orbit)
-      ->check(at_least(1));
-  command->add_option("--height", options->height, "Pixels (800, or the data set's)")
+      ->transform(whole_between(1, 65536));
+  command->add_option("--height", options->height, "Pixels")
       ->group(orbit)
-      ->check(at_least(1));
+      ->transform(whole_between(1, 65536));
   command
       ->add_option("--fov", options->fov, "Degrees along the smaller side (45, or the data set's)")
-      ->group(orbit);
+      ->group(orbit)
+      ->transform(between(0.1, 360));
   command
       ->add_option("--elevation", options->elevation,
                    "Degrees above the centre (20, or the cameras' median)")
-      ->group(orbit);
+      ->group(orbit)
+      ->transform(between(-89.9, 89.9));
   command
       ->add_option("--distance", options->distance,
                    "Of the eye from the centre (the model fits, or the cameras' median)")
-      ->group(orbit);
+      ->group(orbit)
+      ->transform(between(1e-9, kNoBound));
   command
       ->add_option("--camera-model", options->camera_model,
                    "pinhole, fisheye, equirectangular (twice as wide as high) or orthographic")
@@ -225,11 +247,13 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
   const std::string scene = "Scene files (over what they say)";
   command->add_option("--samples", options->samples, "Rays per pixel")
       ->group(scene)
-      ->check(between(1, 65536));
+      ->transform(whole_between(1, 65536));
   command->add_option("--max-bounces", options->max_bounces, "Surfaces that a path may meet")
       ->group(scene)
-      ->check(between(1, 1000));
-  command->add_option("--seed", options->seed, "Of everything that is random")->group(scene);
+      ->transform(whole_between(1, 1000));
+  command->add_option("--seed", options->seed, "Of everything that is random")
+      ->group(scene)
+      ->transform(seed());
   command
       ->add_option("--frames", options->frames,
                    "Only the frames from START up to END, which is left out; either may be empty")
@@ -237,7 +261,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("START:END");
 
   command->add_option("--supersample", options->supersample, "S x S rays per pixel, averaged")
-      ->check(between(1, 16));
+      ->transform(whole_between(1, 16));
   command->add_flag("--depth", options->depth,
                     "Also expected depth: channel Z of an EXR, or NAME_depth.png");
   add_trace_flags(*command, options->trace);

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "base/progress.hpp"
+#include "eval/output_check.hpp"
 #include "options.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/train_config.hpp"
@@ -17,6 +18,7 @@ struct Options {
   std::string data;
   std::string output;
   std::string resume;
+  bool overwrite = false;
   TrainOptions train;
   DeviceFlags device;
 };
@@ -36,8 +38,9 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   keep_run_options(command, options);
   Dataset dataset = load_dataset(
       options.data, {options.train.downscale, options.train.test_every, options.train.undistort});
+  check_not_data(options.output, dataset);
   const std::unique_ptr<Context> context = open_context(options.device);
-  Trainer trainer(*context, std::move(dataset), options.train, options.output);
+  Trainer trainer(*context, std::move(dataset), options.train, options.output, options.overwrite);
   if (!options.resume.empty()) trainer.resume(options.resume);
   const TrainSummary summary = trainer.run(!global.quiet);
 
@@ -69,6 +72,8 @@ Command add_train_command(CLI::App& app, const GlobalOptions& global) {
                    "Go on from the newest whole checkpoint of a run, with its options; 'latest' "
                    "means that of --output, or a new start while there is none")
       ->type_name("RUN");
+  command->add_flag("--overwrite", options->overwrite,
+                    "Take the place of a run that is in the folder: its files are removed");
   add_device_flags(*command, options->device);
   add_train_options(*command, options->train);
   return {command, [command, options, &global] { run(*command, *options, global); }};

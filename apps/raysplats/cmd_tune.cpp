@@ -30,6 +30,7 @@ void run(const Options& options) {
   const DeviceInfo device = select_device(options.device.device);
   TuningStore store;
   if (options.reset) {
+    if (options.dry_run) throw UsageError("--reset measures nothing: leave out --dry-run");
     const std::size_t removed = store.remove(device);
     fmt::print("{} tuning of {} removed from {}\n", removed, device.name, store.path().string());
     return;
@@ -79,7 +80,7 @@ Command add_tune_command(CLI::App& app) {
       ->capture_default_str()
       ->type_name("WxH");
   command->add_option("--repeat", options->tune.repeat, "Repetitions of every candidate")
-      ->check(between(1, 1000))
+      ->transform(whole_between(1, 1000))
       ->capture_default_str();
   command->add_option("--axes", options->axes, "What to vary")
       ->capture_default_str()

@@ -6,18 +6,23 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <new>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "base/standard_streams.hpp"
+#include "help.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 
 namespace {
 
 int fail(raysplats::ErrorCode code, const std::string& message) {
-  fmt::print(stderr, "raysplats: {}\n", message);
+  // What cannot be said is no reason to end otherwise than with the code.
+  std::fputs(fmt::format("raysplats: {}\n", message).c_str(), stderr);
   return static_cast<int>(code);
 }
 
@@ -25,6 +30,7 @@ int run(int argc, char** argv) {
   using namespace raysplats::cli;
   CLI::App app{"Trains and renders 3D Gaussians by ray tracing on any OpenCL device", "raysplats"};
   app.set_version_flag("--version", "raysplats " RAYSPLATS_VERSION);
+  app.formatter(std::make_shared<HelpFormatter>());
   app.require_subcommand(1);
   app.fallthrough();
   GlobalOptions global;
@@ -40,13 +46,18 @@ int run(int argc, char** argv) {
     std::reverse(arguments.begin(), arguments.end());  // the order that CLI11 takes them in
     app.parse(std::move(arguments));
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
+    if (error.get_exit_code() == 0) {
+      app.exit(error);
+      raysplats::finish_standard_output();
+      return 0;
+    }
     return fail(raysplats::ErrorCode::kUsage, explain(error, app));
   }
   start_logging(global);
   for (const Command& command : commands) {
     if (command.app->parsed()) command.run();
   }
+  raysplats::finish_standard_output();
   return 0;
 }
 
@@ -56,6 +67,7 @@ int main(int argc, char** argv) {
   // A file over the process's size limit is then a failed write like any other, not the end of the
   // process.
   std::signal(SIGXFSZ, SIG_IGN);
+  raysplats::open_standard_streams();
   try {
     return run(argc, argv);
   } catch (const raysplats::Error& error) {
@@ -65,6 +77,11 @@ int main(int argc, char** argv) {
                 "The host has no memory left: use fewer Gaussians, smaller images (--downscale) or "
                 "a smaller "
                 "--memory-budget");
+  } catch (const std::system_error& error) {
+    // fmt throws it for what does not fit into the buffer of standard output.
+    if (std::ferror(stdout) == 0) return fail(raysplats::ErrorCode::kRuntime, error.what());
+    return fail(raysplats::ErrorCode::kData,
+                fmt::format("Standard output cannot be written: {}", error.code().message()));
   } catch (const std::exception& error) {
     return fail(raysplats::ErrorCode::kRuntime, error.what());
   }

@@ -15,21 +15,20 @@
 #include <utility>
 
 #include "base/nearest_name.hpp"
+#include "base/number_text.hpp"
+#include "train/train_keys.hpp"
 
 namespace raysplats::cli {
 namespace {
 
-std::optional<double> parse_number(const std::string& text) {
-  double value = 0.0;
-  if (!CLI::detail::lexical_cast(text, value) || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
+/// Refuses what is not `wanted`, and writes what is so that CLI11 reads the same.
 CLI::Validator number_check(const std::string& wanted, const std::function<bool(double)>& valid) {
   return CLI::Validator(
-      [=](const std::string& text) {
-        const std::optional<double> value = parse_number(text);
-        return value && valid(*value) ? std::string() : fmt::format("{} is not {}", text, wanted);
+      [=](std::string& text) {
+        const std::optional<double> value = parse_real(text);
+        if (!value || !valid(*value)) return fmt::format("{} is not {}", text, wanted);
+        text = fmt::format("{}", *value);
+        return std::string();
       },
       "");
 }
@@ -105,14 +104,12 @@ std::unique_ptr<Context> open_context(const DeviceFlags& flags) {
 }
 
 void add_trace_flags(CLI::App& app, TraceFlags& flags) {
-  app.add_option("--q,--quantile", flags.quantile,
-                 "Confidence of an ellipsoid: largest squared whitened distance of a hit")
-      ->check(above(0.0));
-  app.add_option("--min-transmittance", flags.min_transmittance,
-                 "A ray stops below this transmittance")
-      ->check(between(0.0, 1.0));
-  app.add_option("--max-hits", flags.max_hits, "A ray stops after this many hits")
-      ->check(at_least(1));
+  app.add_option("--q,--quantile", flags.quantile, trace_keys::kQuantile.help)
+      ->transform(within(trace_keys::kQuantile));
+  app.add_option("--min-transmittance", flags.min_transmittance, trace_keys::kMinTransmittance.help)
+      ->transform(within(trace_keys::kMinTransmittance));
+  app.add_option("--max-hits", flags.max_hits, trace_keys::kMaxHits.help)
+      ->transform(within(trace_keys::kMaxHits));
   app.add_option("--hit-order", flags.hit_order,
                  "Depth that orders hits: entry (the paper) or peak")
       ->check(one_of({"entry", "peak"}));
@@ -120,17 +117,16 @@ void add_trace_flags(CLI::App& app, TraceFlags& flags) {
       "--adaptive-radius,!--no-adaptive-radius",
       [&flags](std::int64_t count) { flags.adaptive_radius = count > 0; },
       "Shrink the ellipsoids of faint Gaussians to where they reach 1/255");
-  app.add_option("--near", flags.near_depth,
-                 "Skip Gaussians whose mean is nearer than this; 0 = off")
-      ->check(at_least(0.0));
-  app.add_option("--background", flags.background, "Colour behind the model, 0 to 1 each")
-      ->check(triple())
+  app.add_option("--near", flags.near_depth, trace_keys::kNear.help)
+      ->transform(within(trace_keys::kNear));
+  app.add_option("--background", flags.background,
+                 "colour behind the model, 0 to 1 each; one number is a grey")
+      ->check(color())
       ->type_name("R,G,B");
-  app.add_option("--packet-width", flags.packet_width,
-                 "Rays per work-item: 1, 2, 4, 8, 16; 0 = the device's own")
+  app.add_option("--packet-width", flags.packet_width, trace_keys::kPacketWidth.help)
       ->check(one_of({"0", "1", "2", "4", "8", "16"}));
-  app.add_option("--memory-budget", flags.memory_budget, "MiB for hit lists on the device")
-      ->check(at_least(1));
+  app.add_option("--memory-budget", flags.memory_budget, trace_keys::kMemoryBudget.help)
+      ->transform(within(trace_keys::kMemoryBudget));
   app.add_option("--launch-budget-ms", flags.launch_budget_ms,
                  "Time of one launch; 0 = no bound, -1 = none on CPUs and 100 elsewhere")
       ->check(between(-1, 1e9));
@@ -154,11 +150,7 @@ TraceOptions TraceFlags::over(TraceOptions base) const {
                      : *traversal == "tiles" ? Traversal::kTiles
                                              : Traversal::kAuto;
   }
-  if (background) {
-    const std::array<double, 3> color = parse_triple(*background);
-    std::transform(color.begin(), color.end(), base.background.begin(),
-                   [](double c) { return static_cast<float>(c); });
-  }
+  if (background) base.background = parse_color(*background);
   if (packet_width) base.packet_width = *packet_width;
   if (memory_budget) base.memory_budget = *memory_budget << 20;
   if (launch_budget_ms) base.launch_budget_ms = *launch_budget_ms;
@@ -188,19 +180,18 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags) {
   CLI::Option* data = app.add_option("-d,--data", flags.data,
                                      "COLMAP, nerfstudio or Blender data set whose cameras to use");
   data->group(group)->type_name("DATASET");
-  app.add_option("--split", flags.split, "test, train or all")
+  app.add_option("--split", flags.split, "test (default), train or all")
       ->group(group)
-      ->check(one_of({"test", "train", "all"}))
-      ->capture_default_str();
+      ->check(one_of({"test", "train", "all"}));
   app.add_option("--downscale", flags.downscale,
                  "Divide the image sizes by this (1, or as the run was trained)")
       ->group(group)
-      ->check(above(0.0));
+      ->transform(between(0.01, 1e4));
   app.add_option(
          "--test-every", flags.test_every,
          "Every n-th view is a test view where the data set has no split (8, or as the run)")
       ->group(group)
-      ->check(at_least(0));
+      ->transform(whole_between(0, 1e9));
   app.add_flag_function(
          "--undistort,!--no-undistort",
          [&flags](std::int64_t count) { flags.undistort = count > 0; },
@@ -210,23 +201,104 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags) {
   return data;
 }
 
-DataError no_views(const DataFlags& flags) {
-  return DataError(fmt::format("The {} split of {} has no views: choose another --split",
-                               flags.split, flags.data));
+Split DataFlags::chosen_split() const {
+  const std::string name = split.value_or("test");
+  if (name == "train") return Split::kTrain;
+  return name == "all" ? Split::kAll : Split::kTest;
 }
 
-CLI::Validator at_least(double low) {
-  return number_check(fmt::format("a number of at least {}", low),
-                      [low](double v) { return v >= low; });
+void DataFlags::check_used(bool orbit) const {
+  if (data.empty() && (split || test_every || undistort)) {
+    throw UsageError(
+        "--split, --test-every and --undistort are about the views of a data set: add --data "
+        "DATASET");
+  }
+  if (orbit && (split || test_every)) {
+    throw UsageError(
+        "--split and --test-every choose views, but an orbit goes around all of them: leave them "
+        "out");
+  }
+  if (orbit && data.empty() && downscale) {
+    throw UsageError(
+        "--downscale divides the sizes of photos, and this orbit has none: give --width and "
+        "--height");
+  }
 }
+
+void add_overwrite_flag(CLI::App& app, bool& flag) {
+  app.add_flag("--overwrite", flag, "Also into a folder that holds results of something else");
+}
+
+DataError no_views(const DataFlags& flags) {
+  return DataError(fmt::format("The {} split of {} has no views: choose another --split",
+                               flags.split.value_or("test"), flags.data));
+}
+
+CLI::Validator at_least(double low) { return between(low, kNoBound); }
 
 CLI::Validator above(double low) {
   return number_check(fmt::format("a number above {}", low), [low](double v) { return v > low; });
 }
 
 CLI::Validator between(double low, double high) {
-  return number_check(fmt::format("a number from {} to {}", low, high),
+  return number_check(number_words(false, low, high),
                       [=](double v) { return v >= low && v <= high; });
+}
+
+CLI::Validator whole_between(double low, double high) {
+  return CLI::Validator(
+      [=](std::string& text) {
+        const std::optional<std::int64_t> value = parse_whole(text);
+        const auto number = static_cast<double>(value.value_or(0));
+        if (!value || number < low || number > high) {
+          return fmt::format("{} is not {}", text, number_words(true, low, high));
+        }
+        text = std::to_string(*value);
+        return std::string();
+      },
+      "");
+}
+
+CLI::Validator within(const NumberKey& key) {
+  return key.whole ? whole_between(key.low, key.high) : between(key.low, key.high);
+}
+
+CLI::Validator seed() {
+  return CLI::Validator(
+      [](std::string& text) {
+        const std::optional<std::uint64_t> value = parse_natural(text);
+        if (!value) {
+          return fmt::format("{} is not a whole number from 0 to 18446744073709551615", text);
+        }
+        text = std::to_string(*value);
+        return std::string();
+      },
+      "");
+}
+
+CLI::Validator color() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        const std::optional<std::vector<std::string>> parts = list_items({text});
+        const auto channel = [](const std::string& part) {
+          const std::optional<double> value = parse_real(part);
+          return value && trace_keys::kBackground.accepts(*value);
+        };
+        const bool good = parts && (parts->size() == 3 || parts->size() == 1) &&
+                          std::all_of(parts->begin(), parts->end(), channel);
+        return good ? std::string()
+                    : fmt::format("'{}' is not three numbers from 0 to 1, as in 1,0.5,0", text);
+      },
+      "");
+}
+
+std::array<float, 3> parse_color(const std::string& text) {
+  const std::vector<std::string> parts = parts_of(text);
+  std::array<float, 3> out{};
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    out[k] = static_cast<float>(parse_real(parts.at(parts.size() == 1 ? 0 : k)).value_or(0.0));
+  }
+  return out;
 }
 
 CLI::Validator one_of(std::vector<std::string> names) {
@@ -241,10 +313,10 @@ CLI::Validator one_of(std::vector<std::string> names) {
 CLI::Validator triple() {
   return CLI::Validator(
       [](const std::string& text) {
-        const std::vector<std::string> parts = CLI::detail::split(text, ',');
-        const bool good = parts.size() == 3 &&
-                          std::all_of(parts.begin(), parts.end(), [](const std::string& part) {
-                            return parse_number(part).has_value();
+        const std::optional<std::vector<std::string>> parts = list_items({text});
+        const bool good = parts && parts->size() == 3 &&
+                          std::all_of(parts->begin(), parts->end(), [](const std::string& part) {
+                            return parse_real(part).has_value();
                           });
         return good ? std::string()
                     : fmt::format("'{}' is not three numbers with commas, as in 1,0.5,0", text);
@@ -253,17 +325,25 @@ CLI::Validator triple() {
 }
 
 std::array<double, 3> parse_triple(const std::string& text) {
-  const std::vector<std::string> parts = CLI::detail::split(text, ',');
+  const std::vector<std::string> parts = list_items({text}).value_or(std::vector<std::string>());
   std::array<double, 3> out{};
-  for (std::size_t k = 0; k < out.size(); ++k) out[k] = parse_number(parts.at(k)).value_or(0.0);
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = parse_real(parts.at(k)).value_or(0.0);
   return out;
 }
 
-Split parse_split(const std::string& name) {
-  if (name == "train") return Split::kTrain;
-  if (name == "all") return Split::kAll;
-  return Split::kTest;
+namespace {
+
+/// Whether an option takes a list of numbers, which shells cut into words at its spaces.
+bool takes_numbers(std::string_view name) {
+  if (name == "--background" || name == "--up" || name == "--sizes") return true;
+  TrainOptions options;
+  const std::vector<TrainKey> keys = train_keys(options);
+  return name.starts_with("--") && std::any_of(keys.begin(), keys.end(), [&](const TrainKey& key) {
+           return key.list == TrainKey::List::kNumbers && key.name == name.substr(2);
+         });
 }
+
+}  // namespace
 
 std::vector<std::string> own_arguments(int argc, const char* const* argv) {
   // gsplat's and OpenSplat's names for what every trainer needs.
@@ -281,6 +361,14 @@ std::vector<std::string> own_arguments(int argc, const char* const* argv) {
       if (name != foreign) continue;
       word.replace(0, foreign.size(), own);
       break;
+    }
+    // One word for a list, so that what follows it is no part of it: --save-at 5 10 DATA.
+    const std::size_t mark = word.find('=');
+    if (takes_numbers(std::string_view(word).substr(0, mark))) {
+      for (; i + 1 < argc && is_number_list_part(argv[i + 1]); ++i) {
+        word += word.find('=') == std::string::npos ? '=' : ' ';
+        word += argv[i + 1];
+      }
     }
     arguments.push_back(std::move(word));
   }
@@ -316,9 +404,9 @@ std::string explain(const CLI::ParseError& error, const CLI::App& app) {
 }
 
 std::vector<std::string> parts_of(const std::string& text) {
-  std::vector<std::string> parts = CLI::detail::split(text, ',');
-  std::erase(parts, "");
-  return parts;
+  std::optional<std::vector<std::string>> parts = list_items({text});
+  if (!parts) throw UsageError(fmt::format("'{}' is no list as in a,b", text));
+  return std::move(*parts);
 }
 
 std::vector<std::string> names_of(const std::string& option,

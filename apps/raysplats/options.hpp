@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/trace_keys.hpp"
 #include "device/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
@@ -81,22 +82,36 @@ void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOp
 /// run.
 struct DataFlags {
   std::string data;
-  std::string split = "test";
+  std::optional<std::string> split;  ///< "test" when not given
   std::optional<double> downscale;
   std::optional<int> test_every;
   std::optional<bool> undistort;
 
   DatasetOptions over(DatasetOptions base) const;
+  Split chosen_split() const;
+  /// Throws UsageError for options that choose among views where no data set gives any, or where
+  /// an orbit goes around all of them.
+  void check_used(bool orbit) const;
 };
 /// Returns the option --data.
 CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags);
-Split parse_split(const std::string& name);
 DataError no_views(const DataFlags& flags);
+
+/// --overwrite: outputs may take the place of what is there.
+void add_overwrite_flag(CLI::App& app, bool& flag);
 
 /// Validators whose messages are one sentence.
 CLI::Validator at_least(double low);
 CLI::Validator above(double low);
 CLI::Validator between(double low, double high);
+/// Whole numbers, in every spelling that configuration files know (1_000, 1e3).
+CLI::Validator whole_between(double low, double high);
+CLI::Validator within(const NumberKey& key);
+/// 0 to 2^64 - 1.
+CLI::Validator seed();
+/// Three numbers from 0 to 1, or one for grey.
+CLI::Validator color();
+std::array<float, 3> parse_color(const std::string& text);
 CLI::Validator one_of(std::vector<std::string> names);
 /// Three numbers with commas, for example a colour or a direction.
 CLI::Validator triple();
@@ -109,7 +124,7 @@ std::vector<std::string> own_arguments(int argc, const char* const* argv);
 /// One sentence for a command line that does not parse, with the nearest known command or option.
 std::string explain(const CLI::ParseError& error, const CLI::App& app);
 
-/// The parts between commas, without empty ones.
+/// The items of a list in any spelling (list_items()). Throws UsageError when it is none.
 std::vector<std::string> parts_of(const std::string& text);
 /// The same, each of which must be one of `known`; UsageError for others and for none.
 std::vector<std::string> names_of(const std::string& option,

@@ -17,6 +17,7 @@ struct RenderFlags {
   std::string cameras;
   std::optional<int> orbit;
   std::string output;
+  bool overwrite = false;
   std::string format = "png";
   std::string exr;  ///< "linear", "display" or "" = not given
   int supersample = 1;

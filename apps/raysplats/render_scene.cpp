@@ -10,6 +10,7 @@
 #include "base/interrupt.hpp"
 #include "base/output_directory.hpp"
 #include "base/progress.hpp"
+#include "eval/output_check.hpp"
 #include "eval/scene_frames.hpp"
 #include "io/scene_loader.hpp"
 #include "raysplats/error.hpp"
@@ -43,6 +44,21 @@ void check(const RenderFlags& flags) {
   }
   if ((flags.fov || flags.elevation || flags.distance || flags.up) && !flags.orbit) {
     throw UsageError("--fov, --elevation, --distance and --up shape an orbit: add --orbit N");
+  }
+  flags.data.check_used(flags.orbit.has_value());
+}
+
+/// An orbit keeps the lens of the file's camera, which may have no angle.
+void check_angle(const RenderFlags& flags, const SceneCamera& camera) {
+  if (!flags.fov) return;
+  if (camera.model == CameraModel::kEquirectangular) {
+    throw UsageError(
+        "--fov is for other lenses: the [camera] of this file is equirectangular and shows "
+        "everything around");
+  }
+  if (camera.model == CameraModel::kOrthographic) {
+    throw UsageError(
+        "--fov is for other lenses: the [camera] of this file is orthographic and has an 'extent'");
   }
 }
 
@@ -79,7 +95,7 @@ void override_camera(const RenderFlags& flags, SceneFile& scene) {
       camera.source = Source::kData;
     }
     camera.file = flags.data.data;
-    camera.split = parse_split(flags.data.split);
+    camera.split = flags.data.chosen_split();
     camera.data_options = flags.data.over({});
   } else if (!flags.cameras.empty()) {
     camera = {};
@@ -148,6 +164,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   check(flags);
   SceneFile file = read_scene_file(flags.model);
   find_models(file);
+  check_angle(flags, file.camera);
   override_camera(flags, file);
   file.trained = flags.trace.over(file.trace.over(file.trained));
   file.trace = {};
@@ -156,6 +173,8 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   if (flags.seed) file.render.seed = *flags.seed;
   const LoadedScene loaded = load_scene(file);
   const auto [first, last] = parse_frames(flags.frames, loaded.cameras.size());
+  if (!file.camera.file.empty()) check_not_data(flags.output, file.camera.file);
+  check_leftovers(flags.output, frame_names(loaded.cameras), flags.frame_options().format, flags.overwrite);
 
   const std::unique_ptr<Context> context = open_context(flags.device);
   PathTracer tracer(*context, loaded.scene);

@@ -106,12 +106,12 @@ std::string Progress::line(int width) const {
 
 void Progress::draw(bool last) {
   if (stream_ == nullptr) return;
-  if (terminal_) {
-    // One column stays free: a full line would wrap.
-    fmt::print(stream_, "\r\x1b[K{}{}", line(terminal_width(stream_) - 1), last ? "\n" : "");
-  } else {
-    fmt::print(stream_, "{}\n", line(200).substr(0, 200));
-  }
+  // One column of a terminal stays free: a full line would wrap.
+  const std::string text =
+      terminal_ ? fmt::format("\r\x1b[K{}{}", line(terminal_width(stream_) - 1), last ? "\n" : "")
+                : fmt::format("{}\n", line(200).substr(0, 200));
+  // A log that is full is no reason to stop what it tells of.
+  std::fputs(text.c_str(), stream_);
   std::fflush(stream_);
   drawn_ = true;
   drawn_done_ = done_;

@@ -43,11 +43,12 @@ void check(const OrbitOptions& options) {
     throw UsageError(
         "An orbit has no lens with OpenCV distortion: take cameras with distortion from a file");
   }
-  const double widest = options.model == CameraModel::kFisheye ? 360.0 : 180.0;
-  if (!(options.fov_degrees > 0.0 && options.fov_degrees < widest)) {
+  const bool fisheye = options.model == CameraModel::kFisheye;
+  const double fov = options.fov_degrees;
+  if (!(fov > 0.0 && (fisheye ? fov <= 360.0 : fov < 180.0))) {
     throw UsageError(
-        fmt::format("A field of view of {} degrees makes no image: choose one between 0 and {}",
-                    options.fov_degrees, widest));
+        fmt::format("A field of view of {} degrees makes no image: choose one above 0 and {}", fov,
+                    fisheye ? "up to 360" : "below 180"));
   }
   if (!(std::abs(options.elevation_degrees) < 90.0)) {
     throw UsageError(

@@ -140,6 +140,13 @@ void TuningStore::store(const DeviceInfo& device, const DeviceTuning& tuning) {
 }
 
 std::size_t TuningStore::remove(const DeviceInfo& device) {
+  try {
+    parse_entries(path_);
+  } catch (const std::exception&) {
+    // Nobody can tell whose tunings a damaged file has, and it is ignored with a warning each time.
+    std::error_code error;
+    return std::filesystem::remove(path_, error) ? 1 : 0;
+  }
   const std::size_t removed =
       std::erase_if(entries_, [&](const Entry& entry) { return is_device(entry, device); });
   if (removed > 0) write_entries(path_, entries_);

@@ -74,7 +74,17 @@ std::vector<std::size_t> spread(const std::vector<std::size_t>& indices, std::si
   return out;
 }
 
+std::vector<std::string> names_of(const Dataset& dataset, const std::vector<std::size_t>& views) {
+  std::vector<Camera> cameras;
+  for (const std::size_t view : views) cameras.push_back(dataset.views[view].camera);
+  return frame_names(cameras);
+}
+
 }  // namespace
+
+std::vector<std::string> evaluated_names(const Dataset& dataset, Split split) {
+  return names_of(dataset, dataset.indices(split));
+}
 
 std::string EvaluationReport::table() const {
   std::size_t width = 5;
@@ -110,9 +120,7 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
         "The data set {} has no views to evaluate; choose another split or --test-every",
         dataset.root.string()));
   }
-  std::vector<Camera> cameras;
-  for (const std::size_t view : views) cameras.push_back(dataset.views[view].camera);
-  const std::vector<std::string> names = frame_names(cameras);
+  const std::vector<std::string> names = names_of(dataset, views);
   if (!output.empty()) {
     std::error_code error;
     std::filesystem::create_directories(output, error);
@@ -124,7 +132,7 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   EvaluationReport report;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const Image rgba = load_view_image(dataset.views[views[i]]);
-    const Image traced = render(cameras[i]);
+    const Image traced = render(dataset.views[views[i]].camera);
     if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
       throw UsageError(fmt::format(
           "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names[i],
@@ -132,7 +140,8 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
     }
     const Comparison pair = compare(traced, rgba, dataset.alpha_is_background, background);
     EvaluationMetrics metrics;
-    metrics.name = cameras[i].name.empty() ? names[i] : cameras[i].name;
+    const std::string& view_name = dataset.views[views[i]].camera.name;
+    metrics.name = view_name.empty() ? names[i] : view_name;
     // Masked pixels are equal; they must not count as well reconstructed ones.
     metrics.psnr = psnr(pair.render, pair.photo);
     if (std::isfinite(metrics.psnr)) metrics.psnr += 10.0 * std::log10(pair.valid);

@@ -25,18 +25,6 @@ float linear_from_display(float value) {
 
 constexpr int kMaxSupersample = 16;
 
-std::filesystem::path extension(FrameFormat format) {
-  switch (format) {
-    case FrameFormat::kExr:
-      return ".exr";
-    case FrameFormat::kJpg:
-      return ".jpg";
-    case FrameFormat::kPng:
-      break;
-  }
-  return ".png";
-}
-
 /// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
 std::string joined(const std::filesystem::path& name) {
   std::string out;
@@ -77,6 +65,18 @@ Image average_depth(const Image& depth, const Image& rgba, int factor) {
 }
 
 }  // namespace
+
+std::string file_extension(FrameFormat format) {
+  switch (format) {
+    case FrameFormat::kExr:
+      return ".exr";
+    case FrameFormat::kJpg:
+      return ".jpg";
+    case FrameFormat::kPng:
+      break;
+  }
+  return ".png";
+}
 
 std::vector<std::string> frame_names(std::span<const Camera> cameras) {
   std::vector<std::string> names(cameras.size());
@@ -153,11 +153,11 @@ void write_frame(const std::filesystem::path& stem,
         channels.data[count * i + c] = linear_from_display(channels.data[count * i + c]);
       }
     }
-    write_image(file("", extension(options.format)), channels,
+    write_image(file("", file_extension(options.format)), channels,
                 options.depth ? std::vector<std::string>{"Z"} : std::vector<std::string>{});
     return;
   }
-  write_image(file("", extension(options.format)), with_channels(rgba, 3));
+  write_image(file("", file_extension(options.format)), with_channels(rgba, 3));
   if (options.depth) write_image(file("_depth", ".png"), depth_preview(depth, rgba));
 }
 

@@ -22,6 +22,9 @@ enum class FrameFormat {
   kJpg,
 };
 
+/// ".png" and the like.
+std::string file_extension(FrameFormat format);
+
 struct FrameOptions {
   FrameFormat format = FrameFormat::kPng;
   int supersample = 1;  ///< rays per pixel side; the samples are box-averaged

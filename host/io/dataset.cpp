@@ -294,6 +294,13 @@ Dataset load_dataset(const fs::path& root, const DatasetOptions& options) {
     throw DataError(
         fmt::format("The data set {} has no views: there is nothing to train on", root.string()));
   }
+  const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
+  const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
+  if (masked > 0) {
+    const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_mask);
+    spdlog::info("{} of {} photos have a mask, as {}: what is black there does not count", masked,
+                 dataset.views.size(), first->mask_path.string());
+  }
   return dataset;
 }
 

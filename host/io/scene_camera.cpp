@@ -36,7 +36,7 @@ void read_lens(io::TomlTable& table, SceneCamera& camera) {
   if (camera.model == CameraModel::kOrthographic) {
     camera.extent = table.number("extent", 1e-9, kHuge);
   } else if (camera.model != CameraModel::kEquirectangular) {
-    camera.fov = table.number("fov", 0.1, is_wide(camera.model) ? 359.0 : 179.0);
+    camera.fov = table.number("fov", 0.1, is_wide(camera.model) ? 360.0 : 179.0);
     camera.focal = table.number("focal", 1e-3, 1e9);
     if (camera.fov && camera.focal) {
       table.fail("focal", "'fov' and 'focal' in [camera] say the same: leave one out");

@@ -7,8 +7,11 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
+#include <initializer_list>
+#include <tuple>
 
 #include "base/nearest_name.hpp"
+#include "core/trace_keys.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 
@@ -157,6 +160,20 @@ SceneMaterial read_material(TomlTable& table) {
     table.vector("absorption", m.absorption, 0, kMaxColor);
   }
   if (m.kind == Kind::kTransparent) table.number("opacity", m.opacity, 0, 1);
+  const auto is = [&](std::initializer_list<Kind> kinds) {
+    return std::find(kinds.begin(), kinds.end(), m.kind) != kinds.end();
+  };
+  const std::tuple<const char*, const char*, bool> of_kinds[] = {
+      {"color", "a kind other than emissive, which has 'emission'", !is({Kind::kEmissive})},
+      {"texture", "a kind other than emissive", !is({Kind::kEmissive})},
+      {"specular", "the kinds diffuse and transparent", lit},
+      {"roughness", "the kinds diffuse, transparent and mirror", lit || is({Kind::kMirror})},
+      {"ior", "kind = \"glass\"", is({Kind::kGlass})},
+      {"absorption", "kind = \"glass\"", is({Kind::kGlass})},
+      {"opacity", "kind = \"transparent\"", is({Kind::kTransparent})}};
+  for (const auto& [key, kinds, used] : of_kinds) {
+    if (!used && table.has(key)) table.fail(key, fmt::format("'{}' is for {}", key, kinds));
+  }
   table.vector("emission", m.emission, 0, kMaxColor);
   if (const auto shadow = table.number("shadow", 0, 1)) m.shadow = static_cast<float>(*shadow);
   table.finish();
@@ -179,7 +196,7 @@ Light read_light(TomlTable& table) {
   (distant ? light.direction : light.position) = rgb(distant ? glm::normalize(*vector) : *vector);
   table.vector("color", light.color, 0, kMaxColor);
   float intensity = 1.0f;
-  table.number("intensity", intensity, 0, 1e9);
+  table.number("intensity", intensity, 0, kHuge);
   for (float& c : light.color) c *= intensity;
   if (light.kind == Light::Kind::kSphere) table.number("radius", light.radius, 0, kHuge);
   table.finish();
@@ -236,11 +253,26 @@ void maybe(TomlTable& table, const char* key, std::optional<T>& target, double l
   target = value;
 }
 
+template <class T>
+void maybe(TomlTable& table, const char* key, std::optional<T>& target, const NumberKey& range) {
+  maybe(table, key, target, range.low, range.high);
+}
+
 SceneTrace read_trace(TomlTable& table) {
   SceneTrace t;
-  maybe(table, "quantile", t.quantile, 0.01, 100);
-  maybe(table, "min-transmittance", t.min_transmittance, 0, 0.5);
-  maybe(table, "max-hits", t.max_hits, 1, 1e6);
+  if (table.has("q") && table.has("quantile")) {
+    table.fail("q", "'q' and 'quantile' in [trace] say the same: leave one out");
+  }
+  maybe(table, table.has("q") ? "q" : "quantile", t.quantile, trace_keys::kQuantile);
+  maybe(table, trace_keys::kMinTransmittance.name, t.min_transmittance,
+        trace_keys::kMinTransmittance);
+  maybe(table, trace_keys::kMaxHits.name, t.max_hits, trace_keys::kMaxHits);
+  if (table.number("near", trace_keys::kNear.low, trace_keys::kNear.high).value_or(0.0) != 0.0) {
+    table.fail(
+        "near",
+        "'near' in [trace] can only be 0: rays that leave a mirror have no camera that could "
+        "be near");
+  }
   if (table.has("hit-order")) {
     HitOrder order{};
     table.choice<HitOrder>("hit-order", order,
@@ -254,14 +286,16 @@ SceneTrace read_trace(TomlTable& table) {
   }
   if (table.has("background")) {
     t.background.emplace();
-    table.vector("background", *t.background, 0, kMaxColor);
+    table.vector("background", *t.background, trace_keys::kBackground.low,
+                 trace_keys::kBackground.high);
   }
-  maybe(table, "packet-width", t.packet_width, 0, 16);
+  maybe(table, trace_keys::kPacketWidth.name, t.packet_width, trace_keys::kPacketWidth);
   const int width = t.packet_width.value_or(0);
   if ((width & (width - 1)) != 0) {
     table.fail("packet-width", "'packet-width' in [trace] has to be 0, 1, 2, 4, 8 or 16");
   }
-  if (const auto budget = table.number("memory-budget", 1, 1e9)) {
+  if (const auto budget = table.number("memory-budget", trace_keys::kMemoryBudget.low,
+                                       trace_keys::kMemoryBudget.high)) {
     t.memory_budget = static_cast<std::size_t>(*budget) << 20;
   }
   table.finish();

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "base/nearest_name.hpp"
+#include "base/number_text.hpp"
 #include "io/byte_reader.hpp"
 #include "raysplats/error.hpp"
 
@@ -25,28 +26,9 @@ std::string dashed(std::string_view key) {
   return out;
 }
 
-std::string type_name(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a table";
-    case toml::node_type::array:
-      return "a list";
-    case toml::node_type::string:
-      return "a text";
-    case toml::node_type::integer:
-    case toml::node_type::floating_point:
-      return "a number";
-    case toml::node_type::boolean:
-      return "true or false";
-    default:
-      return "a date";
-  }
-}
-
+/// What a range accepts, after "a number" or "three numbers"; "" where it accepts all.
 std::string range(double low, double high) {
-  constexpr double kHuge = 1e30;
-  if (high >= kHuge) return low <= -kHuge ? "" : fmt::format(" of at least {:g}", low);
-  return fmt::format(" from {:g} to {:g}", low, high);
+  return number_words(false, low, high).substr(std::string_view("a number").size());
 }
 
 }  // namespace
@@ -100,9 +82,55 @@ void check_ascii(std::string_view text, const std::filesystem::path& path) {
 
 void fail_toml_assertion() { throw std::logic_error("an assertion of toml++"); }
 
-toml::table read_toml(const std::filesystem::path& path) {
+std::string type_name(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::table:
+      return "a table";
+    case toml::node_type::array:
+      return "a list";
+    case toml::node_type::string:
+      return "a text";
+    case toml::node_type::integer:
+    case toml::node_type::floating_point:
+      return "a number";
+    case toml::node_type::boolean:
+      return "true or false";
+    default:
+      return "a date";
+  }
+}
+
+std::optional<std::vector<std::string>> value_texts(const toml::node& node) {
+  std::vector<std::string> out;
+  if (const toml::array* list = node.as_array()) {
+    for (const toml::node& item : *list) {
+      if (item.is_array()) return std::nullopt;
+      std::optional<std::vector<std::string>> text = value_texts(item);
+      if (!text) return std::nullopt;
+      out.push_back(std::move(text->front()));
+    }
+    return out;
+  }
+  if (node.is_string()) {
+    out.push_back(node.value<std::string>().value_or(""));
+  } else if (node.is_integer()) {
+    out.push_back(fmt::format("{}", node.value<std::int64_t>().value_or(0)));
+  } else if (node.is_floating_point()) {
+    out.push_back(fmt::format("{}", node.value<double>().value_or(0.0)));
+  } else if (node.is_boolean()) {
+    out.emplace_back(node.value<bool>().value_or(false) ? "true" : "false");
+  } else {
+    return std::nullopt;
+  }
+  return out;
+}
+
+std::string read_toml_text(const std::filesystem::path& path) {
   const std::vector<std::byte> bytes = read_file(path, kMaxBytes);
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+toml::table parse_toml(std::string_view text, const std::filesystem::path& path) {
   check_ascii(text, path);
   try {
     return toml::parse(text, path.string());
@@ -115,6 +143,10 @@ toml::table read_toml(const std::filesystem::path& path) {
     throw UsageError(fmt::format("{} is no TOML: look for '[', quotes and keys without their rest",
                                  path.string()));
   }
+}
+
+toml::table read_toml(const std::filesystem::path& path) {
+  return parse_toml(read_toml_text(path), path);
 }
 
 TomlTable::TomlTable(const toml::table& table, const std::filesystem::path& file, std::string name)
@@ -266,7 +298,9 @@ void TomlTable::vector(std::string_view key,
                        std::array<float, 3>& target,
                        double low,
                        double high) {
-  const std::optional<glm::dvec3> value = vector(key);
+  // One number is a grey.
+  const std::optional<glm::dvec3> value =
+      is_number(key) ? glm::dvec3(*number(key, -kNoBound, kNoBound)) : vector(key);
   if (!value) return;
   for (std::size_t k = 0; k < 3; ++k) {
     const double number = (*value)[static_cast<int>(k)];

@@ -31,6 +31,16 @@ namespace raysplats::io {
 /// Parses a TOML file. Throws DataError when it cannot be read, UsageError with the line when it is
 /// no TOML.
 toml::table read_toml(const std::filesystem::path& path);
+/// The same of a text; `path` is named in errors.
+toml::table parse_toml(std::string_view text, const std::filesystem::path& path);
+/// The whole text of a TOML file. Throws DataError when it cannot be read.
+std::string read_toml_text(const std::filesystem::path& path);
+
+/// "a list", "true or false" and so on: what a value is, for messages.
+std::string type_name(const toml::node& node);
+/// A number, text or truth value as text, or a list of them; none for tables, dates and lists that
+/// hold such or lists.
+std::optional<std::vector<std::string>> value_texts(const toml::node& node);
 
 /// One table of a TOML file, read key by key: every reading marks its key as known, and finish()
 /// refuses what nobody asked for. Keys are written with - or _. What is wrong is a UsageError of

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <fstream>
 #include <future>
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -25,6 +27,7 @@ namespace raysplats {
 
 namespace {
 
+constexpr const char* kGenerator = "raysplats";
 constexpr double kFieldOfView = 0.69;  ///< radians, horizontal and vertical
 constexpr double kDistance = 4.0;
 constexpr double kGoldenAngle = 2.399963229728653;
@@ -88,6 +91,7 @@ nlohmann::json transform_matrix(const Camera& camera) {
 
 void write_transforms(const std::filesystem::path& path, const std::vector<Camera>& cameras) {
   nlohmann::ordered_json file;
+  file["generator"] = kGenerator;
   file["camera_angle_x"] = kFieldOfView;
   file["frames"] = nlohmann::ordered_json::array();
   for (const Camera& camera : cameras) {
@@ -122,9 +126,24 @@ void render_all(const std::filesystem::path& directory,
   for (std::future<void>& worker : workers) worker.get();
 }
 
+/// A folder is new, empty or has an earlier data set of ours.
+void check_replaceable(const std::filesystem::path& directory) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(directory, error)) return;
+  if (std::filesystem::is_empty(directory, error)) return;
+  std::ifstream stream(directory / "transforms_train.json");
+  const auto file = nlohmann::json::parse(stream, nullptr, false);
+  if (file.is_object() && file.value("generator", nlohmann::json()) == kGenerator) return;
+  throw UsageError(fmt::format(
+      "The folder {} holds other files: choose a new one, or write there with --overwrite",
+      directory.string()));
+}
+
 }  // namespace
 
-void generate_dataset(const std::filesystem::path& directory, const SyntheticOptions& options) {
+void generate_dataset(const std::filesystem::path& directory,
+                      const SyntheticOptions& options,
+                      bool overwrite) {
   check_range("image size", options.size, 8, 4096);
   check_range("number of training views", options.train_views, 1, 10000);
   check_range("number of test views", options.test_views, 1, 10000);
@@ -135,6 +154,7 @@ void generate_dataset(const std::filesystem::path& directory, const SyntheticOpt
       spread_cameras("test", options.test_views, options.size,
                      best_turn(train, options.test_views, options.size, turn));
 
+  if (!overwrite) check_replaceable(directory);
   make_output_directory(directory / "train");
   make_output_directory(directory / "test");
   std::vector<Camera> all = train;

@@ -19,8 +19,11 @@ struct SyntheticOptions {
 /// set: transforms_train.json, transforms_test.json, train/r_N.png and test/r_N.png (RGBA, straight
 /// alpha, transparent where nothing is hit). The cameras lie 4 units from the origin above the
 /// table top and look at the origin; the held-out views lie between the training views. Equal
-/// options give equal bytes. Throws UsageError for options outside their range, DataError when
-/// `directory` cannot be written.
-void generate_dataset(const std::filesystem::path& directory, const SyntheticOptions& options = {});
+/// options give equal bytes. Throws UsageError for options outside their range and, without
+/// `overwrite`, when `directory` holds anything but an earlier data set of this function, DataError
+/// when it cannot be written.
+void generate_dataset(const std::filesystem::path& directory,
+                      const SyntheticOptions& options = {},
+                      bool overwrite = false);
 
 }  // namespace raysplats

@@ -242,8 +242,12 @@ Checkpoint load_latest_checkpoint(const std::filesystem::path& path) {
                               path.string()));
 }
 
-void remove_old_checkpoints(const std::filesystem::path& run_folder, int keep) {
-  const std::vector<std::filesystem::path> files = list_checkpoints(run_folder);
+void remove_old_checkpoints(const std::filesystem::path& run_folder,
+                            int keep,
+                            std::int64_t iteration) {
+  std::vector<std::filesystem::path> files = list_checkpoints(run_folder);
+  const std::filesystem::path newest = checkpoint_path(run_folder, iteration);
+  std::erase_if(files, [&](const std::filesystem::path& file) { return file > newest; });
   for (std::size_t i = 0; i + static_cast<std::size_t>(std::max(keep, 1)) < files.size(); ++i) {
     std::error_code error;
     std::filesystem::remove(files[i], error);

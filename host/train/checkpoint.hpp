@@ -51,7 +51,10 @@ std::vector<std::filesystem::path> list_checkpoints(const std::filesystem::path&
 /// `path` may also be a single .rsck file. Throws DataError when there is none.
 Checkpoint load_latest_checkpoint(const std::filesystem::path& path);
 
-/// Removes all but the newest `keep` checkpoints of a run folder.
-void remove_old_checkpoints(const std::filesystem::path& run_folder, int keep);
+/// Removes all but the newest `keep` checkpoints of a run folder up to `iteration`; what is beyond
+/// it is not of the run that is at `iteration`.
+void remove_old_checkpoints(const std::filesystem::path& run_folder,
+                            int keep,
+                            std::int64_t iteration);
 
 }  // namespace raysplats

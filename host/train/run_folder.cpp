@@ -5,13 +5,18 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string_view>
+#include <system_error>
+#include <utility>
 
 #include "base/atomic_file.hpp"
 #include "base/output_directory.hpp"
@@ -43,6 +48,60 @@ EvaluationRow evaluation_from_json(const nlohmann::json& json) {
   return row;
 }
 
+constexpr std::array<const char*, 4> kReports{"config.toml", "cameras.json", "metrics.csv",
+                                              "metrics.json"};
+
+std::string iteration_name(std::int64_t iteration) {
+  return fmt::format("iteration_{}", iteration);
+}
+
+std::filesystem::path model_file(const std::filesystem::path& run, std::int64_t iteration) {
+  return run / "point_cloud" / iteration_name(iteration) / "point_cloud.ply";
+}
+
+// N of a file or folder called PREFIX N SUFFIX.
+std::optional<std::int64_t> number_in(std::string_view name,
+                                      std::string_view prefix,
+                                      std::string_view suffix) {
+  if (name.size() <= prefix.size() + suffix.size() || !name.starts_with(prefix) ||
+      !name.ends_with(suffix)) {
+    return std::nullopt;
+  }
+  name.remove_prefix(prefix.size());
+  name.remove_suffix(suffix.size());
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), value);
+  return error == std::errc() && end == name.data() + name.size() ? std::optional(value)
+                                                                  : std::nullopt;
+}
+
+// The entries of a folder that are called so, with their numbers.
+std::vector<std::pair<std::int64_t, std::filesystem::path>> numbered(
+    const std::filesystem::path& folder, std::string_view prefix, std::string_view suffix) {
+  std::vector<std::pair<std::int64_t, std::filesystem::path>> out;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const auto number = number_in(entry.path().filename().string(), prefix, suffix);
+    if (number) out.emplace_back(*number, entry.path());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+void remove_file(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::remove(path, error);
+  if (error) {
+    throw DataError(fmt::format("{} cannot be removed: {}", path.string(), error.message()));
+  }
+}
+
+// A folder goes when nothing else is in it.
+void remove_if_empty(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (std::filesystem::is_empty(folder, error) && !error) remove_file(folder);
+}
+
 }  // namespace
 
 RunFolder::RunFolder(std::filesystem::path path) : path_(std::move(path)) {
@@ -57,7 +116,7 @@ FileLock RunFolder::lock() const {
 }
 
 std::filesystem::path RunFolder::evaluation_folder(std::int64_t iteration) const {
-  return path_ / "eval" / fmt::format("iteration_{}", iteration);
+  return path_ / "eval" / iteration_name(iteration);
 }
 
 void RunFolder::write_config(const TrainOptions& options) const {
@@ -90,8 +149,35 @@ void RunFolder::write_cameras(std::span<const Camera> cameras) const {
 void RunFolder::write_model(const Gaussians& model,
                             const TraceOptions& trace,
                             std::int64_t iteration) const {
-  write_ply(path_ / "point_cloud" / fmt::format("iteration_{}", iteration) / "point_cloud.ply",
-            model, trace);
+  write_ply(model_file(path_, iteration), model, trace);
+}
+
+bool RunFolder::has_model(std::int64_t iteration) const {
+  std::error_code error;
+  return std::filesystem::exists(model_file(path_, iteration), error);
+}
+
+void RunFolder::remove_after(std::int64_t iteration) const {
+  for (const auto& [number, file] : numbered(path_ / "checkpoints", "step_", ".rsck")) {
+    if (number > iteration) remove_file(file);
+  }
+  for (const auto& [number, folder] : numbered(path_ / "point_cloud", "iteration_", "")) {
+    if (number <= iteration) continue;
+    remove_file(folder / "point_cloud.ply");
+    remove_if_empty(folder);
+  }
+  for (const auto& [number, folder] : numbered(path_ / "eval", "iteration_", "")) {
+    if (number <= iteration) continue;
+    std::vector<std::filesystem::path> pictures;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      if (entry.path().extension() == ".png") pictures.push_back(entry.path());
+    }
+    for (const std::filesystem::path& picture : pictures) remove_file(picture);
+    remove_file(folder / "metrics.json");
+    remove_if_empty(folder);
+  }
+  if (iteration > 0) return;
+  for (const char* report : kReports) remove_file(path_ / report);
 }
 
 void RunFolder::begin_metrics(std::int64_t iteration) {
@@ -140,6 +226,25 @@ void RunFolder::write_metrics(const nlohmann::json& summary) const {
   for (const EvaluationRow& row : evaluations_) json["evaluations"].push_back(to_json(row));
   json["note"] = "training_seconds exclude evaluation and compiling kernels";
   write_text_file(path_ / "metrics.json", json.dump(2) + "\n");
+}
+
+void check_no_run(const std::filesystem::path& folder) {
+  std::int64_t newest = -1;
+  for (const auto& [number, path] : numbered(folder / "checkpoints", "step_", ".rsck")) {
+    newest = std::max(newest, number);
+  }
+  for (const auto& [number, path] : numbered(folder / "point_cloud", "iteration_", "")) {
+    newest = std::max(newest, number);
+  }
+  const auto exists = [&](const char* name) {
+    std::error_code error;
+    return std::filesystem::exists(folder / name, error);
+  };
+  if (newest < 0 && std::none_of(kReports.begin(), kReports.end(), exists)) return;
+  throw UsageError(fmt::format(
+      "The folder {} holds another run ({}): go on with it by --resume latest, choose another "
+      "folder, or replace it by --overwrite",
+      folder.string(), newest < 0 ? "without a checkpoint" : fmt::format("iteration {}", newest)));
 }
 
 double recorded_seconds(const std::filesystem::path& run_folder, std::int64_t iteration) {

@@ -45,10 +45,15 @@ class RunFolder {
   void write_cameras(std::span<const Camera> cameras) const;
   /// `trace` goes into the header, for those who take the model elsewhere.
   void write_model(const Gaussians& model, const TraceOptions& trace, std::int64_t iteration) const;
+  bool has_model(std::int64_t iteration) const;
 
   /// Keeps other runs out of the folder until the lock goes, and removes temporary files that a
   /// killed run left. Throws DataError when another run has the folder.
   [[nodiscard]] FileLock lock() const;
+
+  /// Removes what a run has written for iterations after `iteration`, and with 0 its reports and
+  /// configuration too. Files that no run writes stay.
+  void remove_after(std::int64_t iteration) const;
 
   /// Starts metrics.csv and the evaluations anew, keeping what was recorded up to `iteration` (0
   /// keeps nothing).
@@ -63,6 +68,9 @@ class RunFolder {
   std::filesystem::path path_;
   std::vector<EvaluationRow> evaluations_;
 };
+
+/// Throws UsageError when a folder holds files of a run, with which another one would mix.
+void check_no_run(const std::filesystem::path& folder);
 
 /// Seconds of training that the metrics.csv of a run folder has recorded up to `iteration`; 0 when
 /// it has none.

@@ -5,13 +5,15 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <functional>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string_view>
+#include <utility>
 
 #include "base/nearest_name.hpp"
+#include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "train/train_keys.hpp"
 
@@ -20,48 +22,114 @@ namespace {
 
 constexpr std::size_t kCommentWidth = 110;
 
-// Sets every key of the file for which `skip` is false; returns the names of all.
-std::set<std::string> read_keys(const std::filesystem::path& path,
+// The first line of what to_toml() writes.
+constexpr std::string_view kRunMark = "# ---- Run ----\n";
+
+// A file that a run wrote, in the dialect of older versions: strings without escapes and seeds
+// beyond the integers of TOML.
+std::string modern(std::string text) {
+  std::string out;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size() - 1) + 1;
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    constexpr std::string_view kSeed = "seed = ";
+    constexpr std::size_t kMostDigits = 18;
+    if (line.starts_with(kSeed)) {
+      const std::size_t digits = line.find_first_not_of("0123456789", kSeed.size());
+      const std::size_t last = std::min(digits, line.size());
+      if (last - kSeed.size() > kMostDigits) {
+        out += fmt::format("{}\"{}\"{}", kSeed, line.substr(kSeed.size(), last - kSeed.size()),
+                           line.substr(last));
+        begin = end;
+        continue;
+      }
+    }
+    const bool bare = !line.starts_with('#') && line.find('\'') == std::string_view::npos;
+    for (const char c : line) {
+      if (c == '\\' && bare) out += c;
+      out += c;
+    }
+    begin = end;
+  }
+  return out;
+}
+
+std::string file_text(const std::filesystem::path& path) {
+  try {
+    return io::read_toml_text(path);
+  } catch (const DataError& error) {
+    throw UsageError(fmt::format("The configuration file cannot be read: {}", error.what()));
+  }
+}
+
+std::string dashed(std::string_view key) {
+  std::string out(key);
+  std::replace(out.begin(), out.end(), '_', '-');
+  return out;
+}
+
+std::vector<std::string> names_of(const std::vector<TrainKey>& keys) {
+  std::vector<std::string> names;
+  names.reserve(keys.size());
+  for (const TrainKey& key : keys) names.push_back(key.name);
+  return names;
+}
+
+// Sets every key of a table for which `skip` is false; `prefix` is how the file calls the table.
+void read_keys(const toml::table& table,
+               const std::string& prefix,
+               const std::filesystem::path& path,
+               const std::vector<TrainKey>& keys,
+               std::set<std::string>& seen,
+               const std::function<bool(const std::string&)>& skip) {
+  for (const auto& [written, node] : table) {
+    const std::string name = dashed(written.str());
+    const auto fail = [&, &node = node](const std::string& message) {
+      throw UsageError(
+          fmt::format("{}, line {}: {}", path.string(), node.source().begin.line, message));
+    };
+    if (prefix.empty() && name == "train" && node.is_table()) {
+      read_keys(*node.as_table(), "train.", path, keys, seen, skip);
+      continue;
+    }
+    const auto key = std::find_if(keys.begin(), keys.end(), [&](const TrainKey& candidate) {
+      return candidate.name == name;
+    });
+    if (key == keys.end() && (node.is_table() || node.is_array_of_tables())) {
+      fail(fmt::format(
+          "the table [{}{}] is unknown: keys stand at the top of the file or below [train]", prefix,
+          written.str()));
+    }
+    if (key == keys.end()) {
+      fail(fmt::format("unknown key '{}{}': did you mean '{}'?", prefix, written.str(),
+                       nearest_name(name, names_of(keys))));
+    }
+    if (!seen.insert(name).second) fail(fmt::format("'{}' is there twice: leave one out", name));
+    const std::optional<std::vector<std::string>> values = io::value_texts(node);
+    if (!values) {
+      fail(fmt::format(
+          "'{}' takes no {}", name,
+          node.is_array() ? "list of lists, tables or dates" : io::type_name(node).substr(2)));
+    }
+    if (skip(name)) continue;
+    try {
+      key->set(*values);
+    } catch (const UsageError& error) {
+      fail(error.what());
+    }
+  }
+}
+
+// Returns the names of all keys that are there.
+std::set<std::string> read_text(std::string text,
+                                const std::filesystem::path& path,
                                 TrainOptions& options,
                                 const std::function<bool(const std::string&)>& skip) {
-  std::ifstream stream(path);
-  if (!stream.good()) {
-    throw UsageError(
-        fmt::format("The configuration file {} cannot be read: check the path", path.string()));
-  }
-  std::vector<CLI::ConfigItem> items;
-  try {
-    items = CLI::ConfigTOML().from_config(stream);
-  } catch (const CLI::Error& error) {
-    throw UsageError(fmt::format("The configuration file {} is not valid TOML: {}", path.string(),
-                                 error.what()));
-  }
-  const std::vector<TrainKey> keys = train_keys(options);
-  std::set<std::string> names_found;
-  for (const CLI::ConfigItem& item : items) {
-    if (item.name == "++" || item.name == "--")
-      continue;  // CLI11's marks for the begin and end of a table
-    const bool known_table =
-        item.parents.empty() || (item.parents.size() == 1 && item.parents[0] == "train");
-    const auto key = std::find_if(keys.begin(), keys.end(), [&](const TrainKey& candidate) {
-      return candidate.name == item.name;
-    });
-    if (!known_table || key == keys.end()) {
-      std::vector<std::string> names;
-      names.reserve(keys.size());
-      for (const TrainKey& candidate : keys) names.push_back(candidate.name);
-      throw UsageError(fmt::format("Unknown key '{}' in {}: did you mean '{}'?", item.fullname(),
-                                   path.string(), nearest_name(item.name, names)));
-    }
-    names_found.insert(item.name);
-    if (skip(item.name)) continue;
-    try {
-      key->set(item.inputs);
-    } catch (const UsageError& error) {
-      throw UsageError(fmt::format("{} ({})", error.what(), path.string()));
-    }
-  }
-  return names_found;
+  const toml::table root =
+      io::parse_toml(text.starts_with(kRunMark) ? modern(std::move(text)) : text, path);
+  std::set<std::string> seen;
+  read_keys(root, "", path, train_keys(options), seen, skip);
+  return seen;
 }
 
 // The text in lines of comment.
@@ -74,6 +142,13 @@ std::string comment(std::string_view text) {
     text.remove_prefix(std::min(text.size(), length + 1));
   }
   return out;
+}
+
+// A value of TOML as a word for a shell.
+std::string shell_text(std::string text) {
+  if (text == "[]") return text;
+  std::erase_if(text, [](char c) { return c == '"' || c == '[' || c == ']' || c == ' '; });
+  return text;
 }
 
 }  // namespace
@@ -93,11 +168,14 @@ void add_train_options(CLI::App& app, TrainOptions& options) {
           : key.name == "mirrors"  ? "--mirror," + flag
                                    : flag,
           key.set, key.help);
-      option->default_str(key.text())->type_name("")->expected(1);
-      option->multi_option_policy(key.repeatable ? CLI::MultiOptionPolicy::TakeAll
-                                                 : CLI::MultiOptionPolicy::TakeLast);
+      // One word per use: further ones would swallow the data set's name.
+      option->expected(1)->allow_extra_args(false);
+      option->type_name(key.list == TrainKey::List::kNone ? "VALUE" : "LIST");
+      option->multi_option_policy(key.list == TrainKey::List::kNone
+                                      ? CLI::MultiOptionPolicy::TakeLast
+                                      : CLI::MultiOptionPolicy::TakeAll);
     }
-    option->group(key.section);
+    option->default_str(shell_text(key.text()))->group(key.section);
   }
   app.add_option("--config", "configuration file (TOML); options on the command line go before it")
       ->expected(1)
@@ -110,7 +188,7 @@ void add_train_options(CLI::App& app, TrainOptions& options) {
 }
 
 void apply_config_file(CLI::App& app, TrainOptions& options, const std::filesystem::path& path) {
-  read_keys(path, options,
+  read_text(file_text(path), path, options,
             [&app](const std::string& key) { return app.get_option("--" + key)->count() > 0; });
 }
 
@@ -118,7 +196,7 @@ void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesyste
   const auto given = [&app](const std::string& key) {
     return app.get_option("--" + key)->count() > 0;
   };
-  const std::set<std::string> found = read_keys(path, options, given);
+  const std::set<std::string> found = read_text(file_text(path), path, options, given);
   if (found.count("strategy") > 0) return;
   // The run is older than these keys: it goes on as it began.
   if (!given("strategy")) options.strategy = DensityStrategy::kAdc;
@@ -126,8 +204,15 @@ void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesyste
 }
 
 void read_train_config(const std::filesystem::path& path, TrainOptions& options) {
-  read_keys(path, options, [](const std::string&) { return false; });
+  read_text(file_text(path), path, options, [](const std::string&) { return false; });
   validate(options);
+}
+
+TrainOptions parse_train_config(const std::string& text) {
+  TrainOptions options;
+  read_text(text, "the checkpoint's configuration", options,
+            [](const std::string&) { return false; });
+  return options;
 }
 
 std::string to_toml(const TrainOptions& options) {

@@ -30,6 +30,9 @@ void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesyste
 /// Reads a configuration file into `options`.
 void read_train_config(const std::filesystem::path& path, TrainOptions& options);
 
+/// Reads the text of a configuration that a run wrote (to_toml(), in a checkpoint).
+TrainOptions parse_train_config(const std::string& text);
+
 /// The options as a configuration file with every key and what it means.
 std::string to_toml(const TrainOptions& options);
 

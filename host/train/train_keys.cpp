@@ -5,13 +5,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <limits>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
+#include "base/number_text.hpp"
+#include "core/trace_keys.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
@@ -19,30 +20,31 @@ namespace {
 
 using Values = std::vector<std::string>;
 
-constexpr double kHuge = 1e30;
+constexpr double kHuge = kNoBound;
 constexpr double kMaxCount = 1e15;
+constexpr double kMaxSeed = 0x1p64;  // rounded; the type ends there
 
 template <class T>
 T parse_number(const std::string& key, const std::string& text, double low, double high) {
-  T value{};
-  const char* end = text.data() + text.size();
-  const auto [next, error] = std::from_chars(text.data(), end, value);
-  const auto number = static_cast<double>(value);
-  if (error != std::errc() || next != end || !std::isfinite(number) || number < low ||
-      number > high) {
-    throw UsageError(fmt::format("The option '{}' needs {} between {:g} and {:g}, not '{}'", key,
-                                 std::is_integral_v<T> ? "a whole number" : "a number", low, high,
-                                 text));
+  std::optional<T> value;
+  if constexpr (std::is_floating_point_v<T>) {
+    value = parse_real(text);
+  } else if constexpr (std::is_unsigned_v<T>) {
+    value = parse_natural(text);
+  } else if (const std::optional<std::int64_t> whole = parse_whole(text)) {
+    if (std::in_range<T>(*whole)) value = static_cast<T>(*whole);
   }
-  return value;
+  if (!value || static_cast<double>(*value) < low || static_cast<double>(*value) > high) {
+    throw UsageError(fmt::format("The option '{}' needs {}, not '{}'", key,
+                                 number_words(std::is_integral_v<T>, low, high), text));
+  }
+  return *value;
 }
 
 // A share of the run (below 1) or a whole number of iterations.
 RunShare parse_share(const std::string& key, const std::string& text, bool may_be_none) {
-  double value = -1;
-  const char* end = text.data() + text.size();
-  const auto [next, error] = std::from_chars(text.data(), end, value);
-  const bool number = error == std::errc() && next == end && std::isfinite(value);
+  const std::optional<double> number = parse_real(text);
+  const double value = number.value_or(-1);
   const bool whole = value >= 1 && value <= kMaxCount && value == std::floor(value);
   const bool share = value > 0 && value < 1;
   if (!number || !(whole || share || (may_be_none && value == 0))) {
@@ -56,24 +58,19 @@ RunShare parse_share(const std::string& key, const std::string& text, bool may_b
 
 std::string share_text(const RunShare& share) { return fmt::format("{}", share.value); }
 
-// The values of a list, which may arrive split at its commas or not.
-std::vector<std::string> elements(const Values& values) {
-  std::vector<std::string> out;
-  for (const std::string& value : values) {
-    std::size_t begin = 0;
-    while (begin < value.size()) {
-      const std::size_t comma = std::min(value.find(',', begin), value.size());
-      out.push_back(value.substr(begin, comma - begin));
-      begin = comma + 1;
-    }
+std::vector<std::string> items(const std::string& key, const Values& values) {
+  std::optional<std::vector<std::string>> list = list_items(values);
+  if (!list) {
+    throw UsageError(fmt::format("The option '{}' is a list as in [1, 2], not '{}'", key,
+                                 fmt::join(values, " ")));
   }
-  return out;
+  return std::move(*list);
 }
 
 // "4:0.1": a fourth of the size up to a tenth of the run. Plain numbers halve the divisor down to
 // 1: of n entries the first starts at 2^n.
 std::vector<ResolutionStep> parse_resolutions(const std::string& key, const Values& values) {
-  const std::vector<std::string> entries = elements(values);
+  const std::vector<std::string> entries = items(key, values);
   const auto named = std::count_if(entries.begin(), entries.end(), [](const std::string& entry) {
     return entry.find(':') != std::string::npos;
   });
@@ -104,14 +101,23 @@ const std::string& single(const std::string& key, const Values& values) {
   return values.front();
 }
 
-// What a configuration file can hold between double quotes: there are no escapes.
+// The text as TOML that needs no escapes, which the runs of older versions wrote without.
+std::string toml_text(const std::string& text) {
+  const char quote = text.find('\\') == std::string::npos ? '"' : '\'';
+  return quote + text + quote;
+}
+
+// What toml_text() can hold.
 const std::string& quotable(const std::string& key, const std::string& value) {
   const bool bad = std::any_of(value.begin(), value.end(), [](char c) {
     return c == '"' || static_cast<unsigned char>(c) < 0x20;
   });
-  if (bad) {
-    throw UsageError(
-        fmt::format("The option '{}' takes no double quotes and no control characters", key));
+  const bool both = value.find('\\') != std::string::npos && value.find('\'') != std::string::npos;
+  if (bad || both) {
+    throw UsageError(fmt::format(
+        "The option '{}' takes no double quotes, no control characters and no single quotes "
+        "beside backslashes",
+        key));
   }
   return value;
 }
@@ -129,7 +135,17 @@ class Table {
         [name, &target, low, high](const Values& values) {
           target = parse_number<T>(name, single(name, values), low, high);
         },
-        [&target] { return fmt::format("{}", target); });
+        [&target] {
+          // TOML's integers end before unsigned ones do.
+          const bool beyond = std::is_unsigned_v<T> && static_cast<double>(target) >= 0x1p63;
+          const std::string text = fmt::format("{}", target);
+          return beyond ? toml_text(text) : text;
+        });
+  }
+
+  template <class T>
+  void number(const NumberKey& key, T& target) {
+    number(key.name, target, key.low, key.high, key.help);
   }
 
   void flag(const std::string& name, bool& target, const std::string& help) {
@@ -167,20 +183,27 @@ class Table {
         },
         [&target, names] {
           for (const auto& [label, value] : names) {
-            if (value == target) return fmt::format("\"{}\"", label);
+            if (value == target) return toml_text(label);
           }
           return std::string();
         });
   }
 
   void text(const std::string& name, std::string& target, const std::string& help) {
-    // A list of numbers may arrive split at its commas.
+    add(
+        name, help, false,
+        [name, &target](const Values& values) { target = quotable(name, single(name, values)); },
+        [&target] { return toml_text(target); });
+  }
+
+  // A word, or three numbers in any spelling of a list, kept as "r,g,b".
+  void color(const std::string& name, std::string& target, const std::string& help) {
     add(
         name, help, false,
         [name, &target](const Values& values) {
-          target = quotable(name, fmt::format("{}", fmt::join(values, ",")));
+          target = quotable(name, fmt::format("{}", fmt::join(items(name, values), ",")));
         },
-        [&target] { return fmt::format("\"{}\"", target); });
+        [&target] { return toml_text(target); });
   }
 
   void share(const std::string& name, RunShare& target, bool may_be_none, const std::string& help) {
@@ -197,7 +220,7 @@ class Table {
         name, help, false,
         [name, &target](const Values& values) {
           std::vector<RunShare> parsed;
-          for (const std::string& entry : elements(values))
+          for (const std::string& entry : items(name, values))
             parsed.push_back(parse_share(name, entry, false));
           target = std::move(parsed);
         },
@@ -207,6 +230,7 @@ class Table {
           for (const RunShare& entry : target) texts.push_back(share_text(entry));
           return fmt::format("[{}]", fmt::join(texts, ", "));
         });
+    keys_.back().list = TrainKey::List::kNumbers;
   }
 
   void resolutions(const std::string& name,
@@ -222,24 +246,27 @@ class Table {
             texts.push_back(fmt::format("\"{}:{}\"", step.divisor, share_text(step.until)));
           return fmt::format("[{}]", fmt::join(texts, ", "));
         });
+    keys_.back().list = TrainKey::List::kNumbers;
   }
 
   void paths(const std::string& name, std::vector<std::string>& target, const std::string& help) {
-    // Absolute, so that a resumed run finds them from anywhere.
+    // Absolute, so that a resumed run finds them from anywhere. A path may hold what separates the
+    // items of other lists, so that one value is one path.
     add(
         name, help, false,
         [name, &target](const Values& values) {
           target.clear();
           for (const std::string& value : values) {
-            if (value.empty()) continue;
+            if (value.empty() || value == "[]") continue;
             target.push_back(std::filesystem::absolute(quotable(name, value)).string());
           }
         },
         [&target] {
-          return target.empty() ? std::string("[]")
-                                : fmt::format("[\"{}\"]", fmt::join(target, "\", \""));
+          std::vector<std::string> texts;
+          for (const std::string& path : target) texts.push_back(toml_text(path));
+          return fmt::format("[{}]", fmt::join(texts, ", "));
         });
-    keys_.back().repeatable = true;
+    keys_.back().list = TrainKey::List::kPaths;
   }
 
   void learning_rate(const std::string& name, LearningRate& rate, const std::string& help) {
@@ -255,7 +282,8 @@ class Table {
            bool flag,
            std::function<void(const Values&)> set,
            std::function<std::string()> text) {
-    keys_.push_back({name, section_, help, flag, std::move(set), std::move(text)});
+    keys_.push_back(
+        {name, section_, help, flag, TrainKey::List::kNone, std::move(set), std::move(text)});
   }
 
   std::string section_;
@@ -268,7 +296,7 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   Table t;
   t.section("Run");
   t.number("iterations", o.iterations, 0, kMaxCount, "training steps, one view each");
-  t.number("seed", o.seed, 0, 1.8e19,
+  t.number("seed", o.seed, 0, kMaxSeed,
            "seed of view order, random start and splits; a run is a function of it");
   t.flag(
       "deterministic", o.deterministic,
@@ -276,16 +304,16 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
       "do, others add gradients in long integers for it");
 
   t.section("Data");
-  t.number("downscale", o.downscale, 0.01, 1e4, "photos are reduced by this factor");
+  t.number("downscale", o.downscale, 1, 1024, "photos are reduced by this factor");
   t.number("test-every", o.test_every, 0, 1e9,
            "every n-th view is held out when the data set has no split of its own; 0 = none");
   t.flag("undistort", o.undistort,
          "turn photos through lenses with OpenCV distortion into pinhole pictures; false = their "
          "own pixels and rays");
-  t.text("background", o.background,
-         "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
-         "alpha, else black) or "
-         "\"random\" (another colour per iteration for cut-out photos, else black)");
+  t.color("background", o.background,
+          "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
+          "alpha, else black) or "
+          "\"random\" (another colour per iteration for cut-out photos, else black)");
   t.number("image-budget", o.image_budget, 1, 1e9,
            "MiB of photos kept on the device; the others are decoded again when their turn comes");
   t.resolutions(
@@ -350,16 +378,12 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
                      "depth that orders a ray's hits: entry (near side of the ellipsoid, the "
                      "paper) or peak (strongest "
                      "response)");
-  t.number("quantile", o.quantile, 0.01, 100,
-           "squared radius of the ellipsoids in standard deviations (chi^2(3))");
-  t.number("min-transmittance", o.min_transmittance, 0, 0.5,
-           "a ray stops below this transmittance");
-  t.number("max-hits", o.max_hits, 1, 1e6,
-           "a ray stops after so many hits; rays that do are reported");
+  t.number(trace_keys::kQuantile, o.quantile);
+  t.number(trace_keys::kMinTransmittance, o.min_transmittance);
+  t.number(trace_keys::kMaxHits, o.max_hits);
   t.flag("adaptive-radius", o.adaptive_radius,
          "shrink the ellipsoids to where they contribute at least 1/255");
-  t.number("near", o.near_depth, 0, kHuge,
-           "Gaussians nearer to the camera plane are skipped; 0 = off");
+  t.number(trace_keys::kNear, o.near_depth);
   t.choice<Traversal>(
       "traversal", o.traversal,
       {{"auto", Traversal::kAuto}, {"tiles", Traversal::kTiles}, {"bvh", Traversal::kBvh}},
@@ -367,10 +391,8 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
       "walks the hierarchy, the paper) or auto (as 'raysplats tune' found, else tiles); scenes "
       "with "
       "mirrors and orthographic cameras need rays one by one");
-  t.number("packet-width", o.packet_width, 0, 16,
-           "rays per work-item: 1, 2, 4, 8 or 16; 0 = fit to the device");
-  t.number("memory-budget", o.memory_budget, 1, 1e9,
-           "MiB for hit lists; above it they are computed again");
+  t.number(trace_keys::kPacketWidth, o.packet_width);
+  t.number(trace_keys::kMemoryBudget, o.memory_budget);
   t.choice<GradientSum>(
       "gradient-sum", o.gradient_sum,
       {{"auto", GradientSum::kAuto},

@@ -15,11 +15,13 @@ struct TrainKey {
   std::string section;  ///< heading it is listed under
   std::string help;
   bool flag = false;  ///< true or false; on the command line it needs no value
-  /// Parses and stores; throws UsageError that names the key and what it accepts.
+  enum class List { kNone, kNumbers, kPaths };
+  List list = List::kNone;  ///< of lists, every use on the command line adds to them
+  /// Parses and stores the value, or the values of a list in any spelling (list_items()); throws
+  /// UsageError that names the key and what it accepts.
   std::function<void(const std::vector<std::string>&)> set;
   /// The present value as TOML.
   std::function<std::string()> text;
-  bool repeatable = false;  ///< a list to which every use on the command line adds
 };
 
 /// Every training option, bound to the members of `options`, in the order of the documentation. The

@@ -11,6 +11,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "base/atomic_file.hpp"
@@ -171,13 +172,16 @@ struct Trainer::Impl {
   Impl(Context& device,
        Dataset data,
        const TrainOptions& train_options,
-       std::filesystem::path run_path);
+       std::filesystem::path run_path,
+       bool replace);
 
   void start();
   const std::vector<SmallPhoto>& photos();
   std::size_t limit();
   std::size_t largest_photo() const;
   std::size_t ray_views() const;
+  void check_data_options(const Checkpoint& checkpoint) const;
+  void finish_resumed();
   void step();
   void report(Progress& progress);
   void control_density();
@@ -210,6 +214,8 @@ struct Trainer::Impl {
   Dataset dataset;
   TrainOptions options;
   RunFolder run;
+  bool overwrite;
+  bool continues = false;  // what is in the folder is of this run
   std::vector<std::size_t> train_views;
   std::vector<std::size_t> test_views;
   std::vector<Camera> train_cameras;
@@ -286,11 +292,13 @@ struct Trainer::Impl {
 Trainer::Impl::Impl(Context& device,
                     Dataset data,
                     const TrainOptions& train_options,
-                    std::filesystem::path run_path)
+                    std::filesystem::path run_path,
+                    bool replace)
     : context(device),
       dataset(std::move(data)),
       options((validate(train_options), train_options)),
       run(std::move(run_path)),
+      overwrite(replace),
       train_views(dataset.indices(Split::kTrain)),
       test_views(dataset.indices(Split::kTest)),
       train_cameras(cameras_of(dataset, train_views)),
@@ -312,8 +320,10 @@ Trainer::Impl::Impl(Context& device,
               host_image_budget(options, train_cameras)),
       order(options.seed, train_views.size()) {
   if (train_views.empty()) {
-    throw UsageError(fmt::format("The data set {} has no training views: raise --test-every",
-                                 dataset.root.string()));
+    const bool held_out = options.test_every == 1 && !test_views.empty();
+    throw UsageError(fmt::format(
+        "The data set {} has no training views: {}", dataset.root.string(),
+        held_out ? "--test-every 1 holds all of them out" : "its files name none to train on"));
   }
 }
 
@@ -348,9 +358,11 @@ std::size_t Trainer::Impl::ray_views() const {
 
 // Makes the first model, unless resume() has brought one.
 void Trainer::Impl::start() {
+  if (!continues && !overwrite) check_no_run(run.path());
   const std::size_t most = limit();
   density.set_limit(most);
   if (started) {
+    if (overwrite) run.remove_after(continues ? iteration : 0);
     run.begin_metrics(iteration);
   } else {
     Gaussians model = initial_model(
@@ -360,6 +372,7 @@ void Trainer::Impl::start() {
     gaussians =
         DeviceGaussians::upload(context, gathered(model, along_curve), options.scale_activation);
     adam.initialize(gaussians.count, gaussians.sh_degree);
+    if (overwrite) run.remove_after(0);
     run.begin_metrics(0);
     started = true;
     whole = true;
@@ -380,6 +393,9 @@ void Trainer::Impl::start() {
   }
   run.write_config(options);
   run.write_cameras(train_cameras);
+  // From here on what is in the folder is of this run.
+  continues = true;
+  overwrite = false;
 }
 
 // One view: forward, loss, backward, statistics, Adam; nothing is waited for.
@@ -572,7 +588,7 @@ Checkpoint Trainer::Impl::state() {
 void Trainer::Impl::save_checkpoint() {
   write_checkpoint(checkpoint_path(run.path(), iteration), state());
   saved = iteration;
-  remove_old_checkpoints(run.path(), options.keep_checkpoints);
+  remove_old_checkpoints(run.path(), options.keep_checkpoints, iteration);
 }
 
 // After a failure: saves the last whole state, if the device still gives it. Returns what the user
@@ -593,13 +609,31 @@ std::string Trainer::Impl::rescue() {
                      run.path().string());
 }
 
+// The photos as the run saw them: another size or choice of them is another run.
+void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
+  if (checkpoint.config.empty()) return;
+  const TrainOptions before = parse_train_config(checkpoint.config);
+  const auto differs = [&](const char* option, const auto& was, const auto& is) {
+    if (was == is) return;
+    throw UsageError(fmt::format(
+        "The checkpoint of iteration {} was made with '{}' = {}, not {}: resume with the value of "
+        "the run, or start a new one with --init",
+        checkpoint.iteration, option, was, is));
+  };
+  differs("downscale", before.downscale, options.downscale);
+  differs("test-every", before.test_every, options.test_every);
+  differs("undistort", before.undistort, options.undistort);
+}
+
 void Trainer::Impl::resume(const std::filesystem::path& source) {
   const bool own = source == "latest";
   const std::filesystem::path place = own ? run.path() : source;
   if (own && list_checkpoints(place).empty()) {
     spdlog::info("{} holds no checkpoint yet: the run starts anew", place.string());
+    continues = true;
     return;
   }
+  const FolderUse use(*this);
   const Checkpoint checkpoint = load_latest_checkpoint(place);
   if (checkpoint.seed != options.seed) {
     throw UsageError(fmt::format(
@@ -607,10 +641,29 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
         checkpoint.seed, options.seed));
   }
   if (!checkpoint.dataset.empty() && checkpoint.dataset != fingerprint) {
+    throw UsageError(
+        fmt::format("The checkpoint of iteration {} was made with other data than {}: resume with "
+                    "the photos and cameras of the run, or start a new one with --init",
+                    checkpoint.iteration, dataset.root.string()));
+  }
+  check_data_options(checkpoint);
+  if (checkpoint.iteration > options.iterations) {
     throw UsageError(fmt::format(
-        "The checkpoint of iteration {} was made with other data than {}: resume with "
-        "the photos, cameras and --downscale of the run, or start a new one with --init",
-        checkpoint.iteration, dataset.root.string()));
+        "The run is at iteration {} already, beyond --iterations {}: raise them, or resume from an "
+        "earlier checkpoint",
+        checkpoint.iteration, options.iterations));
+  }
+  const bool file = !std::filesystem::is_directory(place);
+  const std::filesystem::path folder = file ? place.parent_path().parent_path() : place;
+  std::error_code error;
+  continues = std::filesystem::equivalent(folder.empty() ? "." : folder, run.path(), error);
+  const std::vector<std::filesystem::path> files = list_checkpoints(run.path());
+  if (continues && file && !overwrite && !files.empty() &&
+      files.back() > checkpoint_path(run.path(), checkpoint.iteration)) {
+    throw UsageError(fmt::format(
+        "The run in {} has gone on to {} after this checkpoint: go on from there with --resume "
+        "latest, choose another folder, or drop what came after iteration {} by --overwrite",
+        run.path().string(), files.back().filename().string(), checkpoint.iteration));
   }
   restore_state(context, checkpoint, options, gaussians, adam, density);
   guard.restore({checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false});
@@ -618,8 +671,7 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   traced_rays = checkpoint.traced_rays;
   capped_before = checkpoint.capped_rays;
   iteration = checkpoint.iteration;
-  const bool file = !std::filesystem::is_directory(place);
-  training.set(recorded_seconds(file ? place.parent_path().parent_path() : place, iteration));
+  training.set(recorded_seconds(folder, iteration));
   started = true;
   whole = true;
 }
@@ -688,6 +740,14 @@ void Trainer::Impl::run_iterations(std::int64_t until,
   context.finish();
 }
 
+// A run that is resumed where it ends: its results may not be in this folder.
+void Trainer::Impl::finish_resumed() {
+  if (run.has_model(iteration)) return;
+  save_model();
+  evaluate_views(true);
+  save_checkpoint();
+}
+
 // Runs them with the folder locked. What fails is saved as far as it goes.
 void Trainer::Impl::advance(std::int64_t until,
                             bool scheduled,
@@ -698,6 +758,10 @@ void Trainer::Impl::advance(std::int64_t until,
   row_seconds = training.seconds();
   training.start();
   try {
+    if (scheduled && iteration == options.iterations) {
+      const auto turn = context.lock();
+      finish_resumed();
+    }
     run_iterations(until, scheduled, progress, interrupted);
   } catch (const Error& error) {
     training.stop();
@@ -769,8 +833,10 @@ void Trainer::Impl::prepare() {
 Trainer::Trainer(Context& context,
                  Dataset dataset,
                  const TrainOptions& options,
-                 std::filesystem::path run_folder)
-    : impl_(std::make_unique<Impl>(context, std::move(dataset), options, std::move(run_folder))) {}
+                 std::filesystem::path run_folder,
+                 bool overwrite)
+    : impl_(std::make_unique<Impl>(
+          context, std::move(dataset), options, std::move(run_folder), overwrite)) {}
 Trainer::~Trainer() = default;
 
 void Trainer::resume(const std::filesystem::path& source) {

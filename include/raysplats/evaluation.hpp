@@ -42,6 +42,9 @@ struct EvaluationOptions {
       {};  ///< hears the number of finished views, returns false to stop early
 };
 
+/// The names of the pictures that evaluate() writes of all views of a split, without extension.
+std::vector<std::string> evaluated_names(const Dataset& dataset, Split split);
+
 /// Compares renders with the photos of a split. `render` yields RGB (further channels are ignored)
 /// of the camera's size, `background` blended in; it is clamped to [0, 1] and compared in floating
 /// point. The photo is composited over `background` when the data set's alpha is background; else

@@ -61,11 +61,14 @@ struct TrainLoss {
 class Trainer {
  public:
   /// Throws UsageError for options that cannot be trained, ResourceError when the device has too
-  /// little memory, DataError when the run folder cannot be written to.
+  /// little memory, DataError when the run folder cannot be written to. With `overwrite` the run
+  /// takes the place of one that is in the folder, whose files are removed when training starts;
+  /// without, a folder that holds another run is refused then.
   Trainer(Context& context,
           Dataset dataset,
           const TrainOptions& options,
-          std::filesystem::path run_folder);
+          std::filesystem::path run_folder,
+          bool overwrite = false);
   ~Trainer();
 
   /// Continues from the newest valid checkpoint of a run folder, or from a checkpoint file, instead

@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 
 RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
                                const Surroundings& surroundings) {
-  const std::string out = folder_ / "out";
-  const std::string err = folder_ / "err";
+  const std::string out = surroundings.out_file.empty() ? folder_ / "out" : surroundings.out_file;
+  const std::string err = surroundings.err_file.empty() ? folder_ / "err" : surroundings.err_file;
   std::vector<std::string> words{RAYSPLATS_PROGRAM};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
@@ -34,6 +34,12 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
   const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600);
   const int err_file = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
   if (::dup2(out_file, STDOUT_FILENO) < 0 || ::dup2(err_file, STDERR_FILENO) < 0) ::_exit(125);
+  // The files' own numbers are free again, as they are in a program that a shell starts.
+  ::close(out_file);
+  ::close(err_file);
+  if (surroundings.closed_out) ::close(STDOUT_FILENO);
+  if (surroundings.closed_err) ::close(STDERR_FILENO);
+  if (!surroundings.folder.empty() && ::chdir(surroundings.folder.c_str()) != 0) ::_exit(126);
   for (const auto& [name, value] : surroundings.environment)
     ::setenv(name.c_str(), value.c_str(), 1);
   if (surroundings.file_size_limit != RLIM_INFINITY) {

@@ -22,6 +22,11 @@ struct Surroundings {
   std::vector<std::pair<std::string, std::string>> environment;  ///< added to the test's own
   rlim_t file_size_limit = RLIM_INFINITY;  ///< bytes; beyond it writes fail, as on a full disk
   bool permissions_count = false;          ///< even for root: what may not be written cannot be
+  std::string out_file = {};               ///< where standard output goes, such as /dev/full
+  std::string err_file = {};               ///< the same of standard error
+  bool closed_out = false;                 ///< as by >&-
+  bool closed_err = false;
+  std::string folder = {};  ///< to run in; the test's own when empty
 };
 
 /// Runs `raysplats` with `arguments` and waits for it.

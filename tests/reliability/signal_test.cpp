@@ -86,8 +86,9 @@ TEST_CASE("a second signal of another kind ends the run at once with whole files
     INFO(outcome.err);
     CHECK((outcome.signal == first || outcome.signal == second));
     CHECK(every_checkpoint_is_whole(run));
-    const Outcome resumed =
-        raysplats_program(tiny_training(run) + Words{"--resume", "latest", "-n", "1"});
+    const std::int64_t reached = raysplats::load_latest_checkpoint(run).iteration;
+    const Outcome resumed = raysplats_program(
+        tiny_training(run) + Words{"--resume", "latest", "-n", std::to_string(reached)});
     INFO(resumed.err);
     CHECK(resumed.code == 0);
     CHECK(temporaries(run) == 0);

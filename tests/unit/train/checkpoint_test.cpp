@@ -124,9 +124,15 @@ TEST_CASE("the newest valid checkpoint is found and old ones go") {
   bad.back() = static_cast<char>(bad.back() + 1);
   write_text_file(checkpoint_path(folder.path, 1000), bad);
   CHECK(load_latest_checkpoint(folder.path).iteration == 200);
-  remove_old_checkpoints(folder.path, 2);
+  remove_old_checkpoints(folder.path, 2, 1000);
   CHECK(list_checkpoints(folder.path).size() == 2);
   CHECK(!std::filesystem::exists(checkpoint_path(folder.path, 100)));
-  remove_old_checkpoints(folder.path, 5);
+  remove_old_checkpoints(folder.path, 5, 1000);
   CHECK(list_checkpoints(folder.path).size() == 2);
+  // What lies beyond a run takes no place of its own.
+  write_checkpoint(checkpoint_path(folder.path, 300), sample(300));
+  remove_old_checkpoints(folder.path, 1, 300);
+  CHECK(std::filesystem::exists(checkpoint_path(folder.path, 300)));
+  CHECK(std::filesystem::exists(checkpoint_path(folder.path, 1000)));
+  CHECK(!std::filesystem::exists(checkpoint_path(folder.path, 200)));
 }

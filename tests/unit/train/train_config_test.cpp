@@ -102,7 +102,7 @@ TEST_CASE("an unknown key is refused with the nearest one") {
   write_text_file(path, "[train]\nssim-wight = 0.1\n");
   CHECK(message_of(path).find("'ssim-weight'") != std::string::npos);
   write_text_file(path, "[render]\niterations = 5\n");
-  CHECK(message_of(path).find("render.iterations") != std::string::npos);
+  CHECK(message_of(path).find("line 1: the table [render] is unknown") != std::string::npos);
   std::filesystem::remove(path);
   CHECK(message_of(temporary("missing.toml")).find("cannot be read") != std::string::npos);
 }
@@ -139,6 +139,105 @@ TEST_CASE("values out of range and of the wrong kind are refused by name") {
   write_text_file(
       path, "position-lr = 0 # off\nposition-lr-final = 0\n\n# comment\neval-at = [1,\n 2]\n");
   CHECK(message_of(path) == "");
+  std::filesystem::remove(path);
+}
+
+TEST_CASE("every spelling of a list is the same list, in files and on the command line") {
+  using List = std::vector<RunShare>;
+  const List expected{300, 1000};
+  const std::vector<ResolutionStep> sizes{{4, 300}, {2, 1000}};
+  const auto path = temporary("lists.toml");
+  for (const std::string value :
+       {"[300, 1000]", "[300,1000,]", "[\n  300, # first\n  1_000,\n]", "\"300,1000\"",
+        "\"[300, 1000]\"", "[\"300\", 1000]", "[3e2, 1e3]", "[0x12c, 1000.0]"}) {
+    INFO(value);
+    for (const std::string key : {"resolution-schedule", "eval-at", "save_at"}) {
+      write_text_file(path, key + " = " + value + "\n");
+      TrainOptions options;
+      read_train_config(path, options);
+      if (key == "eval-at") CHECK(options.eval_at == expected);
+      if (key == "save_at") CHECK(options.save_at == expected);
+      if (key == "resolution-schedule") CHECK(options.resolution_schedule == sizes);
+    }
+  }
+  for (const std::string value : {"[]", "\"\"", "\"[]\""}) {
+    write_text_file(path, "eval-at = " + value + "\n");
+    TrainOptions options;
+    read_train_config(path, options);
+    CHECK(options.eval_at.empty());
+  }
+  write_text_file(path, "eval-at = 7\nbackground = [1, 0.5, 0]\n");
+  TrainOptions one;
+  read_train_config(path, one);
+  CHECK(one.eval_at == List{7});
+  CHECK(one.background == "1,0.5,0");
+  for (const std::string value :
+       {"[[1], [2]]", "[5,,10]", "[0]", "[1.5]", "{ a = 1 }", "2020-01-01", "\"5 x\""}) {
+    INFO(value);
+    write_text_file(path, "eval-at = " + value + "\n");
+    CHECK(message_of(path).find("line 1") != std::string::npos);
+  }
+  std::filesystem::remove(path);
+
+  for (const auto& words : {std::vector<std::string>{"--eval-at=[300,1000]"},
+                            {"--eval-at", "[300, 1000]"},
+                            {"--eval-at", "300", "--eval-at", "1000"},
+                            {"--eval-at", "=[300, 1000]"},
+                            {"--eval-at=300 1000"},
+                            {"--eval-at", "300,1000"}}) {
+    CHECK(parse(words).eval_at == expected);
+  }
+  CHECK(parse({"--eval-at", "[]"}).eval_at.empty());
+  CHECK(parse({"--eval-at="}).eval_at.empty());
+  for (const char* text : {"[\"4:300\", \"2:1000\"]", "4:300,2:1000", "4:300 2:1000", "300,1000"}) {
+    CHECK(parse({"--resolution-schedule", text}).resolution_schedule == sizes);
+  }
+  CHECK(parse({"--background", "[1, 1, 1]"}).background == "1,1,1");
+  CHECK(parse({"--mirror", "a b.obj", "--mirror", "/c.obj"}).mirrors.size() == 2);
+  CHECK_THROWS_AS(parse({"--eval-at", "5,,10"}), UsageError);
+}
+
+TEST_CASE("what is no configuration is not an empty one") {
+  const auto path = temporary("none.toml");
+  std::filesystem::remove_all(path);
+  std::filesystem::create_directory(path);
+  CHECK(message_of(path).find("is not a file") != std::string::npos);
+  std::filesystem::remove(path);
+  for (const std::string text : {"\xff\xfe", "\xc3\x28", "iterations", "iterations 5", "[train",
+                                 "iterations = 5 seed = 4", "iterations = 1__0"}) {
+    INFO(text);
+    write_text_file(path, text);
+    CHECK(message_of(path).find("line 1") != std::string::npos);
+  }
+  write_text_file(path, "\xef\xbb\xbfiterations = 1_000\r\n[train]\nssim_weight = 0.5\n");
+  TrainOptions options;
+  read_train_config(path, options);
+  CHECK(options.iterations == 1000);
+  CHECK(options.ssim_weight == 0.5);
+  write_text_file(path, "iterations = 5\n[train]\niterations = 6\n");
+  CHECK(message_of(path).find("twice") != std::string::npos);
+  write_text_file(path, "[[train]]\niterations = 6\n");
+  CHECK(message_of(path).find("[train]") != std::string::npos);
+  std::filesystem::remove(path);
+}
+
+TEST_CASE("the configurations of runs of older versions are read") {
+  const auto path = temporary("old.toml");
+  write_text_file(path,
+                  "# ---- Run ----\n# training steps\niterations = 7\nseed = "
+                  "18446744073709551615\n# \"colmap\" \\ or\ninit = \"C:\\points\\new.ply\"\n");
+  TrainOptions options;
+  read_train_config(path, options);
+  CHECK(options.iterations == 7);
+  CHECK(options.seed == 18446744073709551615u);
+  CHECK(options.init == "C:\\points\\new.ply");
+  write_text_file(path, to_toml(options));
+  TrainOptions again;
+  read_train_config(path, again);
+  CHECK(again.seed == options.seed);
+  CHECK(again.init == options.init);
+  write_text_file(path, "seed = 18446744073709551616\n");
+  CHECK(message_of(path) != "");
   std::filesystem::remove(path);
 }
 

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+// What new users tried and tripped over.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Words = std::vector<std::string>;
+
+Words operator+(Words first, const Words& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+void succeed(const Words& arguments) {
+  const Outcome outcome = raysplats_program(arguments);
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+}
+
+void refuse(const Words& arguments, int code, const std::string& message) {
+  const Outcome outcome = raysplats_program(arguments);
+  INFO(outcome.err);
+  CHECK(outcome.code == code);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.err, message));
+}
+
+/// A data set of a few tiny photos, made once.
+const std::string& data() {
+  static const TemporaryFolder folder;
+  static const std::string path = [] {
+    succeed({"generate", folder / "data", "--size", "16", "--train-views", "3", "--test-views", "2",
+             "-q"});
+    return folder / "data";
+  }();
+  return path;
+}
+
+Words training(const std::string& run, int iterations) {
+  return {"train",
+          data(),
+          "-o",
+          run,
+          "-n",
+          std::to_string(iterations),
+          "--init-count",
+          "50",
+          "--sh-degree",
+          "0",
+          "--densify-until",
+          "0",
+          "--resolution-schedule",
+          "[]",
+          "-q"};
+}
+
+std::string checkpoint(const std::string& run, const std::string& iteration) {
+  return run + "/checkpoints/step_" + std::string(9 - iteration.size(), '0') + iteration + ".rsck";
+}
+
+/// Every file below a folder with its bytes.
+std::string content(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file() && entry.path().filename() != ".lock")
+      files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  std::string out;
+  for (const fs::path& file : files) out += file.string() + "\n" + read_file(file) + "\n";
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a new run does not mix with an older and longer one") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  succeed(training(run, 8) + Words{"--checkpoint-every", "4"});
+  write_file(run + "/notes.txt", "mine");
+  const std::string before = content(run);
+  refuse(training(run, 2), 2, "holds another run (iteration 8)");
+  refuse(training(run, 2), 2, "--overwrite");
+  CHECK(content(run) == before);
+  // Nor does a run that is resumed from elsewhere.
+  const std::string other = folder / "other";
+  succeed(training(other, 2));
+  refuse(training(run, 4) + Words{"--resume", other}, 2, "holds another run");
+  CHECK(content(run) == before);
+
+  succeed(training(run, 2) + Words{"--overwrite"});
+  CHECK(fs::exists(checkpoint(run, "2")));
+  CHECK_FALSE(fs::exists(checkpoint(run, "4")));
+  CHECK_FALSE(fs::exists(checkpoint(run, "8")));
+  CHECK_FALSE(fs::exists(run + "/point_cloud/iteration_8"));
+  CHECK_FALSE(fs::exists(run + "/eval/iteration_8"));
+  CHECK(read_file(run + "/notes.txt") == "mine");
+  const nlohmann::json info = nlohmann::json::parse(raysplats_program({"info", run, "--json"}).out);
+  CHECK(info.at("iteration") == 2);
+  CHECK(info.at("iterations") == 2);
+  succeed(training(run, 3) + Words{"--resume", "latest"});
+  CHECK(fs::exists(checkpoint(run, "3")));
+}
+
+TEST_CASE("a run goes back to an earlier checkpoint only where it may drop what came after") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  const Words often{"--checkpoint-every", "2", "--keep-checkpoints", "3"};
+  succeed(training(run, 6) + often);
+  const std::string before = content(run);
+  const Words back = training(run, 5) + Words{"--resume", checkpoint(run, "2")} + often;
+  refuse(back, 2, "has gone on to step_000000006.rsck");
+  CHECK(content(run) == before);
+  succeed(back + Words{"--overwrite"});
+  CHECK(fs::exists(checkpoint(run, "2")));
+  CHECK(fs::exists(checkpoint(run, "5")));
+  CHECK_FALSE(fs::exists(checkpoint(run, "6")));
+  CHECK_FALSE(fs::exists(run + "/point_cloud/iteration_6"));
+}
+
+TEST_CASE("a checkpoint that cannot be read does not cost the run its new ones") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  succeed(training(run, 4) + Words{"--checkpoint-every", "2"});
+  write_file(checkpoint(run, "9"), "broken");
+  succeed(training(run, 6) + Words{"--resume", run, "--checkpoint-every", "1", "--keep-checkpoints",
+                                   "1", "--log-level", "off"});
+  CHECK(fs::exists(checkpoint(run, "6")));
+}
+
+TEST_CASE("a run is resumed with the photos that it was trained on") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  succeed(training(run, 2));
+  refuse(training(run, 4) + Words{"--resume", run, "--downscale", "2"}, 2,
+         "'downscale' = 1, not 2");
+  refuse(training(run, 4) + Words{"--resume", run, "--no-undistort"}, 2, "'undistort'");
+  refuse(training(run, 4) + Words{"--resume", run, "--test-every", "3"}, 2, "'test-every'");
+  succeed(training(run, 4) + Words{"--resume", run});
+}
+
+TEST_CASE("a run that is resumed at or beyond its end writes what it reports") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  const std::string other = folder / "other";
+  succeed(training(run, 4));
+  refuse(training(other, 2) + Words{"--resume", run}, 2, "at iteration 4 already");
+  CHECK_FALSE(fs::exists(other + "/point_cloud"));
+  succeed(training(other, 4) + Words{"--resume", run});
+  const std::string model = "/point_cloud/iteration_4/point_cloud.ply";
+  REQUIRE(fs::exists(other + model));
+  CHECK(read_file(other + model) == read_file(run + model));
+  CHECK(fs::exists(checkpoint(other, "4")));
+  CHECK(fs::exists(other + "/eval/iteration_4/metrics.json"));
+}
+
+TEST_CASE("outputs do not go into the data set") {
+  const TemporaryFolder folder;
+  succeed({"generate", folder / "data", "--size", "16", "--train-views", "3", "--test-views", "2",
+           "-q"});
+  const std::string set = folder / "data";
+  write_file(folder / "model.ply", ply_file(2));
+  const std::string before = content(set);
+  const std::string model = folder / "model.ply";
+  for (const std::string& output : {set, set + "/test", set + "/."}) {
+    refuse({"train", set, "-o", output, "-n", "1", "-q"}, 2, "belongs to the data set");
+    refuse({"eval", model, "--data", set, "-o", output, "-q"}, 2, "belongs to the data set");
+    refuse({"render", model, "--data", set, "-o", output, "-q"}, 2, "belongs to the data set");
+    refuse({"render", model, "--cameras", set + "/transforms_test.json", "-o", output, "-q"}, 2,
+           "belongs to the data set");
+  }
+  CHECK(content(set) == before);
+  // A data set of somebody else.
+  write_file(folder / "photos/transforms_train.json", "{\"frames\": []}");
+  refuse({"generate", folder / "photos", "--size", "8", "-q"}, 2, "--overwrite");
+  CHECK(read_file(folder / "photos/transforms_train.json") == "{\"frames\": []}");
+  succeed({"generate", set, "--size", "16", "--train-views", "3", "--test-views", "2", "-q"});
+  CHECK(content(set) == before);
+}
+
+TEST_CASE("eval leaves the run's own figures alone") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  succeed(training(run, 2));
+  const std::string before = content(run);
+  refuse({"eval", run, "--data", data(), "-o", run, "-q"}, 2, "metrics.json would be lost");
+  CHECK(content(run) == before);
+  succeed({"eval", run, "--data", data(), "-o", run + "/eval", "-q"});
+}
+
+TEST_CASE("fewer frames do not mix with more of before") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  const std::string frames = folder / "frames";
+  const auto render = [&](const std::string& count, const Words& more = {}) {
+    return Words{"render",      folder / "model.ply",
+                 "--orbit",     count,
+                 "--width",     "16",
+                 "--height",    "16",
+                 "-o",          frames,
+                 "--log-level", "warn"} +
+           more;
+  };
+  succeed(render("3"));
+  succeed(render("3"));
+  const std::string before = content(frames);
+  refuse(render("2"), 2, "the picture frame_0002.png");
+  CHECK(content(frames) == before);
+  const Outcome outcome = raysplats_program(render("1", {"--overwrite"}));
+  CHECK(outcome.code == 0);
+  CHECK(contains(outcome.err, "2 pictures (frame_0001.png to frame_0002.png)"));
+  CHECK(entries(frames) == 3);
+
+  // Parts of one animation do go together.
+  write_file(
+      folder / "scene.toml",
+      "[[model]]\nfile = \"model.ply\"\n[camera]\nposition = [0.5, 0, -6]\ntarget = [0.5, 0, "
+      "0]\nwidth = 16\n[animation]\nframes = 4\n");
+  const std::string parts = folder / "parts";
+  const auto part = [&](const std::string& range) {
+    return Words{"render", folder / "scene.toml", "--frames", range, "-o", parts, "-q"};
+  };
+  succeed(part("2:"));
+  succeed(part("0:2"));
+  CHECK(entries(parts) == 4);
+  write_file(parts + "/frame_0004.png", "");
+  refuse(part("0:1"), 2, "frame_0004.png");
+}
+
+TEST_CASE("every spelling of a list on the command line gives the same list") {
+  const TemporaryFolder folder;
+  int count = 0;
+  const auto config = [&](const Words& words) {
+    const std::string run = folder / ("run" + std::to_string(count++));
+    // The data set behind the list: it is no part of it.
+    succeed(Words{"train", "-o", run, "-n", "1", "--init-count", "20", "--sh-degree", "0", "-q"} +
+            words + Words{data()});
+    return read_file(run + "/config.toml");
+  };
+  const std::string all =
+      config({"--save-at", "5", "10", "15", "--eval-at=[5,10]", "--resolution-schedule", "=[300,",
+              "1000]", "--background", "1", "0.5", "0"});
+  CHECK(contains(all, "\nsave-at = [5, 10, 15]\n"));
+  CHECK(contains(all, "\neval-at = [5, 10]\n"));
+  CHECK(contains(all, "\nresolution-schedule = [\"4:300\", \"2:1000\"]\n"));
+  CHECK(contains(all, "\nbackground = \"1,0.5,0\"\n"));
+  const std::string more = config({"--save-at", "5", "--save-at", "10", "--eval-at", "[]",
+                                   "--resolution-schedule", "4:300", "2:1000"});
+  CHECK(contains(more, "\nsave-at = [5, 10]\n"));
+  CHECK(contains(more, "\neval-at = []\n"));
+  CHECK(contains(more, "\nresolution-schedule = [\"4:300\", \"2:1000\"]\n"));
+  refuse({"train", data(), "-o", folder / "none", "--save-at", "5,,10"}, 2, "save-at");
+  refuse({"train", data(), "-o", folder / "none", "--save-at", "[5"}, 2, "save-at");
+}
+
+TEST_CASE("what is no configuration is refused") {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "folder");
+  write_file(folder / "broken.toml", "\xff\xfe");
+  for (const char* name : {"folder", "broken.toml"}) {
+    refuse({"train", data(), "-o", folder / "run", "--config", folder / name}, 2, name);
+  }
+  write_file(folder / "table.toml", "[optimizer]\nposition-lr = 1\n");
+  refuse({"train", data(), "-o", folder / "run", "--config", folder / "table.toml"}, 2,
+         "[optimizer]");
+  CHECK_FALSE(fs::exists(folder / "run"));
+}
+
+TEST_CASE("closed standard streams harm no file") {
+  const TemporaryFolder folder;
+  Surroundings both;
+  both.closed_out = both.closed_err = true;
+  Words train = training(folder / "run", 2);
+  train.pop_back();  // log lines are what would go astray
+  CHECK(raysplats_program(train, both).code == 0);
+  const std::string lock = read_file(folder / "run/.lock");
+  CHECK(lock.find_first_not_of("0123456789\n") == std::string::npos);
+  CHECK(fs::exists(checkpoint(folder / "run", "2")));
+  Surroundings silent;
+  silent.closed_err = true;
+  const Outcome refused = raysplats_program({"info", folder / "none"}, silent);
+  CHECK(refused.code == 3);
+}
+
+TEST_CASE("results that cannot be written are a failure") {
+  Surroundings full;
+  full.out_file = "/dev/full";
+  if (!fs::exists(full.out_file)) return;
+  for (const Words& words : {Words{"info", data()}, Words{"--help"}, Words{"--version"},
+                             Words{"info", data(), "--json"}, Words{"train", "-h"}}) {
+    const Outcome outcome = raysplats_program(words, full);
+    CHECK(outcome.code == 3);
+    CHECK(one_sentence(outcome));
+    CHECK(contains(outcome.err, "Standard output cannot be written: "));
+  }
+  // Log lines are no results.
+  const TemporaryFolder folder;
+  Surroundings mute;
+  mute.err_file = "/dev/full";
+  Words train = training(folder / "run", 2);
+  train.pop_back();
+  CHECK(raysplats_program(train, mute).code == 0);
+}
