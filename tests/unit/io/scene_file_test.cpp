@@ -442,10 +442,10 @@ TEST_CASE("scene file: what is wrong is named with its line") {
   usage(kModel + "[render]\nmax-bounces = 3\nmax_bounces = 3\n", {"twice"});
   usage(kModel + "[render.shadows]\nstrenght = 0\n", {"'strength'"});
   usage(kModel + "[animation]\nframe = 3\n", {"'frames'"});
-  usage(kModel + "[trace]\nq = 3\n", {"unknown key 'q'"});
+  usage(kModel + "[trace]\nqq = 3\n", {"unknown key 'qq'"});
   usage(kModel + "[environment]\ncolour = [0, 0, 0]\n", {"'color'"});
   usage(kModel + "[[light]]\nkind = 'point'\nposition = [0, 0, 0]\nradius = 1\n", {"'radius'"});
-  usage(material + "ior = 1.5\n" + kModel, {"line 4", "unknown key 'ior'"});
+  usage(material + "ior = 1.5\n" + kModel, {"line 4", "'ior' is for kind = \"glass\""});
   usage(kModel + "[camera]\nposition = [0, 0, 1]\ntarget = [0, 0, 0]\nk1 = 1\n", {"'k1'"});
 
   usage("model = 3\n", {"line 1", "[[model]]"});
