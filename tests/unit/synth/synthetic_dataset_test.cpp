@@ -171,6 +171,6 @@ TEST_CASE("a folder that cannot be written is a data error") {
   CHECK_THROWS_AS(generate_dataset("/proc/raysplats", kSmall), DataError);
   // A folder where an image should go: the images fail, and no transforms claim a data set.
   fs::create_directories(folder.path() / "half" / "train" / "r_0.png" / "x");
-  CHECK_THROWS_AS(generate_dataset(folder.path() / "half", kSmall), DataError);
+  CHECK_THROWS_AS(generate_dataset(folder.path() / "half", kSmall, true), DataError);
   CHECK_FALSE(fs::exists(folder.path() / "half" / "transforms_train.json"));
 }

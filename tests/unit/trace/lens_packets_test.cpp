@@ -217,7 +217,7 @@ TEST_CASE("packets through a lens in little memory are traced band by band") {
     CAPTURE(view.name);
     TraceOptions options;
     CameraTracer roomy(context, options);
-    options.memory_budget = 192 << 10;
+    options.memory_budget = 256 << 10;
     CameraTracer tight(context, options);
     roomy.update(gaussians);
     tight.update(gaussians);
