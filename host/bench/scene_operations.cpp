@@ -217,7 +217,14 @@ BenchOperation SceneBench::Impl::iteration_by_bvh() {
             adam->step(g, gradients, AdamRates{});
           },
           {{"iteration-bvh", {}, true, [this] {
-              return BenchWork{{{"iterations", 1.0}, {"rays", pixels()}}, 0, 0};
+              // What the walk itself needs at least depends on the scene: rays alone count.
+              BenchWork work{
+                  {{"iterations", 1.0}, {"rays", pixels()}}, 2 * RS_WORK_RAY_BYTES * pixels(), 0};
+              for (const BenchWork& part :
+                   {loss_value_work(), loss_gradient_work(), statistics_work(), adam_work()}) {
+                work = together(work, part);
+              }
+              return work;
             }}}};
 }
 
