@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# What CI checks beside the test suite: the form of the kernels that GPUs get, without a GPU. Each leg ends with PASS, FAIL
+# or SKIPPED (what it needs cannot be had here: a failed download is no failure) and its seconds.
+# usage: scripts/ci.sh [BUILD]     (default: build/release, with the tests built)
+set -euo pipefail
+called_from=$PWD
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+build=$PWD/build/release
+(($# == 0)) || build=$(cd "$called_from" && realpath -- "$1")
+
+work=$(mktemp -d)
+trap 'rm -rf -- "$work"' EXIT
+# A case of every kernel that has a form of its own on GPUs, and a whole training run; all: scripts/gpu_path.sh.
+gpu_cases='*[tiny]*,steps of one?s own train as a run does'
+summary=()
+failed=0
+
+# leg NAME COMMAND...: 0 passes unless the output says SKIPPED, 77 skips, all else fails.
+leg() {
+  local name=$1 status=0 begin=$SECONDS result
+  shift
+  printf '== %s\n' "$name"
+  "$@" 2>&1 | tee "$work/log" || status=$?
+  local reasons
+  reasons=$(sed -n 's/^SKIPPED //p' "$work/log" | paste -sd ';')
+  if ((status == 77)) || { ((status == 0)) && [[ -n $reasons ]]; }; then
+    result="SKIPPED in $((SECONDS - begin)) s: ${reasons:-see above}"
+  elif ((status == 0)); then
+    result="PASS in $((SECONDS - begin)) s"
+  else
+    result="FAIL in $((SECONDS - begin)) s"
+    failed=1
+  fi
+  printf '== %s: %s\n' "$name" "$result"
+  summary+=("$name: $result")
+}
+
+gpu_path() {
+  if ! command -v "${CC:-cc}" >/dev/null; then
+    echo "SKIPPED no C compiler ${CC:-cc}: apt-get install gcc"
+    return 77
+  fi
+  ./scripts/gpu_path.sh --build "$build" --cases "$gpu_cases"
+}
+
+vendor() {
+  if ! command -v python3 >/dev/null; then
+    echo "SKIPPED no python3: apt-get install python3"
+    return 77
+  fi
+  python3 scripts/gpu_compile.py --quiet --skip-missing --targets "$1"
+}
+
+leg "GPU path on this OpenCL" gpu_path
+leg "AMD's compiler (gfx1030)" vendor gfx1030
+leg "NVIDIA's compiler (sm_86)" vendor sm_86
+leg "Intel's compiler (dg2-g10)" vendor dg2-g10
+
+printf '== %s\n' "${summary[@]}"
+exit "$failed"

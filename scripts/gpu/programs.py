@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The kernel programs that the host builds on a GPU, with the definitions it gives them there, in the forms that a default
+training run, a render, rays of one's own, mirrors and `bench` ask for."""
+import os
+
+KERNELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "cl")
+# Context::Impl::program (host/device/context.cpp).
+COMPILER = ["-cl-std=CL1.2", "-cl-mad-enable"]
+
+# packet_shape.cpp and camera_tracer.cpp: one ray per work-item, in tiles of 16.
+CAMERA = dict(PACKET=1, TILE=16, CHUNK=16, LENS=0)
+FORWARD = dict(CAMERA, BLOCK=1, PENDING=48, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
+# candidate_lists.cpp, gaussian_kernel.cpp.
+VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, NEAR_DISTANCE=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1)
+LISTS = dict(TILE=16, PEAK_ORDER=1, LENS=0, VECTOR=1)
+FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, ANGULAR=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1)
+# ray_launch.cpp, ray_backward.cpp.
+WALK = dict(PACKET=4, PENDING=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1)
+RAY_BACKWARD = dict(WALK, SH_DEGREE=3, RAY_SLOPES=0, PRIVATE_COPIES=0)
+RAY_GRADIENTS = dict(SIGMOID_SCALE=0, VECTOR=1)
+# image_loss.cpp.
+LOSS = dict(VECTOR=4, TILE=16, ROWS=1, PIXEL_L2=0)
+# chunk_shape.cpp.
+GROUP = dict(RS_GROUP=256)
+
+# Name, file below cl/, definitions.
+PROGRAMS = [
+    ("forward train", "trace/forward.cl", dict(FORWARD, KEEP_HITS=1)),
+    ("forward render", "trace/forward.cl", FORWARD),
+    ("forward entry", "trace/forward.cl", dict(FORWARD, PEAK_ORDER=0)),
+    ("forward depth", "trace/forward.cl", dict(FORWARD, WITH_DEPTH=1)),
+    ("forward lens", "trace/forward.cl", dict(FORWARD, LENS=1, KEEP_HITS=1)),
+    ("forward around", "trace/forward.cl", dict(FORWARD, LENS=2, KEEP_HITS=1)),
+    ("backward atomic", "trace/backward.cl", dict(CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=0)),
+    ("backward exact", "trace/backward.cl", dict(CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=1)),
+    ("prepare sh3", "trace/prepare_view.cl", VIEW),
+    ("prepare sh0", "trace/prepare_view.cl", dict(VIEW, SH_DEGREE=0, SH_COEFFICIENTS=1)),
+    ("finalize sh3", "trace/finalize_gradients.cl", FINALIZE),
+    ("finalize pose", "trace/finalize_gradients.cl", dict(FINALIZE, POSE=1)),
+    ("lists", "trace/tile_lists.cl", LISTS),
+    ("lists lens", "trace/tile_lists.cl", dict(LISTS, LENS=1)),
+    ("lens tiles", "trace/lens_tiles.cl", dict(CAMERA_MODEL=1, TILE=16)),
+    ("exact lines", "trace/exact_lines.cl", {}),
+    ("camera rays", "trace/camera_rays.cl", dict(CAMERA_MODEL=1)),
+    ("rays", "trace/rays.cl", WALK),
+    ("rays entry", "trace/rays.cl", dict(WALK, PEAK_ORDER=0, ADAPTIVE_RADIUS=0)),
+    ("ray order", "trace/ray_order.cl", dict(PACKET=4)),
+    ("ray backward atomic", "trace/ray_backward.cl", dict(RAY_BACKWARD, EXACT_SUMS=0)),
+    ("ray backward exact", "trace/ray_backward.cl", dict(RAY_BACKWARD, EXACT_SUMS=1)),
+    ("ray slopes", "trace/ray_backward.cl", dict(RAY_BACKWARD, RAY_SLOPES=1, EXACT_SUMS=0)),
+    ("ray records", "trace/ray_gradients.cl", RAY_GRADIENTS),
+    ("ray gradients", "trace/ray_gradients.cl", dict(RAY_GRADIENTS, SH_DEGREE=3, SH_COEFFICIENTS=16)),
+    ("gaussian blocks", "trace/gaussian_blocks.cl", dict(PACKET=4, SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
+    ("bounds", "bvh/gaussian_bounds.cl", dict(RS_SIGMOID_SCALE=0, RS_ADAPTIVE_RADIUS=1)),
+    ("curve", "bvh/curve.cl", dict(GROUP, PACKET=4)),
+    ("tree", "bvh/lbvh.cl", dict(PACKET=4, GROUP=64)),
+    ("tree cost", "bvh/tree_cost.cl", dict(GROUP, PACKET=4)),
+    ("sort arrays", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=0)),
+    ("sort to pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=1)),
+    ("sort pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=1)),
+    ("sort from pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=0)),
+    ("scan", "primitives/scan.cl", GROUP),
+    ("loss prepare", "train/loss_prepare.cl", LOSS),
+    ("loss ssim", "train/loss_ssim.cl", dict(LOSS, SSIM_GRADIENT=1)),
+    ("loss reduce", "train/loss_reduce.cl", {}),
+    ("adam", "train/adam.cl", dict(VECTOR=4, BLOCK=4)),
+    ("densify", "train/densify.cl", dict(SH_COEFFICIENTS=16, SCALE_SIGMOID=0)),
+    ("footprint", "train/footprint.cl", dict(SCALE_SIGMOID=0)),
+    ("guard", "train/guard.cl", {}),
+    ("validate", "train/validate.cl", {}),
+    ("waves", "light/waves.cl", {}),
+    ("mirror paths", "light/mirror_paths.cl", {}),
+    ("surface rays", "light/surface_rays.cl", dict(PACKET=4)),
+    ("triangle blocks", "light/triangle_blocks.cl", dict(PACKET=4)),
+    ("ceilings", "bench/ceilings.cl", dict(CHAINS=8)),
+]
+
+
+def unlisted():
+    """Kernel files that no program above names. Probes are for tests."""
+    listed = {path for _, path, _ in PROGRAMS}
+    found = set()
+    for folder, _, names in os.walk(KERNELS):
+        for name in names:
+            if name.endswith(".cl") and not name.endswith("_probe.cl"):
+                found.add(os.path.relpath(os.path.join(folder, name), KERNELS).replace(os.sep, "/"))
+    return sorted(found - listed)
+
+
+def flags(definitions):
+    return COMPILER + [f"-D{name}={value}" for name, value in sorted(definitions.items())]
+
+
+def resolve(path, seen=None):
+    """The source as host/device/kernel_source.cpp gives it to the driver: every included file once, in its place."""
+    seen = set() if seen is None else seen
+    if path in seen:
+        return ""
+    seen.add(path)
+    out = [f'#line 1 "{path}"\n']
+    with open(os.path.join(KERNELS, path), encoding="utf-8") as file:
+        for number, line in enumerate(file.read().splitlines(), 1):
+            if line.startswith('#include "'):
+                out.append(resolve(line.split('"')[1], seen))
+                out.append(f'#line {number + 1} "{path}"\n')
+            else:
+                out.append(line + "\n")
+    return "".join(out)
