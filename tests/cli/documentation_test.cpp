@@ -96,6 +96,14 @@ const std::vector<std::pair<std::string, std::string>> kNotRun{
     {"cmake --install", "tested by the test 'package'"},
     {"find_package(raysplats", "tested by the test 'package'"},
     {"target_link_libraries(program", "tested by the test 'package'"},
+    {"raysplats::", "C++: apps/examples, tested by the test 'package'"},
+    {"const raysplats::", "C++: apps/examples, tested by the test 'package'"},
+    {"cmake -S apps/examples", "tested by the test 'package'"},
+    {"./scripts/gpu_path.sh", "another build of the driver; run by scripts/ci.sh"},
+    {"scripts/gpu_path.sh", "another build of the driver; run by scripts/ci.sh"},
+    {"./scripts/gpu_compile.py", "downloads compilers; run by scripts/ci.sh"},
+    {"scripts/gpu_compile.py", "downloads compilers; run by scripts/ci.sh"},
+    {"./scripts/ci.sh", "downloads compilers"},
     {"raysplats eval model.ply --data garden --downscale 4 -o eval --lpips",
      "needs a network that the user supplies"},
     {"ctest --preset", "runs this test"},
@@ -160,6 +168,7 @@ class Place {
     write_file(folder_ / "transforms.json",
                R"({"w":16,"h":16,"fl_x":16,"fl_y":16,"cx":8,"cy":8,"frames":[
                  {"transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,6],[0,0,0,1]]}]})");
+    write_npy(folder_ / "rays.npy", "False", "(2, 6)", {0, 0, -6, 0, 0, 1, 1, 0, -6, 0, 0, 1});
     fs::create_directory_symlink(fs::path(RAYSPLATS_SOURCE_DIR) / "configs", folder_ / "configs");
     for (const char* name : {"garden", "lego"}) train(name);
     for (const char* result : {"a.json", "b.json"}) {

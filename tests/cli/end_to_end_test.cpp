@@ -16,7 +16,8 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-// dB; what 1500 Gaussians inside the carved body start from, and what 150 iterations make of them at least.
+// dB; what 1500 Gaussians inside the carved body start from, and what 150 iterations make of them
+// at least.
 constexpr double kUntrained = 17.5;
 constexpr double kTrained = 18.0;
 

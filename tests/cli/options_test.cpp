@@ -55,8 +55,9 @@ TEST_CASE("a scene's [camera] without an angle takes none from the command line"
        {"model = \"equirectangular\"\n", "model = \"orthographic\"\nextent = 2\n"}) {
     write_file(folder / "scene.toml",
                "[[model]]\nfile = \"balls.ply\"\n[camera]\norbit = { frames = 1 }\n" + camera);
-    refuse({"render", folder / "scene.toml", "-o", folder / "x", "--orbit", "1", "--fov", "40"},
-           "--fov");
+    refuse(
+        {"render", folder / "scene.toml", "-o", folder / "x", "--orbit", "1", "--fov", "40", "-q"},
+        "--fov");
   }
 }
 

@@ -129,6 +129,19 @@ std::string ply_file(std::size_t count, std::int64_t declared) {
   return out.str();
 }
 
+void write_npy(const std::filesystem::path& path,
+               const std::string& order,
+               const std::string& shape,
+               const std::vector<float>& numbers) {
+  const std::string header =
+      "{'descr': '<f4', 'fortran_order': " + order + ", 'shape': " + shape + ", }\n";
+  std::ofstream stream(path, std::ios::binary);
+  stream << std::string("\x93NUMPY\x01\x00", 8) << static_cast<char>(header.size()) << '\0'
+         << header;
+  stream.write(reinterpret_cast<const char*>(numbers.data()),
+               static_cast<std::streamsize>(numbers.size() * sizeof(float)));
+}
+
 bool one_sentence(const Outcome& outcome) {
   return outcome.err.starts_with("raysplats: ") && outcome.err.size() > 12 &&
          outcome.err.back() == '\n' &&

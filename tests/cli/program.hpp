@@ -73,6 +73,11 @@ class RunningProgram {
 
 void write_file(const std::filesystem::path& path, const std::string& content);
 std::string read_file(const std::filesystem::path& path);
+/// A .npy file of 32-bit floats; `order` is "True" or "False", `shape` as in Python.
+void write_npy(const std::filesystem::path& path,
+               const std::string& order,
+               const std::string& shape,
+               const std::vector<float>& numbers);
 /// Number of files and folders below `path`, 0 when it does not exist.
 std::size_t entries(const std::filesystem::path& path);
 

@@ -13,24 +13,6 @@
 
 using namespace raysplats;
 
-namespace {
-
-// A .npy file of 32-bit floats.
-void write_rays(const std::string& path,
-                const std::string& order,
-                const std::string& shape,
-                const std::vector<float>& numbers) {
-  const std::string header =
-      "{'descr': '<f4', 'fortran_order': " + order + ", 'shape': " + shape + ", }\n";
-  std::ofstream stream(path, std::ios::binary);
-  stream << std::string("\x93NUMPY\x01\x00", 8) << static_cast<char>(header.size()) << '\0'
-         << header;
-  stream.write(reinterpret_cast<const char*>(numbers.data()),
-               static_cast<std::streamsize>(numbers.size() * sizeof(float)));
-}
-
-}  // namespace
-
 TEST_CASE("rays of a file are traced into a file") {
   const TemporaryFolder folder;
   // A white ball of opacity one half at the origin.
@@ -39,7 +21,7 @@ TEST_CASE("rays of a file are traced into a file") {
   model.log_scales.assign(3, std::log(0.2f));
   model.sh.assign(3, 1.7724539f);
   write_ply(folder / "model.ply", model);
-  write_rays(folder / "rays.npy", "False", "(2, 6)", {0, 0, -3, 0, 0, 1, 5, 0, -3, 0, 0, 1});
+  write_npy(folder / "rays.npy", "False", "(2, 6)", {0, 0, -3, 0, 0, 1, 5, 0, -3, 0, 0, 1});
   const std::vector<std::string> arguments{
       "trace", folder / "model.ply", "--rays",       folder / "rays.npy",
       "-o",    folder / "seen.npz",  "--background", "0,0,1",
@@ -59,7 +41,7 @@ TEST_CASE("rays of a file are traced into a file") {
   CHECK(alpha[1] == 0.0f);
 
   const auto refused = [&](const std::string& order, const std::string& shape, std::size_t count) {
-    write_rays(folder / "rays.npy", order, shape, std::vector<float>(count));
+    write_npy(folder / "rays.npy", order, shape, std::vector<float>(count));
     std::filesystem::remove(folder / "seen.npz");
     const Outcome bad = raysplats_program(arguments);
     CHECK(bad.code != 0);
