@@ -54,7 +54,7 @@ def train(args, scene, seed):
     run = args.output / f"{scene['name']}-{seed}"
     metrics = run / "metrics.json"
     if not metrics.exists() or not json.loads(metrics.read_text()).get("complete"):
-        command = [args.raysplats, "train", args.data / scene["path"], "-o", run, "--seed", seed, "-q",
+        command = [args.raysplats, "train", args.data / scene["path"], "-o", run, "--overwrite", "--seed", seed, "-q",
                    "-n", size["iterations"], "--downscale", size["downscale"], "--checkpoint-every", 0]
         command += ["--device", args.device] if args.device else []
         done = subprocess.run([str(part) for part in command] + args.extra, capture_output=True, text=True)
