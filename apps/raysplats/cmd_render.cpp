@@ -142,7 +142,8 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   if (cameras.empty()) throw no_views(options.data);
   if (!options.data.data.empty()) check_not_data(options.output, dataset);
   if (!options.cameras.empty()) check_not_data(options.output, options.cameras);
-  check_leftovers(options.output, frame_names(cameras), options.frame_options().format, options.overwrite);
+  check_leftovers(options.output, frame_names(cameras), options.frame_options().format,
+                  options.overwrite);
 
   TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   trace.depth = options.depth;

@@ -174,7 +174,8 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   const LoadedScene loaded = load_scene(file);
   const auto [first, last] = parse_frames(flags.frames, loaded.cameras.size());
   if (!file.camera.file.empty()) check_not_data(flags.output, file.camera.file);
-  check_leftovers(flags.output, frame_names(loaded.cameras), flags.frame_options().format, flags.overwrite);
+  check_leftovers(flags.output, frame_names(loaded.cameras), flags.frame_options().format,
+                  flags.overwrite);
 
   const std::unique_ptr<Context> context = open_context(flags.device);
   PathTracer tracer(*context, loaded.scene);
