@@ -19,8 +19,8 @@
 #define ROLE_FIRST_CHILD 2u
 #define ROLE_FIRST_HALF 4u
 
-// Halves of a split along the longest axis (Feng et al. 2025, "Improved-GS", with the constants of
-// LichtFeld Studio's IGS+): offset in standard deviations, what is left of the longest and of the
+// Halves of a split along the longest axis (as "Improved-GS", with the constants of LichtFeld
+// Studio's IGS+, arXiv 2603.08661): offset in standard deviations, what is left of the longest and of the
 // other axes, and of the opacity.
 #ifndef HALF_OFFSET
 #define HALF_OFFSET 0.5f

@@ -88,6 +88,7 @@ bool DensityControl::resets_at(std::int64_t iteration) const {
 std::size_t DensityControl::target(std::size_t count, std::int64_t iteration) const {
   if (count >= limit_) return limit_;
   if (iteration > growth_end_) return count;
+  if (iteration == growth_end_) return limit_;  // growth may be one pass alone
   const auto left = [this](std::int64_t at) {
     const auto span = static_cast<double>(growth_end_ - first_);
     return std::clamp(static_cast<double>(growth_end_ - at) / span, 0.0, 1.0);

@@ -75,10 +75,17 @@ Footprint::Footprint(Context& context, std::span<const Camera> cameras, double s
 
 void Footprint::update(const DeviceGaussians& gaussians) {
   if (share_ <= 0) return;
-  lows_.ensure(context_, gaussians.count, "least scales");
+  if (lows_.size() != gaussians.count)
+    lows_ = Buffer<float>(context_, gaussians.count, "least scales");
   context_.kernel(kProgram, "footprint_floor", build_options(gaussians))
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               views_, static_cast<float>(share_), cameras_, gaussians.means, lows_);
+}
+
+void Footprint::restore(std::span<const float> lows) {
+  if (share_ <= 0 || lows.empty()) return;
+  lows_ = Buffer<float>(context_, lows.size(), "least scales");
+  lows_.upload(lows);
 }
 
 void Footprint::apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard) {

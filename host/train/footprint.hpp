@@ -22,6 +22,11 @@ class Footprint {
   /// Finds the least sizes for the Gaussians' present means; enqueues without waiting.
   void update(const DeviceGaussians& gaussians);
 
+  /// The least scale parameters found last, for checkpoints; empty when everything is off.
+  const Buffer<float>& lows() const { return lows_; }
+  /// Puts them back: what a resumed run does until its next update() depends on them.
+  void restore(std::span<const float> lows);
+
   /// Raises what is smaller; update() has to have seen this number of Gaussians. A guard whose
   /// first word is not 0 keeps them as they are.
   void apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard);

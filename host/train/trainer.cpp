@@ -372,13 +372,13 @@ void Trainer::Impl::start() {
     gaussians =
         DeviceGaussians::upload(context, gathered(model, along_curve), options.scale_activation);
     adam.initialize(gaussians.count, gaussians.sh_degree);
+    footprint.update(gaussians);
     if (overwrite) run.remove_after(0);
     run.begin_metrics(0);
     started = true;
     whole = true;
   }
   small_photos = {};
-  footprint.update(gaussians);
   const bool grows = density.accumulates_at(iteration);
   check_memory(options,
                {grows ? std::max(gaussians.count, most) : gaussians.count, largest_photo(),
@@ -582,6 +582,7 @@ Checkpoint Trainer::Impl::state() {
   checkpoint.traced_rays = traced_rays;
   checkpoint.capped_rays = capped_rays();
   store_state(gaussians, adam, density, checkpoint);
+  if (footprint.lows().size() > 0) checkpoint.sections["footprint"] = footprint.lows().download();
   return checkpoint;
 }
 
@@ -666,6 +667,12 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
         run.path().string(), files.back().filename().string(), checkpoint.iteration));
   }
   restore_state(context, checkpoint, options, gaussians, adam, density);
+  const auto lows = checkpoint.sections.find("footprint");
+  if (lows != checkpoint.sections.end() && lows->second.size() == gaussians.count) {
+    footprint.restore(lows->second);
+  } else {
+    footprint.update(gaussians);  // of a version that had none
+  }
   guard.restore({checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false});
   reported_bad_steps = checkpoint.bad_steps;
   traced_rays = checkpoint.traced_rays;

@@ -311,6 +311,21 @@ TEST_CASE("the budget's count follows its curve to the limit and stays there [sm
   CHECK(!control.accumulates_at(800));
 }
 
+TEST_CASE("growth that has one pass alone reaches the limit in it [small] [tiny]") {
+  Context context(select_device(""));
+  TrainOptions options;
+  options.iterations = 100;
+  options.densify_from = options.densify_until = 50;
+  options.densify_every = 10;
+  options.max_gaussians = 5;
+  DeviceGaussians gaussians = DeviceGaussians::upload(
+      context, model_of({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}), ScaleActivation::kExp);
+  DensityControl control(context, options, 1.0, 7);
+  accumulate(context, control, gaussians, {std::vector<float>(9, 1.0f)});
+  control.refine(gaussians, 50);
+  CHECK(gaussians.count == 5);
+}
+
 TEST_CASE("halves lie side by side along the longest axis, fainter and smaller [small] [tiny]") {
   Context context(select_device(""));
   TrainOptions options;
