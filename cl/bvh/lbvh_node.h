@@ -9,10 +9,10 @@
 
 #include "bvh/box.h"
 #include "primitives/vector_lanes.h"
+#include "shared/tree_layout.h"
 
-// A node: lo.x lo.y lo.z hi.x hi.y hi.z of its children, one vector each. Missing children are
-// empty boxes (lo > hi).
-#define RS_NODE_VECTORS 6
+// A node: lo.x lo.y lo.z hi.x hi.y hi.z of its children, one vector each (RS_NODE_VECTORS). Missing
+// children are empty boxes (lo > hi).
 // A child of every level stays behind: PACKET - 1 per level, and 2^31 things have 15 levels of 4 or
 // 7 of 16.
 #define RS_NODE_STACK 128

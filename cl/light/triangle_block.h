@@ -9,11 +9,14 @@
 #define RS_EXACT_SLABS
 #include "bvh/lbvh_node.h"
 #include "shared/light_layout.h"
+#include "shared/tree_layout.h"
 
 // A block: x y z of the first, second and third corners, one vector each (NaN in lanes without a
 // triangle), then the indices of the triangles as bits.
 #define RS_TRIANGLE_INDEX 9
-#define RS_TRIANGLE_VECTORS 10
+#if RS_TRIANGLE_VECTORS != RS_TRIANGLE_INDEX + 1
+#error "the indices are the end of a block"
+#endif
 
 // The ray's axes permuted so that z is the longest, and the shear that makes it (0, 0, 1).
 typedef struct {

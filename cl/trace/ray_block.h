@@ -6,6 +6,7 @@
 
 #include "bvh/lbvh_node.h"
 #include "shared/layout.h"
+#include "shared/tree_layout.h"
 
 #ifndef ADAPTIVE_RADIUS
 #define ADAPTIVE_RADIUS 0
@@ -27,7 +28,10 @@
 #define RS_BLOCK_OPACITY (9 + ADAPTIVE_RADIUS)
 #define RS_BLOCK_INDEX (RS_BLOCK_OPACITY + 1)
 #define RS_BLOCK_COLOR (RS_BLOCK_INDEX + 1)
-#define RS_BLOCK_VECTORS (RS_BLOCK_COLOR + 4)
+#define RS_BLOCK_VECTORS RS_GAUSSIAN_VECTORS(ADAPTIVE_RADIUS)
+#if RS_BLOCK_VECTORS != RS_BLOCK_COLOR + 4
+#error "the colours are the end of a block"
+#endif
 
 // How a ray passes the Gaussians of a block, in the space where they are unit spheres.
 typedef struct {

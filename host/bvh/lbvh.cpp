@@ -7,6 +7,7 @@
 #include <string>
 
 #include "raysplats/error.hpp"
+#include "shared/tree_layout.h"
 
 namespace raysplats {
 namespace {
@@ -15,7 +16,6 @@ constexpr std::string_view kCurve = "bvh/curve.cl";
 constexpr std::string_view kTree = "bvh/lbvh.cl";
 constexpr std::string_view kCost = "bvh/tree_cost.cl";
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kNodeVectors = 6;  // RS_NODE_VECTORS
 // Boxes ordered together by the surface area heuristic. Larger groups make a better tree but need
 // more private memory.
 constexpr std::size_t kCpuOrderGroup = 256;
@@ -52,6 +52,13 @@ Lbvh::Lbvh(Context& context, int lanes, const ChunkShape& shape)
       sort_(context, shape) {
   grid_ = Buffer<float>(context, 14, "tree grid");
   too_long_ = Buffer<std::uint32_t>(context, 1, "tree flag");
+}
+
+std::size_t Lbvh::bytes_per_box(int lanes) {
+  // Code in two words and order. A node for every block but one in `lanes`.
+  const auto children = static_cast<std::size_t>(lanes - 1);
+  return 3 * sizeof(std::uint32_t) + RadixSort::kBytesPerPair +
+         (RS_NODE_VECTORS * sizeof(float) + children - 1) / children;
 }
 
 std::size_t Lbvh::block_count() const { return ceil_div(count_, static_cast<std::size_t>(lanes_)); }
@@ -98,7 +105,7 @@ void Lbvh::order(const Buffer<RsAabb>& boxes, std::size_t count) {
   level_begin_.ensure(*context_, begin.size(), "tree levels");
   level_begin_.upload(begin);
   scene_node_ = u32(nodes);
-  nodes_.ensure(*context_, (nodes + 1) * kNodeVectors * lanes, "tree nodes");
+  nodes_.ensure(*context_, (nodes + 1) * RS_NODE_VECTORS * lanes, "tree nodes");
   if (count_ > 0) sort_along_curve(boxes);
 }
 

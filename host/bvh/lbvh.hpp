@@ -35,6 +35,9 @@ class Lbvh {
   /// With an explicit division of the work for ordering.
   Lbvh(Context& context, int lanes, const ChunkShape& shape);
 
+  /// What order() and merge() keep on the device for every box, beside the boxes and the blocks.
+  static std::size_t bytes_per_box(int lanes);
+
   /// Order and shape of the tree over boxes[0..count). Boxes that are empty or not finite come
   /// last. Throws UsageError for 2^31 boxes and when the buffer is shorter.
   void order(const Buffer<RsAabb>& boxes, std::size_t count);

@@ -8,11 +8,11 @@
 #include <cmath>
 #include <limits>
 
+#include "light/path_memory.hpp"
 #include "light/surface_store.hpp"
 #include "primitives/scan.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
-#include "trace/memory_shares.hpp"
 #include "trace/model_impl.hpp"
 #include "trace/ray_tracer.hpp"
 
@@ -22,13 +22,6 @@ namespace {
 constexpr const char* kProgram = "light/waves.cl";
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kTallyChunk = 1024;
-// What a path takes on the device, and how many a pixel can have at once: two glass surfaces that
-// both reflect and refract.
-constexpr std::size_t kPathBytes = 512;
-constexpr std::size_t kPathsPerPixel = 4;
-constexpr std::size_t kMaxBatch = std::size_t{1} << 20;
-// CPUs are busy with fewer, and a picture in more parts tells how far it is.
-constexpr std::size_t kMaxCpuBatch = std::size_t{1} << 17;
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
@@ -61,6 +54,12 @@ void check(const std::vector<Light>& lights) {
       throw UsageError(fmt::format("Light {} has a number that is not finite: correct it", i));
     }
   }
+}
+
+PathMemory memory_of(const Scene& scene, const DeviceInfo& device) {
+  PathMemory memory(scene, device);
+  memory.check(0);
+  return memory;
 }
 
 struct Box {
@@ -98,6 +97,7 @@ struct PathTracer::Impl {
   Impl(Context& context_in, const Scene& scene)
       : context(context_in),
         settings((check(scene.render), scene.render)),
+        memory(memory_of(scene, context_in.device())),
         options(without_background(scene.trace)),
         gaussians(DeviceGaussians::upload(context_in, scene.gaussians, ScaleActivation::kExp)),
         tracer(context_in, options),
@@ -113,7 +113,6 @@ struct PathTracer::Impl {
   void choose_bias(const std::vector<Mesh>& meshes);
 
   Kernel kernel(const char* name) { return context.kernel(kProgram, name); }
-  std::size_t batch_size() const;
   RsWave wave_record(std::uint32_t sample, std::size_t first_pixel) const;
   void trace_sample(const Camera& camera,
                     std::uint32_t sample,
@@ -125,6 +124,7 @@ struct PathTracer::Impl {
 
   Context& context;
   RenderSettings settings;
+  PathMemory memory;
   TraceOptions options;
   DeviceGaussians gaussians;
   RayTracer tracer;
@@ -156,13 +156,6 @@ void PathTracer::Impl::choose_bias(const std::vector<Mesh>& meshes) {
   Box box = means_box;
   for (const Mesh& mesh : meshes) box.add(mesh.positions);
   bias = settings.bias > 0 ? settings.bias : static_cast<float>(1e-3 * box.diagonal());
-}
-
-std::size_t PathTracer::Impl::batch_size() const {
-  const std::size_t room = std::min(MemoryShares(options.memory_budget).paths() / kPathBytes,
-                                    context.device().max_allocation / sizeof(RsSurface) / 2);
-  const bool cpu = context.device().type == DeviceType::kCpu;
-  return std::clamp<std::size_t>(room / kPathsPerPixel, kGroup, cpu ? kMaxCpuBatch : kMaxBatch);
 }
 
 RsWave PathTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pixel) const {
@@ -307,6 +300,10 @@ PathTracer& PathTracer::operator=(PathTracer&&) noexcept = default;
 
 void PathTracer::set_meshes(const std::vector<Mesh>& meshes) {
   const auto turn = impl_->context.lock();
+  std::size_t triangles = 0;
+  for (const Mesh& mesh : meshes) triangles += mesh.triangle_count();
+  impl_->memory.set_meshes(triangles);
+  impl_->memory.check(0);
   impl_->surfaces.set_meshes(meshes);
   impl_->choose_bias(meshes);
 }
@@ -317,7 +314,8 @@ Image PathTracer::render(const Camera& camera, const std::function<bool(double)>
   require_pixels(camera);
   self.statistics = {};
   Image out(camera.width, camera.height, 4);
-  const std::size_t batch = self.batch_size();
+  self.memory.check(out.pixels());
+  const std::size_t batch = self.memory.batch();
   const auto samples = static_cast<float>(self.settings.samples);
   for (std::size_t first = 0; first < out.pixels(); first += batch) {
     const std::size_t count = std::min(batch, out.pixels() - first);

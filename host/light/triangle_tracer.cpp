@@ -7,12 +7,12 @@
 #include <cmath>
 
 #include "raysplats/error.hpp"
+#include "shared/tree_layout.h"
 
 namespace raysplats {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kTriangleVectors = 10;  // RS_TRIANGLE_VECTORS
 // As in RayTracer: on CPUs a work-item traces several rays one after the other.
 constexpr std::size_t kCpuRaysPerItem = 64;
 
@@ -62,9 +62,10 @@ void TriangleTracer::build(std::span<const Mesh> meshes) {
         .launch(Range::linear(count, kGroup), corners_, u32(count), boxes_);
   }
   tree_.order(boxes_, count);
-  blocks_.ensure(*context_,
-                 tree_.block_count() * kTriangleVectors * static_cast<std::size_t>(tree_.lanes()),
-                 "triangle blocks");
+  blocks_.ensure(
+      *context_,
+      tree_.block_count() * RS_TRIANGLE_VECTORS * static_cast<std::size_t>(tree_.lanes()),
+      "triangle blocks");
   if (count == 0) return;
   const std::size_t padded = tree_.padded_blocks();
   context_->kernel("light/triangle_blocks.cl", "fill_triangles", build)

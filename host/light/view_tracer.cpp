@@ -157,6 +157,12 @@ ViewTracer::ViewTracer(Context& context, const TraceOptions& options, Mirrors mi
 }
 ViewTracer::~ViewTracer() = default;
 
+std::size_t ViewTracer::triangles() const {
+  std::size_t sum = 0;
+  for (const Mesh& mesh : impl_->mirrors.meshes) sum += mesh.triangle_count();
+  return sum;
+}
+
 bool ViewTracer::by_rays(const Camera& camera) const {
   Impl& self = *impl_;
   if (!self.mirrors.meshes.empty() || self.tree) return true;

@@ -30,6 +30,8 @@ class ViewTracer {
   ViewTracer(Context& context, const TraceOptions& options, Mirrors mirrors = {});
   ~ViewTracer();
 
+  /// Of the mirrors.
+  std::size_t triangles() const;
   /// Whether a view of this camera is traced ray by ray.
   bool by_rays(const Camera& camera) const;
 

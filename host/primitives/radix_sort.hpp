@@ -13,9 +13,14 @@
 namespace raysplats {
 
 /// Stable least-significant-digit radix sort of 32-bit keys with 32-bit values, 8 bits a pass; few
-/// large chunks on CPUs, many on GPUs. Scratch memory (16 bytes a pair) is kept between calls.
+/// large chunks on CPUs, many on GPUs. Scratch memory is kept between calls.
 class RadixSort {
+  using Pair = std::array<std::uint32_t, 2>;
+
  public:
+  /// Of the scratch memory.
+  static constexpr std::size_t kBytesPerPair = 2 * sizeof(Pair);
+
   explicit RadixSort(Context& context);
   /// With an explicit division of the work; the result is the same for every shape.
   RadixSort(Context& context, const ChunkShape& shape);
@@ -28,7 +33,6 @@ class RadixSort {
             int bits = 32);
 
  private:
-  using Pair = std::array<std::uint32_t, 2>;
   struct Ends {
     const Buffer<std::uint32_t>& keys;
     const Buffer<std::uint32_t>& values;

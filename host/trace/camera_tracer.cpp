@@ -373,12 +373,7 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
                                   bool accumulate,
                                   bool with_pose) {
   const std::size_t n = gaussians.count;
-  gradients.means.ensure(context, 3 * n, "mean gradients");
-  gradients.quaternions.ensure(context, 4 * n, "quaternion gradients");
-  gradients.scales.ensure(context, 3 * n, "scale gradients");
-  gradients.opacities.ensure(context, n, "opacity gradients");
-  gradients.sh.ensure(context, gaussians.sh.size(), "SH gradients");
-  gradients.screen.ensure(context, 3 * n, "screen gradients");
+  gradients.ensure(context, gaussians);
   pose.ensure(context, with_pose ? 6 * n : 1, "pose gradients");
   BuildOptions build;
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)

@@ -50,6 +50,9 @@ struct GaussianGradients {
   /// coordinates (as 3DGS), the same from absolute values per ray (as AbsGS), 1 when any ray met it
   /// else 0}.
   Buffer<float> screen;  ///< 3 N
+
+  /// Makes room for those of `gaussians`; what is in them is lost where they have to grow.
+  void ensure(Context& context, const DeviceGaussians& gaussians);
 };
 
 }  // namespace raysplats

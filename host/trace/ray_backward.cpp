@@ -162,12 +162,7 @@ void RayBackward::finish(const DeviceGaussians& gaussians, GaussianGradients& gr
     throw UsageError("RayBackward::begin() must come before finish(), for the same Gaussians");
   }
   const std::size_t n = gaussians.count;
-  gradients.means.ensure(*context_, 3 * n, "mean gradients");
-  gradients.quaternions.ensure(*context_, 4 * n, "quaternion gradients");
-  gradients.scales.ensure(*context_, 3 * n, "scale gradients");
-  gradients.opacities.ensure(*context_, n, "opacity gradients");
-  gradients.sh.ensure(*context_, gaussians.sh.size(), "SH gradients");
-  gradients.screen.ensure(*context_, 3 * n, "screen gradients");
+  gradients.ensure(*context_, gaussians);
   BuildOptions build;
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("SH_DEGREE", degree_)

@@ -42,6 +42,9 @@ class RayOrder {
  public:
   explicit RayOrder(Context& context);
 
+  /// What compute() keeps on the device.
+  static constexpr std::size_t kBytesPerRay = 2 * sizeof(std::uint32_t) + RadixSort::kBytesPerPair;
+
   /// False when the rays are taken as they come: there are too few for a sort to pay.
   bool compute(const Lbvh& tree, const Buffer<Ray>& rays, std::size_t count);
   /// Ray of every position, after a compute() that returned true.

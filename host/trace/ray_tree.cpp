@@ -7,16 +7,20 @@
 
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
+#include "shared/tree_layout.h"
 
 namespace raysplats {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-constexpr std::size_t kBlockVectors = 15;  // RS_BLOCK_VECTORS without ADAPTIVE_RADIUS
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 }  // namespace
+
+std::size_t RayTree::block_floats(bool adaptive_radius) {
+  return RS_GAUSSIAN_VECTORS(adaptive_radius ? 1 : 0);
+}
 
 RayTree::RayTree(Context& context, const TraceOptions& options, int lanes)
     : context_(&context), options_(options), tree_(context, lanes) {}
@@ -24,8 +28,9 @@ RayTree::RayTree(Context& context, const TraceOptions& options, int lanes)
 void RayTree::build(const DeviceGaussians& gaussians) {
   if (gaussians.count > 0) compute_boxes(gaussians);
   tree_.order(boxes_, gaussians.count);
-  const std::size_t vectors = kBlockVectors + (options_.adaptive_radius ? 1 : 0);
-  blocks_.ensure(*context_, tree_.block_count() * vectors * static_cast<std::size_t>(tree_.lanes()),
+  blocks_.ensure(*context_,
+                 tree_.block_count() * static_cast<std::size_t>(tree_.lanes()) *
+                     block_floats(options_.adaptive_radius),
                  "ray blocks");
   fill(gaussians);
   built_cost_ = -1;

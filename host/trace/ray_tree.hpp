@@ -16,6 +16,9 @@ class RayTree {
  public:
   RayTree(Context& context, const TraceOptions& options, int lanes);
 
+  /// Of a Gaussian in its leaf block.
+  static std::size_t block_floats(bool adaptive_radius);
+
   void build(const DeviceGaussians& gaussians);
   /// For Gaussians that changed but kept their number since build(). Throws UsageError otherwise.
   void refit(const DeviceGaussians& gaussians);

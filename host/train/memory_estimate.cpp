@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <string>
 
+#include "bvh/lbvh.hpp"
+#include "light/path_memory.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/gaussians.hpp"
@@ -15,12 +17,13 @@
 #include "trace/gradient_sums.hpp"
 #include "trace/memory_shares.hpp"
 #include "trace/ray_backward.hpp"
+#include "trace/ray_launch.hpp"
+#include "trace/ray_tree.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
-constexpr std::size_t kSortBytes = 16;  // of RadixSort for 32-bit keys, per pair
 
 TraceOptions sum_options_of(const TrainOptions& options) {
   TraceOptions out;
@@ -48,17 +51,15 @@ struct RayShare {
 RayShare rays_per_gaussian(const TrainOptions& options,
                            std::size_t gaussians,
                            const DeviceInfo& device) {
-  const auto lanes = static_cast<std::size_t>(ray_lanes(device, 0));
+  const int lanes = ray_lanes(device, 0);
   const GradientSumChoice choice =
       RayBackward::sum_choice(sum_options_of(options), device, gaussians, options.sh_degree);
   const std::size_t lines =
       RayBackward::sum_lines(options.sh_degree) * sizeof(GradientSums::Line) * choice.copies;
   const std::size_t exact = choice.sum == GradientSum::kExact ? lines * RS_EXACT_WORDS : 0;
-  const std::size_t block = sizeof(float) * (options.adaptive_radius ? 16 : 15);
-  // A node of six vectors for every block but one in `lanes`.
-  const std::size_t nodes = sizeof(float) * 6 / (lanes - 1) + 1;
-  // Box, code in two words, order and the sort's two copies, record.
-  return {sizeof(RsAabb) + 12 + kSortBytes + block + nodes + 64 + lines + exact,
+  const std::size_t block = sizeof(float) * RayTree::block_floats(options.adaptive_radius);
+  // Box, tree, record.
+  return {sizeof(RsAabb) + Lbvh::bytes_per_box(lanes) + block + 64 + lines + exact,
           std::max({lines, exact, block})};
 }
 
@@ -67,7 +68,7 @@ RayShare rays_per_gaussian(const TrainOptions& options,
 std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels) {
   constexpr std::size_t segment =
       sizeof(Ray) + sizeof(RayResult) + 2 * sizeof(RayBackward::Gradient);
-  constexpr std::size_t order = 2 * (8 + kSortBytes);
+  constexpr std::size_t order = 2 * RayOrder::kBytesPerRay;
   const std::size_t mirrors =
       options.mirrors.empty() ? 0 : sizeof(RsSurfaceHit) + sizeof(std::uint32_t);
   const bool reflects = mirrors > 0 && options.mirror_bounces > 0;
@@ -90,9 +91,11 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                                 ? 16 * RS_EXACT_WORDS * sizeof(std::uint32_t)
                                 : 0;
   MemoryEstimate out;
-  // Parameters, gradients and two moments; while the set changes, one more copy of the moments or
-  // the parameters.
-  out.gaussians = demand.gaussians * (floats * 4 + sh * 2 + 5) * sizeof(float);
+  // Parameters, gradients, two moments, gradients on the screen (3) and statistics of density
+  // control (2); while the set changes the new parameters, their sources and roles; the least
+  // scales.
+  const std::size_t footprint = options.footprint > 0 ? 1 : 0;
+  out.gaussians = demand.gaussians * (floats * 5 + 5 + 2 + footprint) * sizeof(float);
   // Line, gradient line and its exact sums, bounds, box, candidate keys and values with their
   // second copies.
   const bool packets = demand.ray_views < demand.views || demand.views == 0;
@@ -110,7 +113,8 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   std::size_t largest = std::max({sh * sizeof(float), sizeof(RsLine), packets ? exact : 0});
   if (demand.ray_views > 0) {
     const RayShare share = rays_per_gaussian(options, demand.gaussians, device);
-    out.rays = demand.gaussians * share.bytes + ray_bytes(options, demand.pixels);
+    out.rays = demand.gaussians * share.bytes + ray_bytes(options, demand.pixels) +
+               mesh_bytes(demand.triangles, ray_lanes(device, 0));
     largest = std::max(largest, share.largest);
   }
   out.largest_buffer = demand.gaussians * largest;

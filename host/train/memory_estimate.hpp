@@ -14,15 +14,17 @@ struct MemoryDemand {
   std::size_t pixels = 0;     ///< of the largest view
   std::size_t views = 0;      ///< photos to train on
   std::size_t ray_views = 0;  ///< of these, traced ray by ray (ViewTracer::by_rays())
+  std::size_t triangles = 0;  ///< of mirrors
 };
 
 /// Device memory that a training run will need, in bytes.
 struct MemoryEstimate {
-  std::size_t gaussians =
-      0;  ///< parameters, gradients, Adam moments, the second copy while densifying
+  /// Parameters, gradients, Adam moments, statistics, least scales, the second copy while
+  /// densifying.
+  std::size_t gaussians = 0;
   std::size_t tracing = 0;  ///< records per view, sums of gradients and sort buffers
   std::size_t rays = 0;     ///< views traced ray by ray: tree, sums of gradients, rays (of mirrors:
-                            ///< two segments of a path, without their meshes)
+                            ///< two segments of a path), meshes
   std::size_t images = 0;   ///< photos within their budget, and the buffers of one view
   std::size_t hits = 0;  ///< hit streams, tile lists and private gradients: memory-budget at most
   std::size_t largest_buffer = 0;

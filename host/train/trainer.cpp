@@ -340,7 +340,7 @@ std::size_t Trainer::Impl::limit() {
   pixels /= static_cast<double>(train_cameras.size());
   if (cut_out) pixels *= opaque_share(photos());
   const MemoryDemand demand{fitted_limit(pixels, options.iterations), largest_photo(),
-                            train_views.size(), ray_views()};
+                            train_views.size(), ray_views(), tracer.triangles()};
   return std::max<std::size_t>(1, gaussians_that_fit(options, demand, context.device()));
 }
 
@@ -382,7 +382,7 @@ void Trainer::Impl::start() {
   const bool grows = density.accumulates_at(iteration);
   check_memory(options,
                {grows ? std::max(gaussians.count, most) : gaussians.count, largest_photo(),
-                train_views.size(), ray_views()},
+                train_views.size(), ray_views(), tracer.triangles()},
                context.device());
   if (const std::size_t by_rays = ray_views(); by_rays > 0) {
     spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),

@@ -29,7 +29,8 @@ class PathTracer {
 
   /// Uploads the scene and builds both trees. Throws UsageError for settings out of range and
   /// Gaussians whose arrays do not fit each other, DataError for meshes with a number that is not
-  /// finite or an index out of range and for Gaussians with a number that is not finite.
+  /// finite or an index out of range and for Gaussians with a number that is not finite,
+  /// ResourceError for a scene that is larger than the device.
   PathTracer(Context& context, const Scene& scene);
   ~PathTracer();
   PathTracer(PathTracer&&) noexcept;
@@ -41,7 +42,8 @@ class PathTracer {
   /// RGBA: the background or environment is blended, alpha is the share of light that did not come
   /// from there. Any camera model. `within` hears the share of the picture that is done, after
   /// every sample of a batch of pixels, and returns false to stop; then the picture is empty.
-  /// Throws UsageError for a camera without pixels or with a number that is not finite.
+  /// Throws UsageError for a camera without pixels or with a number that is not finite,
+  /// ResourceError when its paths would not fit the device beside the scene.
   Image render(const Camera& camera, const std::function<bool(double share)>& within = {});
 
   Statistics statistics() const;

@@ -3,10 +3,14 @@
 
 #include <doctest/doctest.h>
 
+#include <span>
 #include <string>
 
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
+#include "train/adam.hpp"
+#include "train/density_control.hpp"
+#include "train/footprint.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
@@ -33,13 +37,16 @@ std::string refusal(const TrainOptions& options,
   return "";
 }
 
-// A wall behind the cube of the reference scenes.
+// A wall behind the cube of the reference scenes, its triangles again and again.
+constexpr std::size_t kWallTriangles = 2 * 4000;
 Mirrors wall() {
   Mirrors out;
   Mesh mesh;
   mesh.positions = {-9, -9, 2, 9, -9, 2, 9, 9, 2, -9, 9, 2};
-  mesh.triangles = {0, 1, 2, 0, 2, 3};
-  mesh.materials.assign(2, 0);
+  for (std::size_t i = 0; i < kWallTriangles / 2; ++i) {
+    mesh.triangles.insert(mesh.triangles.end(), {0, 1, 2, 0, 2, 3});
+  }
+  mesh.materials.assign(kWallTriangles, 0);
   out.materials.resize(1);
   out.materials[0].kind = Material::Kind::kMirror;
   out.meshes.push_back(mesh);
@@ -67,7 +74,50 @@ std::size_t bytes_of_rays(const Gaussians& model,
   return context.peak_allocated_bytes() - before - known;
 }
 
+// Most bytes that the state of a training holds while a refinement replaces Gaussians.
+std::size_t bytes_of_state(const Gaussians& model, const TrainOptions& options) {
+  Context context = make_test_context();
+  const Camera camera = reference::cube_camera(8, 8);
+  Footprint footprint(context, std::span(&camera, 1), options.footprint);
+  Adam adam(context, {});
+  DensityControl density(context, options, 1.0, 1);
+  density.set_limit(model.size());
+  DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const std::size_t before = context.allocated_bytes() - 4 * (11 * model.size() + model.sh.size());
+  adam.initialize(gaussians.count, gaussians.sh_degree);
+  GaussianGradients gradients;
+  gradients.ensure(context, gaussians);
+  gradients.screen.clear();
+  density.accumulate(gaussians, gradients);
+  footprint.update(gaussians);
+  const DensityPlan plan = density.refine(gaussians, 100);
+  REQUIRE(plan.changes());
+  Buffer<std::uint32_t> source(context, plan.source.size(), "state sources");
+  source.upload(plan.state_source());
+  adam.remap(source, gaussians.count);
+  footprint.update(gaussians);
+  return context.peak_allocated_bytes() - before;
+}
+
 }  // namespace
+
+TEST_CASE("the state of a training is estimated to two percent") {
+  const DeviceInfo device = make_test_context().device();
+  for (const int degree : {0, 1, 3}) {
+    for (const double share : {0.0, 0.3}) {
+      CAPTURE(degree);
+      CAPTURE(share);
+      TrainOptions options;
+      options.sh_degree = degree;
+      options.footprint = share;
+      Gaussians model = reference::random_scene(20000, 43, degree);
+      for (std::size_t i = 0; i < model.size(); i += 100) model.opacities[i] = -20.0f;
+      const auto got = static_cast<double>(bytes_of_state(model, options));
+      const MemoryEstimate estimate = estimate_memory(options, {model.size(), 64, 3}, device);
+      CHECK(static_cast<double>(estimate.gaussians) == doctest::Approx(got).epsilon(0.02));
+    }
+  }
+}
 
 TEST_CASE("a run that is too large is told the most Gaussians that fit, to the last one") {
   TrainOptions options;
@@ -137,8 +187,8 @@ TEST_CASE("what views traced ray by ray take is estimated to an eighth") {
           const auto got =
               static_cast<double>(bytes_of_rays(reference::random_scene(gaussians, 41, degree),
                                                 width, trace, mirrored ? wall() : Mirrors{}));
-          const MemoryEstimate estimate =
-              estimate_memory(options, {gaussians, pixels, 3, 3}, device);
+          const MemoryEstimate estimate = estimate_memory(
+              options, {gaussians, pixels, 3, 3, mirrored ? kWallTriangles : 0}, device);
           CHECK(static_cast<double>(estimate.rays) == doctest::Approx(got).epsilon(0.125));
           CHECK(estimate.tracing == 0);
           CHECK(estimate.hits == 0);

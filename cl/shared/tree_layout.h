@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sizes of the records of the tree that rays walk, in vectors of one float for every lane; what is
+// in them is told where kernels read them (bvh/lbvh_node.h, trace/ray_block.h,
+// light/triangle_block.h).
+#ifndef RS_SHARED_TREE_LAYOUT_H
+#define RS_SHARED_TREE_LAYOUT_H
+
+#define RS_NODE_VECTORS 6
+// Gaussians; `adaptive` is 1 where each has a radius of its own, else 0.
+#define RS_GAUSSIAN_VECTORS(adaptive) (15 + (adaptive))
+#define RS_TRIANGLE_VECTORS 10
+
+#endif
