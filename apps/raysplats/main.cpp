@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <new>
@@ -13,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/memory_limit.hpp"
 #include "base/standard_streams.hpp"
 #include "help.hpp"
 #include "options.hpp"
@@ -24,6 +26,29 @@ int fail(raysplats::ErrorCode code, const std::string& message) {
   // What cannot be said is no reason to end otherwise than with the code.
   std::fputs(fmt::format("raysplats: {}\n", message).c_str(), stderr);
   return static_cast<int>(code);
+}
+
+std::string no_memory() {
+  return fmt::format(
+      "The host has no memory left{}: use fewer Gaussians, smaller images (--downscale) or a "
+      "smaller --memory-budget",
+      raysplats::memory_limit_remark());
+}
+
+// Drivers and libraries have threads of their own, out of reach of main(); some of them meet the
+// end of memory.
+[[noreturn]] void end_of_process() {
+  int code = static_cast<int>(raysplats::ErrorCode::kRuntime);
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+    fail(raysplats::ErrorCode::kRuntime,
+         fmt::format("A library ended the program{}", raysplats::memory_limit_remark()));
+  } catch (const std::bad_alloc&) {
+    code = fail(raysplats::ErrorCode::kMemory, no_memory());
+  } catch (const std::exception& error) {
+    fail(raysplats::ErrorCode::kRuntime, error.what());
+  }
+  std::_Exit(code);
 }
 
 int run(int argc, char** argv) {
@@ -67,16 +92,14 @@ int main(int argc, char** argv) {
   // A file over the process's size limit is then a failed write like any other, not the end of the
   // process.
   std::signal(SIGXFSZ, SIG_IGN);
+  std::set_terminate(end_of_process);
   raysplats::open_standard_streams();
   try {
     return run(argc, argv);
   } catch (const raysplats::Error& error) {
     return fail(error.code(), error.what());
   } catch (const std::bad_alloc&) {
-    return fail(raysplats::ErrorCode::kMemory,
-                "The host has no memory left: use fewer Gaussians, smaller images (--downscale) or "
-                "a smaller "
-                "--memory-budget");
+    return fail(raysplats::ErrorCode::kMemory, no_memory());
   } catch (const std::system_error& error) {
     // fmt throws it for what does not fit into the buffer of standard output.
     if (std::ferror(stdout) == 0) return fail(raysplats::ErrorCode::kRuntime, error.what());

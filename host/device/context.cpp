@@ -5,9 +5,13 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <memory>
+#include <new>
 #include <utility>
 
+#include "base/memory_limit.hpp"
 #include "device/context_impl.hpp"
+#include "device/driver_trouble.hpp"
 #include "device/platform.hpp"
 #include "device/program_cache.hpp"
 #include "device/tuning.hpp"
@@ -41,7 +45,7 @@ cl::Program compile(Context::Impl& context,
                     const std::string& path,
                     const std::string& source,
                     const std::string& options) {
-  cl::Program program(context.context, source);
+  auto program = std::make_unique<cl::Program>(context.context, source);
   const auto tell = [&](const std::string& what) {
     if (context.options.compiling) context.options.compiling(context.compiled, what);
   };
@@ -49,21 +53,30 @@ cl::Program compile(Context::Impl& context,
   tell(path);
   try {
     context.faults.check(Fault::kBuild);
-    program.build({context.device}, options.c_str());
+    program->build({context.device}, options.c_str());
+  } catch (const std::bad_alloc&) {
+    // It came through the driver, which holds its lock of the program for good: releasing the
+    // program would wait for ever.
+    static_cast<void>(program.release());
+    throw ResourceError(
+        fmt::format("The OpenCL driver has no memory left to compile {}{}: close other programs or "
+                    "allow this one more",
+                    path, memory_limit_remark()));
   } catch (const cl::Error& error) {
-    const std::string log = build_log(program, context.device);
-    throw DeviceError(fmt::format(
-        "Kernel file {} does not compile on {} with '{}' ({}): update the driver or choose another "
-        "--device{}{}",
-        path, context.info.name, options, cl_error_name(error.err()), log.empty() ? "" : "\n",
-        log));
+    const std::string log = build_log(*program, context.device);
+    const std::string trouble = driver_trouble();
+    throw DeviceError(
+        fmt::format("Kernel file {} does not compile on {} with '{}' ({}): {}{}{}", path,
+                    context.info.name, options, cl_error_name(error.err()),
+                    trouble.empty() ? "update the driver or choose another --device" : trouble,
+                    log.empty() ? "" : "\n", log));
   }
   tell("");
   if (spdlog::should_log(spdlog::level::debug)) {
-    const std::string log = build_log(program, context.device);
+    const std::string log = build_log(*program, context.device);
     if (!log.empty()) spdlog::debug("kernel file {} with '{}': {}", path, options, log);
   }
-  return program;
+  return *program;
 }
 
 // Empty when the binary is not accepted, for example after a driver update with the same version

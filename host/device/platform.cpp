@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "device/cl.hpp"
+#include "device/driver_trouble.hpp"
 #include "device/platform.hpp"
 #include "raysplats/error.hpp"
 
@@ -91,6 +92,7 @@ DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
 }  // namespace
 
 std::vector<PlatformDevice> platform_devices() {
+  check_driver_surroundings();
   std::vector<cl::Platform> platforms;
   try {
     cl::Platform::get(&platforms);
@@ -123,9 +125,7 @@ std::vector<DeviceInfo> list_devices() {
 DeviceInfo select_device(const std::string& selector) {
   const std::vector<DeviceInfo> devices = list_devices();
   if (devices.empty()) {
-    throw DeviceError(
-        "No OpenCL platform is installed: install your GPU's OpenCL driver, or pocl-opencl-icd to "
-        "run on the CPU");
+    throw DeviceError(why_no_devices());
   }
   if (selector.empty()) {
     for (const DeviceType wanted : {DeviceType::kGpu, DeviceType::kCpu}) {

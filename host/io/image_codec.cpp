@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "base/memory_limit.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
@@ -22,11 +23,10 @@ namespace {
 constexpr const char* kLibrary = "libraysplats-images.so";
 
 [[noreturn]] void fail(const std::string& what) {
-  throw Error(
-      ErrorCode::kRuntime,
-      fmt::format("Pictures cannot be read or written: {}; set RAYSPLATS_IMAGES to the path "
-                  "of {} of version {}",
-                  what, kLibrary, RAYSPLATS_VERSION));
+  throw Error(ErrorCode::kRuntime,
+              fmt::format("Pictures cannot be read or written: {}{}; set RAYSPLATS_IMAGES to the "
+                          "path of {} of version {}",
+                          what, memory_limit_remark(), kLibrary, RAYSPLATS_VERSION));
 }
 
 // Found along the run path of the program, as any library of it; it stays loaded to the end.

@@ -315,3 +315,60 @@ TEST_CASE("results that cannot be written are a failure") {
   train.pop_back();
   CHECK(raysplats_program(train, mute).code == 0);
 }
+
+TEST_CASE("where no device is found the cause is named") {
+  const TemporaryFolder folder;
+  const auto refuse_there = [](const Surroundings& there, const Words& arguments, int code,
+                               const Words& parts) {
+    const Outcome outcome = raysplats_program(arguments, there);
+    INFO(outcome.err);
+    CHECK(outcome.code == code);
+    CHECK(one_sentence(outcome));
+    for (const std::string& part : parts) CHECK(contains(outcome.err, part));
+  };
+  const Words devices{"devices"};
+  refuse_there({{{"OCL_ICD_VENDORS", "/nonexistent"}}}, devices, 4,
+               {"registered in /nonexistent", "OCL_ICD_VENDORS", "pocl-opencl-icd"});
+  write_file(folder / "broken/none.icd", "libnone_of_that_name.so\n");
+  refuse_there({{{"OCL_ICD_VENDORS", folder / "broken"}}}, devices, 4,
+               {"none.icd", "libnone_of_that_name.so"});
+
+  const bool pocl = contains(raysplats_program(devices).out, "Portable Computing Language");
+  if (!pocl) return;
+  for (const char* name : {"POCL_CACHE_DIR", "XDG_CACHE_HOME"}) {
+    refuse_there({{{name, "/proc/none"}}}, devices, 4,
+                 {"the folder /proc/none", name, "cannot be written"});
+  }
+  refuse_there({{{"POCL_CACHE_DIR", ""}}}, devices, 4, {"POCL_CACHE_DIR is empty"});
+  refuse_there({{{"POCL_DEVICES", "none"}}}, devices, 4, {"POCL_DEVICES is 'none'"});
+  // A folder that is there and cannot be written fails later, in the compiler.
+  fs::create_directories(folder / "locked");
+  fs::permissions(folder / "locked", fs::perms::owner_read | fs::perms::owner_exec);
+  Surroundings locked{{{"POCL_CACHE_DIR", folder / "locked"}}};
+  locked.permissions_count = true;
+  const Outcome outcome =
+      raysplats_program(training(folder / "run", 1) + Words{"--no-kernel-cache"}, locked);
+  INFO(outcome.err);
+  CHECK(outcome.code == 4);
+  CHECK(contains(outcome.err, folder / "locked"));
+  CHECK(contains(outcome.err, "cannot be written"));
+}
+
+#ifndef __SANITIZE_ADDRESS__  // it takes terabytes of addresses itself
+TEST_CASE("too little memory is named") {
+  const TemporaryFolder folder;
+  const auto refuse_with = [](rlim_t mebibytes, const Words& arguments, const std::string& part) {
+    Surroundings little;
+    little.memory_limit = mebibytes << 20;
+    const Outcome outcome = raysplats_program(arguments, little);
+    INFO(outcome.err);
+    CHECK(outcome.signal == 0);
+    CHECK(outcome.code != 0);
+    CHECK(one_sentence(outcome));
+    CHECK(contains(outcome.err, part));
+    CHECK(contains(outcome.err, std::to_string(mebibytes) + " MiB of memory (ulimit -v)"));
+  };
+  refuse_with(190, {"devices"}, "OpenCL");
+  refuse_with(200, training(folder / "run", 1), "Pictures cannot be read");
+}
+#endif

@@ -46,6 +46,10 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
     const rlimit limit{surroundings.file_size_limit, surroundings.file_size_limit};
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
   }
+  if (surroundings.memory_limit != RLIM_INFINITY) {
+    const rlimit limit{surroundings.memory_limit, surroundings.memory_limit};
+    if (::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(126);
+  }
   if (surroundings.permissions_count && ::geteuid() == 0 &&
       ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0) != 0) {
     ::_exit(126);

@@ -21,6 +21,7 @@ struct Outcome {
 struct Surroundings {
   std::vector<std::pair<std::string, std::string>> environment;  ///< added to the test's own
   rlim_t file_size_limit = RLIM_INFINITY;  ///< bytes; beyond it writes fail, as on a full disk
+  rlim_t memory_limit = RLIM_INFINITY;     ///< bytes of address space, as by ulimit -v
   bool permissions_count = false;          ///< even for root: what may not be written cannot be
   std::string out_file = {};               ///< where standard output goes, such as /dev/full
   std::string err_file = {};               ///< the same of standard error

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/driver_trouble.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+#include "base/memory_limit.hpp"
+#include "device/cl.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string variable(const char* name) {
+  const char* value = std::getenv(name);
+  return value != nullptr ? value : "";
+}
+
+// A driver is a line, the name of its library, in a file NAME.icd of the loader's folder.
+struct Driver {
+  fs::path file;
+  std::string library;
+};
+
+std::vector<Driver> registered_drivers(const fs::path& folder) {
+  std::vector<Driver> drivers;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() != ".icd") continue;
+    Driver driver{entry->path(), ""};
+    std::ifstream stream(driver.file);
+    std::getline(stream, driver.library);
+    drivers.push_back(std::move(driver));
+  }
+  std::sort(drivers.begin(), drivers.end(),
+            [](const Driver& a, const Driver& b) { return a.file < b.file; });
+  return drivers;
+}
+
+// Nothing when the library loads.
+std::string load_error(const std::string& library) {
+  void* handle = ::dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle == nullptr) return ::dlerror();
+  ::dlclose(handle);
+  return "";
+}
+
+// The folder that PoCL keeps compiled kernels in, and the variable that names it.
+struct PoclCache {
+  std::string variable;
+  fs::path folder;
+};
+
+PoclCache pocl_cache() {
+  if (std::getenv("POCL_CACHE_DIR") != nullptr)
+    return {"POCL_CACHE_DIR", variable("POCL_CACHE_DIR")};
+  if (const std::string cache = variable("XDG_CACHE_HOME"); !cache.empty())
+    return {"XDG_CACHE_HOME", fs::path(cache) / "pocl" / "kcache"};
+  if (const std::string home = variable("HOME"); !home.empty())
+    return {"HOME", fs::path(home) / ".cache" / "pocl" / "kcache"};
+  return {"", "/tmp/pocl/kcache"};
+}
+
+// "the folder F of its cache, by VARIABLE, cannot be written (reason)"; empty when it can.
+std::string pocl_cache_trouble() {
+  const PoclCache cache = pocl_cache();
+  std::error_code error;
+  fs::create_directories(cache.folder, error);
+  if (!error && ::access(cache.folder.c_str(), W_OK | X_OK) != 0)
+    error = std::error_code(errno, std::generic_category());
+  if (!error) return "";
+  return fmt::format("the folder {}{} of its cache cannot be written ({})", cache.folder.string(),
+                     cache.variable.empty() ? "" : fmt::format(" ({})", cache.variable),
+                     error.message());
+}
+
+bool is_pocl(const std::string& platform) {
+  return platform.find("Portable Computing Language") != std::string::npos;
+}
+
+std::vector<std::string> platform_names() {
+  std::vector<std::string> names;
+  try {
+    std::vector<cl::Platform> platforms;
+    cl::Platform::get(&platforms);
+    for (const cl::Platform& platform : platforms)
+      names.push_back(platform.getInfo<CL_PLATFORM_NAME>());
+  } catch (const cl::Error&) {  // how the loader says that there is none
+  }
+  return names;
+}
+
+std::string why_no_platforms() {
+  std::string chosen;
+  for (const char* name : {"OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH"}) {
+    if (chosen.empty() && !variable(name).empty()) chosen = name;
+  }
+  const fs::path folder = chosen.empty() ? "/etc/OpenCL/vendors" : variable(chosen.c_str());
+  const std::vector<Driver> drivers = registered_drivers(folder);
+  for (const Driver& driver : drivers) {
+    const std::string error = load_error(driver.library);
+    if (error.empty()) continue;
+    const std::string remark = memory_limit_remark();
+    return fmt::format("The OpenCL driver of {} cannot be loaded ({}){}: {}", driver.file.string(),
+                       error, remark,
+                       remark.empty() ? "install it anew" : "allow it more, or install it anew");
+  }
+  if (drivers.empty() && !chosen.empty()) {
+    return fmt::format(
+        "No OpenCL platform is registered in {}, which {} names: unset it, or install "
+        "pocl-opencl-icd "
+        "to run on the CPU",
+        folder.string(), chosen);
+  }
+  if (!drivers.empty()) {
+    return fmt::format("The OpenCL driver of {} offers no platform here: install another driver",
+                       drivers.front().file.string());
+  }
+  return "No OpenCL platform is installed: install your GPU's OpenCL driver, or pocl-opencl-icd to "
+         "run on the CPU";
+}
+
+}  // namespace
+
+std::string why_no_devices() {
+  const std::vector<std::string> platforms = platform_names();
+  if (platforms.empty()) return why_no_platforms();
+  for (const std::string& platform : platforms) {
+    if (!is_pocl(platform)) continue;
+    if (const std::string trouble = pocl_cache_trouble(); !trouble.empty()) {
+      return fmt::format("The OpenCL platform {} offers no device: {}; name one by POCL_CACHE_DIR",
+                         platform, trouble);
+    }
+    if (const std::string only = variable("POCL_DEVICES"); !only.empty()) {
+      return fmt::format("The OpenCL platform {} offers no device: POCL_DEVICES is '{}', unset it",
+                         platform, only);
+    }
+  }
+  return fmt::format(
+      "The OpenCL platform {} offers no device{}: 'clinfo' shows what its driver finds",
+      fmt::join(platforms, ", "), memory_limit_remark());
+}
+
+std::string driver_trouble() {
+  for (const std::string& platform : platform_names()) {
+    if (!is_pocl(platform)) continue;
+    if (const std::string trouble = pocl_cache_trouble(); !trouble.empty())
+      return trouble + ", name one by POCL_CACHE_DIR";
+  }
+  const std::string remark = memory_limit_remark();
+  return remark.empty() ? "" : remark.substr(2) + ", allow it more or update the driver";
+}
+
+void check_driver_surroundings() {
+  // PoCL aborts.
+  if (std::getenv("POCL_CACHE_DIR") != nullptr && variable("POCL_CACHE_DIR").empty())
+    throw DeviceError("POCL_CACHE_DIR is empty: name a folder by it, or unset it");
+}
+
+}  // namespace raysplats
