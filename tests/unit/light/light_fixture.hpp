@@ -64,6 +64,8 @@ inline double largest_difference(const Image& a, const Image& b) {
   return out;
 }
 
+constexpr double kTolerance = 1e-4;
+
 /// A picture of one sample per pixel against the reference: every pixel within `tolerance`, but for
 /// those with a decision within `tie` of going the other way and those where the device chooses by
 /// chance, of which there may be `excused_share`.
@@ -71,8 +73,8 @@ inline void check_picture(Context& context,
                           const Scene& scene,
                           const Camera& camera,
                           const std::string& what,
-                          double tolerance = 2e-3,
-                          double excused_share = 0.1,
+                          double tolerance = kTolerance,
+                          double excused_share = 0.02,
                           double tie = 3e-5) {
   CAPTURE(what);
   const Image image = render_on_device(context, scene, camera);

@@ -242,7 +242,7 @@ TEST_CASE("a pinhole's gradients ray by ray are those of packets") {
   ViewTracer packets(context, options), rays(context, options);
   const Traced expected = trace_and_differentiate(context, packets, gaussians, camera, gradient);
   const Traced got = trace_and_differentiate(context, rays, gaussians, camera, gradient, true);
-  CHECK(compare(got.image, render, 1e-4).maximum < 2e-3);
+  CHECK(compare(got.image, render).maximum < 2e-3);
   check_gradients(got.gradients, expected.gradients, 1e-3);
 
   // In batches that are traced again; 58 x 66 pixels are less than one.
@@ -406,8 +406,8 @@ TEST_CASE("camera rays through the tree have the picture and the gradients of th
         CHECK(tree.by_rays(camera));
         const Traced a = trace_and_differentiate(context, tiles, gaussians, camera, gradient);
         const Traced b = trace_and_differentiate(context, tree, gaussians, camera, gradient);
-        CHECK(compare(a.image, expected, 1e-4).maximum < 2e-3);
-        CHECK(compare(b.image, expected, 1e-4).maximum < 2e-3);
+        CHECK(compare(a.image, expected).maximum < 2e-3);
+        CHECK(compare(b.image, expected).maximum < 2e-3);
         check_gradients(b.gradients, a.gradients, 1e-3);
       }
     }
