@@ -156,11 +156,18 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   const InterruptGuard interrupt;
   Progress progress("rendering", static_cast<std::int64_t>(cameras.size()), 0,
                     global.quiet ? nullptr : stderr);
-  const FrameReport report = write_frames(tracer, gaussians, cameras, options.output,
-                                          options.frame_options(), [&](std::size_t done) {
-                                            progress.update(static_cast<std::int64_t>(done), "");
-                                            return !interrupt.requested();
-                                          });
+  std::size_t frames = 0;
+  const FrameReport report = write_frames(
+      tracer, gaussians, cameras, options.output, options.frame_options(),
+      [&](std::size_t done) {
+        frames = done;
+        progress.update(static_cast<std::int64_t>(done), "");
+        return !interrupt.requested();
+      },
+      [&](double share) {
+        progress.update(static_cast<std::int64_t>(frames), share_of_frame(share));
+        return !interrupt.requested();
+      });
   progress.finish();
   if (interrupt.requested()) {
     throw Error(ErrorCode::kInterrupted,

@@ -4,18 +4,20 @@
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <functional>
+#include <memory>
 #include <string_view>
 #include <utility>
 
 #include "base/nearest_name.hpp"
 #include "base/number_text.hpp"
+#include "base/progress.hpp"
 #include "train/train_keys.hpp"
 
 namespace raysplats::cli {
@@ -79,23 +81,25 @@ void add_device_flags(CLI::App& app, DeviceFlags& flags) {
 
 namespace {
 
-// What is seen of compiling: a line that is redrawn on a terminal, one line elsewhere.
-void show_compiling(std::size_t number, const std::string& program) {
-  if (!spdlog::should_log(spdlog::level::info)) return;
-  if (::isatty(2) == 1) {
-    fmt::print(stderr, "\r\x1b[K{}",
-               program.empty() ? "" : fmt::format("compiling kernels: {} ({})", number, program));
-    std::fflush(stderr);
-  } else if (number == 1 && !program.empty()) {
-    spdlog::info("compiling kernels for the device: they are kept for the next time");
-  }
+// Shows the compiling of kernels, whose number nobody knows before: a bar without an end.
+std::function<void(std::size_t, const std::string&)> show_compiling() {
+  if (!spdlog::should_log(spdlog::level::info)) return {};
+  const auto bar = std::make_shared<Progress>("compiling kernels", Progress::kUnknown);
+  return [bar](std::size_t number, const std::string& program) {
+    if (program.empty()) {
+      bar->suspend();
+      return;
+    }
+    bar->resume();
+    bar->update(static_cast<std::int64_t>(number), program);
+  };
 }
 
 }  // namespace
 
 std::unique_ptr<Context> open_context(const DeviceFlags& flags) {
   ContextOptions options;
-  options.compiling = show_compiling;
+  options.compiling = show_compiling();
   options.profile = flags.profile;
   options.kernel_cache = !flags.no_kernel_cache;
   const DeviceInfo device = select_device(flags.device);
@@ -155,6 +159,10 @@ TraceOptions TraceFlags::over(TraceOptions base) const {
   if (memory_budget) base.memory_budget = *memory_budget << 20;
   if (launch_budget_ms) base.launch_budget_ms = *launch_budget_ms;
   return base;
+}
+
+std::string share_of_frame(double share) {
+  return fmt::format("{:.0f} % of this frame", 100.0 * share);
 }
 
 std::string with_compiling(const std::string& text, double seconds) {

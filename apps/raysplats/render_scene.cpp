@@ -196,8 +196,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
         return !interrupt.requested();
       },
       [&](double share) {
-        progress.update(static_cast<std::int64_t>(frames),
-                        fmt::format("{:.0f} % of this frame", 100.0 * share));
+        progress.update(static_cast<std::int64_t>(frames), share_of_frame(share));
         return !interrupt.requested();
       });
   progress.finish();

@@ -41,7 +41,8 @@ Progress::Progress(std::string label, std::int64_t total, std::int64_t done, std
       start_(std::chrono::steady_clock::now()) {}
 
 Progress::~Progress() {
-  if (stream_ != nullptr && terminal_ && drawn_ && !finished_) std::fputc('\n', stream_);
+  if (stream_ != nullptr && terminal_ && drawn_ && !finished_ && !suspended_)
+    std::fputc('\n', stream_);
 }
 
 double Progress::clock() const {
@@ -87,12 +88,13 @@ void Progress::resume() {
 }
 
 std::string Progress::line(int width) const {
+  const bool known = total_ != kUnknown;
   const double share =
       total_ > 0 ? std::clamp(static_cast<double>(done_) / static_cast<double>(total_), 0.0, 1.0)
                  : 1.0;
-  std::string text = fmt::format("{}/{}", done_, total_);
+  std::string text = known ? fmt::format("{}/{}", done_, total_) : std::to_string(done_);
   if (!fields_.empty()) text += ", " + fields_;
-  if (rate_ > 0) {
+  if (rate_ > 0 && known) {
     text += fmt::format(", {:.{}f} it/s, {} left", rate_, rate_ < 10 ? 2 : 1,
                         format_duration(static_cast<double>(total_ - done_) / rate_));
   }
@@ -100,6 +102,14 @@ std::string Progress::line(int width) const {
   if (room < 5)
     return fmt::format("{} {}", label_, text)
         .substr(0, static_cast<std::size_t>(std::max(width, 1)));
+  if (!known) {
+    constexpr int kBlock = 3;
+    const int turn = 2 * (room - kBlock);
+    const int at = static_cast<int>(done_ % turn);
+    const int before = std::min(at, turn - at);
+    return fmt::format("{} [{:<{}}==={:<{}}] {}", label_, "", before, "", room - kBlock - before,
+                       text);
+  }
   const int filled = static_cast<int>(share * room);
   return fmt::format("{} [{:=<{}}{:<{}}] {}", label_, "", filled, "", room - filled, text);
 }

@@ -16,6 +16,9 @@ std::string format_duration(double seconds);
 /// nor for the time left.
 class Progress {
  public:
+  /// A total that nobody knows: the bar runs to and fro.
+  static constexpr std::int64_t kUnknown = -1;
+
   /// `done` of `total` steps are behind us already (a resumed run). A null stream prints nothing.
   Progress(std::string label,
            std::int64_t total,

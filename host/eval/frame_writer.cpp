@@ -25,6 +25,26 @@ float linear_from_display(float value) {
 
 constexpr int kMaxSupersample = 16;
 
+/// Lets a tracer be watched while it lives.
+class Watch {
+ public:
+  Watch(ViewTracer& tracer, const std::function<bool(double)>& within) : tracer_(&tracer) {
+    if (!within) return;
+    tracer.set_watch([this, &within](double share) {
+      stopped_ = !within(share);
+      return !stopped_;
+    });
+  }
+  ~Watch() { tracer_->set_watch({}); }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+  bool stopped() const { return stopped_; }
+
+ private:
+  ViewTracer* tracer_;
+  bool stopped_ = false;
+};
+
 /// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
 std::string joined(const std::filesystem::path& name) {
   std::string out;
@@ -166,18 +186,25 @@ FrameReport write_frames(ViewTracer& tracer,
                          std::span<const Camera> cameras,
                          const std::filesystem::path& folder,
                          const FrameOptions& options,
-                         const std::function<bool(std::size_t)>& done) {
+                         const std::function<bool(std::size_t)>& done,
+                         const std::function<bool(double)>& within) {
   if (options.supersample < 1 || options.supersample > kMaxSupersample) {
     throw UsageError(fmt::format("--supersample {} is out of range: use 1 to {}",
                                  options.supersample, kMaxSupersample));
   }
   const std::vector<std::string> names = frame_names(cameras);
   FrameReport report;
+  const Watch watch(tracer, within);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Camera camera = downscaled(cameras[i], 1.0 / options.supersample);
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
-    tracer.forward(gaussians, camera);
+    try {
+      tracer.forward(gaussians, camera);
+    } catch (const Error&) {
+      if (!watch.stopped()) throw;
+      break;
+    }
     const Image samples = tracer.download_image();
     Image depth;
     if (options.depth) {

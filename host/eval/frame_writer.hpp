@@ -61,14 +61,16 @@ void write_frame(const std::filesystem::path& stem,
                  const FrameOptions& options);
 
 /// Traces every camera and writes its files to `folder`, which exists. `done` hears the number of
-/// finished frames and returns false to stop early. The tracer was
-/// made with the option depth when options.depth is set. Throws UsageError for a supersampling
+/// finished frames and returns false to stop early; so does `within` with the share of the frame
+/// that is being traced, which is not written then. The tracer was made with the option depth when
+/// options.depth is set. Throws UsageError for a supersampling
 /// factor outside 1..16, DataError when a file fails.
 FrameReport write_frames(ViewTracer& tracer,
                          const DeviceGaussians& gaussians,
                          std::span<const Camera> cameras,
                          const std::filesystem::path& folder,
                          const FrameOptions& options,
-                         const std::function<bool(std::size_t)>& done = {});
+                         const std::function<bool(std::size_t)>& done = {},
+                         const std::function<bool(double)>& within = {});
 
 }  // namespace raysplats

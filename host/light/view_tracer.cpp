@@ -26,6 +26,7 @@ constexpr std::size_t kGroup = 64;
 constexpr std::size_t kPathBytes = 2 * (sizeof(Ray) + sizeof(RayResult) + sizeof(RsSurfaceHit) +
                                         sizeof(RsPath) + 2 * sizeof(RayBackward::Gradient) + 4);
 constexpr std::size_t kLeastBatch = 4096;
+constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
@@ -115,7 +116,10 @@ struct ViewTracer::Impl {
     if (!rays) rays.emplace(context, options, mirrors);
     return *rays;
   }
-  std::size_t batch() const { return ViewTracer::batch(options.memory_budget); }
+  std::size_t batch() const {
+    const std::size_t most = ViewTracer::batch(options.memory_budget);
+    return watch ? std::min(most, kWatchedBatch) : most;
+  }
   Kernel kernel(const char* name) { return context.kernel("light/mirror_paths.cl", name); }
   void trace_batch(const DeviceGaussians& gaussians,
                    std::size_t first,
@@ -136,6 +140,7 @@ struct ViewTracer::Impl {
   std::uint64_t packets_revision = 0;
   std::uint64_t packets_capped = 0;  // of views that were kept
   std::optional<Rays> rays;          // once a view needs it
+  std::function<void(double)> watch;
   // The last view.
   bool by_rays = false;
   bool kept = false;
@@ -224,10 +229,14 @@ void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep)
     kernel("store_picture")
         .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), paths.seen(),
                 image);
-    if (!options.depth) continue;
-    kernel("store_depth")
-        .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels),
-                depth_axis(camera), paths.rays(), paths.results(), depth);
+    if (options.depth) {
+      kernel("store_depth")
+          .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels),
+                  depth_axis(camera), paths.rays(), paths.results(), depth);
+    }
+    if (!watch) continue;
+    context.finish();
+    watch(static_cast<double>(first + count) / static_cast<double>(pixels));
   }
 }
 
@@ -317,6 +326,16 @@ void ViewTracer::Rays::add_pose(const Camera& camera,
     pose.center[static_cast<std::size_t>(k)] += by_center[k];
     pose.rotation[static_cast<std::size_t>(k)] += rotation[k];
   }
+}
+
+void ViewTracer::set_watch(const std::function<bool(double)>& watch) {
+  impl_->watch = {};
+  if (watch) {
+    impl_->watch = [watch](double share) {
+      if (!watch(share)) throw Error(ErrorCode::kInterrupted, "The picture was stopped");
+    };
+  }
+  impl_->packets.set_watch(impl_->watch);
 }
 
 void ViewTracer::set_background(const std::array<float, 3>& background) {

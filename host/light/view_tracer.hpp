@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "device/context.hpp"
@@ -62,6 +63,9 @@ class ViewTracer {
                 GaussianGradients& gradients,
                 PoseGradient* pose = nullptr);
 
+  /// From the next forward() on `watch` hears the share of the picture that is done, several times
+  /// a second, and lets forward() end with Error(kInterrupted) by returning false.
+  void set_watch(const std::function<bool(double share)>& watch);
   /// Colour behind everything from the next forward() on.
   void set_background(const std::array<float, 3>& background);
   /// Rays of the last view that stopped because of max_hits; blocks.

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <utility>
 
 #include "bvh/gaussian_bounds.hpp"
 #include "core/planes.hpp"
@@ -30,6 +31,9 @@ constexpr std::size_t kCopiesPerUnit = 2;
 constexpr std::uint32_t kChunkEntries =
     16;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
 
+// Of launches whose picture somebody watches.
+constexpr double kWatchedMilliseconds = 300.0;
+
 const std::vector<int> kFront{0};
 
 std::array<float, 4> background_of(const TraceOptions& options) {
@@ -49,6 +53,7 @@ struct CameraTracer::Impl {
         no_tangents(context_in, 1, "no tangents of a lens"),
         forward_budget(options_in.launch_budget_ms, context_in.device().type),
         backward_budget(forward_budget),
+        watched_budget(kWatchedMilliseconds, context_in.device().type),
         counters(context_in, 4, "trace counters"),
         sums(context_in, "line gradients") {}
 
@@ -114,7 +119,10 @@ struct CameraTracer::Impl {
   Buffer<float> no_tangents;
   LaunchBudget forward_budget;
   LaunchBudget backward_budget;
-  Camera view;  // of the last forward()
+  LaunchBudget watched_budget;  // of launches that somebody watches, where no other bounds them
+  std::function<void(double)> watch;
+  std::size_t watched_tiles = 0;  // of this forward() that are done
+  Camera view;                    // of the last forward()
   int lens_kind = 0;
   int face = 0;
   RsCamera camera{};                      // of the face that is being traced
@@ -148,6 +156,8 @@ CameraTracer::CameraTracer(Context& context, const TraceOptions& options)
   }
 }
 CameraTracer::~CameraTracer() = default;
+
+void CameraTracer::set_watch(std::function<void(double)> watch) { impl_->watch = std::move(watch); }
 
 const Buffer<float>& CameraTracer::image() const { return impl_->image; }
 const Buffer<float>& CameraTracer::depth() const { return impl_->depth; }
@@ -186,6 +196,7 @@ void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camer
   self.hits_kept = keep_hits;
   self.statistics_saved = false;
   self.candidates = 0;
+  self.watched_tiles = 0;
   self.counters.clear();
   self.trace_faces(gaussians, keep_hits);
   if (!keep_hits) return;
@@ -290,13 +301,20 @@ void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
   Kernel& kernel = forward_kernel(keep);
   const auto rows = static_cast<std::uint32_t>(window.rows);
   const auto columns = static_cast<std::uint32_t>(window.columns);
-  in_bands(context, forward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
+  LaunchBudget& budget = watch && !forward_budget.bounded() ? watched_budget : forward_budget;
+  const double all = static_cast<double>(lists.tiles_x()) * lists.tile_rows() *
+                     static_cast<double>(std::size(faces()));
+  in_bands(context, budget, rows, [&](std::uint32_t first, std::uint32_t number) {
     kernel.launch(packet_range(kernel, packet.block, columns, first, number), lists.lines(),
                   lists.references(), lists.boxes(), lists.box_stride(), lists.limits(),
                   lists.offsets(), camera, window, options.min_transmittance, options.max_hits,
                   background_of(options), image, depth, transmittances, stream_ends, pool,
                   pool_transmittance, static_cast<std::uint32_t>(keep ? pool_capacity() : 0),
                   counters, face, tiles(), tangents());
+    if (!watch) return;
+    context.finish();
+    watched_tiles += std::size_t{number} * columns;
+    watch(std::min(1.0, static_cast<double>(watched_tiles) / all));
   });
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "device/context.hpp"
@@ -38,6 +39,10 @@ class CameraTracer {
   /// Traces one view. With `keep_hits` the hit lists stay for backward() when they fit the memory
   /// budget and are recomputed there when they do not.
   void forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits = false);
+
+  /// From the next forward() on `watch` hears the share of the picture that is done after every
+  /// launch, which then are short ones; what it throws ends forward(). Nothing is heard with {}.
+  void set_watch(std::function<void(double share)> watch);
 
   /// Result of the last forward(): planar R, G, B (background blended), A = 1 - T; 4 x height x
   /// width.

@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <linux/capability.h>
+#include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -28,11 +29,19 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
+  if (surroundings.terminal) {
+    terminal_ = ::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
+    if (terminal_ < 0 || ::grantpt(terminal_) != 0 || ::unlockpt(terminal_) != 0)
+      throw std::system_error(errno, std::generic_category(), "posix_openpt");
+    const winsize size{24, 80, 0, 0};
+    ::ioctl(terminal_, TIOCSWINSZ, &size);
+  }
   process_ = ::fork();
   if (process_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
   if (process_ > 0) return;
   const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600);
-  const int err_file = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
+  const int err_file = surroundings.terminal ? ::open(::ptsname(terminal_), O_WRONLY | O_NOCTTY)
+                                             : ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
   if (::dup2(out_file, STDOUT_FILENO) < 0 || ::dup2(err_file, STDERR_FILENO) < 0) ::_exit(125);
   // The files' own numbers are free again, as they are in a program that a shell starts.
   ::close(out_file);
@@ -59,12 +68,26 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
 }
 
 RunningProgram::~RunningProgram() {
+  if (terminal_ >= 0) ::close(terminal_);
   if (ended_) return;
   ::kill(process_, SIGKILL);
   ::waitpid(process_, nullptr, 0);
 }
 
-std::string RunningProgram::errors() const { return read_file(folder_ / "err"); }
+void RunningProgram::read_terminal() const {
+  char part[4096];
+  for (;;) {
+    const ssize_t count = ::read(terminal_, part, sizeof(part));
+    if (count <= 0) return;
+    screen_.append(part, static_cast<std::size_t>(count));
+  }
+}
+
+std::string RunningProgram::errors() const {
+  if (terminal_ < 0) return read_file(folder_ / "err");
+  read_terminal();
+  return screen_;
+}
 
 bool RunningProgram::runs() {
   if (!ended_) ended_ = ::waitpid(process_, &status_, WNOHANG) == process_;
@@ -72,6 +95,11 @@ bool RunningProgram::runs() {
 }
 
 Outcome RunningProgram::wait() {
+  // A terminal that nobody reads takes no more.
+  while (terminal_ >= 0 && runs()) {
+    read_terminal();
+    ::usleep(1000);
+  }
   if (!ended_ && ::waitpid(process_, &status_, 0) != process_)
     throw std::system_error(errno, std::generic_category(), "waitpid");
   ended_ = true;
@@ -79,7 +107,7 @@ Outcome RunningProgram::wait() {
   outcome.code = WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_);
   outcome.signal = WIFSIGNALED(status_) ? WTERMSIG(status_) : 0;
   outcome.out = read_file(folder_ / "out");
-  outcome.err = read_file(folder_ / "err");
+  outcome.err = errors();
   return outcome;
 }
 

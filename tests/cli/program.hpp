@@ -25,6 +25,7 @@ struct Surroundings {
   bool permissions_count = false;          ///< even for root: what may not be written cannot be
   std::string out_file = {};               ///< where standard output goes, such as /dev/full
   std::string err_file = {};               ///< the same of standard error
+  bool terminal = false;                   ///< standard error is one, 80 columns wide
   bool closed_out = false;                 ///< as by >&-
   bool closed_err = false;
   std::string folder = {};  ///< to run in; the test's own when empty
@@ -67,7 +68,11 @@ class RunningProgram {
 
  private:
   TemporaryFolder folder_;
+  void read_terminal() const;
+
   pid_t process_ = -1;
+  int terminal_ = -1;           // the near end of the program's terminal
+  mutable std::string screen_;  // what came out of it so far
   int status_ = 0;
   bool ended_ = false;
 };

@@ -115,6 +115,29 @@ TEST_CASE("no OpenCL platform is exit code 4 with the remedy") {
   CHECK(entries(folder / "frames") == 0);
 }
 
+TEST_CASE("the compiling of kernels is a bar on a terminal, lines elsewhere, and counted apart") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  const std::vector<std::string> render{
+      "render", folder / "model.ply", "--orbit",          "1", "--width", "8",
+      "-o",     folder / "x",         "--no-kernel-cache"};
+  const Outcome lines = raysplats_program(render);
+  REQUIRE(lines.code == 0);
+  CHECK(lines.err.find("\ncompiling kernels [") != std::string::npos);
+  CHECK(lines.err.find("] 1, ") != std::string::npos);
+  CHECK(lines.err.find('\r') == std::string::npos);
+  CHECK(lines.out.find(" s of compiling kernels") != std::string::npos);
+  Surroundings terminal;
+  terminal.terminal = true;
+  const Outcome bar = raysplats_program(render, terminal);
+  REQUIRE(bar.code == 0);
+  CHECK(bar.err.find("\r\x1b[Kcompiling kernels [") != std::string::npos);
+  CHECK(bar.err.find("] 1, ") != std::string::npos);
+  std::vector<std::string> quiet = render;
+  quiet.emplace_back("-q");
+  CHECK(raysplats_program(quiet).err.empty());
+}
+
 TEST_CASE("an unknown device is exit code 2") {
   const TemporaryFolder folder;
   write_file(folder / "model.ply", ply_file(2));

@@ -138,6 +138,32 @@ TEST_CASE("a signal ends a long frame between its samples, with 130 though it is
   CHECK(entries(folder / "frames") == 0);
 }
 
+TEST_CASE("a signal ends a long frame of a model, is told of at once and ends with 130") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(40));
+  // Seconds of tracing: in packets, and ray by ray.
+  for (const Words& how : {Words{}, Words{"--traversal", "bvh"}}) {
+    Surroundings terminal;
+    terminal.terminal = true;
+    RunningProgram program(Words{"render", folder / "model.ply", "--orbit", "1", "--width", "3000",
+                                 "-o", folder / "frames"} +
+                               how,
+                           terminal);
+    while (program.runs() && !has(program.errors(), "% of this frame"))
+      std::this_thread::sleep_for(10ms);
+    REQUIRE(::kill(program.process(), SIGINT) == 0);
+    while (program.runs() && !has(program.errors(), "once more stops at once"))
+      std::this_thread::sleep_for(10ms);
+    const Outcome outcome = program.wait();
+    INFO(outcome.err);
+    CHECK(has(outcome.err, "Interrupted: stopping as soon as"));
+    CHECK(outcome.signal == 0);
+    CHECK(outcome.code == 130);
+    CHECK(has(outcome.err, "Interrupted after 0 of 1 frames"));
+    CHECK(entries(folder / "frames") == 0);
+  }
+}
+
 TEST_CASE("a folder takes one run at a time, and a lock that was left behind none") {
   const TemporaryFolder folder;
   const std::string run = folder / "run";

@@ -29,6 +29,15 @@ TEST_CASE("the progress line fits its width and shows the state") {
   CHECK(line.find("loss 0.5") != std::string::npos);
   CHECK(line.find("left") != std::string::npos);
   CHECK(progress.rate() > 0);
+  Progress open("Compiling", Progress::kUnknown, 0, nullptr);
+  for (int i = 1; i < 100; ++i) {
+    open.update(i, "a.cl");
+    const std::string bar = open.line(60);
+    CHECK(bar.size() <= 60);
+    CHECK(bar.find("===") != std::string::npos);
+    CHECK(bar.find("] " + std::to_string(i) + ", a.cl") != std::string::npos);
+    CHECK(bar.find("left") == std::string::npos);
+  }
   Progress nothing("Empty", 0, 0, nullptr);
   CHECK(nothing.line(80).find("0/0") != std::string::npos);
 }
