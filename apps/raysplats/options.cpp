@@ -180,6 +180,7 @@ DatasetOptions DataFlags::over(DatasetOptions base) const {
   if (downscale) base.downscale = *downscale;
   if (test_every) base.test_every = *test_every;
   if (undistort) base.undistort = *undistort;
+  if (masks) base.masks = *masks == "cutout" ? MaskUse::kCutout : MaskUse::kIgnore;
   return base;
 }
 
@@ -206,6 +207,10 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags) {
          "Make photos with OpenCV distortion pinhole pictures (default, or as the run); no: keep "
          "their own pixels and lenses")
       ->group(group);
+  app.add_option("--masks", flags.masks,
+                 "What is black in masks: ignore (default, or as the run) or cutout (background)")
+      ->group(group)
+      ->check(one_of({"ignore", "cutout"}));
   return data;
 }
 
@@ -216,9 +221,10 @@ Split DataFlags::chosen_split() const {
 }
 
 void DataFlags::check_used(bool orbit) const {
-  if (data.empty() && (split || test_every || undistort)) {
+  if (data.empty() && (split || test_every || undistort || masks)) {
     throw UsageError(
-        "--split, --test-every and --undistort are about the views of a data set: add --data "
+        "--split, --test-every, --undistort and --masks are about the views of a data set: add "
+        "--data "
         "DATASET");
   }
   if (orbit && (split || test_every)) {

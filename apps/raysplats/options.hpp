@@ -89,6 +89,7 @@ struct DataFlags {
   std::optional<double> downscale;
   std::optional<int> test_every;
   std::optional<bool> undistort;
+  std::optional<std::string> masks;
 
   DatasetOptions over(DatasetOptions base) const;
   Split chosen_split() const;

@@ -6,6 +6,8 @@
 // Launch: one work-item per tile of TILE x ROWS pixels, grid tiles_x x tiles_y; any work-group
 // size.
 //   pair      3 planes u (R, G, B), then 3 planes v, padded as in train/ssim_window.h, borders zero
+//   composite 0: m is the photo's alpha; 1: the photo is blended over the background and m is 1; 2:
+//             the same, and m is the plane of words 0 to 255 behind the photo's pixels
 //   partials  per tile {sum m rho(x - y), sum m (clamp(x) - y)^2, 3 sum m, 0} over R, G, B
 // Complexity: one pass over the pixels.
 #include "train/ssim_window.h"
@@ -93,6 +95,16 @@ __kernel void prepare_pair(const __global float* image,
         y[1] = y[1] * alpha + green * rest;
         y[2] = y[2] * alpha + blue * rest;
         mask = valid;
+        if (composite == 2) {
+          if (column + VECTOR <= last) {
+            mask = rs_to_float(rs_load_words(target + pixels + in)) * (1.0f / 255.0f);
+          } else {
+            uint tail[VECTOR];
+            for (int i = 0; i < VECTOR; ++i)
+              tail[i] = column + i < last ? target[pixels + in + i] : 0;
+            mask = rs_to_float(rs_load_private_words(tail)) * (1.0f / 255.0f);
+          }
+        }
       }
       __global float* out = pair + RS_PADDED(row, stride) + column;
       for (int c = 0; c < 3; ++c) {

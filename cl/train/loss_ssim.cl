@@ -112,7 +112,7 @@ __kernel void ssim_slopes(const __global float* pair,
 }
 
 // gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B; the A plane is
-// zeroed.
+// zeroed. `masked`: 0, m = 1; 1, the photo's alpha; 2, the words behind the photo's pixels.
 __kernel void loss_gradient(const __global float* pair,
                             const __global float* slopes,
                             const __global uint* target,
@@ -153,12 +153,14 @@ __kernel void loss_gradient(const __global float* pair,
       const bool whole = column + VECTOR <= last;
       lanes mask = (lanes)(1.0f);
       if (masked) {
+        const __global uint* weights = masked == 2 ? target + pixels + pixel : target + pixel;
+        const uint shift = masked == 2 ? 0 : 24;
         if (whole) {
-          mask = rs_to_float(rs_load_words(target + pixel) >> 24) * (1.0f / 255.0f);
+          mask = rs_to_float(rs_load_words(weights) >> shift) * (1.0f / 255.0f);
         } else {
           uint tail[VECTOR];
-          for (int k = 0; k < VECTOR; ++k) tail[k] = column + k < last ? target[pixel + k] : 0;
-          mask = rs_to_float(rs_load_private_words(tail) >> 24) * (1.0f / 255.0f);
+          for (int k = 0; k < VECTOR; ++k) tail[k] = column + k < last ? weights[k] : 0;
+          mask = rs_to_float(rs_load_private_words(tail) >> shift) * (1.0f / 255.0f);
         }
       }
 #if PIXEL_L2

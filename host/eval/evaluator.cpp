@@ -20,25 +20,32 @@ namespace {
 struct Comparison {
   Image render;  // RGB in [0, 1], equal to the photo where that is masked out
   Image photo;   // RGB
+  Image whole;   // the render as it is, in [0, 1]
   double valid;  // share of the pixels that count
 };
 
 Comparison compare(const Image& traced,
-                   const Image& rgba,
+                   const ViewPicture& picture,
                    bool alpha_is_background,
                    const std::array<float, 3>& background) {
-  Comparison out{Image(rgba.width, rgba.height, 3), Image(rgba.width, rgba.height, 3), 1.0};
+  const Image& rgba = picture.rgba;
+  const Image empty(rgba.width, rgba.height, 3);
+  Comparison out{empty, empty, empty, 1.0};
   if (alpha_is_background) out.photo = composite(rgba, background.data());
+  const bool weighted = !picture.weight.data.empty();
   double weights = 0;
   for (int y = 0; y < rgba.height; ++y) {
     for (int x = 0; x < rgba.width; ++x) {
-      const float mask = alpha_is_background ? 1.0f : rgba.at(x, y, 3);
+      const float mask = weighted              ? picture.weight.at(x, y, 0)
+                         : alpha_is_background ? 1.0f
+                                               : rgba.at(x, y, 3);
       weights += static_cast<double>(mask);
       for (int c = 0; c < 3; ++c) {
         if (!alpha_is_background) out.photo.at(x, y, c) = rgba.at(x, y, c);
         const float photo = out.photo.at(x, y, c);
-        out.render.at(x, y, c) =
-            photo + mask * (std::clamp(traced.at(x, y, c), 0.0f, 1.0f) - photo);
+        const float shown = std::clamp(traced.at(x, y, c), 0.0f, 1.0f);
+        out.whole.at(x, y, c) = shown;
+        out.render.at(x, y, c) = photo + mask * (shown - photo);
       }
     }
   }
@@ -51,6 +58,7 @@ nlohmann::json to_json(const EvaluationMetrics& metrics) {
   if (!metrics.name.empty()) json["name"] = metrics.name;
   json["psnr"] = metrics.psnr;
   json["ssim"] = metrics.ssim;
+  if (metrics.psnr_all) json["psnr_all"] = *metrics.psnr_all;
   if (metrics.lpips) json["lpips"] = *metrics.lpips;
   return json;
 }
@@ -58,9 +66,15 @@ nlohmann::json to_json(const EvaluationMetrics& metrics) {
 EvaluationMetrics mean_of(const std::vector<EvaluationMetrics>& images) {
   EvaluationMetrics mean;
   const double share = 1.0 / static_cast<double>(images.size());
+  // Of all views, those included whose pixels all count.
+  const bool masked = std::any_of(images.begin(), images.end(), [](const EvaluationMetrics& image) {
+    return image.psnr_all.has_value();
+  });
+  if (masked) mean.psnr_all = 0.0;
   for (const EvaluationMetrics& image : images) {
     mean.psnr += image.psnr * share;
     mean.ssim += image.ssim * share;
+    if (masked) *mean.psnr_all += image.psnr_all.value_or(image.psnr) * share;
     if (image.lpips) mean.lpips = mean.lpips.value_or(0.0) + *image.lpips * share;
   }
   return mean;
@@ -131,20 +145,22 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
 
   EvaluationReport report;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const Image rgba = load_view_image(dataset.views[views[i]]);
+    const ViewPicture picture = load_view_picture(dataset.views[views[i]]);
+    const Image& rgba = picture.rgba;
     const Image traced = render(dataset.views[views[i]].camera);
     if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
       throw UsageError(fmt::format(
           "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names[i],
           traced.width, traced.height, traced.channels, rgba.width, rgba.height));
     }
-    const Comparison pair = compare(traced, rgba, dataset.alpha_is_background, background);
+    const Comparison pair = compare(traced, picture, dataset.alpha_is_background, background);
     EvaluationMetrics metrics;
     const std::string& view_name = dataset.views[views[i]].camera.name;
     metrics.name = view_name.empty() ? names[i] : view_name;
     // Masked pixels are equal; they must not count as well reconstructed ones.
     metrics.psnr = psnr(pair.render, pair.photo);
     if (std::isfinite(metrics.psnr)) metrics.psnr += 10.0 * std::log10(pair.valid);
+    if (pair.valid < 1.0) metrics.psnr_all = psnr(pair.whole, pair.photo);
     metrics.ssim = ssim(pair.render, pair.photo);
     if (options.lpips != nullptr) metrics.lpips = options.lpips->distance(pair.render, pair.photo);
     report.images.push_back(metrics);

@@ -6,17 +6,21 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <exception>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 
 #include "io/colmap_model.hpp"
 #include "io/image_file.hpp"
 #include "io/ply_points.hpp"
 #include "io/transforms.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
 
 namespace raysplats {
 namespace {
@@ -73,6 +77,51 @@ void set_cameras(
   if (undistort && view.camera.model == CameraModel::kOpenCv) {
     view.camera.model = CameraModel::kPinhole;
     view.camera.distortion = {};
+  }
+}
+
+/// The mask has the photo's shape (not necessarily its size) and leaves something of it.
+void check_mask(const View& view) {
+  const io::ImageSize size = io::image_size(view.mask_path);
+  const Camera& photo = view.source_camera;
+  const double expected_height = static_cast<double>(size.width) * photo.height / photo.width;
+  if (std::abs(expected_height - size.height) > std::max(2.0, 0.02 * size.height)) {
+    throw DataError(fmt::format(
+        "The mask {} has {} x {} pixels but its photo {} x {}, which is another shape: make it of "
+        "the photo that it belongs to",
+        view.mask_path.string(), size.width, size.height, photo.width, photo.height));
+  }
+  const Image mask = read_image(view.mask_path);
+  for (std::size_t i = 0; i < mask.pixels(); ++i) {
+    if (mask.data[i * static_cast<std::size_t>(mask.channels)] > 0) return;
+  }
+  throw DataError(
+      fmt::format("The mask {} is black everywhere and leaves nothing of its photo {}: remove the "
+                  "photo from the data set, or the mask",
+                  view.mask_path.string(), view.image_path.string()));
+}
+
+/// Checks the masks on all cores; the first failure in the order of the views is thrown.
+void check_masks(const std::vector<View>& views) {
+  std::atomic<std::size_t> next{0};
+  std::vector<std::exception_ptr> errors(views.size());
+  const auto work = [&] {
+    for (std::size_t i = next++; i < views.size(); i = next++) {
+      if (views[i].mask_path.empty()) continue;
+      try {
+        check_mask(views[i]);
+      } catch (...) {
+        errors[i] = std::current_exception();
+      }
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
+      workers.emplace_back(work);
+  }
+  for (const std::exception_ptr& error : errors) {
+    if (error) std::rethrow_exception(error);
   }
 }
 
@@ -188,7 +237,9 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
                                     file.path.string(), frame.mask_path, i));
       }
     } else {
-      view.mask_path = find_mask(folder, photo->filename());
+      // Names may repeat in several folders (train/r_0, test/r_0).
+      view.mask_path = find_mask(folder, io::inner_name(name));
+      if (view.mask_path.empty()) view.mask_path = find_mask(folder, photo->filename());
     }
     const io::ImageSize size = io::image_size(*photo);
     Camera nominal = io::frame_camera(file, i, frame.width.value_or(size.width),
@@ -297,9 +348,15 @@ Dataset load_dataset(const fs::path& root, const DatasetOptions& options) {
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
   if (masked > 0) {
+    check_masks(dataset.views);
+    const bool ignores = options.masks == MaskUse::kIgnore;
+    if (!ignores) dataset.alpha_is_background = true;
+    for (View& view : dataset.views)
+      view.mask_apart = ignores && dataset.alpha_is_background && has_mask(view);
     const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_mask);
-    spdlog::info("{} of {} photos have a mask, as {}: what is black there does not count", masked,
-                 dataset.views.size(), first->mask_path.string());
+    spdlog::info("{} of {} photos have a mask, as {}: what is black there {}", masked,
+                 dataset.views.size(), first->mask_path.string(),
+                 ignores ? "does not count" : "is background");
   }
   return dataset;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "core/camera_model.hpp"
@@ -131,6 +132,17 @@ Image undistort(Image rgba, const Camera& camera) {
       }
       store_straight(sum, target);
     }
+  }
+  return out;
+}
+
+ViewPicture take_weight(Image rgba, const Image& weight) {
+  ViewPicture out{std::move(rgba), Image(weight.width, weight.height, 1)};
+  for (std::size_t i = 0; i < weight.pixels(); ++i) {
+    const float share = weight.data[kChannels * i + 3];
+    float& alpha = out.rgba.data[kChannels * i + 3];
+    alpha = share > 0 ? std::min(alpha / share, 1.0f) : 0.0f;
+    out.weight.data[i] = share;
   }
   return out;
 }

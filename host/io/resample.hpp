@@ -2,6 +2,7 @@
 #pragma once
 
 #include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
 #include "raysplats/image.hpp"
 
 namespace raysplats::io {
@@ -15,6 +16,10 @@ Image area_resample(const Image& rgba, int width, int height);
 /// taken (bilinear, colours weighted by alpha). Pixels whose ray leaves the photo, or lies beyond
 /// lens_limit(), get alpha 0.
 Image undistort(Image rgba, const Camera& camera);
+
+/// Divides a picture whose alpha is coverage times weight (so that colours come from what counts)
+/// by the weight, which is the alpha of `weight`.
+ViewPicture take_weight(Image rgba, const Image& weight);
 
 /// Sets alpha to 0 where the camera's lens (kOpenCv or kFisheye) sees nothing: beyond the image of
 /// lens_limit().

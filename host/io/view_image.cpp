@@ -40,17 +40,8 @@ void apply_mask(Image& rgba, const Image& mask) {
   }
 }
 
-}  // namespace
-
-Image load_view_image(const View& view) {
-  Image rgba = to_rgba(read_image(view.image_path));
-  if (rgba.width != view.source_camera.width || rgba.height != view.source_camera.height) {
-    throw DataError(
-        fmt::format("The image {} has {} x {} pixels now, but {} x {} when the data set was opened",
-                    view.image_path.string(), rgba.width, rgba.height, view.source_camera.width,
-                    view.source_camera.height));
-  }
-  if (!view.mask_path.empty()) apply_mask(rgba, read_image(view.mask_path));
+/// Takes the lens out of a picture and gives it the view's size.
+Image fitted(Image rgba, const View& view) {
   if (view.source_camera.model == CameraModel::kOpenCv &&
       view.camera.model == CameraModel::kPinhole) {
     rgba = io::undistort(std::move(rgba), view.source_camera);
@@ -59,6 +50,28 @@ Image load_view_image(const View& view) {
   }
   if (rgba.width == view.camera.width && rgba.height == view.camera.height) return rgba;
   return io::area_resample(rgba, view.camera.width, view.camera.height);
+}
+
+}  // namespace
+
+Image load_view_image(const View& view) { return load_view_picture(view).rgba; }
+
+ViewPicture load_view_picture(const View& view) {
+  Image rgba = to_rgba(read_image(view.image_path));
+  if (rgba.width != view.source_camera.width || rgba.height != view.source_camera.height) {
+    throw DataError(
+        fmt::format("The image {} has {} x {} pixels now, but {} x {} when the data set was opened",
+                    view.image_path.string(), rgba.width, rgba.height, view.source_camera.width,
+                    view.source_camera.height));
+  }
+  if (view.mask_path.empty()) return {fitted(std::move(rgba), view), {}};
+  const Image mask = read_image(view.mask_path);
+  apply_mask(rgba, mask);
+  if (!view.mask_apart) return {fitted(std::move(rgba), view), {}};
+  Image weight(rgba.width, rgba.height, 4, 1.0f);
+  apply_mask(weight, mask);
+  // Where nothing is known the coverage is none, so that resampling takes it from known pixels.
+  return io::take_weight(fitted(std::move(rgba), view), fitted(std::move(weight), view));
 }
 
 Image composite(const Image& rgba, const float background[3]) {

@@ -9,16 +9,31 @@
 
 namespace raysplats::io {
 
+namespace {
+
+std::uint32_t byte_of(float value) {
+  // Written so that NaN becomes 0.
+  const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;
+  return static_cast<std::uint32_t>(clamped * 255.0f + 0.5f);
+}
+
+}  // namespace
+
+PackedImage pack(const ViewPicture& picture) {
+  PackedImage out = pack(picture.rgba);
+  out.weights.reserve(picture.weight.data.size());
+  for (const float weight : picture.weight.data)
+    out.weights.push_back(static_cast<std::uint8_t>(byte_of(weight)));
+  return out;
+}
+
 PackedImage pack(const Image& rgba) {
-  PackedImage out{rgba.width, rgba.height, {}};
+  PackedImage out{rgba.width, rgba.height, {}, {}};
   out.pixels.resize(rgba.pixels());
   for (std::size_t i = 0; i < rgba.pixels(); ++i) {
     std::uint32_t word = 0;
     for (std::size_t c = 0; c < 4; ++c) {
-      const float value = rgba.data[4 * i + c];
-      // Written so that NaN becomes 0.
-      const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;
-      word |= static_cast<std::uint32_t>(clamped * 255.0f + 0.5f) << (8 * c);
+      word |= byte_of(rgba.data[4 * i + c]) << (8 * c);
     }
     out.pixels[i] = word;
   }
@@ -41,7 +56,7 @@ ViewLoader::~ViewLoader() {
 std::size_t ViewLoader::view_bytes(std::size_t index) const {
   const Camera& camera = views_[index].camera;
   return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height) *
-         sizeof(std::uint32_t);
+         (sizeof(std::uint32_t) + (views_[index].mask_apart ? 1 : 0));
 }
 
 void ViewLoader::prefetch(std::span<const std::size_t> indices) {
@@ -158,7 +173,7 @@ void ViewLoader::work(const std::stop_token& stop) {
     std::shared_ptr<const PackedImage> image;
     std::exception_ptr error;
     try {
-      image = std::make_shared<const PackedImage>(pack(load_view_image(views_[index])));
+      image = std::make_shared<const PackedImage>(pack(load_view_picture(views_[index])));
     } catch (...) {
       error = std::current_exception();
     }

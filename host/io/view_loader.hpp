@@ -23,12 +23,15 @@ struct PackedImage {
   int width = 0;
   int height = 0;
   std::vector<std::uint32_t> pixels;
+  /// How much each pixel counts, 0 to 255; empty where ViewPicture::weight is.
+  std::vector<std::uint8_t> weights;
 
-  std::size_t bytes() const { return pixels.size() * sizeof(std::uint32_t); }
+  std::size_t bytes() const { return pixels.size() * sizeof(std::uint32_t) + weights.size(); }
 };
 
 /// Rounds an RGBA image to 8 bits a channel, clamped to [0, 1].
 PackedImage pack(const Image& rgba);
+PackedImage pack(const ViewPicture& picture);
 
 /// Loads the pictures of a data set in worker threads and keeps those used last within a byte
 /// budget. All members may be called from several threads.

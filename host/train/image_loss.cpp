@@ -110,17 +110,19 @@ void ImageLoss::evaluate(const Buffer<float>& image,
   s.resize(width, height);
   gradient.ensure(s.context, 4 * pixels, "image gradient");
 
+  const bool weighted = alpha_is_background && target.size() >= 2 * pixels;
   Range range{{s.tiles_x(), s.tiles_y(), 1}, {0, 0, 0}};
   if (s.serial) range.local = {1, 1, 1};
   s.prepare.launch(range, image, target, s.pair, s.pixel_partials, width, height, s.stride, s.plane,
-                   alpha_is_background ? 1 : 0, background[0], background[1], background[2]);
+                   alpha_is_background ? (weighted ? 2 : 1) : 0, background[0], background[1],
+                   background[2]);
   range.global[2] = 3;
   s.slopes_kernel.launch(range, s.pair, s.slopes, s.ssim_partials, width, height, s.stride,
                          s.plane);
   const float share = 1.0f / (3.0f * static_cast<float>(pixels));
   s.gradient_kernel.launch(range, s.pair, s.slopes, target, gradient, width, height, s.stride,
-                           s.plane, alpha_is_background ? 0 : 1, (1.0f - s.ssim_weight) * share,
-                           -s.ssim_weight * share);
+                           s.plane, alpha_is_background ? (weighted ? 2 : 0) : 1,
+                           (1.0f - s.ssim_weight) * share, -s.ssim_weight * share);
 }
 
 ImageLoss::Partials ImageLoss::partials() const {

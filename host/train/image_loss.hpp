@@ -21,7 +21,7 @@ namespace raysplats {
 /// still taken over *all* pixels, so masking takes a pixel's share out of the loss and leaves the
 /// weight of the others as it was; a masked pixel (m = 0) is equal in both images and contributes
 /// neither value nor gradient. With alpha_is_background y = rgb * a + background * (1 - a) and m =
-/// 1 everywhere.
+/// 1 everywhere, or what the photo's plane of weights says.
 class ImageLoss {
  public:
   /// Where evaluate() leaves its sums: per tile {pixel term, squared error, weight, 0}, and SSIM
@@ -46,7 +46,8 @@ class ImageLoss {
   ~ImageLoss();
 
   /// Enqueues loss and gradient. `image`: planar R, G, B, A (A is not read), 4 x height x width.
-  /// `target`: packed r | g << 8 | b << 16 | a << 24, height x width. `gradient` is grown as needed
+  /// `target`: packed r | g << 8 | b << 16 | a << 24, height x width; with alpha_is_background a
+  /// plane of weights, words 0 to 255, may follow (TargetCache). `gradient` is grown as needed
   /// and overwritten: planar dL/dR, dL/dG, dL/dB and zeros for A. Nothing is waited for.
   void evaluate(const Buffer<float>& image,
                 const Buffer<std::uint32_t>& target,

@@ -92,6 +92,7 @@ DatasetOptions dataset_options(const ModelSource& source) {
     out.downscale = source.trained->downscale;
     out.test_every = source.trained->test_every;
     out.undistort = source.trained->undistort;
+    out.masks = source.trained->masks;
   }
   return out;
 }

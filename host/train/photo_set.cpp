@@ -25,6 +25,13 @@ glm::dvec4 SmallPhoto::at(const glm::dvec2& point) const {
   return {channel(pixel, 0), channel(pixel, 1), channel(pixel, 2), channel(pixel, 3)};
 }
 
+bool SmallPhoto::known(const glm::dvec2& point) const {
+  if (picture->weights.empty()) return true;
+  const auto x = static_cast<std::size_t>(std::clamp<double>(point.x, 0, picture->width - 1));
+  const auto y = static_cast<std::size_t>(std::clamp<double>(point.y, 0, picture->height - 1));
+  return picture->weights[y * static_cast<std::size_t>(picture->width) + x] >= 128;
+}
+
 std::optional<glm::dvec2> SmallPhoto::sees(const glm::dvec3& world) const {
   const std::optional<glm::dvec2> point = project(camera, world);
   if (!point ||

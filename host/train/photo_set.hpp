@@ -20,6 +20,8 @@ struct SmallPhoto {
   /// Colour and alpha in [0, 1] of the pixel that contains the image point; the point has to lie
   /// inside the picture.
   glm::dvec4 at(const glm::dvec2& point) const;
+  /// Whether the pixel that contains the image point counts: at least half of it is not masked out.
+  bool known(const glm::dvec2& point) const;
   /// Where a world point is seen inside the picture.
   std::optional<glm::dvec2> sees(const glm::dvec3& world) const;
 };

@@ -127,7 +127,8 @@ std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
     const glm::dvec3 world = ray.origin + depth_of(step, depths) * ray.direction;
     differences.clear();
     for (const std::size_t i : neighbours) {
-      if (const auto point = photos[i].sees(world))
+      const auto point = photos[i].sees(world);
+      if (point && photos[i].at(*point).w >= 0.5)
         differences.push_back(difference(reference, patch_at(photos[i], *point)));
     }
     costs[step] = -1;
@@ -200,7 +201,8 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
     bool inside = true;
     for (const SmallPhoto& photo : photos) {
       const auto point = photo.sees(world);
-      if (!point) continue;
+      // What a mask ignores says neither that something is there nor that nothing is.
+      if (!point || !photo.known(*point)) continue;
       inside = shows_something(photo, *point);
       if (!inside) break;
       const glm::dvec4 color = photo.at(*point);

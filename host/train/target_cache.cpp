@@ -9,14 +9,23 @@
 namespace raysplats {
 namespace {
 
-Image unpack(const io::PackedImage& packed) {
+constexpr float kWhole = 255.0f;
+
+// The photo at another size. Colours come from the pixels that count.
+io::PackedImage reduced(const io::PackedImage& packed, int width, int height) {
   Image image(packed.width, packed.height, 4);
+  Image weight(packed.weights.empty() ? 0 : packed.width,
+               packed.weights.empty() ? 0 : packed.height, 4);
   for (std::size_t i = 0; i < packed.pixels.size(); ++i) {
-    for (std::size_t c = 0; c < 4; ++c) {
-      image.data[4 * i + c] = static_cast<float>(packed.pixels[i] >> (8 * c) & 0xffu) / 255.0f;
-    }
+    for (std::size_t c = 0; c < 4; ++c)
+      image.data[4 * i + c] = static_cast<float>(packed.pixels[i] >> (8 * c) & 0xffu) / kWhole;
+    if (packed.weights.empty()) continue;
+    weight.data[4 * i + 3] = static_cast<float>(packed.weights[i]) / kWhole;
+    image.data[4 * i + 3] *= weight.data[4 * i + 3];
   }
-  return image;
+  image = io::area_resample(image, width, height);
+  if (packed.weights.empty()) return io::pack(image);
+  return io::pack(io::take_weight(std::move(image), io::area_resample(weight, width, height)));
 }
 
 }  // namespace
@@ -39,16 +48,18 @@ const Buffer<std::uint32_t>& TargetCache::get(std::size_t view, int width, int h
 
   std::shared_ptr<const io::PackedImage> photo = loader_.get(view);
   if (photo->width != width || photo->height != height) {
-    photo = std::make_shared<const io::PackedImage>(
-        io::pack(io::area_resample(unpack(*photo), width, height)));
+    photo = std::make_shared<const io::PackedImage>(reduced(*photo, width, height));
   }
-  const bool stays = cached_ + photo->bytes() <= budget_;
+  std::vector<std::uint32_t> words = photo->pixels;
+  words.insert(words.end(), photo->weights.begin(), photo->weights.end());
+  const std::size_t bytes = words.size() * sizeof(std::uint32_t);
+  const bool stays = cached_ + bytes <= budget_;
   Entry& target = stays ? entry : passing_;
   target.width = width;
   target.height = height;
-  target.pixels = Buffer<std::uint32_t>(context_, photo->pixels.size(), "photo");
-  target.pixels.upload(photo->pixels);
-  if (stays) cached_ += photo->bytes();
+  target.pixels = Buffer<std::uint32_t>(context_, words.size(), "photo");
+  target.pixels.upload(words);
+  if (stays) cached_ += bytes;
   return target.pixels;
 }
 

@@ -25,7 +25,8 @@ class TargetCache {
               std::size_t budget,
               std::size_t host_budget);
 
-  /// The photo of a view (an index into `views`) reduced to width x height (area average).
+  /// The photo of a view (an index into `views`) reduced to width x height (area average). Where
+  /// the view's mask is apart, a word per pixel with its weight, 0 to 255, follows.
   const Buffer<std::uint32_t>& get(std::size_t view, int width, int height);
 
   /// Decodes these photos in the background as far as they are not on the device.

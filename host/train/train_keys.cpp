@@ -310,6 +310,9 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.flag("undistort", o.undistort,
          "turn photos through lenses with OpenCV distortion into pinhole pictures; false = their "
          "own pixels and rays");
+  t.choice<MaskUse>("masks", o.masks, {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
+                    "what is black in the photos' masks: ignore (it counts neither in the loss nor "
+                    "in metrics) or cutout (background, as transparent pixels are)");
   t.color("background", o.background,
           "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
           "alpha, else black) or "

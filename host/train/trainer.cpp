@@ -624,6 +624,8 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   differs("downscale", before.downscale, options.downscale);
   differs("test-every", before.test_every, options.test_every);
   differs("undistort", before.undistort, options.undistort);
+  const auto cuts = [](const TrainOptions& o) { return o.masks == MaskUse::kCutout; };
+  differs("masks = cutout", cuts(before), cuts(options));
 }
 
 void Trainer::Impl::resume(const std::filesystem::path& source) {

@@ -15,12 +15,19 @@ namespace raysplats {
 enum class DatasetKind { kColmap, kBlender, kNerfstudio };
 enum class Split { kTrain, kTest, kAll };
 
+/// What a photo's mask says about the pixels that are black in it.
+enum class MaskUse {
+  kIgnore,  ///< nothing is known of them: they count neither in training nor in evaluation
+  kCutout,  ///< they are background, as the transparent pixels of cut-out photos
+};
+
 /// One photo and the camera that took it, at the size it is used (after --downscale).
 struct View {
   Camera camera;                     ///< of the picture that load_view_image() gives
   std::filesystem::path image_path;  ///< the photo on disk, possibly distorted and larger
   std::filesystem::path mask_path;   ///< optional mask (black = ignore); empty when there is none
-  Camera source_camera;              ///< of the photo on disk, with its lens
+  bool mask_apart = false;  ///< alpha is coverage, and what the mask ignores is a plane of its own
+  Camera source_camera;     ///< of the photo on disk, with its lens
   bool test = false;
 };
 
@@ -39,8 +46,8 @@ struct Dataset {
   std::filesystem::path root;
   std::vector<View> views;  ///< sorted by name within a split
   PointCloud points;
-  bool alpha_is_background =
-      false;  ///< RGBA is composited over the background (Blender), else alpha is a mask
+  bool alpha_is_background = false;  ///< RGBA is composited over the background (Blender,
+                                     ///< MaskUse::kCutout), else alpha is a mask
 
   std::vector<std::size_t> indices(Split split) const;
 };
@@ -52,11 +59,12 @@ struct DatasetOptions {
   /// keep their pixels and their model. Other models cannot become pinholes without loss and keep
   /// theirs either way.
   bool undistort = true;
+  MaskUse masks = MaskUse::kIgnore;
 };
 
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender) and reads everything but the pixels.
 /// Throws DataError for a folder that is none, a missing image, an unsupported camera model, no
-/// views.
+/// views, a mask of another shape than its photo or black everywhere.
 Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& options = {});
 
 /// The photo of a view as RGBA float at camera.width x camera.height: undistorted where
@@ -64,6 +72,15 @@ Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& op
 /// or coverage: 1 where the photo is valid, 0 beyond the limit of a lens; RGB is straight (not
 /// premultiplied).
 Image load_view_image(const View& view);
+
+/// A photo, and how much each of its pixels counts.
+struct ViewPicture {
+  Image rgba;    ///< as load_view_image()
+  Image weight;  ///< one channel in [0, 1], or empty where all count alike (!View::mask_apart)
+};
+
+/// The photo of a view with what its mask ignores.
+ViewPicture load_view_picture(const View& view);
 
 /// RGB of `rgba` over a constant background.
 Image composite(const Image& rgba, const float background[3]);

@@ -20,7 +20,8 @@ struct EvaluationMetrics {
   std::string name;
   double psnr = 0;  ///< decibels, over the pixels that are not masked out
   double ssim = 0;
-  std::optional<double> lpips;  ///< when a network was given
+  std::optional<double> psnr_all;  ///< over all pixels, when some are masked out
+  std::optional<double> lpips;     ///< when a network was given
 };
 
 struct EvaluationReport {
@@ -29,8 +30,8 @@ struct EvaluationReport {
 
   /// One line per image and the mean, aligned.
   std::string table() const;
-  /// {"psnr", "ssim", "lpips" (if measured), "images": [{"name", "psnr", "ssim", ...}]}; an
-  /// infinite PSNR is null.
+  /// {"psnr", "ssim", "psnr_all" (if some pixels are masked out), "lpips" (if measured), "images":
+  /// [{"name", "psnr", "ssim", ...}]}; an infinite PSNR is null.
   std::string json() const;
 };
 

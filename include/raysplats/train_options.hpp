@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "raysplats/dataset.hpp"
 #include "raysplats/trace_options.hpp"
 
 namespace raysplats {
@@ -67,6 +68,7 @@ struct TrainOptions {
   double downscale = 1.0;
   int test_every = 8;
   bool undistort = true;
+  MaskUse masks = MaskUse::kIgnore;
   std::string background = "auto";   ///< "auto", "random" or "r,g,b"
   std::int64_t image_budget = 1024;  ///< MiB
   std::vector<ResolutionStep> resolution_schedule{{4, 0.1}, {3, 0.18}, {2, 0.4}};

@@ -134,6 +134,20 @@ TEST_CASE("evaluator: masked pixels neither help nor hurt") {
     REQUIRE(report.images.size() == 1);
     CHECK(report.mean.psnr == doctest::Approx(-20 * std::log10(0.2)).epsilon(1e-4));
     CHECK(report.mean.ssim < 0.999);
+    // Beside it what all pixels give, those under the mask included.
+    REQUIRE(report.mean.psnr_all.has_value());
+    const View& view = scene.dataset.views[0];
+    const Image rgba = load_view_image(view);
+    Image rgb(kWidth, kHeight, 3), shown(kWidth, kHeight, 3);
+    const Image traced = render(view.camera);
+    for (std::size_t p = 0; p < rgb.pixels(); ++p) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        rgb.data[3 * p + c] = rgba.data[4 * p + c];
+        shown.data[3 * p + c] = std::clamp(traced.data[4 * p + c], 0.0f, 1.0f);
+      }
+    }
+    CHECK(*report.mean.psnr_all == doctest::Approx(psnr(shown, rgb)).epsilon(1e-6));
+    CHECK(nlohmann::json::parse(report.json()).contains("psnr_all"));
   }
 }
 

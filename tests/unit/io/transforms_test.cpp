@@ -268,6 +268,61 @@ TEST_CASE("Blender scenes have their own test views, straight alpha and no size 
   CHECK(contains(data_error([&] { load(); }), "./test/r_0"));
 }
 
+TEST_CASE("masks of cut-out photos ignore pixels or cut them out, and bad masks are refused") {
+  const Scratch scratch;
+  // The right half is transparent; the mask ignores the upper half, in quarters of the photo's
+  // size.
+  Image photo(16, 8, 4, 1.0f);
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      photo.at(x, y, 0) = y < 4 ? 0.0f : 1.0f;
+      photo.at(x, y, 3) = x < 8 ? 1.0f : 0.0f;
+    }
+  }
+  Image mask(8, 4, 1, 1.0f);
+  for (int x = 0; x < 8; ++x) mask.at(x, 0, 0) = mask.at(x, 1, 0) = 0.0f;
+  write_image(scratch / "train/r_0.png", photo);
+  write_image(scratch / "test/r_0.png", photo);
+  write_image(scratch / "masks/train/r_0.png", mask);
+  for (const char* split : {"train", "test"}) {
+    write_bytes(scratch / (std::string("transforms_") + split + ".json"),
+                file_of("\"camera_angle_x\": 0.8, ", frame(std::string(split) + "/r_0", 0, "")));
+  }
+  DatasetOptions options;
+  const Dataset ignored = load_dataset(scratch.path(), options);
+  REQUIRE(ignored.views.size() == 2);
+  CHECK(ignored.views[0].mask_apart);
+  CHECK(ignored.views[1].mask_path.empty());
+  CHECK(load_view_picture(ignored.views[1]).weight.data.empty());
+  const ViewPicture whole = load_view_picture(ignored.views[0]);
+  CHECK(whole.weight.at(3, 3, 0) == 0.0f);
+  CHECK(whole.weight.at(3, 4, 0) == 1.0f);
+  CHECK(whole.rgba.at(3, 4, 3) == 1.0f);
+  CHECK(whole.rgba.at(12, 4, 3) == 0.0f);
+  CHECK(load_view_image(ignored.views[0]).data == whole.rgba.data);
+  // Reduced so that a pixel has three rows that are ignored and one that counts.
+  View small = ignored.views[0];
+  small.camera = downscaled(small.camera, 16.0 / 3.0);
+  small.camera.height = 1;
+  const ViewPicture reduced = load_view_picture(small);
+  CHECK(reduced.weight.at(0, 0, 0) == doctest::Approx(0.5));
+  CHECK(reduced.rgba.at(0, 0, 3) == doctest::Approx(1.0));
+  CHECK(reduced.rgba.at(0, 0, 0) == doctest::Approx(1.0));
+
+  options.masks = MaskUse::kCutout;
+  const Dataset cut = load_dataset(scratch.path(), options);
+  CHECK(cut.alpha_is_background);
+  CHECK(!cut.views[0].mask_apart);
+  CHECK(load_view_picture(cut.views[0]).weight.data.empty());
+  CHECK(load_view_image(cut.views[0]).at(3, 3, 3) == 0.0f);
+  CHECK(load_view_image(cut.views[0]).at(3, 4, 3) == 1.0f);
+
+  write_image(scratch / "masks/train/r_0.png", Image(8, 8, 1, 1.0f));
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "another shape"));
+  write_image(scratch / "masks/train/r_0.png", Image(16, 8, 1, 0.0f));
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "black everywhere"));
+}
+
 TEST_CASE("nerfstudio scenes: distortion, masks, points, lists of names, scaled photos") {
   const Scratch scratch;
   std::string frames;

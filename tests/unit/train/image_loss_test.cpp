@@ -31,7 +31,9 @@ struct Scene {
   bool alpha_is_background = false;
   std::array<float, 3> background{0, 0, 0};
 
-  std::size_t pixels() const { return target.size(); }
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
 };
 
 // Smooth image with noise and a photo that differs from it; alpha in whole steps and between.
@@ -73,6 +75,7 @@ double photo_value(const Scene& s, std::size_t pixel, std::size_t c) {
 }
 
 double photo_weight(const Scene& s, std::size_t pixel) {
+  if (s.target.size() > s.pixels()) return s.target[s.pixels() + pixel] / 255.0;
   return s.alpha_is_background ? 1.0 : (s.target[pixel] >> 24) / 255.0;
 }
 
@@ -208,6 +211,25 @@ TEST_CASE(
       if (alpha_is_background) continue;
       for (std::size_t i = 0; i < s.pixels(); ++i) {
         if (s.target[i] >> 24 != 0) continue;
+        for (std::size_t c = 0; c < 3; ++c) CHECK(result.gradient[c * s.pixels() + i] == 0.0f);
+      }
+    }
+  }
+}
+
+TEST_CASE("image loss: a plane of weights ignores pixels of cut-out photos [small]") {
+  for (const int width : {21, 32}) {
+    CAPTURE(width);
+    for (const PixelLoss pixel_loss : {PixelLoss::kL1, PixelLoss::kL2}) {
+      Scene s = make_scene(width, 14, 6, true);
+      s.alpha_is_background = true;
+      s.background = {1.0f, 0.5f, 0.25f};
+      for (std::size_t i = 0; i < s.pixels(); ++i)
+        s.target.push_back(i % 5 == 0 ? 0U : i % 5 == 1 ? 97U : 255U);
+      const Result result = run(s, pixel_loss, 0.2f, 0);
+      check_value(s, pixel_loss, 0.2f, result.value);
+      check_gradient(s, pixel_loss, 0.2f, result.gradient);
+      for (std::size_t i = 0; i < s.pixels(); i += 5) {
         for (std::size_t c = 0; c < 3; ++c) CHECK(result.gradient[c * s.pixels() + i] == 0.0f);
       }
     }

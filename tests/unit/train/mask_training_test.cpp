@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// Photos with something in them that the others do not show, and masks that say where.
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+#include "raysplats/context.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/device.hpp"
+#include "raysplats/io.hpp"
+#include "raysplats/trainer.hpp"
+#include "synth/synthetic_dataset.hpp"
+
+using namespace raysplats;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kSize = 48;
+constexpr int kViews = 20;
+constexpr int kBox = 22;  // pixels of a side
+
+struct Folder {
+  fs::path path =
+      fs::temp_directory_path() / ("raysplats_mask_training_" + std::to_string(::getpid()));
+  Folder() { fs::remove_all(path); }
+  ~Folder() {
+    std::error_code error;
+    fs::remove_all(path, error);
+  }
+};
+
+// Paints a box into three of ten photos, at another place in each, and puts masks of it beside
+// them.
+void add_moving_box(const fs::path& data) {
+  fs::create_directories(data / "masks/train");
+  for (int i = 0; i < kViews; ++i) {
+    if (i % 10 >= 3) continue;
+    const std::string name = "train/r_" + std::to_string(i) + ".png";
+    Image photo = read_image(data / name);
+    Image mask(kSize, kSize, 1, 1.0f);
+    const int left = (7 * i) % (kSize - kBox), top = (5 * i + 3) % (kSize - kBox);
+    for (int y = top; y < top + kBox; ++y) {
+      for (int x = left; x < left + kBox; ++x) {
+        photo.at(x, y, 0) = 0.9f;
+        photo.at(x, y, 1) = 0.1f;
+        photo.at(x, y, 2) = 0.8f;
+        photo.at(x, y, 3) = 1.0f;
+        mask.at(x, y, 0) = 0.0f;
+      }
+    }
+    write_image(data / name, photo);
+    write_image(data / "masks" / name, mask);
+  }
+}
+
+double trained_psnr(Context& context, const fs::path& data, const fs::path& run) {
+  TrainOptions options;
+  options.iterations = 300;
+  options.eval_at = {};
+  options.save_at = {};
+  options.eval_renders = 0;
+  options.checkpoint_every = 0;
+  Trainer trainer(context, load_dataset(data), options, run);
+  return trainer.run(false).evaluations.back().psnr;
+}
+
+}  // namespace
+
+TEST_CASE("a moving box under masks costs next to nothing, and much without them") {
+  const Folder folder;
+  Context context{select_device("")};
+  SyntheticOptions synthetic;
+  synthetic.size = kSize;
+  synthetic.train_views = kViews;
+  synthetic.test_views = 5;
+  generate_dataset(folder.path / "data", synthetic, false);
+  const fs::path data = folder.path / "data";
+  const double clean = trained_psnr(context, data, folder.path / "clean");
+  add_moving_box(data);
+  const double masked = trained_psnr(context, data, folder.path / "masked");
+  fs::rename(data / "masks", folder.path / "masks");
+  const double bare = trained_psnr(context, data, folder.path / "bare");
+  MESSAGE("clean " << clean << " dB, masked " << masked << ", without masks " << bare);
+  CHECK(masked > clean - 0.3);
+  CHECK(bare < clean - 0.5);
+}
