@@ -1,190 +1,165 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adam (Kingma and Ba 2015) for all parameters of the Gaussians in one launch, and the moves of its
-// moments.
+// Adam (Kingma and Ba 2015) for the parameters of the Gaussians: first which of them take the step,
+// then one group of parameters after the other; and the moves of its moments.
 //
 // A Gaussian with a gradient that is not finite keeps its parameters and moments and is counted;
-// with visible_only so does, uncounted, one that no ray met (screen[3 i + 2] == 0). A work-item
-// owns BLOCK consecutive Gaussians, so every group is one contiguous run for it; only a block with
-// an exception is walked Gaussian by Gaussian.
-//
-// A guard word that is not 0 turns the whole step off (train/guard.cl).
-//
-// Launch of adam_step: one work-item per block, any work-group size.
-// Complexity: reads parameter, gradient and both moments once, writes all but the gradient: bound
-// by memory.
+// with visible_only so does, uncounted, one that no ray met (screen[3 i + 2] == 0). A guard word
+// that is not 0 turns the whole step off (train/guard.cl).
+#include "shared/adam_layout.h"
 #include "train/lanes.h"
 
+// Gaussians of a work-group of choose_steps.
 #ifndef BLOCK
 #define BLOCK 64
 #endif
-// Most SH floats of one Gaussian: 25 coefficients of R, G, B.
-#define MAX_SH 75
-// A first moment below this moves nothing; left alone it would decay into denormal numbers, which
-// CPUs handle slowly.
-#define TINY_MOMENT 1e-30f
-
-typedef struct {
-  float beta1, rest1;  // rest = 1 - beta
-  float beta2, rest2;
-  float epsilon;
-  float root_scale;  // 1 / sqrt(1 - beta2^step)
-} AdamConstants;
-
-typedef struct {
-  __global float* parameter;
-  const __global float* gradient;
-  __global float* first;
-  __global float* second;
-} AdamGroup;
-
-// `rate` is the learning rate over 1 - beta1^step.
-void adam_lanes(AdamGroup group, size_t i, lanes rate, const AdamConstants* k) {
-  const lanes g = rs_load(group.gradient + i);
-  lanes first = k->beta1 * rs_load(group.first + i) + k->rest1 * g;
-  first = rs_pick(fabs(first) < TINY_MOMENT, 0.0f, first);
-  const lanes second = k->beta2 * rs_load(group.second + i) + k->rest2 * g * g;
-  rs_store(first, group.first + i);
-  rs_store(second, group.second + i);
-  rs_store(
-      rs_load(group.parameter + i) - rate * first / (sqrt(second) * k->root_scale + k->epsilon),
-      group.parameter + i);
-}
-
-void adam_scalar(AdamGroup group, size_t i, float rate, const AdamConstants* k) {
-  const float g = group.gradient[i];
-  float first = k->beta1 * group.first[i] + k->rest1 * g;
-  first = fabs(first) < TINY_MOMENT ? 0.0f : first;
-  const float second = k->beta2 * group.second[i] + k->rest2 * g * g;
-  group.first[i] = first;
-  group.second[i] = second;
-  group.parameter[i] -= rate * first / (sqrt(second) * k->root_scale + k->epsilon);
-}
-
-void adam_run(AdamGroup group, size_t begin, size_t end, float rate, const AdamConstants* k) {
-  size_t i = begin;
-  for (; i + VECTOR <= end; i += VECTOR) adam_lanes(group, i, (lanes)(rate), k);
-  for (; i < end; ++i) adam_scalar(group, i, rate, k);
-}
-
-// SH: `rates` repeats with `period` floats and reaches VECTOR beyond it; `begin` is the start of a
-// Gaussian.
-void adam_run_sh(AdamGroup group,
-                 size_t begin,
-                 size_t end,
-                 const float* rates,
-                 int period,
-                 const AdamConstants* k) {
-  const int advance = VECTOR % period;
-  int phase = 0;
-  size_t i = begin;
-  for (; i + VECTOR <= end; i += VECTOR) {
-    adam_lanes(group, i, rs_load_private(rates + phase), k);
-    phase += advance;
-    phase = phase >= period ? phase - period : phase;
-  }
-  for (; i < end; ++i) adam_scalar(group, i, rates[phase++], k);
-}
+// Its work-items.
+#ifndef GROUP
+#define GROUP 1
+#endif
+// Floats of one Gaussian in the group of parameters, and those that a work-item of adam_step
+// updates: many on CPUs; one vector on GPUs, so that neighbours touch neighbouring addresses.
+#ifndef WIDTH
+#define WIDTH 1
+#endif
+#ifndef SPAN
+#define SPAN VECTOR
+#endif
 
 // Exponent of infinity and NaN. Compilers may take zero times anything for zero, so numbers that
 // are not finite are known by their bits.
 #define RS_EXPONENT 0x7f800000u
 
-// Whether a gradient of the run is not finite.
-bool poisoned(const __global float* gradient, size_t begin, size_t end) {
+// Marks in `bad` the Gaussians of [first, last) with a gradient that is not finite; the work-items
+// of the group share the vectors between them.
+void mark_poisoned(
+    const __global float* gradient, size_t first, size_t last, size_t width, __local uint* bad) {
   const __global uint* words = (const __global uint*)gradient;
+  const size_t begin = first * width, end = last * width;
   lane_words most = (lane_words)(0u);
   uint rest = 0;
-  size_t i = begin;
-  for (; i + VECTOR <= end; i += VECTOR) most = max(most, rs_load_words(words + i) & RS_EXPONENT);
+  size_t i = begin + get_local_id(0) * VECTOR;
+  for (; i + VECTOR <= end; i += GROUP * VECTOR) {
+    most = max(most, rs_load_words(words + i) & RS_EXPONENT);
+  }
   for (; i < end; ++i) rest = max(rest, words[i] & RS_EXPONENT);
-  return rest == RS_EXPONENT || rs_any_lane(most == RS_EXPONENT);
-}
-
-__kernel void adam_step(__global float* means,
-                        const __global float* means_gradient,
-                        __global float* means_first,
-                        __global float* means_second,
-                        __global float* quaternions,
-                        const __global float* quaternions_gradient,
-                        __global float* quaternions_first,
-                        __global float* quaternions_second,
-                        __global float* scales,
-                        const __global float* scales_gradient,
-                        __global float* scales_first,
-                        __global float* scales_second,
-                        __global float* opacities,
-                        const __global float* opacities_gradient,
-                        __global float* opacities_first,
-                        __global float* opacities_second,
-                        __global float* sh,
-                        const __global float* sh_gradient,
-                        __global float* sh_first,
-                        __global float* sh_second,
-                        const __global float* screen,
-                        __global uint* skipped,
-                        const __global uint* guard,
-                        uint count,
-                        int sh_floats,
-                        float means_rate,
-                        float quaternions_rate,
-                        float scales_rate,
-                        float opacities_rate,
-                        float sh_dc_rate,
-                        float sh_rest_rate,
-                        float beta1,
-                        float rest1,
-                        float beta2,
-                        float rest2,
-                        float epsilon,
-                        float root_scale,
-                        int visible_only) {
-  const size_t first = get_global_id(0) * (size_t)BLOCK;
-  if (first >= count || guard[0] != 0) return;
-  const size_t last = min(first + BLOCK, (size_t)count);
-  const AdamConstants k = {beta1, rest1, beta2, rest2, epsilon, root_scale};
-  const AdamGroup mean_group = {means, means_gradient, means_first, means_second};
-  const AdamGroup quaternion_group = {quaternions, quaternions_gradient, quaternions_first,
-                                      quaternions_second};
-  const AdamGroup scale_group = {scales, scales_gradient, scales_first, scales_second};
-  const AdamGroup opacity_group = {opacities, opacities_gradient, opacities_first,
-                                   opacities_second};
-  const AdamGroup sh_group = {sh, sh_gradient, sh_first, sh_second};
-  float sh_rates[MAX_SH + VECTOR];
-  for (int i = 0, phase = 0; i < sh_floats + VECTOR; ++i) {
-    sh_rates[i] = phase < 3 ? sh_dc_rate : sh_rest_rate;
-    phase = phase + 1 == sh_floats ? 0 : phase + 1;
-  }
-
-#define RS_POISONED(from, to)                              \
-  (poisoned(means_gradient, 3 * (from), 3 * (to)) ||       \
-   poisoned(quaternions_gradient, 4 * (from), 4 * (to)) || \
-   poisoned(scales_gradient, 3 * (from), 3 * (to)) ||      \
-   poisoned(opacities_gradient, (from), (to)) ||           \
-   poisoned(sh_gradient, sh_floats * (from), sh_floats * (to)))
-#define RS_UPDATE(from, to)                                               \
-  adam_run(mean_group, 3 * (from), 3 * (to), means_rate, &k);             \
-  adam_run(quaternion_group, 4 * (from), 4 * (to), quaternions_rate, &k); \
-  adam_run(scale_group, 3 * (from), 3 * (to), scales_rate, &k);           \
-  adam_run(opacity_group, (from), (to), opacities_rate, &k);              \
-  adam_run_sh(sh_group, sh_floats*(from), sh_floats*(to), sh_rates, sh_floats, &k)
-
-  uint visible = 0;
-  for (size_t i = first; i < last; ++i) visible += !visible_only || screen[3 * i + 2] != 0.0f;
-  if (visible == 0) return;
-  if (visible == last - first && !RS_POISONED(first, last)) {
-    RS_UPDATE(first, last);
-    return;
-  }
-  uint bad = 0;
-  for (size_t i = first; i < last; ++i) {
-    if (visible_only && screen[3 * i + 2] == 0.0f) continue;
-    if (!RS_POISONED(i, i + 1)) {
-      RS_UPDATE(i, i + 1);
-    } else {
-      ++bad;
+  if (rest != RS_EXPONENT && !rs_any_lane(most == RS_EXPONENT)) return;
+  for (i = begin + get_local_id(0) * VECTOR; i < end; i += GROUP * VECTOR) {
+    for (size_t k = i; k < min(i + VECTOR, end); ++k) {
+      if ((words[k] & RS_EXPONENT) == RS_EXPONENT) atomic_or(bad + (k / width - first), 1u);
     }
   }
-  if (bad > 0) atomic_add(skipped, bad);
+}
+
+// steps[i] is 1 where Gaussian i takes the step, else 0. Launch: GROUP work-items for every BLOCK
+// Gaussians. Complexity: reads every gradient once.
+__kernel void choose_steps(const __global float* means,
+                           const __global float* quaternions,
+                           const __global float* scales,
+                           const __global float* opacities,
+                           const __global float* sh,
+                           const __global float* screen,
+                           const __global uint* guard,
+                           uint count,
+                           uint sh_floats,
+                           int visible_only,
+                           __global uchar* steps,
+                           __global uint* skipped) {
+  __local uint bad[BLOCK];
+  const size_t first = get_global_id(0) / GROUP * BLOCK;
+  const size_t last = min(first + BLOCK, (size_t)count);
+  const bool open = guard[0] == 0;
+  for (uint k = get_local_id(0); k < BLOCK; k += GROUP) bad[k] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (open) {
+    mark_poisoned(means, first, last, 3, bad);
+    mark_poisoned(quaternions, first, last, 4, bad);
+    mark_poisoned(scales, first, last, 3, bad);
+    mark_poisoned(opacities, first, last, 1, bad);
+    mark_poisoned(sh, first, last, sh_floats, bad);
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (size_t i = first + get_local_id(0); i < last; i += GROUP) {
+    const bool taken = open && (!visible_only || screen[3 * i + 2] != 0.0f);
+    const bool poisoned = bad[i - first] != 0;
+    steps[i] = taken && !poisoned;
+    if (taken && poisoned) atomic_inc(skipped);
+  }
+}
+
+// The learning rates of the floats from `phase` of a Gaussian on: of SH the first three have their
+// own.
+lanes step_rates(int phase, const RsAdam* adam) {
+#if WIDTH <= 4
+  return (lanes)(adam->rate);
+#else
+  lane_mask place = phase + RS_LANE_IDS;
+  for (int k = 0; k < (VECTOR + WIDTH - 2) / WIDTH; ++k) {
+    place = place >= WIDTH ? place - WIDTH : place;
+  }
+  return rs_pick(place < 3, adam->rate, adam->rest_rate);
+#endif
+}
+
+#define RS_ADAM_UPDATE(T, load, store, pick, rates)                                     \
+  const T g = load(gradient + i);                                                       \
+  T m = adam->beta1 * load(first + i) + adam->rest1 * g;                                \
+  m = pick(fabs(m) < RS_TINY_MOMENT, 0.0f, m);                                          \
+  const T v = adam->beta2 * load(second + i) + adam->rest2 * g * g;                     \
+  store(m, first + i);                                                                  \
+  store(v, second + i);                                                                 \
+  store(load(parameter + i) - rates * m / (sqrt(v) * adam->root_scale + adam->epsilon), \
+        parameter + i)
+
+#define rs_load_one(p) (*(p))
+#define rs_store_one(value, p) (*(p) = (value))
+#define rs_pick_one(condition, yes, no) ((condition) ? (yes) : (no))
+
+void adam_run(__global float* parameter,
+              const __global float* gradient,
+              __global float* first,
+              __global float* second,
+              size_t begin,
+              size_t end,
+              const RsAdam* adam) {
+  int phase = (int)(begin % WIDTH);
+  size_t i = begin;
+  for (; i + VECTOR <= end; i += VECTOR) {
+    const lanes rates = step_rates(phase, adam);
+    RS_ADAM_UPDATE(lanes, rs_load, rs_store, rs_pick, rates);
+    phase = (phase + VECTOR) % WIDTH;
+  }
+  for (; i < end; ++i) {
+    const float rate = WIDTH <= 4 || phase < 3 ? adam->rate : adam->rest_rate;
+    RS_ADAM_UPDATE(float, rs_load_one, rs_store_one, rs_pick_one, rate);
+    phase = phase + 1 == WIDTH ? 0 : phase + 1;
+  }
+}
+
+// One group of parameters of `count` Gaussians. Launch: a work-item for every SPAN floats, any
+// work-group size. Complexity: reads parameter, gradient and both moments once, writes all but the
+// gradient: bound by memory.
+__kernel void adam_step(__global float* parameter,
+                        const __global float* gradient,
+                        __global float* first,
+                        __global float* second,
+                        const __global uchar* steps,
+                        uint count,
+                        RsAdam adam) {
+  const size_t begin = get_global_id(0) * SPAN;
+  const size_t end = min(begin + SPAN, (size_t)count * WIDTH);
+  if (begin >= end) return;
+  const size_t lowest = begin / WIDTH, highest = (end - 1) / WIDTH;
+  uint all = 1;
+  for (size_t i = lowest; i <= highest; ++i) all &= steps[i];
+  if (all) {
+    adam_run(parameter, gradient, first, second, begin, end, &adam);
+    return;
+  }
+  for (size_t i = lowest; i <= highest; ++i) {
+    if (!steps[i]) continue;
+    adam_run(parameter, gradient, first, second, max(begin, i * WIDTH), min(end, (i + 1) * WIDTH),
+             &adam);
+  }
 }
 
 // Row i of `to` becomes row source[i] of `from`, or zeros where source[i] is 0xffffffff. Launch:

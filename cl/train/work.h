@@ -17,8 +17,9 @@
 // Per channel: three windows along the column 48 and the row 48, sum 10.
 #define RS_WORK_LOSS_GRADIENT_FLOPS 318
 
-// Adam, per parameter: parameter, gradient and two moments read; all but the gradient written.
-#define RS_WORK_ADAM_BYTES 28
+// Adam, per parameter: gradient read to choose; parameter, gradient and two moments read; all but
+// the gradient written.
+#define RS_WORK_ADAM_BYTES 32
 // First moment 3, second 4, step 6, check for NaN 2.
 #define RS_WORK_ADAM_FLOPS 15
 

@@ -102,16 +102,12 @@ void SceneBench::Impl::make_loss() {
 void SceneBench::Impl::make_gradients() {
   if (!adam) adam.emplace(context, AdamOptions{});
   if (gradients.means.size() > 0) return;
-  const auto sh = 3 * static_cast<std::size_t>(sh_count());
-  const auto make = [&](Buffer<float>& buffer, std::size_t width, const char* label) {
-    upload(context, buffer, random_floats(width * count(), 1e-3, options.seed, kGradientStream),
-           label);
-  };
-  make(gradients.means, 3, "mean gradients");
-  make(gradients.quaternions, 4, "quaternion gradients");
-  make(gradients.scales, 3, "scale gradients");
-  make(gradients.opacities, 1, "opacity gradients");
-  make(gradients.sh, sh, "SH gradients");
+  gradients.ensure(context, gaussians());
+  for_each_group(
+      [this](ParameterGroup, Buffer<float>& buffer) {
+        buffer.upload(random_floats(buffer.size(), 1e-3, options.seed, kGradientStream));
+      },
+      gradients);
   std::vector<float> screen(3 * count());
   for (std::size_t i = 0; i < count(); ++i) {
     screen[3 * i] = screen[3 * i + 1] = 1e-4f;
@@ -182,16 +178,10 @@ DeviceGaussians SceneBench::Impl::copy_of_gaussians() {
   out.active_sh_degree = from.active_sh_degree;
   out.activation = from.activation;
   out.changed(context);
-  const auto copy = [this](const Buffer<float>& source, const char* label) {
-    Buffer<float> target(context, source.size(), label);
-    target.copy_from(source, source.size());
-    return target;
-  };
-  out.means = copy(from.means, "means");
-  out.quaternions = copy(from.quaternions, "quaternions");
-  out.scales = copy(from.scales, "scales");
-  out.opacities = copy(from.opacities, "opacities");
-  out.sh = copy(from.sh, "sh");
+  out.ensure(context, from.count, from.sh_degree, "copied parameters");
+  for_each_group([](ParameterGroup, const Buffer<float>& source,
+                    Buffer<float>& target) { target.copy_from(source, source.size()); },
+                 from, out);
   return out;
 }
 

@@ -47,13 +47,8 @@ DeviceGaussians DeviceGaussians::upload(Context& context,
 }
 
 void GaussianGradients::ensure(Context& context, const DeviceGaussians& gaussians) {
-  const std::size_t n = gaussians.count;
-  means.ensure(context, 3 * n, "mean gradients");
-  quaternions.ensure(context, 4 * n, "quaternion gradients");
-  scales.ensure(context, 3 * n, "scale gradients");
-  opacities.ensure(context, n, "opacity gradients");
-  sh.ensure(context, gaussians.sh.size(), "SH gradients");
-  screen.ensure(context, 3 * n, "screen gradients");
+  Parameters::ensure(context, gaussians.count, gaussians.sh_degree, "gradients");
+  screen.ensure(context, 3 * gaussians.count, "screen gradients");
 }
 
 Gaussians DeviceGaussians::download() const {

@@ -4,17 +4,16 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/trace_options.hpp"
+#include "trace/parameters.hpp"
 
 namespace raysplats {
 
-/// The trained parameters on the device, one flat float buffer per group, Gaussian-major as in
-/// Gaussians. `scales` hold the parameter before `activation`: log-scale for kExp, logit of the
-/// scale for kSigmoid.
-struct DeviceGaussians {
+/// The trained parameters on the device. `scales` hold the parameter before `activation`: log-scale
+/// for kExp, logit of the scale for kSigmoid.
+struct DeviceGaussians : Parameters {
   std::size_t count = 0;
   int sh_degree = 0;  ///< degree the sh buffer is laid out for
   int active_sh_degree =
@@ -23,11 +22,6 @@ struct DeviceGaussians {
   /// Of the parameters as they are, from Context::new_revision(). What is made of them (boxes,
   /// trees) remembers it, and is stale when it differs.
   std::uint64_t revision = 0;
-  Buffer<float> means;        ///< 3 N
-  Buffer<float> quaternions;  ///< 4 N
-  Buffer<float> scales;       ///< 3 N
-  Buffer<float> opacities;    ///< N
-  Buffer<float> sh;           ///< N x coefficients x 3
 
   /// Copies a host model to the device. For kSigmoid a scale of 1 or more is clamped just below 1.
   static DeviceGaussians upload(Context& context,
@@ -38,14 +32,8 @@ struct DeviceGaussians {
   void changed(Context& context) { revision = context.new_revision(); }
 };
 
-/// Gradient of the loss for every parameter, laid out as DeviceGaussians, and what densification
-/// needs.
-struct GaussianGradients {
-  Buffer<float> means;
-  Buffer<float> quaternions;
-  Buffer<float> scales;  ///< with respect to the parameter before activation
-  Buffer<float> opacities;
-  Buffer<float> sh;
+/// Gradient of the loss for every parameter and what densification needs.
+struct GaussianGradients : Parameters {
   /// Per Gaussian and view: {norm of the gradient at the projected mean in normalised device
   /// coordinates (as 3DGS), the same from absolute values per ray (as AbsGS), 1 when any ray met it
   /// else 0}.

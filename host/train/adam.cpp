@@ -3,33 +3,32 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "raysplats/error.hpp"
 #include "train/lanes.hpp"
 
 namespace raysplats {
 
-const char* group_name(ParameterGroup group) {
-  switch (group) {
-    case ParameterGroup::kMeans:
-      return "means";
-    case ParameterGroup::kQuaternions:
-      return "quaternions";
-    case ParameterGroup::kScales:
-      return "scales";
-    case ParameterGroup::kOpacities:
-      return "opacities";
-    case ParameterGroup::kSh:
-      return "sh";
-  }
-  return "";
-}
+namespace {
+
+constexpr char kProgram[] = "train/adam.cl";
+// Gaussians that are looked at, and on CPUs updated, by one work-group.
+constexpr std::size_t kBlock = 256;
+constexpr std::size_t kGroup = 64;
+constexpr std::size_t kCachedFloats = std::size_t{1} << 20;
+
+std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
+
+}  // namespace
 
 Adam::Adam(Context& context, const AdamOptions& options, int vector)
     : context_(context),
       options_(options),
-      serial_(context.device().type == DeviceType::kCpu),
+      cpu_(context.device().type == DeviceType::kCpu),
+      lanes_(cpu_ || vector != 0 ? lane_count(context.device(), vector) : 1),
       skipped_(context, 1, "Adam skipped updates"),
       open_guard_(context, 1, "Adam guard") {
   if (!(options.beta1 >= 0 && options.beta1 < 1 && options.beta2 >= 0 && options.beta2 < 1 &&
@@ -38,25 +37,31 @@ Adam::Adam(Context& context, const AdamOptions& options, int vector)
         "Adam got beta1 {}, beta2 {} and epsilon {}; betas are in [0, 1), epsilon is positive",
         options.beta1, options.beta2, options.epsilon));
   }
-  block_ = serial_ ? 64 : 4;
   BuildOptions build;
-  build.define("VECTOR", lane_count(context.device(), vector)).define("BLOCK", block_);
-  step_kernel_ = context.kernel("train/adam.cl", "adam_step", build);
-  remap_kernel_ = context.kernel("train/adam.cl", "remap_rows", build);
+  build.define("VECTOR", lanes_).define("BLOCK", kBlock).define("GROUP", cpu_ ? 1 : kGroup);
+  choose_kernel_ = context.kernel(kProgram, "choose_steps", build);
+  remap_kernel_ = context.kernel(kProgram, "remap_rows", build);
   skipped_.clear();
   open_guard_.clear();
 }
 
+// A work-item takes the floats of a block of Gaussians on CPUs, elsewhere one vector.
+Kernel Adam::step_kernel(ParameterGroup group) const {
+  const std::size_t width = group_width(group, sh_degree_);
+  BuildOptions build;
+  build.define("VECTOR", lanes_)
+      .define("WIDTH", width)
+      .define("SPAN", cpu_ ? kBlock * width : static_cast<std::size_t>(lanes_));
+  return context_.kernel(kProgram, "adam_step", build);
+}
+
 void Adam::initialize(std::size_t count, int sh_degree) {
-  const std::size_t sh_floats = 3 * static_cast<std::size_t>(sh_coefficients(sh_degree));
-  const std::array<std::size_t, kParameterGroups.size()> widths{3, 4, 3, 1, sh_floats};
-  for (std::size_t i = 0; i < widths.size(); ++i) {
-    moments_[i].width = widths[i];
-    moments_[i].first.ensure(context_, widths[i] * count, "Adam first moment");
-    moments_[i].second.ensure(context_, widths[i] * count, "Adam second moment");
-    reset(kParameterGroups[i]);
-  }
+  first_.ensure(context_, count, sh_degree, "Adam first moments");
+  second_.ensure(context_, count, sh_degree, "Adam second moments");
+  for (const ParameterGroup group : kParameterGroups) reset(group);
+  initialized_ = true;
   count_ = count;
+  sh_degree_ = sh_degree;
   steps_ = 0;
 }
 
@@ -64,40 +69,73 @@ void Adam::step(DeviceGaussians& gaussians,
                 const GaussianGradients& gradients,
                 const AdamRates& rates,
                 const Buffer<std::uint32_t>* guard) {
-  if (moments_[0].width == 0) initialize(gaussians.count, gaussians.sh_degree);
-  Moments& sh = moments(ParameterGroup::kSh);
-  const std::size_t sh_floats = 3 * static_cast<std::size_t>(sh_coefficients(gaussians.sh_degree));
-  if (gaussians.count != count_ || sh_floats != sh.width) {
+  if (!initialized_) initialize(gaussians.count, gaussians.sh_degree);
+  if (gaussians.count != count_ || gaussians.sh_degree != sh_degree_) {
     throw UsageError(fmt::format(
-        "Adam holds moments of {} Gaussians with {} SH values and was given {} with {}; "
-        "remap or initialise it first",
-        count_, sh.width, gaussians.count, sh_floats));
+        "Adam holds moments of {} Gaussians of SH degree {} and was given {} of degree {}; remap "
+        "or initialise it first",
+        count_, sh_degree_, gaussians.count, gaussians.sh_degree));
   }
   ++steps_;
   if (count_ == 0) return;
   gaussians.changed(context_);
   const double bias1 = 1.0 - std::pow(options_.beta1, static_cast<double>(steps_));
   const double bias2 = 1.0 - std::pow(options_.beta2, static_cast<double>(steps_));
-  const auto rate = [&](double learning_rate) { return static_cast<float>(learning_rate / bias1); };
+  RsAdam record{};
+  record.beta1 = static_cast<float>(options_.beta1);
+  record.rest1 = static_cast<float>(1.0 - options_.beta1);
+  record.beta2 = static_cast<float>(options_.beta2);
+  record.rest2 = static_cast<float>(1.0 - options_.beta2);
+  record.epsilon = static_cast<float>(options_.epsilon);
+  record.root_scale = static_cast<float>(1.0 / std::sqrt(bias2));
 
-  Range range{{(count_ + block_ - 1) / block_, 1, 1}, {0, 0, 0}};
-  if (serial_) range.local = {1, 1, 1};
-  Moments& mean = moments(ParameterGroup::kMeans);
-  Moments& quaternion = moments(ParameterGroup::kQuaternions);
-  Moments& scale = moments(ParameterGroup::kScales);
-  Moments& opacity = moments(ParameterGroup::kOpacities);
-  step_kernel_.launch(
-      range, gaussians.means, gradients.means, mean.first, mean.second, gaussians.quaternions,
-      gradients.quaternions, quaternion.first, quaternion.second, gaussians.scales,
-      gradients.scales, scale.first, scale.second, gaussians.opacities, gradients.opacities,
-      opacity.first, opacity.second, gaussians.sh, gradients.sh, sh.first, sh.second,
-      gradients.screen, skipped_, guard != nullptr ? *guard : open_guard_,
-      static_cast<std::uint32_t>(count_), static_cast<std::int32_t>(sh_floats), rate(rates.means),
-      rate(rates.quaternions), rate(rates.scales), rate(rates.opacities), rate(rates.sh_dc),
-      rate(rates.sh_rest), static_cast<float>(options_.beta1),
-      static_cast<float>(1.0 - options_.beta1), static_cast<float>(options_.beta2),
-      static_cast<float>(1.0 - options_.beta2), static_cast<float>(options_.epsilon),
-      static_cast<float>(1.0 / std::sqrt(bias2)), options_.visible_only ? 1 : 0);
+  chosen_.ensure(context_, count_, "Gaussians that take the step");
+  const std::size_t slice = slice_size();
+  for (std::size_t begin = 0; begin < count_; begin += slice) {
+    step_slice(begin, std::min(begin + slice, count_), gaussians, gradients, rates, bias1, record,
+               guard != nullptr ? *guard : open_guard_);
+  }
+}
+
+// Gradients are read twice: on CPUs a part of the Gaussians goes all the way while they are in the
+// cache.
+std::size_t Adam::slice_size() const {
+  if (!cpu_) return count_;
+  std::size_t floats = 0;
+  for (const ParameterGroup group : kParameterGroups) floats += group_width(group, sh_degree_);
+  return std::max<std::size_t>(1, kCachedFloats / floats / kBlock) * kBlock;
+}
+
+void Adam::step_slice(std::size_t begin,
+                      std::size_t end,
+                      DeviceGaussians& gaussians,
+                      const GaussianGradients& gradients,
+                      const AdamRates& rates,
+                      double bias1,
+                      RsAdam record,
+                      const Buffer<std::uint32_t>& guard) {
+  const std::size_t items = cpu_ ? 1 : kGroup;
+  Range blocks = Range::linear((end - begin + kBlock - 1) / kBlock * items, items);
+  blocks.offset[0] = begin / kBlock * items;
+  choose_kernel_.launch(blocks, gradients.means, gradients.quaternions, gradients.scales,
+                        gradients.opacities, gradients.sh, gradients.screen, guard, u32(end),
+                        u32(group_width(ParameterGroup::kSh, sh_degree_)),
+                        options_.visible_only ? 1 : 0, chosen_, skipped_);
+  const double group_rates[kParameterGroups.size()] = {rates.means, rates.quaternions, rates.scales,
+                                                       rates.opacities, rates.sh_dc};
+  for_each_group(
+      [&](ParameterGroup group, Buffer<float>& parameter, const Buffer<float>& gradient,
+          Buffer<float>& first, Buffer<float>& second) {
+        const std::size_t width = group_width(group, sh_degree_);
+        const std::size_t span = cpu_ ? kBlock * width : static_cast<std::size_t>(lanes_);
+        record.rate = static_cast<float>(group_rates[static_cast<std::size_t>(group)] / bias1);
+        record.rest_rate = static_cast<float>(rates.sh_rest / bias1);
+        Range range = Range::linear(((end - begin) * width + span - 1) / span, cpu_ ? 1 : kGroup);
+        range.offset[0] = begin * width / span;
+        step_kernel(group).launch(range, parameter, gradient, first, second, chosen_, u32(end),
+                                  record);
+      },
+      gaussians, gradients, first_, second_);
 }
 
 void Adam::remap(const Buffer<std::uint32_t>& source, std::size_t new_count) {
@@ -105,38 +143,37 @@ void Adam::remap(const Buffer<std::uint32_t>& source, std::size_t new_count) {
     throw UsageError(
         fmt::format("Adam was given {} source indices for {} Gaussians", source.size(), new_count));
   }
-  const auto move = [&](Buffer<float>& from, std::size_t width, const char* label) {
-    Buffer<float> to(context_, width * new_count, label);
-    Range range{{new_count, 1, 1}, {0, 0, 0}};
-    if (new_count > 0) {
-      remap_kernel_.launch(range, from, to, source, static_cast<std::int32_t>(width),
-                           static_cast<std::uint32_t>(new_count));
-    }
-    from = std::move(to);
-  };
-  for (Moments& group : moments_) {
-    move(group.first, group.width, "Adam first moment");
-    move(group.second, group.width, "Adam second moment");
+  for (Parameters* moments : {&first_, &second_}) {
+    for_each_group(
+        [&](ParameterGroup group, Buffer<float>& from) {
+          const std::size_t width = group_width(group, sh_degree_);
+          Buffer<float> to(context_, width * new_count, "Adam moments");
+          if (new_count > 0) {
+            remap_kernel_.launch(Range{{new_count, 1, 1}, {0, 0, 0}}, from, to, source,
+                                 static_cast<std::int32_t>(width), u32(new_count));
+          }
+          from = std::move(to);
+        },
+        *moments);
   }
   count_ = new_count;
 }
 
 void Adam::reset(ParameterGroup group) {
-  moments(group).first.clear();
-  moments(group).second.clear();
+  first_[group].clear();
+  second_[group].clear();
 }
 
 void Adam::restore(ParameterGroup group,
                    std::span<const float> first,
                    std::span<const float> second) {
-  Moments& target = moments(group);
-  if (first.size() != target.first.size() || second.size() != target.second.size()) {
+  if (first.size() != first_[group].size() || second.size() != second_[group].size()) {
     throw UsageError(
         fmt::format("The {} moments given to Adam have {} and {} values, {} are expected",
-                    group_name(group), first.size(), second.size(), target.first.size()));
+                    group_name(group), first.size(), second.size(), first_[group].size()));
   }
-  target.first.upload(first);
-  target.second.upload(second);
+  first_[group].upload(first);
+  second_[group].upload(second);
 }
 
 }  // namespace raysplats

@@ -1,23 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
+#include "shared/adam_layout.h"
 #include "trace/device_gaussians.hpp"
 
 namespace raysplats {
-
-enum class ParameterGroup { kMeans, kQuaternions, kScales, kOpacities, kSh };
-constexpr std::array<ParameterGroup, 5> kParameterGroups{
-    ParameterGroup::kMeans, ParameterGroup::kQuaternions, ParameterGroup::kScales,
-    ParameterGroup::kOpacities, ParameterGroup::kSh};
-/// "means", "quaternions", "scales", "opacities" or "sh".
-const char* group_name(ParameterGroup group);
 
 struct AdamOptions {
   double beta1 = 0.9;
@@ -37,11 +30,13 @@ struct AdamRates {
   double sh_rest = 0;  ///< the others
 };
 
-/// Adam (Kingma and Ba 2015) for the parameters of DeviceGaussians: one launch per step. A Gaussian
-/// with any non-finite gradient is left as it was in that step and counted.
+/// Adam (Kingma and Ba 2015) for the parameters of DeviceGaussians: a launch that chooses which
+/// Gaussians take the step, and one per group of parameters. A Gaussian with any non-finite
+/// gradient is left as it was in that step and counted.
 class Adam {
  public:
-  /// `vector` is the number of floats per vector (1, 4, 8 or 16); 0 = the device's own.
+  /// `vector` is the number of floats per vector (1, 4, 8 or 16); 0 = the device's own on CPUs, 1
+  /// elsewhere, where neighbouring work-items then touch neighbouring addresses.
   Adam(Context& context, const AdamOptions& options, int vector = 0);
 
   /// Makes moments of zeros for `count` Gaussians and sets steps() to 0.
@@ -66,8 +61,8 @@ class Adam {
   void set_steps(std::int64_t steps) { steps_ = steps; }
 
   /// Moments, laid out as the parameters. Empty before initialize().
-  const Buffer<float>& first_moment(ParameterGroup group) const { return moments(group).first; }
-  const Buffer<float>& second_moment(ParameterGroup group) const { return moments(group).second; }
+  const Buffer<float>& first_moment(ParameterGroup group) const { return first_[group]; }
+  const Buffer<float>& second_moment(ParameterGroup group) const { return second_[group]; }
   /// Uploads both moments of a group; the sizes must be those of initialize().
   void restore(ParameterGroup group, std::span<const float> first, std::span<const float> second);
 
@@ -77,24 +72,30 @@ class Adam {
   std::uint32_t skipped() const { return skipped_.read(0); }
 
  private:
-  struct Moments {
-    Buffer<float> first, second;
-    std::size_t width = 0;  // floats per Gaussian
-  };
-  Moments& moments(ParameterGroup group) { return moments_[static_cast<std::size_t>(group)]; }
-  const Moments& moments(ParameterGroup group) const {
-    return moments_[static_cast<std::size_t>(group)];
-  }
+  Kernel step_kernel(ParameterGroup group) const;
+  std::size_t slice_size() const;
+  // Of the Gaussians [begin, end); begin is a multiple of slice_size().
+  void step_slice(std::size_t begin,
+                  std::size_t end,
+                  DeviceGaussians& gaussians,
+                  const GaussianGradients& gradients,
+                  const AdamRates& rates,
+                  double bias1,
+                  RsAdam record,
+                  const Buffer<std::uint32_t>& guard);
 
   Context& context_;
   AdamOptions options_;
-  std::size_t block_;
-  bool serial_;
-  Kernel step_kernel_, remap_kernel_;
+  bool cpu_;
+  int lanes_;
+  Kernel choose_kernel_, remap_kernel_;
   Buffer<std::uint32_t> skipped_;
   Buffer<std::uint32_t> open_guard_;  // a guard that lets every step pass
-  std::array<Moments, kParameterGroups.size()> moments_;
+  Buffer<std::uint8_t> chosen_;       // Gaussians that take the step
+  Parameters first_, second_;         // moments
+  bool initialized_ = false;
   std::size_t count_ = 0;
+  int sh_degree_ = 0;
   std::int64_t steps_ = 0;
 };
 

@@ -157,11 +157,7 @@ void DensityControl::gather(DeviceGaussians& gaussians,
   next.sh_degree = gaussians.sh_degree;
   next.active_sh_degree = gaussians.active_sh_degree;
   next.activation = gaussians.activation;
-  next.means = Buffer<float>(context_, 3 * count, "means");
-  next.quaternions = Buffer<float>(context_, 4 * count, "quaternions");
-  next.scales = Buffer<float>(context_, 3 * count, "scales");
-  next.opacities = Buffer<float>(context_, count, "opacities");
-  next.sh = Buffer<float>(context_, 3 * sh * count, "sh");
+  next.ensure(context_, count, gaussians.sh_degree, "parameters");
   const std::uint64_t key =
       CounterRng(options_.seed, kSplitStream, static_cast<std::uint64_t>(iteration)).bits();
   BuildOptions build;

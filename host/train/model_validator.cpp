@@ -16,37 +16,6 @@ constexpr std::size_t kGroupSize = 64;
 constexpr std::size_t kCpuChunk = 1024;
 constexpr std::size_t kGpuChunk = 4;
 
-std::size_t width_of(ParameterGroup group, int sh_degree) {
-  switch (group) {
-    case ParameterGroup::kMeans:
-    case ParameterGroup::kScales:
-      return 3;
-    case ParameterGroup::kQuaternions:
-      return 4;
-    case ParameterGroup::kOpacities:
-      return 1;
-    case ParameterGroup::kSh:
-      break;
-  }
-  return 3 * static_cast<std::size_t>(sh_coefficients(sh_degree));
-}
-
-const Buffer<float>& values_of(const DeviceGaussians& gaussians, ParameterGroup group) {
-  switch (group) {
-    case ParameterGroup::kMeans:
-      return gaussians.means;
-    case ParameterGroup::kQuaternions:
-      return gaussians.quaternions;
-    case ParameterGroup::kScales:
-      return gaussians.scales;
-    case ParameterGroup::kOpacities:
-      return gaussians.opacities;
-    case ParameterGroup::kSh:
-      break;
-  }
-  return gaussians.sh;
-}
-
 }  // namespace
 
 ModelValidator::ModelValidator(Context& context, const TraceOptions& options)
@@ -75,9 +44,9 @@ std::string ModelValidator::find_fault(const DeviceGaussians& gaussians, const A
   if (gaussians.count == 0) return "";
   for (const ParameterGroup group : kParameterGroups) {
     const std::string name = group_name(group);
-    const std::size_t width = width_of(group, gaussians.sh_degree);
+    const std::size_t width = group_width(group, gaussians.sh_degree);
     for (const auto& [values, what] :
-         {std::pair(&values_of(gaussians, group), name),
+         {std::pair(&gaussians[group], name),
           std::pair(&adam.first_moment(group), "first moments of " + name),
           std::pair(&adam.second_moment(group), "second moments of " + name)}) {
       const std::string fault = find_non_finite(*values, what, width);

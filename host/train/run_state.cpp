@@ -15,38 +15,6 @@ const char* activation_name(ScaleActivation activation) {
   return activation == ScaleActivation::kExp ? "exp" : "sigmoid";
 }
 
-std::size_t group_width(ParameterGroup group, int sh_degree) {
-  switch (group) {
-    case ParameterGroup::kMeans:
-    case ParameterGroup::kScales:
-      return 3;
-    case ParameterGroup::kQuaternions:
-      return 4;
-    case ParameterGroup::kOpacities:
-      return 1;
-    case ParameterGroup::kSh:
-      break;
-  }
-  return static_cast<std::size_t>(3 * sh_coefficients(sh_degree));
-}
-
-template <class Model>
-auto& group_buffer(Model& gaussians, ParameterGroup group) {
-  switch (group) {
-    case ParameterGroup::kMeans:
-      return gaussians.means;
-    case ParameterGroup::kQuaternions:
-      return gaussians.quaternions;
-    case ParameterGroup::kScales:
-      return gaussians.scales;
-    case ParameterGroup::kOpacities:
-      return gaussians.opacities;
-    case ParameterGroup::kSh:
-      break;
-  }
-  return gaussians.sh;
-}
-
 const std::vector<float>& section(const Checkpoint& checkpoint,
                                   const std::string& name,
                                   std::size_t size) {
@@ -72,7 +40,7 @@ void store_state(const DeviceGaussians& gaussians,
   checkpoint.optimiser_steps = adam.steps();
   for (const ParameterGroup group : kParameterGroups) {
     const std::string name = group_name(group);
-    checkpoint.sections[name] = group_buffer(gaussians, group).download();
+    checkpoint.sections[name] = gaussians[group].download();
     checkpoint.sections[name + ".first"] = adam.first_moment(group).download();
     checkpoint.sections[name + ".second"] = adam.second_moment(group).download();
   }
@@ -101,13 +69,12 @@ void restore_state(Context& context,
   gaussians.sh_degree = checkpoint.sh_degree;
   gaussians.active_sh_degree = checkpoint.active_sh_degree;
   gaussians.activation = options.scale_activation;
+  gaussians.ensure(context, count, checkpoint.sh_degree, "parameters");
   adam.initialize(count, checkpoint.sh_degree);
   for (const ParameterGroup group : kParameterGroups) {
     const std::string name = group_name(group);
     const std::size_t size = count * group_width(group, checkpoint.sh_degree);
-    Buffer<float> buffer(context, size, name);
-    buffer.upload(section(checkpoint, name, size));
-    group_buffer(gaussians, group) = std::move(buffer);
+    gaussians[group].upload(section(checkpoint, name, size));
     adam.restore(group, section(checkpoint, name + ".first", size),
                  section(checkpoint, name + ".second", size));
   }

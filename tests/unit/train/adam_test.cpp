@@ -23,7 +23,9 @@ Context& context() {
 constexpr std::size_t kGroups = kParameterGroups.size();
 
 std::vector<std::size_t> widths(int degree) {
-  return {3, 4, 3, 1, 3 * static_cast<std::size_t>(sh_coefficients(degree))};
+  std::vector<std::size_t> out;
+  for (const ParameterGroup group : kParameterGroups) out.push_back(group_width(group, degree));
+  return out;
 }
 
 // Host twin of the device state, everything in double.
@@ -65,16 +67,8 @@ struct Fixture {
     }
   }
 
-  Buffer<float>& parameters(std::size_t g) {
-    Buffer<float>* all[] = {&gaussians.means, &gaussians.quaternions, &gaussians.scales,
-                            &gaussians.opacities, &gaussians.sh};
-    return *all[g];
-  }
-  Buffer<float>& gradient_buffer(std::size_t g) {
-    Buffer<float>* all[] = {&gradients.means, &gradients.quaternions, &gradients.scales,
-                            &gradients.opacities, &gradients.sh};
-    return *all[g];
-  }
+  Buffer<float>& parameters(std::size_t g) { return gaussians[kParameterGroups[g]]; }
+  Buffer<float>& gradient_buffer(std::size_t g) { return gradients[kParameterGroups[g]]; }
   void random_gradient() {
     for (auto& group : gradient) {
       for (float& value : group)

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// One step of Adam for one group of parameters.
+#ifndef RS_SHARED_ADAM_LAYOUT_H
+#define RS_SHARED_ADAM_LAYOUT_H
+
+#include "shared/compat.h"
+
+// A first moment below this moves nothing; left alone it would decay into denormal numbers, which
+// CPUs handle slowly.
+#define RS_TINY_MOMENT 1e-30f
+
+typedef struct {
+  rs_float beta1, rest1;  // rest = 1 - beta
+  rs_float beta2, rest2;
+  rs_float epsilon;
+  rs_float root_scale;       // 1 / sqrt(1 - beta2^step)
+  rs_float rate, rest_rate;  // over 1 - beta1^step; of SH the first coefficient's and the others'
+} RsAdam;
+RS_STATIC_ASSERT_SIZE(RsAdam, 32);
+
+#endif
