@@ -3,7 +3,8 @@
 //   begin_paths        once: a path for every camera ray
 //   (nearest_surface)  the next triangle of each ray
 //   load_surfaces      its position, normals, colour; the ray ends there
-//   (trace_rays)       the Gaussians in front of it
+//   (trace_rays)       the Gaussians in front of it; rays_to_surfaces and results_of_picture where
+//                      packets have traced the camera's rays
 //   shadow_rays, (light_through), (trace_rays), add_light
 //                      per light and sample, for Gaussians and for surfaces
 //   advance            what the path has gained, and the rays that go on: two slots a path
@@ -38,6 +39,34 @@ __kernel void begin_paths(const uint count,
   path.splits = path.lineage = 0;
   path.direct = direct;
   paths[i] = path;
+}
+
+// The rays of a camera that end on a surface; those that meet none are empty (t_max < t_min).
+__kernel void rays_to_surfaces(const uint count,
+                               __global const RsSurface* restrict surfaces,
+                               __global const float8* restrict rays,
+                               __global float8* restrict ending) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+  float8 ray = rays[i];
+  if (surfaces[i].material < 0) ray.s7 = -1.0f;
+  ending[i] = ray;
+}
+
+// What the others meet, from a picture of the Gaussians alone: planar colour and alpha of `pixels`
+// pixels. It has no depths: they are asked for by lights on Gaussians and in glass, and a camera
+// stands in none.
+__kernel void results_of_picture(const uint count,
+                                 const uint first_pixel,
+                                 const uint pixels,
+                                 __global const float* restrict picture,
+                                 __global const RsSurface* restrict surfaces,
+                                 __global float8* restrict results) {
+  const uint i = get_global_id(0);
+  if (i >= count || surfaces[i].material >= 0) return;
+  __global const float* at = picture + first_pixel + i;
+  const size_t plane = pixels;
+  results[i] = (float8)(at[0], at[plane], at[2 * plane], at[3 * plane], 0.0f, 0.0f, 0.0f, 0.0f);
 }
 
 // vertices: per triangle three corners of eight floats (position, normal, uv); a flat triangle has

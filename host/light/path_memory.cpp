@@ -34,6 +34,8 @@ constexpr std::size_t kPathBytes = 3 * (sizeof(Ray) + sizeof(RsPath)) + sizeof(R
 constexpr std::size_t kShadowBytes =
     sizeof(Ray) + sizeof(std::int32_t) + kFloat + sizeof(RayResult);
 constexpr std::size_t kPixelBytes = 4 * kFloat;
+// Picture of packets, transmittances and the place of a pixel behind a lens.
+constexpr std::size_t kPacketPixelBytes = 13 * kFloat;
 
 // Position, normal and uv of three corners.
 constexpr std::size_t kVertexBytes = 3 * (3 + 3 + 2) * kFloat;
@@ -69,6 +71,11 @@ PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
       3 * kFloat * static_cast<std::size_t>(sh_coefficients(scene.gaussians.sh_degree));
   const std::size_t block = kFloat * RayTree::block_floats(scene.trace.adaptive_radius);
   gaussians_ = count * (11 * kFloat + sh + sizeof(RsAabb) + block + Lbvh::bytes_per_box(lanes_));
+  if (scene.render.samples == 1) {
+    packets_ = count * (sizeof(RsLine) + sizeof(RsViewBounds) + sizeof(RsAabb) + 4) +
+               MemoryShares(scene.trace.memory_budget).tile_lists();
+    packet_pixel_ = kPacketPixelBytes;
+  }
   std::size_t texels = 0;
   for (const Image& texture : scene.textures) texels += kFloat * texture.data.size();
   const std::size_t environment = kFloat * scene.environment.equirect.data.size();

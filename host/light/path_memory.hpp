@@ -23,8 +23,11 @@ class PathMemory {
   std::size_t gaussians() const { return gaussians_; }
   /// Meshes with their tree, textures, the environment's picture.
   std::size_t surfaces() const { return meshes_ + pictures_; }
-  /// Of a picture with so many pixels; with glass, whose paths split, at most this.
-  std::size_t paths(std::size_t pixels) const { return std::min(pixels, batch_) * pixel_; }
+  /// Of a picture with so many pixels; with glass, whose paths split, at most this. Of one sample
+  /// per pixel with what packets need at most.
+  std::size_t paths(std::size_t pixels) const {
+    return std::min(pixels, batch_) * pixel_ + pixels * packet_pixel_ + (pixels > 0 ? packets_ : 0);
+  }
   std::size_t total(std::size_t pixels) const { return gaussians() + surfaces() + paths(pixels); }
   std::size_t largest_buffer(std::size_t pixels) const;
 
@@ -35,6 +38,7 @@ class PathMemory {
   DeviceInfo device_;
   int lanes_;
   std::size_t batch_, pixel_, pixel_largest_;
+  std::size_t packets_ = 0, packet_pixel_ = 0;
   std::size_t gaussians_, pictures_, meshes_ = 0;
   std::size_t largest_, largest_mesh_ = 0;
 };

@@ -13,7 +13,9 @@
 #include "primitives/scan.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
+#include "trace/camera_tracer.hpp"
 #include "trace/model_impl.hpp"
+#include "trace/ray_launch.hpp"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
@@ -101,6 +103,7 @@ struct PathTracer::Impl {
         options(without_background(scene.trace)),
         gaussians(DeviceGaussians::upload(context_in, scene.gaussians, ScaleActivation::kExp)),
         tracer(context_in, options),
+        packets(context_in, options),
         surfaces(context_in, scene),
         lights(scene.lights),
         camera_rays(context_in),
@@ -119,6 +122,10 @@ struct PathTracer::Impl {
                     std::size_t first,
                     std::size_t count);
   std::size_t trace_wave(const RsWave& wave, std::size_t count);
+  bool light_on_gaussians();
+  bool by_packets(const Camera& camera);
+  bool trace_packets(const Camera& camera, const std::function<bool(double)>& within);
+  void take_packets(std::size_t first_pixel, std::size_t count);
   void gather_light(const RsWave& wave, std::size_t count, bool from_gaussians);
   void add_tallies(std::size_t count);
 
@@ -128,6 +135,9 @@ struct PathTracer::Impl {
   TraceOptions options;
   DeviceGaussians gaussians;
   RayTracer tracer;
+  CameraTracer packets;
+  bool packets_updated = false;
+  std::size_t packet_pixels = 0;  // of the picture that they have traced; 0 = none
   SurfaceStore surfaces;
   std::vector<Light> lights;
   CameraRays camera_rays;
@@ -217,13 +227,14 @@ std::size_t PathTracer::Impl::trace_wave(const RsWave& wave, std::size_t count) 
       .launch(each, u32(count), hits, surfaces.vertices(), surfaces.triangle_materials(),
               surfaces.materials(), surfaces.textures(), surfaces.texels(), paths, rays,
               from_origin, met);
-  tracer.trace(gaussians, rays, from_origin, count, results);
+  if (wave.bounce == 0 && packet_pixels > 0) {
+    take_packets(wave.first_pixel, count);
+  } else {
+    tracer.trace(gaussians, rays, from_origin, count, results);
+  }
   gaussian_light.clear(count);
   surface_light.clear(count);
-  const ShadowSettings& shadows = settings.shadows;
-  const bool on_gaussians = (shadows.mesh_on_gaussians && surfaces.triangles().size() > 0) ||
-                            shadows.gaussians_on_gaussians;
-  if (on_gaussians && shadows.strength > 0 && gaussians.count > 0) gather_light(wave, count, true);
+  if (light_on_gaussians()) gather_light(wave, count, true);
   if (surfaces.lit()) gather_light(wave, count, false);
   kernel("advance").launch(each, u32(count), wave, surfaces.materials(), surfaces.environment(),
                            surfaces.environment_picture(), paths, rays, results, met,
@@ -239,6 +250,57 @@ std::size_t PathTracer::Impl::trace_wave(const RsWave& wave, std::size_t count) 
     kernel("gather_paths").launch(each, u32(count), offsets, next_paths, next_rays, paths, rays);
   }
   return live;
+}
+
+bool PathTracer::Impl::light_on_gaussians() {
+  const ShadowSettings& shadows = settings.shadows;
+  const bool wanted = (shadows.mesh_on_gaussians && surfaces.triangles().size() > 0) ||
+                      shadows.gaussians_on_gaussians;
+  return wanted && shadows.strength > 0 && gaussians.count > 0 && !lights.empty();
+}
+
+// Rays through the middles of the pixels of a camera with a centre share what they meet; lights on
+// Gaussians need depths along rays.
+bool PathTracer::Impl::by_packets(const Camera& camera) {
+  return settings.samples == 1 && gaussians.count > 0 && !light_on_gaussians() &&
+         !walks_tree(options, context.device()) && packets.traces(camera);
+}
+
+// The picture of the Gaussians alone; false when `within` stopped it.
+bool PathTracer::Impl::trace_packets(const Camera& camera,
+                                     const std::function<bool(double)>& within) {
+  struct Stopped {};
+  if (!packets_updated) packets.update(gaussians);
+  packets_updated = true;
+  if (within) {
+    packets.set_watch([&within](double) {
+      if (!within(0.0)) throw Stopped();
+    });
+  }
+  try {
+    packets.forward(gaussians, camera);
+  } catch (const Stopped&) {
+    packets.set_watch({});
+    return false;
+  }
+  packets.set_watch({});
+  statistics.capped_rays += packets.statistics().capped_rays;
+  packet_pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  return true;
+}
+
+// Camera rays that meet no surface from the packets' picture, the others ray by ray.
+void PathTracer::Impl::take_packets(std::size_t first_pixel, std::size_t count) {
+  const Range each = Range::linear(count, kGroup);
+  results.ensure(context, count, "ray results");
+  if (surfaces.triangles().size() > 0) {
+    shadow_rays.ensure(context, count, "shadow rays");
+    kernel("rays_to_surfaces").launch(each, u32(count), met, rays, shadow_rays);
+    tracer.trace(gaussians, shadow_rays, from_origin, count, results);
+  }
+  kernel("results_of_picture")
+      .launch(each, u32(count), u32(first_pixel), u32(packet_pixels), packets.image(), met,
+              results);
 }
 
 void PathTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool from_gaussians) {
@@ -315,6 +377,8 @@ Image PathTracer::render(const Camera& camera, const std::function<bool(double)>
   self.statistics = {};
   Image out(camera.width, camera.height, 4);
   self.memory.check(out.pixels());
+  self.packet_pixels = 0;
+  if (self.by_packets(camera) && !self.trace_packets(camera, within)) return Image();
   const std::size_t batch = self.memory.batch();
   const auto samples = static_cast<float>(self.settings.samples);
   for (std::size_t first = 0; first < out.pixels(); first += batch) {

@@ -15,7 +15,9 @@ namespace raysplats {
 
 /// Draws a scene of Gaussians, meshes, materials, lights and an environment by path tracing
 /// (docs/light.md): paths advance one surface at a time, all of a picture's together, as waves of
-/// rays without the ones that have ended (Laine, Karras and Aila 2013). Threads: as Context.
+/// rays without the ones that have ended (Laine, Karras and Aila 2013). Of one sample per pixel the
+/// rays of a camera with a centre are traced in packets as Tracer does, until lights on Gaussians
+/// ask for more; those that end on a surface once more. Threads: as Context.
 class PathTracer {
  public:
   /// Rays of the last render().
@@ -23,7 +25,8 @@ class PathTracer {
     std::uint64_t camera_rays = 0;
     std::uint64_t continued_rays = 0;  ///< behind mirrors, glass, transparent and diffuse surfaces
     std::uint64_t shadow_rays = 0;     ///< from surfaces and Gaussians
-    std::uint64_t capped_rays = 0;     ///< stopped because of TraceOptions::max_hits
+    std::uint64_t capped_rays = 0;     ///< stopped because of TraceOptions::max_hits; where packets
+                                       ///< trace the camera's rays, on their whole way
     std::uint64_t ended_by_bounces = 0;  ///< paths that max_bounces ended
   };
 
