@@ -2,6 +2,7 @@
 #include "raysplats/evaluation.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
@@ -157,10 +158,16 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
     EvaluationMetrics metrics;
     const std::string& view_name = dataset.views[views[i]].camera.name;
     metrics.name = view_name.empty() ? names[i] : view_name;
+    if (!(pair.valid > 0)) {
+      spdlog::warn("nothing of {} can be compared: its mask or its lens leaves no pixel",
+                   metrics.name);
+      if (options.done && !options.done(i + 1)) break;
+      continue;
+    }
     // Masked pixels are equal; they must not count as well reconstructed ones.
-    metrics.psnr = psnr(pair.render, pair.photo);
-    if (std::isfinite(metrics.psnr)) metrics.psnr += 10.0 * std::log10(pair.valid);
-    if (pair.valid < 1.0) metrics.psnr_all = psnr(pair.whole, pair.photo);
+    metrics.psnr =
+        std::min(psnr(pair.render, pair.photo) + 10.0 * std::log10(pair.valid), kMostPsnr);
+    if (pair.valid < 1.0) metrics.psnr_all = std::min(psnr(pair.whole, pair.photo), kMostPsnr);
     metrics.ssim = ssim(pair.render, pair.photo);
     if (options.lpips != nullptr) metrics.lpips = options.lpips->distance(pair.render, pair.photo);
     report.images.push_back(metrics);
@@ -168,6 +175,11 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
       write_image(output / (names[i] + ".png"), side_by_side(pair.photo, pair.render));
     }
     if (options.done && !options.done(i + 1)) break;
+  }
+  if (report.images.empty()) {
+    throw DataError(
+        fmt::format("No view of {} has a pixel to compare: their masks or lenses leave none",
+                    dataset.root.string()));
   }
   report.mean = mean_of(report.images);
   if (!output.empty()) write_text_file(output / "metrics.json", report.json());

@@ -174,7 +174,8 @@ void write_frame(const std::filesystem::path& stem,
       }
     }
     write_image(file("", file_extension(options.format)), channels,
-                options.depth ? std::vector<std::string>{"Z"} : std::vector<std::string>{});
+                options.depth ? std::vector<std::string>{"Z"} : std::vector<std::string>{},
+                options.linear_exr ? ColorSpace::kLinear : ColorSpace::kDisplay);
     return;
   }
   write_image(file("", file_extension(options.format)), with_channels(rgba, 3));

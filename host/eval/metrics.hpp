@@ -5,6 +5,10 @@
 
 namespace raysplats {
 
+/// Decibels of a picture that is its photo, and the most that is reported of any: no rounding of
+/// 8-bit numbers is finer.
+constexpr double kMostPsnr = 100.0;
+
 /// Peak signal-to-noise ratio in decibels for a peak of 1, over all pixels and channels; infinity
 /// for equal images. Throws UsageError when the sizes differ or there is nothing to compare.
 double psnr(const Image& image, const Image& photo);

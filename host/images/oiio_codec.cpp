@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The library raysplats-images: pictures by OpenImageIO.
+// The library raysplats-images: EXR by OpenEXR, other pictures by
+// OpenImageIO.
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
@@ -11,8 +12,10 @@
 #include <utility>
 #include <vector>
 
+#include "images/exr_codec.hpp"
 #include "images/network.hpp"
 #include "io/image_codec.hpp"
+#include "io/image_limits.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
@@ -56,16 +59,8 @@ class OiioDecoder : public ImageDecoder {
       throw DataError(
           fmt::format("The image {} cannot be read: {}", name_, reason(input_->geterror())));
     }
-    if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep) {
-      throw DataError(fmt::format("The image {} is not a flat picture with pixels", name_));
-    }
-    if (spec.width > kMaxImageSide || spec.height > kMaxImageSide ||
-        static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height) >
-            kMaxImagePixels) {
-      throw DataError(fmt::format(
-          "The image {} has {} x {} pixels, more than {} a side or {} million: make it smaller",
-          name_, spec.width, spec.height, kMaxImageSide, kMaxImagePixels >> 20));
-    }
+    const bool flat = spec.nchannels >= 1 && spec.depth <= 1 && !spec.deep;
+    require_bearable_size(name_, flat ? spec.width : 0, spec.height);
   }
 
   int width() const override { return input_->spec().width; }
@@ -90,36 +85,29 @@ class OiioCodec : public ImageCodec {
   std::unique_ptr<ImageDecoder> open(const std::string& format,
                                      const std::string& name,
                                      std::span<const std::byte> memory) const override {
+    if (format == "openexr") return open_exr(name);
     return std::make_unique<OiioDecoder>(format, name, memory);
   }
   std::vector<unsigned char> encode(const std::filesystem::path& path,
                                     const Image& image,
                                     const ImageEncoding& encoding) const override {
-    const bool jpeg = encoding.format == "jpeg", exr = encoding.format == "openexr";
+    if (encoding.format == "openexr") return encode_exr(path, image, encoding);
+    const bool jpeg = encoding.format == "jpeg";
     // JPEG has neither alpha nor grey with alpha.
     const int channels = jpeg ? (image.channels >= 3 ? 3 : 1) : image.channels;
-    OIIO::ImageSpec spec(image.width, image.height, channels,
-                         exr ? OIIO::TypeFloat : OIIO::TypeUInt8);
+    OIIO::ImageSpec spec(image.width, image.height, channels, OIIO::TypeUInt8);
     spec.attribute("oiio:UnassociatedAlpha", 1);
     if (jpeg) {
       spec.attribute("Compression", "jpeg:95");
       spec.attribute("jpeg:subsampling", "4:4:4");
     }
-    if (exr) {
-      spec.attribute("compression", "zip");
-      spec.channelnames = encoding.channel_names;
-    }
     // Encoded in memory: OpenImageIO's encoders miss a full disk, and libjpeg ends the process on
     // one.
     const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(encoding.format);
     OIIO::Filesystem::IOVecOutput encoded;
-    bool written = output && output->set_ioproxy(&encoded) && output->open(path.string(), spec);
-    if (written && exr) {
-      written = output->write_image(OIIO::TypeFloat, image.data.data());
-    } else if (written) {
-      written = output->write_image(OIIO::TypeUInt8, to_bytes(image, channels).data());
-    }
-    written = written && output->close();
+    const bool written =
+        output && output->set_ioproxy(&encoded) && output->open(path.string(), spec) &&
+        output->write_image(OIIO::TypeUInt8, to_bytes(image, channels).data()) && output->close();
     if (!written) {
       throw DataError(
           fmt::format("The image {} cannot be written: {}", path.string(),

@@ -15,6 +15,7 @@
 #include <string_view>
 
 #include "io/byte_reader.hpp"
+#include "io/image_file.hpp"
 #include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 
@@ -133,7 +134,7 @@ ColmapImage make_image(std::string name,
   if (name.empty()) fail("an image has no name");
   if (camera_id > UINT32_MAX) fail(fmt::format("the camera number {} is too large", camera_id));
   ColmapImage image;
-  image.name = std::move(name);
+  image.name = portable_path(std::move(name)).string();
   image.camera_id = static_cast<std::uint32_t>(camera_id);
   image.rotation = glm::mat3_cast(glm::normalize(rotation));
   image.translation = {pose[4], pose[5], pose[6]};

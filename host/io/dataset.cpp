@@ -15,6 +15,7 @@
 #include <string>
 #include <thread>
 
+#include "core/camera_check.hpp"
 #include "io/colmap_model.hpp"
 #include "io/image_file.hpp"
 #include "io/ply_points.hpp"
@@ -73,6 +74,8 @@ void set_cameras(
   view.source_camera.cx *= scale_x;
   view.source_camera.fy *= scale_y;
   view.source_camera.cy *= scale_y;
+  require_believable(view.source_camera,
+                     fmt::format("The camera of the image {}", view.image_path.string()));
   view.camera = downscaled(view.source_camera, factor);
   if (undistort && view.camera.model == CameraModel::kOpenCv) {
     view.camera.model = CameraModel::kPinhole;
@@ -229,7 +232,7 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
     View view;
     view.image_path = *photo;
     fs::path name = frame.file_path;
-    if (name.filename() != photo->filename()) name += photo->extension();
+    if (!io::has_image_extension(name)) name += photo->extension();
     if (!frame.mask_path.empty()) {
       view.mask_path = folder / frame.mask_path;
       if (!is_file(view.mask_path)) {

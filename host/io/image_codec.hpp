@@ -32,7 +32,8 @@ class PerceptualNetwork {
 /// How a picture is stored.
 struct ImageEncoding {
   std::string format;                      ///< "png", "jpeg" or "openexr"
-  std::vector<std::string> channel_names;  ///< of "openexr"; empty = the codec's own
+  std::vector<std::string> channel_names;  ///< of "openexr"
+  std::string color_space;  ///< of "openexr": what "oiio:ColorSpace" says; may be empty
 };
 
 /// What the library raysplats-images does: formats of pictures and networks. Everything behind it
@@ -41,9 +42,9 @@ struct ImageEncoding {
 class ImageCodec {
  public:
   virtual ~ImageCodec() = default;
-  /// `format`: "png", "jpeg", "openexr", "bmp", "hdr" or "tiff". `name` is the path, or stands for
-  /// it in errors where `memory`, which has to outlive the decoder, is not empty. Throws DataError
-  /// for what is no flat picture of a bearable size.
+  /// `format`: "png", "jpeg", "openexr", "webp", "bmp", "hdr" or "tiff". `name` is the path, or
+  /// stands for it in errors where `memory` (not of "openexr"), which has to outlive the decoder,
+  /// is not empty. Throws DataError for what is no flat picture of a bearable size.
   virtual std::unique_ptr<ImageDecoder> open(const std::string& format,
                                              const std::string& name,
                                              std::span<const std::byte> memory) const = 0;
@@ -60,10 +61,6 @@ class ImageCodec {
 /// The codec, loaded by the first call. Throws Error(kRuntime) when the library is not there or is
 /// of another version.
 const ImageCodec& image_codec();
-
-/// Most pixels along a side, and of a picture.
-constexpr int kMaxImageSide = 32768;
-constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
 
 }  // namespace raysplats::io
 

@@ -14,8 +14,9 @@
 
 #include "base/atomic_file.hpp"
 #include "io/byte_reader.hpp"
-#include "io/exr_header.hpp"
 #include "io/image_codec.hpp"
+#include "io/image_header.hpp"
+#include "io/image_limits.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -23,15 +24,7 @@ namespace raysplats {
 namespace {
 
 constexpr std::string_view kPngStart = "\x89PNG\r\n\x1a\n";
-constexpr const char* kFormats = "PNG, JPEG, EXR, HDR, TIFF or BMP";
-
-std::string lower_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return extension;
-}
+constexpr const char* kFormats = "PNG, JPEG, EXR, HDR, TIFF, WebP or BMP";
 
 /// OpenImageIO's name of the format that the first bytes belong to; "" for any other.
 std::string_view format_of(std::string_view magic) {
@@ -40,6 +33,9 @@ std::string_view format_of(std::string_view magic) {
   if (magic.starts_with("\x76\x2f\x31\x01")) return "openexr";
   if (magic.starts_with("BM")) return "bmp";
   if (magic.starts_with("#?RADIANCE") || magic.starts_with("#?RGBE")) return "hdr";
+  if (magic.starts_with("RIFF") &&
+      magic.substr(std::min<std::size_t>(8, magic.size())).starts_with("WEBP"))
+    return "webp";
   const std::array<std::string_view, 4> tiff{
       std::string_view("II*\0", 4), std::string_view("MM\0*", 4), std::string_view("II+\0", 4),
       std::string_view("MM\0+", 4)};
@@ -118,9 +114,9 @@ bool has_whole_png_chunks(std::string_view bytes, bool header_only) {
   throw DataError(fmt::format("The image {} is truncated or damaged: copy it again", name));
 }
 
-/// Opens an image, its size checked before anything is decoded. `for_pixels`: checks that the file
-/// is whole.
-std::unique_ptr<io::ImageDecoder> open_image(const std::filesystem::path& path, bool for_pixels) {
+/// OpenImageIO's name of an image file's format; throws DataError for what is none. `for_pixels`:
+/// checks that the file is whole.
+std::string checked_format(const std::filesystem::path& path, bool for_pixels) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
     throw DataError(
@@ -152,8 +148,7 @@ std::unique_ptr<io::ImageDecoder> open_image(const std::filesystem::path& path, 
     whole = has_whole_png_chunks(start, true);
   }
   if (!whole) fail_damaged(path.string());
-  if (format == "openexr") io::check_exr_header(path, io::kMaxImageSide);
-  return io::image_codec().open(std::string(format), path.string(), {});
+  return std::string(format);
 }
 
 std::vector<std::string> exr_channel_names(const Image& image,
@@ -167,19 +162,42 @@ std::vector<std::string> exr_channel_names(const Image& image,
   return names;
 }
 
+/// OpenImageIO's names, which it has had longest.
+std::string color_space_name(ColorSpace space) {
+  if (space == ColorSpace::kLinear) return "Linear";
+  return space == ColorSpace::kDisplay ? "sRGB" : "";
+}
+
 }  // namespace
 
 namespace io {
 
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return extension;
+}
+
+std::filesystem::path portable_path(std::string text) {
+  std::replace(text.begin(), text.end(), '\\', '/');
+  return text;
+}
+
 bool has_image_extension(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
-  const std::array<const char*, 8> known{".png", ".jpg", ".jpeg", ".exr",
-                                         ".hdr", ".tif", ".tiff", ".bmp"};
-  return std::find(known.begin(), known.end(), extension) != known.end();
+  return std::find(kImageExtensions.begin(), kImageExtensions.end(), extension) !=
+         kImageExtensions.end();
 }
 
 ImageSize image_size(const std::filesystem::path& path) {
-  const auto input = open_image(path, false);
+  const std::string format = checked_format(path, false);
+  if (const auto size = size_in_header(path, format)) {
+    require_bearable_size(path.string(), size->width, size->height);
+    return *size;
+  }
+  const auto input = image_codec().open(format, path.string(), {});
   return {input->width(), input->height()};
 }
 
@@ -197,12 +215,15 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
 
 }  // namespace io
 
-Image read_image(const std::filesystem::path& path) { return open_image(path, true)->decode(); }
+Image read_image(const std::filesystem::path& path) {
+  return io::image_codec().open(checked_format(path, true), path.string(), {})->decode();
+}
 
 void write_image(const std::filesystem::path& path,
                  const Image& image,
-                 const std::vector<std::string>& extra_channels) {
-  const std::string extension = lower_extension(path);
+                 const std::vector<std::string>& extra_channels,
+                 ColorSpace space) {
+  const std::string extension = io::lower_extension(path);
   const bool jpeg = extension == ".jpg" || extension == ".jpeg";
   const bool exr = extension == ".exr";
   if (!jpeg && !exr && extension != ".png") {
@@ -218,7 +239,8 @@ void write_image(const std::filesystem::path& path,
                     "named) do not fit the format",
                     path.string(), image.width, image.height, image.channels, extra));
   }
-  io::ImageEncoding encoding{exr ? "openexr" : (jpeg ? "jpeg" : "png"), {}};
+  io::ImageEncoding encoding{
+      exr ? "openexr" : (jpeg ? "jpeg" : "png"), {}, color_space_name(space)};
   if (exr) encoding.channel_names = exr_channel_names(image, extra_channels);
   const std::vector<unsigned char> encoded = io::image_codec().encode(path, image, encoding);
   AtomicFile file(path);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <span>
@@ -22,8 +23,16 @@ ImageSize image_size(const std::filesystem::path& path);
 /// read_image() of a PNG or JPEG file in memory; `name` stands for its path in errors.
 Image decode_image(std::span<const std::byte> bytes, const std::string& name);
 
-/// Whether read_image() knows the extension (.png, .jpg, .jpeg, .exr, .hdr, .tif, .tiff, .bmp in
-/// any case).
+/// The extensions that read_image() knows; it takes them in any case.
+constexpr std::array<const char*, 9> kImageExtensions{".png",  ".jpg",  ".jpeg", ".exr", ".tif",
+                                                      ".tiff", ".webp", ".bmp",  ".hdr"};
+
+/// The extension in small letters.
+std::string lower_extension(const std::filesystem::path& path);
+/// Whether read_image() knows the extension.
 bool has_image_extension(const std::filesystem::path& path);
+
+/// A path of a data set's files, which may have been written on Windows.
+std::filesystem::path portable_path(std::string text);
 
 }  // namespace raysplats::io

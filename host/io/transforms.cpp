@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
 #include "base/atomic_file.hpp"
+#include "core/camera_check.hpp"
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
 #include "io/resample.hpp"
@@ -205,7 +207,7 @@ std::optional<std::vector<std::string>> read_names(const Scope& scope, const cha
   std::vector<std::string> names;
   for (const json& name : *found) {
     if (!name.is_string()) scope.fail(fmt::format("'{}' holds something that is no text", key));
-    names.push_back(name.get<std::string>());
+    names.push_back(portable_path(name.get<std::string>()));
   }
   return names;
 }
@@ -217,7 +219,7 @@ TransformsFile read_transforms(const fs::path& path) {
   const Scope scope{root, path, "the file"};
   TransformsFile file;
   file.path = path;
-  file.ply_file_path = scope.text("ply_file_path");
+  file.ply_file_path = portable_path(scope.text("ply_file_path"));
   file.train_filenames = read_names(scope, "train_filenames");
   file.val_filenames = read_names(scope, "val_filenames");
   file.test_filenames = read_names(scope, "test_filenames");
@@ -236,8 +238,8 @@ TransformsFile read_transforms(const fs::path& path) {
       frame_scope.fail("'k4' is supported for OPENCV_FISHEYE only, undistort the images first");
     }
     read_pose(frame_scope, frame);
-    frame.file_path = frame_scope.text("file_path");
-    frame.mask_path = frame_scope.text("mask_path");
+    frame.file_path = portable_path(frame_scope.text("file_path"));
+    frame.mask_path = portable_path(frame_scope.text("mask_path"));
     file.frames.push_back(std::move(frame));
   }
   return file;
@@ -293,10 +295,14 @@ std::optional<fs::path> find_image(const fs::path& folder, const fs::path& file_
   const fs::path exact = (folder / file_path).lexically_normal();
   std::error_code error;
   if (fs::is_regular_file(exact, error)) return exact;
-  if (has_image_extension(exact)) return std::nullopt;
-  for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".exr", ".tif", ".tiff", ".bmp"}) {
-    const fs::path candidate = exact.string() + extension;
-    if (fs::is_regular_file(candidate, error)) return candidate;
+  // Without an extension any will do; with one only its case may differ.
+  const bool named = has_image_extension(exact);
+  const std::string stem = named ? fs::path(exact).replace_extension().string() : exact.string();
+  for (std::string extension : kImageExtensions) {
+    if (named && lower_extension(exact) != extension) continue;
+    if (fs::is_regular_file(stem + extension, error)) return stem + extension;
+    for (char& c : extension) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    if (fs::is_regular_file(stem + extension, error)) return stem + extension;
   }
   return std::nullopt;
 }
@@ -327,6 +333,7 @@ std::vector<Camera> read_cameras(const std::filesystem::path& path) {
     cameras.push_back(io::frame_camera(file, i, size.width, size.height));
     cameras.back().name =
         frame.file_path.empty() ? fmt::format("frame_{:04d}", i) : io::inner_name(frame.file_path);
+    require_believable(cameras.back(), fmt::format("{}: the camera of frame {}", path.string(), i));
   }
   return cameras;
 }

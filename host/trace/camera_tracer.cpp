@@ -86,7 +86,7 @@ struct CameraTracer::Impl {
                      std::uint32_t rows) const;
   Statistics count_statistics() const;
   std::size_t chunks_wanted();
-  void grow_pool(std::size_t chunks);
+  void grow_pool(std::size_t chunks, std::size_t least = 1);
   Kernel& forward_kernel(bool keep);
   float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
   float screen_y() const { return static_cast<float>(camera.height) / (2.0f * camera.fy); }
@@ -100,11 +100,15 @@ struct CameraTracer::Impl {
   }
   std::size_t row_bytes() const { return sizeof(float) * static_cast<std::size_t>(packet.lanes); }
   std::size_t chunk_bytes() const { return kChunkEntries * (sizeof(Stream) + row_bytes()); }
-  std::size_t pool_limit() const {
+  // What the device and the 32-bit addresses of chunks allow.
+  std::size_t largest_pool() const {
     return std::min<std::size_t>(
-        {MemoryShares(options.memory_budget).hit_streams() / chunk_bytes(),
-         context.device().max_allocation / (kChunkEntries * std::max(sizeof(Stream), row_bytes())),
-         std::numeric_limits<std::uint32_t>::max() / kChunkEntries});
+        context.device().max_allocation / (kChunkEntries * std::max(sizeof(Stream), row_bytes())),
+        std::numeric_limits<std::uint32_t>::max() / kChunkEntries);
+  }
+  std::size_t pool_limit() const {
+    return std::min(MemoryShares(options.memory_budget).hit_streams() / chunk_bytes(),
+                    largest_pool());
   }
 
   Context& context;
@@ -331,8 +335,9 @@ std::size_t CameraTracer::Impl::chunks_wanted() {
   return saved.stream_bytes / chunk_bytes();
 }
 
-void CameraTracer::Impl::grow_pool(std::size_t chunks) {
-  const std::size_t room = std::max<std::size_t>(1, std::min(chunks + chunks / 4, pool_limit()));
+void CameraTracer::Impl::grow_pool(std::size_t chunks, std::size_t least) {
+  const std::size_t room =
+      std::max<std::size_t>({std::min(chunks + chunks / 4, pool_limit()), least, std::size_t{1}});
   pool.ensure(context, room * kChunkEntries, "hit pool");
   pool_transmittance.ensure(context, pool.size() * static_cast<std::size_t>(packet.lanes),
                             "hit transmittances");
@@ -376,12 +381,18 @@ void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
     backward_rows(gaussians, image_gradient, row + rows / 2, rows - rows / 2);
     return;
   }
+  // A row of tiles is the least, whatever its share of the budget.
   if (wanted > pool_capacity()) {
-    throw ResourceError(fmt::format(
-        "The hits of one row of tiles need {:.1f} MiB, the memory budget leaves {:.1f} MiB: "
-        "raise --memory-budget or --downscale",
-        static_cast<double>(wanted * chunk_bytes()) / (1 << 20),
-        static_cast<double>(pool_capacity() * chunk_bytes()) / (1 << 20)));
+    if (wanted > largest_pool()) {
+      throw ResourceError(fmt::format(
+          "The hits of one row of tiles need {:.1f} MiB, the device has buffers of {:.1f} MiB: "
+          "raise --downscale",
+          static_cast<double>(wanted * chunk_bytes()) / (1 << 20),
+          static_cast<double>(largest_pool() * chunk_bytes()) / (1 << 20)));
+    }
+    grow_pool(wanted, wanted);
+    counters.clear();
+    trace_rows(gaussians, row, rows, true);
   }
   launch_backward(image_gradient, row, rows);
 }

@@ -126,10 +126,9 @@ DensityPlan DensityControl::plan(const DeviceGaussians& gaussians, std::int64_t 
 DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iteration) {
   DensityPlan plan = this->plan(gaussians, iteration);
   if (plan.source.empty()) {
-    throw Error(ErrorCode::kRuntime, fmt::format("Density control at iteration {} would remove all "
-                                                 "{} Gaussians: lower --prune-opacity or "
-                                                 "the learning rates",
-                                                 iteration, gaussians.count));
+    throw Error(ErrorCode::kRuntime,
+                fmt::format("Density control at iteration {} would remove all {} Gaussians: {}",
+                            iteration, gaussians.count, plan.remedy()));
   }
   if (plan.changes()) gather(gaussians, plan, iteration);
   if (options_.strategy == DensityStrategy::kBudget && options_.opacity_decay > 0)

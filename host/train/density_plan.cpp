@@ -2,7 +2,9 @@
 #include "train/density_plan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "core/morton_order.hpp"
 
@@ -83,6 +85,18 @@ std::vector<std::uint32_t> DensityPlan::state_source() const {
   return out;
 }
 
+std::string DensityPlan::remedy() const {
+  const std::array<std::pair<std::size_t, const char*>, 5> reasons{
+      {{faint, "most are too faint: lower --prune-opacity or --opacity-lr"},
+       {large, "most are too large: raise --prune-scale, or set it to 0"},
+       {small, "most are too small: lower --prune-scale-min"},
+       {unseen, "no view meets most of them: see whether cameras and points belong together"},
+       {not_finite, "most are not finite: lower the learning rates"}}};
+  return std::max_element(reasons.begin(), reasons.end(),
+                          [](const auto& a, const auto& b) { return a.first < b.first; })
+      ->second;
+}
+
 DensityPlan plan_density(std::span<const float> means,
                          std::span<const float> scales,
                          std::span<const float> opacities,
@@ -97,12 +111,15 @@ DensityPlan plan_density(std::span<const float> means,
     const double size = rules.activation == ScaleActivation::kExp
                             ? std::exp(static_cast<double>(parameter))
                             : sigmoid(parameter);
-    const bool keep = is_finite(means, scales, opacities, i) &&
-                      sigmoid(opacities[i]) >= rules.min_opacity &&
-                      (rules.max_size <= 0 || size <= rules.max_size) &&
-                      (rules.min_size <= 0 || size >= rules.min_size);
-    if (!keep) {
+    const bool finite = is_finite(means, scales, opacities, i);
+    std::size_t* const reason = !finite                                         ? &plan.not_finite
+                                : !(sigmoid(opacities[i]) >= rules.min_opacity) ? &plan.faint
+                                : !(rules.max_size <= 0 || size <= rules.max_size) ? &plan.large
+                                : !(rules.min_size <= 0 || size >= rules.min_size) ? &plan.small
+                                                                                   : nullptr;
+    if (reason != nullptr) {
       fates[i] = Fate::kPrune;
+      ++*reason;
       ++plan.pruned;
       continue;
     }
@@ -132,11 +149,13 @@ DensityPlan plan_budget(std::span<const float> means,
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < count; ++i) {
     const float views = statistics[2 * i + 1];
-    const bool keep = is_finite(means, scales, opacities, i) &&
-                      sigmoid(opacities[i]) >= rules.min_opacity &&
-                      (views > 0 || !rules.remove_unseen);
-    if (!keep) {
+    std::size_t* const reason = !is_finite(means, scales, opacities, i)         ? &plan.not_finite
+                                : !(sigmoid(opacities[i]) >= rules.min_opacity) ? &plan.faint
+                                : !(views > 0 || !rules.remove_unseen)          ? &plan.unseen
+                                                                                : nullptr;
+    if (reason != nullptr) {
       fates[i] = Fate::kPrune;
+      ++*reason;
       ++plan.pruned;
       continue;
     }

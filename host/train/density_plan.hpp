@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "raysplats/trace_options.hpp"
@@ -47,10 +48,14 @@ struct DensityPlan {
   std::size_t cloned = 0;
   std::size_t split = 0;
   std::size_t pruned = 0;
+  /// Of the pruned, by the first of these that holds.
+  std::size_t not_finite = 0, faint = 0, large = 0, small = 0, unseen = 0;
   std::size_t refused = 0;  ///< candidates left as they are because of max_count
   /// source[i] where i keeps its state, 0xffffffff where it is new.
   std::vector<std::uint32_t> state_source() const;
   bool changes() const { return cloned + split + pruned > 0; }
+  /// What the user can do when too many are pruned: about the most frequent reason.
+  std::string remedy() const;
 };
 
 /// Decides from host copies of the parameters (means 3 N, scales 3 N and opacities N before

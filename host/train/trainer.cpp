@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "base/interrupt.hpp"
 #include "base/progress.hpp"
 #include "core/morton_order.hpp"
+#include "eval/metrics.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/evaluation.hpp"
@@ -46,6 +48,8 @@ namespace {
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 constexpr int kSmallPhoto = 200;       // longer side of photos that the start looks at, in pixels
 constexpr std::size_t kReadAhead = 8;  // photos decoded ahead of their turn
+constexpr int kViewsToJudge = 3;       // reports of views that were reported before
+constexpr double kLeastRise = 0.1;     // decibels that a run has to gain
 constexpr double kManyCapped = 1e-3;   // share of rays at which the cap on hits gets a warning
 
 // A clock that can be stopped, and stands while kernels are compiled.
@@ -197,6 +201,8 @@ struct Trainer::Impl {
   std::uint64_t capped_rays() const { return capped_before + tracer.kept_capped_rays(); }
   std::string capped_share();
   void warn_of_capped_rays() const;
+  void note_rise(double psnr);
+  void warn_of_no_progress() const;
   void write_metrics(bool complete);
   void run_iterations(std::int64_t until,
                       bool scheduled,
@@ -245,6 +251,9 @@ struct Trainer::Impl {
   std::uint64_t traced_rays = 0;    // of all training views of the run
   std::uint64_t capped_before = 0;  // rays that stopped at max-hits before it was resumed
   bool cap_reported = false;
+  std::map<std::pair<std::size_t, int>, double> first_psnr;  // by view and divisor, as reported
+  std::optional<double> psnr_rise;  // the most that a view has gained over its first report
+  int views_seen_again = 0;
   Stopwatch training{context};
   Stopwatch evaluating{context};
   double last_loss = 0;
@@ -461,7 +470,7 @@ void Trainer::Impl::validate_model() {
 // What somebody who looks for the cause needs.
 void Trainer::Impl::write_dump() {
   const std::filesystem::path folder = run.path() / "dump";
-  write_image(folder / "picture.exr", tracer.download_image());
+  write_image(folder / "picture.exr", tracer.download_image(), {}, ColorSpace::kDisplay);
   const Camera& camera = train_cameras[order.at(iteration - 1)];
   nlohmann::json rotation = nlohmann::json::array();
   for (int row = 0; row < 3; ++row) {
@@ -485,7 +494,8 @@ void Trainer::Impl::report(Progress& progress) {
   const ImageLoss::Value value = loss.value();
   check_guard();
   last_loss = value.total;
-  const double psnr = std::min(value.psnr, 100.0);
+  const double psnr = std::min(value.psnr, kMostPsnr);
+  note_rise(psnr);
   const double seconds = training.seconds();
   const double elapsed = seconds - row_seconds;
   run.append({iteration, seconds, value.total, psnr, gaussians.count,
@@ -514,6 +524,24 @@ void Trainer::Impl::warn_of_capped_rays() const {
       "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
       "behind: raise it",
       iteration, capped_rays(), traced_rays, options.max_hits);
+}
+
+// Views differ in what they can reach, so a view is compared with itself.
+void Trainer::Impl::note_rise(double psnr) {
+  const std::pair view(order.at(iteration - 1), resolution_divisor(options, iteration - 1));
+  const auto [first, is_new] = first_psnr.try_emplace(view, psnr);
+  if (is_new) return;
+  psnr_rise = std::max(psnr_rise.value_or(psnr - first->second), psnr - first->second);
+  ++views_seen_again;
+}
+
+// Of a run whose pictures never came nearer to the photos.
+void Trainer::Impl::warn_of_no_progress() const {
+  if (views_seen_again < kViewsToJudge || *psnr_rise > kLeastRise) return;
+  spdlog::warn(
+      "the model learned nothing: the PSNR of no training view rose by more than {} dB; see "
+      "whether cameras, points and photos belong together ('raysplats info {}')",
+      kLeastRise, dataset.root.string());
 }
 
 // What happens between this step and the next one: density control.
@@ -696,6 +724,7 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"kernel_build_seconds", context.build_seconds()},
                      {"traced_rays", traced_rays},
                      {"capped_rays", capped_rays()},
+                     {"psnr_rise", psnr_rise ? nlohmann::json(*psnr_rise) : nullptr},
                      {"skipped_updates", adam.skipped()},
                      {"bad_steps", guard.counts().bad_steps},
                      {"peak_device_bytes", context.peak_allocated_bytes()},
@@ -801,6 +830,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   advance(options.iterations, true, show_progress, [&] { return interrupt.requested(); });
   write_metrics(iteration == options.iterations);
   if (capped_rays() > 0) warn_of_capped_rays();
+  if (iteration == options.iterations) warn_of_no_progress();
   if (iteration < options.iterations && !stop_asked) {
     throw Error(
         ErrorCode::kInterrupted,

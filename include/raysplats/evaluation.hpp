@@ -18,7 +18,7 @@ namespace raysplats {
 /// Measures of one view, or their means over views.
 struct EvaluationMetrics {
   std::string name;
-  double psnr = 0;  ///< decibels, over the pixels that are not masked out
+  double psnr = 0;  ///< decibels, over the pixels that are not masked out; at most 100
   double ssim = 0;
   std::optional<double> psnr_all;  ///< over all pixels, when some are masked out
   std::optional<double> lpips;     ///< when a network was given
@@ -31,7 +31,7 @@ struct EvaluationReport {
   /// One line per image and the mean, aligned.
   std::string table() const;
   /// {"psnr", "ssim", "psnr_all" (if some pixels are masked out), "lpips" (if measured), "images":
-  /// [{"name", "psnr", "ssim", ...}]}; an infinite PSNR is null.
+  /// [{"name", "psnr", "ssim", ...}]}.
   std::string json() const;
 };
 
@@ -52,7 +52,8 @@ std::vector<std::string> evaluated_names(const Dataset& dataset, Split split);
 /// alpha is a mask, and render and photo are blended to be equal where it is 0. With an output
 /// folder every view's photo | render | error goes to NAME.png there, and the report to
 /// metrics.json. Throws UsageError when the split has no views or a render has another size than
-/// its photo.
+/// its photo, DataError when masks leave no pixel of any view; single views without one are left
+/// out with a warning.
 EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
                           const Dataset& dataset,
                           Split split,

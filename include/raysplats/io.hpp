@@ -30,15 +30,20 @@ void write_ply(const std::filesystem::path& path,
 /// TraceOptions has them; nothing for other files. Throws DataError for a value out of range.
 std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path);
 
-/// Reads PNG, JPEG, EXR, Radiance HDR, TIFF or BMP as float; 1 to 4 channels as in the file (grey
-/// stays 1 channel).
+/// Reads PNG, JPEG, EXR, Radiance HDR, TIFF, WebP or BMP as float; 1 to 4 channels as in the file
+/// (grey stays 1 channel).
 Image read_image(const std::filesystem::path& path);
 
+/// What the numbers of a picture are: proportional to light, or display values (sRGB).
+enum class ColorSpace { kUnknown, kLinear, kDisplay };
+
 /// Writes .png, .jpg or .exr by the extension, atomically. 8-bit formats clamp to [0, 1] and round.
-/// An EXR with channels beyond RGBA takes their names from `extra_channels` (for example "Z").
+/// An EXR with channels beyond RGBA takes their names from `extra_channels` (for example "Z"),
+/// and says in its attribute "oiio:ColorSpace" what `space` says.
 void write_image(const std::filesystem::path& path,
                  const Image& image,
-                 const std::vector<std::string>& extra_channels = {});
+                 const std::vector<std::string>& extra_channels = {},
+                 ColorSpace space = ColorSpace::kUnknown);
 
 /// Cameras of a transforms.json (Blender or nerfstudio keys, file-level or per frame), OpenGL axes
 /// on disk.

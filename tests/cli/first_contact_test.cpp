@@ -316,6 +316,31 @@ TEST_CASE("results that cannot be written are a failure") {
   CHECK(raysplats_program(train, mute).code == 0);
 }
 
+TEST_CASE("a run that learns nothing says so") {
+  const TemporaryFolder folder;
+  const auto metrics = [&](const std::string& run) {
+    return nlohmann::json::parse(read_file(run + "/metrics.json"));
+  };
+  Words still = training(folder / "still", 40);
+  still.pop_back();
+  for (const char* rate : {"--position-lr", "--rotation-lr", "--scale-lr", "--opacity-lr",
+                           "--sh-lr", "--sh-rest-lr"}) {
+    still = still + Words{rate, "0", std::string(rate) + "-final", "0"};
+  }
+  const Outcome outcome = raysplats_program(still + Words{"--log-every", "1"});
+  INFO(outcome.err);
+  CHECK(outcome.code == 0);
+  CHECK(contains(outcome.err, "the model learned nothing"));
+  CHECK(metrics(folder / "still").at("psnr_rise").get<double>() < 0.1);
+
+  Words learning = training(folder / "learns", 40);
+  learning.pop_back();
+  const Outcome fine = raysplats_program(learning + Words{"--log-every", "1"});
+  CHECK(fine.code == 0);
+  CHECK_FALSE(contains(fine.err, "learned nothing"));
+  CHECK(metrics(folder / "learns").at("psnr_rise").get<double>() > 0.1);
+}
+
 TEST_CASE("where no device is found the cause is named") {
   const TemporaryFolder folder;
   const auto refuse_there = [](const Surroundings& there, const Words& arguments, int code,
@@ -369,6 +394,6 @@ TEST_CASE("too little memory is named") {
     CHECK(contains(outcome.err, std::to_string(mebibytes) + " MiB of memory (ulimit -v)"));
   };
   refuse_with(190, {"devices"}, "OpenCL");
-  refuse_with(200, training(folder / "run", 1), "Pictures cannot be read");
+  refuse_with(200, training(folder / "run", 1), "cannot be");
 }
 #endif

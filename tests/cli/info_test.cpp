@@ -67,6 +67,19 @@ TEST_CASE("info says which lenses loading takes out and which it keeps") {
   }
 }
 
+TEST_CASE("info knows a data set of PNG photos without the library of pictures") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  REQUIRE(raysplats_program(
+              {"generate", data, "--size", "8", "--train-views", "3", "--test-views", "1", "-q"})
+              .code == 0);
+  const Surroundings without{{{"RAYSPLATS_IMAGES", "/nonexistent"}}};
+  const Outcome info = raysplats_program({"info", data}, without);
+  INFO(info.err);
+  CHECK(info.code == 0);
+  CHECK(info.out.find("8x8") != std::string::npos);
+}
+
 TEST_CASE("info describes meshes, scene files and the header of a model") {
   const TemporaryFolder folder;
   write_file(folder / "wall.obj", "v 0 0 0\nv 2 0 0\nv 0 3 0\nv 2 3 1\nf 1 2 3\nf 2 4 3\n");

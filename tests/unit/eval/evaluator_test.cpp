@@ -151,6 +151,27 @@ TEST_CASE("evaluator: masked pixels neither help nor hurt") {
   }
 }
 
+TEST_CASE("evaluator: equal pictures have a PSNR, and views without a pixel are left out") {
+  Scene scene;
+  const auto photo = [&](const Camera& camera) { return load_view_image(scene.view(camera.name)); };
+  const EvaluationReport same = evaluate(photo, scene.dataset, Split::kTest, kBackground);
+  CHECK(same.mean.psnr <= kMostPsnr);
+  CHECK(same.mean.psnr > kMostPsnr - 5);  // half of the pixels count
+  CHECK(same.json().find("null") == std::string::npos);
+
+  write_image(scene.dataset.views[0].image_path, Image(kWidth, kHeight, 4, 0.0f));
+  EvaluationOptions options;
+  std::size_t heard = 0;
+  options.done = [&](std::size_t count) { return heard = count, true; };
+  const EvaluationReport rest =
+      evaluate(photo, scene.dataset, Split::kTest, kBackground, {}, options);
+  REQUIRE(rest.images.size() == 1);
+  CHECK(rest.images[0].name == scene.dataset.views[1].camera.name);
+  CHECK(heard == 2);
+  write_image(scene.dataset.views[1].image_path, Image(kWidth, kHeight, 4, 0.0f));
+  CHECK_THROWS_AS(evaluate(photo, scene.dataset, Split::kTest, kBackground), DataError);
+}
+
 TEST_CASE("evaluator: limits, early stop, LPIPS and refusals") {
   Scene scene;
   const auto render = [](const Camera& camera) {

@@ -12,6 +12,7 @@
 
 #include "base/rng.hpp"
 #include "io/image_file.hpp"
+#include "io/image_header.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
 
@@ -101,17 +102,112 @@ TEST_CASE("EXR is exact for any float and names its channels") {
   Image image = gradient(7, 5, 5);
   image.data[3] = -12345.678f;
   image.data[9] = 1e-30f;
-  write_image(scratch / "a.exr", image, {"Z"});
+  write_image(scratch / "a.exr", image, {"Z"}, ColorSpace::kLinear);
   auto input = OIIO::ImageInput::open((scratch / "a.exr").string());
   REQUIRE(input);
   CHECK(input->spec().channelnames == std::vector<std::string>{"R", "G", "B", "A", "Z"});
   CHECK(input->spec().format == OIIO::TypeFloat);
+  CHECK(input->spec().get_string_attribute("oiio:ColorSpace") == "Linear");
+  CHECK(input->spec().find_attribute("chromaticities") != nullptr);
   std::vector<float> all(7 * 5 * 5);
   REQUIRE(input->read_image(0, 0, 0, 5, OIIO::TypeFloat, all.data()));
   CHECK(all == image.data);
   const Image colors = read_image(scratch / "a.exr");
   CHECK(colors.channels == 4);
   CHECK(colors.at(6, 4, 3) == image.at(6, 4, 3));
+  write_image(scratch / "b.exr", gradient(3, 2, 3), {}, ColorSpace::kDisplay);
+  input = OIIO::ImageInput::open((scratch / "b.exr").string());
+  REQUIRE(input);
+  CHECK(input->spec().get_string_attribute("oiio:ColorSpace") == "sRGB");
+}
+
+TEST_CASE("EXR of other programs is read in every compression, as halves, in tiles and windows") {
+  const Scratch scratch;
+  const Image image = gradient(50, 37, 4);
+  const fs::path path = scratch / "a.exr";
+  const auto write = [&](const OIIO::ImageSpec& spec) {
+    const auto output = OIIO::ImageOutput::create(path.string());
+    REQUIRE(output);
+    REQUIRE(output->open(path.string(), spec));
+    REQUIRE(output->write_image(OIIO::TypeFloat, image.data.data()));
+    REQUIRE(output->close());
+  };
+  for (const char* compression : {"none", "rle", "zip", "zips", "piz", "pxr24", "b44", "dwaa"}) {
+    for (const OIIO::TypeDesc& type : {OIIO::TypeFloat, OIIO::TypeHalf}) {
+      for (const int tile : {0, 16}) {
+        CAPTURE(compression);
+        CAPTURE(tile);
+        OIIO::ImageSpec spec(image.width, image.height, 4, type);
+        spec.attribute("compression", compression);
+        spec.tile_width = spec.tile_height = tile;
+        write(spec);
+        CHECK(io::image_size(path).width == 50);
+        CHECK(io::image_size(path).height == 37);
+        const bool lossy = std::string(compression) == "b44" || std::string(compression) == "dwaa";
+        CHECK(largest_difference(read_image(path), image) < (lossy ? 0.03 : 1e-3));
+      }
+    }
+  }
+  // What a renderer drew of a larger picture.
+  OIIO::ImageSpec window(image.width, image.height, 4, OIIO::TypeFloat);
+  window.x = -7, window.y = 11;
+  window.full_width = 100, window.full_height = 90;
+  write(window);
+  CHECK(largest_difference(read_image(path), image) == 0.0);
+  // Channels that are no colours are left out where there are colours.
+  OIIO::ImageSpec mixed(image.width, image.height, 4, OIIO::TypeFloat);
+  mixed.channelnames = {"Z", "R", "G", "B"};
+  write(mixed);
+  const Image colors = read_image(path);
+  CHECK(colors.channels == 3);
+  CHECK(colors.at(20, 10, 2) == image.at(20, 10, 3));
+}
+
+TEST_CASE("the size of a PNG or JPEG is read from its header as the library reads it") {
+  const Scratch scratch;
+  for (const auto& [width, height] : {std::pair(1, 1), {300, 7}, {2, 513}}) {
+    for (const char* name : {"a.png", "a.jpg"}) {
+      write_image(scratch / name, gradient(width, height, 3));
+      const auto size = io::size_in_header(scratch / name, name[2] == 'p' ? "png" : "jpeg");
+      REQUIRE(size);
+      CHECK(size->width == width);
+      CHECK(size->height == height);
+    }
+  }
+  // A segment that holds what looks like the beginning of a frame, and fill bytes.
+  const std::string jpeg = read_bytes(scratch / "a.jpg");
+  const std::string segment("\xff\xff\xe1\0\x0a\xff\xc0\0\x11\x08\0\1\0", 13);
+  write_bytes(scratch / "b.jpg", jpeg.substr(0, 2) + segment + jpeg.substr(2));
+  const auto behind = io::size_in_header(scratch / "b.jpg", "jpeg");
+  REQUIRE(behind);
+  CHECK(behind->height == 513);
+  // A frame without a height, no frame, no header: for the library.
+  std::string open = jpeg;
+  const std::size_t frame = open.find("\xff\xc0");
+  REQUIRE(frame != std::string::npos);
+  open[frame + 5] = open[frame + 6] = 0;
+  write_bytes(scratch / "c.jpg", open);
+  CHECK_FALSE(io::size_in_header(scratch / "c.jpg", "jpeg"));
+  for (std::size_t length = 0; length < frame + 9; ++length) {
+    write_bytes(scratch / "c.jpg", jpeg.substr(0, length));
+    CHECK_FALSE(io::size_in_header(scratch / "c.jpg", "jpeg"));
+  }
+  CHECK_FALSE(io::size_in_header(scratch / "a.png", "openexr"));
+}
+
+TEST_CASE("WebP is read, and refused when it is cut") {
+  const Scratch scratch;
+  std::vector<std::uint8_t> pixels(40 * 30 * 3);
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint8_t>(i / 15);
+  write_raw(scratch / "a.webp", 3, OIIO::TypeUInt8, pixels.data(), 40, 30);
+  const Image image = read_image(scratch / "a.webp");
+  CHECK(image.width == 40);
+  CHECK(io::image_size(scratch / "a.webp").height == 30);
+  CHECK(std::abs(image.at(20, 15, 1) - static_cast<float>(pixels[(15 * 40 + 20) * 3 + 1]) / 255) <
+        0.1f);
+  const std::string whole = read_bytes(scratch / "a.webp");
+  write_bytes(scratch / "cut.webp", whole.substr(0, whole.size() / 2));
+  CHECK(read_error(scratch / "cut.webp") != "");
 }
 
 TEST_CASE("JPEG is close to the original and drops alpha") {

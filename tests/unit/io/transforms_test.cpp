@@ -323,6 +323,51 @@ TEST_CASE("masks of cut-out photos ignore pixels or cut them out, and bad masks 
   CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "black everywhere"));
 }
 
+TEST_CASE("photos are found by names of Windows and extensions in capitals") {
+  const Scratch scratch;
+  for (const char* name : {"train/a.PNG", "train/b.png", "train/c.JPG"})
+    write_image(scratch / name, Image(20, 10, 3, 0.5f));
+  write_bytes(scratch / "transforms_train.json",
+              file_of("\"camera_angle_x\": 0.8, ", frame("train\\\\a", 1) + "," +
+                                                       frame(".\\\\train\\\\b.PNG", 2) + "," +
+                                                       frame("train/c", 3)));
+  const Dataset dataset = load_dataset(scratch.path());
+  REQUIRE(dataset.views.size() == 3);
+  CHECK(dataset.views[0].camera.name == "train/a.PNG");
+  CHECK(dataset.views[1].image_path == scratch / "train/b.png");
+  CHECK(dataset.views[1].camera.name == "train/b.PNG");
+  CHECK(dataset.views[2].image_path == scratch / "train/c.JPG");
+}
+
+TEST_CASE("cameras that no photo can have been taken with are refused by name") {
+  const Scratch scratch;
+  write_image(scratch / "train/far.png", Image(20, 10, 3, 0.5f));
+  write_bytes(scratch / "transforms_train.json",
+              file_of("\"camera_angle_x\": 0.8, ", frame("train/far", 1e30)));
+  std::string message = data_error([&] { load_dataset(scratch.path()); });
+  CHECK(contains(message, "far.png"));
+  CHECK(contains(message, "from the origin"));
+  CHECK(contains(cameras_error(file_of("\"fl_x\": 20, \"w\": 20, \"h\": 10, ", frame("far", 1e30))),
+                 "the camera of frame 0"));
+  const auto lens = [](const std::string& model, const std::string& terms) {
+    return file_of(
+        "\"fl_x\": 20, \"w\": 20, \"h\": 10, \"camera_model\": \"" + model + "\", " + terms + ", ",
+        frame("a", 1));
+  };
+  CHECK(contains(cameras_error(lens("OPENCV", "\"k1\": 1e9")), "k1 1e+09"));
+  CHECK(contains(cameras_error(lens("OPENCV", "\"p2\": 1e9")), "p2 1e+09"));
+  CHECK(contains(cameras_error(lens("OPENCV_FISHEYE", "\"k4\": 1e9")), "k4 1e+09"));
+  // Strong lenses and far places are none.
+  CHECK(cameras_of(lens("OPENCV", "\"k1\": -0.4, \"k2\": 0.3, \"k3\": -0.1")).size() == 1);
+  CHECK(cameras_of(lens("OPENCV_FISHEYE", "\"k1\": 0.1, \"k4\": -0.01")).size() == 1);
+  CHECK(cameras_of(file_of("\"fl_x\": 20, \"w\": 20, \"h\": 10, ", frame("a", 5e6))).size() == 1);
+  // So is a lens of a telephoto, whose terms are large because r is small.
+  CHECK(cameras_of(file_of("\"fl_x\": 4000, \"w\": 20, \"h\": 10, \"k3\": 1e4, "
+                           "\"camera_model\": \"OPENCV\", ",
+                           frame("a", 1)))
+            .size() == 1);
+}
+
 TEST_CASE("nerfstudio scenes: distortion, masks, points, lists of names, scaled photos") {
   const Scratch scratch;
   std::string frames;

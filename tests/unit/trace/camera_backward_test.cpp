@@ -191,6 +191,8 @@ TEST_CASE("packet widths, every way of adding and recomputed hits give the same 
   TraceOptions tight = options;
   tight.memory_budget = 4200000;  // two private copies, hit lists in bands
   check(tight, "memory budget");
+  tight.memory_budget = 1 << 18;
+  check(tight, "less than the hits of a row of tiles");
   const auto sum_of = [&](const TraceOptions& variant) {
     return GradientSumChoice::of(variant, context.device(), model.size(), variant.memory_budget / 4,
                                  2)

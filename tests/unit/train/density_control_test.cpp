@@ -229,8 +229,23 @@ TEST_CASE("Gaussians that are not finite are removed and an empty result is an e
   CHECK(gaussians.count == 1);
   TrainOptions strict = rules();
   strict.prune_opacity = 0.9;
-  DensityControl remover(context, strict, 1.0, 1);
-  CHECK_THROWS_AS(remover.refine(gaussians, 1), Error);
+  const auto advice = [&](const TrainOptions& options) {
+    DensityControl remover(context, options, 1.0, 1);
+    try {
+      remover.refine(gaussians, 1);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  CHECK(advice(strict).find("lower --prune-opacity") != std::string::npos);
+  TrainOptions narrow = rules();
+  narrow.prune_scale = 1e-6;
+  CHECK(advice(narrow).find("raise --prune-scale") != std::string::npos);
+  TrainOptions wide = rules();
+  wide.prune_scale = 0;
+  wide.prune_scale_min = 1e6;
+  CHECK(advice(wide).find("lower --prune-scale-min") != std::string::npos);
 }
 
 TEST_CASE("opacity reset lowers and never raises [small] [tiny]") {

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/image_header.hpp"
+
+#include <array>
+#include <cstddef>
+#include <fstream>
+#include <istream>
+
+namespace raysplats::io {
+namespace {
+
+// A number of `count` bytes, the most significant first; nothing at the end of the file.
+std::optional<unsigned> big_endian(std::istream& stream, int count) {
+  unsigned value = 0;
+  for (int i = 0; i < count; ++i) {
+    const int byte = stream.get();
+    if (byte < 0) return std::nullopt;
+    value = value << 8 | static_cast<unsigned>(byte);
+  }
+  return value;
+}
+
+std::optional<ImageSize> size_of(std::optional<unsigned> width, std::optional<unsigned> height) {
+  constexpr unsigned kMost = 0x7fffffffu;
+  if (!width || !height || *width < 1 || *height < 1 || *width > kMost || *height > kMost)
+    return std::nullopt;
+  return ImageSize{static_cast<int>(*width), static_cast<int>(*height)};
+}
+
+// The first chunk is IHDR, which begins with both (PNG specification, section 11.2.2).
+std::optional<ImageSize> png_size(std::istream& stream) {
+  stream.seekg(16);
+  const auto width = big_endian(stream, 4);
+  return size_of(width, big_endian(stream, 4));
+}
+
+// The segment that begins the frame has both (ITU-T T.81, B.2.2); a height of 0 comes later.
+std::optional<ImageSize> jpeg_size(std::istream& stream) {
+  stream.seekg(2);
+  for (;;) {
+    if (stream.get() != 0xff) return std::nullopt;
+    int marker = 0xff;
+    while (marker == 0xff) marker = stream.get();  // fill bytes
+    const bool frame =
+        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    const bool bare = marker <= 0x01 || (marker >= 0xd0 && marker <= 0xda);
+    if (bare) return std::nullopt;  // the picture begins, or the file ends
+    const auto length = big_endian(stream, 2);
+    if (!length || *length < 2) return std::nullopt;
+    if (!frame) {
+      stream.seekg(*length - 2, std::ios::cur);
+      continue;
+    }
+    stream.get();  // bits per sample
+    const auto height = big_endian(stream, 2);
+    return size_of(big_endian(stream, 2), height);
+  }
+}
+
+}  // namespace
+
+std::optional<ImageSize> size_in_header(const std::filesystem::path& path,
+                                        std::string_view format) {
+  std::ifstream stream(path, std::ios::binary);
+  if (format == "png") return png_size(stream);
+  if (format == "jpeg") return jpeg_size(stream);
+  return std::nullopt;
+}
+
+}  // namespace raysplats::io

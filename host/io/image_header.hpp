@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string_view>
+
+#include "io/image_file.hpp"
+
+namespace raysplats::io {
+
+/// Width and height as the header of a "png" or "jpeg" file states them, so that thousands of
+/// photos are known without the library of pictures; nothing for other formats and for headers
+/// that only that library may understand. Reads a few bytes, not the picture.
+std::optional<ImageSize> size_in_header(const std::filesystem::path& path, std::string_view format);
+
+}  // namespace raysplats::io
