@@ -19,6 +19,7 @@
 #define RS_RESULT_ALPHA s3
 #define RS_RESULT_EXPECTED s4
 #define RS_RESULT_MEDIAN s5
+#define RS_RESULT_LEADING s6
 
 #define RS_FAR 3.402823466e+38f
 
@@ -151,14 +152,31 @@ float gaussian_depth(float8 result, float begin, float end) {
   return clamp(depth, begin, end);
 }
 
-// Rays from what a path meets to sample `light_sample` of light `number`: from its Gaussians
-// (`gaussians` 1) or its surface. Where no light can come, and where no answer matters, the ray is
-// empty (t_max < t_min).
+// How far a Gaussian reaches from its centre towards a unit direction.
+float reach_of_gaussian(__global const float* restrict quaternions,
+                        __global const float* restrict log_scales,
+                        const float quantile,
+                        const uint i,
+                        const float3 direction) {
+  const float4 q = normalize(vload4(i, quaternions));
+  const float3 axis = q.yzw;
+  // The direction in the Gaussian's axes: turned by the conjugate.
+  const float3 turned = direction + 2.0f * cross(axis, cross(axis, direction) - q.x * direction);
+  return sqrt(quantile) * length(exp(vload3(i, log_scales)) * turned);
+}
+
+// Rays from what a path meets to sample `light_sample` of light `number`: from its surface
+// (`target` 0), from its Gaussians to triangles (1) or to other Gaussians (2), which begin behind
+// what the leading Gaussian reaches: its neighbours make the same surface. Where no light can come,
+// and where no answer matters, the ray is empty (t_max < t_min).
 __kernel void shadow_rays(const uint count,
                           const RsWave wave,
                           const int number,
                           const int light_sample,
-                          const int gaussians,
+                          const int target,
+                          __global const float* restrict quaternions,
+                          __global const float* restrict log_scales,
+                          const float quantile,
                           __global const RsLight* restrict lights,
                           __global const RsMaterial* restrict materials,
                           __global const RsPath* restrict paths,
@@ -169,6 +187,7 @@ __kernel void shadow_rays(const uint count,
                           __global int* restrict skip) {
   const uint i = get_global_id(0);
   if (i >= count) return;
+  const int gaussians = target > 0 ? 1 : 0;
   float8 ray = (float8)(0.0f);
   ray.s5 = 1.0f;
   ray.s7 = -1.0f;
@@ -216,6 +235,10 @@ __kernel void shadow_rays(const uint count,
       const float3 v = to - p;
       distance = length(v);
       direction = v / fmax(distance, 1e-20f);
+    }
+    if (target == 2) {
+      begin = fmax(begin, reach_of_gaussian(quaternions, log_scales, quantile,
+                                            as_uint(results[i].RS_RESULT_LEADING), direction));
     }
     ray = (float8)(p, begin, direction, distance);
   }

@@ -5,6 +5,10 @@
 // blocks met / PACKET lanes, plus hits^2 / PACKET for the order (ray_walk.h).
 #include "trace/ray_color.h"
 
+#ifndef LEADING
+#define LEADING 0
+#endif
+
 typedef struct {
   float4 color;  // the fourth lane is zero
   float transmittance, depth_sum, median;
@@ -12,6 +16,10 @@ typedef struct {
   bool capped, stopped;
   float last_key;  // of the last blended hit
   uint last_index;
+#if LEADING
+  float most;    // the largest weight so far, in front of the median
+  uint leading;  // the Gaussian of the median depth, or else of the largest weight
+#endif
 } RayState;
 
 void blend_hits(const RayScene* scene,
@@ -32,7 +40,14 @@ void blend_hits(const RayScene* scene,
     state->color += weight * hit_color(scene, ray, ray_basis, pending, i);
     state->depth_sum += weight * peak;
     state->transmittance = before * (1.0f - alpha);
-    if (before >= 0.5f && state->transmittance < 0.5f) state->median = peak;
+    const bool middle = before >= 0.5f && state->transmittance < 0.5f;
+    if (middle) state->median = peak;
+#if LEADING
+    if (middle || (before >= 0.5f && weight > state->most)) {
+      state->most = weight;
+      state->leading = pending->index[i];
+    }
+#endif
     ++state->hits;
     state->last_key = pending->key.s[i];
     state->last_index = pending->index[i];
@@ -46,9 +61,11 @@ void blend_hits(const RayScene* scene,
 #include "trace/ray_walk.h"
 
 // rays: 8 floats each (origin, t_min, direction, t_max). results: 8 words each (colour, alpha,
-// expected depth, median depth, hits, capped). level_begin[l]: first node of level l, from 1;
-// ray_order: which ray a work-item traces, read when `ordered`. color_from_origin: 0 for colours
-// along the rays, 1 from their origins, 2 as from_origin[] says for each.
+// expected depth, median depth, hits, capped); with LEADING the word of the hits is the Gaussian
+// that leads them: of the median depth, or the one that shows most where there is none.
+// level_begin[l]: first node of level l, from 1; ray_order: which ray a work-item traces, read when
+// `ordered`. color_from_origin: 0 for colours along the rays, 1 from their origins, 2 as
+// from_origin[] says for each.
 __kernel void trace_rays(const uint ray_count,
                          const uint rays_per_item,
                          const int levels,
@@ -85,11 +102,19 @@ __kernel void trace_rays(const uint ray_count,
     float basis[25];
     basis_along_ray(&scene, &ray, basis);
     RayState state = {(float4)(0.0f), 1.0f, 0.0f, 0.0f, 0, false, false, -1.0f, 0};
+#if LEADING
+    state.most = 0.0f;
+    state.leading = 0;
+#endif
     walk_ray(&scene, raw.s7, basis, &ray, &state);
     const float3 color = state.color.xyz + state.transmittance * background.xyz;
     const float weight = 1.0f - state.transmittance;
-    results[id] =
-        (float8)(color, weight, weight > 0.0f ? state.depth_sum / weight : 0.0f, state.median,
-                 as_float((uint)state.hits), as_float((uint)(state.capped ? 1 : 0)));
+#if LEADING
+    const uint count = state.leading;
+#else
+    const uint count = (uint)state.hits;
+#endif
+    results[id] = (float8)(color, weight, weight > 0.0f ? state.depth_sum / weight : 0.0f,
+                           state.median, as_float(count), as_float((uint)(state.capped ? 1 : 0)));
   }
 }

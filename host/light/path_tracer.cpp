@@ -316,19 +316,26 @@ void PathTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool 
   passes.ensure(context, count, "light that passes");
   blocked.ensure(context, count, "light that Gaussians take");
   const int kind = from_gaussians ? 1 : 0;
+  const auto make_rays = [&](int light, int k, int target) {
+    kernel("shadow_rays")
+        .launch(each, u32(count), wave, light, k, target, gaussians.quaternions, gaussians.scales,
+                tracer.options().quantile, surfaces.lights(), surfaces.materials(), paths, rays,
+                results, met, shadow_rays, skip);
+  };
   for (std::size_t number = 0; number < lights.size(); ++number) {
     const bool soft = lights[number].kind == Light::Kind::kSphere && lights[number].radius > 0;
     const int samples = soft && (use_triangles || use_gaussians) ? settings.light_samples : 1;
     const int light = static_cast<int>(number);
     for (int k = 0; k < samples; ++k) {
-      kernel("shadow_rays")
-          .launch(each, u32(count), wave, light, k, kind, surfaces.lights(), surfaces.materials(),
-                  paths, rays, results, met, shadow_rays, skip);
+      make_rays(light, k, kind);
       if (use_triangles) {
         surfaces.triangles().light_through(shadow_rays, skip, surfaces.triangle_shadows(), count,
                                            passes);
       }
-      if (use_gaussians) tracer.trace(gaussians, shadow_rays, count, blocked);
+      if (use_gaussians) {
+        if (from_gaussians) make_rays(light, k, 2);
+        tracer.trace(gaussians, shadow_rays, count, blocked);
+      }
       kernel("add_light")
           .launch(each, u32(count), wave, light, 1.0f / static_cast<float>(samples), kind,
                   use_triangles ? 1 : 0, use_gaussians ? 1 : 0, surfaces.lights(),

@@ -69,6 +69,26 @@ class Walk {
   LightPath& path_;
 };
 
+/// The Gaussian of the median depth, or else of the largest weight.
+std::size_t leading(const RayTrace& ray, double& margin) {
+  std::size_t index = ray.hits.front().index;
+  double most = 0.0, second = 0.0;
+  for (const Hit& hit : ray.hits) {
+    if (hit.transmittance < 0.5) break;
+    const double weight = hit.transmittance * hit.alpha;
+    if (hit.transmittance * (1.0 - hit.alpha) < 0.5) return hit.index;
+    if (weight > most) {
+      second = most;
+      most = weight;
+      index = hit.index;
+    } else {
+      second = std::max(second, weight);
+    }
+  }
+  margin = std::min(margin, most - second);
+  return index;
+}
+
 /// Adds T s C to the result; returns what the ray met.
 RayTrace Walk::gaussians(const State& state, double t_end, double& margin) {
   const double t_min = state.t_start > 0.0 ? std::nextafter(state.t_start, kInfinity) : 0.0;
@@ -92,7 +112,10 @@ RayTrace Walk::gaussians(const State& state, double t_end, double& margin) {
     }
   }
   light *= absorbed(sigma, depth - state.t_start);
-  if (shaded) light *= gaussian_shadow(scene_, state.origin + depth * state.direction, margin);
+  if (shaded) {
+    light *= gaussian_shadow(scene_, state.origin + depth * state.direction, leading(ray, margin),
+                             margin);
+  }
   path_.color += state.probability * state.throughput * light;
   return ray;
 }

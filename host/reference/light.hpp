@@ -60,7 +60,8 @@ LightPath trace_light(const LightScene& scene,
 LightPath trace_light(const Scene& scene, const glm::dvec3& origin, const glm::dvec3& direction);
 
 /// The share of a light's colour that reaches a point past triangles and Gaussians (V before
-/// `strength`); those up to `t_after` on the way and the triangle `skip` do not count.
+/// `strength`); those up to `t_after` on the way and the triangle `skip` do not count, nor do
+/// Gaussians within the reach of `leading` along the way.
 double visibility(const LightScene& scene,
                   const Light& light,
                   const glm::dvec3& point,
@@ -68,7 +69,8 @@ double visibility(const LightScene& scene,
                   int skip,
                   bool triangles,
                   bool gaussians,
-                  double& margin);
+                  double& margin,
+                  const PreparedGaussian* leading = nullptr);
 
 struct LightRender {
   int width = 0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <limits>
 #include <numbers>
 
@@ -45,6 +46,7 @@ double transmittance(const LightScene& scene,
                      int skip,
                      bool triangles,
                      bool gaussians,
+                     const PreparedGaussian* leading,
                      double& margin) {
   double out = 1.0;
   if (triangles) {
@@ -52,6 +54,12 @@ double transmittance(const LightScene& scene,
                                   t_max, skip, margin);
   }
   if (gaussians && out > 0.0) {
+    if (leading != nullptr) {
+      // S R^T l: how far the ellipsoid reaches along l.
+      const glm::dvec3 along = glm::transpose(glm::inverse(leading->whitening)) * direction;
+      t_after = std::max(
+          t_after, std::sqrt(static_cast<double>(scene.options.quantile)) * glm::length(along));
+    }
     const RayTrace ray = trace_ray(scene.parameters, scene.prepared, scene.options, point,
                                    direction, t_after, t_max, ColorMode::kAlongRay);
     margin = std::min(margin, ray.margin);
@@ -69,12 +77,13 @@ double visibility(const LightScene& scene,
                   int skip,
                   bool triangles,
                   bool gaussians,
-                  double& margin) {
+                  double& margin,
+                  const PreparedGaussian* leading) {
   if (!triangles && !gaussians) return 1.0;
   const LightAt at = light_at(light, point);
   if (light.kind != Light::Kind::kSphere || light.radius <= 0.0f) {
     return transmittance(scene, point, at.direction, t_after, at.distance, skip, triangles,
-                         gaussians, margin);
+                         gaussians, leading, margin);
   }
   // Rings of equal area on the disc that faces the point. A ray's own decisions count for little in
   // the mean, so that they leave the margin alone.
@@ -92,7 +101,7 @@ double visibility(const LightScene& scene,
       const double distance = glm::distance(target, point);
       double ignored = 1.0;
       sum += transmittance(scene, point, (target - point) / distance, t_after, distance, skip,
-                           triangles, gaussians, ignored);
+                           triangles, gaussians, leading, ignored);
     }
   }
   return sum / (kRings * kSpokes);
@@ -156,15 +165,19 @@ glm::dvec3 diffuse_light(const LightScene& scene,
   return point.color * lambert + static_cast<double>(material.specular) * highlight;
 }
 
-double gaussian_shadow(const LightScene& scene, const glm::dvec3& point, double& margin) {
+double gaussian_shadow(const LightScene& scene,
+                       const glm::dvec3& point,
+                       std::size_t leading,
+                       double& margin) {
   const ShadowSettings& shadows = scene.scene.render.shadows;
   double sum = 0.0;
   double weights = 0.0;
   for (const Light& light : scene.scene.lights) {
     const LightAt at = light_at(light, point);
     const double weight = std::max({at.color.r, at.color.g, at.color.b});
-    const double open = visibility(scene, light, point, scene.bias, -1, shadows.mesh_on_gaussians,
-                                   shadows.gaussians_on_gaussians, margin);
+    const double open =
+        visibility(scene, light, point, scene.bias, -1, shadows.mesh_on_gaussians,
+                   shadows.gaussians_on_gaussians, margin, &scene.prepared[leading]);
     sum += weight * (1.0 - shadows.strength * (1.0 - open));
     weights += weight;
   }

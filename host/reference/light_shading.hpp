@@ -28,7 +28,10 @@ glm::dvec3 diffuse_light(const LightScene& scene,
                          const glm::dvec3& direction,
                          double& margin);
 
-/// The shadow s of Gaussians whose depth is at `point`.
-double gaussian_shadow(const LightScene& scene, const glm::dvec3& point, double& margin);
+/// The shadow s of Gaussians whose depth is at `point` and which Gaussian `leading` leads.
+double gaussian_shadow(const LightScene& scene,
+                       const glm::dvec3& point,
+                       std::size_t leading,
+                       double& margin);
 
 }  // namespace raysplats::reference

@@ -120,10 +120,10 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
   const std::array<float, 4> background{options.background[0], options.background[1],
                                         options.background[2], 0.0f};
+  BuildOptions build = ray_walk_build(self.context.device(), options, self.near, tree.lanes());
+  build.define("LEADING", color_mode == kFlagPerRay ? 1 : 0);
   launch_in_bands(
-      self.context, self.budget,
-      self.context.kernel("trace/rays.cl", "trace_rays",
-                          ray_walk_build(self.context.device(), options, self.near, tree.lanes())),
+      self.context, self.budget, self.context.kernel("trace/rays.cl", "trace_rays", build),
       (count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup, u32(count), u32(rays_per_item),
       tree.levels(), tree.level_begin(), tree.nodes(), self.tree.blocks(), gaussians.sh,
       sh_coefficients(gaussians.sh_degree), gaussians.active_sh_degree, color_mode, from_origin,

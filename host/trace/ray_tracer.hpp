@@ -44,8 +44,9 @@ class RayTracer {
              std::size_t count,
              Buffer<RayResult>& results,
              ColorDirection color_direction = ColorDirection::kRay);
-  /// The same with colours from the origin for rays whose from_origin is 1, along the ray where it
-  /// is 0.
+  /// The same for paths: colours from the origin for rays whose from_origin is 1, along the ray
+  /// where it is 0, and instead of the number of hits the Gaussian that leads them: the one of the
+  /// median depth, or the one that shows most where there is none.
   void trace(const DeviceGaussians& gaussians,
              const Buffer<Ray>& rays,
              const Buffer<std::uint32_t>& from_origin,

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raysplats/path_tracer.hpp"
 
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/matrix.hpp>
+
+#include "base/rng.hpp"
+#include "light/view_tracer.hpp"
 #include "light_fixture.hpp"
 #include "trace/camera_tracer.hpp"
 
@@ -128,6 +135,77 @@ TEST_CASE("shadows of all four kinds") {
   scene.trace.hit_order = HitOrder::kPeak;
   scene.render.bias = 0.0f;
   check_picture(context, scene, kCamera, "all in peak order");
+}
+
+TEST_CASE("a surface of Gaussians throws no speckle on itself, and its dark side is dark") {
+  Context context = make_test_context();
+  // Flat Gaussians of all sizes on a ball, white.
+  Scene scene;
+  Gaussians& model = scene.gaussians;
+  CounterRng rng(11, 0);
+  const auto vector = [&] { return glm::dvec3(rng.normal(), rng.normal(), rng.normal()); };
+  for (int i = 0; i < 4000; ++i) {
+    const glm::dvec3 place = glm::normalize(vector()) * (1.0 + 0.02 * rng.normal());
+    const glm::dvec3 normal =
+        glm::normalize(glm::normalize(place) + 0.2 * glm::normalize(vector()));
+    // The turn of z to the normal.
+    const glm::dquat turn =
+        glm::normalize(glm::dquat(1.0 + normal.z, glm::cross(glm::dvec3(0, 0, 1), normal)));
+    for (int k = 0; k < 3; ++k) {
+      model.means.push_back(static_cast<float>(place[k]));
+      model.log_scales.push_back(
+          static_cast<float>(std::log(k < 2 ? 0.04 : 0.008) + 0.3 * rng.normal()));
+      model.sh.push_back(1.7725f);  // colour 1
+    }
+    for (const double part : {turn.w, turn.x, turn.y, turn.z})
+      model.quaternions.push_back(static_cast<float>(part));
+    model.opacities.push_back(static_cast<float>(1.5 + 1.5 * rng.normal()));
+  }
+  Light sun;
+  sun.kind = Light::Kind::kDirectional;
+  sun.direction = {-0.6f, 0.6f, 0.55f};
+  scene.lights = {sun};
+  const Camera camera = look_at({0, 0, -6}, {0, 0, 0}, {0, -1, 0}, 48, 48, 100);
+  const glm::dvec3 towards = -glm::normalize(glm::dvec3(-0.6, 0.6, 0.55));
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    scene.trace.hit_order = order;
+    scene.render.shadows = {false, false, false, false, 1.0f};
+    const Image bare = render_on_device(context, scene, camera);
+    scene.render.shadows.gaussians_on_gaussians = true;
+    const Image shaded = render_on_device(context, scene, camera);
+    double lit = 0, lit_squares = 0, dark = 0;
+    int lit_pixels = 0, dark_pixels = 0;
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 48; ++x) {
+        // Where the pixel's ray meets the ball.
+        const glm::dvec3 d =
+            glm::normalize(glm::transpose(camera.rotation) *
+                           glm::dvec3((x + 0.5 - 24) / 100, (y + 0.5 - 24) / 100, 1));
+        const glm::dvec3 eye = camera.center();
+        const double b = glm::dot(eye, d), c = glm::dot(eye, eye) - 1.0;
+        if (b * b < c || bare.at(x, y, 0) < 0.5f) continue;
+        const double facing = glm::dot(eye - (b + std::sqrt(b * b - c)) * d, towards);
+        const double share =
+            static_cast<double>(shaded.at(x, y, 0)) / static_cast<double>(bare.at(x, y, 0));
+        if (facing > 0.35) {
+          lit += share;
+          lit_squares += share * share;
+          ++lit_pixels;
+        } else if (facing < -0.35) {
+          dark += share;
+          ++dark_pixels;
+        }
+      }
+    }
+    REQUIRE(lit_pixels > 100);
+    REQUIRE(dark_pixels > 20);
+    const double mean = lit / lit_pixels;
+    const double deviation = std::sqrt(std::max(0.0, lit_squares / lit_pixels - mean * mean));
+    MESSAGE("lit ", mean, " +- ", deviation, ", dark ", dark / dark_pixels);
+    CHECK(mean > 0.97);
+    CHECK(deviation < 0.12);
+    CHECK(dark / dark_pixels < 0.1);
+  }
 }
 
 TEST_CASE("mirrors") {
@@ -342,6 +420,53 @@ TEST_CASE("a scene without meshes is what the packet tracer draws") {
     }
     CHECK(sum > 1.0);
     CHECK(largest < 1e-4);
+  }
+}
+
+TEST_CASE("Gaussians that coincide blend in the order of their indices, however they are traced") {
+  Context context = make_test_context();
+  // Every Gaussian a second time, in other colours.
+  Gaussians model = reference::random_scene(120, 61, 0);
+  const std::size_t half = model.size();
+  const auto twice = [](std::vector<float>& values) {
+    const std::vector<float> once = values;
+    values.insert(values.end(), once.begin(), once.end());
+  };
+  for (auto* values : {&model.means, &model.quaternions, &model.log_scales, &model.opacities})
+    twice(*values);
+  for (std::size_t i = 0; i < 3 * half; ++i) model.sh.push_back(i % 3 == 0 ? 1.5f : -1.5f);
+  for (float& opacity : model.opacities) opacity = 1.0f;
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    TraceOptions options;
+    options.hit_order = order;
+    const reference::Render expected =
+        reference::render(reference::Parameters(model), options, kCamera);
+    const auto compare = [&](const Image& image, const char* how) {
+      CAPTURE(how);
+      std::size_t other = 0;
+      for (std::size_t i = 0; i < expected.pixels(); ++i) {
+        double worst = 0;
+        for (std::size_t c = 0; c < 3; ++c) {
+          worst = std::max(worst, std::abs(static_cast<double>(image.data[4 * i + c]) -
+                                           expected.image[c * expected.pixels() + i]));
+        }
+        other += worst > 1e-3 ? 1 : 0;
+      }
+      MESSAGE(std::string(how), ": ", other, " of ", expected.pixels());
+      CHECK(other * 100 <= expected.pixels());
+    };
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+    for (const Traversal traversal : {Traversal::kTiles, Traversal::kBvh}) {
+      options.traversal = traversal;
+      ViewTracer tracer(context, options);
+      tracer.forward(gaussians, kCamera);
+      compare(tracer.download_image(), traversal == Traversal::kTiles ? "tiles" : "bvh");
+    }
+    Scene scene;
+    scene.gaussians = model;
+    scene.trace = options;
+    compare(render_on_device(context, scene, kCamera), "paths");
   }
 }
 
