@@ -28,7 +28,7 @@ Command add_generate_command(CLI::App& app) {
       app.add_subcommand("generate", "Write a small ray-traced data set (Blender format)");
   auto options = std::make_shared<Options>();
   SyntheticOptions& data = options->data;
-  command->add_option("DIR", options->directory, "Folder for the data set")
+  command->add_option("DIR,-o,--output", options->directory, "Folder for the data set")
       ->required()
       ->type_name("");
   command->add_option("--size", data.size, "Width and height of the images")

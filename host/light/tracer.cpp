@@ -9,8 +9,10 @@
 #include <utility>
 
 #include "core/planes.hpp"
+#include "device/foreign_opencl.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/opencl.hpp"
 #include "trace/model_impl.hpp"
 #include "trace/ray_backward.hpp"
 #include "trace/ray_tracer.hpp"
@@ -79,6 +81,12 @@ struct Tracer::Impl {
     return std::max(kLeastBatch, std::min<std::size_t>(options.memory_budget / 4 / kRayBytes,
                                                        context.device().max_allocation /
                                                            sizeof(RayBackward::Slopes)));
+  }
+  void require_no_near() const {
+    if (options.near_depth <= 0.0f) return;
+    throw UsageError(fmt::format(
+        "TraceOptions::near_depth is {}, but single rays have no camera that could be near: use 0",
+        options.near_depth));
   }
   void trace_batch(const DeviceGaussians& gaussians, std::size_t first, std::size_t count);
   RaysGradients backward(const DeviceGaussians& gaussians,
@@ -172,11 +180,7 @@ std::vector<RayResult> Tracer::trace(const Model& model,
   Impl& self = *impl_;
   const auto lock = self.context.lock();
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
-  if (self.options.near_depth > 0.0f) {
-    throw UsageError(fmt::format(
-        "TraceOptions::near_depth is {}, but single rays have no camera that could be near: use 0",
-        self.options.near_depth));
-  }
+  self.require_no_near();
   std::vector<Ray> sound;
   sound.reserve(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) sound.push_back(checked(rays[i], i));
@@ -200,6 +204,30 @@ std::vector<RayResult> Tracer::trace(const Model& model,
     self.rays.clear();
   }
   return out;
+}
+
+void trace(Tracer& tracer,
+           const Model& model,
+           cl_mem rays,
+           std::size_t count,
+           cl_mem results,
+           ColorDirection direction) {
+  Tracer::Impl& self = tracer.impl();
+  const auto turn = self.context.lock();
+  const DeviceGaussians& gaussians = gaussians_of(model, self.context);
+  self.require_no_near();
+  check_foreign(self.context, rays, count * sizeof(Ray), "the rays");
+  check_foreign(self.context, results, count * sizeof(RayResult), "the results");
+  self.revision = 0;
+  self.last_was_picture = false;
+  self.capped = 0;
+  self.device_rays.ensure(self.context, count, "rays");
+  self.results.ensure(self.context, count, "ray results");
+  copy_in(self.context, rays, self.device_rays.raw(), count * sizeof(Ray), "the rays");
+  self.tracer.follow(gaussians);
+  self.tracer.set_background(self.options.background);
+  self.tracer.trace(gaussians, self.device_rays, count, self.results, direction);
+  copy_out(self.context, self.results.raw(), results, count * sizeof(RayResult), "the results");
 }
 
 RaysGradients Tracer::backward(const Model& model, std::span<const RayGradient> gradients) {

@@ -80,8 +80,11 @@ class Tracer {
   /// Colour behind everything from the next render() or trace() on.
   void set_background(const std::array<float, 3>& background);
 
- private:
+  /// Of the library itself; not installed.
   struct Impl;
+  Impl& impl() const { return *impl_; }
+
+ private:
   std::unique_ptr<Impl> impl_;
 };
 

@@ -48,6 +48,15 @@ TEST_CASE("options that would do nothing are refused") {
   refuse({"tune", "--reset", "--dry-run"}, "--dry-run");
 }
 
+TEST_CASE("generate takes its folder by -o, as the other commands do") {
+  const TemporaryFolder folder;
+  const Words small{"--size", "8", "--train-views", "1", "--test-views", "1", "-q"};
+  CHECK(raysplats_program(Words{"generate", "-o", folder / "data"} + small).code == 0);
+  CHECK(std::filesystem::exists(folder / "data/transforms_train.json"));
+  CHECK(raysplats_program(Words{"generate", folder / "more"} + small).code == 0);
+  CHECK(std::filesystem::exists(folder / "more/transforms_train.json"));
+}
+
 TEST_CASE("a scene's [camera] without an angle takes none from the command line") {
   const TemporaryFolder folder;
   write_file(folder / "balls.ply", ply_file(2));

@@ -40,7 +40,7 @@ const std::map<std::string, std::string> kFaces{
     {"pose_gradient", "core"}, {"dataset", "io"},         {"io", "io"},
     {"model", "trace"},        {"tracer", "light"},       {"path_tracer", "light"},
     {"lpips", "eval"},         {"evaluation", "eval"},    {"train_options", "train"},
-    {"trainer", "train"}};
+    {"trainer", "train"},      {"opencl", "light"}};
 
 Names reach_of(const std::string& module) {
   Names reach{module};
