@@ -3,25 +3,25 @@
 // S S R^T (Byrski et al. 2025, eq. 2), grown by what float rounding can lose. Launch: work-items of
 // `chunk` consecutive Gaussians each; O(1) per Gaussian. Scalars without branches, so that
 // compilers make vectors of a long loop (one work-item per Gaussian suits GPUs).
+#include "shared/alpha.h"
 #include "shared/layout.h"
 
 // S = sigmoid(s) instead of exp(s).
-#ifndef RS_SIGMOID_SCALE
-#define RS_SIGMOID_SCALE 0
+#ifndef SIGMOID_SCALE
+#define SIGMOID_SCALE 0
 #endif
 // Q shrinks to where opacity * response reaches 1/255; Gaussians below that are empty.
-#ifndef RS_ADAPTIVE_RADIUS
-#define RS_ADAPTIVE_RADIUS 0
+#ifndef ADAPTIVE_RADIUS
+#define ADAPTIVE_RADIUS 0
 #endif
 
-#define RS_MIN_ALPHA (1.0f / 255.0f)
 // Relative growth of a half-width, and slack per unit of the centre's magnitude (four half units in
 // the last place).
 #define RS_GROWTH 1.00001f
 #define RS_CENTER_SLACK 2.4e-7f
 
 inline float activated_scale(float parameter) {
-#if RS_SIGMOID_SCALE
+#if SIGMOID_SCALE
   return 1.0f / (1.0f + exp(-parameter));
 #else
   return exp(parameter);
@@ -78,7 +78,7 @@ __kernel void gaussian_bounds(__global const float* restrict means,
 
     float squared_radius = quantile;
     int good = finite(opacities[i]) & finite(sx) & finite(sy) & finite(sz);
-#if RS_ADAPTIVE_RADIUS
+#if ADAPTIVE_RADIUS
     // The limits give way by what rounding does to a logarithm near zero.
     const float alpha = 1.0f / (1.0f + exp(-opacities[i]));
     good = good & (alpha >= RS_MIN_ALPHA * 0.99999f);

@@ -3,6 +3,7 @@
 #ifndef RS_TRACE_GAUSSIAN_H
 #define RS_TRACE_GAUSSIAN_H
 
+#include "shared/alpha.h"
 #include "trace/gaussian_lanes.h"
 
 #ifndef SIGMOID_SCALE
@@ -11,8 +12,6 @@
 #ifndef ADAPTIVE_RADIUS
 #define ADAPTIVE_RADIUS 0
 #endif
-
-#define RS_ALPHA_MIN (1.0f / 255.0f)
 
 gv sigmoid(gv x) { return 1.0f / (1.0f + exp(-x)); }
 
@@ -38,7 +37,7 @@ gv scale_log_derivative(gv scale) {
 gv effective_quantile(float quantile, gv opacity) {
   (void)opacity;
 #if ADAPTIVE_RADIUS
-  return smaller(2.0f * log(opacity / RS_ALPHA_MIN), (gv)(quantile));
+  return smaller(2.0f * log(opacity / RS_MIN_ALPHA), (gv)(quantile));
 #else
   return (gv)(quantile);
 #endif

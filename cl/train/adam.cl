@@ -5,7 +5,7 @@
 // A Gaussian with a gradient that is not finite keeps its parameters and moments and is counted;
 // with visible_only so does, uncounted, one that no ray met (screen[3 i + 2] == 0). A guard word
 // that is not 0 turns the whole step off (train/guard.cl).
-#include "shared/adam_layout.h"
+#include "shared/train_layout.h"
 #include "train/lanes.h"
 
 // Gaussians of a work-group of choose_steps.

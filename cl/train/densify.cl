@@ -9,8 +9,8 @@
 #ifndef SH_COEFFICIENTS
 #define SH_COEFFICIENTS 16
 #endif
-#ifndef SCALE_SIGMOID
-#define SCALE_SIGMOID 0
+#ifndef SIGMOID_SCALE
+#define SIGMOID_SCALE 0
 #endif
 
 // What becomes of a Gaussian in the new set; host/train/density_plan.hpp names the same values.
@@ -20,8 +20,8 @@
 #define ROLE_FIRST_HALF 4u
 
 // Halves of a split along the longest axis (as "Improved-GS", with the constants of LichtFeld
-// Studio's IGS+, arXiv 2603.08661): offset in standard deviations, what is left of the longest and of the
-// other axes, and of the opacity.
+// Studio's IGS+, arXiv 2603.08661): offset in standard deviations, what is left of the longest and
+// of the other axes, and of the opacity.
 #ifndef HALF_OFFSET
 #define HALF_OFFSET 0.5f
 #define HALF_LONGEST 0.5f
@@ -81,7 +81,7 @@ float3 rotate(float4 q, float3 v) {
 
 // Standard deviation of a trained scale parameter, and the way back.
 float scale_value(float parameter) {
-#if SCALE_SIGMOID
+#if SIGMOID_SCALE
   return 1.0f / (1.0f + exp(-parameter));
 #else
   return exp(parameter);
@@ -89,7 +89,7 @@ float scale_value(float parameter) {
 }
 
 float scale_parameter(float value) {
-#if SCALE_SIGMOID
+#if SIGMOID_SCALE
   return log(value / (1.0f - value));
 #else
   return log(value);

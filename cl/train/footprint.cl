@@ -8,8 +8,8 @@
 // Complexity of footprint_floor: O(N views) arithmetic, one read and one write per Gaussian.
 #include "shared/layout.h"
 
-#ifndef SCALE_SIGMOID
-#define SCALE_SIGMOID 0
+#ifndef SIGMOID_SCALE
+#define SIGMOID_SCALE 0
 #endif
 
 // lows[i] becomes the least scale parameter of Gaussian i: that of `share` pixels. A Gaussian that
@@ -41,7 +41,7 @@ __kernel void footprint_floor(uint count,
   }
   const float size = share * least;
   float low = -INFINITY;
-#if SCALE_SIGMOID
+#if SIGMOID_SCALE
   if (size > 0.0f && size < 1.0f) low = log(size / (1.0f - size));
 #else
   if (size > 0.0f && size < INFINITY) low = log(size);

@@ -22,8 +22,8 @@ GaussianBounds::GaussianBounds(Context& context, bool sigmoid_scale, bool adapti
       kernel_(context.kernel("bvh/gaussian_bounds.cl",
                              "gaussian_bounds",
                              BuildOptions()
-                                 .define("RS_SIGMOID_SCALE", sigmoid_scale ? 1 : 0)
-                                 .define("RS_ADAPTIVE_RADIUS", adaptive_radius ? 1 : 0))) {}
+                                 .define("SIGMOID_SCALE", sigmoid_scale ? 1 : 0)
+                                 .define("ADAPTIVE_RADIUS", adaptive_radius ? 1 : 0))) {}
 
 void GaussianBounds::compute(const Buffer<float>& means,
                              const Buffer<float>& quaternions,

@@ -7,7 +7,7 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
-#include "shared/adam_layout.h"
+#include "shared/train_layout.h"
 #include "trace/device_gaussians.hpp"
 
 namespace raysplats {

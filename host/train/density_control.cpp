@@ -161,7 +161,7 @@ void DensityControl::gather(DeviceGaussians& gaussians,
       CounterRng(options_.seed, kSplitStream, static_cast<std::uint64_t>(iteration)).bits();
   BuildOptions build;
   build.define("SH_COEFFICIENTS", sh);
-  build.define("SCALE_SIGMOID", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0);
+  build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0);
   context_.kernel(kProgram, "gather_gaussians", build)
       .launch(Range::linear(count, kGroup), static_cast<std::uint32_t>(count), low_word(key),
               low_word(key >> 32), static_cast<float>(options_.split_factor), source, role,

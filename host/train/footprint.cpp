@@ -18,7 +18,7 @@ constexpr double kMargin =
 
 BuildOptions build_options(const DeviceGaussians& gaussians) {
   BuildOptions build;
-  build.define("SCALE_SIGMOID", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0);
+  build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0);
   return build;
 }
 

@@ -4,19 +4,20 @@
 #include <array>
 #include <vector>
 
+#include "shared/train_layout.h"
+
 namespace raysplats {
 namespace {
 
 constexpr char kProgram[] = "train/guard.cl";
 constexpr std::size_t kItems = 64;
-constexpr std::size_t kWords = 5;  // as in cl/train/guard.cl
 
 }  // namespace
 
 StepGuard::StepGuard(Context& context)
     : check_(context.kernel(kProgram, "guard_loss")),
       close_(context.kernel(kProgram, "guard_close")),
-      state_(context, kWords, "step guard") {
+      state_(context, RS_GUARD_WORDS, "step guard") {
   state_.clear();
 }
 
@@ -38,8 +39,8 @@ StepGuard::Counts StepGuard::counts() const {
 
 void StepGuard::restore(const Counts& counts) {
   const std::uint32_t stopped = counts.stopped ? 1 : 0;
-  state_.upload(
-      std::array<std::uint32_t, kWords>{stopped, counts.in_a_row, counts.bad_steps, stopped, 0});
+  state_.upload(std::array<std::uint32_t, RS_GUARD_WORDS>{stopped, counts.in_a_row,
+                                                          counts.bad_steps, stopped, 0});
 }
 
 }  // namespace raysplats

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One step of Adam for one group of parameters.
-#ifndef RS_SHARED_ADAM_LAYOUT_H
-#define RS_SHARED_ADAM_LAYOUT_H
+// Records of training that kernels and host share.
+#ifndef RS_SHARED_TRAIN_LAYOUT_H
+#define RS_SHARED_TRAIN_LAYOUT_H
 
 #include "shared/compat.h"
 
@@ -9,6 +9,10 @@
 // CPUs handle slowly.
 #define RS_TINY_MOMENT 1e-30f
 
+// Of the state of train/guard.cl.
+#define RS_GUARD_WORDS 5
+
+// One step of Adam for one group of parameters.
 typedef struct {
   rs_float beta1, rest1;  // rest = 1 - beta
   rs_float beta2, rest2;

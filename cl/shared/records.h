@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every record that kernels and host share, with its fields: what the layout_probe kernel and a
+// test compare.
+#ifndef RS_SHARED_RECORDS_H
+#define RS_SHARED_RECORDS_H
+
+#include "shared/layout.h"
+#include "shared/light_layout.h"
+#include "shared/train_layout.h"
+
+// clang-format off
+#define RS_RECORDS(RECORD, FIELD) \
+  RECORD(RsAabb) FIELD(RsAabb, lo) FIELD(RsAabb, hi) \
+  RECORD(RsLine) FIELD(RsLine, v) \
+  RECORD(RsViewBounds) FIELD(RsViewBounds, x0) FIELD(RsViewBounds, y0) FIELD(RsViewBounds, x1) \
+    FIELD(RsViewBounds, y1) FIELD(RsViewBounds, depth) FIELD(RsViewBounds, quantile) \
+    FIELD(RsViewBounds, kind) FIELD(RsViewBounds, padding) \
+  RECORD(RsCamera) FIELD(RsCamera, rotation) FIELD(RsCamera, center) FIELD(RsCamera, fx) \
+    FIELD(RsCamera, fy) FIELD(RsCamera, cx) FIELD(RsCamera, cy) FIELD(RsCamera, width) \
+    FIELD(RsCamera, height) FIELD(RsCamera, near_depth) FIELD(RsCamera, padding) \
+  RECORD(RsFootprintView) FIELD(RsFootprintView, rotation) FIELD(RsFootprintView, center) \
+    FIELD(RsFootprintView, low) FIELD(RsFootprintView, high) FIELD(RsFootprintView, spacing) \
+    FIELD(RsFootprintView, kind) FIELD(RsFootprintView, padding) \
+  RECORD(RsLensCamera) FIELD(RsLensCamera, rotation) FIELD(RsLensCamera, center) \
+    FIELD(RsLensCamera, fx) FIELD(RsLensCamera, fy) FIELD(RsLensCamera, cx) \
+    FIELD(RsLensCamera, cy) FIELD(RsLensCamera, k1) FIELD(RsLensCamera, k2) \
+    FIELD(RsLensCamera, k3) FIELD(RsLensCamera, k4) FIELD(RsLensCamera, p1) \
+    FIELD(RsLensCamera, p2) FIELD(RsLensCamera, limit) FIELD(RsLensCamera, image_limit) \
+    FIELD(RsLensCamera, aperture) FIELD(RsLensCamera, focus_distance) FIELD(RsLensCamera, width) \
+    FIELD(RsLensCamera, height) FIELD(RsLensCamera, jitter) FIELD(RsLensCamera, sample) \
+    FIELD(RsLensCamera, seed_lo) FIELD(RsLensCamera, seed_hi) \
+  RECORD(RsLensTile) FIELD(RsLensTile, x0) FIELD(RsLensTile, y0) FIELD(RsLensTile, x1) \
+    FIELD(RsLensTile, y1) FIELD(RsLensTile, face) FIELD(RsLensTile, cosine) \
+    FIELD(RsLensTile, padding) \
+  RECORD(RsSurfaceHit) FIELD(RsSurfaceHit, t) FIELD(RsSurfaceHit, u) FIELD(RsSurfaceHit, v) \
+    FIELD(RsSurfaceHit, triangle) \
+  RECORD(RsMaterial) FIELD(RsMaterial, kind) FIELD(RsMaterial, color) FIELD(RsMaterial, texture) \
+    FIELD(RsMaterial, specular) FIELD(RsMaterial, roughness) FIELD(RsMaterial, ior) \
+    FIELD(RsMaterial, absorption) FIELD(RsMaterial, opacity) FIELD(RsMaterial, emission) \
+    FIELD(RsMaterial, shadow) \
+  RECORD(RsTexture) FIELD(RsTexture, offset) FIELD(RsTexture, width) FIELD(RsTexture, height) \
+    FIELD(RsTexture, padding) \
+  RECORD(RsLight) FIELD(RsLight, kind) FIELD(RsLight, position) FIELD(RsLight, direction) \
+    FIELD(RsLight, color) FIELD(RsLight, radius) FIELD(RsLight, padding) \
+  RECORD(RsEnvironment) FIELD(RsEnvironment, color) FIELD(RsEnvironment, width) \
+    FIELD(RsEnvironment, height) FIELD(RsEnvironment, right) FIELD(RsEnvironment, up) \
+    FIELD(RsEnvironment, forward) FIELD(RsEnvironment, light) FIELD(RsEnvironment, padding) \
+  RECORD(RsPath) FIELD(RsPath, skip) FIELD(RsPath, pixel) FIELD(RsPath, begin) \
+    FIELD(RsPath, throughput) FIELD(RsPath, media) FIELD(RsPath, splits) FIELD(RsPath, lineage) \
+    FIELD(RsPath, blind) FIELD(RsPath, direct) \
+  RECORD(RsSurface) FIELD(RsSurface, position) FIELD(RsSurface, material) \
+    FIELD(RsSurface, shading) FIELD(RsSurface, entering) FIELD(RsSurface, normal) \
+    FIELD(RsSurface, triangle) FIELD(RsSurface, color) FIELD(RsSurface, t) \
+    FIELD(RsSurface, offset) \
+  RECORD(RsWave) FIELD(RsWave, seed_lo) FIELD(RsWave, seed_hi) FIELD(RsWave, sample) \
+    FIELD(RsWave, samples) FIELD(RsWave, bounce) FIELD(RsWave, max_bounces) \
+    FIELD(RsWave, min_throughput) FIELD(RsWave, indirect) FIELD(RsWave, ambient) \
+    FIELD(RsWave, strength) FIELD(RsWave, bias) FIELD(RsWave, lights) \
+    FIELD(RsWave, light_samples) FIELD(RsWave, first_pixel) \
+  RECORD(RsAdam) FIELD(RsAdam, beta1) FIELD(RsAdam, rest1) FIELD(RsAdam, beta2) \
+    FIELD(RsAdam, rest2) FIELD(RsAdam, epsilon) FIELD(RsAdam, root_scale) FIELD(RsAdam, rate) \
+    FIELD(RsAdam, rest_rate)
+// clang-format on
+
+#endif
