@@ -33,7 +33,8 @@ const char* type_name(DeviceType type) {
 nlohmann::ordered_json to_json(const DeviceInfo& device) {
   nlohmann::ordered_json tuning;
   if (device.tuning) {
-    tuning = {{"packet_width", device.tuning->packet_width},
+    tuning = {{"packet_shape", device.tuning->grouped ? "group" : "vector"},
+              {"packet_width", device.tuning->packet_width},
               {"tile", device.tuning->tile},
               {"pending", device.tuning->pending},
               {"group", device.tuning->group}};

@@ -89,6 +89,7 @@ Command add_tune_command(CLI::App& app) {
   command->add_flag("--reset", options->reset, "Forget what was found for the device instead");
   add_trace_flags(*command, options->trace);
   command->remove_option(command->get_option("--packet-width"));
+  command->remove_option(command->get_option("--packet-shape"));
   add_device_flags(*command, options->device);
   command->remove_option(command->get_option("--profile"));
   return {command, [options] { run(*options); }};

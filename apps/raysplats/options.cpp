@@ -127,8 +127,12 @@ void add_trace_flags(CLI::App& app, TraceFlags& flags) {
                  "colour behind the model, 0 to 1 each; one number is a grey")
       ->check(color())
       ->type_name("R,G,B");
+  std::vector<std::string> shapes;
+  for (const auto& [name, form] : trace_keys::kPacketShapes) shapes.emplace_back(name);
+  app.add_option("--packet-shape", flags.packet_shape, trace_keys::kPacketShapeHelp)
+      ->check(one_of(shapes));
   app.add_option("--packet-width", flags.packet_width, trace_keys::kPacketWidth.help)
-      ->check(one_of({"0", "1", "2", "4", "8", "16"}));
+      ->check(one_of({"0", "1", "2", "4", "8", "16", "32", "64"}));
   app.add_option("--memory-budget", flags.memory_budget, trace_keys::kMemoryBudget.help)
       ->transform(within(trace_keys::kMemoryBudget));
   app.add_option("--launch-budget-ms", flags.launch_budget_ms,
@@ -155,6 +159,9 @@ TraceOptions TraceFlags::over(TraceOptions base) const {
                                              : Traversal::kAuto;
   }
   if (background) base.background = parse_color(*background);
+  for (const auto& [name, form] : trace_keys::kPacketShapes) {
+    if (packet_shape && *packet_shape == name) base.packet_form = form;
+  }
   if (packet_width) base.packet_width = *packet_width;
   if (memory_budget) base.memory_budget = *memory_budget << 20;
   if (launch_budget_ms) base.launch_budget_ms = *launch_budget_ms;
@@ -471,9 +478,9 @@ std::pair<int, int> parse_resolution(const std::string& text) {
 
 std::string describe(const DeviceTuning& tuning) {
   const std::string group = tuning.group == 0 ? "whole tiles" : std::to_string(tuning.group);
-  return fmt::format("packet width {}, tiles of {}, pending {}, groups of {}{}",
-                     tuning.packet_width, tuning.tile, tuning.pending, group,
-                     tuning.bvh ? ", bvh" : "");
+  return fmt::format("packets as {} of {}, tiles of {}, pending {}, groups of {}{}",
+                     tuning.grouped ? "groups" : "vectors", tuning.packet_width, tuning.tile,
+                     tuning.pending, group, tuning.bvh ? ", bvh" : "");
 }
 
 std::string readable_bytes(std::uint64_t bytes) {

@@ -62,6 +62,7 @@ struct TraceFlags {
   std::optional<float> near_depth;
   std::optional<std::string> traversal;  // commands that know it: add_traversal_flag()
   std::optional<std::string> background;
+  std::optional<std::string> packet_shape;
   std::optional<int> packet_width;
   std::optional<std::size_t> memory_budget;  ///< MiB
   std::optional<double> launch_budget_ms;

@@ -17,6 +17,7 @@
 // al. 2024).
 #include "primitives/prefetch.h"
 #include "trace/hit_stream.h"
+#include "trace/line_gradient.h"
 #include "trace/line_sum.h"
 #include "trace/packet.h"
 
@@ -54,13 +55,6 @@ __attribute__((always_inline)) float16 sum_lanes(const fv* v) {
 #endif
 }
 
-// What the rays of a packet share, and the gradient of its pixels.
-typedef struct {
-  fv X, Y;
-  fv gR, gG, gB, gA;
-  float screen_x, screen_y;
-} Pixels;
-
 // Rows whose place among the others is still open, in order of walking: slots head .. head + size -
 // 1 of a ring. behind sums T alpha (colour . gradient) over the hits known to be farther.
 typedef struct {
@@ -74,62 +68,6 @@ typedef struct {
   uint head, size;
 } OpenRows;
 
-#if LENS == 2
-// Length of a gradient with respect to the angle in which the mean at (x, y) is seen, from that
-// with respect to its tangent coordinates.
-fv rs_angular_length(const float x, const float y, const fv gx, const fv gy) {
-  const fv radial = x * gx + y * gy;
-  return sqrt((1.0f + x * x + y * y) * (gx * gx + gy * gy + radial * radial));
-}
-#endif
-
-// Gradient of the line but for opacity and colour, from that of the squared distance. Each form
-// meets the Gaussian by itself: behind one branch for both compilers may gather the line's numbers.
-void line_gradient_projective(const Pixels* p,
-                              __global const float* v,
-                              const fv g_distance2,
-                              fv* g) {
-  const PacketMeeting m = rs_meet_projective(v, 0.0f, p->X, p->Y);
-  const fv inverse = 1.0f / m.direction2;
-  const fv dx = p->X - v[0];
-  const fv dy = p->Y - v[1];
-  const fv gN = g_distance2 * inverse;
-  const fv gD = -gN * m.numerator * inverse;
-  const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
-  g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
-  g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
-#if LENS == 2
-  g[2] = rs_angular_length(v[0], v[1], g[0], g[1]) * p->screen_x;
-#else
-  g[2] =
-      sqrt(g[0] * g[0] * (p->screen_x * p->screen_x) + g[1] * g[1] * (p->screen_y * p->screen_y));
-#endif
-  g[3] = gNx * dx;
-  g[4] = 2.0f * gNx * dy;
-  g[5] = gNy * dy;
-  g[6] = gD;
-  g[7] = 2.0f * gDx;
-  g[8] = 2.0f * gDy;
-  g[9] = gDx * dx;
-  g[10] = 2.0f * gDx * dy;
-  g[11] = gDy * dy;
-}
-
-// g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'.
-void line_gradient_general(const Pixels* p, __global const float* v, const fv g_distance2, fv* g) {
-  const PacketMeeting m = rs_meet_general(v, 0.0f, p->X, p->Y);
-  const fv peak = m.along / m.direction2;
-  for (int k = 0; k < 3; ++k) {
-    const fv direction = v[3 * k] * p->X + v[3 * k + 1] * p->Y + v[3 * k + 2];
-    const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
-    const fv g_direction = peak * g_origin;
-    g[3 * k] = g_direction * p->X;
-    g[3 * k + 1] = g_direction * p->Y;
-    g[3 * k + 2] = g_direction;
-    g[9 + k] = g_origin;
-  }
-}
-
 // Sums one Gaussian's gradient line over the rays of the packet and adds it to memory.
 void add_gradient(const Pixels* p,
                   const uint reference,
@@ -138,18 +76,8 @@ void add_gradient(const Pixels* p,
                   const fv weight,
                   __global const RsLine* restrict lines,
                   const LineSums* sums) {
-  __global const float* v = lines[reference >> 1].v;
-  const fv g_distance2 = -0.5f * alpha * g_alpha;
   fv g[16];
-  g[12] = g_alpha * (alpha / v[12]);  // the response is alpha / opacity
-  g[13] = weight * p->gR;
-  g[14] = weight * p->gG;
-  g[15] = weight * p->gB;
-  if (reference & 1) {
-    line_gradient_general(p, v, g_distance2, g);
-  } else {
-    line_gradient_projective(p, v, g_distance2, g);
-  }
+  line_gradient(p, reference & 1, lines[reference >> 1].v, g_alpha, alpha, weight, g);
   rs_add_line(sums, reference >> 1, sum_lanes(g));
 }
 
@@ -209,18 +137,9 @@ void packet_backward(const RsCamera* camera,
   const uint packets_x = (width + PACKET_WIDTH - 1) / PACKET_WIDTH;
   const uint2 tail = stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH];
   if (tail.x == RS_NO_CHUNK) return;
-  Pixels p;
-  const PacketRays rays = rs_packet_rays(camera, tangents, px, py);
-  p.X = rays.X;
-  p.Y = rays.Y;
-  p.screen_x = screen_x;
-  p.screen_y = screen_y;
   const size_t plane = (size_t)width * height;
-  p.gR = rs_load_pixels(image_gradient, width, height, px, py);
-  p.gG = rs_load_pixels(image_gradient + plane, width, height, px, py);
-  p.gB = rs_load_pixels(image_gradient + 2 * plane, width, height, px, py);
-  // Alpha is a fourth colour channel that is 1 in every Gaussian and 0 in the background.
-  p.gA = rs_load_pixels(image_gradient + 3 * plane, width, height, px, py);
+  Pixels p;
+  load_pixels(&p, camera, tangents, image_gradient, screen_x, screen_y, px, py);
   const fv T = rs_load_pixels(transmittances, width, height, px, py);
   const fv T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
   OpenRows rows;

@@ -82,7 +82,6 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
   stream.capacity = pool_capacity;
   stream.cursor = counters;
   const int width = camera.width, height = camera.height;
-  const size_t plane = (size_t)width * height;
   uint hits = 0, capped_rays = 0;
   for (int q = 0; q < RS_BLOCK_PACKETS; ++q) {
     const int px = block_x + q % BLOCK * PACKET_WIDTH;
@@ -105,32 +104,12 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
                             &stream);
     }
 
-    rs_store_pixels(image, width, height, px, py, p.R + p.T * background.x);
-    rs_store_pixels(image + plane, width, height, px, py, p.G + p.T * background.y);
-    rs_store_pixels(image + 2 * plane, width, height, px, py, p.B + p.T * background.z);
-    rs_store_pixels(image + 3 * plane, width, height, px, py, 1.0f - p.T);
-#if WITH_DEPTH
-    const fv weight = 1.0f - p.T;
-#if LENS == 2
-    const fv length = sqrt(1.0f + p.X * p.X + p.Y * p.Y);
-#else
-    const fv length = (fv)(1.0f);
-#endif
-    rs_store_pixels(depth_image, width, height, px, py,
-                    select((fv)(0.0f), length * p.depth_sum / weight, RS_MASK(weight > 0.0f)));
-    rs_store_pixels(depth_image + plane, width, height, px, py, length * p.median);
-    rs_store_pixels(depth_image + 2 * plane, width, height, px, py, rs_to_float(p.hits));
-#else
-    (void)depth_image;
-#endif
+    packet_store(&p, image, depth_image, transmittances, width, height, px, py, background);
 #if KEEP_HITS
     const uint packets_x = (width + PACKET_WIDTH - 1) / PACKET_WIDTH;
     stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH] =
         (uint2)(stream.chunk, stream.used);
-    rs_store_pixels(transmittances, width, height, px, py, p.T);
-    rs_store_pixels(transmittances + plane, width, height, px, py, p.T_last);
 #else
-    (void)transmittances;
     (void)stream_ends;
 #endif
     capped_rays += popcount(rs_lane_bits(capped));

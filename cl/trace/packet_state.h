@@ -65,6 +65,45 @@ void packet_blend(PacketState* p,
 #endif
 }
 
+// Writes what the packet at (px, py) has blended: planar R, G, B over the background and alpha;
+// WITH_DEPTH: expected depth, median depth and hits; KEEP_HITS: the transmittances behind and
+// before the last hit.
+void packet_store(const PacketState* p,
+                  __global float* restrict image,
+                  __global float* restrict depth_image,
+                  __global float* restrict transmittances,
+                  const int width,
+                  const int height,
+                  const int px,
+                  const int py,
+                  const float4 background) {
+  const size_t plane = (size_t)width * height;
+  rs_store_pixels(image, width, height, px, py, p->R + p->T * background.x);
+  rs_store_pixels(image + plane, width, height, px, py, p->G + p->T * background.y);
+  rs_store_pixels(image + 2 * plane, width, height, px, py, p->B + p->T * background.z);
+  rs_store_pixels(image + 3 * plane, width, height, px, py, 1.0f - p->T);
+#if WITH_DEPTH
+  const fv weight = 1.0f - p->T;
+#if LENS == 2
+  const fv length = sqrt(1.0f + p->X * p->X + p->Y * p->Y);
+#else
+  const fv length = (fv)(1.0f);
+#endif
+  rs_store_pixels(depth_image, width, height, px, py,
+                  select((fv)(0.0f), length * p->depth_sum / weight, RS_MASK(weight > 0.0f)));
+  rs_store_pixels(depth_image + plane, width, height, px, py, length * p->median);
+  rs_store_pixels(depth_image + 2 * plane, width, height, px, py, rs_to_float(p->hits));
+#else
+  (void)depth_image;
+#endif
+#if KEEP_HITS
+  rs_store_pixels(transmittances, width, height, px, py, p->T);
+  rs_store_pixels(transmittances + plane, width, height, px, py, p->T_last);
+#else
+  (void)transmittances;
+#endif
+}
+
 // How the lanes of a packet meet a candidate; key orders the hits.
 typedef struct {
   iv hit;

@@ -15,6 +15,7 @@
 #include "bench/ceilings.hpp"
 #include "bench/operation.hpp"
 #include "bench/scene_bench.hpp"
+#include "core/trace_keys.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
 
@@ -90,8 +91,9 @@ std::uint64_t peak_process_bytes() {
 std::string tuning_text(const DeviceInfo& device) {
   if (!device.tuning) return "none";
   const DeviceTuning& tuning = *device.tuning;
-  return fmt::format("packet width {}, tile {}, pending {}, group {}{}", tuning.packet_width,
-                     tuning.tile, tuning.pending, tuning.group, tuning.bvh ? ", bvh" : "");
+  return fmt::format("packet shape {}, width {}, tile {}, pending {}, group {}{}",
+                     tuning.grouped ? "group" : "vector", tuning.packet_width, tuning.tile,
+                     tuning.pending, tuning.group, tuning.bvh ? ", bvh" : "");
 }
 
 std::map<std::string, std::string> option_texts(const Context& context,
@@ -105,6 +107,7 @@ std::map<std::string, std::string> option_texts(const Context& context,
           {"repeat", std::to_string(options.repeat)},
           {"rays", std::to_string(options.rays)},
           {"triangles", std::to_string(options.triangles)},
+          {"packet-shape", trace_keys::packet_shape_name(options.trace.packet_form)},
           {"packet-width", std::to_string(options.trace.packet_width)},
           {"hit-order", options.trace.hit_order == HitOrder::kPeak ? "peak" : "entry"},
           {"quantile", fmt::format("{:g}", options.trace.quantile)},

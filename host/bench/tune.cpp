@@ -17,6 +17,7 @@ namespace {
 constexpr double kWorthwhile = 0.98;
 constexpr int kRounds = 3;
 constexpr std::array<int, 5> kWidths{1, 2, 4, 8, 16};
+constexpr std::array<int, 4> kGroupWidths{8, 16, 32, 64};
 constexpr std::array<int, 3> kTiles{16, 32, 64};
 constexpr std::array<int, 6> kPending{24, 32, 48, 64, 96, 128};
 constexpr std::array<int, 5> kGroups{1, 16, 32, 64, 128};
@@ -32,6 +33,7 @@ class Course {
                                            bench_scene(options.scene, options.size, options.seed),
                                            ScaleActivation::kExp)) {
     options_.packet_width = 0;
+    options_.packet_form = PacketForm::kAuto;
     options_.traversal = Traversal::kAuto;  // the tuning's
     const std::size_t pixels =
         static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
@@ -122,16 +124,22 @@ DeviceTuning winner(const std::vector<TuneTrial>& trials, const DeviceTuning& cu
 
 }  // namespace
 
-DeviceTuning default_tuning(const DeviceInfo& device) {
+namespace {
+
+DeviceTuning tuning_of(const DeviceInfo& device, const TraceOptions& options) {
   DeviceInfo plain = device;
   plain.tuning.reset();
-  const PacketShape shape = packet_shape(plain, 0);
-  return {shape.lanes, shape.tile, shape.pending, shape.group, false};
+  const PacketShape shape = packet_shape(plain, options);
+  return {shape.grouped, shape.lanes, shape.tile, shape.pending, shape.group, false};
 }
 
+}  // namespace
+
+DeviceTuning default_tuning(const DeviceInfo& device) { return tuning_of(device, {}); }
+
 const std::vector<std::string>& tune_axes() {
-  static const std::vector<std::string> axes{"packet-width", "tile", "pending", "group",
-                                             "traversal"};
+  static const std::vector<std::string> axes{"packet-shape", "packet-width", "tile",
+                                             "pending",      "group",        "traversal"};
   return axes;
 }
 
@@ -148,8 +156,21 @@ std::vector<DeviceTuning> tune_candidates(const std::string& axis,
     DeviceTuning candidate = current;
     candidate.bvh = !current.bvh;
     out.push_back(candidate);
+  } else if (axis == "packet-shape") {
+    // A CPU runs the work-items of a group one after the other, and compiles them long.
+    if (device.type == DeviceType::kCpu) return out;
+    TraceOptions other;
+    other.packet_form = current.grouped ? PacketForm::kVector : PacketForm::kGroup;
+    out.push_back(tuning_of(device, other));
+  } else if (axis == "packet-width" && current.grouped) {
+    for (const int width : kGroupWidths) {
+      if (static_cast<std::size_t>(width) <= device.max_work_group_size)
+        add(&DeviceTuning::packet_width, width);
+    }
   } else if (axis == "packet-width") {
     for (const int width : kWidths) add(&DeviceTuning::packet_width, width);
+  } else if (current.grouped && (axis == "pending" || axis == "group")) {
+    return out;  // groups have neither
   } else if (axis == "tile") {
     for (const int tile : kTiles) add(&DeviceTuning::tile, tile);
   } else if (axis == "pending") {

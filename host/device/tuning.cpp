@@ -22,6 +22,7 @@ constexpr const char* kSchema = "raysplats-tuning";
 constexpr int kSchemaVersion = 1;
 constexpr std::uintmax_t kMaxBytes = std::uintmax_t{1} << 20;
 constexpr std::array<int, 5> kWidths{1, 2, 4, 8, 16};
+constexpr std::array<int, 4> kGroupWidths{8, 16, 32, 64};
 constexpr std::array<int, 4> kTiles{8, 16, 32, 64};
 constexpr int kMaxPending = 1024;
 constexpr std::uint64_t kMaxNumber = 1 << 20;
@@ -52,6 +53,8 @@ Entry entry_from(const nlohmann::json& json) {
   entry.platform = json.at("platform").get<std::string>();
   entry.driver = json.at("driver").get<std::string>();
   entry.version = json.at("raysplats").get<std::string>();
+  // Files of older versions know vectors alone.
+  entry.tuning.grouped = json.value("packet_shape", std::string("vector")) == "group";
   entry.tuning.packet_width = whole_number(json, "packet_width");
   entry.tuning.tile = whole_number(json, "tile");
   entry.tuning.pending = whole_number(json, "pending");
@@ -95,6 +98,7 @@ void write_entries(const std::filesystem::path& path, const std::vector<Entry>& 
                        {"platform", entry.platform},
                        {"driver", entry.driver},
                        {"raysplats", entry.version},
+                       {"packet_shape", entry.tuning.grouped ? "group" : "vector"},
                        {"packet_width", entry.tuning.packet_width},
                        {"tile", entry.tuning.tile},
                        {"pending", entry.tuning.pending},
@@ -109,7 +113,10 @@ void write_entries(const std::filesystem::path& path, const std::vector<Entry>& 
 }  // namespace
 
 bool is_valid(const DeviceTuning& tuning) {
-  return std::find(kWidths.begin(), kWidths.end(), tuning.packet_width) != kWidths.end() &&
+  const auto is_one_of = [&](const auto& widths) {
+    return std::find(widths.begin(), widths.end(), tuning.packet_width) != widths.end();
+  };
+  return (tuning.grouped ? is_one_of(kGroupWidths) : is_one_of(kWidths)) &&
          std::find(kTiles.begin(), kTiles.end(), tuning.tile) != kTiles.end() &&
          tuning.pending >= 1 && tuning.pending <= kMaxPending && tuning.group >= 0;
 }

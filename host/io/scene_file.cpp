@@ -290,9 +290,19 @@ SceneTrace read_trace(TomlTable& table) {
                  trace_keys::kBackground.high);
   }
   maybe(table, trace_keys::kPacketWidth.name, t.packet_width, trace_keys::kPacketWidth);
-  const int width = t.packet_width.value_or(0);
-  if ((width & (width - 1)) != 0) {
-    table.fail("packet-width", "'packet-width' in [trace] has to be 0, 1, 2, 4, 8 or 16");
+  if (table.has(trace_keys::kPacketShape)) {
+    PacketForm form{};
+    std::vector<std::pair<std::string, PacketForm>> forms;
+    for (const auto& [name, each] : trace_keys::kPacketShapes) forms.emplace_back(name, each);
+    table.choice<PacketForm>(trace_keys::kPacketShape, form, forms);
+    t.packet_form = form;
+  }
+  if (!trace_keys::is_packet_width(t.packet_form.value_or(PacketForm::kAuto),
+                                   t.packet_width.value_or(0))) {
+    table.fail(
+        "packet-width",
+        "'packet-width' in [trace] has to be 0, 1, 2, 4, 8 or 16 with 'packet-shape' vector, "
+        "0, 8, 16, 32 or 64 with group");
   }
   if (const auto budget = table.number("memory-budget", trace_keys::kMemoryBudget.low,
                                        trace_keys::kMemoryBudget.high)) {
@@ -340,6 +350,7 @@ TraceOptions SceneTrace::over(TraceOptions base) const {
   base.quantile = quantile.value_or(base.quantile);
   base.min_transmittance = min_transmittance.value_or(base.min_transmittance);
   base.max_hits = max_hits.value_or(base.max_hits);
+  base.packet_form = packet_form.value_or(base.packet_form);
   base.packet_width = packet_width.value_or(base.packet_width);
   base.hit_order = hit_order.value_or(base.hit_order);
   base.adaptive_radius = adaptive_radius.value_or(base.adaptive_radius);

@@ -65,6 +65,7 @@ struct SceneTrace {
   std::optional<float> quantile, min_transmittance;
   std::optional<int> max_hits, packet_width;
   std::optional<HitOrder> hit_order;
+  std::optional<PacketForm> packet_form;
   std::optional<bool> adaptive_radius;
   std::optional<std::array<float, 3>> background;
   std::optional<std::size_t> memory_budget;  ///< bytes

@@ -46,7 +46,7 @@ struct CameraTracer::Impl {
   Impl(Context& context_in, const TraceOptions& options_in)
       : context(context_in),
         options(options_in),
-        packet(packet_shape(context_in.device(), options_in.packet_width)),
+        packet(packet_shape(context_in.device(), options_in)),
         lists(context_in, packet.tile),
         lens(context_in, packet.tile),
         no_tiles(context_in, 1, "no tiles of a lens"),
@@ -88,6 +88,11 @@ struct CameraTracer::Impl {
   std::size_t chunks_wanted();
   void grow_pool(std::size_t chunks, std::size_t least = 1);
   Kernel& forward_kernel(bool keep);
+  BuildOptions packet_build() const;
+  // Work-items of a packet.
+  std::size_t lane_items() const {
+    return packet.grouped ? static_cast<std::size_t>(packet.lanes) : 1;
+  }
   float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
   float screen_y() const { return static_cast<float>(camera.height) / (2.0f * camera.fy); }
   std::size_t pixels() const {
@@ -257,6 +262,16 @@ void CameraTracer::Impl::trace_window(const DeviceGaussians& gaussians,
   launch_forward(window, keep);
 }
 
+BuildOptions CameraTracer::Impl::packet_build() const {
+  BuildOptions build;
+  build.define("PACKET", packet.grouped ? 1 : packet.lanes)
+      .define("TILE", packet.tile)
+      .define("CHUNK", kChunkEntries)
+      .define("LENS", lens_kind);
+  if (packet.grouped) build.define("GROUP", packet.lanes);
+  return build;
+}
+
 Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
   const int variant =
       (options.depth ? 1 : 0) | (options.hit_order == HitOrder::kPeak ? 2 : 0) | lens_kind << 2;
@@ -266,23 +281,19 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
   }
   Kernel& kernel = forward_kernels[keep ? 1 : 0];
   if (!kernel) {
-    BuildOptions build;
-    build.define("PACKET", packet.lanes)
-        .define("TILE", packet.tile)
-        .define("BLOCK", packet.block)
-        .define("PENDING", packet.pending)
-        .define("CHUNK", kChunkEntries)
-        .define("LENS", lens_kind)
-        .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
+    BuildOptions build = packet_build();
+    if (!packet.grouped) build.define("BLOCK", packet.block).define("PENDING", packet.pending);
+    build.define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
         .define("WITH_DEPTH", options.depth ? 1 : 0)
         .define("KEEP_HITS", keep ? 1 : 0);
-    kernel = context.kernel("trace/forward.cl", "trace_forward", build);
+    kernel = packet.grouped ? context.kernel("trace/group_forward.cl", "trace_forward_group", build)
+                            : context.kernel("trace/forward.cl", "trace_forward", build);
   }
   return kernel;
 }
 
 // Rows [row, row + rows) of `columns` tiles, counted from the first tile of the candidate lists or
-// the image; a work-item for every block x block packets.
+// the image; a work-item for every block x block packets, or a work-group for every packet.
 Range CameraTracer::Impl::packet_range(const Kernel& kernel,
                                        int block,
                                        std::uint32_t columns,
@@ -291,12 +302,17 @@ Range CameraTracer::Impl::packet_range(const Kernel& kernel,
   PacketShape item = packet;
   item.width *= block;
   item.height *= block;
-  const auto group = packet_group(item, kernel.max_work_group_size());
   const auto tile = static_cast<std::size_t>(item.tile / item.height);
   const std::size_t across =
       std::min(columns * static_cast<std::size_t>(item.tile / item.width),
                static_cast<std::size_t>((camera.width + item.width - 1) / item.width));
-  Range range = Range::plane(across, rows * tile, group[0], group[1]);
+  Range range;
+  if (packet.grouped) {
+    range = {{across * lane_items(), rows * tile, 1}, {lane_items(), 1, 1}, {}};
+  } else {
+    const auto group = packet_group(item, kernel.max_work_group_size());
+    range = Range::plane(across, rows * tile, group[0], group[1]);
+  }
   range.offset[1] = row * tile;
   return range;
 }
@@ -346,18 +362,18 @@ void CameraTracer::Impl::grow_pool(std::size_t chunks, std::size_t least) {
 void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
-  BuildOptions build;
-  build.define("PACKET", packet.lanes)
-      .define("TILE", packet.tile)
-      .define("CHUNK", kChunkEntries)
-      .define("LENS", lens_kind);
-  Kernel kernel = context.kernel("trace/backward.cl", "trace_backward", sums.define(build));
+  BuildOptions build = packet_build();
+  sums.define(build);
+  Kernel kernel = packet.grouped
+                      ? context.kernel("trace/group_backward.cl", "trace_backward_group", build)
+                      : context.kernel("trace/backward.cl", "trace_backward", build);
   // No ray meets a Gaussian twice.
   const float limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet.lanes));
   const bool shared = !sums.is_private();
   in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    const Range range = shared ? packet_range(kernel, 1, lists.tiles_x(), first, number)
-                               : Range{{sums.copies(), 1, 1}, {1, 1, 1}, {}};
+    const Range range = shared
+                            ? packet_range(kernel, 1, lists.tiles_x(), first, number)
+                            : Range{{sums.copies() * lane_items(), 1, 1}, {lane_items(), 1, 1}, {}};
     // Shared sums find their rows by the offset of the launch.
     kernel.launch(range, static_cast<std::uint32_t>(count),
                   static_cast<std::uint32_t>(sums.copies()), lists.lines(), image_gradient,

@@ -8,20 +8,57 @@
 #include "raysplats/error.hpp"
 
 namespace raysplats {
+namespace {
 
-PacketShape packet_shape(const DeviceInfo& device, int lanes) {
-  const bool cpu = device.type == DeviceType::kCpu;
-  if (lanes == 0 && device.tuning) {
-    lanes = device.tuning->packet_width;
-  } else if (lanes == 0) {
-    lanes = 1;
-    while (cpu && lanes < 16 && static_cast<std::uint32_t>(2 * lanes) <= device.float_vector_width)
-      lanes *= 2;
+// Local memory that the kernels of a group take, with room to spare: rows of three floats per ray
+// (group_rows.h, group_backward.cl) and what is as long as the group is wide.
+std::uint64_t group_local_memory(int lanes) {
+  return 4096 + 420 * static_cast<std::uint64_t>(lanes);
+}
+
+// Fits one hardware thread of most GPUs; more rays share more rows, and their local memory leaves
+// room for fewer groups.
+constexpr int kGroupLanes = 32;
+
+bool takes_groups(const DeviceInfo& device, int lanes) {
+  return static_cast<std::size_t>(lanes) <= device.max_work_group_size &&
+         group_local_memory(lanes) <= device.local_memory;
+}
+
+PacketForm default_form(const DeviceInfo& device, int lanes) {
+  if (lanes > 16) return PacketForm::kGroup;
+  if (lanes > 0 || device.type == DeviceType::kCpu) return PacketForm::kVector;
+  return takes_groups(device, kGroupLanes) ? PacketForm::kGroup : PacketForm::kVector;
+}
+
+int default_lanes(const DeviceInfo& device, PacketForm form) {
+  if (form == PacketForm::kGroup) return kGroupLanes;
+  int lanes = 1;
+  while (device.type == DeviceType::kCpu && lanes < 16 &&
+         static_cast<std::uint32_t>(2 * lanes) <= device.float_vector_width)
+    lanes *= 2;
+  return lanes;
+}
+
+}  // namespace
+
+PacketShape packet_shape(const DeviceInfo& device, const TraceOptions& options) {
+  PacketForm form = options.packet_form;
+  int lanes = options.packet_width;
+  const auto& tuning = device.tuning;
+  if (tuning && lanes == 0 &&
+      (form == PacketForm::kAuto || (form == PacketForm::kGroup) == tuning->grouped)) {
+    form = tuning->grouped ? PacketForm::kGroup : PacketForm::kVector;
+    lanes = tuning->packet_width;
   }
+  if (form == PacketForm::kAuto) form = default_form(device, lanes);
+  if (lanes == 0) lanes = default_lanes(device, form);
+
   PacketShape shape;
+  shape.grouped = form == PacketForm::kGroup;
   shape.lanes = lanes;
   // Single rays are for devices that run many work-items at once: they have no room for queues.
-  shape.block = lanes > 1 ? 2 : 1;
+  shape.block = lanes > 1 && !shape.grouped ? 2 : 1;
   switch (lanes) {
     case 1:
       break;
@@ -38,16 +75,38 @@ PacketShape packet_shape(const DeviceInfo& device, int lanes) {
     case 16:
       shape.width = shape.height = 4;
       break;
+    case 32:
+      shape.width = 8;
+      shape.height = 4;
+      break;
+    case 64:
+      shape.width = shape.height = 8;
+      break;
     default:
-      throw UsageError(fmt::format("--packet-width {}: choose 1, 2, 4, 8 or 16", lanes));
+      lanes = 0;
+  }
+  if (lanes == 0 || (shape.grouped ? lanes < 8 : lanes > 16)) {
+    throw UsageError(
+        shape.grouped
+            ? fmt::format("--packet-width {} in a group: choose 8, 16, 32 or 64", shape.lanes)
+            : fmt::format("--packet-width {}: choose 1, 2, 4, 8 or 16, or 32 or 64 in "
+                          "a group",
+                          shape.lanes));
+  }
+  if (shape.grouped && !takes_groups(device, lanes)) {
+    throw DeviceError(fmt::format(
+        "{} has {} work-items and {} bytes of local memory a work-group, packets of {} "
+        "work-items need more: choose --packet-shape vector or a smaller --packet-width",
+        device.name, device.max_work_group_size, device.local_memory, lanes));
   }
   // CPUs gain from shared lists of larger tiles; GPUs need many small groups.
+  const bool cpu = device.type == DeviceType::kCpu;
   shape.tile = cpu ? 32 : 16;
   shape.pending = cpu ? 96 : 48;
-  if (device.tuning && device.tuning->packet_width == lanes) {
-    shape.tile = device.tuning->tile;
-    shape.pending = device.tuning->pending;
-    shape.group = device.tuning->group;
+  if (tuning && tuning->grouped == shape.grouped && tuning->packet_width == lanes) {
+    shape.tile = tuning->tile;
+    shape.pending = tuning->pending;
+    shape.group = tuning->group;
   }
   return shape;
 }

@@ -5,12 +5,14 @@
 #include <cstddef>
 
 #include "raysplats/device.hpp"
+#include "raysplats/trace_options.hpp"
 
 namespace raysplats {
 
-/// Block of camera rays that one work-item traces, and the square tile whose packets share a
-/// candidate list.
+/// Block of camera rays that one work-item or one work-group traces, and the square tile whose
+/// packets share a candidate list.
 struct PacketShape {
+  bool grouped = false;  ///< a lane is a work-item (cl/trace/group.h), not a lane of a vector
   int lanes = 1;
   int width = 1;     ///< pixels
   int height = 1;    ///< pixels
@@ -20,10 +22,11 @@ struct PacketShape {
   int group = 0;     ///< most work-items of a work-group; 0 = all packets of a tile
 };
 
-/// `lanes` of 1, 2, 4, 8 or 16; 0 takes the device's tuning, or without one its float vector width
-/// on CPUs and 1 elsewhere. The rest follows the tuning when that has the same width.
-/// Throws UsageError for other widths.
-PacketShape packet_shape(const DeviceInfo& device, int lanes);
+/// Lanes and form as the options say; what they leave open is the device's tuning, or without one
+/// vectors as wide as the device's own on CPUs and elsewhere groups of 32,
+/// or single rays where local memory is short. The rest follows the tuning when that has
+/// the same form and width. Throws UsageError for other widths.
+PacketShape packet_shape(const DeviceInfo& device, const TraceOptions& options);
 
 /// Work-group of packets: those of a tile, halved until at most `limit` work-items are left.
 std::array<std::size_t, 2> packet_group(const PacketShape& packet, std::size_t limit);

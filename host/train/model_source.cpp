@@ -117,6 +117,7 @@ TraceOptions trace_options(const ModelSource& source, bool cut_out) {
   out.near_depth = static_cast<float>(trained.near_depth);
   out.traversal = trained.traversal;
   out.background = background_color(trained, cut_out);
+  out.packet_form = trained.packet_form;
   out.packet_width = trained.packet_width;
   out.memory_budget = static_cast<std::size_t>(trained.memory_budget) << 20;
   return out;

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "base/nearest_name.hpp"
+#include "core/trace_keys.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "train/train_keys.hpp"
@@ -230,10 +231,11 @@ std::string to_toml(const TrainOptions& options) {
 }
 
 void validate(const TrainOptions& options) {
-  const int width = options.packet_width;
-  if (width != 0 && width != 1 && width != 2 && width != 4 && width != 8 && width != 16) {
+  if (!trace_keys::is_packet_width(options.packet_form, options.packet_width)) {
     throw UsageError(
-        fmt::format("The option 'packet-width' is 0, 1, 2, 4, 8 or 16, not {}", width));
+        fmt::format("The option 'packet-width' is 0, 1, 2, 4, 8 or 16 with 'packet-shape' vector, "
+                    "0, 8, 16, 32 or 64 with group, not {}",
+                    options.packet_width));
   }
   const auto& sizes = options.resolution_schedule;
   const auto earlier = [&options](const ResolutionStep& a, const ResolutionStep& b) {

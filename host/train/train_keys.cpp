@@ -394,6 +394,10 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
       "walks the hierarchy, the paper) or auto (as 'raysplats tune' found, else tiles); scenes "
       "with "
       "mirrors and orthographic cameras need rays one by one");
+  std::vector<std::pair<std::string, PacketForm>> forms;
+  for (const auto& [name, form] : trace_keys::kPacketShapes) forms.emplace_back(name, form);
+  t.choice<PacketForm>(trace_keys::kPacketShape, o.packet_form, forms,
+                       trace_keys::kPacketShapeHelp);
   t.number(trace_keys::kPacketWidth, o.packet_width);
   t.number(trace_keys::kMemoryBudget, o.memory_budget);
   t.choice<GradientSum>(

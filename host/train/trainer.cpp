@@ -97,6 +97,7 @@ TraceOptions trace_options_of(const TrainOptions& options, const std::array<floa
   trace.near_depth = static_cast<float>(options.near_depth);
   trace.traversal = options.traversal;
   trace.background = background;
+  trace.packet_form = options.packet_form;
   trace.packet_width = options.packet_width;
   trace.gradient_sum = options.gradient_sum;
   trace.deterministic = options.deterministic;

@@ -13,7 +13,8 @@ enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
 
 /// How camera rays are traced on a device: the choices that change the speed and nothing else.
 struct DeviceTuning {
-  int packet_width = 1;  ///< rays per work-item: 1, 2, 4, 8 or 16
+  bool grouped = false;  ///< packets are work-groups, not vectors
+  int packet_width = 1;  ///< rays of a packet: 1, 2, 4, 8 or 16, in groups 8, 16, 32 or 64
   int tile = 16;         ///< pixels along a side of the tiles that share a candidate list
   int pending = 48;      ///< entries of a ray's sorted list
   int group = 0;         ///< most work-items of a work-group; 0 = all packets of a tile

@@ -21,6 +21,13 @@ enum class Traversal {
   kBvh,    ///< every ray walks the bounding volume hierarchy (the paper)
 };
 
+/// What a packet of camera rays is made of.
+enum class PacketForm {
+  kAuto,    ///< the device's own: vectors on CPUs, groups elsewhere; widths 32 and 64 are groups
+  kVector,  ///< the lanes of a vector in one work-item
+  kGroup,   ///< the work-items of a work-group, which share rows of hits in local memory
+};
+
 /// Function from the trained scale parameter to the standard deviation.
 enum class ScaleActivation { kExp, kSigmoid };
 
@@ -44,8 +51,10 @@ struct TraceOptions {
       0.0f;  ///< Gaussians whose mean is nearer along the view axis are skipped; 0 = off
   std::array<float, 3> background{0.0f, 0.0f, 0.0f};
   Traversal traversal = Traversal::kAuto;  ///< of camera rays
-  bool depth = false;    ///< camera rays also yield expected depth, median depth and hit count
-  int packet_width = 0;  ///< rays per work-item: 1, 2, 4, 8 or 16; 0 = the device's own
+  bool depth = false;  ///< camera rays also yield expected depth, median depth and hit count
+  PacketForm packet_form = PacketForm::kAuto;
+  int packet_width = 0;  ///< rays of a packet: 1, 2, 4, 8, 16 in a vector, 8, 16, 32, 64 in a
+                         ///< group; 0 = the device's own
   GradientSum gradient_sum = GradientSum::kAuto;
   bool deterministic = false;      ///< kAuto gives the same bits every time; on CPUs it always does
   double launch_budget_ms = -1.0;  ///< time of one launch; 0 = unbounded, -1 = the device's default

@@ -111,6 +111,7 @@ struct TrainOptions {
   bool adaptive_radius = true;
   double near_depth = 0.0;
   Traversal traversal = Traversal::kAuto;
+  PacketForm packet_form = PacketForm::kAuto;
   int packet_width = 0;
   std::int64_t memory_budget = 1024;  ///< MiB
   GradientSum gradient_sum = GradientSum::kAuto;

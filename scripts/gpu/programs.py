@@ -7,8 +7,10 @@ KERNELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "
 # Context::Impl::program (host/device/context.cpp).
 COMPILER = ["-cl-std=CL1.2", "-cl-mad-enable"]
 
-# packet_shape.cpp and camera_tracer.cpp: one ray per work-item, in tiles of 16.
+# packet_shape.cpp and camera_tracer.cpp: a packet per work-group, or one ray per work-item, in tiles of 16.
 CAMERA = dict(PACKET=1, TILE=16, CHUNK=16, LENS=0)
+GROUP_CAMERA = dict(CAMERA, GROUP=32)
+GROUP_FORWARD = dict(GROUP_CAMERA, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 FORWARD = dict(CAMERA, BLOCK=1, PENDING=48, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 # candidate_lists.cpp, gaussian_kernel.cpp.
 VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, NEAR_DISTANCE=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1)
@@ -25,6 +27,14 @@ GROUP = dict(RS_GROUP=256)
 
 # Name, file below cl/, definitions.
 PROGRAMS = [
+    ("group forward train", "trace/group_forward.cl", dict(GROUP_FORWARD, KEEP_HITS=1)),
+    ("group forward train 64", "trace/group_forward.cl", dict(GROUP_FORWARD, KEEP_HITS=1, GROUP=64)),
+    ("group forward render", "trace/group_forward.cl", GROUP_FORWARD),
+    ("group forward depth", "trace/group_forward.cl", dict(GROUP_FORWARD, PEAK_ORDER=0, WITH_DEPTH=1)),
+    ("group forward around", "trace/group_forward.cl", dict(GROUP_FORWARD, LENS=2, KEEP_HITS=1)),
+    ("group backward atomic", "trace/group_backward.cl", dict(GROUP_CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=0)),
+    ("group backward atomic 64", "trace/group_backward.cl", dict(GROUP_CAMERA, GROUP=64, PRIVATE_COPIES=0, EXACT_SUMS=0)),
+    ("group backward exact", "trace/group_backward.cl", dict(GROUP_CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=1)),
     ("forward train", "trace/forward.cl", dict(FORWARD, KEEP_HITS=1)),
     ("forward render", "trace/forward.cl", FORWARD),
     ("forward entry", "trace/forward.cl", dict(FORWARD, PEAK_ORDER=0)),

@@ -18,7 +18,7 @@ void parse(std::span<const std::uint8_t> input) {
   device.driver_version = "1";
   if (const auto found = store.find(device); found && !is_valid(*found)) std::abort();
   store.remove(device);
-  store.store(device, {8, 16, 32, 0});
+  store.store(device, {false, 8, 16, 32, 0});
   if (!TuningStore(scratch().path().string()).find(device)) std::abort();
 }
 

@@ -21,6 +21,10 @@ TEST_CASE("tune: candidates are valid, differ in one axis and begin with the cur
   CHECK(start.packet_width == 8);
   for (const std::string& axis : tune_axes()) {
     const std::vector<DeviceTuning> candidates = tune_candidates(axis, start, device);
+    if (axis == "packet-shape") {
+      CHECK(candidates == std::vector<DeviceTuning>{start});
+      continue;
+    }
     REQUIRE(candidates.size() > 1);
     CHECK(candidates.front() == start);
     for (std::size_t i = 1; i < candidates.size(); ++i) {
@@ -33,6 +37,28 @@ TEST_CASE("tune: candidates are valid, differ in one axis and begin with the cur
       CHECK(std::count(candidates.begin(), candidates.end(), c) == 1);
     }
   }
+}
+
+TEST_CASE("tune: GPUs try groups and vectors, each in its own widths") {
+  DeviceInfo device;
+  device.type = DeviceType::kGpu;
+  device.local_memory = 32768;
+  device.max_work_group_size = 256;
+  const DeviceTuning start = default_tuning(device);
+  CHECK(start.grouped);
+  CHECK(start.packet_width == 32);
+  const std::vector<DeviceTuning> forms = tune_candidates("packet-shape", start, device);
+  REQUIRE(forms.size() == 2);
+  CHECK_FALSE(forms[1].grouped);
+  CHECK(tune_candidates("packet-shape", forms[1], device)[1] == start);
+  for (const DeviceTuning& form : forms) {
+    for (const DeviceTuning& c : tune_candidates("packet-width", form, device)) {
+      CHECK(is_valid(c));
+      CHECK(c.grouped == form.grouped);
+    }
+  }
+  CHECK(tune_candidates("pending", start, device).size() == 1);
+  CHECK(tune_candidates("pending", forms[1], device).size() > 1);
 }
 
 TEST_CASE("tune: measures the axes and leaves the winner in the context") {
@@ -71,8 +97,9 @@ TEST_CASE("tune: the picture and the gradients do not depend on the tuning") {
       DeviceGaussians::upload(context, bench_scene("clustered", 2000, 5), ScaleActivation::kExp);
   const Camera camera = bench_camera(70, 50);
   std::vector<float> picture, means;
-  for (const DeviceTuning& tuning : {DeviceTuning{4, 32, 96, 0}, DeviceTuning{4, 16, 24, 1},
-                                     DeviceTuning{4, 64, 7, 16}, DeviceTuning{4, 8, 128, 2}}) {
+  for (const DeviceTuning& tuning :
+       {DeviceTuning{false, 4, 32, 96, 0}, DeviceTuning{false, 4, 16, 24, 1},
+        DeviceTuning{false, 4, 64, 7, 16}, DeviceTuning{false, 4, 8, 128, 2}}) {
     INFO("tile " << tuning.tile << ", pending " << tuning.pending << ", group " << tuning.group);
     context.set_tuning(tuning);
     CameraTracer tracer(context, TraceOptions{});

@@ -27,7 +27,7 @@ DeviceInfo device(const std::string& name, const std::string& driver = "1.0") {
   return out;
 }
 
-const DeviceTuning kTuning{8, 16, 64, 32, true};
+const DeviceTuning kTuning{false, 8, 16, 64, 32, true};
 
 std::string text_of(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
@@ -64,18 +64,18 @@ TEST_CASE("tuning: stored per device, driver and version, and found again") {
 
   TuningStore store(directory);
   store.store(device("A"), kTuning);
-  store.store(device("B"), {1, 32, 48, 0});
+  store.store(device("B"), {true, 32, 32, 48, 0});
   CHECK(store.path() == folder.path() / "cache" / "tuning.json");
   CHECK(TuningStore(directory).find(device("A")) == kTuning);
-  CHECK(TuningStore(directory).find(device("B")) == DeviceTuning{1, 32, 48, 0});
+  CHECK(TuningStore(directory).find(device("B")) == DeviceTuning{true, 32, 32, 48, 0});
   CHECK_FALSE(TuningStore(directory).find(device("A", "2.0")));
   CHECK_FALSE(TuningStore(directory).find(device("C")));
   DeviceInfo elsewhere = device("A");
   elsewhere.platform = "Other";
   CHECK_FALSE(TuningStore(directory).find(elsewhere));
 
-  TuningStore(directory).store(device("A"), {16, 64, 96, 0});
-  CHECK(TuningStore(directory).find(device("A")) == DeviceTuning{16, 64, 96, 0});
+  TuningStore(directory).store(device("A"), {false, 16, 64, 96, 0});
+  CHECK(TuningStore(directory).find(device("A")) == DeviceTuning{false, 16, 64, 96, 0});
 
   // An entry of another version of the program is left alone and not used.
   std::string text = text_of(store.path());

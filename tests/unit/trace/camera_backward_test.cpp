@@ -87,6 +87,8 @@ void check_every_variant(Gaussians model, const Camera& camera) {
         options.adaptive_radius = adaptive;
         options.background = {0.25f, 0.5f, 1.0f};
         CHECK_ERRORS(compare_gradients(context, model, options, camera, activation), 1e-3);
+        options.packet_form = PacketForm::kGroup;
+        CHECK_ERRORS(compare_gradients(context, model, options, camera, activation), 1e-3);
       }
     }
   }
@@ -104,13 +106,12 @@ TEST_CASE("gradients of a tiny scene equal the double reference in every variant
 
 TEST_CASE("gradients of a few pixels equal the double reference in every way of adding [tiny]") {
   Context context = make_test_context();
-  for (const int width : {1, 4}) {
+  for (const Packet& packet : packets({1, 4}, {8, 32})) {
     for (const GradientSum sum :
          {GradientSum::kCopies, GradientSum::kExact, GradientSum::kAtomic}) {
-      CAPTURE(width);
+      CAPTURE(packet);
       CAPTURE(static_cast<int>(sum));
-      TraceOptions options;
-      options.packet_width = width;
+      TraceOptions options = packet.over({});
       options.gradient_sum = sum;
       CHECK_ERRORS(compare_gradients(context, reference::random_scene(8, 28, 1), options,
                                      reference::cube_camera(5, 4)),
@@ -142,11 +143,15 @@ TEST_CASE("gradients of opaque and of vanishing Gaussians") {
 TEST_CASE("gradients of packets that are sorted because rays reach the cap on hits") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(400, 27, 1);
-  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
-    TraceOptions options;
-    options.hit_order = order;
-    options.max_hits = 9;
-    CHECK_ERRORS(compare_gradients(context, model, options, reference::cube_camera(30, 26)), 1e-3);
+  for (const Packet& packet : packets({1, 16}, {64})) {
+    for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+      CAPTURE(packet);
+      TraceOptions options = packet.over({});
+      options.hit_order = order;
+      options.max_hits = 9;
+      CHECK_ERRORS(compare_gradients(context, model, options, reference::cube_camera(30, 26)),
+                   1e-3);
+    }
   }
 }
 
@@ -183,10 +188,9 @@ TEST_CASE("packet widths, every way of adding and recomputed hits give the same 
     CHECK(error(got.opacities, base.opacities) < 1e-4);
     CHECK(error(got.sh, base.sh) < 1e-4);
   };
-  for (const int lanes : {1, 2, 4, 8}) {
-    TraceOptions variant = options;
-    variant.packet_width = lanes;
-    check(variant, "packet width");
+  for (const Packet& packet : packets({1, 2, 4, 8}, {8, 32, 64})) {
+    CAPTURE(packet);
+    check(packet.over(options), "packet");
   }
   TraceOptions tight = options;
   tight.memory_budget = 4200000;  // two private copies, hit lists in bands

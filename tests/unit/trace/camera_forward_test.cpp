@@ -88,17 +88,16 @@ TEST_CASE("every SH degree is evaluated as the reference does") {
   }
 }
 
-TEST_CASE("every packet width gives the same image") {
+TEST_CASE("every form of packet gives the same image") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(400, 4, 1);
   const Camera camera = reference::cube_camera(37, 29);
   TraceOptions options;
   options.packet_width = 1;
   const Image expected = trace_image(context, model, options, camera);
-  for (const int lanes : {2, 4, 8, 16}) {
-    CAPTURE(lanes);
-    options.packet_width = lanes;
-    const Image image = trace_image(context, model, options, camera);
+  for (const Packet& packet : packets({2, 4, 8, 16}, {8, 32, 64})) {
+    CAPTURE(packet);
+    const Image image = trace_image(context, model, packet.over(options), camera);
     double worst = 0;
     for (std::size_t i = 0; i < image.data.size(); ++i) {
       worst = std::max(worst, static_cast<double>(std::abs(image.data[i] - expected.data[i])));
@@ -129,11 +128,10 @@ TEST_CASE("more pending hits than the list holds are still blended in exact orde
   TraceOptions options;
   options.min_transmittance = 1e-6f;
   options.max_hits = 10000;
-  for (const int lanes : {1, 4, 16}) {
-    CAPTURE(lanes);
-    options.packet_width = lanes;
+  for (const Packet& packet : packets({1, 4, 16}, {32})) {
+    CAPTURE(packet);
     const Camera camera = reference::cube_camera(16, 16);
-    const Image image = trace_image(context, model, options, camera);
+    const Image image = trace_image(context, model, packet.over(options), camera);
     const Difference difference =
         compare(image, reference::render(reference::Parameters(model), options, camera), 0);
     CHECK(difference.mean < 1e-4);
@@ -159,10 +157,10 @@ TEST_CASE("packets that share a list have more candidates than their queues hold
   const reference::Render expected =
       reference::render(reference::Parameters(model), options, camera);
   CHECK(expected.hits == 700 * 24 * 16);
-  for (const int lanes : {1, 2, 4, 8, 16}) {
-    CAPTURE(lanes);
-    options.packet_width = lanes;
-    const Difference difference = compare(trace_image(context, model, options, camera), expected);
+  for (const Packet& packet : packets({1, 2, 4, 8, 16}, {32})) {
+    CAPTURE(packet);
+    const Difference difference =
+        compare(trace_image(context, model, packet.over(options), camera), expected);
     CHECK(difference.mean < 1e-4);
     CHECK(difference.maximum < 2e-3);
   }
@@ -327,9 +325,9 @@ TEST_CASE("tiles of a row whose lists are too long are traced apart") {
   const Camera camera = reference::cube_camera(200, 20);
   TraceOptions options;
   options.max_hits = 10000;
-  for (const int lanes : {1, 8, 16}) {
-    CAPTURE(lanes);
-    options.packet_width = lanes;
+  for (const Packet& packet : packets({1, 8, 16}, {32})) {
+    CAPTURE(packet);
+    options = packet.over(options);
     options.memory_budget = std::size_t{1} << 30;
     const DeviceGaussians gaussians =
         DeviceGaussians::upload(context, model, ScaleActivation::kExp);

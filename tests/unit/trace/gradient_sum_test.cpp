@@ -162,10 +162,9 @@ TEST_CASE("the way of adding follows the device, and is never atomic where it mu
 TEST_CASE("every way of adding gradients gives the same, and all but atomics the same bits") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(1500, 31, 1);
-  for (const int width : {1, 16}) {
-    CAPTURE(width);
-    TraceOptions options;
-    options.packet_width = width;
+  for (const Packet& packet : packets({1, 16}, {32})) {
+    CAPTURE(packet);
+    TraceOptions options = packet.over({});
     options.gradient_sum = GradientSum::kCopies;
     const Pass copies = trace_view(context, model, options);
     options.gradient_sum = GradientSum::kExact;

@@ -21,6 +21,7 @@ namespace {
 struct LensContext {
   LensContext(int width, int tile) {
     DeviceTuning tuning;
+    tuning.grouped = width >= 32;
     tuning.packet_width = width;
     tuning.tile = tile;
     tuning.pending = width == 1 ? 7 : 48;

@@ -16,20 +16,34 @@ DeviceInfo cpu(std::uint32_t vector_width) {
   return device;
 }
 
+TraceOptions width_of(int lanes, PacketForm form = PacketForm::kAuto) {
+  TraceOptions options;
+  options.packet_width = lanes;
+  options.packet_form = form;
+  return options;
+}
+
+DeviceInfo gpu_of(std::uint64_t local_memory) {
+  DeviceInfo device;
+  device.type = DeviceType::kGpu;
+  device.float_vector_width = 4;
+  device.local_memory = local_memory;
+  device.max_work_group_size = 256;
+  return device;
+}
+
 }  // namespace
 
 TEST_CASE("packet shape: follows the device's vectors") {
-  CHECK(packet_shape(cpu(16), 0).lanes == 16);
-  CHECK(packet_shape(cpu(8), 0).lanes == 8);
-  CHECK(packet_shape(cpu(1), 0).lanes == 1);
-  DeviceInfo gpu;
-  gpu.type = DeviceType::kGpu;
-  gpu.float_vector_width = 4;
-  CHECK(packet_shape(gpu, 0).lanes == 1);
-  CHECK(packet_shape(gpu, 8).lanes == 8);
-  CHECK_THROWS_AS(packet_shape(gpu, 3), UsageError);
+  CHECK(packet_shape(cpu(16), width_of(0)).lanes == 16);
+  CHECK(packet_shape(cpu(8), width_of(0)).lanes == 8);
+  CHECK(packet_shape(cpu(1), width_of(0)).lanes == 1);
+  const DeviceInfo gpu = gpu_of(1000);  // too little local memory for groups
+  CHECK(packet_shape(gpu, width_of(0)).lanes == 1);
+  CHECK(packet_shape(gpu, width_of(8)).lanes == 8);
+  CHECK_THROWS_AS(packet_shape(gpu, width_of(3)), UsageError);
   for (const int lanes : {1, 2, 4, 8, 16}) {
-    const PacketShape shape = packet_shape(cpu(16), lanes);
+    const PacketShape shape = packet_shape(cpu(16), width_of(lanes));
     CHECK(shape.width * shape.height == lanes);
     CHECK(shape.tile % (shape.block * shape.width) == 0);
     CHECK(shape.tile % (shape.block * shape.height) == 0);
@@ -39,24 +53,51 @@ TEST_CASE("packet shape: follows the device's vectors") {
 
 TEST_CASE("packet shape: a tuning counts unless another width is asked for") {
   DeviceInfo device = cpu(16);
-  const PacketShape plain = packet_shape(device, 16);
-  device.tuning = DeviceTuning{4, 64, 33, 8};
+  const PacketShape plain = packet_shape(device, width_of(16));
+  device.tuning = DeviceTuning{false, 4, 64, 33, 8};
   for (const int lanes : {0, 4}) {
-    const PacketShape tuned = packet_shape(device, lanes);
+    const PacketShape tuned = packet_shape(device, width_of(lanes));
     CHECK(tuned.lanes == 4);
     CHECK(tuned.tile == 64);
     CHECK(tuned.pending == 33);
     CHECK(tuned.group == 8);
   }
-  const PacketShape other = packet_shape(device, 16);
+  const PacketShape other = packet_shape(device, width_of(16));
   CHECK(other.lanes == 16);
   CHECK(other.tile == plain.tile);
   CHECK(other.pending == plain.pending);
   CHECK(other.group == 0);
 }
 
+TEST_CASE("packet shape: groups on GPUs, and where they are asked for") {
+  const PacketShape shape = packet_shape(gpu_of(32768), width_of(0));
+  CHECK(shape.grouped);
+  CHECK(shape.lanes == 32);
+  CHECK(shape.width * shape.height == shape.lanes);
+  CHECK(shape.block == 1);
+  CHECK(shape.tile % shape.width == 0);
+  CHECK(packet_shape(gpu_of(32768), width_of(64)).height == 8);
+  DeviceInfo device = cpu(16);
+  device.local_memory = 65536;
+  device.max_work_group_size = 4096;
+  CHECK_FALSE(packet_shape(device, width_of(0)).grouped);
+  CHECK(packet_shape(device, width_of(64)).grouped);
+  CHECK_FALSE(packet_shape(device, width_of(16)).grouped);
+  CHECK(packet_shape(device, width_of(16, PacketForm::kGroup)).grouped);
+  CHECK(packet_shape(device, width_of(0, PacketForm::kGroup)).lanes == 32);
+  CHECK_FALSE(packet_shape(gpu_of(65536), width_of(0, PacketForm::kVector)).grouped);
+  CHECK_THROWS_AS(packet_shape(device, width_of(4, PacketForm::kGroup)), UsageError);
+  CHECK_THROWS_AS(packet_shape(device, width_of(32, PacketForm::kVector)), UsageError);
+  CHECK_THROWS_AS(packet_shape(gpu_of(16000), width_of(64)), DeviceError);
+  // A tuning of the other form does not count.
+  device.tuning = DeviceTuning{true, 64, 32, 48, 0};
+  CHECK(packet_shape(device, width_of(0)).lanes == 64);
+  CHECK(packet_shape(device, width_of(0, PacketForm::kVector)).lanes == 16);
+  CHECK(packet_shape(device, width_of(0, PacketForm::kVector)).tile == 32);
+}
+
 TEST_CASE("packet group: within the limits of the kernel and the tuning") {
-  PacketShape shape = packet_shape(cpu(16), 16);
+  PacketShape shape = packet_shape(cpu(16), width_of(16));
   shape.tile = 32;
   const auto size = [&](std::size_t limit) {
     const auto group = packet_group(shape, limit);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,31 @@ namespace raysplats {
 inline Context make_test_context() {
   const char* selector = std::getenv("RAYSPLATS_DEVICE");
   return Context(select_device(selector == nullptr ? "" : selector));
+}
+
+/// What a packet of rays may be.
+struct Packet {
+  PacketForm form;
+  int lanes;
+
+  TraceOptions over(TraceOptions options) const {
+    options.packet_form = form;
+    options.packet_width = lanes;
+    return options;
+  }
+};
+
+inline std::ostream& operator<<(std::ostream& out, const Packet& packet) {
+  return out << (packet.form == PacketForm::kGroup ? "group of " : "vector of ") << packet.lanes;
+}
+
+/// Every form of packet in the widths named.
+inline std::vector<Packet> packets(const std::vector<int>& vectors = {1, 2, 4, 8, 16},
+                                   const std::vector<int>& groups = {8, 16, 32, 64}) {
+  std::vector<Packet> out;
+  for (const int lanes : vectors) out.push_back({PacketForm::kVector, lanes});
+  for (const int lanes : groups) out.push_back({PacketForm::kGroup, lanes});
+  return out;
 }
 
 struct Difference {

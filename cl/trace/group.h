@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// A packet whose rays are the work-items of one work-group: the form for devices that run many
+// work-items at once. GROUP work-items trace a block of GROUP pixels together, all on the same way
+// through the code; what they share lies in local memory. Barriers and local atomics of OpenCL 1.2
+// are all it takes; where a group is no larger than a hardware thread, compilers drop most of both.
+// No barrier depends on a condition but that of a loop, and no way leaves a loop between two:
+// implementations that make loops over work-items double what follows a conditional barrier.
+#ifndef RS_TRACE_GROUP_H
+#define RS_TRACE_GROUP_H
+
+#if PACKET != 1
+#error "Packets of work-items hold one ray per work-item"
+#endif
+
+#include "trace/packet.h"
+
+#ifndef GROUP
+#define GROUP 32
+#endif
+#define RS_GROUP_WIDTH (GROUP >= 32 ? 8 : 4)
+#define RS_GROUP_HEIGHT (GROUP / RS_GROUP_WIDTH)
+// Of a kernel: its groups have this size, whatever the host says.
+#define RS_GROUP_KERNEL __attribute__((reqd_work_group_size(GROUP, 1, 1)))
+
+// Rows of hits that are open at once, at most 32: local memory holds three floats per ray of each.
+#ifndef OPEN
+#define OPEN 32
+#endif
+#define RS_ALL_SLOTS ((uint)((1ul << OPEN) - 1))
+
+#define rs_group_barrier() barrier(CLK_LOCAL_MEM_FENCE)
+
+// One bit per work-item whose flag is set, work-item 0 lowest. `words`: two words of local memory.
+ulong rs_group_bits(__local uint* words, const int lane, const bool flag) {
+  rs_group_barrier();
+  if (lane < 2) words[lane] = 0;
+  rs_group_barrier();
+  if (flag) atomic_or(words + (lane >> 5), 1u << (lane & 31));
+  rs_group_barrier();
+  return (ulong)words[1] << 32 | words[0];
+}
+
+uint rs_lowest_of(const ulong bits) { return 63 - (uint)clz(bits & -bits); }
+
+// Columns and rows of groups that cover a picture.
+uint rs_group_number(const int width, const int px, const int py) {
+  const uint across = (width + RS_GROUP_WIDTH - 1) / RS_GROUP_WIDTH;
+  return (py / RS_GROUP_HEIGHT) * across + px / RS_GROUP_WIDTH;
+}
+
+#endif

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+// trace_backward_group: what trace_backward does, with a packet per work-group (group.h) and the
+// streams that trace_forward_group kept. The 16 components of a line's gradient are summed over the
+// rays through local memory; one work-item adds one of them to the sums.
+//   PRIVATE_COPIES 1: work-group g of `groups` takes every groups-th tile and adds to its own copy.
+//   otherwise:        a work-group per packet of the band.
+#ifndef TILE
+#define TILE 16
+#endif
+
+#include "trace/group.h"
+#include "trace/hit_stream.h"
+#include "trace/line_gradient.h"
+#include "trace/line_sum.h"
+
+// Parts in which the rays of a group are summed, so that all work-items have a share.
+#define RS_SUM_PARTS (GROUP > 16 ? GROUP / 16 : 1)
+#define RS_SUM_RAYS (GROUP / RS_SUM_PARTS)
+
+// As in backward.cl; what a row brings is kept per ray in the column of its work-item, what all
+// rays share by one of them.
+typedef struct {
+  float alpha[OPEN][GROUP];
+  float before[OPEN][GROUP];  // transmittance in front, 0 in rays that do not blend it
+  float behind[OPEN][GROUP];
+  float part[16][GROUP + 1];  // one more column than rays: columns fall on other banks
+  float sum[RS_SUM_PARTS][16];
+  uint reference[OPEN];
+  uint oldest[OPEN];  // number of the nearest row that it may change places with
+} BackwardMemory;
+
+// Adds the sums of g over the group to line `line`.
+void group_add_line(__local BackwardMemory* memory,
+                    const int lane,
+                    const LineSums* sums,
+                    const uint line,
+                    const float* g) {
+#pragma unroll
+  for (int k = 0; k < 16; ++k) memory->part[k][lane] = g[k];
+  rs_group_barrier();
+  for (int i = lane; i < 16 * RS_SUM_PARTS; i += GROUP) {
+    const int k = i % 16, first = i / 16 * RS_SUM_RAYS;
+    float sum = 0.0f;
+    for (int j = 0; j < RS_SUM_RAYS; ++j) sum += memory->part[k][first + j];
+    memory->sum[i / 16][k] = sum;
+  }
+  rs_group_barrier();
+  for (int k = lane; k < 16; k += GROUP) {
+    float sum = memory->sum[0][k];
+    for (int j = 1; j < RS_SUM_PARTS; ++j) sum += memory->sum[j][k];
+    rs_add_sum(sums, (size_t)line * 16 + k, sum);
+  }
+}
+
+// The row of the slot has met all rows that it may change places with: its gradient is complete.
+// Returns its T alpha (colour . gradient), which lies behind everything still to come.
+float close_row(__local BackwardMemory* memory,
+                const int lane,
+                const uint slot,
+                const Pixels* p,
+                const float T,
+                const float T_last,
+                const float sky,
+                __global const RsLine* restrict lines,
+                const LineSums* sums) {
+  const uint reference = memory->reference[slot];
+  __global const float* v = lines[reference >> 1].v;
+  const float alpha = memory->alpha[slot][lane];
+  const float before = memory->before[slot][lane];
+  const float projected = v[13] * p->gR + v[14] * p->gG + v[15] * p->gB + p->gA;
+  // Only the last hit of a ray can be opaque, and only the background is behind that.
+  const float behind = before <= T_last
+                           ? before * sky
+                           : (memory->behind[slot][lane] + T * sky) * (1.0f / (1.0f - alpha));
+  const float g_alpha = before > 0.0f ? before * projected - behind : 0.0f;
+  float g[16];
+  line_gradient(p, reference & 1, v, g_alpha, alpha, before * alpha, g);
+  group_add_line(memory, lane, sums, reference >> 1, g);
+  return before * alpha * projected;
+}
+
+// `works`: whether there is a packet at (group_x, group_y); otherwise nothing happens.
+void group_backward(__local BackwardMemory* memory,
+                    const int lane,
+                    const bool works,
+                    const RsCamera* camera,
+                    __global const float* restrict tangents,
+                    const int group_x,
+                    const int group_y,
+                    __global const RsLine* restrict lines,
+                    __global const float* restrict image_gradient,
+                    __global const float* restrict transmittances,
+                    __global const uint2* restrict stream_ends,
+                    __global const uint2* restrict pool,
+                    __global const float* restrict pool_transmittance,
+                    const float4 background,
+                    const float screen_x,
+                    const float screen_y,
+                    const LineSums* sums) {
+  const int width = camera->width, height = camera->height;
+  const uint2 tail =
+      works ? stream_ends[rs_group_number(width, group_x, group_y)] : (uint2)(RS_NO_CHUNK, 0);
+  const int px = group_x + lane % RS_GROUP_WIDTH;
+  const int py = group_y + lane / RS_GROUP_WIDTH;
+  const size_t plane = (size_t)width * height;
+  Pixels p;
+  load_pixels(&p, camera, tangents, image_gradient, screen_x, screen_y, px, py);
+  const float T = rs_load_pixels(transmittances, width, height, px, py);
+  const float T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
+  const float sky = background.x * p.gR + background.y * p.gG + background.z * p.gB;
+  float behind = 0.0f;  // of closed rows: farther than all that are open or still to come
+  uint open = 0;        // slots that are taken, a bit each
+  // Rows are numbered downwards from a number that no window reaches below.
+  uint number = 0x80000000u;
+  uint chunk = tail.x;
+  uint used = tail.y;
+  while (chunk != RS_NO_CHUNK) {
+    const size_t first = (size_t)chunk * CHUNK;
+    for (uint n = used - 1; n > 0; --n, --number) {
+      uint closing = 0;
+      for (uint rest = open; rest != 0; rest &= rest - 1) {
+        if (memory->oldest[rs_lowest_bit(rest)] > number) closing |= rest & -rest;
+      }
+      open &= ~closing;
+      for (; closing != 0; closing &= closing - 1)
+        behind += close_row(memory, lane, rs_lowest_bit(closing), &p, T, T_last, sky, lines, sums);
+      const uint2 row = pool[first + n];
+      const float before = pool_transmittance[(first + n) * GROUP + lane];
+      __global const float* v = lines[row.x >> 1].v;
+      const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
+      const float alpha = v[12] * rs_exp(-0.5f * m.numerator / m.direction2);
+      const float projected = v[13] * p.gR + v[14] * p.gG + v[15] * p.gB + p.gA;
+      const float mine = before * alpha * projected;
+      float farther = behind;
+      for (uint rest = open; rest != 0; rest &= rest - 1) {
+        const uint slot = rs_lowest_bit(rest);
+        const float other = memory->before[slot][lane];
+        if (other < before) {
+          __global const float* w = lines[memory->reference[slot] >> 1].v;
+          farther += other * memory->alpha[slot][lane] *
+                     (w[13] * p.gR + w[14] * p.gG + w[15] * p.gB + p.gA);
+        } else {
+          memory->behind[slot][lane] += mine;
+        }
+      }
+      const uint slot = rs_lowest_bit(~open & RS_ALL_SLOTS);
+      open |= 1u << slot;
+      memory->alpha[slot][lane] = alpha;
+      memory->before[slot][lane] = before;
+      memory->behind[slot][lane] = farther;
+      if (lane == 0) {
+        memory->reference[slot] = row.x;
+        memory->oldest[slot] = number - row.y;
+      }
+      rs_group_barrier();
+    }
+    chunk = pool[first].x;
+    used = CHUNK;
+  }
+  for (; open != 0; open &= open - 1)
+    close_row(memory, lane, rs_lowest_bit(open), &p, T, T_last, sky, lines, sums);
+}
+
+RS_GROUP_KERNEL __kernel void trace_backward_group(
+    const uint count,
+    const uint groups,
+    __global const RsLine* restrict lines,
+    __global const float* restrict image_gradient,
+    __global const float* restrict transmittances,
+    __global const uint2* restrict stream_ends,
+    __global const uint2* restrict pool,
+    __global const float* restrict pool_transmittance,
+    const RsCamera camera_argument,
+    const uint tiles_x,
+    const uint tile_row,
+    const uint tile_rows,
+    const float4 background,
+    const float screen_x,
+    const float screen_y,
+    const float limit,
+    __global float* restrict gradients,
+    const int face,
+    __global const RsLensTile* restrict tiles,
+    __global const float* restrict tangents) {
+  __local BackwardMemory memory;
+  const RsCamera camera = camera_argument;
+  const int lane = get_local_id(0);
+  LineSums sums;
+  sums.lines = gradients;
+  sums.limit = limit;
+#if PRIVATE_COPIES
+  // Tiles are numbered over the whole image, so that the sums do not depend on the bands.
+  const uint group = get_group_id(0);
+  sums.lines += (size_t)group * count * 16;
+  const uint first = tile_row * tiles_x, end = first + tile_rows * tiles_x;
+  for (uint tile = first + (group + groups - first % groups) % groups; tile < end; tile += groups) {
+    const bool works = rs_on_face(tiles, face, tile);
+    const int x0 = tile % tiles_x * TILE;
+    const int y0 = tile / tiles_x * TILE;
+    for (int y = y0; y < min(y0 + TILE, camera.height); y += RS_GROUP_HEIGHT) {
+      for (int x = x0; x < min(x0 + TILE, camera.width); x += RS_GROUP_WIDTH) {
+        group_backward(&memory, lane, works, &camera, tangents, x, y, lines, image_gradient,
+                       transmittances, stream_ends, pool, pool_transmittance, background, screen_x,
+                       screen_y, &sums);
+      }
+    }
+  }
+#else
+  (void)count;
+  (void)groups;
+  (void)tile_rows;
+  const int x = (int)(get_global_id(0) / GROUP) * RS_GROUP_WIDTH;
+  const int y = (int)get_global_id(1) * RS_GROUP_HEIGHT + tile_row * TILE;
+  const bool works = x < camera.width && y < camera.height &&
+                     rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE);
+  group_backward(&memory, lane, works, &camera, tangents, x, y, lines, image_gradient,
+                 transmittances, stream_ends, pool, pool_transmittance, background, screen_x,
+                 screen_y, &sums);
+#endif
+}

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// trace_forward_group: what trace_forward does, with a packet per work-group (group.h).
+//   global size: GROUP times the packets in x, the packets in y, from the window's first tile on
+// Packets beyond the limits of group_rows.h start again in parts, and the least parts in passes
+// (group_passes.h).
+#ifndef TILE
+#define TILE 16
+#endif
+#ifndef KEEP_HITS
+#define KEEP_HITS 0
+#endif
+
+#include "primitives/counter.h"
+#include "trace/group.h"
+#include "trace/group_passes.h"
+#include "trace/group_rows.h"
+
+// Rays that are not tried in smaller parts.
+#define RS_LEAST_PART 4
+
+#if LENS
+// Outermost rays of the packet.
+void outermost_rays(__local GroupMemory* memory,
+                    const int lane,
+                    const PacketRays* rays,
+                    GroupCandidates* c) {
+  __local float* X = memory->open.key[0];
+  __local float* Y = memory->open.alpha[0];
+  X[lane] = rays->valid ? rays->X : INFINITY;
+  Y[lane] = rays->valid ? rays->Y : INFINITY;
+  rs_group_barrier();
+  c->x0 = c->y0 = INFINITY;
+  c->x1 = c->y1 = -INFINITY;
+  for (int i = 0; i < GROUP; ++i) {
+    if (!(X[i] < INFINITY)) continue;
+    c->x0 = fmin(c->x0, X[i]);
+    c->x1 = fmax(c->x1, X[i]);
+    c->y0 = fmin(c->y0, Y[i]);
+    c->y1 = fmax(c->y1, Y[i]);
+  }
+  rs_group_barrier();
+}
+#endif
+
+// counters: chunks wanted, rays that stopped at max_hits, hits (two words).
+RS_GROUP_KERNEL __kernel void trace_forward_group(__global const RsLine* restrict lines,
+                                                  __global const uint* restrict references,
+                                                  __global const float* restrict boxes,
+                                                  const uint stride,
+                                                  __global const float2* restrict limits,
+                                                  __global const uint* restrict offsets,
+                                                  const RsCamera camera_argument,
+                                                  const int4 window,
+                                                  const float min_transmittance,
+                                                  const int max_hits,
+                                                  const float4 background,
+                                                  __global float* restrict image,
+                                                  __global float* restrict depth_image,
+                                                  __global float* restrict transmittances,
+                                                  __global uint2* restrict stream_ends,
+                                                  __global uint2* restrict pool,
+                                                  __global float* restrict pool_transmittance,
+                                                  const uint pool_capacity,
+                                                  volatile __global uint* restrict counters,
+                                                  const int face,
+                                                  __global const RsLensTile* restrict tiles,
+                                                  __global const float* restrict tangents) {
+  __local GroupMemory memory;
+  const RsCamera camera = camera_argument;
+  const int lane = get_local_id(0);
+  const int window_x = (int)(get_global_id(0) / GROUP) * RS_GROUP_WIDTH;
+  const int window_y = (int)get_global_id(1) * RS_GROUP_HEIGHT;
+  const int group_x = window_x + window.x * TILE;
+  const int group_y = window_y + window.y * TILE;
+  const int column = window_x / TILE, row = window_y / TILE;
+  const uint picture_tiles_x = (camera.width + TILE - 1) / TILE;
+  const uint tile = row * window.z + column;
+  const bool works =
+      column < window.z && row < window.w && group_x < camera.width && group_y < camera.height &&
+      rs_on_face(tiles, face, (row + window.y) * picture_tiles_x + column + window.x);
+
+  const int px = group_x + lane % RS_GROUP_WIDTH;
+  const int py = group_y + lane / RS_GROUP_WIDTH;
+  PacketState p;
+  const PacketRays rays = rs_packet_rays(&camera, tangents, px, py);
+  p.X = rays.X;
+  p.Y = rays.Y;
+  p.valid = works ? rays.valid : 0;
+  packet_clear(&p);
+
+  GroupCandidates candidates;
+  candidates.boxes = boxes;
+  candidates.stride = stride;
+  candidates.begin = works ? offsets[tile] : 0;
+  candidates.end = works ? offsets[tile + 1] : 0;
+#if LENS
+  outermost_rays(&memory, lane, &rays, &candidates);
+#else
+  candidates.x0 = (group_x + 0.5f - camera.cx) / camera.fx;
+  candidates.x1 = (group_x + RS_GROUP_WIDTH - 0.5f - camera.cx) / camera.fx;
+  candidates.y0 = (group_y + 0.5f - camera.cy) / camera.fy;
+  candidates.y1 = (group_y + RS_GROUP_HEIGHT - 0.5f - camera.cy) / camera.fy;
+#endif
+  HitStream stream;
+  stream.pool = pool;
+  stream.transmittance = pool_transmittance;
+  stream.capacity = pool_capacity;
+  stream.cursor = counters;
+  stream_restart(&stream);
+
+  // All rays together; where that does not fit, half as many of them, and so on.
+  bool capped = false;
+  int first = 0, part = GROUP;
+  while (first < GROUP) {
+    const bool mine = lane >= first && lane < first + part;
+    const uint chunk = stream.chunk, used = stream.used;
+    bool done = group_in_rows(&memory, &candidates, lane, mine, lines, references, limits,
+                              min_transmittance, max_hits, &p, &stream);
+    if (!done) {
+      if (mine) packet_clear(&p);
+      stream.chunk = chunk;
+      stream.used = used;
+    }
+    const bool alone = !done && part <= RS_LEAST_PART;
+    if (group_in_passes(&memory, &candidates, lane, alone && mine && p.valid, lines, references,
+                        limits, min_transmittance, max_hits, &p, &stream))
+      capped = true;
+    if (done || alone) {
+      first += part;
+    } else {
+      part /= 2;
+    }
+  }
+
+  if (works) {
+    packet_store(&p, image, depth_image, transmittances, camera.width, camera.height, px, py,
+                 background);
+  }
+#if KEEP_HITS
+  if (works && lane == 0)
+    stream_ends[rs_group_number(camera.width, group_x, group_y)] =
+        (uint2)(stream.chunk, stream.used);
+#else
+  (void)stream_ends;
+#endif
+  rs_group_barrier();
+  if (lane < 2) memory.words[lane] = 0;
+  rs_group_barrier();
+  atomic_add(memory.words, (uint)p.hits);
+  if (capped) atomic_inc(memory.words + 1);
+  rs_group_barrier();
+  if (lane == 0) {
+    rs_count(counters + 2, memory.words[0]);
+    if (memory.words[1] != 0) atomic_add(counters + 1, memory.words[1]);
+  }
+}

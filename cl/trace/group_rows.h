@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+// Blending a packet of work-items without sorting its rays: the rows of packet_rows.h, spread over
+// a work-group. Candidates are taken in batches. All work-items test one candidate at a time, each
+// against its own ray; of a candidate that some ray hits its nearest and farthest key stay, and its
+// row waits until nothing that comes later in the list can be nearer. Rows that wait are ordered by
+// counting, a row per work-item; those that may open are opened one after the other, meeting their
+// Gaussian again, which is cheaper than to keep what every ray found. An open row keeps key, alpha
+// and the product over nearer hits per ray, each work-item in its own column.
+//
+// The stream has the rows in the order in which they are settled, and a row's window counts those
+// settled while it was open: so the backward pass has no more rows open at once than this one,
+// however long one of them stays.
+#ifndef RS_TRACE_GROUP_ROWS_H
+#define RS_TRACE_GROUP_ROWS_H
+
+#include "trace/group.h"
+#include "trace/hit_stream.h"
+#include "trace/packet_state.h"
+
+// Candidates of a batch.
+#define RS_GROUP_BATCH (GROUP < 16 ? GROUP : 16)
+// Candidates found and not tested yet: a power of two.
+#define RS_GROUP_QUEUE (2 * GROUP)
+// Rows that wait, those of a batch included.
+#ifndef WAITING
+#define WAITING 64
+#endif
+typedef struct {
+  float key[OPEN][GROUP];
+  float alpha[OPEN][GROUP];   // 0 where a ray misses
+  float before[OPEN][GROUP];  // product over the nearer hits so far
+  float last_key[OPEN];       // farthest key of the rays that hit
+  uint reference[OPEN];
+  uint settled[OPEN];  // rows settled when it was opened
+  uint stream_row[OPEN];
+} OpenRows;
+
+// Rows that wait, nearest first; ordering them anew writes the other side.
+typedef struct {
+  float first_key[2][WAITING];
+  float last_key[2][WAITING];
+  uint candidate[2][WAITING];
+} WaitingRows;
+
+typedef struct {
+  OpenRows open;
+  WaitingRows waiting;
+  uint found_first[RS_GROUP_BATCH];  // keys of a batch, as integers
+  uint found_last[RS_GROUP_BATCH];
+  uint queue[RS_GROUP_QUEUE];
+  uint words[2];
+  uint taken;
+  uint alive;
+} GroupMemory;
+
+// The way through the candidate list of the tile; the same in every work-item.
+typedef struct {
+  __global const float* boxes;  // planes of `stride`: x0, y0, x1, y1
+  size_t stride;
+  uint begin, end;       // of the list
+  float x0, y0, x1, y1;  // outermost rays of the packet
+  uint read;             // up to here the list is in the queue
+  uint queued, taken;    // entries of the queue, counted from the start
+} GroupCandidates;
+
+// Reads on until there is a batch, or the list ends. A box per work-item.
+void group_fetch(__local GroupMemory* memory, GroupCandidates* c, const int lane) {
+  while (c->queued - c->taken < RS_GROUP_BATCH && c->read < c->end) {
+    const uint k = c->read + lane;
+    bool meets = false;
+    if (k < c->end) {
+      __global const float* box = c->boxes + k;
+      meets = box[0] <= c->x1 && box[c->stride] <= c->y1 && box[2 * c->stride] >= c->x0 &&
+              box[3 * c->stride] >= c->y0;
+    }
+    const ulong bits = rs_group_bits(memory->words, lane, meets);
+    const uint place = (uint)popcount(bits & ((1ul << lane) - 1));
+    if (meets) memory->queue[(c->queued + place) % RS_GROUP_QUEUE] = k;
+    c->queued += (uint)popcount(bits);
+    c->read += GROUP;
+  }
+}
+
+float group_waiting_key(const __local GroupMemory* memory,
+                        const int side,
+                        const int begin,
+                        const int waiting,
+                        const int i) {
+  return i < waiting ? memory->waiting.first_key[side][begin + i]
+                     : as_float(memory->found_first[i - waiting]);
+}
+
+// Neighbouring work-items write neighbouring words.
+void group_stream_set(const HitStream* stream,
+                      const int lane,
+                      const uint row,
+                      const float transmittance) {
+  if (row != RS_NO_ROW) stream->transmittance[(size_t)row * GROUP + lane] = transmittance;
+}
+
+// Blends an open row whose place is known; `settled` is the product over such rows.
+void group_settle(const __local OpenRows* rows,
+                  const int slot,
+                  const int lane,
+                  __global const RsLine* restrict lines,
+                  const float min_transmittance,
+                  PacketState* p,
+                  float* settled,
+                  const HitStream* stream) {
+  const uint reference = rows->reference[slot];
+  const float alpha = rows->alpha[slot][lane];
+  const float before = rows->before[slot][lane];
+  const int mine = RS_MASK(alpha > 0.0f) & RS_MASK(before >= min_transmittance);
+  packet_blend(p, lines[reference >> 1].v, reference & 1, mine, before, alpha);
+  *settled -= *settled * alpha;
+#if KEEP_HITS
+  group_stream_set(stream, lane, rows->stream_row[slot], mine ? before : 0.0f);
+#else
+  (void)stream;
+#endif
+}
+
+// By work-item 0: places in the stream for the rows of the slots `closing`, which settle now.
+void group_push_rows(__local OpenRows* rows, uint closing, uint settled, HitStream* stream) {
+  for (; closing != 0; closing &= closing - 1, ++settled) {
+    const uint slot = rs_lowest_bit(closing);
+    rows->stream_row[slot] =
+        stream_push(stream, rows->reference[slot], settled - rows->settled[slot]);
+  }
+}
+
+// Traces the rays that are `traced`. False when they need more rows at once than there is room for,
+// or a ray has more than max_hits hits: fewer rays need less room, and group_passes.h has no such
+// limits. Work-item 0 alone pushes rows into its stream; all set them.
+bool group_in_rows(__local GroupMemory* memory,
+                   GroupCandidates* candidates,
+                   const int lane,
+                   const bool traced,
+                   __global const RsLine* restrict lines,
+                   __global const uint* restrict references,
+                   __global const float2* restrict limits,
+                   const float min_transmittance,
+                   const int max_hits,
+                   PacketState* p,
+                   HitStream* stream) {
+  __local OpenRows* rows = &memory->open;
+  float settled = 1.0f;
+  uint settled_rows = 0;
+  uint open = 0;    // slots that are taken, a bit each
+  uint closed = 0;  // of the last row: others may still read of them
+  int alive = traced ? p->valid : 0;
+  candidates->read = candidates->begin;
+  candidates->queued = candidates->taken = 0;
+  int side = 0, begin = 0, waiting = 0;
+  bool fits = true;
+  bool goes_on = true;
+  while (goes_on && fits) {
+    group_fetch(memory, candidates, lane);
+    const int queued = (int)(candidates->queued - candidates->taken);
+    const int batch = min(min(queued, RS_GROUP_BATCH), WAITING - waiting);
+    fits = batch > 0 || queued == 0;
+    if (lane < RS_GROUP_BATCH) {
+      memory->found_first[lane] = as_uint(INFINITY);
+      memory->found_last[lane] = 0;
+    }
+    if (lane == 0) memory->alive = 0;
+    rs_group_barrier();
+    for (int j = 0; j < batch; ++j) {
+      const uint k = memory->queue[(candidates->taken + j) % RS_GROUP_QUEUE];
+      const PacketHit hit = packet_hit(p, lines, references[k], limits[k].y, alive);
+      if (hit.hit) {
+        // Keys are not negative: their bits are in order.
+        const uint key = as_uint(hit.key) & 0x7fffffff;
+        atomic_min(&memory->found_first[j], key);
+        atomic_max(&memory->found_last[j], key);
+      }
+    }
+    if (alive) atomic_or(&memory->alive, 1u);
+    float bound = INFINITY;
+    if (queued > batch) {
+      bound = limits[memory->queue[(candidates->taken + batch) % RS_GROUP_QUEUE]].x;
+    } else if (candidates->read < candidates->end) {
+      bound = limits[candidates->read].x;
+    }
+    rs_group_barrier();
+    goes_on = memory->alive != 0 && bound < INFINITY;
+    // Every row to the place that its nearest key has among all; what no ray hits has none.
+    const int total = waiting + batch;
+    int found = 0, ready = 0;
+    for (int i = 0; i < total; ++i) {
+      const float key = group_waiting_key(memory, side, begin, waiting, i);
+      found += key < INFINITY;
+      ready += key < INFINITY && key <= bound;
+    }
+    if (memory->alive == 0) ready = 0;
+    for (int i = lane; i < total; i += GROUP) {
+      const float key = group_waiting_key(memory, side, begin, waiting, i);
+      if (!(key < INFINITY)) continue;
+      int place = 0;
+      for (int j = 0; j < total; ++j) {
+        const float other = group_waiting_key(memory, side, begin, waiting, j);
+        place += other < key || (other == key && j < i);
+      }
+      const bool old = i < waiting;
+      __local WaitingRows* w = &memory->waiting;
+      w->first_key[1 - side][place] = key;
+      w->last_key[1 - side][place] =
+          old ? w->last_key[side][begin + i] : as_float(memory->found_last[i - waiting]);
+      w->candidate[1 - side][place] =
+          old ? w->candidate[side][begin + i]
+              : memory->queue[(candidates->taken + i - waiting) % RS_GROUP_QUEUE];
+    }
+    rs_group_barrier();
+    side = 1 - side;
+    candidates->taken += batch;
+
+    for (int r = 0; r < ready && fits; ++r) {
+      const float first_key = memory->waiting.first_key[side][r];
+      const uint k = memory->waiting.candidate[side][r];
+      const uint reference = references[k];
+      const PacketHit hit = packet_hit(p, lines, reference, limits[k].y, alive);
+      // Compared as integers (keys are not negative), less one where an equal key of a Gaussian
+      // with a higher index counts as farther.
+      const int order = as_int(hit.key) & 0x7fffffff;
+      uint closing = 0;
+      float before = 1.0f;
+      for (uint rest = open; rest != 0; rest &= rest - 1) {
+        const int other = (int)rs_lowest_bit(rest);
+        if (rows->last_key[other] < first_key) {
+          closing |= 1u << other;
+          continue;
+        }
+        const bool nearer =
+            order - (reference < rows->reference[other] ? 1 : 0) < as_int(rows->key[other][lane]);
+        const float other_before = rows->before[other][lane];
+        if (nearer) {
+          rows->before[other][lane] = other_before - other_before * hit.alpha;
+        } else {
+          before -= before * rows->alpha[other][lane];
+        }
+      }
+      const uint free = ~(open | closed) & RS_ALL_SLOTS;
+      fits = free != 0;
+      const int slot = fits ? (int)rs_lowest_bit(free) : 0;
+      const uint settling = (uint)popcount(closing);
+      if (lane == 0 && fits) {
+#if KEEP_HITS
+        group_push_rows(rows, closing, settled_rows, stream);
+#endif
+        rows->last_key[slot] = memory->waiting.last_key[side][r];
+        rows->reference[slot] = reference;
+        rows->settled[slot] = settled_rows + settling;
+      }
+      rs_group_barrier();
+      for (uint rest = fits ? closing : 0; rest != 0; rest &= rest - 1)
+        group_settle(rows, (int)rs_lowest_bit(rest), lane, lines, min_transmittance, p, &settled,
+                     stream);
+      settled_rows += settling;
+      open = (open & ~closing) | 1u << slot;
+      closed = closing;
+      rows->key[slot][lane] = as_float(order);
+      rows->alpha[slot][lane] = hit.alpha;
+      rows->before[slot][lane] = before * settled;
+    }
+    begin = ready;
+    waiting = found - ready;
+    alive &= RS_MASK(p->T >= min_transmittance);
+  }
+#if KEEP_HITS
+  if (lane == 0 && fits) group_push_rows(rows, open, settled_rows, stream);
+#endif
+  rs_group_barrier();
+  for (uint rest = fits ? open : 0; rest != 0; rest &= rest - 1)
+    group_settle(rows, (int)rs_lowest_bit(rest), lane, lines, min_transmittance, p, &settled,
+                 stream);
+  return rs_group_bits(memory->words, lane, !fits || (traced && p->hits > max_hits)) == 0;
+}
+
+#endif

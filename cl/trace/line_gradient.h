@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gradient of a Gaussian's line from that of one hit, per ray of a packet.
+#ifndef RS_TRACE_LINE_GRADIENT_H
+#define RS_TRACE_LINE_GRADIENT_H
+
+#include "trace/packet.h"
+
+// What the rays of a packet share, and the gradient of its pixels.
+typedef struct {
+  fv X, Y;
+  fv gR, gG, gB, gA;
+  float screen_x, screen_y;
+} Pixels;
+
+// Loads what the pixels of the packet at (px, py) bring to the backward pass, its tangent
+// coordinates as well.
+void load_pixels(Pixels* p,
+                 const RsCamera* camera,
+                 __global const float* restrict tangents,
+                 __global const float* restrict image_gradient,
+                 const float screen_x,
+                 const float screen_y,
+                 const int px,
+                 const int py) {
+  const int width = camera->width, height = camera->height;
+  const size_t plane = (size_t)width * height;
+  const PacketRays rays = rs_packet_rays(camera, tangents, px, py);
+  p->X = rays.X;
+  p->Y = rays.Y;
+  p->screen_x = screen_x;
+  p->screen_y = screen_y;
+  p->gR = rs_load_pixels(image_gradient, width, height, px, py);
+  p->gG = rs_load_pixels(image_gradient + plane, width, height, px, py);
+  p->gB = rs_load_pixels(image_gradient + 2 * plane, width, height, px, py);
+  // Alpha is a fourth colour channel that is 1 in every Gaussian and 0 in the background.
+  p->gA = rs_load_pixels(image_gradient + 3 * plane, width, height, px, py);
+}
+
+#if LENS == 2
+// Length of a gradient with respect to the angle in which the mean at (x, y) is seen, from that
+// with respect to its tangent coordinates.
+fv rs_angular_length(const float x, const float y, const fv gx, const fv gy) {
+  const fv radial = x * gx + y * gy;
+  return sqrt((1.0f + x * x + y * y) * (gx * gx + gy * gy + radial * radial));
+}
+#endif
+
+// Gradient of the line but for opacity and colour, from that of the squared distance. Each form
+// meets the Gaussian by itself: behind one branch for both compilers may gather the line's numbers.
+void line_gradient_projective(const Pixels* p,
+                              __global const float* v,
+                              const fv g_distance2,
+                              fv* g) {
+  const PacketMeeting m = rs_meet_projective(v, 0.0f, p->X, p->Y);
+  const fv inverse = 1.0f / m.direction2;
+  const fv dx = p->X - v[0];
+  const fv dy = p->Y - v[1];
+  const fv gN = g_distance2 * inverse;
+  const fv gD = -gN * m.numerator * inverse;
+  const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
+  g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
+  g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
+#if LENS == 2
+  g[2] = rs_angular_length(v[0], v[1], g[0], g[1]) * p->screen_x;
+#else
+  g[2] =
+      sqrt(g[0] * g[0] * (p->screen_x * p->screen_x) + g[1] * g[1] * (p->screen_y * p->screen_y));
+#endif
+  g[3] = gNx * dx;
+  g[4] = 2.0f * gNx * dy;
+  g[5] = gNy * dy;
+  g[6] = gD;
+  g[7] = 2.0f * gDx;
+  g[8] = 2.0f * gDy;
+  g[9] = gDx * dx;
+  g[10] = 2.0f * gDx * dy;
+  g[11] = gDy * dy;
+}
+
+// g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'.
+void line_gradient_general(const Pixels* p, __global const float* v, const fv g_distance2, fv* g) {
+  const PacketMeeting m = rs_meet_general(v, 0.0f, p->X, p->Y);
+  const fv peak = m.along / m.direction2;
+  for (int k = 0; k < 3; ++k) {
+    const fv direction = v[3 * k] * p->X + v[3 * k + 1] * p->Y + v[3 * k + 2];
+    const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
+    const fv g_direction = peak * g_origin;
+    g[3 * k] = g_direction * p->X;
+    g[3 * k + 1] = g_direction * p->Y;
+    g[3 * k + 2] = g_direction;
+    g[9 + k] = g_origin;
+  }
+}
+
+// All 16 components of the gradient of a line from that of its alpha at one hit; weight is the
+// transmittance in front of it times alpha.
+void line_gradient(const Pixels* p,
+                   const bool general,
+                   __global const float* v,
+                   const fv g_alpha,
+                   const fv alpha,
+                   const fv weight,
+                   fv* g) {
+  const fv g_distance2 = -0.5f * alpha * g_alpha;
+  g[12] = g_alpha * (alpha / v[12]);  // the response is alpha / opacity
+  g[13] = weight * p->gR;
+  g[14] = weight * p->gG;
+  g[15] = weight * p->gB;
+  if (general) {
+    line_gradient_general(p, v, g_distance2, g);
+  } else {
+    line_gradient_projective(p, v, g_distance2, g);
+  }
+}
+
+#endif
