@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "options.hpp"
 #include "synth/synthetic_dataset.hpp"
@@ -11,11 +16,21 @@ namespace {
 
 struct Options {
   std::string directory;
+  std::string scene = "still-life";
   bool overwrite = false;
   SyntheticOptions data;
 };
 
-void run(const Options& options) {
+constexpr std::array<std::pair<std::string_view, SyntheticScene>, 4> kScenes{
+    {{"still-life", SyntheticScene::kStillLife},
+     {"forward", SyntheticScene::kForward},
+     {"room", SyntheticScene::kRoom},
+     {"outdoor", SyntheticScene::kOutdoor}}};
+
+void run(Options& options) {
+  const auto* found = std::find_if(kScenes.begin(), kScenes.end(),
+                                   [&](const auto& each) { return each.first == options.scene; });
+  options.data.scene = found->second;
   generate_dataset(options.directory, options.data, options.overwrite);
   fmt::print("{} training and {} test views of {}x{} in {}\n", options.data.train_views,
              options.data.test_views, options.data.size, options.data.size, options.directory);
@@ -25,12 +40,20 @@ void run(const Options& options) {
 
 Command add_generate_command(CLI::App& app) {
   CLI::App* command =
-      app.add_subcommand("generate", "Write a small ray-traced data set (Blender format)");
+      app.add_subcommand("generate", "Write a small ray-traced data set (Blender or nerfstudio)");
   auto options = std::make_shared<Options>();
   SyntheticOptions& data = options->data;
   command->add_option("DIR,-o,--output", options->directory, "Folder for the data set")
       ->required()
       ->type_name("");
+  std::vector<std::string> names;
+  for (const auto& [name, scene] : kScenes) names.emplace_back(name);
+  command
+      ->add_option("--scene", options->scene,
+                   "still-life (transparent ground), or before a wall (forward), in a room, or "
+                   "outdoor with hills and sky")
+      ->check(one_of(names))
+      ->capture_default_str();
   command->add_option("--size", data.size, "Width and height of the images")
       ->transform(whole_between(8, 4096))
       ->capture_default_str();

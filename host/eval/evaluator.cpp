@@ -22,6 +22,7 @@ struct Comparison {
   Image render;  // RGB in [0, 1], equal to the photo where that is masked out
   Image photo;   // RGB
   Image whole;   // the render as it is, in [0, 1]
+  Image mask;    // one channel: how much each pixel counts
   double valid;  // share of the pixels that count
 };
 
@@ -31,7 +32,7 @@ Comparison compare(const Image& traced,
                    const std::array<float, 3>& background) {
   const Image& rgba = picture.rgba;
   const Image empty(rgba.width, rgba.height, 3);
-  Comparison out{empty, empty, empty, 1.0};
+  Comparison out{empty, empty, empty, Image(rgba.width, rgba.height, 1), 1.0};
   if (alpha_is_background) out.photo = composite(rgba, background.data());
   const bool weighted = !picture.weight.data.empty();
   double weights = 0;
@@ -41,6 +42,7 @@ Comparison compare(const Image& traced,
                          : alpha_is_background ? 1.0f
                                                : rgba.at(x, y, 3);
       weights += static_cast<double>(mask);
+      out.mask.at(x, y, 0) = mask;
       for (int c = 0; c < 3; ++c) {
         if (!alpha_is_background) out.photo.at(x, y, c) = rgba.at(x, y, c);
         const float photo = out.photo.at(x, y, c);
@@ -59,6 +61,7 @@ nlohmann::json to_json(const EvaluationMetrics& metrics) {
   if (!metrics.name.empty()) json["name"] = metrics.name;
   json["psnr"] = metrics.psnr;
   json["ssim"] = metrics.ssim;
+  json["psnr_corrected"] = metrics.psnr_corrected;
   if (metrics.psnr_all) json["psnr_all"] = *metrics.psnr_all;
   if (metrics.lpips) json["lpips"] = *metrics.lpips;
   return json;
@@ -75,6 +78,7 @@ EvaluationMetrics mean_of(const std::vector<EvaluationMetrics>& images) {
   for (const EvaluationMetrics& image : images) {
     mean.psnr += image.psnr * share;
     mean.ssim += image.ssim * share;
+    mean.psnr_corrected += image.psnr_corrected * share;
     if (masked) *mean.psnr_all += image.psnr_all.value_or(image.psnr) * share;
     if (image.lpips) mean.lpips = mean.lpips.value_or(0.0) + *image.lpips * share;
   }
@@ -105,11 +109,11 @@ std::string EvaluationReport::table() const {
   std::size_t width = 5;
   for (const EvaluationMetrics& image : images) width = std::max(width, image.name.size());
   const bool lpips = mean.lpips.has_value();
-  std::string out = fmt::format("{:<{}} {:>8} {:>8}{}\n", "image", width, "PSNR", "SSIM",
-                                lpips ? "    LPIPS" : "");
+  std::string out = fmt::format("{:<{}} {:>8} {:>8} {:>9}{}\n", "image", width, "PSNR", "SSIM",
+                                "corrected", lpips ? "    LPIPS" : "");
   const auto line = [&](const std::string& name, const EvaluationMetrics& m) {
-    out += fmt::format("{:<{}} {:>8.3f} {:>8.4f}{}\n", name, width, m.psnr, m.ssim,
-                       m.lpips ? fmt::format(" {:>8.4f}", *m.lpips) : "");
+    out += fmt::format("{:<{}} {:>8.3f} {:>8.4f} {:>9.3f}{}\n", name, width, m.psnr, m.ssim,
+                       m.psnr_corrected, m.lpips ? fmt::format(" {:>8.4f}", *m.lpips) : "");
   };
   for (const EvaluationMetrics& image : images) line(image.name, image);
   line("mean", mean);
@@ -167,6 +171,7 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
     // Masked pixels are equal; they must not count as well reconstructed ones.
     metrics.psnr =
         std::min(psnr(pair.render, pair.photo) + 10.0 * std::log10(pair.valid), kMostPsnr);
+    metrics.psnr_corrected = std::min(corrected_psnr(pair.whole, pair.photo, pair.mask), kMostPsnr);
     if (pair.valid < 1.0) metrics.psnr_all = std::min(psnr(pair.whole, pair.photo), kMostPsnr);
     metrics.ssim = ssim(pair.render, pair.photo);
     if (options.lpips != nullptr) metrics.lpips = options.lpips->distance(pair.render, pair.photo);

@@ -3,9 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <limits>
 #include <vector>
 
@@ -97,6 +103,43 @@ double psnr(const Image& image, const Image& photo) {
   }
   if (sum == 0) return std::numeric_limits<double>::infinity();
   return -10.0 * std::log10(sum / static_cast<double>(image.data.size()));
+}
+
+double corrected_psnr(const Image& image, const Image& photo, const Image& weight) {
+  check_sizes(image, photo, "PSNR");
+  const auto color = [](const Image& from, std::size_t i) {
+    const float* p = from.data.data() + i * static_cast<std::size_t>(from.channels);
+    return glm::dvec3(p[0], p[1], p[2]);
+  };
+  // Normal equations of the difference to the identity; the ridge keeps it small where an image of
+  // few colours leaves it open.
+  glm::dmat4 normal(0.0);
+  std::array<glm::dvec4, 3> right{};
+  double weights = 0;
+  for (std::size_t i = 0; i < image.pixels(); ++i) {
+    const auto w = static_cast<double>(weight.data[i]);
+    const glm::dvec4 x(color(image, i), 1.0);
+    const glm::dvec3 miss = color(photo, i) - glm::dvec3(x);
+    normal += w * glm::outerProduct(x, x);
+    for (int c = 0; c < 3; ++c) right[static_cast<std::size_t>(c)] += w * miss[c] * x;
+    weights += w;
+  }
+  if (weights == 0) throw UsageError("A PSNR was asked for of a photo that is masked out entirely");
+  const glm::dmat4 inverse = glm::inverse(normal + glm::dmat4(1e-6 * weights));
+  std::array<glm::dvec4, 3> change{};
+  for (std::size_t c = 0; c < 3; ++c) change[c] = inverse * right[c];
+  double sum = 0;
+  for (std::size_t i = 0; i < image.pixels(); ++i) {
+    const glm::dvec4 x(color(image, i), 1.0);
+    const glm::dvec3 y = color(photo, i);
+    for (int c = 0; c < 3; ++c) {
+      const double shown = x[c] + glm::dot(change[static_cast<std::size_t>(c)], x);
+      const double miss = std::clamp(shown, 0.0, 1.0) - y[c];
+      sum += static_cast<double>(weight.data[i]) * miss * miss;
+    }
+  }
+  if (sum == 0) return std::numeric_limits<double>::infinity();
+  return -10.0 * std::log10(sum / (3.0 * weights));
 }
 
 double ssim(const Image& image, const Image& photo) {

@@ -13,6 +13,11 @@ constexpr double kMostPsnr = 100.0;
 /// for equal images. Throws UsageError when the sizes differ or there is nothing to compare.
 double psnr(const Image& image, const Image& photo);
 
+/// PSNR over the pixels of weight > 0 (`weight`: one channel), each counting as much as its weight,
+/// after the affine map of colours (3 x 4, least squares over the same pixels) that brings the
+/// image closest to the photo, clamped to [0, 1]. Throws UsageError like psnr().
+double corrected_psnr(const Image& image, const Image& photo, const Image& weight);
+
 /// Structural similarity (Wang et al. 2004), mean over pixels and channels, in double precision:
 /// Gaussian window of sigma 1.5 and 11 x 11 pixels, C1 = 0.01^2, C2 = 0.03^2, population
 /// covariance. As scikit-image's structural_similarity(gaussian_weights=True, sigma=1.5,

@@ -23,8 +23,10 @@ constexpr double kSceneRadius = 1.25;
 
 }  // namespace
 
-Scene::Scene(std::vector<Object> objects)
-    : objects_(std::move(objects)), whole_{glm::dvec3(0.0), kSceneRadius * kSceneRadius} {
+Scene::Scene(std::vector<Object> objects, Backdrop backdrop)
+    : objects_(std::move(objects)),
+      backdrop_(std::move(backdrop)),
+      whole_{glm::dvec3(0.0), kSceneRadius * kSceneRadius} {
   for (const Object& object : objects_) {
     const double radius = object.shape->bound_radius();
     bounds_.push_back({object.shape->bound_center(), radius * radius});
@@ -83,8 +85,13 @@ glm::dvec3 Scene::shade(const Object& object,
   return color;
 }
 
+Scene::Sample Scene::behind(const Ray& ray) const {
+  if (!backdrop_) return {};
+  return {.color = backdrop_(ray), .alpha = 1.0};
+}
+
 Scene::Sample Scene::trace(const Ray& ray, int lamp_sample) const {
-  if (!may_meet(whole_, ray)) return {};
+  if (!may_meet(whole_, ray)) return behind(ray);
   double nearest = kMiss;
   const Object* hit = nullptr;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -95,7 +102,7 @@ Scene::Sample Scene::trace(const Ray& ray, int lamp_sample) const {
       hit = &objects_[i];
     }
   }
-  if (hit == nullptr) return {};
+  if (hit == nullptr) return behind(ray);
   const glm::dvec3 linear =
       shade(*hit, ray.origin + nearest * ray.direction, -ray.direction, lamp_sample);
   // The square root stands for the transfer curve of a display.

@@ -9,6 +9,7 @@
 
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
+#include "synth/backdrop.hpp"
 #include "synth/shapes.hpp"
 
 namespace raysplats::synth {
@@ -30,7 +31,8 @@ struct Object {
 /// Objects lit by one disc-shaped lamp and a sky that is brighter above.
 class Scene {
  public:
-  explicit Scene(std::vector<Object> objects);
+  /// Without a backdrop rays that meet nothing are transparent.
+  explicit Scene(std::vector<Object> objects, Backdrop backdrop = {});
 
   /// Displayed colour and coverage (0 or 1) along a ray; `lamp_sample` picks one of the
   /// kLampSamples points of the lamp, whose average gives a soft shadow.
@@ -54,14 +56,17 @@ class Scene {
                    const glm::dvec3& to_eye,
                    int lamp_sample) const;
 
+  Sample behind(const Ray& ray) const;
+
   std::vector<Object> objects_;
+  Backdrop backdrop_;
   std::vector<Bound> bounds_;
   Bound whole_;
   std::vector<glm::dvec3> lamp_points_;
 };
 
 /// The scene of the generator; `seed` varies its noise and its pebbles.
-Scene make_still_life(std::uint64_t seed);
+Scene make_still_life(std::uint64_t seed, Backdrop backdrop = {});
 
 /// RGBA with straight alpha: kLampSamples samples on a grid in each pixel, averaged premultiplied.
 Image render(const Scene& scene, const Camera& camera);

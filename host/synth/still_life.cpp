@@ -237,7 +237,7 @@ void add_tripod(Builder& builder) {
 
 }  // namespace
 
-Scene make_still_life(std::uint64_t seed) {
+Scene make_still_life(std::uint64_t seed, Backdrop backdrop) {
   const Noise noise(CounterRng(seed, 1).bits());
   Builder builder;
   builder.add<Disc>(table_material(noise), kTableRadius, kTableTop - 0.07, kTableTop);
@@ -250,7 +250,7 @@ Scene make_still_life(std::uint64_t seed) {
   builder.add<Torus>(stripes_material(), lean, 0.20, 0.075);
   add_tripod(builder);
   add_pebbles(builder, seed);
-  return Scene(builder.take());
+  return Scene(builder.take(), std::move(backdrop));
 }
 
 }  // namespace raysplats::synth

@@ -14,13 +14,16 @@
 #include <string>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/atomic_file.hpp"
 #include "base/output_directory.hpp"
 #include "base/rng.hpp"
+#include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "synth/backdrop.hpp"
 #include "synth/scene.hpp"
 
 namespace raysplats {
@@ -28,7 +31,8 @@ namespace raysplats {
 namespace {
 
 constexpr const char* kGenerator = "raysplats";
-constexpr double kFieldOfView = 0.69;  ///< radians, horizontal and vertical
+constexpr double kFieldOfView = 0.69;     ///< radians, horizontal and vertical
+constexpr double kWideFieldOfView = 1.0;  ///< of captures with a backdrop
 constexpr double kDistance = 4.0;
 constexpr double kGoldenAngle = 2.399963229728653;
 
@@ -56,6 +60,55 @@ std::vector<Camera> spread_cameras(const std::string& split, int count, int size
     cameras.back().name = fmt::format("{}/r_{}", split, i);
   }
   return cameras;
+}
+
+/// Where the cameras of a capture with a backdrop stand and what they look at.
+struct Stand {
+  glm::dvec3 eye, target;
+};
+
+/// `u` and `v` in [0, 1).
+Stand stand_of(SyntheticScene scene, double u, double v) {
+  const double angle = 2.0 * std::numbers::pi * u;
+  const glm::dvec3 around(std::cos(angle), std::sin(angle), 0.0);
+  if (scene == SyntheticScene::kForward)
+    return {{2.4 * u - 1.2, -3.4, 1.4 * v - 0.3}, {0.3 * (u - 0.5), 1.0, 0.0}};
+  if (scene == SyntheticScene::kRoom)
+    return {2.3 * around + glm::dvec3(0, 0, 1.6 * v - 0.4), glm::dvec3(0, 0, 0.4 * (0.5 - v))};
+  return {3.2 * around + glm::dvec3(0, 0, 1.1 * v - 0.3), {0.0, 0.0, 0.2}};
+}
+
+/// `count` cameras of a capture with a backdrop: a sequence of low discrepancy (R2, Roberts 2018)
+/// from a start of its own.
+std::vector<Camera> backdrop_cameras(const SyntheticOptions& options,
+                                     const std::string& split,
+                                     int count,
+                                     double start) {
+  const double focal = 0.5 * options.size / std::tan(0.5 * kWideFieldOfView);
+  std::vector<Camera> cameras;
+  for (int i = 0; i < count; ++i) {
+    const double u = start + 0.7548776662466927 * i;
+    const double v = start + 0.5698402909980532 * i;
+    const Stand stand = stand_of(options.scene, u - std::floor(u), v - std::floor(v));
+    cameras.push_back(
+        look_at(stand.eye, stand.target, glm::dvec3(0, 0, 1), options.size, options.size, focal));
+    cameras.back().name = fmt::format("{}/r_{}", split, i);
+  }
+  return cameras;
+}
+
+synth::Backdrop backdrop_of(const SyntheticOptions& options) {
+  switch (options.scene) {
+    case SyntheticScene::kForward:
+      return synth::painted_wall(options.seed);
+    case SyntheticScene::kRoom:
+      return synth::papered_room(options.seed);
+    case SyntheticScene::kOutdoor:
+      return synth::open_country(options.seed);
+    case SyntheticScene::kStillLife:
+      break;
+  }
+  return {};
 }
 
 /// Angle to add to the azimuth of all test views that keeps them farthest from every training view.
@@ -89,29 +142,63 @@ nlohmann::json transform_matrix(const Camera& camera) {
   return rows;
 }
 
+nlohmann::ordered_json frame_of(const Camera& camera, const std::string& extension) {
+  nlohmann::ordered_json frame;
+  frame["file_path"] = "./" + camera.name + extension;
+  frame["transform_matrix"] = transform_matrix(camera);
+  return frame;
+}
+
 void write_transforms(const std::filesystem::path& path, const std::vector<Camera>& cameras) {
   nlohmann::ordered_json file;
   file["generator"] = kGenerator;
   file["camera_angle_x"] = kFieldOfView;
   file["frames"] = nlohmann::ordered_json::array();
   for (const Camera& camera : cameras) {
-    nlohmann::ordered_json frame;
-    frame["file_path"] = "./" + camera.name;
-    frame["transform_matrix"] = transform_matrix(camera);
-    file["frames"].push_back(std::move(frame));
+    file["frames"].push_back(frame_of(camera, ""));
   }
   write_text_file(path, file.dump(1) + "\n");
+}
+
+/// nerfstudio's file, which names the views of both splits.
+void write_capture(const std::filesystem::path& path,
+                   const std::vector<Camera>& train,
+                   const std::vector<Camera>& test) {
+  const Camera& first = train.front();
+  nlohmann::ordered_json file{{"generator", kGenerator}, {"camera_model", "PINHOLE"},
+                              {"w", first.width},        {"h", first.height},
+                              {"fl_x", first.fx},        {"fl_y", first.fy},
+                              {"cx", first.cx},          {"cy", first.cy}};
+  file["frames"] = nlohmann::ordered_json::array();
+  for (const auto& [key, cameras] :
+       {std::pair{"train_filenames", &train}, std::pair{"test_filenames", &test}}) {
+    file[key] = nlohmann::ordered_json::array();
+    for (const Camera& camera : *cameras) {
+      file["frames"].push_back(frame_of(camera, ".png"));
+      file[key].push_back("./" + camera.name + ".png");
+    }
+  }
+  write_text_file(path, file.dump(1) + "\n");
+}
+
+/// The picture without its alpha.
+Image opaque(const Image& rgba) {
+  const float black[3] = {0, 0, 0};
+  return composite(rgba, black);
 }
 
 /// Renders and writes the images on all cores; the first failure stops the others and is thrown.
 void render_all(const std::filesystem::path& directory,
                 const synth::Scene& scene,
-                const std::vector<Camera>& cameras) {
+                const std::vector<Camera>& cameras,
+                bool transparent) {
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     try {
       for (std::size_t i = next++; i < cameras.size(); i = next++) {
-        write_image(directory / (cameras[i].name + ".png"), synth::render(scene, cameras[i]));
+        const Image picture = synth::render(scene, cameras[i]);
+        write_image(directory / (cameras[i].name + ".png"),
+                    transparent ? picture : opaque(picture));
       }
     } catch (...) {
       next = cameras.size();
@@ -126,17 +213,28 @@ void render_all(const std::filesystem::path& directory,
   for (std::future<void>& worker : workers) worker.get();
 }
 
+/// Whether the file is of an earlier data set of ours.
+bool is_ours(const std::filesystem::path& path) {
+  std::ifstream stream(path);
+  const auto file = nlohmann::json::parse(stream, nullptr, false);
+  return file.is_object() && file.value("generator", nlohmann::json()) == kGenerator;
+}
+
 /// A folder is new, empty or has an earlier data set of ours.
 void check_replaceable(const std::filesystem::path& directory) {
   std::error_code error;
   if (!std::filesystem::is_directory(directory, error)) return;
   if (std::filesystem::is_empty(directory, error)) return;
-  std::ifstream stream(directory / "transforms_train.json");
-  const auto file = nlohmann::json::parse(stream, nullptr, false);
-  if (file.is_object() && file.value("generator", nlohmann::json()) == kGenerator) return;
+  if (is_ours(directory / "transforms_train.json") || is_ours(directory / "transforms.json"))
+    return;
   throw UsageError(fmt::format(
       "The folder {} holds other files: choose a new one, or write there with --overwrite",
       directory.string()));
+}
+
+/// Camera files of the other kind would be taken for those of the data set.
+void remove_own(const std::filesystem::path& path) {
+  if (is_ours(path)) std::filesystem::remove(path);
 }
 
 }  // namespace
@@ -147,22 +245,34 @@ void generate_dataset(const std::filesystem::path& directory,
   check_range("image size", options.size, 8, 4096);
   check_range("number of training views", options.train_views, 1, 10000);
   check_range("number of test views", options.test_views, 1, 10000);
-  const double turn = 2.0 * std::numbers::pi * CounterRng(options.seed, 2).uniform();
+  const double start = CounterRng(options.seed, 2).uniform();
+  const double turn = 2.0 * std::numbers::pi * start;
+  const bool transparent = options.scene == SyntheticScene::kStillLife;
   const std::vector<Camera> train =
-      spread_cameras("train", options.train_views, options.size, turn);
+      transparent ? spread_cameras("train", options.train_views, options.size, turn)
+                  : backdrop_cameras(options, "train", options.train_views, start);
   const std::vector<Camera> test =
-      spread_cameras("test", options.test_views, options.size,
-                     best_turn(train, options.test_views, options.size, turn));
+      transparent ? spread_cameras("test", options.test_views, options.size,
+                                   best_turn(train, options.test_views, options.size, turn))
+                  : backdrop_cameras(options, "test", options.test_views, start + 0.5);
 
   if (!overwrite) check_replaceable(directory);
   make_output_directory(directory / "train");
   make_output_directory(directory / "test");
   std::vector<Camera> all = train;
   all.insert(all.end(), test.begin(), test.end());
-  render_all(directory, synth::make_still_life(options.seed), all);
+  render_all(directory, synth::make_still_life(options.seed, backdrop_of(options)), all,
+             transparent);
   // Last, so that an interrupted run is not taken for a data set.
-  write_transforms(directory / "transforms_train.json", train);
-  write_transforms(directory / "transforms_test.json", test);
+  if (transparent) {
+    remove_own(directory / "transforms.json");
+    write_transforms(directory / "transforms_train.json", train);
+    write_transforms(directory / "transforms_test.json", test);
+  } else {
+    remove_own(directory / "transforms_train.json");
+    remove_own(directory / "transforms_test.json");
+    write_capture(directory / "transforms.json", train, test);
+  }
 }
 
 }  // namespace raysplats

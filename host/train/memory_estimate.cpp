@@ -105,7 +105,7 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   // Image, gradient, depth and about 12 planes of the loss.
   out.images = std::min(static_cast<std::size_t>(options.image_budget) * kMiB,
                         demand.views * demand.pixels * 4) +
-               demand.pixels * 24 * sizeof(float);
+               demand.pixels * (24 + (options.exposure ? 4 : 0)) * sizeof(float);
   if (packets) {
     out.hits = std::min(static_cast<std::size_t>(options.memory_budget) * kMiB,
                         demand.pixels * static_cast<std::size_t>(options.max_hits) * 12);

@@ -12,6 +12,9 @@
 namespace raysplats {
 namespace {
 
+constexpr std::size_t kColorBins = 32;  // per channel
+constexpr double kSharedColor = 0.2;    // share of the pixels that makes a colour the ground's
+
 double channel(std::uint32_t pixel, int index) {
   return static_cast<double>(pixel >> (8 * index) & 255u) / 255.0;
 }
@@ -72,6 +75,35 @@ double opaque_share(std::span<const SmallPhoto> photos) {
         static_cast<double>(opaque) / static_cast<double>(std::max<std::size_t>(pixels.size(), 1));
   }
   return photos.empty() ? 1.0 : sum / static_cast<double>(photos.size());
+}
+
+std::array<float, 3> typical_color(std::span<const SmallPhoto> photos) {
+  struct Sum {
+    std::array<double, 3> color{};
+    double weight = 0;
+    void add(std::uint32_t pixel) {
+      const double share = channel(pixel, 3);
+      for (int c = 0; c < 3; ++c) color[static_cast<std::size_t>(c)] += share * channel(pixel, c);
+      weight += share;
+    }
+  };
+  Sum all;
+  std::vector<Sum> bins(kColorBins * kColorBins * kColorBins);
+  for (const SmallPhoto& photo : photos) {
+    for (const std::uint32_t pixel : photo.picture->pixels) {
+      all.add(pixel);
+      const std::size_t bin = ((pixel >> 3 & 31u) * kColorBins + (pixel >> 11 & 31u)) * kColorBins +
+                              (pixel >> 19 & 31u);
+      bins[bin].add(pixel);
+    }
+  }
+  const auto most = std::max_element(
+      bins.begin(), bins.end(), [](const Sum& a, const Sum& b) { return a.weight < b.weight; });
+  const Sum& chosen = most->weight >= kSharedColor * all.weight ? *most : all;
+  std::array<float, 3> out{};
+  if (chosen.weight == 0) return out;
+  for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<float>(chosen.color[c] / chosen.weight);
+  return out;
 }
 
 }  // namespace raysplats

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -34,5 +35,10 @@ std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
 
 /// Mean share of the pixels that show something: alpha at least one half.
 double opaque_share(std::span<const SmallPhoto> photos);
+
+/// The colour that is least wrong where photos say nothing: one that a fifth of the pixels share to
+/// 8 of 256 steps (a studio's ground, a blown-out sky), else the mean colour. Alpha is the weight
+/// of a pixel; black when none counts.
+std::array<float, 3> typical_color(std::span<const SmallPhoto> photos);
 
 }  // namespace raysplats

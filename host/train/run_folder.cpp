@@ -32,9 +32,15 @@ constexpr char kCsvHeader[] = "iteration,seconds,loss,psnr,gaussians,it_per_s\n"
 std::ptrdiff_t columns(std::string_view row) { return std::count(row.begin(), row.end(), ','); }
 
 nlohmann::json to_json(const EvaluationRow& row) {
-  return {{"iteration", row.iteration}, {"training_seconds", row.training_seconds},
-          {"psnr", row.psnr},           {"ssim", row.ssim},
-          {"views", row.views},         {"gaussians", row.gaussians}};
+  nlohmann::json json{{"iteration", row.iteration},
+                      {"training_seconds", row.training_seconds},
+                      {"psnr", row.psnr},
+                      {"ssim", row.ssim},
+                      {"views", row.views},
+                      {"gaussians", row.gaussians},
+                      {"psnr_corrected", row.psnr_corrected}};
+  if (row.psnr_all) json["psnr_all"] = *row.psnr_all;
+  return json;
 }
 
 EvaluationRow evaluation_from_json(const nlohmann::json& json) {
@@ -45,11 +51,13 @@ EvaluationRow evaluation_from_json(const nlohmann::json& json) {
   json.at("ssim").get_to(row.ssim);
   json.at("views").get_to(row.views);
   json.at("gaussians").get_to(row.gaussians);
+  row.psnr_corrected = json.value("psnr_corrected", 0.0);  // runs of older versions have none
+  if (json.contains("psnr_all")) row.psnr_all = json.at("psnr_all").get<double>();
   return row;
 }
 
-constexpr std::array<const char*, 4> kReports{"config.toml", "cameras.json", "metrics.csv",
-                                              "metrics.json"};
+constexpr std::array<const char*, 5> kReports{"config.toml", "cameras.json", "metrics.csv",
+                                              "metrics.json", "exposures.json"};
 
 std::string iteration_name(std::int64_t iteration) {
   return fmt::format("iteration_{}", iteration);
@@ -144,6 +152,22 @@ void RunFolder::write_cameras(std::span<const Camera> cameras) const {
                     {"fx", camera.fx}});
   }
   write_text_file(path_ / "cameras.json", list.dump() + "\n");
+}
+
+void RunFolder::write_exposures(std::span<const Camera> cameras,
+                                std::span<const float> deltas) const {
+  nlohmann::json json = nlohmann::json::object();
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    nlohmann::json rows = nlohmann::json::array();
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float* row = deltas.data() + 12 * i + 4 * c;
+      nlohmann::json values = {row[0], row[1], row[2], row[3]};
+      values[c] = 1.0f + row[c];
+      rows.push_back(std::move(values));
+    }
+    json[cameras[i].name] = std::move(rows);
+  }
+  write_text_file(path_ / "exposures.json", json.dump(1) + "\n");
 }
 
 void RunFolder::write_model(const Gaussians& model,
@@ -245,6 +269,16 @@ void check_no_run(const std::filesystem::path& folder) {
       "The folder {} holds another run ({}): go on with it by --resume latest, choose another "
       "folder, or replace it by --overwrite",
       folder.string(), newest < 0 ? "without a checkpoint" : fmt::format("iteration {}", newest)));
+}
+
+std::optional<EvaluationRow> better_before(std::span<const EvaluationRow> evaluations,
+                                           double margin) {
+  std::optional<EvaluationRow> best;
+  for (const EvaluationRow& row : evaluations) {
+    if (row.views == evaluations.back().views && (!best || row.psnr > best->psnr)) best = row;
+  }
+  if (best && best->psnr <= evaluations.back().psnr + margin) best.reset();
+  return best;
 }
 
 double recorded_seconds(const std::filesystem::path& run_folder, std::int64_t iteration) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -43,6 +44,9 @@ class RunFolder {
   /// cameras.json as the viewers of 3DGS read it: centre and camera-to-world rotation of every
   /// view.
   void write_cameras(std::span<const Camera> cameras) const;
+  /// Writes exposures.json: the 3 x 4 colour matrix of every training photo, by its name. `deltas`
+  /// as in Exposure::State.
+  void write_exposures(std::span<const Camera> cameras, std::span<const float> deltas) const;
   /// `trace` goes into the header, for those who take the model elsewhere.
   void write_model(const Gaussians& model, const TraceOptions& trace, std::int64_t iteration) const;
   bool has_model(std::int64_t iteration) const;
@@ -71,6 +75,11 @@ class RunFolder {
 
 /// Throws UsageError when a folder holds files of a run, with which another one would mix.
 void check_no_run(const std::filesystem::path& folder);
+
+/// The best of the evaluations before the last one, if that saw as many views and ended more than
+/// `margin` decibels below it.
+std::optional<EvaluationRow> better_before(std::span<const EvaluationRow> evaluations,
+                                           double margin = 0.1);
 
 /// Seconds of training that the metrics.csv of a run folder has recorded up to `iteration`; 0 when
 /// it has none.

@@ -244,8 +244,9 @@ void validate(const TrainOptions& options) {
   if (!std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
     throw UsageError("The iterations of 'resolution-schedule' have to ascend");
   }
-  for (const LearningRate& rate : {options.position_lr, options.rotation_lr, options.scale_lr,
-                                   options.opacity_lr, options.sh_lr, options.sh_rest_lr}) {
+  for (const LearningRate& rate :
+       {options.position_lr, options.rotation_lr, options.scale_lr, options.opacity_lr,
+        options.sh_lr, options.sh_rest_lr, options.exposure_lr}) {
     if ((rate.initial > 0) != (rate.final_value > 0)) {
       throw UsageError(
           "A learning rate and its final value are both 0 (the group stays as it is) or both above "

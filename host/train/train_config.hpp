@@ -40,8 +40,9 @@ std::string to_toml(const TrainOptions& options);
 void validate(const TrainOptions& options);
 
 /// The constant colour behind the Gaussians in evaluations, and in training unless it is "random";
-/// `cut_out` says that the photos are composited by their alpha. Throws UsageError for a text that
-/// is no colour.
+/// `cut_out` says that the photos are composited by their alpha. "auto" is white behind those and
+/// else black: a run names the mean colour that it chose in its configuration. Throws UsageError
+/// for a text that is no colour.
 std::array<float, 3> background_color(const TrainOptions& options, bool cut_out);
 
 }  // namespace raysplats

@@ -315,7 +315,7 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
                     "in metrics) or cutout (background, as transparent pixels are)");
   t.color("background", o.background,
           "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
-          "alpha, else black) or "
+          "alpha, else their typical colour, which the run's configuration then names) or "
           "\"random\" (another colour per iteration for cut-out photos, else black)");
   t.number("image-budget", o.image_budget, 1, 1e9,
            "MiB of photos kept on the device; the others are decoded again when their turn comes");
@@ -357,6 +357,11 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.number("ssim-weight", o.ssim_weight, 0, 1,
            "lambda in (1 - lambda) pixel term + lambda (1 - SSIM)");
 
+  t.flag("exposure", o.exposure,
+         "train an affine colour (3 x 4) for each training photo too, for captures whose exposure "
+         "or white balance changes; their mean stays the identity, which other views are shown "
+         "with");
+
   t.section("Optimiser (Adam)");
   t.learning_rate("position-lr", o.position_lr, "the means, times the scene extent");
   t.learning_rate("rotation-lr", o.rotation_lr, "the quaternions");
@@ -364,6 +369,7 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.learning_rate("opacity-lr", o.opacity_lr, "the opacity parameters");
   t.learning_rate("sh-lr", o.sh_lr, "colour (SH band 0)");
   t.learning_rate("sh-rest-lr", o.sh_rest_lr, "the SH bands above 0");
+  t.learning_rate("exposure-lr", o.exposure_lr, "the photos' affine colours");
   t.number("lr-decay", o.lr_decay, 0, 1,
            "rates fall as exp(-lr-decay * iteration) until they meet their final value; 0 = they "
            "reach it "

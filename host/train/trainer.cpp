@@ -28,6 +28,7 @@
 #include "train/checkpoint.hpp"
 #include "train/dataset_fingerprint.hpp"
 #include "train/density_control.hpp"
+#include "train/exposure.hpp"
 #include "train/footprint.hpp"
 #include "train/image_loss.hpp"
 #include "train/initialization.hpp"
@@ -46,11 +47,12 @@ namespace raysplats {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
-constexpr int kSmallPhoto = 200;       // longer side of photos that the start looks at, in pixels
-constexpr std::size_t kReadAhead = 8;  // photos decoded ahead of their turn
-constexpr int kViewsToJudge = 3;       // reports of views that were reported before
-constexpr double kLeastRise = 0.1;     // decibels that a run has to gain
-constexpr double kManyCapped = 1e-3;   // share of rays at which the cap on hits gets a warning
+constexpr int kSmallPhoto = 200;         // longer side of photos that the start looks at, in pixels
+constexpr std::size_t kMeanPhotos = 24;  // whose typical colour is the background
+constexpr std::size_t kReadAhead = 8;    // photos decoded ahead of their turn
+constexpr int kViewsToJudge = 3;         // reports of views that were reported before
+constexpr double kLeastRise = 0.1;       // decibels that a run has to gain
+constexpr double kManyCapped = 1e-3;     // share of rays at which the cap on hits gets a warning
 
 // A clock that can be stopped, and stands while kernels are compiled.
 class Stopwatch {
@@ -182,6 +184,7 @@ struct Trainer::Impl {
 
   void start();
   const std::vector<SmallPhoto>& photos();
+  void choose_background();
   std::size_t limit();
   std::size_t largest_photo() const;
   std::size_t ray_views() const;
@@ -235,6 +238,7 @@ struct Trainer::Impl {
   Adam adam;
   DensityControl density;
   Footprint footprint;
+  std::optional<Exposure> exposure;  // with the option
   StepGuard guard;
   std::optional<ModelValidator> validator;  // once it is asked for
   TargetCache targets;
@@ -329,6 +333,7 @@ Trainer::Impl::Impl(Context& device,
               static_cast<std::size_t>(options.image_budget) * kMiB,
               host_image_budget(options, train_cameras)),
       order(options.seed, train_views.size()) {
+  if (options.exposure) exposure.emplace(device, train_views.size());
   if (train_views.empty()) {
     const bool held_out = options.test_every == 1 && !test_views.empty();
     throw UsageError(fmt::format(
@@ -340,6 +345,20 @@ Trainer::Impl::Impl(Context& device,
 const std::vector<SmallPhoto>& Trainer::Impl::photos() {
   if (small_photos.empty()) small_photos = load_small_photos(dataset, train_views, kSmallPhoto);
   return small_photos;
+}
+
+// What shows through where no Gaussian is. No photo says what lies there, and of all colours the
+// mean one is the least wrong. The run's configuration names it from then on.
+void Trainer::Impl::choose_background() {
+  if (options.background != "auto" || cut_out) return;
+  std::vector<std::size_t> some;
+  const std::size_t count = std::min(kMeanPhotos, train_views.size());
+  for (std::size_t i = 0; i < count; ++i)
+    some.push_back(train_views[i * train_views.size() / count]);
+  const std::array<float, 3> color = typical_color(
+      small_photos.empty() ? load_small_photos(dataset, some, kSmallPhoto) : small_photos);
+  options.background = fmt::format("{:.4f},{:.4f},{:.4f}", color[0], color[1], color[2]);
+  background = background_color(options, cut_out);
 }
 
 // The most Gaussians of this run.
@@ -383,6 +402,7 @@ void Trainer::Impl::start() {
         DeviceGaussians::upload(context, gathered(model, along_curve), options.scale_activation);
     adam.initialize(gaussians.count, gaussians.sh_degree);
     footprint.update(gaussians);
+    choose_background();
     if (overwrite) run.remove_after(0);
     run.begin_metrics(0);
     started = true;
@@ -420,10 +440,17 @@ void Trainer::Impl::step() {
   tracer.set_background(behind);
   tracer.forward(gaussians, camera, true);
   traced_rays += pixels_of(camera);
-  loss.evaluate(tracer.image(), targets.get(view, camera.width, camera.height), cut_out, behind,
+  const Buffer<float>& shown =
+      exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
+               : tracer.image();
+  loss.evaluate(shown, targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
   const ImageLoss::Partials partials = loss.partials();
   guard.check_loss(partials.pixel, partials.ssim, partials.tiles);
+  if (exposure) {
+    exposure->step(tracer.image(), image_gradient, view, camera.width, camera.height,
+                   learning_rate(options.exposure_lr, options, iteration), guard.mark());
+  }
   tracer.backward(gaussians, image_gradient, gradients);
   whole = false;
   if (density.accumulates_at(iteration)) density.accumulate(gaussians, gradients, &guard.mark());
@@ -586,7 +613,8 @@ void Trainer::Impl::evaluate_views(bool last) {
   const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
                                                       run.evaluation_folder(iteration), choice);
   run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
-              report.images.size(), gaussians.count});
+              report.images.size(), gaussians.count, report.mean.psnr_corrected,
+              report.mean.psnr_all});
   write_metrics(false);
   evaluating.stop();
   spdlog::info("iteration {}: PSNR {:.2f} dB, SSIM {:.4f} over {} test views after {} of training",
@@ -596,6 +624,7 @@ void Trainer::Impl::evaluate_views(bool last) {
 
 void Trainer::Impl::save_model() {
   run.write_model(gaussians.download(), trace_options_of(options, background), iteration);
+  if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
 }
 
 Checkpoint Trainer::Impl::state() {
@@ -612,6 +641,13 @@ Checkpoint Trainer::Impl::state() {
   checkpoint.capped_rays = capped_rays();
   store_state(gaussians, adam, density, checkpoint);
   if (footprint.lows().size() > 0) checkpoint.sections["footprint"] = footprint.lows().download();
+  if (exposure) {
+    Exposure::State colors = exposure->state();
+    checkpoint.sections["exposure"] = std::move(colors.deltas);
+    checkpoint.sections["exposure.first"] = std::move(colors.first);
+    checkpoint.sections["exposure.second"] = std::move(colors.second);
+    checkpoint.sections["exposure.steps"] = std::move(colors.steps);
+  }
   return checkpoint;
 }
 
@@ -653,6 +689,7 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   differs("downscale", before.downscale, options.downscale);
   differs("test-every", before.test_every, options.test_every);
   differs("undistort", before.undistort, options.undistort);
+  differs("exposure", before.exposure, options.exposure);
   const auto cuts = [](const TrainOptions& o) { return o.masks == MaskUse::kCutout; };
   differs("masks = cutout", cuts(before), cuts(options));
 }
@@ -704,6 +741,18 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   } else {
     footprint.update(gaussians);  // of a version that had none
   }
+  if (exposure) {
+    const auto part = [&](const std::string& name) {
+      const auto found = checkpoint.sections.find(name);
+      return found == checkpoint.sections.end() ? std::vector<float>() : found->second;
+    };
+    exposure->restore({part("exposure"), part("exposure.first"), part("exposure.second"),
+                       part("exposure.steps")});
+  }
+  // What the run began with, black in those of older versions.
+  if (options.background == "auto" && !checkpoint.config.empty())
+    options.background = parse_train_config(checkpoint.config).background;
+  background = background_color(options, cut_out);
   guard.restore({checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false});
   reported_bad_steps = checkpoint.bad_steps;
   traced_rays = checkpoint.traced_rays;
@@ -832,6 +881,12 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   write_metrics(iteration == options.iterations);
   if (capped_rays() > 0) warn_of_capped_rays();
   if (iteration == options.iterations) warn_of_no_progress();
+  if (const auto best = better_before(run.evaluations())) {
+    spdlog::warn(
+        "the last PSNR of the test views, {:.2f} dB, is below that of iteration {}, {:.2f} dB: the "
+        "run learns its photos by heart or its rates are too high",
+        run.evaluations().back().psnr, best->iteration, best->psnr);
+  }
   if (iteration < options.iterations && !stop_asked) {
     throw Error(
         ErrorCode::kInterrupted,

@@ -20,6 +20,9 @@ struct EvaluationMetrics {
   std::string name;
   double psnr = 0;  ///< decibels, over the pixels that are not masked out; at most 100
   double ssim = 0;
+  /// The same after the affine colour (3 x 4) that brings the render closest to the photo: what is
+  /// left when exposure and white balance do not count.
+  double psnr_corrected = 0;
   std::optional<double> psnr_all;  ///< over all pixels, when some are masked out
   std::optional<double> lpips;     ///< when a network was given
 };
@@ -30,8 +33,8 @@ struct EvaluationReport {
 
   /// One line per image and the mean, aligned.
   std::string table() const;
-  /// {"psnr", "ssim", "psnr_all" (if some pixels are masked out), "lpips" (if measured), "images":
-  /// [{"name", "psnr", "ssim", ...}]}.
+  /// {"psnr", "ssim", "psnr_corrected", "psnr_all" (if some pixels are masked out), "lpips" (if
+  /// measured), "images": [{"name", "psnr", "ssim", ...}]}.
   std::string json() const;
 };
 

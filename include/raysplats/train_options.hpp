@@ -69,7 +69,8 @@ struct TrainOptions {
   int test_every = 8;
   bool undistort = true;
   MaskUse masks = MaskUse::kIgnore;
-  std::string background = "auto";   ///< "auto", "random" or "r,g,b"
+  /// "auto" (white behind cut-out photos, else the photos' mean colour), "random" or "r,g,b".
+  std::string background = "auto";
   std::int64_t image_budget = 1024;  ///< MiB
   std::vector<ResolutionStep> resolution_schedule{{4, 0.1}, {3, 0.18}, {2, 0.4}};
   std::vector<std::string> mirrors;  ///< mesh files of known mirrors
@@ -88,14 +89,16 @@ struct TrainOptions {
   // Loss
   PixelLoss pixel_loss = PixelLoss::kL1;
   double ssim_weight = 0.2;
+  bool exposure = false;  ///< an affine colour per training photo is trained too
 
   // Optimiser
   LearningRate position_lr{5e-4, 5e-6};  ///< times the scene extent
   LearningRate rotation_lr{3e-3, 1e-3};
-  LearningRate scale_lr{2e-2, 5e-3};
+  LearningRate scale_lr{4e-2, 5e-3};
   LearningRate opacity_lr{1e-1, 3e-2};
   LearningRate sh_lr{1e-2, 2.5e-3};
   LearningRate sh_rest_lr{5e-4, 1.25e-4};
+  LearningRate exposure_lr{3e-2, 3e-3};
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration
   bool scale_lr_by_extent = false;
   double adam_beta1 = 0.9;

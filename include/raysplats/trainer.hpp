@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "raysplats/context.hpp"
@@ -25,6 +26,8 @@ struct EvaluationRow {
   double ssim = 0;
   std::size_t views = 0;
   std::size_t gaussians = 0;
+  double psnr_corrected = 0;       ///< as EvaluationMetrics::psnr_corrected
+  std::optional<double> psnr_all;  ///< as EvaluationMetrics::psnr_all
 };
 
 struct TrainSummary {

