@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Runs unit tests in the form that GPUs get (one ray per work-item, work-groups, shared gradient sums, bounded launches) on
+# Runs unit tests in the form that GPUs get (packets as work-groups, shared gradient sums, bounded launches) on
 # whatever OpenCL implementation is at hand: a small preloaded library makes every device say that it is a GPU.
 # usage: scripts/gpu_path.sh [-R REGEX] [--cases GLOBS] [--build BUILD]
 #   -R REGEX       test programs, as ctest names them (default: ^(trace|train)$; others: primitives, bvh, light, bench)
