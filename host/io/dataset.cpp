@@ -6,14 +6,11 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "core/camera_check.hpp"
 #include "io/colmap_model.hpp"
@@ -83,7 +80,7 @@ void set_cameras(
   }
 }
 
-/// The mask has the photo's shape (not necessarily its size) and leaves something of it.
+/// The mask has the photo's shape, not necessarily its size.
 void check_mask(const View& view) {
   const io::ImageSize size = io::image_size(view.mask_path);
   const Camera& photo = view.source_camera;
@@ -93,38 +90,6 @@ void check_mask(const View& view) {
         "The mask {} has {} x {} pixels but its photo {} x {}, which is another shape: make it of "
         "the photo that it belongs to",
         view.mask_path.string(), size.width, size.height, photo.width, photo.height));
-  }
-  const Image mask = read_image(view.mask_path);
-  for (std::size_t i = 0; i < mask.pixels(); ++i) {
-    if (mask.data[i * static_cast<std::size_t>(mask.channels)] > 0) return;
-  }
-  throw DataError(
-      fmt::format("The mask {} is black everywhere and leaves nothing of its photo {}: remove the "
-                  "photo from the data set, or the mask",
-                  view.mask_path.string(), view.image_path.string()));
-}
-
-/// Checks the masks on all cores; the first failure in the order of the views is thrown.
-void check_masks(const std::vector<View>& views) {
-  std::atomic<std::size_t> next{0};
-  std::vector<std::exception_ptr> errors(views.size());
-  const auto work = [&] {
-    for (std::size_t i = next++; i < views.size(); i = next++) {
-      if (views[i].mask_path.empty()) continue;
-      try {
-        check_mask(views[i]);
-      } catch (...) {
-        errors[i] = std::current_exception();
-      }
-    }
-  };
-  {
-    std::vector<std::jthread> workers;
-    for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
-      workers.emplace_back(work);
-  }
-  for (const std::exception_ptr& error : errors) {
-    if (error) std::rethrow_exception(error);
   }
 }
 
@@ -351,7 +316,9 @@ Dataset load_dataset(const fs::path& root, const DatasetOptions& options) {
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
   if (masked > 0) {
-    check_masks(dataset.views);
+    for (const View& view : dataset.views) {
+      if (has_mask(view)) check_mask(view);
+    }
     const bool ignores = options.masks == MaskUse::kIgnore;
     if (!ignores) dataset.alpha_is_background = true;
     for (View& view : dataset.views)

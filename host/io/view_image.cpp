@@ -40,6 +40,16 @@ void apply_mask(Image& rgba, const Image& mask) {
   }
 }
 
+void require_light(const Image& mask, const View& view) {
+  for (std::size_t i = 0; i < mask.pixels(); ++i) {
+    if (mask.data[i * static_cast<std::size_t>(mask.channels)] > 0) return;
+  }
+  throw DataError(
+      fmt::format("The mask {} is black everywhere and leaves nothing of its photo {}: remove the "
+                  "photo from the data set, or the mask",
+                  view.mask_path.string(), view.image_path.string()));
+}
+
 /// Takes the lens out of a picture and gives it the view's size.
 Image fitted(Image rgba, const View& view) {
   if (view.source_camera.model == CameraModel::kOpenCv &&
@@ -66,6 +76,7 @@ ViewPicture load_view_picture(const View& view) {
   }
   if (view.mask_path.empty()) return {fitted(std::move(rgba), view), {}};
   const Image mask = read_image(view.mask_path);
+  require_light(mask, view);
   apply_mask(rgba, mask);
   if (!view.mask_apart) return {fitted(std::move(rgba), view), {}};
   Image weight(rgba.width, rgba.height, 4, 1.0f);

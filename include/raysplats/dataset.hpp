@@ -64,7 +64,7 @@ struct DatasetOptions {
 
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender) and reads everything but the pixels.
 /// Throws DataError for a folder that is none, a missing image, an unsupported camera model, no
-/// views, a mask of another shape than its photo or black everywhere.
+/// views, a mask of another shape than its photo.
 Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& options = {});
 
 /// The photo of a view as RGBA float at camera.width x camera.height: undistorted where
@@ -73,7 +73,7 @@ Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& op
 /// premultiplied).
 Image load_view_image(const View& view);
 
-/// A photo, and how much each of its pixels counts.
+/// A photo, and how much each of its pixels counts: a mask that is black everywhere is refused.
 struct ViewPicture {
   Image rgba;    ///< as load_view_image()
   Image weight;  ///< one channel in [0, 1], or empty where all count alike (!View::mask_apart)
