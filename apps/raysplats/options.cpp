@@ -478,8 +478,8 @@ std::pair<int, int> parse_resolution(const std::string& text) {
 
 std::string describe(const DeviceTuning& tuning) {
   const std::string group = tuning.group == 0 ? "whole tiles" : std::to_string(tuning.group);
-  return fmt::format("packets as {} of {}, tiles of {}, pending {}, groups of {}{}",
-                     tuning.grouped ? "groups" : "vectors", tuning.packet_width, tuning.tile,
+  return fmt::format("packet width {}{}, tiles of {}, pending {}, groups of {}{}",
+                     tuning.packet_width, tuning.grouped ? " as work-groups" : "", tuning.tile,
                      tuning.pending, group, tuning.bvh ? ", bvh" : "");
 }
 

@@ -439,7 +439,6 @@ void Trainer::Impl::step() {
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
   tracer.set_background(behind);
   tracer.forward(gaussians, camera, true);
-  traced_rays += pixels_of(camera);
   const Buffer<float>& shown =
       exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
                : tracer.image();
@@ -448,6 +447,7 @@ void Trainer::Impl::step() {
   const ImageLoss::Partials partials = loss.partials();
   guard.check_loss(partials.pixel, partials.ssim, partials.tiles);
   if (exposure) {
+    whole = false;
     exposure->step(tracer.image(), image_gradient, view, camera.width, camera.height,
                    learning_rate(options.exposure_lr, options, iteration), guard.mark());
   }
@@ -457,6 +457,7 @@ void Trainer::Impl::step() {
   adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
   footprint.apply(gaussians, guard.mark());
   guard.close(adam.refused(), gaussians.count);
+  traced_rays += pixels_of(camera);
   ++iteration;
   whole = true;
   stepped = true;
