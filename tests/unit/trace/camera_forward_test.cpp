@@ -173,41 +173,46 @@ TEST_CASE("the cap on hits is exact and counted") {
   TraceOptions options;
   options.max_hits = 7;
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  CameraTracer tracer(context, options);
-  tracer.update(gaussians);
-  tracer.forward(gaussians, camera);
   const reference::Render expected =
       reference::render(reference::Parameters(model), options, camera);
-  CHECK(compare(tracer.download_image(), expected).maximum < 2e-3);
   CHECK(expected.capped_rays > 50);
-  CHECK(std::abs(static_cast<double>(tracer.statistics().capped_rays) -
-                 static_cast<double>(expected.capped_rays)) <= 2);
-  CHECK(std::abs(static_cast<double>(tracer.statistics().hits) -
-                 static_cast<double>(expected.hits)) <= 5);
+  for (const Packet& packet : packets({1, 16}, {32})) {
+    CAPTURE(packet);
+    CameraTracer tracer(context, packet.over(options));
+    tracer.update(gaussians);
+    tracer.forward(gaussians, camera);
+    CHECK(compare(tracer.download_image(), expected).maximum < 2e-3);
+    CHECK(std::abs(static_cast<double>(tracer.statistics().capped_rays) -
+                   static_cast<double>(expected.capped_rays)) <= 2);
+    CHECK(std::abs(static_cast<double>(tracer.statistics().hits) -
+                   static_cast<double>(expected.hits)) <= 5);
+  }
 }
 
 TEST_CASE("depth and hit count equal the reference") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(400, 7, 0);
   const Camera camera = reference::cube_camera(40, 31);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
     TraceOptions options;
     options.depth = true;
     options.hit_order = order;
-    const DeviceGaussians gaussians =
-        DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-    CameraTracer tracer(context, options);
-    tracer.update(gaussians);
-    tracer.forward(gaussians, camera);
-    const Image depth = tracer.download_depth();
     const reference::Render expected =
         reference::render(reference::Parameters(model), options, camera);
-    for (std::size_t i = 0; i < expected.pixels(); ++i) {
-      if (expected.margin[i] < 1e-5) continue;
-      CHECK(depth.data[3 * i] == doctest::Approx(expected.depth[i]).epsilon(1e-3));
-      CHECK(depth.data[3 * i + 1] ==
-            doctest::Approx(expected.depth[expected.pixels() + i]).epsilon(1e-3));
-      CHECK(depth.data[3 * i + 2] == doctest::Approx(expected.depth[2 * expected.pixels() + i]));
+    for (const Packet& packet : packets({1, 16}, {32})) {
+      CAPTURE(packet);
+      CameraTracer tracer(context, packet.over(options));
+      tracer.update(gaussians);
+      tracer.forward(gaussians, camera);
+      const Image depth = tracer.download_depth();
+      for (std::size_t i = 0; i < expected.pixels(); ++i) {
+        if (expected.margin[i] < 1e-5) continue;
+        CHECK(depth.data[3 * i] == doctest::Approx(expected.depth[i]).epsilon(1e-3));
+        CHECK(depth.data[3 * i + 1] ==
+              doctest::Approx(expected.depth[expected.pixels() + i]).epsilon(1e-3));
+        CHECK(depth.data[3 * i + 2] == doctest::Approx(expected.depth[2 * expected.pixels() + i]));
+      }
     }
   }
 }
@@ -228,8 +233,11 @@ TEST_CASE("empty scenes, single pixels and odd sizes [small]") {
   for (const auto& size : std::vector<std::pair<int, int>>{{1, 1}, {1, 70}, {70, 1}, {33, 2}}) {
     CAPTURE(size.first);
     CAPTURE(size.second);
-    check_against_reference(context, model, options,
-                            reference::cube_camera(size.first, size.second));
+    for (const PacketForm form : {PacketForm::kAuto, PacketForm::kGroup}) {
+      options.packet_form = form;
+      check_against_reference(context, model, options,
+                              reference::cube_camera(size.first, size.second));
+    }
   }
   const Gaussians one = reference::random_scene(1, 9, 0);
   check_against_reference(context, one, options, reference::cube_camera(32, 32));
@@ -247,6 +255,8 @@ TEST_CASE("a camera inside the scene: means beside and behind it, ellipsoids aro
                                     {std::cos(angle), 0.3, std::sin(angle)}, {0, 1, 0}, 45, 39, 30);
       TraceOptions options;
       options.hit_order = order;
+      check_against_reference(context, model, options, camera);
+      options.packet_form = PacketForm::kGroup;
       check_against_reference(context, model, options, camera);
     }
   }

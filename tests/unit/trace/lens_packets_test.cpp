@@ -17,7 +17,7 @@ using namespace raysplats;
 
 namespace {
 
-// Packets of every width, on tiles small enough for small pictures.
+// Packets of a width, from 32 on as work-groups, on tiles small enough for small pictures.
 struct LensContext {
   LensContext(int width, int tile) {
     DeviceTuning tuning;
@@ -187,7 +187,7 @@ void check_view(Context& context, const View& view, const Gaussians& model, Trac
 
 TEST_CASE("packets through every lens equal the double reference, forward and backward") {
   const Gaussians model = reference::random_scene(400, 42, 2);
-  for (const int width : {1, 4, 16}) {
+  for (const int width : {1, 4, 16, 32}) {
     LensContext context_holder(width, 8);
     Context& context = context_holder.context;
     CAPTURE(width);
