@@ -8,13 +8,12 @@
 #include <cstdio>
 #include <memory>
 
-#include "base/interrupt.hpp"
 #include "base/output_directory.hpp"
-#include "base/progress.hpp"
 #include "core/morton_order.hpp"
 #include "core/orbit.hpp"
 #include "eval/frame_writer.hpp"
 #include "eval/output_check.hpp"
+#include "frame_progress.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -153,27 +152,12 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), cameras.size());
 
-  const InterruptGuard interrupt;
-  Progress progress("rendering", static_cast<std::int64_t>(cameras.size()), 0,
-                    global.quiet ? nullptr : stderr);
-  std::size_t frames = 0;
+  FrameProgress progress(cameras.size(), global.quiet);
   const FrameReport report = write_frames(
       tracer, gaussians, cameras, options.output, options.frame_options(),
-      [&](std::size_t done) {
-        frames = done;
-        progress.update(static_cast<std::int64_t>(done), "");
-        return !interrupt.requested();
-      },
-      [&](double share) {
-        progress.update(static_cast<std::int64_t>(frames), share_of_frame(share));
-        return !interrupt.requested();
-      });
-  progress.finish();
-  if (interrupt.requested()) {
-    throw Error(ErrorCode::kInterrupted,
-                fmt::format("Interrupted after {} of {} frames: what is in {} is whole",
-                            report.frames, cameras.size(), options.output));
-  }
+      [&](std::size_t done) { return progress.done(done); },
+      [&](double share) { return progress.within(share); });
+  progress.finish(report.frames, options.output);
   warn_of_capped_rays(report.capped_rays, report.rays, trace);
   const std::string speed =
       fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,

@@ -168,10 +168,6 @@ TraceOptions TraceFlags::over(TraceOptions base) const {
   return base;
 }
 
-std::string share_of_frame(double share) {
-  return fmt::format("{:.0f} % of this frame", 100.0 * share);
-}
-
 std::string with_compiling(const std::string& text, double seconds) {
   if (seconds < 0.1) return text;
   return fmt::format("{}, besides {:.1f} s of compiling kernels", text, seconds);

@@ -73,9 +73,6 @@ void add_trace_flags(CLI::App& app, TraceFlags& flags);
 /// --traversal, for commands that trace cameras by either way.
 void add_traversal_flag(CLI::App& app, TraceFlags& flags);
 
-/// "34 % of this frame".
-std::string share_of_frame(double share);
-
 /// `text`, and how long kernels were compiled where that is worth mentioning.
 std::string with_compiling(const std::string& text, double seconds);
 

@@ -7,11 +7,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/interrupt.hpp"
 #include "base/output_directory.hpp"
-#include "base/progress.hpp"
 #include "eval/output_check.hpp"
 #include "eval/scene_frames.hpp"
+#include "frame_progress.hpp"
 #include "io/scene_loader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/path_tracer.hpp"
@@ -184,27 +183,12 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
                loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
                loaded.scene.lights.size(), last - first);
 
-  const InterruptGuard interrupt;
-  Progress progress("rendering", static_cast<std::int64_t>(last - first), 0,
-                    global.quiet ? nullptr : stderr);
-  std::size_t frames = 0;
+  FrameProgress progress(last - first, global.quiet);
   const SceneReport report = write_scene_frames(
       tracer, loaded, first, last, flags.output, flags.frame_options(),
-      [&](std::size_t done) {
-        frames = done;
-        progress.update(static_cast<std::int64_t>(done), "");
-        return !interrupt.requested();
-      },
-      [&](double share) {
-        progress.update(static_cast<std::int64_t>(frames), share_of_frame(share));
-        return !interrupt.requested();
-      });
-  progress.finish();
-  if (interrupt.requested()) {
-    throw Error(ErrorCode::kInterrupted,
-                fmt::format("Interrupted after {} of {} frames: what is in {} is whole",
-                            report.frames, last - first, flags.output));
-  }
+      [&](std::size_t done) { return progress.done(done); },
+      [&](double share) { return progress.within(share); });
+  progress.finish(report.frames, flags.output);
   const PathTracer::Statistics& rays = report.rays;
   warn_of_capped_rays(rays.capped_rays, rays.camera_rays + rays.continued_rays + rays.shadow_rays,
                       loaded.scene.trace);

@@ -348,7 +348,7 @@ const std::vector<SmallPhoto>& Trainer::Impl::photos() {
 }
 
 // What shows through where no Gaussian is. No photo says what lies there, and of all colours the
-// mean one is the least wrong. The run's configuration names it from then on.
+// typical one is the least wrong. The run's configuration names it from then on.
 void Trainer::Impl::choose_background() {
   if (options.background != "auto" || cut_out) return;
   std::vector<std::size_t> some;

@@ -69,7 +69,7 @@ struct TrainOptions {
   int test_every = 8;
   bool undistort = true;
   MaskUse masks = MaskUse::kIgnore;
-  /// "auto" (white behind cut-out photos, else the photos' mean colour), "random" or "r,g,b".
+  /// "auto" (white behind cut-out photos, else the photos' typical colour), "random" or "r,g,b".
   std::string background = "auto";
   std::int64_t image_budget = 1024;  ///< MiB
   std::vector<ResolutionStep> resolution_schedule{{4, 0.1}, {3, 0.18}, {2, 0.4}};

@@ -15,7 +15,7 @@ void parse(std::span<const std::uint8_t> input) {
   DeviceInfo device;
   device.name = "device";
   device.platform = "platform";
-  device.driver_version = "1";
+  device.driver_version = std::string("1");
   if (const auto found = store.find(device); found && !is_valid(*found)) std::abort();
   store.remove(device);
   store.store(device, {false, 8, 16, 32, 0});

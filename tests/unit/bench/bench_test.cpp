@@ -65,7 +65,7 @@ TEST_CASE("bench: ids follow scenes, sizes and the filter") {
   options.filter = "^(refit|adam)/.*/20$";
   CHECK(bench_ids(options) == std::vector<std::string>{"refit/random/20", "adam/random/20",
                                                        "refit/surface/20", "adam/surface/20"});
-  options.filter = "(";
+  options.filter = std::string("(");
   CHECK_THROWS_AS(bench_ids(options), UsageError);
 }
 

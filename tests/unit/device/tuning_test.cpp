@@ -82,7 +82,7 @@ TEST_CASE("tuning: stored per device, driver and version, and found again") {
   const std::string version = std::string("\"raysplats\": \"");
   for (std::size_t at = text.find(version); at != std::string::npos;
        at = text.find(version, at + 1)) {
-    text.insert(at + version.size(), "9");
+    text.insert(at + version.size(), 1, '9');
   }
   folder.write("cache/tuning.json", text);
   CHECK_FALSE(TuningStore(directory).find(device("A")));

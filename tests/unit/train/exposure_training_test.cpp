@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photos whose exposure changes, with and without colours of their own.
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -15,7 +14,8 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
-#include "synth/synthetic_dataset.hpp"
+#include "unit/device/temporary_directory.hpp"
+#include "unit/train/short_training.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;
@@ -24,16 +24,6 @@ namespace {
 
 constexpr int kSize = 48;
 constexpr int kViews = 20;
-
-struct Folder {
-  fs::path path =
-      fs::temp_directory_path() / ("raysplats_exposure_training_" + std::to_string(::getpid()));
-  Folder() { fs::remove_all(path); }
-  ~Folder() {
-    std::error_code error;
-    fs::remove_all(path, error);
-  }
-};
 
 // Opaque photos; those for training have gains from 0.7 to 1.4 when `planted`.
 Dataset capture(const fs::path& data, const fs::path& photos, bool planted) {
@@ -53,13 +43,8 @@ Dataset capture(const fs::path& data, const fs::path& photos, bool planted) {
 }
 
 TrainOptions options_of(bool exposure) {
-  TrainOptions options;
-  options.iterations = 400;
+  TrainOptions options = short_training(400);
   options.exposure = exposure;
-  options.eval_at = {};
-  options.save_at = {};
-  options.eval_renders = 0;
-  options.checkpoint_every = 0;
   return options;
 }
 
@@ -71,25 +56,21 @@ double corrected(Context& context, const Dataset& dataset, const fs::path& run, 
 }  // namespace
 
 TEST_CASE("planted gains cost much less when every photo has a colour of its own") {
-  const Folder folder;
+  const TemporaryDirectory folder;
   Context context{select_device("")};
-  SyntheticOptions synthetic;
-  synthetic.size = kSize;
-  synthetic.train_views = kViews;
-  synthetic.test_views = 5;
-  const fs::path data = folder.path / "data";
-  generate_dataset(data, synthetic, false);
-  const Dataset plain = capture(data, folder.path / "plain", false);
-  const Dataset gains = capture(data, folder.path / "gains", true);
-  const double clean = corrected(context, plain, folder.path / "clean", false);
-  const double modelled = corrected(context, gains, folder.path / "modelled", true);
-  const double ignored = corrected(context, gains, folder.path / "ignored", false);
+  const fs::path data = folder.path() / "data";
+  make_photos(data, kSize, kViews, 5);
+  const Dataset plain = capture(data, folder.path() / "plain", false);
+  const Dataset gains = capture(data, folder.path() / "gains", true);
+  const double clean = corrected(context, plain, folder.path() / "clean", false);
+  const double modelled = corrected(context, gains, folder.path() / "modelled", true);
+  const double ignored = corrected(context, gains, folder.path() / "ignored", false);
   MESSAGE("clean " << clean << " dB, modelled " << modelled << ", ignored " << ignored);
   CHECK(modelled > ignored + 1.5);
   CHECK(modelled > clean - 2.6);
 
   // The run folder says what the photos' colours are: the brightest one's matrix is largest.
-  std::ifstream stream(folder.path / "modelled/exposures.json");
+  std::ifstream stream(folder.path() / "modelled/exposures.json");
   const nlohmann::json exposures = nlohmann::json::parse(stream);
   REQUIRE(exposures.size() == kViews);
   double least = 10, most = 0, sum = 0;
@@ -105,26 +86,22 @@ TEST_CASE("planted gains cost much less when every photo has a colour of its own
 }
 
 TEST_CASE("a resumed run goes on with the photos' colours, bit for bit") {
-  const Folder folder;
+  const TemporaryDirectory folder;
   Context context{select_device("")};
-  SyntheticOptions synthetic;
-  synthetic.size = 24;
-  synthetic.train_views = 6;
-  synthetic.test_views = 2;
-  const fs::path data = folder.path / "data";
-  generate_dataset(data, synthetic, false);
-  const Dataset gains = capture(data, folder.path / "gains", true);
+  const fs::path data = folder.path() / "data";
+  make_photos(data, 24, 6, 2);
+  const Dataset gains = capture(data, folder.path() / "gains", true);
   TrainOptions options = options_of(true);
   options.iterations = 40;
   options.max_gaussians = 600;
-  Trainer whole(context, gains, options, folder.path / "whole");
+  Trainer whole(context, gains, options, folder.path() / "whole");
   whole.run(false);
   options.checkpoint_every = 17;
-  Trainer part(context, gains, options, folder.path / "part");
+  Trainer part(context, gains, options, folder.path() / "part");
   part.step(17);
   part.save();
-  Trainer rest(context, gains, options, folder.path / "rest");
-  rest.resume(folder.path / "part");
+  Trainer rest(context, gains, options, folder.path() / "rest");
+  rest.resume(folder.path() / "part");
   rest.run(false);
   CHECK(rest.model().sh == whole.model().sh);
   CHECK(rest.model().means == whole.model().means);
@@ -132,9 +109,10 @@ TEST_CASE("a resumed run goes on with the photos' colours, bit for bit") {
     std::ifstream stream(path);
     return std::string(std::istreambuf_iterator<char>(stream), {});
   };
-  CHECK(bytes(folder.path / "rest/exposures.json") == bytes(folder.path / "whole/exposures.json"));
-  CHECK(bytes(folder.path / "rest/exposures.json").size() > 100);
+  CHECK(bytes(folder.path() / "rest/exposures.json") ==
+        bytes(folder.path() / "whole/exposures.json"));
+  CHECK(bytes(folder.path() / "rest/exposures.json").size() > 100);
   options.exposure = false;
-  Trainer other(context, gains, options, folder.path / "other");
-  CHECK_THROWS_AS(other.resume(folder.path / "part"), UsageError);
+  Trainer other(context, gains, options, folder.path() / "other");
+  CHECK_THROWS_AS(other.resume(folder.path() / "part"), UsageError);
 }
