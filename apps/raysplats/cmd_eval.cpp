@@ -7,16 +7,16 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/interrupt.hpp"
 #include "base/output_directory.hpp"
-#include "base/progress.hpp"
 #include "core/morton_order.hpp"
 #include "eval/output_check.hpp"
-#include "light/view_tracer.hpp"
+#include "frame_progress.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/evaluation.hpp"
 #include "raysplats/io.hpp"
+#include "raysplats/model.hpp"
+#include "raysplats/tracer.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/model_source.hpp"
 
@@ -55,37 +55,27 @@ void run(const Options& options, const GlobalOptions& global) {
 
   const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   const std::unique_ptr<Context> context = open_context(options.device);
-  const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
-  ViewTracer tracer(*context, trace, mirrors_of(source));
+  const Model on_device(*context, model);
+  Tracer tracer(*context, trace, mirrors_of(source));
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), views);
 
-  const InterruptGuard interrupt;
-  Progress progress("evaluating", static_cast<std::int64_t>(views), 0,
-                    global.quiet ? nullptr : stderr);
+  FrameProgress progress("evaluating", views, global.quiet);
   std::uint64_t rays = 0;
   std::uint64_t capped = 0;
   const auto render = [&](const Camera& camera) {
-    tracer.forward(gaussians, camera);
-    Image image = tracer.download_image();
+    Image image = tracer.render(on_device, camera, false,
+                                [&](double share) { return progress.within(share); });
     rays += image.pixels();
     capped += tracer.capped_rays();
     return image;
   };
   EvaluationOptions evaluation;
   evaluation.lpips = lpips.get();
-  evaluation.done = [&](std::size_t done) {
-    progress.update(static_cast<std::int64_t>(done), "");
-    return !interrupt.requested();
-  };
+  evaluation.done = [&](std::size_t done) { return progress.done(done); };
   const EvaluationReport report =
       evaluate(render, dataset, split, trace.background, options.output, evaluation);
-  progress.finish();
-  if (interrupt.requested()) {
-    throw Error(ErrorCode::kInterrupted,
-                fmt::format("Interrupted after {} of {} views: the means in {} are of those",
-                            report.images.size(), views, options.output));
-  }
+  progress.finish(report.images.size(), "views: the means in " + options.output + " are of those");
   warn_of_capped_rays(capped, rays, trace);
   fmt::print("{}", report.table());
   if (options.device.profile) fmt::print("{}", context->profile_table());

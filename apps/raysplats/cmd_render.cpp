@@ -147,17 +147,17 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   trace.depth = options.depth;
   const std::unique_ptr<Context> context = open_context(options.device);
-  const DeviceGaussians gaussians = DeviceGaussians::upload(*context, model, ScaleActivation::kExp);
-  ViewTracer tracer(*context, trace, mirrors_of(source));
+  const Model on_device(*context, model);
+  Tracer tracer(*context, trace, mirrors_of(source));
   make_output_directory(options.output);
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), cameras.size());
 
-  FrameProgress progress(cameras.size(), global.quiet);
+  FrameProgress progress("rendering", cameras.size(), global.quiet);
   const FrameReport report = write_frames(
-      tracer, gaussians, cameras, options.output, options.frame_options(),
+      tracer, on_device, cameras, options.output, options.frame_options(),
       [&](std::size_t done) { return progress.done(done); },
       [&](double share) { return progress.within(share); });
-  progress.finish(report.frames, options.output);
+  progress.finish(report.frames, "frames: what is in " + options.output + " is whole");
   warn_of_capped_rays(report.capped_rays, report.rays, trace);
   const std::string speed =
       fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,

@@ -14,13 +14,14 @@
 
 namespace raysplats {
 
-/// Draws how far frames are and lets signals end them: what write_frames() and
-/// write_scene_frames() tell.
+/// Draws how far frames are and lets signals end them: what write_frames(),
+/// write_scene_frames() and evaluate() tell.
 class FrameProgress {
  public:
-  FrameProgress(std::size_t frames, bool quiet)
+  /// `work`: what the bar is called.
+  FrameProgress(const std::string& work, std::size_t frames, bool quiet)
       : total_(frames),
-        progress_("rendering", static_cast<std::int64_t>(frames), 0, quiet ? nullptr : stderr) {}
+        progress_(work, static_cast<std::int64_t>(frames), 0, quiet ? nullptr : stderr) {}
 
   /// A frame is done. False = stop.
   bool done(std::size_t frames) {
@@ -34,13 +35,13 @@ class FrameProgress {
                      fmt::format("{:.0f} % of this frame", 100.0 * share));
     return !interrupt_.requested();
   }
-  /// Throws Error (kInterrupted) when a signal has ended it after `written` frames in `folder`.
-  void finish(std::size_t written, const std::string& folder) {
+  /// Throws Error (kInterrupted) when a signal has ended it after `frames`; `rest` ends the
+  /// sentence: "frames: what is in DIR is whole".
+  void finish(std::size_t frames, const std::string& rest) {
     progress_.finish();
     if (!interrupt_.requested()) return;
     throw Error(ErrorCode::kInterrupted,
-                fmt::format("Interrupted after {} of {} frames: what is in {} is whole", written,
-                            total_, folder));
+                fmt::format("Interrupted after {} of {} {}", frames, total_, rest));
   }
 
  private:

@@ -183,12 +183,12 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
                loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
                loaded.scene.lights.size(), last - first);
 
-  FrameProgress progress(last - first, global.quiet);
+  FrameProgress progress("rendering", last - first, global.quiet);
   const SceneReport report = write_scene_frames(
       tracer, loaded, first, last, flags.output, flags.frame_options(),
       [&](std::size_t done) { return progress.done(done); },
       [&](double share) { return progress.within(share); });
-  progress.finish(report.frames, flags.output);
+  progress.finish(report.frames, "frames: what is in " + flags.output + " is whole");
   const PathTracer::Statistics& rays = report.rays;
   warn_of_capped_rays(rays.capped_rays, rays.camera_rays + rays.continued_rays + rays.shadow_rays,
                       loaded.scene.trace);

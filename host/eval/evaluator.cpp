@@ -149,10 +149,13 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   }
 
   EvaluationReport report;
+  bool stopped = false;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const ViewPicture picture = load_view_picture(dataset.views[views[i]]);
     const Image& rgba = picture.rgba;
     const Image traced = render(dataset.views[views[i]].camera);
+    stopped = traced.data.empty();
+    if (stopped) break;
     if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
       throw UsageError(fmt::format(
           "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names[i],
@@ -165,7 +168,8 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
     if (!(pair.valid > 0)) {
       spdlog::warn("nothing of {} can be compared: its mask or its lens leaves no pixel",
                    metrics.name);
-      if (options.done && !options.done(i + 1)) break;
+      stopped = options.done && !options.done(i + 1);
+      if (stopped) break;
       continue;
     }
     // Masked pixels are equal; they must not count as well reconstructed ones.
@@ -179,8 +183,10 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
     if (!output.empty() && i < options.max_pictures.value_or(views.size())) {
       write_image(output / (names[i] + ".png"), side_by_side(pair.photo, pair.render));
     }
-    if (options.done && !options.done(i + 1)) break;
+    stopped = options.done && !options.done(i + 1);
+    if (stopped) break;
   }
+  if (report.images.empty() && stopped) return report;
   if (report.images.empty()) {
     throw DataError(
         fmt::format("No view of {} has a pixel to compare: their masks or lenses leave none",

@@ -25,26 +25,6 @@ float linear_from_display(float value) {
 
 constexpr int kMaxSupersample = 16;
 
-/// Lets a tracer be watched while it lives.
-class Watch {
- public:
-  Watch(ViewTracer& tracer, const std::function<bool(double)>& within) : tracer_(&tracer) {
-    if (!within) return;
-    tracer.set_watch([this, &within](double share) {
-      stopped_ = !within(share);
-      return !stopped_;
-    });
-  }
-  ~Watch() { tracer_->set_watch({}); }
-  Watch(const Watch&) = delete;
-  Watch& operator=(const Watch&) = delete;
-  bool stopped() const { return stopped_; }
-
- private:
-  ViewTracer* tracer_;
-  bool stopped_ = false;
-};
-
 /// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
 std::string joined(const std::filesystem::path& name) {
   std::string out;
@@ -182,8 +162,8 @@ void write_frame(const std::filesystem::path& stem,
   if (options.depth) write_image(file("_depth", ".png"), depth_preview(depth, rgba));
 }
 
-FrameReport write_frames(ViewTracer& tracer,
-                         const DeviceGaussians& gaussians,
+FrameReport write_frames(Tracer& tracer,
+                         const Model& model,
                          std::span<const Camera> cameras,
                          const std::filesystem::path& folder,
                          const FrameOptions& options,
@@ -195,22 +175,14 @@ FrameReport write_frames(ViewTracer& tracer,
   }
   const std::vector<std::string> names = frame_names(cameras);
   FrameReport report;
-  const Watch watch(tracer, within);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Camera camera = downscaled(cameras[i], 1.0 / options.supersample);
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
-    try {
-      tracer.forward(gaussians, camera);
-    } catch (const Error&) {
-      if (!watch.stopped()) throw;
-      break;
-    }
-    const Image samples = tracer.download_image();
+    const Image samples = tracer.render(model, camera, false, within);
+    if (samples.data.empty()) break;
     Image depth;
-    if (options.depth) {
-      depth = average_depth(tracer.download_depth(), samples, options.supersample);
-    }
+    if (options.depth) depth = average_depth(tracer.depth(), samples, options.supersample);
     report.trace_seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
         (tracer.context().build_seconds() - built);

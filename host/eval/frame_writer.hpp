@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "light/view_tracer.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
-#include "trace/device_gaussians.hpp"
+#include "raysplats/model.hpp"
+#include "raysplats/tracer.hpp"
 
 namespace raysplats {
 
@@ -65,8 +65,8 @@ void write_frame(const std::filesystem::path& stem,
 /// that is being traced, which is not written then. The tracer was made with the option depth when
 /// options.depth is set. Throws UsageError for a supersampling
 /// factor outside 1..16, DataError when a file fails.
-FrameReport write_frames(ViewTracer& tracer,
-                         const DeviceGaussians& gaussians,
+FrameReport write_frames(Tracer& tracer,
+                         const Model& model,
                          std::span<const Camera> cameras,
                          const std::filesystem::path& folder,
                          const FrameOptions& options,

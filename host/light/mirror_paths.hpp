@@ -11,19 +11,11 @@
 #include "device/context.hpp"
 #include "light/surface_store.hpp"
 #include "primitives/scan.hpp"
-#include "raysplats/scene.hpp"
+#include "raysplats/mirrors.hpp"
 #include "trace/ray_backward.hpp"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
-
-/// Known mirrors of a scene of Gaussians. Every surface reflects from both sides, times the colour
-/// of its material.
-struct Mirrors {
-  std::vector<Mesh> meshes;
-  std::vector<Material> materials;
-  int max_bounces = 4;  ///< mirrors that a ray may meet; behind the last one it is black
-};
 
 /// Rays through Gaussians that mirrors turn (docs/light.md), with gradients: the segments of a path
 /// are traced one after the other, all paths of a batch together, and without the ones that ended.

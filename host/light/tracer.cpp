@@ -56,6 +56,26 @@ Ray checked(const Ray& ray, std::size_t number) {
   return out;
 }
 
+// Lets a tracer be watched while it lives.
+class Watch {
+ public:
+  Watch(ViewTracer& tracer, const std::function<bool(double)>& within) : tracer_(&tracer) {
+    if (!within) return;
+    tracer.set_watch([this, &within](double share) {
+      stopped_ = !within(share);
+      return !stopped_;
+    });
+  }
+  ~Watch() { tracer_->set_watch({}); }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+  bool stopped() const { return stopped_; }
+
+ private:
+  ViewTracer* tracer_;
+  bool stopped_ = false;
+};
+
 Gaussians downloaded(const GaussianGradients& gradients, int sh_degree) {
   Gaussians out;
   out.sh_degree = sh_degree;
@@ -70,10 +90,11 @@ Gaussians downloaded(const GaussianGradients& gradients, int sh_degree) {
 }  // namespace
 
 struct Tracer::Impl {
-  Impl(Context& context_in, const TraceOptions& options_in)
+  Impl(Context& context_in, const TraceOptions& options_in, Mirrors mirrors_in)
       : context(context_in),
         options(options_in),
-        views(context_in, options_in),
+        mirrors(!mirrors_in.meshes.empty()),
+        views(context_in, options_in, std::move(mirrors_in)),
         tracer(context_in, options_in),
         sums(context_in, tracer) {}
 
@@ -82,7 +103,11 @@ struct Tracer::Impl {
                                                        context.device().max_allocation /
                                                            sizeof(RayBackward::Slopes)));
   }
-  void require_no_near() const {
+  void require_bare_rays() const {
+    if (mirrors) {
+      throw UsageError(
+          "Single rays do not see the mirrors of this Tracer: trace them with one that has none");
+    }
     if (options.near_depth <= 0.0f) return;
     throw UsageError(fmt::format(
         "TraceOptions::near_depth is {}, but single rays have no camera that could be near: use 0",
@@ -94,6 +119,7 @@ struct Tracer::Impl {
 
   Context& context;
   TraceOptions options;
+  bool mirrors;
   ViewTracer views;
   RayTracer tracer;
   RayBackward sums;
@@ -115,19 +141,28 @@ struct Tracer::Impl {
   Buffer<RayBackward::Slopes> slopes;
 };
 
-Tracer::Tracer(Context& context, const TraceOptions& options) {
+Tracer::Tracer(Context& context, const TraceOptions& options, Mirrors mirrors) {
   const auto lock = context.lock();
-  impl_ = std::make_unique<Impl>(context, options);
+  impl_ = std::make_unique<Impl>(context, options, std::move(mirrors));
 }
 Tracer::~Tracer() = default;
 Tracer::Tracer(Tracer&&) noexcept = default;
 Tracer& Tracer::operator=(Tracer&&) noexcept = default;
 
-Image Tracer::render(const Model& model, const Camera& camera, bool differentiable) {
+Image Tracer::render(const Model& model,
+                     const Camera& camera,
+                     bool differentiable,
+                     const std::function<bool(double)>& within) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
   self.width = self.height = 0;
-  self.views.forward(gaussians_of(model, self.context), camera, differentiable);
+  const Watch watch(self.views, within);
+  try {
+    self.views.forward(gaussians_of(model, self.context), camera, differentiable);
+  } catch (const Error&) {
+    if (!watch.stopped()) throw;
+    return {};
+  }
   self.width = camera.width;
   self.height = camera.height;
   self.last_was_picture = true;
@@ -160,7 +195,13 @@ ViewGradients Tracer::backward(const Model& model, const Image& gradient) {
   self.image_gradient.ensure(self.context, gradient.data.size(), "image gradient");
   self.image_gradient.upload(planes_of(gradient));
   ViewGradients out;
-  self.views.backward(gaussians, self.image_gradient, self.gradients, &out.pose);
+  if (self.mirrors) {
+    const double unknown = std::numeric_limits<double>::quiet_NaN();
+    out.pose.center.fill(unknown);
+    out.pose.rotation.fill(unknown);
+  }
+  self.views.backward(gaussians, self.image_gradient, self.gradients,
+                      self.mirrors ? nullptr : &out.pose);
   out.parameters = downloaded(self.gradients, gaussians.sh_degree);
   return out;
 }
@@ -180,7 +221,7 @@ std::vector<RayResult> Tracer::trace(const Model& model,
   Impl& self = *impl_;
   const auto lock = self.context.lock();
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
-  self.require_no_near();
+  self.require_bare_rays();
   std::vector<Ray> sound;
   sound.reserve(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) sound.push_back(checked(rays[i], i));
@@ -215,7 +256,7 @@ void trace(Tracer& tracer,
   Tracer::Impl& self = tracer.impl();
   const auto turn = self.context.lock();
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
-  self.require_no_near();
+  self.require_bare_rays();
   check_foreign(self.context, rays, count * sizeof(Ray), "the rays");
   check_foreign(self.context, results, count * sizeof(RayResult), "the results");
   self.revision = 0;
@@ -287,6 +328,8 @@ std::uint64_t Tracer::capped_rays() const {
 }
 
 const TraceOptions& Tracer::options() const { return impl_->options; }
+
+const Context& Tracer::context() const { return impl_->context; }
 
 void Tracer::set_background(const std::array<float, 3>& background) {
   Impl& self = *impl_;

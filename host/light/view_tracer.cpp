@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/planes.hpp"
+#include "light/mirror_paths.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer.hpp"

@@ -8,9 +8,9 @@
 #include <memory>
 
 #include "device/context.hpp"
-#include "light/mirror_paths.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
+#include "raysplats/mirrors.hpp"
 #include "raysplats/pose_gradient.hpp"
 #include "raysplats/trace_options.hpp"
 #include "trace/device_gaussians.hpp"

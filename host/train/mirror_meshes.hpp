@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "light/mirror_paths.hpp"
+#include "raysplats/mirrors.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "raysplats/context.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/image.hpp"
+#include "raysplats/mirrors.hpp"
 #include "raysplats/model.hpp"
 #include "raysplats/pose_gradient.hpp"
 #include "raysplats/rays.hpp"
@@ -23,7 +25,7 @@ struct ViewGradients {
   /// dL/d(parameter), laid out as the model's: means, quaternions, log_scales, opacities (logits),
   /// sh.
   Gaussians parameters;
-  PoseGradient pose;  ///< of the camera
+  PoseGradient pose;  ///< of the camera; NaN with mirrors, behind which it is not known
 };
 
 /// Gradients of a loss over rays.
@@ -34,7 +36,8 @@ struct RaysGradients {
 
 /// Traces Gaussians, forward and backward: pictures of cameras of every model, and rays of your
 /// own. What is computed is in docs/model.md; the hits of every ray are blended in exact order
-/// (Byrski et al. 2025). The gradients hold the set and the order of the hits fixed.
+/// (Byrski et al. 2025). The gradients hold the set and the order of the hits fixed. Cameras may
+/// look into known mirrors, forward and backward (docs/light.md).
 ///
 /// Units: world units for positions and depths, pixels for focal lengths; colours as they were
 /// trained, usually display values in [0, 1]. A tracer notices by itself when a model has changed.
@@ -43,17 +46,22 @@ struct RaysGradients {
 /// the backward pass.
 class Tracer {
  public:
-  /// Throws UsageError for options out of range.
-  explicit Tracer(Context& context, const TraceOptions& options = {});
+  /// Throws UsageError for options and mirrors out of range, and for options.depth,
+  /// options.near_depth and Traversal::kTiles beside mirrors, which they do not know.
+  explicit Tracer(Context& context, const TraceOptions& options = {}, Mirrors mirrors = {});
   ~Tracer();
   Tracer(Tracer&&) noexcept;
   Tracer& operator=(Tracer&&) noexcept;
 
   /// RGBA at the camera's size: background blended in, A = 1 - transmittance. `differentiable`
-  /// keeps what backward() needs, within options.memory_budget. Throws UsageError for a camera
-  /// without pixels or with a number that is not finite, for a model of another context, and for
-  /// a camera that Traversal::kTiles cannot trace.
-  Image render(const Model& model, const Camera& camera, bool differentiable = false);
+  /// keeps what backward() needs, within options.memory_budget. `within` hears the share of the
+  /// picture that is done, several times a second, and returns false to stop; then the picture is
+  /// empty. Throws UsageError for a camera without pixels or with a number that is not finite, for
+  /// a model of another context, and for a camera that Traversal::kTiles cannot trace.
+  Image render(const Model& model,
+               const Camera& camera,
+               bool differentiable = false,
+               const std::function<bool(double share)>& within = {});
   /// Of the last picture, with options.depth: expected depth, median depth and number of hits per
   /// pixel. Depth is along the viewing axis for kPinhole, kOpenCv and kOrthographic, along the ray
   /// for other models; 0 where nothing is. Throws UsageError without options.depth.
@@ -65,8 +73,8 @@ class Tracer {
 
   /// Rays of any origins and directions. Throws UsageError, naming the ray, for a number that is
   /// not finite (t_max may be infinite), a direction of length 0, and ends that are not
-  /// 0 <= t_min <= t_max; for a model of another context; and for options.near_depth, which belongs
-  /// to cameras.
+  /// 0 <= t_min <= t_max; for a model of another context; and for options.near_depth and mirrors,
+  /// which belong to cameras.
   std::vector<RayResult> trace(const Model& model,
                                std::span<const Ray> rays,
                                ColorDirection direction = ColorDirection::kRay,
@@ -77,6 +85,7 @@ class Tracer {
   /// Rays of the last render() or trace() that stopped because of options.max_hits.
   std::uint64_t capped_rays() const;
   const TraceOptions& options() const;
+  const Context& context() const;
   /// Colour behind everything from the next render() or trace() on.
   void set_background(const std::array<float, 3>& background);
 

@@ -164,6 +164,24 @@ TEST_CASE("a signal ends a long frame of a model, is told of at once and ends wi
   }
 }
 
+TEST_CASE("a signal ends an evaluation within a view, with 130") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(40));
+  REQUIRE(raysplats_program({"generate", "-o", folder / "data", "--size", "1200", "--train-views",
+                             "2", "--test-views", "1"})
+              .code == 0);
+  RunningProgram program({"eval", folder / "model.ply", "--data", folder / "data", "-o",
+                          folder / "eval", "--traversal", "bvh"});
+  while (program.runs() && !has(program.errors(), "% of this frame"))
+    std::this_thread::sleep_for(10ms);
+  REQUIRE(::kill(program.process(), SIGINT) == 0);
+  const Outcome outcome = program.wait();
+  INFO(outcome.err);
+  CHECK(outcome.code == 130);
+  CHECK(has(outcome.err, "Interrupted after 0 of 1 views"));
+  CHECK(entries(folder / "eval") == 0);
+}
+
 TEST_CASE("a folder takes one run at a time, and a lock that was left behind none") {
   const TemporaryFolder folder;
   const std::string run = folder / "run";

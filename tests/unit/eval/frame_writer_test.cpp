@@ -91,9 +91,8 @@ TEST_CASE("frames hold what the tracer saw") {
   TraceOptions trace;
   trace.background = {0.0f, 0.0f, 1.0f};
   trace.depth = true;
-  ViewTracer tracer(context, trace);
-  const DeviceGaussians gaussians =
-      DeviceGaussians::upload(context, red_balls(), ScaleActivation::kExp);
+  Tracer tracer(context, trace);
+  const Model model(context, red_balls());
   Camera camera = look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, 33, 21, 30.0);
   camera.name = "views/ball.png";
   const std::vector<Camera> cameras{camera};
@@ -105,7 +104,7 @@ TEST_CASE("frames hold what the tracer saw") {
   options.supersample = 2;
   std::size_t heard = 0;
   const FrameReport report =
-      write_frames(tracer, gaussians, cameras, folder.path, options, [&](std::size_t done) {
+      write_frames(tracer, model, cameras, folder.path, options, [&](std::size_t done) {
         heard = done;
         return true;
       });
@@ -122,11 +121,13 @@ TEST_CASE("frames hold what the tracer saw") {
   // The independent view of the same frame: four rays per pixel averaged from a picture of twice
   // the size.
   CameraTracer packets(context, trace);
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(context, red_balls(), ScaleActivation::kExp);
   packets.update(gaussians);
   packets.forward(gaussians, downscaled(camera, 0.5));
   const Image expected = box_average(packets.download_image(), 2);
   options.depth = false;
-  write_frames(tracer, gaussians, cameras, folder.path, options);
+  write_frames(tracer, model, cameras, folder.path, options);
   const Image exr = read_image(folder.path / "ball.exr");
   REQUIRE(exr.channels == 4);
   double worst = 0.0;
@@ -141,7 +142,7 @@ TEST_CASE("frames hold what the tracer saw") {
 
   // Proportional to light: what is 0.5 on the screen is a fifth of the light of 1.
   options.linear_exr = true;
-  write_frames(tracer, gaussians, cameras, folder.path, options);
+  write_frames(tracer, model, cameras, folder.path, options);
   const Image linear = read_image(folder.path / "ball.exr");
   worst = 0.0;
   for (std::size_t i = 0; i < linear.data.size(); ++i) {
@@ -154,7 +155,7 @@ TEST_CASE("frames hold what the tracer saw") {
 
   options.format = FrameFormat::kPng;
   options.depth = true;
-  write_frames(tracer, gaussians, cameras, folder.path, options);
+  write_frames(tracer, model, cameras, folder.path, options);
   const Image png = read_image(folder.path / "ball.png");
   REQUIRE(png.channels == 3);
   CHECK(png.at(16, 10, 0) == doctest::Approx(exr.at(16, 10, 0)).epsilon(0.01));
@@ -173,11 +174,11 @@ TEST_CASE("frames hold what the tracer saw") {
   panorama.height = 32;
   options.format = FrameFormat::kExr;
   options.supersample = 1;
-  write_frames(tracer, gaussians, std::vector<Camera>{panorama}, folder.path, options);
+  write_frames(tracer, model, std::vector<Camera>{panorama}, folder.path, options);
   const std::vector<float> around = exr_channel(folder.path / "panorama.exr", "Z");
   CHECK(around[16 * 64 + 32] == doctest::Approx(4.0f).epsilon(0.02));
   CHECK(around[16 * 64] == 0.0f);
 
   options.supersample = 0;
-  CHECK_THROWS_AS(write_frames(tracer, gaussians, cameras, folder.path, options), UsageError);
+  CHECK_THROWS_AS(write_frames(tracer, model, cameras, folder.path, options), UsageError);
 }

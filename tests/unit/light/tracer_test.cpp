@@ -263,6 +263,81 @@ TEST_CASE("a tracer follows its model, and refuses gradients of a state that is 
   CHECK_NOTHROW(tracer.backward(model, Image(24, 20, 4)));
 }
 
+TEST_CASE("a tracer with a mirror sees, and differentiates, what a camera behind it would see") {
+  Context context = make_test_context();
+  // Gaussians behind the camera, and a mirror before it that fills the picture.
+  Gaussians gaussians = reference::random_scene(60, 41, 0);
+  for (std::size_t i = 0; i < gaussians.size(); ++i) gaussians.means[3 * i + 2] -= 4.0f;
+  const Model model(context, gaussians);
+  Mesh wall;
+  wall.positions = {-9, -9, 3, 9, -9, 3, 9, 9, 3, -9, 9, 3};
+  wall.triangles = {0, 1, 2, 0, 2, 3};
+  wall.materials = {0, 0};
+  Mirrors mirrors;
+  mirrors.meshes = {wall};
+  mirrors.materials.resize(1);
+  mirrors.materials[0].kind = Material::Kind::kMirror;
+  mirrors.materials[0].color = {1.0f, 1.0f, 1.0f};
+  Tracer tracer(context, {}, mirrors);
+  Tracer direct(context);
+  const Camera camera = look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 32, 24, 40.0);
+  const Camera image_of_it = look_at({0, 0, 6}, {0, 0, 0}, {0, -1, 0}, 32, 24, 40.0);
+
+  const Image seen = tracer.render(model, camera, true);
+  const Image expected = direct.render(model, image_of_it, true);
+  Image gradient(32, 24, 4), flipped(32, 24, 4);
+  CounterRng rng(42, 6);
+  double worst = 0.0, covered = 0.0;
+  for (int y = 0; y < 24; ++y) {
+    for (int x = 0; x < 32; ++x) {
+      for (int c = 0; c < 4; ++c) {
+        worst = std::max<double>(worst, std::abs(seen.at(x, y, c) - expected.at(31 - x, y, c)));
+        gradient.at(x, y, c) = flipped.at(31 - x, y, c) = static_cast<float>(rng.normal());
+      }
+      covered += static_cast<double>(expected.at(x, y, 3));
+    }
+  }
+  CHECK(worst < 1e-4);
+  CHECK(covered > 50.0);
+
+  const ViewGradients got = tracer.backward(model, gradient);
+  const ViewGradients wanted = direct.backward(model, flipped);
+  CHECK(std::isnan(got.pose.center[0]));
+  CHECK(std::isfinite(wanted.pose.center[0]));
+  double off = 0.0, size = 0.0;
+  for (std::size_t i = 0; i < got.parameters.means.size(); ++i) {
+    off += std::pow(got.parameters.means[i] - wanted.parameters.means[i], 2);
+    size += std::pow(wanted.parameters.means[i], 2);
+  }
+  CHECK(size > 0.0);
+  CHECK(std::sqrt(off / size) < 1e-3);
+
+  const std::vector<Ray> ray{{{0, 0, 0}, 0, {0, 0, 1}, kInfinity}};
+  CHECK(message_of([&] { tracer.trace(model, ray); }).find("mirrors") != std::string::npos);
+}
+
+TEST_CASE("a picture can be stopped while it is drawn") {
+  Context context = make_test_context();
+  const Model model(context, reference::random_scene(60, 43, 0));
+  for (const Traversal traversal : {Traversal::kTiles, Traversal::kBvh}) {
+    TraceOptions options;
+    options.traversal = traversal;
+    Tracer tracer(context, options);
+    const Camera camera = reference::cube_camera(800, 600);
+    std::size_t heard = 0;
+    const Image stopped = tracer.render(model, camera, false, [&](double share) {
+      CHECK(share > 0.0);
+      CHECK(share <= 1.0);
+      return ++heard < 2;
+    });
+    if (heard >= 2) CHECK(stopped.data.empty());
+    const Image whole = tracer.render(model, camera, false, [](double) { return true; });
+    CHECK(whole.data == tracer.render(model, camera).data);
+    CHECK(tracer.render(model, camera, false, [](double) { return false; }).data.empty());
+    CHECK_THROWS_AS(tracer.depth(), UsageError);
+  }
+}
+
 TEST_CASE("models and tracers refuse what cannot be traced") {
   Context context = make_test_context();
   Gaussians gaussians = reference::random_scene(20, 39, 1);

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "raysplats/scene.hpp"
+
+namespace raysplats {
+
+/// Known mirrors of a scene of Gaussians. Every surface reflects from both sides, times the colour
+/// of its material.
+struct Mirrors {
+  std::vector<Mesh> meshes;
+  std::vector<Material> materials;
+  int max_bounces = 4;  ///< mirrors that a ray may meet; behind the last one it is black
+};
+
+}  // namespace raysplats
