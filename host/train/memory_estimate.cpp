@@ -23,8 +23,6 @@
 namespace raysplats {
 namespace {
 
-constexpr std::size_t kMiB = std::size_t{1} << 20;
-
 TraceOptions sum_options_of(const TrainOptions& options) {
   TraceOptions out;
   out.gradient_sum = options.gradient_sum;

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/psnr_rise.hpp"
+
+#include <algorithm>
+
+namespace raysplats {
+namespace {
+
+constexpr int kViewsToJudge = 3;  // reports of views that were reported before
+
+}  // namespace
+
+void PsnrRise::note(std::size_t view, int divisor, double psnr) {
+  const auto [first, is_new] = first_.try_emplace(std::pair(view, divisor), psnr);
+  if (is_new) return;
+  most_ = std::max(most_.value_or(psnr - first->second), psnr - first->second);
+  ++seen_again_;
+}
+
+bool PsnrRise::learned_nothing() const { return seen_again_ >= kViewsToJudge && *most_ <= kLeast; }
+
+}  // namespace raysplats

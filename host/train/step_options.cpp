@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/step_options.hpp"
+
+#include "train/memory_estimate.hpp"
+#include "train/schedule.hpp"
+
+namespace raysplats {
+
+TraceOptions trace_options_of(const TrainOptions& options, const std::array<float, 3>& background) {
+  TraceOptions trace;
+  trace.quantile = static_cast<float>(options.quantile);
+  trace.min_transmittance = static_cast<float>(options.min_transmittance);
+  trace.max_hits = options.max_hits;
+  trace.hit_order = options.hit_order;
+  trace.adaptive_radius = options.adaptive_radius;
+  trace.near_depth = static_cast<float>(options.near_depth);
+  trace.traversal = options.traversal;
+  trace.background = background;
+  trace.packet_form = options.packet_form;
+  trace.packet_width = options.packet_width;
+  trace.gradient_sum = options.gradient_sum;
+  trace.deterministic = options.deterministic;
+  trace.launch_budget_ms = options.launch_budget_ms;
+  trace.memory_budget = static_cast<std::size_t>(options.memory_budget) * kMiB;
+  return trace;
+}
+
+AdamOptions adam_options_of(const TrainOptions& options) {
+  AdamOptions adam;
+  adam.beta1 = options.adam_beta1;
+  adam.beta2 = options.adam_beta2;
+  adam.epsilon = options.adam_epsilon;
+  adam.visible_only = options.sparse_adam;
+  return adam;
+}
+
+AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t iteration) {
+  AdamRates rates;
+  rates.means = extent * learning_rate(options.position_lr, options, iteration);
+  rates.quaternions = learning_rate(options.rotation_lr, options, iteration);
+  rates.scales = (options.scale_lr_by_extent ? extent : 1.0) *
+                 learning_rate(options.scale_lr, options, iteration);
+  rates.opacities = learning_rate(options.opacity_lr, options, iteration);
+  rates.sh_dc = learning_rate(options.sh_lr, options, iteration);
+  rates.sh_rest = learning_rate(options.sh_rest_lr, options, iteration);
+  return rates;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/file_lock.hpp"
+#include "base/progress.hpp"
+#include "light/view_tracer.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/trainer.hpp"
+#include "train/adam.hpp"
+#include "train/checkpoint.hpp"
+#include "train/density_control.hpp"
+#include "train/exposure.hpp"
+#include "train/footprint.hpp"
+#include "train/image_loss.hpp"
+#include "train/initialization.hpp"
+#include "train/model_validator.hpp"
+#include "train/photo_set.hpp"
+#include "train/psnr_rise.hpp"
+#include "train/run_folder.hpp"
+#include "train/schedule.hpp"
+#include "train/step_guard.hpp"
+#include "train/stopwatch.hpp"
+#include "train/target_cache.hpp"
+
+namespace raysplats {
+
+/// Pixels of a camera's picture.
+std::size_t pixels_of(const Camera& camera);
+/// Photos decoded ahead of their turn.
+constexpr std::size_t kReadAhead = 8;
+
+// The state of a run. Its functions stand in files by what they are for.
+struct Trainer::Impl {
+  Impl(Context& device,
+       Dataset data,
+       const TrainOptions& train_options,
+       std::filesystem::path run_path,
+       bool replace);
+
+  // trainer_start.cpp: from a data set to the first step.
+  void start();
+  const std::vector<SmallPhoto>& photos();
+  void choose_background();
+  std::size_t limit();
+  std::size_t largest_photo() const;
+  std::size_t ray_views() const;
+
+  // trainer_step.cpp: one step, and what happens between two of them.
+  void step();
+  void control_density();
+
+  // trainer_checks.cpp: what stops a run.
+  void check_guard();
+  void validate_model();
+  void write_dump();
+
+  // trainer_report.cpp: what a run says of itself.
+  void report(Progress& progress);
+  void evaluate_views(bool last);
+  void save_model();
+  void write_metrics(bool complete);
+  std::uint64_t capped_rays() const { return capped_before + tracer.kept_capped_rays(); }
+  std::string capped_share();
+  void warn_of_capped_rays() const;
+  void warn_of_no_progress() const;
+
+  // trainer_resume.cpp: checkpoints.
+  void resume(const std::filesystem::path& source);
+  void check_data_options(const Checkpoint& checkpoint) const;
+  Checkpoint state();
+  void save_checkpoint();
+  std::string rescue();
+
+  // trainer_loop.cpp: iterations by the schedule.
+  TrainSummary train(bool show_progress);
+  bool train_some(std::int64_t count);
+  void prepare();
+  void advance(std::int64_t until,
+               bool scheduled,
+               bool show_progress,
+               const std::function<bool()>& interrupted);
+  void run_iterations(std::int64_t until,
+                      bool scheduled,
+                      Progress& progress,
+                      const std::function<bool()>& interrupted);
+  void finish_resumed();
+
+  Context& context;
+  Dataset dataset;
+  TrainOptions options;
+  RunFolder run;
+  bool overwrite;
+  bool continues = false;  // what is in the folder is of this run
+  std::vector<std::size_t> train_views;
+  std::vector<std::size_t> test_views;
+  std::vector<Camera> train_cameras;
+  double extent;
+  bool cut_out;
+  std::string fingerprint;
+  std::array<float, 3> background;
+  ViewTracer tracer;
+  ImageLoss loss;
+  Adam adam;
+  DensityControl density;
+  Footprint footprint;
+  std::optional<Exposure> exposure;  // with the option
+  StepGuard guard;
+  std::optional<ModelValidator> validator;  // once it is asked for
+  TargetCache targets;
+  ViewOrder order;
+
+  DeviceGaussians gaussians;
+  GaussianGradients gradients;
+  Buffer<float> image_gradient;
+  std::int64_t iteration = 0;            // completed
+  std::vector<SmallPhoto> small_photos;  // once they are asked for
+  bool started = false;
+  bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
+  std::int64_t saved = -1;  // iteration of the newest checkpoint of this run
+  std::uint32_t reported_bad_steps = 0;
+  std::uint64_t traced_rays = 0;    // of all training views of the run
+  std::uint64_t capped_before = 0;  // rays that stopped at max-hits before it was resumed
+  bool cap_reported = false;
+  PsnrRise rise;
+  Stopwatch training{context};
+  Stopwatch evaluating{context};
+  double last_loss = 0;
+  std::int64_t row_iteration = 0;
+  double row_seconds = 0;
+
+  std::function<void(const TrainProgress&)> callback;
+  std::atomic<bool> stop_asked = false;
+  std::atomic<bool> save_asked = false;
+  std::atomic<bool> busy = false;  // in run() or step()
+  bool stepped = false;            // since this object was made
+  bool prepared = false;           // for steps of the caller's own
+  std::optional<FileLock> folder_lock;
+
+  // Marks the trainer as busy while it lives.
+  struct Busy {
+    explicit Busy(Impl& impl) : busy(impl.busy) {
+      if (busy.exchange(true)) {
+        throw UsageError(
+            "The trainer is training already: wait for its run() or step(), and call neither from "
+            "its callback");
+      }
+      impl.stop_asked = false;
+    }
+    ~Busy() { busy = false; }
+    Busy(const Busy&) = delete;
+    Busy& operator=(const Busy&) = delete;
+    std::atomic<bool>& busy;
+  };
+  // Keeps other runs out of the folder while it lives.
+  struct FolderUse {
+    explicit FolderUse(Impl& impl_in) : impl(impl_in), own(!impl.folder_lock) {
+      if (own) impl.folder_lock.emplace(impl.run.lock());
+    }
+    ~FolderUse() {
+      if (own) impl.folder_lock.reset();
+    }
+    FolderUse(const FolderUse&) = delete;
+    FolderUse& operator=(const FolderUse&) = delete;
+    Impl& impl;
+    bool own;
+  };
+};
+
+}  // namespace raysplats

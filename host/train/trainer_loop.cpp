@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <new>
+
+#include "base/interrupt.hpp"
+#include "train/trainer_impl.hpp"
+
+namespace raysplats {
+namespace {
+
+// The same error with a remark at its end.
+[[noreturn]] void throw_with(const Error& error, const std::string& remark) {
+  const std::string message = fmt::format("{}; {}", error.what(), remark);
+  switch (error.code()) {
+    case ErrorCode::kUsage:
+      throw UsageError(message);
+    case ErrorCode::kData:
+      throw DataError(message);
+    case ErrorCode::kDevice:
+      throw DeviceError(message);
+    case ErrorCode::kMemory:
+      throw ResourceError(message);
+    default:
+      throw Error(error.code(), message);
+  }
+}
+
+bool contains(const std::vector<RunShare>& list, std::int64_t iterations, std::int64_t value) {
+  return std::any_of(list.begin(), list.end(), [iterations, value](const RunShare& share) {
+    return share.of(iterations) == value;
+  });
+}
+
+bool every(std::int64_t period, std::int64_t iteration) {
+  return period > 0 && iteration % period == 0;
+}
+
+}  // namespace
+
+// Up to `until` completed iterations; with `scheduled` also the evaluations and files of the
+// options.
+void Trainer::Impl::run_iterations(std::int64_t until,
+                                   bool scheduled,
+                                   Progress& progress,
+                                   const std::function<bool()>& interrupted) {
+  const auto pause = [&](const auto& work) {
+    context.finish();
+    training.stop();
+    progress.suspend();
+    work();
+    progress.resume();
+    training.start();
+  };
+  bool stop = false;
+  while (iteration < until && !stop) {
+    const auto turn = context.lock();
+    step();
+    const bool last = iteration == options.iterations;
+    if (last || every(options.log_every, iteration)) report(progress);
+    if (every(options.validate_every, iteration)) pause([this] { validate_model(); });
+    if (callback) {
+      const auto hear = callback;  // it may be replaced meanwhile
+      try {
+        pause([&] { hear({iteration, options.iterations, gaussians.count}); });
+      } catch (...) {
+        if (!last) control_density();  // what is saved then has this iteration complete
+        throw;
+      }
+    }
+    // Asked once: a signal that comes later is seen after the next step.
+    stop = interrupted() || stop_asked;
+    const bool evaluates = last || every(options.eval_every, iteration) ||
+                           contains(options.eval_at, options.iterations, iteration);
+    const bool saves = stop || last || contains(options.save_at, options.iterations, iteration);
+    // Before density control, as in 3DGS: fresh clones and children have not settled yet.
+    if (scheduled && saves) pause([this] { save_model(); });
+    if (scheduled && evaluates && (last || !stop)) pause([this, last] { evaluate_views(last); });
+    if (!last) control_density();
+    const bool asked = save_asked.exchange(false);
+    if (asked && !(scheduled && saves)) pause([this] { save_model(); });
+    if (asked || (scheduled && (stop || last || every(options.checkpoint_every, iteration))))
+      pause([this] { save_checkpoint(); });
+  }
+  context.finish();
+}
+
+// A run that is resumed where it ends: its results may not be in this folder.
+void Trainer::Impl::finish_resumed() {
+  if (run.has_model(iteration)) return;
+  save_model();
+  evaluate_views(true);
+  save_checkpoint();
+}
+
+// Runs them with the folder locked. What fails is saved as far as it goes.
+void Trainer::Impl::advance(std::int64_t until,
+                            bool scheduled,
+                            bool show_progress,
+                            const std::function<bool()>& interrupted) {
+  Progress progress("Training", options.iterations, iteration, show_progress ? stderr : nullptr);
+  row_iteration = iteration;
+  row_seconds = training.seconds();
+  training.start();
+  try {
+    if (scheduled && iteration == options.iterations) {
+      const auto turn = context.lock();
+      finish_resumed();
+    }
+    run_iterations(until, scheduled, progress, interrupted);
+  } catch (const Error& error) {
+    training.stop();
+    if (error.code() == ErrorCode::kRuntime) throw;  // the model itself is at fault
+    throw_with(error, rescue());
+  } catch (const std::bad_alloc&) {
+    training.stop();
+    throw_with(ResourceError("The host has no memory left: use smaller images (--downscale) or a "
+                             "smaller --image-budget"),
+               rescue());
+  } catch (...) {  // of a callback
+    training.stop();
+    spdlog::warn("a callback failed after iteration {}: {}", iteration, rescue());
+    throw;
+  }
+  training.stop();
+  progress.finish();
+}
+
+TrainSummary Trainer::Impl::train(bool show_progress) {
+  const Busy busy(*this);
+  const InterruptGuard interrupt;
+  const FolderUse folder(*this);
+  {
+    const auto turn = context.lock();
+    start();
+  }
+  advance(options.iterations, true, show_progress, [&] { return interrupt.requested(); });
+  write_metrics(iteration == options.iterations);
+  if (capped_rays() > 0) warn_of_capped_rays();
+  if (iteration == options.iterations) warn_of_no_progress();
+  if (const auto best = better_before(run.evaluations())) {
+    spdlog::warn(
+        "the last PSNR of the test views, {:.2f} dB, is below that of iteration {}, {:.2f} dB: the "
+        "run learns its photos by heart or its rates are too high",
+        run.evaluations().back().psnr, best->iteration, best->psnr);
+  }
+  if (iteration < options.iterations && !stop_asked) {
+    throw Error(
+        ErrorCode::kInterrupted,
+        fmt::format("Interrupted at iteration {}; everything is saved: continue with --resume {}",
+                    iteration, run.path().string()));
+  }
+  TrainSummary summary;
+  summary.iterations = iteration;
+  summary.gaussians = gaussians.count;
+  summary.loss = last_loss;
+  summary.training_seconds = training.seconds();
+  summary.evaluation_seconds = evaluating.seconds();
+  summary.kernel_build_seconds = context.build_seconds();
+  summary.evaluations = run.evaluations();
+  return summary;
+}
+
+bool Trainer::Impl::train_some(std::int64_t count) {
+  if (count < 1) {
+    throw UsageError(
+        fmt::format("Trainer::step() cannot make {} iterations: ask for 1 or more", count));
+  }
+  const Busy busy(*this);
+  prepare();
+  const std::int64_t left = std::max<std::int64_t>(options.iterations - iteration, 0);
+  advance(iteration + std::min(count, left), false, false, [] { return false; });
+  return iteration < options.iterations;
+}
+
+// For steps of the caller's own: the folder stays locked until the trainer goes.
+void Trainer::Impl::prepare() {
+  if (prepared) return;
+  const auto turn = context.lock();
+  if (!folder_lock) folder_lock.emplace(run.lock());
+  start();
+  prepared = true;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "eval/metrics.hpp"
+#include "raysplats/evaluation.hpp"
+#include "train/step_options.hpp"
+#include "train/trainer_impl.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr double kManyCapped = 1e-3;  // share of rays at which the cap on hits gets a warning
+
+}  // namespace
+
+// Waits for the device and reports the step just done.
+void Trainer::Impl::report(Progress& progress) {
+  const ImageLoss::Value value = loss.value();
+  check_guard();
+  last_loss = value.total;
+  const double psnr = std::min(value.psnr, kMostPsnr);
+  rise.note(order.at(iteration - 1), resolution_divisor(options, iteration - 1), psnr);
+  const double seconds = training.seconds();
+  const double elapsed = seconds - row_seconds;
+  run.append({iteration, seconds, value.total, psnr, gaussians.count,
+              elapsed > 0 ? static_cast<double>(iteration - row_iteration) / elapsed : 0.0});
+  row_iteration = iteration;
+  row_seconds = seconds;
+  progress.update(iteration, fmt::format("loss {:.4f}, PSNR {:.2f} of this view, {} Gaussians{}",
+                                         value.total, psnr, gaussians.count, capped_share()));
+}
+
+// What the progress line says of rays that the cap on hits cut off; the first time that they are
+// many, a warning does too.
+std::string Trainer::Impl::capped_share() {
+  const std::uint64_t capped = capped_rays();
+  if (capped == 0) return "";
+  const double share = static_cast<double>(capped) / static_cast<double>(traced_rays);
+  if (share >= kManyCapped && !cap_reported) {
+    cap_reported = true;
+    warn_of_capped_rays();
+  }
+  return fmt::format(", {:.2g} % of rays capped", 100.0 * share);
+}
+
+void Trainer::Impl::warn_of_capped_rays() const {
+  spdlog::warn(
+      "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
+      "behind: raise it",
+      iteration, capped_rays(), traced_rays, options.max_hits);
+}
+
+// Of a run whose pictures never came nearer to the photos.
+void Trainer::Impl::warn_of_no_progress() const {
+  if (!rise.learned_nothing()) return;
+  spdlog::warn(
+      "the model learned nothing: the PSNR of no training view rose by more than {} dB; see "
+      "whether cameras, points and photos belong together ('raysplats info {}')",
+      PsnrRise::kLeast, dataset.root.string());
+}
+
+// Traces the test views; the time counts as evaluation, not as training.
+void Trainer::Impl::evaluate_views(bool last) {
+  if (test_views.empty()) return;
+  evaluating.start();
+  tracer.set_background(background);
+  const auto render = [this](const Camera& camera) {
+    tracer.forward(gaussians, camera);
+    return tracer.download_image();
+  };
+  EvaluationOptions choice;
+  choice.max_views = last ? 0 : static_cast<std::size_t>(options.eval_views);
+  choice.max_pictures = static_cast<std::size_t>(options.eval_renders);
+  const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
+                                                      run.evaluation_folder(iteration), choice);
+  run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
+              report.images.size(), gaussians.count, report.mean.psnr_corrected,
+              report.mean.psnr_all});
+  write_metrics(false);
+  evaluating.stop();
+  spdlog::info("iteration {}: PSNR {:.2f} dB, SSIM {:.4f} over {} test views after {} of training",
+               iteration, report.mean.psnr, report.mean.ssim, report.images.size(),
+               format_duration(training.seconds()));
+}
+
+void Trainer::Impl::save_model() {
+  run.write_model(gaussians.download(), trace_options_of(options, background), iteration);
+  if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
+}
+
+void Trainer::Impl::write_metrics(bool complete) {
+  run.write_metrics({{"complete", complete},
+                     {"iteration", iteration},
+                     {"iterations", options.iterations},
+                     {"gaussians", gaussians.count},
+                     {"loss", last_loss},
+                     {"training_seconds", training.seconds()},
+                     {"evaluation_seconds", evaluating.seconds()},
+                     {"kernel_build_seconds", context.build_seconds()},
+                     {"traced_rays", traced_rays},
+                     {"capped_rays", capped_rays()},
+                     {"psnr_rise", rise.most() ? nlohmann::json(*rise.most()) : nullptr},
+                     {"skipped_updates", adam.skipped()},
+                     {"bad_steps", guard.counts().bad_steps},
+                     {"peak_device_bytes", context.peak_allocated_bytes()},
+                     {"device", context.device().name}});
+}
+
+}  // namespace raysplats

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <system_error>
+
+#include "train/run_state.hpp"
+#include "train/train_config.hpp"
+#include "train/trainer_impl.hpp"
+
+namespace raysplats {
+
+Checkpoint Trainer::Impl::state() {
+  Checkpoint checkpoint;
+  checkpoint.iteration = iteration;
+  checkpoint.seed = options.seed;
+  checkpoint.scene_extent = extent;
+  checkpoint.dataset = fingerprint;
+  checkpoint.config = to_toml(options);
+  const StepGuard::Counts counts = guard.counts();
+  checkpoint.bad_steps = counts.bad_steps;
+  checkpoint.bad_steps_in_a_row = counts.in_a_row;
+  checkpoint.traced_rays = traced_rays;
+  checkpoint.capped_rays = capped_rays();
+  store_state(gaussians, adam, density, checkpoint);
+  if (footprint.lows().size() > 0) checkpoint.sections["footprint"] = footprint.lows().download();
+  if (exposure) {
+    Exposure::State colors = exposure->state();
+    checkpoint.sections["exposure"] = std::move(colors.deltas);
+    checkpoint.sections["exposure.first"] = std::move(colors.first);
+    checkpoint.sections["exposure.second"] = std::move(colors.second);
+    checkpoint.sections["exposure.steps"] = std::move(colors.steps);
+  }
+  return checkpoint;
+}
+
+void Trainer::Impl::save_checkpoint() {
+  write_checkpoint(checkpoint_path(run.path(), iteration), state());
+  saved = iteration;
+  remove_old_checkpoints(run.path(), options.keep_checkpoints, iteration);
+}
+
+// After a failure: saves the last whole state, if the device still gives it. Returns what the user
+// can do then.
+std::string Trainer::Impl::rescue() {
+  const auto turn = context.lock();
+  if (whole && saved != iteration) {
+    try {
+      context.finish();
+      write_checkpoint(checkpoint_path(run.path(), iteration), state());
+      saved = iteration;
+    } catch (const std::exception& error) {
+      spdlog::warn("the state of iteration {} cannot be saved: {}", iteration, error.what());
+    }
+  }
+  if (saved < 0) return "nothing was saved yet";
+  return fmt::format("iteration {} is saved: continue with --resume {}", saved,
+                     run.path().string());
+}
+
+// The photos as the run saw them: another size or choice of them is another run.
+void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
+  if (checkpoint.config.empty()) return;
+  const TrainOptions before = parse_train_config(checkpoint.config);
+  const auto differs = [&](const char* option, const auto& was, const auto& is) {
+    if (was == is) return;
+    throw UsageError(fmt::format(
+        "The checkpoint of iteration {} was made with '{}' = {}, not {}: resume with the value of "
+        "the run, or start a new one with --init",
+        checkpoint.iteration, option, was, is));
+  };
+  differs("downscale", before.downscale, options.downscale);
+  differs("test-every", before.test_every, options.test_every);
+  differs("undistort", before.undistort, options.undistort);
+  differs("exposure", before.exposure, options.exposure);
+  const auto cuts = [](const TrainOptions& o) { return o.masks == MaskUse::kCutout; };
+  differs("masks = cutout", cuts(before), cuts(options));
+}
+
+void Trainer::Impl::resume(const std::filesystem::path& source) {
+  const bool own = source == "latest";
+  const std::filesystem::path place = own ? run.path() : source;
+  if (own && list_checkpoints(place).empty()) {
+    spdlog::info("{} holds no checkpoint yet: the run starts anew", place.string());
+    continues = true;
+    return;
+  }
+  const FolderUse use(*this);
+  const Checkpoint checkpoint = load_latest_checkpoint(place);
+  if (checkpoint.seed != options.seed) {
+    throw UsageError(fmt::format(
+        "The checkpoint was made with seed {}, not {}: resume with the configuration of the run",
+        checkpoint.seed, options.seed));
+  }
+  if (!checkpoint.dataset.empty() && checkpoint.dataset != fingerprint) {
+    throw UsageError(
+        fmt::format("The checkpoint of iteration {} was made with other data than {}: resume with "
+                    "the photos and cameras of the run, or start a new one with --init",
+                    checkpoint.iteration, dataset.root.string()));
+  }
+  check_data_options(checkpoint);
+  if (checkpoint.iteration > options.iterations) {
+    throw UsageError(fmt::format(
+        "The run is at iteration {} already, beyond --iterations {}: raise them, or resume from an "
+        "earlier checkpoint",
+        checkpoint.iteration, options.iterations));
+  }
+  const bool file = !std::filesystem::is_directory(place);
+  const std::filesystem::path folder = file ? place.parent_path().parent_path() : place;
+  std::error_code error;
+  continues = std::filesystem::equivalent(folder.empty() ? "." : folder, run.path(), error);
+  const std::vector<std::filesystem::path> files = list_checkpoints(run.path());
+  if (continues && file && !overwrite && !files.empty() &&
+      files.back() > checkpoint_path(run.path(), checkpoint.iteration)) {
+    throw UsageError(fmt::format(
+        "The run in {} has gone on to {} after this checkpoint: go on from there with --resume "
+        "latest, choose another folder, or drop what came after iteration {} by --overwrite",
+        run.path().string(), files.back().filename().string(), checkpoint.iteration));
+  }
+  restore_state(context, checkpoint, options, gaussians, adam, density);
+  const auto lows = checkpoint.sections.find("footprint");
+  if (lows != checkpoint.sections.end() && lows->second.size() == gaussians.count) {
+    footprint.restore(lows->second);
+  } else {
+    footprint.update(gaussians);  // of a version that had none
+  }
+  if (exposure) {
+    const auto part = [&](const std::string& name) {
+      const auto found = checkpoint.sections.find(name);
+      return found == checkpoint.sections.end() ? std::vector<float>() : found->second;
+    };
+    exposure->restore({part("exposure"), part("exposure.first"), part("exposure.second"),
+                       part("exposure.steps")});
+  }
+  // What the run began with, black in those of older versions.
+  if (options.background == "auto" && !checkpoint.config.empty())
+    options.background = parse_train_config(checkpoint.config).background;
+  background = background_color(options, cut_out);
+  guard.restore({checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false});
+  reported_bad_steps = checkpoint.bad_steps;
+  traced_rays = checkpoint.traced_rays;
+  capped_before = checkpoint.capped_rays;
+  iteration = checkpoint.iteration;
+  training.set(recorded_seconds(folder, iteration));
+  started = true;
+  whole = true;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <spdlog/spdlog.h>
+
+#include "train/step_options.hpp"
+#include "train/train_config.hpp"
+#include "train/trainer_impl.hpp"
+
+namespace raysplats {
+
+// One view: forward, loss, backward, statistics, Adam; nothing is waited for.
+void Trainer::Impl::step() {
+  const std::size_t view = order.at(iteration);
+  targets.prefetch(order.upcoming(kReadAhead - 1));
+  const int divisor = resolution_divisor(options, iteration);
+  const Camera& full = train_cameras[view];
+  const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
+  const std::array<float, 3> behind = step_background(options, cut_out, background, iteration);
+  gaussians.active_sh_degree = active_sh_degree(options, iteration);
+  tracer.set_background(behind);
+  tracer.forward(gaussians, camera, true);
+  const Buffer<float>& shown =
+      exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
+               : tracer.image();
+  loss.evaluate(shown, targets.get(view, camera.width, camera.height), cut_out, behind,
+                camera.width, camera.height, image_gradient);
+  const ImageLoss::Partials partials = loss.partials();
+  guard.check_loss(partials.pixel, partials.ssim, partials.tiles);
+  if (exposure) {
+    whole = false;
+    exposure->step(tracer.image(), image_gradient, view, camera.width, camera.height,
+                   learning_rate(options.exposure_lr, options, iteration), guard.mark());
+  }
+  tracer.backward(gaussians, image_gradient, gradients);
+  whole = false;
+  if (density.accumulates_at(iteration)) density.accumulate(gaussians, gradients, &guard.mark());
+  adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
+  footprint.apply(gaussians, guard.mark());
+  guard.close(adam.refused(), gaussians.count);
+  traced_rays += pixels_of(camera);
+  ++iteration;
+  whole = true;
+  stepped = true;
+}
+
+// What happens between this step and the next one: density control.
+void Trainer::Impl::control_density() {
+  const bool refines = density.refines_at(iteration);
+  const bool resets = density.resets_at(iteration);
+  if (!refines && !resets) return;
+  check_guard();
+  whole = false;
+  if (refines) {
+    const DensityPlan plan = density.refine(gaussians, iteration);
+    if (plan.changes()) {
+      const std::vector<std::uint32_t> source = plan.state_source();
+      Buffer<std::uint32_t> device_source(context, source.size(), "state sources");
+      device_source.upload(source);
+      adam.remap(device_source, gaussians.count);
+    }
+    footprint.update(gaussians);
+    spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",
+                  iteration, plan.cloned, plan.split, plan.pruned, plan.refused, gaussians.count);
+  }
+  if (resets) {
+    density.reset_opacities(gaussians);
+    adam.reset(ParameterGroup::kOpacities);
+  }
+  whole = true;
+}
+
+}  // namespace raysplats
