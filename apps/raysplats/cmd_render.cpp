@@ -85,7 +85,8 @@ std::vector<Camera> orbit(const RenderFlags& options,
     const std::array<double, 3> up = parse_triple(*options.up);
     shape.up = {up[0], up[1], up[2]};
   }
-  const SceneExtent extent = scene_extent(model);
+  SceneExtent extent = scene_extent(model);
+  extent.center = common_target(photos).value_or(extent.center);
   // Check the direction before the photos are measured along it.
   orbit_cameras(extent, shape);
   shape = orbit_like(photos, extent.center, shape);

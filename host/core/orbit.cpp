@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
@@ -23,7 +24,10 @@ constexpr double kRadians = std::numbers::pi / 180.0;
 constexpr double kShown = 0.98;  // share of the opacity within the extent
 constexpr double kReach = 2.0;   // standard deviations of a Gaussian that are to be seen
 constexpr double kMargin = 1.05;
-constexpr double kFarAway = 4.0;  // times the median: what reaches further is background
+// Axes within about 10 degrees of each other: where they meet is lost in noise.
+constexpr double kLeastSpread = 0.03;
+constexpr double kMostBehind = 0.2;  // share of the cameras that may look away from their target
+constexpr double kFarAway = 4.0;     // times the median: what reaches further is background
 
 double median(std::vector<double> values) {
   const double half = 0.5;
@@ -133,6 +137,33 @@ double field_of_view(const Camera& camera) {
   const bool portrait = camera.width < camera.height;
   const double half = 0.5 * (portrait ? camera.width : camera.height);
   return 2.0 * std::atan(half / (portrait ? camera.fx : camera.fy)) / kRadians;
+}
+
+std::optional<glm::dvec3> common_target(std::span<const Camera> cameras) {
+  if (cameras.empty()) return std::nullopt;
+  // The squared distance of x from an axis through c along d is |P (x - c)|^2 with P = I - d d^T.
+  glm::dmat3 sum(0.0);
+  glm::dvec3 right(0.0);
+  for (const Camera& camera : cameras) {
+    const glm::dvec3 axis = glm::transpose(camera.rotation) * glm::dvec3(0.0, 0.0, 1.0);
+    const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(axis, axis);
+    sum += across;
+    right += across * camera.center();
+  }
+  const auto count = static_cast<double>(cameras.size());
+  const glm::dmat3 inverse = glm::inverse(sum);
+  double norm = 0.0;
+  for (int k = 0; k < 3; ++k) norm += glm::dot(inverse[k], inverse[k]);
+  // The smallest eigenvalue of the mean, within a factor of the square root of 3; NaN fails too.
+  if (!(1.0 / (std::sqrt(norm) * count) >= kLeastSpread)) return std::nullopt;
+  const glm::dvec3 target = inverse * right;
+  double behind = 0.0;
+  for (const Camera& camera : cameras) {
+    const glm::dvec3 axis = glm::transpose(camera.rotation) * glm::dvec3(0.0, 0.0, 1.0);
+    if (!(glm::dot(target - camera.center(), axis) > 0.0)) ++behind;
+  }
+  if (behind >= kMostBehind * count) return std::nullopt;
+  return target;
 }
 
 OrbitOptions orbit_like(std::span<const Camera> cameras,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,11 @@ struct OrbitOptions {
   /// a pinhole sees of the plane through the centre, kEquirectangular everything.
   CameraModel model = CameraModel::kPinhole;
 };
+
+/// The point that photos look at: the nearest to their viewing axes in the mean square. None where
+/// the axes do not meet (they are nearly parallel, or look away from each other as in a room that
+/// was photographed from its middle: the point lies behind a fifth of the cameras or more).
+std::optional<glm::dvec3> common_target(std::span<const Camera> cameras);
 
 /// Distance and elevation at which photos were taken, for an orbit that stays where the model was
 /// seen. Medians over the cameras relative to `center` and `up`; leaves `options` as they are

@@ -170,6 +170,7 @@ std::vector<Camera> on_orbit(const SceneCamera& camera, const SceneExtent& exten
   if (!camera.file.empty()) {
     const std::vector<Camera> photos =
         views_of(load_dataset(camera.file, camera.data_options), Split::kAll);
+    if (!camera.target) around.center = common_target(photos).value_or(extent.center);
     shape.up = camera.up.value_or(estimate_up(photos));
     shape = orbit_like(photos, around.center, shape);
     shape.width = photos.front().width;

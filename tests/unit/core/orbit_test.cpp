@@ -182,6 +182,32 @@ TEST_CASE("up, distance and elevation come from the cameras") {
   CHECK(estimate_up({}) == glm::dvec3(0, -1, 0));
 }
 
+TEST_CASE("photos that look at one point have it as their target, others have none") {
+  const glm::dvec3 target(1.0, -2.0, 0.5);
+  CounterRng rng(11, 0);
+  const auto point = [&](double size) {
+    return size * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
+  };
+  std::vector<Camera> inwards, parallel, outwards;
+  for (int i = 0; i < 40; ++i) {
+    const glm::dvec3 eye = target + 4.0 * glm::normalize(point(1.0));
+    inwards.push_back(look_at(eye, target + point(0.1), {0, 0, 1}, 80, 60, 70.0));
+    const glm::dvec3 place(0.3 * rng.normal(), 0.3 * rng.normal(), 0.0);
+    parallel.push_back(
+        look_at(place, place + glm::dvec3(0, 0, 5) + point(0.2), {0, -1, 0}, 80, 60, 70.0));
+    const glm::dvec3 middle = point(0.1);
+    outwards.push_back(
+        look_at(middle, middle + glm::normalize(point(1.0)), {0, 0, 1}, 80, 60, 70.0));
+  }
+  const std::optional<glm::dvec3> found = common_target(inwards);
+  REQUIRE(found);
+  CHECK(glm::distance(*found, target) < 0.1);
+  CHECK_FALSE(common_target(parallel));
+  CHECK_FALSE(common_target(outwards));
+  CHECK_FALSE(common_target({}));
+  CHECK_FALSE(common_target(std::vector<Camera>{inwards[0]}));
+}
+
 TEST_CASE("orbits of other camera models see the extent too") {
   const double degree = 3.14159265358979 / 180.0;
   const SceneExtent extent{glm::dvec3(1, 0, 0), 2.0};
