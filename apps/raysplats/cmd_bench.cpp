@@ -33,7 +33,7 @@ struct Options {
   std::string json;
   std::string csv;
   BenchOptions bench;
-  TraceFlags trace;
+  TraceSettings trace;
   DeviceFlags device;
 };
 

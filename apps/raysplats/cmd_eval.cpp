@@ -29,7 +29,7 @@ struct Options {
   std::string lpips;
   bool overwrite = false;
   DataFlags data;
-  TraceFlags trace;
+  TraceSettings trace;
   DeviceFlags device;
 };
 

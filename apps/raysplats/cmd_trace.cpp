@@ -22,7 +22,7 @@ struct Options {
   std::string rays;
   std::string output;
   std::string color_direction = "ray";
-  TraceFlags trace;
+  TraceSettings trace;
   DeviceFlags device;
 };
 

@@ -36,8 +36,7 @@ void keep_run_options(CLI::App& command, Options& options) {
 
 void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   keep_run_options(command, options);
-  Dataset dataset = load_dataset(options.data, {options.train.downscale, options.train.test_every,
-                                                options.train.undistort, options.train.masks});
+  Dataset dataset = load_dataset(options.data, options.train.data);
   check_not_data(options.output, dataset);
   const std::unique_ptr<Context> context = open_context(options.device);
   Trainer trainer(*context, std::move(dataset), options.train, options.output, options.overwrite);

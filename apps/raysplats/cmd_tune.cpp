@@ -22,7 +22,7 @@ struct Options {
   std::string resolution = "512x512";
   bool dry_run = false;
   bool reset = false;
-  TraceFlags trace;
+  TraceSettings trace;
   DeviceFlags device;
 };
 

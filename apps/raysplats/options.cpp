@@ -18,6 +18,7 @@
 #include "base/nearest_name.hpp"
 #include "base/number_text.hpp"
 #include "base/progress.hpp"
+#include "core/option_flags.hpp"
 #include "train/train_keys.hpp"
 
 namespace raysplats::cli {
@@ -107,65 +108,33 @@ std::unique_ptr<Context> open_context(const DeviceFlags& flags) {
   return std::make_unique<Context>(device, options);
 }
 
-void add_trace_flags(CLI::App& app, TraceFlags& flags) {
-  app.add_option("--q,--quantile", flags.quantile, trace_keys::kQuantile.help)
-      ->transform(within(trace_keys::kQuantile));
-  app.add_option("--min-transmittance", flags.min_transmittance, trace_keys::kMinTransmittance.help)
-      ->transform(within(trace_keys::kMinTransmittance));
-  app.add_option("--max-hits", flags.max_hits, trace_keys::kMaxHits.help)
-      ->transform(within(trace_keys::kMaxHits));
-  app.add_option("--hit-order", flags.hit_order,
-                 "Depth that orders hits: entry (the paper) or peak")
-      ->check(one_of({"entry", "peak"}));
-  app.add_flag_function(
-      "--adaptive-radius,!--no-adaptive-radius",
-      [&flags](std::int64_t count) { flags.adaptive_radius = count > 0; },
-      "Shrink the ellipsoids of faint Gaussians to where they reach 1/255");
-  app.add_option("--near", flags.near_depth, trace_keys::kNear.help)
-      ->transform(within(trace_keys::kNear));
-  app.add_option("--background", flags.background,
-                 "colour behind the model, 0 to 1 each; one number is a grey")
-      ->check(color())
-      ->type_name("R,G,B");
-  std::vector<std::string> shapes;
-  for (const auto& [name, form] : trace_keys::kPacketShapes) shapes.emplace_back(name);
-  app.add_option("--packet-shape", flags.packet_shape, trace_keys::kPacketShapeHelp)
-      ->check(one_of(shapes));
-  app.add_option("--packet-width", flags.packet_width, trace_keys::kPacketWidth.help)
-      ->check(one_of({"0", "1", "2", "4", "8", "16", "32", "64"}));
-  app.add_option("--memory-budget", flags.memory_budget, trace_keys::kMemoryBudget.help)
-      ->transform(within(trace_keys::kMemoryBudget));
-  app.add_option("--launch-budget-ms", flags.launch_budget_ms,
-                 "Time of one launch; 0 = no bound, -1 = none on CPUs and 100 elsewhere")
-      ->check(between(-1, 1e9));
+namespace {
+
+CLI::Option* add_trace_row(CLI::App& app,
+                           TraceSettings& settings,
+                           const std::string& name,
+                           const std::string& names = {}) {
+  TraceOptions defaults;
+  const std::vector<OptionRow> rows = trace_rows(defaults);
+  return add_row(
+      app, *find_row(rows, name),
+      [&settings, name](const std::vector<std::string>& values) { settings.set(name, values); },
+      names);
 }
 
-void add_traversal_flag(CLI::App& app, TraceFlags& flags) {
-  app.add_option("--traversal", flags.traversal,
-                 "How camera rays find Gaussians: tiles, bvh, or auto (as tuned, else tiles)")
-      ->check(one_of({"auto", "tiles", "bvh"}));
+}  // namespace
+
+void add_trace_flags(CLI::App& app, TraceSettings& settings) {
+  add_trace_row(app, settings, "quantile", "--q");
+  for (const char* name : {"min-transmittance", "max-hits", "hit-order", "adaptive-radius", "near"})
+    add_trace_row(app, settings, name);
+  add_trace_row(app, settings, "background")->type_name("R,G,B");
+  for (const char* name : {"packet-shape", "packet-width", "memory-budget", "launch-budget-ms"})
+    add_trace_row(app, settings, name);
 }
 
-TraceOptions TraceFlags::over(TraceOptions base) const {
-  if (quantile) base.quantile = *quantile;
-  if (min_transmittance) base.min_transmittance = *min_transmittance;
-  if (max_hits) base.max_hits = *max_hits;
-  if (hit_order) base.hit_order = *hit_order == "peak" ? HitOrder::kPeak : HitOrder::kEntry;
-  if (adaptive_radius) base.adaptive_radius = *adaptive_radius;
-  if (near_depth) base.near_depth = *near_depth;
-  if (traversal) {
-    base.traversal = *traversal == "bvh"     ? Traversal::kBvh
-                     : *traversal == "tiles" ? Traversal::kTiles
-                                             : Traversal::kAuto;
-  }
-  if (background) base.background = parse_color(*background);
-  for (const auto& [name, form] : trace_keys::kPacketShapes) {
-    if (packet_shape && *packet_shape == name) base.packet_form = form;
-  }
-  if (packet_width) base.packet_width = *packet_width;
-  if (memory_budget) base.memory_budget = *memory_budget << 20;
-  if (launch_budget_ms) base.launch_budget_ms = *launch_budget_ms;
-  return base;
+void add_traversal_flag(CLI::App& app, TraceSettings& settings) {
+  add_trace_row(app, settings, "traversal");
 }
 
 std::string with_compiling(const std::string& text, double seconds) {
@@ -276,10 +245,6 @@ CLI::Validator whole_between(double low, double high) {
       "");
 }
 
-CLI::Validator within(const NumberKey& key) {
-  return key.whole ? whole_between(key.low, key.high) : between(key.low, key.high);
-}
-
 CLI::Validator seed() {
   return CLI::Validator(
       [](std::string& text) {
@@ -291,31 +256,6 @@ CLI::Validator seed() {
         return std::string();
       },
       "");
-}
-
-CLI::Validator color() {
-  return CLI::Validator(
-      [](const std::string& text) {
-        const std::optional<std::vector<std::string>> parts = list_items({text});
-        const auto channel = [](const std::string& part) {
-          const std::optional<double> value = parse_real(part);
-          return value && trace_keys::kBackground.accepts(*value);
-        };
-        const bool good = parts && (parts->size() == 3 || parts->size() == 1) &&
-                          std::all_of(parts->begin(), parts->end(), channel);
-        return good ? std::string()
-                    : fmt::format("'{}' is not three numbers from 0 to 1, as in 1,0.5,0", text);
-      },
-      "");
-}
-
-std::array<float, 3> parse_color(const std::string& text) {
-  const std::vector<std::string> parts = parts_of(text);
-  std::array<float, 3> out{};
-  for (std::size_t k = 0; k < out.size(); ++k) {
-    out[k] = static_cast<float>(parse_real(parts.at(parts.size() == 1 ? 0 : k)).value_or(0.0));
-  }
-  return out;
 }
 
 CLI::Validator one_of(std::vector<std::string> names) {
@@ -354,9 +294,9 @@ namespace {
 bool takes_numbers(std::string_view name) {
   if (name == "--background" || name == "--up" || name == "--sizes") return true;
   TrainOptions options;
-  const std::vector<TrainKey> keys = train_keys(options);
-  return name.starts_with("--") && std::any_of(keys.begin(), keys.end(), [&](const TrainKey& key) {
-           return key.list == TrainKey::List::kNumbers && key.name == name.substr(2);
+  const std::vector<OptionRow> keys = train_keys(options);
+  return name.starts_with("--") && std::any_of(keys.begin(), keys.end(), [&](const OptionRow& key) {
+           return key.list == OptionRow::List::kNumbers && key.name == name.substr(2);
          });
 }
 

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/trace_keys.hpp"
+#include "core/trace_rows.hpp"
 #include "device/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
@@ -53,25 +53,9 @@ void add_device_flags(CLI::App& app, DeviceFlags& flags);
 std::unique_ptr<Context> open_context(const DeviceFlags& flags);
 
 /// Tracing options as given: what is not given stays as the model's run or the defaults have it.
-struct TraceFlags {
-  std::optional<float> quantile;
-  std::optional<float> min_transmittance;
-  std::optional<int> max_hits;
-  std::optional<std::string> hit_order;
-  std::optional<bool> adaptive_radius;
-  std::optional<float> near_depth;
-  std::optional<std::string> traversal;  // commands that know it: add_traversal_flag()
-  std::optional<std::string> background;
-  std::optional<std::string> packet_shape;
-  std::optional<int> packet_width;
-  std::optional<std::size_t> memory_budget;  ///< MiB
-  std::optional<double> launch_budget_ms;
-
-  TraceOptions over(TraceOptions base) const;
-};
-void add_trace_flags(CLI::App& app, TraceFlags& flags);
+void add_trace_flags(CLI::App& app, TraceSettings& settings);
 /// --traversal, for commands that trace cameras by either way.
-void add_traversal_flag(CLI::App& app, TraceFlags& flags);
+void add_traversal_flag(CLI::App& app, TraceSettings& settings);
 
 /// `text`, and how long kernels were compiled where that is worth mentioning.
 std::string with_compiling(const std::string& text, double seconds);
@@ -108,12 +92,8 @@ CLI::Validator above(double low);
 CLI::Validator between(double low, double high);
 /// Whole numbers, in every spelling that configuration files know (1_000, 1e3).
 CLI::Validator whole_between(double low, double high);
-CLI::Validator within(const NumberKey& key);
 /// 0 to 2^64 - 1.
 CLI::Validator seed();
-/// Three numbers from 0 to 1, or one for grey.
-CLI::Validator color();
-std::array<float, 3> parse_color(const std::string& text);
 CLI::Validator one_of(std::vector<std::string> names);
 /// Three numbers with commas, for example a colour or a direction.
 CLI::Validator triple();

@@ -33,7 +33,7 @@ struct RenderFlags {
   std::optional<int> max_bounces;
   std::optional<std::uint64_t> seed;
   std::string frames;
-  TraceFlags trace;
+  TraceSettings trace;
   DeviceFlags device;
 
   /// Throws UsageError for options that do not go with the format.

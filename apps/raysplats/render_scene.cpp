@@ -31,7 +31,7 @@ void check(const RenderFlags& flags) {
   if (flags.supersample != 1) {
     throw UsageError("--supersample is for models alone: scene files take --samples");
   }
-  if (flags.trace.near_depth) {
+  if (flags.trace.has("near")) {
     throw UsageError(
         "--near is for models alone: rays that leave a mirror have no camera that could be near");
   }

@@ -15,7 +15,7 @@
 #include "bench/ceilings.hpp"
 #include "bench/operation.hpp"
 #include "bench/scene_bench.hpp"
-#include "core/trace_keys.hpp"
+#include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
 
@@ -107,7 +107,7 @@ std::map<std::string, std::string> option_texts(const Context& context,
           {"repeat", std::to_string(options.repeat)},
           {"rays", std::to_string(options.rays)},
           {"triangles", std::to_string(options.triangles)},
-          {"packet-shape", trace_keys::packet_shape_name(options.trace.packet_form)},
+          {"packet-shape", packet_shape_name(options.trace.packet_form)},
           {"packet-width", std::to_string(options.trace.packet_width)},
           {"hit-order", options.trace.hit_order == HitOrder::kPeak ? "peak" : "entry"},
           {"quantile", fmt::format("{:g}", options.trace.quantile)},

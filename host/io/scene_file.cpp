@@ -11,7 +11,6 @@
 #include <tuple>
 
 #include "base/nearest_name.hpp"
-#include "core/trace_keys.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 
@@ -245,68 +244,36 @@ RenderSettings read_render(TomlTable& table) {
   return r;
 }
 
-template <class T>
-void maybe(TomlTable& table, const char* key, std::optional<T>& target, double low, double high) {
-  if (!table.has(key)) return;
-  T value{};
-  table.number(key, value, low, high);
-  target = value;
-}
-
-template <class T>
-void maybe(TomlTable& table, const char* key, std::optional<T>& target, const NumberKey& range) {
-  maybe(table, key, target, range.low, range.high);
-}
-
-SceneTrace read_trace(TomlTable& table) {
-  SceneTrace t;
+TraceSettings read_trace(TomlTable& table) {
+  TraceSettings t;
   if (table.has("q") && table.has("quantile")) {
     table.fail("q", "'q' and 'quantile' in [trace] say the same: leave one out");
   }
-  maybe(table, table.has("q") ? "q" : "quantile", t.quantile, trace_keys::kQuantile);
-  maybe(table, trace_keys::kMinTransmittance.name, t.min_transmittance,
-        trace_keys::kMinTransmittance);
-  maybe(table, trace_keys::kMaxHits.name, t.max_hits, trace_keys::kMaxHits);
-  if (table.number("near", trace_keys::kNear.low, trace_keys::kNear.high).value_or(0.0) != 0.0) {
+  const auto read = [&](const char* key, const char* name) {
+    const std::optional<std::vector<std::string>> values = table.values(key);
+    if (!values) return;
+    try {
+      t.set(name, *values);
+    } catch (const UsageError& error) {
+      table.fail(key, fmt::format("{} ([trace])", error.what()));
+    }
+  };
+  read("q", "quantile");
+  for (const char* name :
+       {"quantile", "min-transmittance", "max-hits", "hit-order", "adaptive-radius", "background",
+        "packet-width", "packet-shape", "memory-budget", "launch-budget-ms"}) {
+    read(name, name);
+  }
+  if (table.number("near", 0, kHuge).value_or(0.0) != 0.0) {
     table.fail(
         "near",
         "'near' in [trace] can only be 0: rays that leave a mirror have no camera that could "
         "be near");
   }
-  if (table.has("hit-order")) {
-    HitOrder order{};
-    table.choice<HitOrder>("hit-order", order,
-                           {{"entry", HitOrder::kEntry}, {"peak", HitOrder::kPeak}});
-    t.hit_order = order;
-  }
-  if (table.has("adaptive-radius")) {
-    bool value = false;
-    table.flag("adaptive-radius", value);
-    t.adaptive_radius = value;
-  }
-  if (table.has("background")) {
-    t.background.emplace();
-    table.vector("background", *t.background, trace_keys::kBackground.low,
-                 trace_keys::kBackground.high);
-  }
-  maybe(table, trace_keys::kPacketWidth.name, t.packet_width, trace_keys::kPacketWidth);
-  if (table.has(trace_keys::kPacketShape)) {
-    PacketForm form{};
-    std::vector<std::pair<std::string, PacketForm>> forms;
-    for (const auto& [name, each] : trace_keys::kPacketShapes) forms.emplace_back(name, each);
-    table.choice<PacketForm>(trace_keys::kPacketShape, form, forms);
-    t.packet_form = form;
-  }
-  if (!trace_keys::is_packet_width(t.packet_form.value_or(PacketForm::kAuto),
-                                   t.packet_width.value_or(0))) {
-    table.fail(
-        "packet-width",
-        "'packet-width' in [trace] has to be 0, 1, 2, 4, 8 or 16 with 'packet-shape' vector, "
-        "0, 8, 16, 32 or 64 with group");
-  }
-  if (const auto budget = table.number("memory-budget", trace_keys::kMemoryBudget.low,
-                                       trace_keys::kMemoryBudget.high)) {
-    t.memory_budget = static_cast<std::size_t>(*budget) << 20;
+  try {
+    check_packet_width(t.over({}));
+  } catch (const UsageError& error) {
+    table.fail("packet-width", error.what());
   }
   table.finish();
   return t;
@@ -346,19 +313,6 @@ glm::dmat4 SceneMesh::placement(double time) const {
          glm::translate(identity, -center) * transform;
 }
 
-TraceOptions SceneTrace::over(TraceOptions base) const {
-  base.quantile = quantile.value_or(base.quantile);
-  base.min_transmittance = min_transmittance.value_or(base.min_transmittance);
-  base.max_hits = max_hits.value_or(base.max_hits);
-  base.packet_form = packet_form.value_or(base.packet_form);
-  base.packet_width = packet_width.value_or(base.packet_width);
-  base.hit_order = hit_order.value_or(base.hit_order);
-  base.adaptive_radius = adaptive_radius.value_or(base.adaptive_radius);
-  base.background = background.value_or(base.background);
-  base.memory_budget = memory_budget.value_or(base.memory_budget);
-  return base;
-}
-
 SceneFile read_scene_file(const std::filesystem::path& path) {
   const toml::table root = io::read_toml(path);
   TomlTable table(root, path, "the scene file");
@@ -374,7 +328,7 @@ SceneFile read_scene_file(const std::filesystem::path& path) {
   if (auto found = table.table("render")) scene.render = read_render(*found);
   if (auto found = table.table("trace")) scene.trace = read_trace(*found);
   if (auto found = table.table("animation")) {
-    maybe(*found, "frames", scene.frames, 1, 1e6);
+    if (found->has("frames")) found->number("frames", scene.frames.emplace(), 1, 1e6);
     found->finish();
   }
   table.finish();

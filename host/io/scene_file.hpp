@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/trace_rows.hpp"
 #include "io/scene_camera.hpp"
 #include "raysplats/scene.hpp"
 #include "raysplats/trace_options.hpp"
@@ -59,20 +60,6 @@ struct SceneEnvironment {
   float rotation = 0.0f;
 };
 
-/// Tracing options that were given; the others are as the models were trained. near_depth means
-/// nothing to rays that are not a camera's.
-struct SceneTrace {
-  std::optional<float> quantile, min_transmittance;
-  std::optional<int> max_hits, packet_width;
-  std::optional<HitOrder> hit_order;
-  std::optional<PacketForm> packet_form;
-  std::optional<bool> adaptive_radius;
-  std::optional<std::array<float, 3>> background;
-  std::optional<std::size_t> memory_budget;  ///< bytes
-
-  TraceOptions over(TraceOptions base) const;
-};
-
 /// What a scene.toml says (docs/scene.md), checked but not loaded.
 struct SceneFile {
   std::filesystem::path path;
@@ -83,7 +70,7 @@ struct SceneFile {
   SceneEnvironment environment;
   SceneCamera camera;
   RenderSettings render;
-  SceneTrace trace;
+  TraceSettings trace;        ///< that were given; the others are as the models were trained
   TraceOptions trained;       ///< what `trace` goes over
   std::optional<int> frames;  ///< [animation]
   /// Size of the pictures whatever the camera says, then divided by `downscale`.

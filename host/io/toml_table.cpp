@@ -262,6 +262,18 @@ std::optional<std::string> TomlTable::text(std::string_view key) {
   return node->value<std::string>();
 }
 
+std::optional<std::vector<std::string>> TomlTable::values(std::string_view key) {
+  const toml::node* node = take(key);
+  if (node == nullptr) return std::nullopt;
+  std::optional<std::vector<std::string>> texts = value_texts(*node);
+  if (!texts) {
+    fail(key,
+         fmt::format("'{}' in {} has to be a value or a list of values, not {}", key, name_,
+                     node->is_array() ? "a list of lists, tables or dates" : type_name(*node)));
+  }
+  return texts;
+}
+
 std::optional<std::vector<double>> TomlTable::numbers(std::string_view key, std::size_t count) {
   const toml::node* node = take(key);
   if (node == nullptr) return std::nullopt;

@@ -59,6 +59,8 @@ class TomlTable {
   void seed(std::string_view key, std::uint64_t& target);
   void flag(std::string_view key, bool& target);
   std::optional<std::string> text(std::string_view key);
+  /// A number, text or truth value, or a list of them, as texts.
+  std::optional<std::vector<std::string>> values(std::string_view key);
   /// Three numbers.
   void vector(std::string_view key, std::array<float, 3>& target, double low, double high);
   std::optional<glm::dvec3> vector(std::string_view key);

@@ -23,18 +23,10 @@
 namespace raysplats {
 namespace {
 
-TraceOptions sum_options_of(const TrainOptions& options) {
-  TraceOptions out;
-  out.gradient_sum = options.gradient_sum;
-  out.deterministic = options.deterministic;
-  out.memory_budget = static_cast<std::size_t>(options.memory_budget) * kMiB;
-  return out;
-}
-
 // Whether gradients of packets may be added in long integers. Copies that do not fit their share
 // of memory-budget become that, too.
 bool may_sum_exactly(const TrainOptions& options, std::size_t gaussians, const DeviceInfo& device) {
-  const TraceOptions trace = sum_options_of(options);
+  const TraceOptions trace = options.trace;
   return GradientSumChoice::of(trace, device, gaussians,
                                MemoryShares(trace.memory_budget).packet_gradients(), 1)
              .sum == GradientSum::kExact;
@@ -51,11 +43,11 @@ RayShare rays_per_gaussian(const TrainOptions& options,
                            const DeviceInfo& device) {
   const int lanes = ray_lanes(device, 0);
   const GradientSumChoice choice =
-      RayBackward::sum_choice(sum_options_of(options), device, gaussians, options.sh_degree);
+      RayBackward::sum_choice(options.trace, device, gaussians, options.sh_degree);
   const std::size_t lines =
       RayBackward::sum_lines(options.sh_degree) * sizeof(GradientSums::Line) * choice.copies;
   const std::size_t exact = choice.sum == GradientSum::kExact ? lines * RS_EXACT_WORDS : 0;
-  const std::size_t block = sizeof(float) * RayTree::block_floats(options.adaptive_radius);
+  const std::size_t block = sizeof(float) * RayTree::block_floats(options.trace.adaptive_radius);
   // Box, tree, record.
   return {sizeof(RsAabb) + Lbvh::bytes_per_box(lanes) + block + 64 + lines + exact,
           std::max({lines, exact, block})};
@@ -72,7 +64,7 @@ std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels) {
   const bool reflects = mirrors > 0 && options.mirror_bounces > 0;
   const std::size_t reflected = reflects ? segment + mirrors + sizeof(RsPath) : 0;
   const std::size_t rays =
-      std::min(pixels, ViewTracer::batch(static_cast<std::size_t>(options.memory_budget) * kMiB));
+      std::min(pixels, ViewTracer::batch(options.trace.memory_budget));
   return rays * (segment + order + mirrors + reflected);
 }
 
@@ -105,8 +97,8 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                         demand.views * demand.pixels * 4) +
                demand.pixels * (24 + (options.exposure ? 4 : 0)) * sizeof(float);
   if (packets) {
-    out.hits = std::min(static_cast<std::size_t>(options.memory_budget) * kMiB,
-                        demand.pixels * static_cast<std::size_t>(options.max_hits) * 12);
+    out.hits = std::min(options.trace.memory_budget,
+                        demand.pixels * static_cast<std::size_t>(options.trace.max_hits) * 12);
   }
   std::size_t largest = std::max({sh * sizeof(float), sizeof(RsLine), packets ? exact : 0});
   if (demand.ray_views > 0) {

@@ -87,39 +87,19 @@ ModelSource find_model(const std::filesystem::path& path) {
 }
 
 DatasetOptions dataset_options(const ModelSource& source) {
-  DatasetOptions out;
-  if (source.trained) {
-    out.downscale = source.trained->downscale;
-    out.test_every = source.trained->test_every;
-    out.undistort = source.trained->undistort;
-    out.masks = source.trained->masks;
-  }
-  return out;
+  return source.trained ? source.trained->data : DatasetOptions();
 }
 
 TraceOptions trace_options(const ModelSource& source, bool cut_out) {
-  TraceOptions out;
   if (!source.trained && source.header) return *source.header;
   if (!source.trained) {
     spdlog::info(
         "{} does not say how it is traced: hits are taken in peak order, as rasterisers do",
         source.ply.string());
-    out.hit_order = HitOrder::kPeak;
-    out.adaptive_radius = true;
-    return out;
+    return peak_order();
   }
-  const TrainOptions& trained = *source.trained;
-  out.quantile = static_cast<float>(trained.quantile);
-  out.min_transmittance = static_cast<float>(trained.min_transmittance);
-  out.max_hits = trained.max_hits;
-  out.hit_order = trained.hit_order;
-  out.adaptive_radius = trained.adaptive_radius;
-  out.near_depth = static_cast<float>(trained.near_depth);
-  out.traversal = trained.traversal;
-  out.background = background_color(trained, cut_out);
-  out.packet_form = trained.packet_form;
-  out.packet_width = trained.packet_width;
-  out.memory_budget = static_cast<std::size_t>(trained.memory_budget) << 20;
+  TraceOptions out = source.trained->trace;
+  out.background = background_color(*source.trained, cut_out);
   return out;
 }
 

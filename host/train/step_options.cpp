@@ -1,27 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/step_options.hpp"
 
-#include "train/memory_estimate.hpp"
 #include "train/schedule.hpp"
 
 namespace raysplats {
 
 TraceOptions trace_options_of(const TrainOptions& options, const std::array<float, 3>& background) {
-  TraceOptions trace;
-  trace.quantile = static_cast<float>(options.quantile);
-  trace.min_transmittance = static_cast<float>(options.min_transmittance);
-  trace.max_hits = options.max_hits;
-  trace.hit_order = options.hit_order;
-  trace.adaptive_radius = options.adaptive_radius;
-  trace.near_depth = static_cast<float>(options.near_depth);
-  trace.traversal = options.traversal;
+  TraceOptions trace = options.trace;
   trace.background = background;
-  trace.packet_form = options.packet_form;
-  trace.packet_width = options.packet_width;
-  trace.gradient_sum = options.gradient_sum;
-  trace.deterministic = options.deterministic;
-  trace.launch_budget_ms = options.launch_budget_ms;
-  trace.memory_budget = static_cast<std::size_t>(options.memory_budget) * kMiB;
   return trace;
 }
 

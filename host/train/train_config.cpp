@@ -13,7 +13,8 @@
 #include <utility>
 
 #include "base/nearest_name.hpp"
-#include "core/trace_keys.hpp"
+#include "core/option_flags.hpp"
+#include "core/trace_rows.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "train/train_keys.hpp"
@@ -69,10 +70,10 @@ std::string dashed(std::string_view key) {
   return out;
 }
 
-std::vector<std::string> names_of(const std::vector<TrainKey>& keys) {
+std::vector<std::string> names_of(const std::vector<OptionRow>& keys) {
   std::vector<std::string> names;
   names.reserve(keys.size());
-  for (const TrainKey& key : keys) names.push_back(key.name);
+  for (const OptionRow& key : keys) names.push_back(key.name);
   return names;
 }
 
@@ -80,7 +81,7 @@ std::vector<std::string> names_of(const std::vector<TrainKey>& keys) {
 void read_keys(const toml::table& table,
                const std::string& prefix,
                const std::filesystem::path& path,
-               const std::vector<TrainKey>& keys,
+               const std::vector<OptionRow>& keys,
                std::set<std::string>& seen,
                const std::function<bool(const std::string&)>& skip) {
   for (const auto& [written, node] : table) {
@@ -93,7 +94,7 @@ void read_keys(const toml::table& table,
       read_keys(*node.as_table(), "train.", path, keys, seen, skip);
       continue;
     }
-    const auto key = std::find_if(keys.begin(), keys.end(), [&](const TrainKey& candidate) {
+    const auto key = std::find_if(keys.begin(), keys.end(), [&](const OptionRow& candidate) {
       return candidate.name == name;
     });
     if (key == keys.end() && (node.is_table() || node.is_array_of_tables())) {
@@ -155,27 +156,9 @@ std::string shell_text(std::string text) {
 }  // namespace
 
 void add_train_options(CLI::App& app, TrainOptions& options) {
-  for (const TrainKey& key : train_keys(options)) {
-    const std::string flag = "--" + key.name;
-    CLI::Option* option = nullptr;
-    if (key.flag) {
-      const auto set = key.set;
-      option = app.add_flag_function(
-          fmt::format("{},!--no-{}", flag, key.name),
-          [set](std::int64_t count) { set({count > 0 ? "true" : "false"}); }, key.help);
-    } else {
-      option = app.add_option_function<std::vector<std::string>>(
-          key.name == "iterations" ? "-n," + flag
-          : key.name == "mirrors"  ? "--mirror," + flag
-                                   : flag,
-          key.set, key.help);
-      // One word per use: further ones would swallow the data set's name.
-      option->expected(1)->allow_extra_args(false);
-      option->type_name(key.list == TrainKey::List::kNone ? "VALUE" : "LIST");
-      option->multi_option_policy(key.list == TrainKey::List::kNone
-                                      ? CLI::MultiOptionPolicy::TakeLast
-                                      : CLI::MultiOptionPolicy::TakeAll);
-    }
+  for (const OptionRow& key : train_keys(options)) {
+    const char* names = key.name == "iterations" ? "-n" : key.name == "mirrors" ? "--mirror" : "";
+    CLI::Option* option = add_row(app, key, key.set, names);
     option->default_str(shell_text(key.text()))->group(key.section);
   }
   app.add_option("--config", "configuration file (TOML); options on the command line go before it")
@@ -220,7 +203,7 @@ std::string to_toml(const TrainOptions& options) {
   TrainOptions copy = options;
   std::string out;
   std::string section;
-  for (const TrainKey& key : train_keys(copy)) {
+  for (const OptionRow& key : train_keys(copy)) {
     if (key.section != section) {
       section = key.section;
       out += fmt::format("{}# ---- {} ----\n", out.empty() ? "" : "\n", section);
@@ -231,12 +214,7 @@ std::string to_toml(const TrainOptions& options) {
 }
 
 void validate(const TrainOptions& options) {
-  if (!trace_keys::is_packet_width(options.packet_form, options.packet_width)) {
-    throw UsageError(
-        fmt::format("The option 'packet-width' is 0, 1, 2, 4, 8 or 16 with 'packet-shape' vector, "
-                    "0, 8, 16, 32 or 64 with group, not {}",
-                    options.packet_width));
-  }
+  check_packet_width(options.trace);
   const auto& sizes = options.resolution_schedule;
   const auto earlier = [&options](const ResolutionStep& a, const ResolutionStep& b) {
     return a.until.of(options.iterations) < b.until.of(options.iterations);
@@ -253,7 +231,7 @@ void validate(const TrainOptions& options) {
           "0");
     }
   }
-  if (options.deterministic && options.gradient_sum == GradientSum::kAtomic) {
+  if (options.trace.deterministic && options.trace.gradient_sum == GradientSum::kAtomic) {
     throw UsageError(
         "The options 'deterministic' and 'gradient-sum' = atomic contradict each other, because "
         "atomic sums depend on the scheduling: use 'gradient-sum' = auto or leave 'deterministic' "

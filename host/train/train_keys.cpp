@@ -6,40 +6,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <optional>
-#include <type_traits>
 #include <utility>
 
 #include "base/number_text.hpp"
-#include "core/trace_keys.hpp"
+#include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
 namespace {
 
-using Values = std::vector<std::string>;
+using Values = OptionTable::Values;
 
 constexpr double kHuge = kNoBound;
 constexpr double kMaxCount = 1e15;
 constexpr double kMaxSeed = 0x1p64;  // rounded; the type ends there
-
-template <class T>
-T parse_number(const std::string& key, const std::string& text, double low, double high) {
-  std::optional<T> value;
-  if constexpr (std::is_floating_point_v<T>) {
-    value = parse_real(text);
-  } else if constexpr (std::is_unsigned_v<T>) {
-    value = parse_natural(text);
-  } else if (const std::optional<std::int64_t> whole = parse_whole(text)) {
-    if (std::in_range<T>(*whole)) value = static_cast<T>(*whole);
-  }
-  if (!value || static_cast<double>(*value) < low || static_cast<double>(*value) > high) {
-    throw UsageError(fmt::format("The option '{}' needs {}, not '{}'", key,
-                                 number_words(std::is_integral_v<T>, low, high), text));
-  }
-  return *value;
-}
 
 // A share of the run (below 1) or a whole number of iterations.
 RunShare parse_share(const std::string& key, const std::string& text, bool may_be_none) {
@@ -58,19 +39,10 @@ RunShare parse_share(const std::string& key, const std::string& text, bool may_b
 
 std::string share_text(const RunShare& share) { return fmt::format("{}", share.value); }
 
-std::vector<std::string> items(const std::string& key, const Values& values) {
-  std::optional<std::vector<std::string>> list = list_items(values);
-  if (!list) {
-    throw UsageError(fmt::format("The option '{}' is a list as in [1, 2], not '{}'", key,
-                                 fmt::join(values, " ")));
-  }
-  return std::move(*list);
-}
-
 // "4:0.1": a fourth of the size up to a tenth of the run. Plain numbers halve the divisor down to
 // 1: of n entries the first starts at 2^n.
 std::vector<ResolutionStep> parse_resolutions(const std::string& key, const Values& values) {
-  const std::vector<std::string> entries = items(key, values);
+  const std::vector<std::string> entries = option_items(key, values);
   const auto named = std::count_if(entries.begin(), entries.end(), [](const std::string& entry) {
     return entry.find(':') != std::string::npos;
   });
@@ -86,7 +58,7 @@ std::vector<ResolutionStep> parse_resolutions(const std::string& key, const Valu
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const std::size_t colon = entries[i].find(':');
     ResolutionStep step;
-    step.divisor = named > 0 ? parse_number<int>(key, entries[i].substr(0, colon), 1, 64)
+    step.divisor = named > 0 ? option_number<int>(key, entries[i].substr(0, colon), 1, 64)
                              : 1 << (entries.size() - i);
     step.until = parse_share(key, named > 0 ? entries[i].substr(colon + 1) : entries[i], false);
     out.push_back(step);
@@ -94,133 +66,24 @@ std::vector<ResolutionStep> parse_resolutions(const std::string& key, const Valu
   return out;
 }
 
-const std::string& single(const std::string& key, const Values& values) {
-  if (values.size() != 1) {
-    throw UsageError(fmt::format("The option '{}' takes one value, not {}", key, values.size()));
-  }
-  return values.front();
-}
-
-// The text as TOML that needs no escapes, which the runs of older versions wrote without.
-std::string toml_text(const std::string& text) {
-  const char quote = text.find('\\') == std::string::npos ? '"' : '\'';
-  return quote + text + quote;
-}
-
-// What toml_text() can hold.
-const std::string& quotable(const std::string& key, const std::string& value) {
-  const bool bad = std::any_of(value.begin(), value.end(), [](char c) {
-    return c == '"' || static_cast<unsigned char>(c) < 0x20;
-  });
-  const bool both = value.find('\\') != std::string::npos && value.find('\'') != std::string::npos;
-  if (bad || both) {
-    throw UsageError(fmt::format(
-        "The option '{}' takes no double quotes, no control characters and no single quotes "
-        "beside backslashes",
-        key));
-  }
-  return value;
-}
-
-// Collects the table; every function adds one key.
-class Table {
+// The kinds of options that only a run has.
+class TrainTable : public OptionTable {
  public:
-  void section(std::string name) { section_ = std::move(name); }
-
-  template <class T>
-  void number(
-      const std::string& name, T& target, double low, double high, const std::string& help) {
-    add(
-        name, help, false,
-        [name, &target, low, high](const Values& values) {
-          target = parse_number<T>(name, single(name, values), low, high);
-        },
-        [&target] {
-          // TOML's integers end before unsigned ones do.
-          const bool beyond = std::is_unsigned_v<T> && static_cast<double>(target) >= 0x1p63;
-          const std::string text = fmt::format("{}", target);
-          return beyond ? toml_text(text) : text;
-        });
-  }
-
-  template <class T>
-  void number(const NumberKey& key, T& target) {
-    number(key.name, target, key.low, key.high, key.help);
-  }
-
-  void flag(const std::string& name, bool& target, const std::string& help) {
-    add(
-        name, help, true,
-        [name, &target](const Values& values) {
-          const std::string& text = single(name, values);
-          if (text != "true" && text != "false") {
-            throw UsageError(fmt::format("The option '{}' is true or false, not '{}'", name, text));
-          }
-          target = text == "true";
-        },
-        [&target] { return std::string(target ? "true" : "false"); });
-  }
-
-  template <class E>
-  void choice(const std::string& name,
-              E& target,
-              const std::vector<std::pair<std::string, E>>& names,
-              const std::string& help) {
-    add(
-        name, help, false,
-        [name, &target, names](const Values& values) {
-          const std::string& text = single(name, values);
-          std::vector<std::string> known;
-          for (const auto& [label, value] : names) {
-            if (label == text) {
-              target = value;
-              return;
-            }
-            known.push_back(label);
-          }
-          throw UsageError(
-              fmt::format("The option '{}' is {}, not '{}'", name, fmt::join(known, " or "), text));
-        },
-        [&target, names] {
-          for (const auto& [label, value] : names) {
-            if (value == target) return toml_text(label);
-          }
-          return std::string();
-        });
-  }
-
-  void text(const std::string& name, std::string& target, const std::string& help) {
-    add(
-        name, help, false,
-        [name, &target](const Values& values) { target = quotable(name, single(name, values)); },
-        [&target] { return toml_text(target); });
-  }
-
-  // A word, or three numbers in any spelling of a list, kept as "r,g,b".
-  void color(const std::string& name, std::string& target, const std::string& help) {
-    add(
-        name, help, false,
-        [name, &target](const Values& values) {
-          target = quotable(name, fmt::format("{}", fmt::join(items(name, values), ",")));
-        },
-        [&target] { return toml_text(target); });
-  }
-
   void share(const std::string& name, RunShare& target, bool may_be_none, const std::string& help) {
     add(
-        name, help, false,
+        name, help,
         [name, &target, may_be_none](const Values& values) {
-          target = parse_share(name, single(name, values), may_be_none);
+          target = parse_share(name, option_value(name, values), may_be_none);
         },
         [&target] { return share_text(target); });
   }
 
   void shares(const std::string& name, std::vector<RunShare>& target, const std::string& help) {
     add(
-        name, help, false,
+        name, help,
         [name, &target](const Values& values) {
           std::vector<RunShare> parsed;
-          for (const std::string& entry : items(name, values))
+          for (const std::string& entry : option_items(name, values))
             parsed.push_back(parse_share(name, entry, false));
           target = std::move(parsed);
         },
@@ -229,15 +92,15 @@ class Table {
           texts.reserve(target.size());
           for (const RunShare& entry : target) texts.push_back(share_text(entry));
           return fmt::format("[{}]", fmt::join(texts, ", "));
-        });
-    keys_.back().list = TrainKey::List::kNumbers;
+        },
+        OptionRow::List::kNumbers);
   }
 
   void resolutions(const std::string& name,
                    std::vector<ResolutionStep>& target,
                    const std::string& help) {
     add(
-        name, help, false,
+        name, help,
         [name, &target](const Values& values) { target = parse_resolutions(name, values); },
         [&target] {
           std::vector<std::string> texts;
@@ -245,75 +108,41 @@ class Table {
           for (const ResolutionStep& step : target)
             texts.push_back(fmt::format("\"{}:{}\"", step.divisor, share_text(step.until)));
           return fmt::format("[{}]", fmt::join(texts, ", "));
-        });
-    keys_.back().list = TrainKey::List::kNumbers;
-  }
-
-  void paths(const std::string& name, std::vector<std::string>& target, const std::string& help) {
-    // Absolute, so that a resumed run finds them from anywhere. A path may hold what separates the
-    // items of other lists, so that one value is one path.
-    add(
-        name, help, false,
-        [name, &target](const Values& values) {
-          target.clear();
-          for (const std::string& value : values) {
-            if (value.empty() || value == "[]") continue;
-            target.push_back(std::filesystem::absolute(quotable(name, value)).string());
-          }
         },
-        [&target] {
-          std::vector<std::string> texts;
-          for (const std::string& path : target) texts.push_back(toml_text(path));
-          return fmt::format("[{}]", fmt::join(texts, ", "));
-        });
-    keys_.back().list = TrainKey::List::kPaths;
+        OptionRow::List::kNumbers);
   }
 
   void learning_rate(const std::string& name, LearningRate& rate, const std::string& help) {
     number(name, rate.initial, 0, 1e3, "learning rate of " + help);
     number(name + "-final", rate.final_value, 0, 1e3, "value that " + name + " decays to");
   }
-
-  std::vector<TrainKey> take() { return std::move(keys_); }
-
- private:
-  void add(const std::string& name,
-           const std::string& help,
-           bool flag,
-           std::function<void(const Values&)> set,
-           std::function<std::string()> text) {
-    keys_.push_back(
-        {name, section_, help, flag, TrainKey::List::kNone, std::move(set), std::move(text)});
-  }
-
-  std::string section_;
-  std::vector<TrainKey> keys_;
 };
 
 }  // namespace
 
-std::vector<TrainKey> train_keys(TrainOptions& o) {
-  Table t;
+std::vector<OptionRow> train_keys(TrainOptions& o) {
+  TrainTable t;
   t.section("Run");
   t.number("iterations", o.iterations, 0, kMaxCount, "training steps, one view each");
   t.number("seed", o.seed, 0, kMaxSeed,
            "seed of view order, random start and splits; a run is a function of it");
   t.flag(
-      "deterministic", o.deterministic,
+      "deterministic", o.trace.deterministic,
       "the same seed gives the same bytes on the same device, whatever the scheduling; CPUs always "
       "do, others add gradients in long integers for it");
 
   t.section("Data");
-  t.number("downscale", o.downscale, 1, 1024, "photos are reduced by this factor");
-  t.number("test-every", o.test_every, 0, 1e9,
+  t.number("downscale", o.data.downscale, 1, 1024, "photos are reduced by this factor");
+  t.number("test-every", o.data.test_every, 0, 1e9,
            "every n-th view is held out when the data set has no split of its own; 0 = none");
-  t.flag("undistort", o.undistort,
+  t.flag("undistort", o.data.undistort,
          "turn photos through lenses with OpenCV distortion into pinhole pictures; false = their "
          "own pixels and rays");
-  t.choice<MaskUse>("masks", o.masks, {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
+  t.choice<MaskUse>("masks", o.data.masks,
+                    {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
                     "what is black in the photos' masks: ignore (it counts neither in the loss nor "
                     "in metrics) or cutout (background, as transparent pixels are)");
-  t.color("background", o.background,
+  t.words("background", o.background,
           "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
           "alpha, else their typical colour, which the run's configuration then names) or "
           "\"random\" (another colour per iteration for cut-out photos, else black)");
@@ -382,43 +211,7 @@ std::vector<TrainKey> train_keys(TrainOptions& o) {
   t.flag("sparse-adam", o.sparse_adam, "leave Gaussians alone that no ray of the view met");
 
   t.section("Ray tracing");
-  t.choice<HitOrder>("hit-order", o.hit_order,
-                     {{"entry", HitOrder::kEntry}, {"peak", HitOrder::kPeak}},
-                     "depth that orders a ray's hits: entry (near side of the ellipsoid, the "
-                     "paper) or peak (strongest "
-                     "response)");
-  t.number(trace_keys::kQuantile, o.quantile);
-  t.number(trace_keys::kMinTransmittance, o.min_transmittance);
-  t.number(trace_keys::kMaxHits, o.max_hits);
-  t.flag("adaptive-radius", o.adaptive_radius,
-         "shrink the ellipsoids to where they contribute at least 1/255");
-  t.number(trace_keys::kNear, o.near_depth);
-  t.choice<Traversal>(
-      "traversal", o.traversal,
-      {{"auto", Traversal::kAuto}, {"tiles", Traversal::kTiles}, {"bvh", Traversal::kBvh}},
-      "how camera rays find Gaussians: tiles (packets share the list of their tile), bvh (each ray "
-      "walks the hierarchy, the paper) or auto (as 'raysplats tune' found, else tiles); scenes "
-      "with "
-      "mirrors and orthographic cameras need rays one by one");
-  std::vector<std::pair<std::string, PacketForm>> forms;
-  for (const auto& [name, form] : trace_keys::kPacketShapes) forms.emplace_back(name, form);
-  t.choice<PacketForm>(trace_keys::kPacketShape, o.packet_form, forms,
-                       trace_keys::kPacketShapeHelp);
-  t.number(trace_keys::kPacketWidth, o.packet_width);
-  t.number(trace_keys::kMemoryBudget, o.memory_budget);
-  t.choice<GradientSum>(
-      "gradient-sum", o.gradient_sum,
-      {{"auto", GradientSum::kAuto},
-       {"copies", GradientSum::kCopies},
-       {"exact", GradientSum::kExact},
-       {"atomic", GradientSum::kAtomic}},
-      "how the gradients of rays are added: private copies (CPUs), exact (long integers, the same "
-      "bits in any order) or atomic (floats, not deterministic); auto = copies on CPUs, else "
-      "atomic, "
-      "or exact with deterministic");
-  t.number("launch-budget-ms", o.launch_budget_ms, -1, 1e9,
-           "a view is traced in bands of rows that take about this long each, so that watchdogs of "
-           "displays do not stop them; 0 = no bound, -1 = none on CPUs and 100 elsewhere");
+  add_trace_rows(t, o.trace);
 
   t.section("Density control");
   t.choice<DensityStrategy>(

@@ -79,7 +79,7 @@ Trainer::Impl::Impl(Context& device,
       order(options.seed, train_views.size()) {
   if (options.exposure) exposure.emplace(device, train_views.size());
   if (train_views.empty()) {
-    const bool held_out = options.test_every == 1 && !test_views.empty();
+    const bool held_out = options.data.test_every == 1 && !test_views.empty();
     throw UsageError(fmt::format(
         "The data set {} has no training views: {}", dataset.root.string(),
         held_out ? "--test-every 1 holds all of them out" : "its files name none to train on"));

@@ -51,7 +51,7 @@ void Trainer::Impl::warn_of_capped_rays() const {
   spdlog::warn(
       "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
       "behind: raise it",
-      iteration, capped_rays(), traced_rays, options.max_hits);
+      iteration, capped_rays(), traced_rays, options.trace.max_hits);
 }
 
 // Of a run whose pictures never came nearer to the photos.

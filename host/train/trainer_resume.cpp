@@ -69,11 +69,11 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
         "the run, or start a new one with --init",
         checkpoint.iteration, option, was, is));
   };
-  differs("downscale", before.downscale, options.downscale);
-  differs("test-every", before.test_every, options.test_every);
-  differs("undistort", before.undistort, options.undistort);
+  differs("downscale", before.data.downscale, options.data.downscale);
+  differs("test-every", before.data.test_every, options.data.test_every);
+  differs("undistort", before.data.undistort, options.data.undistort);
   differs("exposure", before.exposure, options.exposure);
-  const auto cuts = [](const TrainOptions& o) { return o.masks == MaskUse::kCutout; };
+  const auto cuts = [](const TrainOptions& o) { return o.data.masks == MaskUse::kCutout; };
   differs("masks = cutout", cuts(before), cuts(options));
 }
 

@@ -92,7 +92,7 @@ void Trainer::Impl::start() {
   if (const std::size_t by_rays = ray_views(); by_rays > 0) {
     spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),
                  !options.mirrors.empty() ? "there are mirrors in the scene"
-                 : options.traversal == Traversal::kBvh
+                 : options.trace.traversal == Traversal::kBvh
                      ? "traversal is bvh"
                      : "as tuned for the device, or their cameras have no tiles");
   }

@@ -55,6 +55,15 @@ struct LearningRate {
   double final_value = 0;
 };
 
+/// What a model is trained with unless options say otherwise: the order of hits in which standard
+/// viewers blend, and ellipsoids no larger than what they show.
+inline TraceOptions peak_order() {
+  TraceOptions options;
+  options.hit_order = HitOrder::kPeak;
+  options.adaptive_radius = true;
+  return options;
+}
+
 /// Everything that decides how a model is trained. The defaults are those of configs/default.toml;
 /// every member is a key of the configuration files and an option of `raysplats train` (the name
 /// with dashes).
@@ -62,13 +71,9 @@ struct TrainOptions {
   // Run
   std::int64_t iterations = 10000;
   std::uint64_t seed = 42;
-  bool deterministic = false;  ///< CPUs always are, unless gradient_sum is kAtomic
 
   // Data
-  double downscale = 1.0;
-  int test_every = 8;
-  bool undistort = true;
-  MaskUse masks = MaskUse::kIgnore;
+  DatasetOptions data;
   /// "auto" (white behind cut-out photos, else the photos' typical colour), "random" or "r,g,b".
   std::string background = "auto";
   std::int64_t image_budget = 1024;  ///< MiB
@@ -107,18 +112,8 @@ struct TrainOptions {
   bool sparse_adam = false;
 
   // Ray tracing
-  HitOrder hit_order = HitOrder::kPeak;
-  double quantile = 11.3449;
-  double min_transmittance = 1e-4;
-  int max_hits = 512;
-  bool adaptive_radius = true;
-  double near_depth = 0.0;
-  Traversal traversal = Traversal::kAuto;
-  PacketForm packet_form = PacketForm::kAuto;
-  int packet_width = 0;
-  std::int64_t memory_budget = 1024;  ///< MiB
-  GradientSum gradient_sum = GradientSum::kAuto;
-  double launch_budget_ms = -1.0;  ///< 0 = unbounded, -1 = the device's default
+  /// As standard viewers blend. Its background is not read: `background` above says it.
+  TraceOptions trace = peak_order();
 
   // Density control
   DensityStrategy strategy = DensityStrategy::kBudget;

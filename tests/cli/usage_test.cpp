@@ -66,11 +66,11 @@ TEST_CASE("a wrong command line is one sentence, exit code 2") {
   check_refused({"render", "m.ply", "-o", "x", "--data", "d", "--cameras", "c"}, 2, "--cameras");
   check_refused({"render", "m.ply", "-o", "x", "--data", "d", "--fov", "30"}, 2, "--orbit");
   check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--hit-order", "far"}, 2,
-                "entry, peak");
+                "'hit-order' is entry or peak");
   check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--background", "1,1"}, 2,
                 "three numbers");
   check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--max-hits", "nan"}, 2,
-                "--max-hits");
+                "'max-hits' needs a whole number");
 }
 
 TEST_CASE("devices can be read by programs") {

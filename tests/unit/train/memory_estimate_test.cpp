@@ -121,7 +121,7 @@ TEST_CASE("the state of a training is estimated to two percent") {
 
 TEST_CASE("a run that is too large is told the most Gaussians that fit, to the last one") {
   TrainOptions options;
-  options.memory_budget = 256;
+  options.trace.memory_budget = std::size_t{256} << 20;
   const MemoryDemand demand{5'000'000, 800 * 800, 100};
   for (const DeviceInfo& device :
        {device_with(std::uint64_t{4} << 30, std::uint64_t{1} << 30),
@@ -150,16 +150,16 @@ TEST_CASE("hit lists count up to their budget, exact sums where they may be used
   cpu.type = DeviceType::kCpu;
   TrainOptions options;
   const MemoryDemand demand{100'000, 1'000'000, 10};
-  options.memory_budget = 512;
+  options.trace.memory_budget = std::size_t{512} << 20;
   CHECK(estimate_memory(options, demand, gpu).hits == std::size_t{512} << 20);
-  options.max_hits = 2;
-  options.deterministic = true;
+  options.trace.max_hits = 2;
+  options.trace.deterministic = true;
   CHECK(estimate_memory(options, demand, gpu).hits == 24'000'000);
   const std::size_t exact = estimate_memory(options, demand, gpu).tracing;
   CHECK(exact == estimate_memory(options, demand, cpu).tracing + 320 * demand.gaussians);
-  options.deterministic = false;
+  options.trace.deterministic = false;
   CHECK(exact == estimate_memory(options, demand, gpu).tracing + 320 * demand.gaussians);
-  options.gradient_sum = GradientSum::kExact;
+  options.trace.gradient_sum = GradientSum::kExact;
   CHECK(exact == estimate_memory(options, demand, cpu).tracing);
 }
 
@@ -176,8 +176,8 @@ TEST_CASE("what views traced ray by ray take is estimated to an eighth") {
           CAPTURE(count);
           TrainOptions options;
           options.sh_degree = degree;
-          options.gradient_sum = sum;
-          options.memory_budget = 256;
+          options.trace.gradient_sum = sum;
+          options.trace.memory_budget = std::size_t{256} << 20;
           if (mirrored) options.mirrors = {"wall.obj"};
           TraceOptions trace;
           trace.gradient_sum = sum;
@@ -212,10 +212,10 @@ TEST_CASE("rays one by one count where a view needs them, in batches within thei
   CHECK(some.total() == packets.total() + all.rays);
   CHECK(all.total() < some.total());
   // 64 sums of 20 bytes more for each Gaussian.
-  options.deterministic = true;
+  options.trace.deterministic = true;
   const MemoryEstimate exact = estimate_memory(options, {gaussians, pixels, 10, 10}, gpu);
   CHECK(exact.rays == all.rays + gaussians * 64 * 20);
   CHECK(exact.largest_buffer == gaussians * 64 * 20);
-  options.memory_budget = 64;
+  options.trace.memory_budget = std::size_t{64} << 20;
   CHECK(estimate_memory(options, {0, pixels, 10, 10}, gpu).rays < std::size_t{64} << 20);
 }

@@ -42,12 +42,12 @@ TEST_CASE("a run folder means its newest saved model and its settings") {
                          "iteration_5000");  // interrupted before the file appeared
   CHECK_FALSE(find_model(run).trained.has_value());
   TrainOptions options;
-  options.hit_order = HitOrder::kPeak;
-  options.quantile = 9.5;
-  options.adaptive_radius = false;
+  options.trace.hit_order = HitOrder::kPeak;
+  options.trace.quantile = 9.5;
+  options.trace.adaptive_radius = false;
   options.background = "0.25,0.5,1";
-  options.memory_budget = 17;
-  options.downscale = 4.0;
+  options.trace.memory_budget = std::size_t{17} << 20;
+  options.data.downscale = 4.0;
   std::ofstream(run / "config.toml") << to_toml(options);
 
   for (const fs::path& named : {run, run / "point_cloud" / "iteration_1000" / "point_cloud.ply"}) {

@@ -93,7 +93,7 @@ TrainOptions small_options(std::int64_t iterations) {
   options.eval_at = {};
   options.save_at = {};
   options.checkpoint_every = 0;
-  options.memory_budget = 64;
+  options.trace.memory_budget = std::size_t{64} << 20;
   return options;
 }
 

@@ -51,8 +51,8 @@ TEST_CASE("the configuration written is the configuration read") {
   options.save_at = {10, 20};
   options.position_lr = {3e-4, 7e-7};
   options.scale_activation = ScaleActivation::kSigmoid;
-  options.hit_order = HitOrder::kPeak;
-  options.adaptive_radius = false;
+  options.trace.hit_order = HitOrder::kPeak;
+  options.trace.adaptive_radius = false;
   options.adam_epsilon = 1e-15;
   options.seed = 12345678901234567890ull;
   const auto path = temporary("round.toml");
@@ -78,15 +78,15 @@ TEST_CASE("the configurations of the project are valid and the default one docum
   std::ifstream stream(folder / "default.toml");
   const std::string text((std::istreambuf_iterator<char>(stream)),
                          std::istreambuf_iterator<char>());
-  for (const TrainKey& key : train_keys(defaults)) {
+  for (const OptionRow& key : train_keys(defaults)) {
     INFO(key.name);
     CHECK(text.find("\n" + key.name + " = ") != std::string::npos);
     CHECK(!key.help.empty());
   }
   TrainOptions paper;
   read_train_config(folder / "paper.toml", paper);
-  CHECK(paper.hit_order == HitOrder::kEntry);
-  CHECK(paper.traversal == Traversal::kBvh);
+  CHECK(paper.trace.hit_order == HitOrder::kEntry);
+  CHECK(paper.trace.traversal == Traversal::kBvh);
   CHECK(paper.scale_activation == ScaleActivation::kSigmoid);
   CHECK(paper.sh_degree == 0);
   CHECK(paper.pixel_loss == PixelLoss::kL2);
@@ -265,11 +265,11 @@ TEST_CASE("the command line beats the file, wherever --config stands") {
     const TrainOptions options = parse(arguments);
     CHECK(options.iterations == 9);
     CHECK(options.seed == 5);
-    CHECK(!options.adaptive_radius);
+    CHECK(!options.trace.adaptive_radius);
     CHECK(options.eval_at == std::vector<RunShare>{1, 2});
   }
-  CHECK(parse({"--config", path.string(), "--adaptive-radius"}).adaptive_radius);
-  CHECK(!parse({"--no-adaptive-radius"}).adaptive_radius);
+  CHECK(parse({"--config", path.string(), "--adaptive-radius"}).trace.adaptive_radius);
+  CHECK(!parse({"--no-adaptive-radius"}).trace.adaptive_radius);
   CHECK(parse({"--background", "1,1,1"}).background == "1,1,1");
   CHECK_THROWS_AS(parse({"--iterations", "x"}), UsageError);
   std::filesystem::remove(path);

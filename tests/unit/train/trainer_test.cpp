@@ -94,7 +94,7 @@ TrainOptions small_options() {
   options.eval_at = {};
   options.save_at = {};
   options.checkpoint_every = 0;
-  options.memory_budget = 64;
+  options.trace.memory_budget = std::size_t{64} << 20;
   return options;
 }
 
@@ -118,7 +118,7 @@ std::vector<std::string> lines_of(const std::filesystem::path& path) {
 TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
   Scene scene;
   TrainOptions options = small_options();
-  options.deterministic = true;  // elsewhere than on CPUs gradients are atomic sums otherwise
+  options.trace.deterministic = true;  // elsewhere than on CPUs gradients are atomic sums otherwise
   Trainer straight(scene.context, scene.dataset, options, scene.folder / "straight");
   const TrainSummary summary = straight.run(false);
   CHECK(summary.iterations == 40);
@@ -163,7 +163,7 @@ TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
 TEST_CASE("rays that reach the cap on hits are counted over the whole run, resumed ones included") {
   Scene scene;
   TrainOptions options = small_options();
-  options.max_hits = 25;
+  options.trace.max_hits = 25;
   const auto metrics_of = [](const std::filesystem::path& run) {
     return nlohmann::json::parse(std::ifstream(run / "metrics.json"));
   };
@@ -197,7 +197,7 @@ TEST_CASE("rays that reach the cap on hits are counted over the whole run, resum
 TEST_CASE("a run resumed between two passes of density control ends with the same bytes") {
   Scene scene;
   TrainOptions options = small_options();
-  options.deterministic = true;
+  options.trace.deterministic = true;
   options.footprint = 3.0;  // nearly every axis is at its least size
   options.position_lr = {2e-2, 2e-2};
   Trainer straight(scene.context, scene.dataset, options, scene.folder / "straight");

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/trace_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kMiBShift = 20;
+
+const std::vector<std::pair<std::string, PacketForm>>& packet_shapes() {
+  static const std::vector<std::pair<std::string, PacketForm>> shapes{
+      {"auto", PacketForm::kAuto}, {"vector", PacketForm::kVector}, {"group", PacketForm::kGroup}};
+  return shapes;
+}
+
+}  // namespace
+
+std::string packet_shape_name(PacketForm form) {
+  for (const auto& [name, each] : packet_shapes()) {
+    if (each == form) return name;
+  }
+  return "";
+}
+
+void check_packet_width(const TraceOptions& options) {
+  const int width = options.packet_width;
+  if (width == 0) return;
+  const int low = options.packet_form == PacketForm::kGroup ? 8 : 1;
+  const int high = options.packet_form == PacketForm::kVector ? 16 : 64;
+  if ((width & (width - 1)) == 0 && width >= low && width <= high) return;
+  throw UsageError(
+      fmt::format("The option 'packet-width' is 0, 1, 2, 4, 8 or 16 with 'packet-shape' vector, "
+                  "0, 8, 16, 32 or 64 with group, not {}",
+                  width));
+}
+
+void add_trace_rows(OptionTable& t, TraceOptions& o) {
+  t.choice<HitOrder>("hit-order", o.hit_order,
+                     {{"entry", HitOrder::kEntry}, {"peak", HitOrder::kPeak}},
+                     "depth that orders a ray's hits: entry (near side of the ellipsoid, the "
+                     "paper) or peak (strongest response)");
+  t.number("quantile", o.quantile, 0.01, 100,
+           "squared radius of the ellipsoids in standard deviations (chi^2(3))");
+  t.number("min-transmittance", o.min_transmittance, 0, 0.5,
+           "a ray stops below this transmittance");
+  t.number("max-hits", o.max_hits, 1, 1e6,
+           "a ray stops after so many hits; rays that do are reported");
+  t.flag("adaptive-radius", o.adaptive_radius,
+         "shrink the ellipsoids to where they contribute at least 1/255");
+  t.number("near", o.near_depth, 0, kNoBound,
+           "Gaussians nearer to the camera plane are skipped; 0 = off");
+  t.choice<Traversal>(
+      "traversal", o.traversal,
+      {{"auto", Traversal::kAuto}, {"tiles", Traversal::kTiles}, {"bvh", Traversal::kBvh}},
+      "how camera rays find Gaussians: tiles (packets share the list of their tile), bvh (each ray "
+      "walks the hierarchy, the paper) or auto (as 'raysplats tune' found, else tiles); scenes "
+      "with mirrors and orthographic cameras need rays one by one");
+  t.choice<PacketForm>(
+      "packet-shape", o.packet_form, packet_shapes(),
+      "what a packet of camera rays is: vector (the lanes of one work-item), group (the work-items "
+      "of a work-group) or auto (as 'raysplats tune' found, else vectors on CPUs and groups "
+      "elsewhere)");
+  t.number("packet-width", o.packet_width, 0, 64,
+           "rays of a packet: 1, 2, 4, 8 or 16, in a group also 32 or 64; 0 = fit to the device");
+  t.add(
+      "memory-budget", "MiB for hit lists; above it they are computed again",
+      [&o](const OptionTable::Values& values) {
+        const std::string& text = option_value("memory-budget", values);
+        const auto mib = option_number<std::int64_t>("memory-budget", text, 1, 1e9);
+        o.memory_budget = static_cast<std::size_t>(mib) << kMiBShift;
+      },
+      [&o] { return std::to_string(o.memory_budget >> kMiBShift); });
+  t.choice<GradientSum>(
+      "gradient-sum", o.gradient_sum,
+      {{"auto", GradientSum::kAuto},
+       {"copies", GradientSum::kCopies},
+       {"exact", GradientSum::kExact},
+       {"atomic", GradientSum::kAtomic}},
+      "how the gradients of rays are added: private copies (CPUs), exact (long integers, the same "
+      "bits in any order) or atomic (floats, not deterministic); auto = copies on CPUs, else "
+      "atomic, or exact with deterministic");
+  t.number("launch-budget-ms", o.launch_budget_ms, -1, 1e9,
+           "a view is traced in bands of rows that take about this long each, so that watchdogs of "
+           "displays do not stop them; 0 = no bound, -1 = none on CPUs and 100 elsewhere");
+}
+
+void add_background_row(OptionTable& table, TraceOptions& options) {
+  table.color("background", options.background,
+              "colour behind the Gaussians, 0 to 1 each; one number is a grey");
+}
+
+std::vector<OptionRow> trace_rows(TraceOptions& options) {
+  OptionTable table;
+  add_trace_rows(table, options);
+  add_background_row(table, options);
+  return table.take();
+}
+
+void TraceSettings::set(const std::string& name, const std::vector<std::string>& values) {
+  TraceOptions scratch;
+  const std::vector<OptionRow> rows = trace_rows(scratch);
+  const OptionRow* row = find_row(rows, name);
+  if (row == nullptr) throw UsageError(fmt::format("There is no option '{}' of tracing", name));
+  row->set(values);
+  given_.push_back({name, values});
+}
+
+bool TraceSettings::has(const std::string& name) const {
+  return std::any_of(given_.begin(), given_.end(),
+                     [&](const Given& each) { return each.name == name; });
+}
+
+TraceOptions TraceSettings::over(TraceOptions base) const {
+  const std::vector<OptionRow> rows = trace_rows(base);
+  for (const Given& each : given_) find_row(rows, each.name)->set(each.values);
+  return base;
+}
+
+}  // namespace raysplats
