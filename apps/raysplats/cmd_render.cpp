@@ -14,6 +14,7 @@
 #include "eval/frame_writer.hpp"
 #include "eval/output_check.hpp"
 #include "frame_progress.hpp"
+#include "io/data_origin.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -135,6 +136,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   } else if (!options.cameras.empty()) {
     for (const Camera& camera : read_cameras(options.cameras)) {
       cameras.push_back(downscaled(camera, options.data.downscale.value_or(1.0)));
+      io::move_origin(cameras.back(), {source.origin[0], source.origin[1], source.origin[2]});
     }
   } else {
     cameras = cameras_of(dataset, options.data.chosen_split());

@@ -141,17 +141,18 @@ ColmapImage make_image(std::string name,
   return image;
 }
 
-void add_point(PointCloud& points,
+void add_point(ColmapModel& model,
                const glm::dvec3& position,
                std::span<const double, 3> rgb,
                const Fail& fail) {
   for (int i = 0; i < 3; ++i) {
     const auto value = static_cast<float>(position[i]);
     if (!std::isfinite(value)) fail("a point has a coordinate that is not finite");
-    points.positions.push_back(value);
+    model.points.positions.push_back(value);
+    model.positions.push_back(position[i]);
   }
   for (const double value : rgb) {
-    points.colors.push_back(static_cast<float>(std::clamp(value, 0.0, 255.0) / 255.0));
+    model.points.colors.push_back(static_cast<float>(std::clamp(value, 0.0, 255.0) / 255.0));
   }
 }
 
@@ -250,13 +251,14 @@ void add_track(PointCloud& points, std::uint64_t length, double error) {
   points.errors.push_back(static_cast<float>(error));
 }
 
-void read_points_binary(const fs::path& path, PointCloud& points) {
+void read_points_binary(const fs::path& path, ColmapModel& model) {
   const auto bytes = read_file(path);
   ByteReader reader(bytes, path);
   const Fail fail = [&](const std::string& message) { reader.fail(message); };
   const std::uint64_t count = reader.count("number of points", 8 + 3 * 8 + 3 + 8 + 8);
-  points.positions.reserve(3 * static_cast<std::size_t>(count));
-  points.colors.reserve(3 * static_cast<std::size_t>(count));
+  model.points.positions.reserve(3 * static_cast<std::size_t>(count));
+  model.points.colors.reserve(3 * static_cast<std::size_t>(count));
+  model.positions.reserve(3 * static_cast<std::size_t>(count));
   for (std::uint64_t i = 0; i < count; ++i) {
     reader.skip(8, "the number of a point");
     glm::dvec3 position;
@@ -265,14 +267,14 @@ void read_points_binary(const fs::path& path, PointCloud& points) {
     std::array<double, 3> rgb;
     for (double& value : rgb) value = reader.read<std::uint8_t>("a point's colour");
     const auto error = reader.read<double>("the error of a point");
-    add_point(points, position, rgb, fail);
+    add_point(model, position, rgb, fail);
     const std::uint64_t length = reader.count("track length", 8);
     reader.skip(8 * length, "the track of a point");
-    add_track(points, length, error);
+    add_track(model.points, length, error);
   }
 }
 
-void read_points_text(const fs::path& path, PointCloud& points) {
+void read_points_text(const fs::path& path, ColmapModel& model) {
   const auto bytes = read_file(path);
   TextReader reader(bytes, path);
   const Fail fail = [&](const std::string& message) { reader.fail(message); };
@@ -283,11 +285,11 @@ void read_points_text(const fs::path& path, PointCloud& points) {
     std::array<double, 3> rgb;
     for (double& value : rgb)
       value = static_cast<double>(reader.unsigned_integer("a point's colour"));
-    add_point(points, position, rgb, fail);
+    add_point(model, position, rgb, fail);
     const double error = reader.number("the error of a point");
     std::istringstream track{std::string(reader.rest())};
     const auto words = std::distance(std::istream_iterator<std::string>(track), {});
-    add_track(points, static_cast<std::uint64_t>(words) / 2, error);
+    add_track(model.points, static_cast<std::uint64_t>(words) / 2, error);
   }
 }
 
@@ -370,8 +372,8 @@ ColmapModel read_colmap_model(const fs::path& folder) {
     throw DataError(fmt::format("{}: the image '{}' appears twice", images->string(), twice->name));
   }
   if (const std::optional<fs::path> points = model_file(folder, "points3D")) {
-    is_binary(*points) ? read_points_binary(*points, model.points)
-                       : read_points_text(*points, model.points);
+    is_binary(*points) ? read_points_binary(*points, model)
+                       : read_points_text(*points, model);
   } else {
     spdlog::warn("{} has no points3D.bin or points3D.txt: the data set has no points to start from",
                  folder.string());

@@ -27,6 +27,7 @@ struct ColmapModel {
   std::map<std::uint32_t, Camera> cameras;  ///< without name and pose
   std::vector<ColmapImage> images;          ///< sorted by name
   PointCloud points;
+  std::vector<double> positions;  ///< of the points, as precise as in the file
 };
 
 /// The folder of the model to use below a data set: of sparse/*, sparse, colmap/sparse/*,

@@ -10,10 +10,12 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 
 #include "core/camera_check.hpp"
 #include "io/colmap_model.hpp"
+#include "io/data_origin.hpp"
 #include "io/image_file.hpp"
 #include "io/ply_points.hpp"
 #include "io/transforms.hpp"
@@ -99,6 +101,31 @@ void mark_every(std::vector<View>& views, int test_every) {
   for (std::size_t i = 0; i < views.size(); i += step) views[i].test = true;
 }
 
+/// Counts all positions from the origin that the options or the scene say; `points`: of
+/// dataset.points, as precise as in their file.
+void set_origin(Dataset& dataset, std::span<const double> points, const DatasetOptions& options) {
+  glm::dvec3 origin;
+  if (options.origin) {
+    const std::array<double, 3>& o = *options.origin;
+    origin = {o[0], o[1], o[2]};
+  } else {
+    origin = io::fitting_origin(dataset.views, points);
+  }
+  if (origin == glm::dvec3(0.0)) return;
+  spdlog::info(
+      "positions count from {}, {}, {}: the scene lies far from the origin of its files, where "
+      "single precision would blur it",
+      origin.x, origin.y, origin.z);
+  dataset.origin = {origin.x, origin.y, origin.z};
+  for (View& view : dataset.views) {
+    io::move_origin(view.camera, origin);
+    io::move_origin(view.source_camera, origin);
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    dataset.points.positions[i] = static_cast<float>(points[i] - origin[static_cast<int>(i % 3)]);
+  }
+}
+
 void sort_by_name(std::vector<View>& views) {
   std::stable_sort(views.begin(), views.end(),
                    [](const View& a, const View& b) { return a.camera.name < b.camera.name; });
@@ -177,6 +204,7 @@ Dataset load_colmap(const fs::path& root,
   }
   sort_by_name(dataset.views);
   mark_every(dataset.views, options.test_every);
+  set_origin(dataset, model.positions, options);
   return dataset;
 }
 
@@ -231,6 +259,7 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
   }
   if (!held_out) {
     mark_every(dataset.views, options.test_every);
+    set_origin(dataset, {}, options);
     return dataset;
   }
   std::vector<View> test = transforms_views(io::read_transforms(*held_out), options);
@@ -239,6 +268,7 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
     view.test = true;
     dataset.views.push_back(std::move(view));
   }
+  set_origin(dataset, {}, options);
   return dataset;
 }
 
@@ -271,6 +301,9 @@ Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
     sort_by_name(dataset.views);
   }
   if (!file.ply_file_path.empty()) dataset.points = io::read_ply_points(root / file.ply_file_path);
+  const std::vector<double> points(dataset.points.positions.begin(),
+                                   dataset.points.positions.end());
+  set_origin(dataset, points, options);
   return dataset;
 }
 

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <string_view>
 
 #include "raysplats/error.hpp"
@@ -17,6 +18,7 @@ namespace raysplats {
 namespace {
 
 constexpr std::string_view kPrefix = "comment raysplats ";
+constexpr std::string_view kOrigin = "origin";
 constexpr std::size_t kMaxHeaderLines = 4096;
 constexpr std::size_t kMaxLine = 4096;
 
@@ -38,11 +40,12 @@ bool parse(std::string_view text, T& value) {
   return error == std::errc() && next == end;
 }
 
-bool parse_color(std::string_view text, std::array<float, 3>& color) {
+template <class T>
+bool parse_triple(std::string_view text, std::array<T, 3>& values) {
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t comma = k < 2 ? text.find(',') : text.size();
-    if (comma == std::string_view::npos || !parse(text.substr(0, comma), color[k]) ||
-        !std::isfinite(color[k])) {
+    if (comma == std::string_view::npos || !parse(text.substr(0, comma), values[k]) ||
+        !std::isfinite(values[k])) {
       return false;
     }
     text.remove_prefix(std::min(comma + 1, text.size()));
@@ -72,8 +75,31 @@ bool set_option(std::string_view key, std::string_view value, TraceOptions& out)
     return parse(value, out.near_depth) && out.near_depth >= 0 && std::isfinite(out.near_depth);
   }
   if (key == "max_hits") return parse(value, out.max_hits) && out.max_hits >= 1;
-  if (key == "background") return parse_color(value, out.background);
+  if (key == "background") return parse_triple(value, out.background);
   return true;
+}
+
+// Gives every comment of this program in the header of a PLY to `take`, which returns false for one
+// that cannot be.
+void for_each_comment(const std::filesystem::path& path,
+                      const std::function<bool(std::string_view, std::string_view)>& take) {
+  std::ifstream stream(path, std::ios::binary);
+  std::string line;
+  if (!next_line(stream, line) || line != "ply") return;
+  for (std::size_t n = 0; n < kMaxHeaderLines && next_line(stream, line); ++n) {
+    if (line == "end_header") break;
+    if (!line.starts_with(kPrefix)) continue;
+    const std::string_view text = std::string_view(line).substr(kPrefix.size());
+    const std::size_t space = text.find(' ');
+    const std::string_view value =
+        space == std::string_view::npos ? std::string_view() : text.substr(space + 1);
+    if (!take(text.substr(0, space), value)) {
+      throw DataError(
+          fmt::format("{}: '{}' is nothing that raysplats writes: correct the line of the header, "
+                      "or remove it",
+                      path.string(), line));
+    }
+  }
 }
 
 }  // namespace
@@ -94,26 +120,27 @@ std::string io::ply_option_comments(const TraceOptions& options) {
   return out;
 }
 
+std::string io::ply_origin_comment(const std::array<double, 3>& origin) {
+  if (origin == std::array<double, 3>{}) return "";
+  return fmt::format("{}{} {},{},{}\n", kPrefix, kOrigin, origin[0], origin[1], origin[2]);
+}
+
 std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  std::string line;
-  if (!next_line(stream, line) || line != "ply") return std::nullopt;
   std::optional<TraceOptions> out;
-  for (std::size_t n = 0; n < kMaxHeaderLines && next_line(stream, line); ++n) {
-    if (line == "end_header") break;
-    if (!line.starts_with(kPrefix)) continue;
-    const std::string_view text = std::string_view(line).substr(kPrefix.size());
-    const std::size_t space = text.find(' ');
-    const std::string_view value =
-        space == std::string_view::npos ? std::string_view() : text.substr(space + 1);
+  for_each_comment(path, [&](std::string_view key, std::string_view value) {
+    if (key == kOrigin) return true;
     if (!out) out.emplace();
-    if (!set_option(text.substr(0, space), value, *out)) {
-      throw DataError(fmt::format(
-          "{}: '{}' is no option of a trace: correct the line of the header, or remove it",
-          path.string(), line));
-    }
-  }
+    return set_option(key, value, *out);
+  });
   return out;
+}
+
+std::array<double, 3> read_ply_origin(const std::filesystem::path& path) {
+  std::array<double, 3> origin{};
+  for_each_comment(path, [&](std::string_view key, std::string_view value) {
+    return key != kOrigin || parse_triple(value, origin);
+  });
+  return origin;
 }
 
 }  // namespace raysplats

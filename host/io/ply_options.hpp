@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "raysplats/trace_options.hpp"
@@ -10,5 +11,7 @@ namespace raysplats::io {
 /// Header lines of a PLY, "comment raysplats KEY VALUE" each, with the options that change what a
 /// model shows. read_ply_options() reads them back to the bit.
 std::string ply_option_comments(const TraceOptions& options);
+/// The line with the origin; nothing for 0. read_ply_origin() reads it back to the bit.
+std::string ply_origin_comment(const std::array<double, 3>& origin);
 
 }  // namespace raysplats::io

@@ -318,7 +318,13 @@ Gaussians initial_model(const Dataset& dataset,
   const bool by_name = options.init == "auto" || options.init == "colmap" ||
                        options.init == "random" || options.init == "photos";
   if (!by_name) {
-    return subset(with_sh_degree(read_ply(options.init), options.sh_degree), limit);
+    Gaussians start = with_sh_degree(read_ply(options.init), options.sh_degree);
+    const std::array<double, 3> origin = read_ply_origin(options.init);
+    for (std::size_t i = 0; i < start.means.size(); ++i) {
+      start.means[i] = static_cast<float>(static_cast<double>(start.means[i]) +
+                                          (origin[i % 3] - dataset.origin[i % 3]));
+    }
+    return subset(std::move(start), limit);
   }
   const auto share = [limit](double part) {
     return std::max<std::size_t>(1, static_cast<std::size_t>(part * static_cast<double>(limit)));

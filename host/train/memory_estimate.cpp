@@ -63,8 +63,7 @@ std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels) {
       options.mirrors.empty() ? 0 : sizeof(RsSurfaceHit) + sizeof(std::uint32_t);
   const bool reflects = mirrors > 0 && options.mirror_bounces > 0;
   const std::size_t reflected = reflects ? segment + mirrors + sizeof(RsPath) : 0;
-  const std::size_t rays =
-      std::min(pixels, ViewTracer::batch(options.trace.memory_budget));
+  const std::size_t rays = std::min(pixels, ViewTracer::batch(options.trace.memory_budget));
   return rays * (segment + order + mirrors + reflected);
 }
 

@@ -9,7 +9,9 @@
 
 namespace raysplats {
 
-Mirrors load_mirrors(const std::vector<std::string>& paths, int max_bounces) {
+Mirrors load_mirrors(const std::vector<std::string>& paths,
+                     int max_bounces,
+                     const std::array<double, 3>& origin) {
   Mirrors out;
   out.max_bounces = max_bounces;
   for (const std::string& path : paths) {
@@ -21,6 +23,10 @@ Mirrors load_mirrors(const std::vector<std::string>& paths, int max_bounces) {
       material.kind = Material::Kind::kMirror;
       out.materials.push_back(material);
     }
+    for (std::size_t i = 0; i < file.mesh.positions.size(); ++i) {
+      float& position = file.mesh.positions[i];
+      position = static_cast<float>(static_cast<double>(position) - origin[i % 3]);
+    }
     out.meshes.push_back(std::move(file.mesh));
   }
   return out;
@@ -29,7 +35,7 @@ Mirrors load_mirrors(const std::vector<std::string>& paths, int max_bounces) {
 Mirrors mirrors_of(const ModelSource& source) {
   if (!source.trained || source.trained->mirrors.empty()) return {};
   spdlog::info("{} was trained with mirrors: its rays are traced one by one", source.ply.string());
-  return load_mirrors(source.trained->mirrors, source.trained->mirror_bounces);
+  return load_mirrors(source.trained->mirrors, source.trained->mirror_bounces, source.origin);
 }
 
 }  // namespace raysplats

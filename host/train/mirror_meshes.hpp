@@ -10,8 +10,10 @@
 namespace raysplats {
 
 /// Known mirrors from mesh files (io::read_mesh). Materials that are mirrors keep their colour, all
-/// others reflect everything.
-Mirrors load_mirrors(const std::vector<std::string>& paths, int max_bounces);
+/// others reflect everything. `origin` is taken off their positions (Dataset::origin).
+Mirrors load_mirrors(const std::vector<std::string>& paths,
+                     int max_bounces,
+                     const std::array<double, 3>& origin = {});
 
 /// The mirrors that a model was trained with; none for a PLY that is in no run.
 Mirrors mirrors_of(const ModelSource& source);

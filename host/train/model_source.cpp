@@ -38,6 +38,7 @@ void read_options(ModelSource& source, const std::filesystem::path& run) {
 
 void read_header(ModelSource& source) {
   if (!source.trained) source.header = read_ply_options(source.ply);
+  source.origin = read_ply_origin(source.ply);
 }
 
 }  // namespace
@@ -87,7 +88,9 @@ ModelSource find_model(const std::filesystem::path& path) {
 }
 
 DatasetOptions dataset_options(const ModelSource& source) {
-  return source.trained ? source.trained->data : DatasetOptions();
+  DatasetOptions out = source.trained ? source.trained->data : DatasetOptions();
+  out.origin = source.origin;
+  return out;
 }
 
 TraceOptions trace_options(const ModelSource& source, bool cut_out) {

@@ -19,6 +19,7 @@ struct ModelSource {
       trained;  ///< of the run folder it is in; none for a PLY from elsewhere
   std::optional<TraceOptions> header;     ///< of a PLY that is in no run: what its header says
   std::optional<std::int64_t> iteration;  ///< of RUN/point_cloud/iteration_N
+  std::array<double, 3> origin{};         ///< from which its positions count (Dataset::origin)
 };
 
 /// Whether `path` is the folder of a training run.
@@ -31,7 +32,7 @@ bool is_run_folder(const std::filesystem::path& path);
 ModelSource find_model(const std::filesystem::path& path);
 
 /// The image size and the held-out views of the model's training, the defaults when nothing is
-/// known.
+/// known; positions count from the model's origin.
 DatasetOptions dataset_options(const ModelSource& source);
 
 /// What a model has to be traced with to look as in training; `cut_out` as for background_color().

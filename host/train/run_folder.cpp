@@ -172,8 +172,9 @@ void RunFolder::write_exposures(std::span<const Camera> cameras,
 
 void RunFolder::write_model(const Gaussians& model,
                             const TraceOptions& trace,
-                            std::int64_t iteration) const {
-  write_ply(model_file(path_, iteration), model, trace);
+                            std::int64_t iteration,
+                            const std::array<double, 3>& origin) const {
+  write_ply(model_file(path_, iteration), model, trace, origin);
 }
 
 bool RunFolder::has_model(std::int64_t iteration) const {

@@ -48,7 +48,10 @@ class RunFolder {
   /// as in Exposure::State.
   void write_exposures(std::span<const Camera> cameras, std::span<const float> deltas) const;
   /// `trace` goes into the header, for those who take the model elsewhere.
-  void write_model(const Gaussians& model, const TraceOptions& trace, std::int64_t iteration) const;
+  void write_model(const Gaussians& model,
+                   const TraceOptions& trace,
+                   std::int64_t iteration,
+                   const std::array<double, 3>& origin = {}) const;
   bool has_model(std::int64_t iteration) const;
 
   /// Keeps other runs out of the folder until the lock goes, and removes temporary files that a

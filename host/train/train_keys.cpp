@@ -142,6 +142,30 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
                     {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
                     "what is black in the photos' masks: ignore (it counts neither in the loss nor "
                     "in metrics) or cutout (background, as transparent pixels are)");
+  t.add(
+      "origin",
+      "\"x,y,z\" in the data set's coordinates, from which the model's positions count; \"auto\" = "
+      "0, but near the cameras where the scene lies so far from 0 that single precision would blur "
+      "it (surveyed captures), which the run's configuration then names",
+      [&o](const Values& values) {
+        if (values.size() == 1 && values.front() == "auto") {
+          o.data.origin.reset();
+          return;
+        }
+        const std::vector<std::string> parts = option_items("origin", values);
+        std::array<double, 3> origin{};
+        for (std::size_t k = 0; k < parts.size() && k < origin.size(); ++k)
+          origin[k] = option_number<double>("origin", parts[k], -kHuge, kHuge);
+        if (parts.size() != origin.size()) {
+          throw UsageError(fmt::format("The option 'origin' is auto or three numbers, not '{}'",
+                                       fmt::join(values, " ")));
+        }
+        o.data.origin = origin;
+      },
+      [&o] {
+        if (!o.data.origin) return std::string("\"auto\"");
+        return fmt::format("[{}]", fmt::join(*o.data.origin, ", "));
+      });
   t.words("background", o.background,
           "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
           "alpha, else their typical colour, which the run's configuration then names) or "

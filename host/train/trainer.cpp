@@ -66,7 +66,7 @@ Trainer::Impl::Impl(Context& device,
       background(background_color(options, cut_out)),
       tracer(device,
              trace_options_of(options, background),
-             load_mirrors(options.mirrors, options.mirror_bounces)),
+             load_mirrors(options.mirrors, options.mirror_bounces, dataset.origin)),
       loss(device, options.pixel_loss, static_cast<float>(options.ssim_weight)),
       adam(device, adam_options_of(options)),
       density(device, options, extent, train_views.size()),
@@ -77,6 +77,7 @@ Trainer::Impl::Impl(Context& device,
               static_cast<std::size_t>(options.image_budget) * kMiB,
               host_image_budget(options, train_cameras)),
       order(options.seed, train_views.size()) {
+  options.data.origin = dataset.origin;
   if (options.exposure) exposure.emplace(device, train_views.size());
   if (train_views.empty()) {
     const bool held_out = options.data.test_every == 1 && !test_views.empty();

@@ -88,7 +88,8 @@ void Trainer::Impl::evaluate_views(bool last) {
 }
 
 void Trainer::Impl::save_model() {
-  run.write_model(gaussians.download(), trace_options_of(options, background), iteration);
+  run.write_model(gaussians.download(), trace_options_of(options, background), iteration,
+                  dataset.origin);
   if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
 }
 

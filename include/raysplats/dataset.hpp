@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,7 @@ struct Dataset {
   PointCloud points;
   bool alpha_is_background = false;  ///< RGBA is composited over the background (Blender,
                                      ///< MaskUse::kCutout), else alpha is a mask
+  std::array<double, 3> origin{};    ///< what was taken off all positions of the files
 
   std::vector<std::size_t> indices(Split split) const;
 };
@@ -60,6 +63,9 @@ struct DatasetOptions {
   /// theirs either way.
   bool undistort = true;
   MaskUse masks = MaskUse::kIgnore;
+  /// What is taken off all positions; none = 0, but a point near the cameras where the scene lies
+  /// so far from the origin of its files (surveyed captures) that single precision would blur it.
+  std::optional<std::array<double, 3>> origin;
 };
 
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender) and reads everything but the pixels.

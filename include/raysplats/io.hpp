@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -21,14 +22,20 @@ Gaussians read_ply(const std::filesystem::path& path);
 /// Writes an Inria-style binary little-endian 3DGS PLY atomically (temporary file, sync, rename).
 /// `trace` is how the model wants to be traced; the options of it that change the picture (order,
 /// quantile, adaptive radius, near depth, transmittance, cap on hits, background) go into the
-/// header as comments, which other programs skip.
+/// header as comments, which other programs skip; so does `origin`, from which positions count
+/// (Dataset::origin), unless it is 0.
 void write_ply(const std::filesystem::path& path,
                const Gaussians& model,
-               const std::optional<TraceOptions>& trace = std::nullopt);
+               const std::optional<TraceOptions>& trace = std::nullopt,
+               const std::array<double, 3>& origin = {});
 
 /// The options in the header of a PLY that write_ply() was given them for, the others as
 /// TraceOptions has them; nothing for other files. Throws DataError for a value out of range.
 std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path);
+
+/// The origin in the header of a PLY; 0 where it says none. Throws DataError for one that is no
+/// three numbers.
+std::array<double, 3> read_ply_origin(const std::filesystem::path& path);
 
 /// Reads PNG, JPEG, EXR, Radiance HDR, TIFF, WebP or BMP as float; 1 to 4 channels as in the file
 /// (grey stays 1 channel).

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
+
+namespace raysplats::io {
+
+/// Where positions should count from, so that single precision does not blur a scene that lies far
+/// from the origin of its coordinates (surveyed captures: metres of a map grid or from the earth's
+/// centre): near the median of the cameras, rounded to the scene's size, where that is more than
+/// 200 times as far away as the scene is large, else 0. `points`: x, y, z each, may be empty.
+glm::dvec3 fitting_origin(std::span<const View> views, std::span<const double> points);
+
+/// The same pose counted from `origin`.
+void move_origin(Camera& camera, const glm::dvec3& origin);
+
+}  // namespace raysplats::io
