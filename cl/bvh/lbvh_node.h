@@ -17,6 +17,12 @@
 // 7 of 16.
 #define RS_NODE_STACK 128
 
+// The tree and its leaf blocks as arguments of kernels that walk it: how many levels of nodes, the
+// first node of level l, from 1, at level_begin[l].
+#define RS_TREE_ARGUMENTS                                                                         \
+  const int levels, __global const uint *restrict level_begin, __global const fv *restrict nodes, \
+      __global const fv *restrict blocks
+
 typedef union {
   fv v;
   float s[PACKET];

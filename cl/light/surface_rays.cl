@@ -42,18 +42,15 @@ void push_children(WalkStack* stack, uint bits, const RayLanes* entry, uint node
   }
 }
 
-// rays: origin, t_min, direction, t_max; hits lie in (t_min, t_max]. skip: triangle that ray i does
-// not meet, read with a stride of `skip_stride` words; 0 = none is skipped.
-__kernel void nearest_surface(const uint ray_count,
-                              const uint rays_per_item,
-                              const int levels,
-                              __global const uint* restrict level_begin,
-                              __global const fv* restrict nodes,
-                              __global const fv* restrict blocks,
-                              __global const float8* restrict rays,
-                              __global const int* restrict skip,
-                              const uint skip_stride,
-                              __global RsSurfaceHit* restrict hits) {
+// rays: origin, t_min, direction, t_max. skip: triangle that ray i does not meet, read with a
+// stride of `skip_stride` words; 0 = none is skipped.
+#define RS_SURFACE_RAY_ARGUMENTS                                               \
+  const uint ray_count, const uint rays_per_item, RS_TREE_ARGUMENTS,           \
+      __global const float8 *restrict rays, __global const int *restrict skip, \
+      const uint skip_stride
+
+// Hits lie in (t_min, t_max].
+__kernel void nearest_surface(RS_SURFACE_RAY_ARGUMENTS, __global RsSurfaceHit* restrict hits) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
   for (uint id = first; id < last; ++id) {
@@ -104,16 +101,8 @@ __kernel void nearest_surface(const uint ray_count,
 }
 
 // passes[i] = product of 1 - shadow over the triangles that ray i crosses; rays with t_max < t_min
-// give 1. shadow: one value per triangle. skip as above.
-__kernel void light_through(const uint ray_count,
-                            const uint rays_per_item,
-                            const int levels,
-                            __global const uint* restrict level_begin,
-                            __global const fv* restrict nodes,
-                            __global const fv* restrict blocks,
-                            __global const float8* restrict rays,
-                            __global const int* restrict skip,
-                            const uint skip_stride,
+// give 1. shadow: one value per triangle.
+__kernel void light_through(RS_SURFACE_RAY_ARGUMENTS,
                             __global const float* restrict shadow,
                             __global float* restrict passes) {
   const uint first = (uint)get_global_id(0) * rays_per_item;

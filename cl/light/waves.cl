@@ -165,6 +165,12 @@ float reach_of_gaussian(__global const float* restrict quaternions,
   return sqrt(quantile) * length(exp(vload3(i, log_scales)) * turned);
 }
 
+// What a light shines on: the rays that met Gaussians and surfaces, and what they met.
+#define RS_LIT_ARGUMENTS                                                                  \
+  __global const RsLight *restrict lights, __global const RsMaterial *restrict materials, \
+      __global const float8 *restrict rays, __global const float8 *restrict results,      \
+      __global const RsSurface *restrict surfaces
+
 // Rays from what a path meets to sample `light_sample` of light `number`: from its surface
 // (`target` 0), from its Gaussians to triangles (1) or to other Gaussians (2), which begin behind
 // what the leading Gaussian reaches: its neighbours make the same surface. Where no light can come,
@@ -174,15 +180,11 @@ __kernel void shadow_rays(const uint count,
                           const int number,
                           const int light_sample,
                           const int target,
+                          RS_LIT_ARGUMENTS,
                           __global const float* restrict quaternions,
                           __global const float* restrict log_scales,
                           const float quantile,
-                          __global const RsLight* restrict lights,
-                          __global const RsMaterial* restrict materials,
                           __global const RsPath* restrict paths,
-                          __global const float8* restrict rays,
-                          __global const float8* restrict results,
-                          __global const RsSurface* restrict surfaces,
                           __global float8* restrict out,
                           __global int* restrict skip) {
   const uint i = get_global_id(0);
@@ -257,11 +259,7 @@ __kernel void add_light(const uint count,
                         const int gaussians,
                         const int use_triangles,
                         const int use_gaussians,
-                        __global const RsLight* restrict lights,
-                        __global const RsMaterial* restrict materials,
-                        __global const float8* restrict rays,
-                        __global const float8* restrict results,
-                        __global const RsSurface* restrict surfaces,
+                        RS_LIT_ARGUMENTS,
                         __global const float8* restrict shadow,
                         __global const float* restrict passes,
                         __global const float8* restrict blocked,

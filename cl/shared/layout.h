@@ -94,6 +94,12 @@ RS_STATIC_ASSERT_SIZE(RsLensTile, 32);
 // Faces of that cube: the first looks forward.
 #define RS_FACES 6
 
+typedef struct {
+  rs_float rows[RS_FACES]
+               [9];  // camera axes to the axes of the faces; the last row of each is its axis
+} RsLensFaces;
+RS_STATIC_ASSERT_SIZE(RsLensFaces, 216);
+
 #define RS_CAMERA_PINHOLE 0
 #define RS_CAMERA_OPENCV 1
 #define RS_CAMERA_FISHEYE 2

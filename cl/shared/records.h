@@ -6,6 +6,7 @@
 
 #include "shared/layout.h"
 #include "shared/light_layout.h"
+#include "shared/trace_layout.h"
 #include "shared/train_layout.h"
 
 // clang-format off
@@ -32,6 +33,7 @@
   RECORD(RsLensTile) FIELD(RsLensTile, x0) FIELD(RsLensTile, y0) FIELD(RsLensTile, x1) \
     FIELD(RsLensTile, y1) FIELD(RsLensTile, face) FIELD(RsLensTile, cosine) \
     FIELD(RsLensTile, padding) \
+  RECORD(RsLensFaces) FIELD(RsLensFaces, rows) \
   RECORD(RsSurfaceHit) FIELD(RsSurfaceHit, t) FIELD(RsSurfaceHit, u) FIELD(RsSurfaceHit, v) \
     FIELD(RsSurfaceHit, triangle) \
   RECORD(RsMaterial) FIELD(RsMaterial, kind) FIELD(RsMaterial, color) FIELD(RsMaterial, texture) \
@@ -59,7 +61,22 @@
     FIELD(RsWave, light_samples) FIELD(RsWave, first_pixel) \
   RECORD(RsAdam) FIELD(RsAdam, beta1) FIELD(RsAdam, rest1) FIELD(RsAdam, beta2) \
     FIELD(RsAdam, rest2) FIELD(RsAdam, epsilon) FIELD(RsAdam, root_scale) FIELD(RsAdam, rate) \
-    FIELD(RsAdam, rest_rate)
+    FIELD(RsAdam, rest_rate) \
+  RECORD(RsForward) FIELD(RsForward, window) FIELD(RsForward, background) \
+    FIELD(RsForward, min_transmittance) FIELD(RsForward, max_hits) \
+    FIELD(RsForward, pool_capacity) FIELD(RsForward, padding) \
+  RECORD(RsBackward) FIELD(RsBackward, gaussians) FIELD(RsBackward, copies) \
+    FIELD(RsBackward, tiles_x) FIELD(RsBackward, tile_row) FIELD(RsBackward, tile_rows) \
+    FIELD(RsBackward, background) FIELD(RsBackward, screen_x) FIELD(RsBackward, screen_y) \
+    FIELD(RsBackward, limit) FIELD(RsBackward, padding) \
+  RECORD(RsFinalize) FIELD(RsFinalize, gaussians) FIELD(RsFinalize, copies) \
+    FIELD(RsFinalize, screen_x) FIELD(RsFinalize, screen_y) \
+  RECORD(RsRayWalk) FIELD(RsRayWalk, near) FIELD(RsRayWalk, background) \
+    FIELD(RsRayWalk, quantile) FIELD(RsRayWalk, min_transmittance) FIELD(RsRayWalk, max_hits) \
+    FIELD(RsRayWalk, sh_coefficients) FIELD(RsRayWalk, active_degree) \
+    FIELD(RsRayWalk, color_from_origin) FIELD(RsRayWalk, padding) \
+  RECORD(RsRaySums) FIELD(RsRaySums, screen) FIELD(RsRaySums, gaussians) \
+    FIELD(RsRaySums, limit) FIELD(RsRaySums, padding)
 // clang-format on
 
 #endif

@@ -6,9 +6,8 @@
 // and in one sum beyond. Nothing is subtracted, and nothing divided where alpha = 1: only the last
 // hit of a ray can be opaque. The 16 components of a Gaussian's line are summed over the rays of
 // the packet and added to memory once.
-//   PRIVATE_COPIES 1: work-item g of `groups` takes every groups-th tile and adds to its own copy
-//   of the gradient
-//                     lines: no atomics, the same sum every time.    global: groups
+//   PRIVATE_COPIES 1: work-item g of `copies` takes every copies-th tile and adds to its own copy
+//                     of the gradient lines: no atomics, the same sum every time.    global: groups
 //   EXACT_SUMS 1:     one long integer per component (exact_sum.h): the same sum whatever the order
 //                     of the packets, with integer atomics only.       global: packets of the band
 //   otherwise:        one copy, compare-and-swap adds.                 global: packets of the band
@@ -16,6 +15,7 @@
 // sums the per-ray lengths of the screen gradient instead, the densification signal of AbsGS (Ye et
 // al. 2024).
 #include "primitives/prefetch.h"
+#include "trace/arguments.h"
 #include "trace/hit_stream.h"
 #include "trace/line_gradient.h"
 #include "trace/line_sum.h"
@@ -193,35 +193,26 @@ void packet_backward(const RsCamera* camera,
   while (rows.size > 0) close_row(&rows, &p, T, T_last, background, lines, sums);
 }
 
-__kernel void trace_backward(const uint count,
-                             const uint groups,
+__kernel void trace_backward(RS_VIEW_ARGUMENTS,
+                             const RsBackward backward_argument,
+                             RS_STREAM_ARGUMENTS(const),
                              __global const RsLine* restrict lines,
                              __global const float* restrict image_gradient,
-                             __global const float* restrict transmittances,
-                             __global const uint2* restrict stream_ends,
-                             __global const uint2* restrict pool,
-                             __global const float* restrict pool_transmittance,
-                             const RsCamera camera_argument,
-                             const uint tiles_x,
-                             const uint tile_row,
-                             const uint tile_rows,
-                             const float4 background,
-                             const float screen_x,
-                             const float screen_y,
-                             const float limit,
-                             __global float* restrict gradients,
-                             const int face,
-                             __global const RsLensTile* restrict tiles,
-                             __global const float* restrict tangents) {
+                             __global float* restrict gradients) {
   const RsCamera camera = camera_argument;
+  const RsBackward backward = backward_argument;
+  const uint tiles_x = backward.tiles_x, tile_row = backward.tile_row;
+  const float4 background =
+      (float4)(backward.background[0], backward.background[1], backward.background[2], 0.0f);
   LineSums sums;
   sums.lines = gradients;
-  sums.limit = limit;
+  sums.limit = backward.limit;
 #if PRIVATE_COPIES
   // Tiles are numbered over the whole image, so that the sums do not depend on the bands.
   const uint group = get_global_id(0);
-  sums.lines += (size_t)group * count * 16;
-  const uint first = tile_row * tiles_x, end = first + tile_rows * tiles_x;
+  sums.lines += (size_t)group * backward.gaussians * 16;
+  const uint groups = backward.copies;
+  const uint first = tile_row * tiles_x, end = first + backward.tile_rows * tiles_x;
   for (uint tile = first + (group + groups - first % groups) % groups; tile < end; tile += groups) {
     if (!rs_on_face(tiles, face, tile)) continue;
     const int x0 = tile % tiles_x * TILE;
@@ -229,19 +220,17 @@ __kernel void trace_backward(const uint count,
     for (int y = y0; y < min(y0 + TILE, camera.height); y += PACKET_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += PACKET_WIDTH) {
         packet_backward(&camera, tangents, x, y, lines, image_gradient, transmittances, stream_ends,
-                        pool, pool_transmittance, background, screen_x, screen_y, &sums);
+                        pool, pool_transmittance, background, backward.screen_x, backward.screen_y,
+                        &sums);
       }
     }
   }
 #else
-  (void)count;
-  (void)groups;
-  (void)tile_rows;
   const int x = get_global_id(0) * PACKET_WIDTH;
   const int y = get_global_id(1) * PACKET_HEIGHT + tile_row * TILE;
   if (x >= camera.width || y >= camera.height) return;
   if (!rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE)) return;
   packet_backward(&camera, tangents, x, y, lines, image_gradient, transmittances, stream_ends, pool,
-                  pool_transmittance, background, screen_x, screen_y, &sums);
+                  pool_transmittance, background, backward.screen_x, backward.screen_y, &sums);
 #endif
 }

@@ -7,6 +7,7 @@
 // work-item per VECTOR Gaussians from number `begin` on, any local size; end - begin is a multiple
 // of VECTOR. With POSE, per-Gaussian contributions to the camera's gradient are written too (6
 // floats each: centre in world axes, left rotation vector in camera axes).
+#include "trace/arguments.h"
 #include "trace/view.h"
 
 #ifndef POSE
@@ -138,25 +139,13 @@ void add_rows(__global float* p, const uint stride, const gv* rows) {
 
 __kernel void finalize_gradients(const uint begin,
                                  const uint end,
-                                 const uint count,
-                                 const uint copies,
+                                 const RsFinalize finalize,
+                                 const RsCamera camera_argument,
                                  __global float* restrict line_gradients,
                                  __global const RsViewBounds* restrict bounds,
                                  __global const RsLine* restrict lines,
-                                 __global const float* restrict means,
-                                 __global const float* restrict quaternions,
-                                 __global const float* restrict scales,
-                                 __global const float* restrict opacities,
-                                 __global const float* restrict sh,
-                                 const RsCamera camera_argument,
-                                 const float screen_x,
-                                 const float screen_y,
-                                 __global float* restrict g_means,
-                                 __global float* restrict g_quaternions,
-                                 __global float* restrict g_scales,
-                                 __global float* restrict g_opacities,
-                                 __global float* restrict g_sh,
-                                 __global float* restrict screen,
+                                 RS_GAUSSIAN_ARGUMENTS,
+                                 RS_GRADIENT_ARGUMENTS,
                                  __global float* restrict pose) {
 #if !POSE
   (void)pose;
@@ -173,7 +162,8 @@ __kernel void finalize_gradients(const uint begin,
   gv v[16];
   gi touched = kind != RS_LINE_HIDDEN;
   if (RS_ANY_GAUSSIAN(touched)) {
-    touched = sum_copies(line_gradients + 16 * i, (size_t)count * 16, copies, v);
+    touched =
+        sum_copies(line_gradients + 16 * i, (size_t)finalize.gaussians * 16, finalize.copies, v);
   }
   if (!RS_ANY_GAUSSIAN(touched)) {
 #if ACCUMULATE
@@ -201,12 +191,12 @@ __kernel void finalize_gradients(const uint begin,
   const gi general = kind == RS_LINE_GENERAL;
   if (RS_ANY_GAUSSIAN(touched & general)) general_gradient(&g, v, general, &view);
 #if ANGULAR
-  (void)screen_y;
   const gv x0 = g.m[0] / g.m[2], y0 = g.m[1] / g.m[2];
   const gv across = x0 * v[0] + y0 * v[1];
-  gv slope =
-      screen_x * sqrt((1.0f + x0 * x0 + y0 * y0) * (v[0] * v[0] + v[1] * v[1] + across * across));
+  gv slope = finalize.screen_x *
+             sqrt((1.0f + x0 * x0 + y0 * y0) * (v[0] * v[0] + v[1] * v[1] + across * across));
 #else
+  const float screen_x = finalize.screen_x, screen_y = finalize.screen_y;
   gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
 #endif
   slope = (touched & projective) ? slope : zero;

@@ -17,6 +17,7 @@
 #endif
 
 #include "primitives/counter.h"
+#include "trace/arguments.h"
 #include "trace/candidates.h"
 #include "trace/hit_stream.h"
 #include "trace/packet_rows.h"
@@ -24,39 +25,31 @@
 #include "trace/packet_state.h"
 
 // counters: chunks wanted, rays that stopped at max_hits, hits (two words).
-__kernel void trace_forward(__global const RsLine* restrict lines,
-                            __global const uint* restrict references,
-                            __global const float* restrict boxes,
-                            const uint stride,
-                            __global const float2* restrict limits,
-                            __global const uint* restrict offsets,
-                            const RsCamera camera_argument,
-                            const int4 window,
-                            const float min_transmittance,
-                            const int max_hits,
-                            const float4 background,
+__kernel void trace_forward(RS_LIST_ARGUMENTS,
+                            RS_VIEW_ARGUMENTS,
+                            const RsForward forward_argument,
+                            RS_STREAM_ARGUMENTS(),
                             __global float* restrict image,
                             __global float* restrict depth_image,
-                            __global float* restrict transmittances,
-                            __global uint2* restrict stream_ends,
-                            __global uint2* restrict pool,
-                            __global float* restrict pool_transmittance,
-                            const uint pool_capacity,
-                            volatile __global uint* restrict counters,
-                            const int face,
-                            __global const RsLensTile* restrict tiles,
-                            __global const float* restrict tangents) {
+                            volatile __global uint* restrict counters) {
   const RsCamera camera = camera_argument;
+  const RsForward forward = forward_argument;
+  const float min_transmittance = forward.min_transmittance;
+  const int max_hits = forward.max_hits;
+  const float4 background =
+      (float4)(forward.background[0], forward.background[1], forward.background[2], 0.0f);
   const int window_x = get_global_id(0) * (BLOCK * PACKET_WIDTH);
   const int window_y = get_global_id(1) * (BLOCK * PACKET_HEIGHT);
-  const int block_x = window_x + window.x * TILE;
-  const int block_y = window_y + window.y * TILE;
+  const int block_x = window_x + forward.window[0] * TILE;
+  const int block_y = window_y + forward.window[1] * TILE;
   const int column = window_x / TILE, row = window_y / TILE;
-  if (column >= window.z || row >= window.w) return;
+  if (column >= forward.window[2] || row >= forward.window[3]) return;
   if (block_x >= camera.width || block_y >= camera.height) return;
-  const uint tile = row * window.z + column;
+  const uint tile = row * forward.window[2] + column;
   const uint picture_tiles_x = (camera.width + TILE - 1) / TILE;
-  if (!rs_on_face(tiles, face, (row + window.y) * picture_tiles_x + column + window.x)) return;
+  if (!rs_on_face(tiles, face,
+                  (row + forward.window[1]) * picture_tiles_x + column + forward.window[0]))
+    return;
 
   BlockCandidates block;
   block_candidates_init(&block, boxes, stride, offsets[tile], offsets[tile + 1]);
@@ -79,7 +72,7 @@ __kernel void trace_forward(__global const RsLine* restrict lines,
   HitStream stream;
   stream.pool = pool;
   stream.transmittance = pool_transmittance;
-  stream.capacity = pool_capacity;
+  stream.capacity = forward.pool_capacity;
   stream.cursor = counters;
   const int width = camera.width, height = camera.height;
   uint hits = 0, capped_rays = 0;

@@ -4,6 +4,7 @@
 #include "bvh/box.h"
 #include "primitives/prefetch.h"
 #include "shared/color.h"
+#include "trace/arguments.h"
 #include "trace/gaussian.h"
 #include "trace/ray_block.h"
 
@@ -42,11 +43,7 @@ __kernel void fill_blocks(const uint count,
                           const uint padded_blocks,
                           __global const uint* restrict order,
                           __global const RsAabb* restrict boxes,
-                          __global const float* restrict means,
-                          __global const float* restrict quaternions,
-                          __global const float* restrict scales,
-                          __global const float* restrict opacities,
-                          __global const float* restrict sh,
+                          RS_GAUSSIAN_ARGUMENTS,
                           const int sh_coefficients,
                           const float quantile,
                           __global float* restrict blocks,

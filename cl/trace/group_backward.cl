@@ -2,12 +2,13 @@
 // trace_backward_group: what trace_backward does, with a packet per work-group (group.h) and the
 // streams that trace_forward_group kept. The 16 components of a line's gradient are summed over the
 // rays through local memory; one work-item adds one of them to the sums.
-//   PRIVATE_COPIES 1: work-group g of `groups` takes every groups-th tile and adds to its own copy.
+//   PRIVATE_COPIES 1: work-group g of `copies` takes every copies-th tile and adds to its own copy.
 //   otherwise:        a work-group per packet of the band.
 #ifndef TILE
 #define TILE 16
 #endif
 
+#include "trace/arguments.h"
 #include "trace/group.h"
 #include "trace/hit_stream.h"
 #include "trace/line_gradient.h"
@@ -161,38 +162,28 @@ void group_backward(__local BackwardMemory* memory,
     close_row(memory, lane, rs_lowest_bit(open), &p, T, T_last, sky, lines, sums);
 }
 
-RS_GROUP_KERNEL __kernel void trace_backward_group(
-    const uint count,
-    const uint groups,
-    __global const RsLine* restrict lines,
-    __global const float* restrict image_gradient,
-    __global const float* restrict transmittances,
-    __global const uint2* restrict stream_ends,
-    __global const uint2* restrict pool,
-    __global const float* restrict pool_transmittance,
-    const RsCamera camera_argument,
-    const uint tiles_x,
-    const uint tile_row,
-    const uint tile_rows,
-    const float4 background,
-    const float screen_x,
-    const float screen_y,
-    const float limit,
-    __global float* restrict gradients,
-    const int face,
-    __global const RsLensTile* restrict tiles,
-    __global const float* restrict tangents) {
+RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
+                                                   const RsBackward backward_argument,
+                                                   RS_STREAM_ARGUMENTS(const),
+                                                   __global const RsLine* restrict lines,
+                                                   __global const float* restrict image_gradient,
+                                                   __global float* restrict gradients) {
   __local BackwardMemory memory;
   const RsCamera camera = camera_argument;
+  const RsBackward backward = backward_argument;
+  const uint tiles_x = backward.tiles_x, tile_row = backward.tile_row;
+  const float4 background =
+      (float4)(backward.background[0], backward.background[1], backward.background[2], 0.0f);
   const int lane = get_local_id(0);
   LineSums sums;
   sums.lines = gradients;
-  sums.limit = limit;
+  sums.limit = backward.limit;
 #if PRIVATE_COPIES
   // Tiles are numbered over the whole image, so that the sums do not depend on the bands.
   const uint group = get_group_id(0);
-  sums.lines += (size_t)group * count * 16;
-  const uint first = tile_row * tiles_x, end = first + tile_rows * tiles_x;
+  sums.lines += (size_t)group * backward.gaussians * 16;
+  const uint groups = backward.copies;
+  const uint first = tile_row * tiles_x, end = first + backward.tile_rows * tiles_x;
   for (uint tile = first + (group + groups - first % groups) % groups; tile < end; tile += groups) {
     const bool works = rs_on_face(tiles, face, tile);
     const int x0 = tile % tiles_x * TILE;
@@ -200,21 +191,18 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(
     for (int y = y0; y < min(y0 + TILE, camera.height); y += RS_GROUP_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += RS_GROUP_WIDTH) {
         group_backward(&memory, lane, works, &camera, tangents, x, y, lines, image_gradient,
-                       transmittances, stream_ends, pool, pool_transmittance, background, screen_x,
-                       screen_y, &sums);
+                       transmittances, stream_ends, pool, pool_transmittance, background,
+                       backward.screen_x, backward.screen_y, &sums);
       }
     }
   }
 #else
-  (void)count;
-  (void)groups;
-  (void)tile_rows;
   const int x = (int)(get_global_id(0) / GROUP) * RS_GROUP_WIDTH;
   const int y = (int)get_global_id(1) * RS_GROUP_HEIGHT + tile_row * TILE;
   const bool works = x < camera.width && y < camera.height &&
                      rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE);
   group_backward(&memory, lane, works, &camera, tangents, x, y, lines, image_gradient,
-                 transmittances, stream_ends, pool, pool_transmittance, background, screen_x,
-                 screen_y, &sums);
+                 transmittances, stream_ends, pool, pool_transmittance, background,
+                 backward.screen_x, backward.screen_y, &sums);
 #endif
 }

@@ -11,6 +11,7 @@
 #endif
 
 #include "primitives/counter.h"
+#include "trace/arguments.h"
 #include "trace/group.h"
 #include "trace/group_passes.h"
 #include "trace/group_rows.h"
@@ -43,41 +44,33 @@ void outermost_rays(__local GroupMemory* memory,
 #endif
 
 // counters: chunks wanted, rays that stopped at max_hits, hits (two words).
-RS_GROUP_KERNEL __kernel void trace_forward_group(__global const RsLine* restrict lines,
-                                                  __global const uint* restrict references,
-                                                  __global const float* restrict boxes,
-                                                  const uint stride,
-                                                  __global const float2* restrict limits,
-                                                  __global const uint* restrict offsets,
-                                                  const RsCamera camera_argument,
-                                                  const int4 window,
-                                                  const float min_transmittance,
-                                                  const int max_hits,
-                                                  const float4 background,
+RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
+                                                  RS_VIEW_ARGUMENTS,
+                                                  const RsForward forward_argument,
+                                                  RS_STREAM_ARGUMENTS(),
                                                   __global float* restrict image,
                                                   __global float* restrict depth_image,
-                                                  __global float* restrict transmittances,
-                                                  __global uint2* restrict stream_ends,
-                                                  __global uint2* restrict pool,
-                                                  __global float* restrict pool_transmittance,
-                                                  const uint pool_capacity,
-                                                  volatile __global uint* restrict counters,
-                                                  const int face,
-                                                  __global const RsLensTile* restrict tiles,
-                                                  __global const float* restrict tangents) {
+                                                  volatile __global uint* restrict counters) {
   __local GroupMemory memory;
   const RsCamera camera = camera_argument;
+  const RsForward forward = forward_argument;
+  const float min_transmittance = forward.min_transmittance;
+  const int max_hits = forward.max_hits;
+  const float4 background =
+      (float4)(forward.background[0], forward.background[1], forward.background[2], 0.0f);
   const int lane = get_local_id(0);
   const int window_x = (int)(get_global_id(0) / GROUP) * RS_GROUP_WIDTH;
   const int window_y = (int)get_global_id(1) * RS_GROUP_HEIGHT;
-  const int group_x = window_x + window.x * TILE;
-  const int group_y = window_y + window.y * TILE;
+  const int group_x = window_x + forward.window[0] * TILE;
+  const int group_y = window_y + forward.window[1] * TILE;
   const int column = window_x / TILE, row = window_y / TILE;
   const uint picture_tiles_x = (camera.width + TILE - 1) / TILE;
-  const uint tile = row * window.z + column;
+  const uint tile = row * forward.window[2] + column;
   const bool works =
-      column < window.z && row < window.w && group_x < camera.width && group_y < camera.height &&
-      rs_on_face(tiles, face, (row + window.y) * picture_tiles_x + column + window.x);
+      column < forward.window[2] && row < forward.window[3] && group_x < camera.width &&
+      group_y < camera.height &&
+      rs_on_face(tiles, face,
+                 (row + forward.window[1]) * picture_tiles_x + column + forward.window[0]);
 
   const int px = group_x + lane % RS_GROUP_WIDTH;
   const int py = group_y + lane / RS_GROUP_WIDTH;
@@ -104,7 +97,7 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(__global const RsLine* restric
   HitStream stream;
   stream.pool = pool;
   stream.transmittance = pool_transmittance;
-  stream.capacity = pool_capacity;
+  stream.capacity = forward.pool_capacity;
   stream.cursor = counters;
   stream_restart(&stream);
 

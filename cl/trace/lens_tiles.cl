@@ -31,20 +31,16 @@ __kernel void lens_directions(const RsLensCamera camera, __global float* restric
   directions[2 * (size_t)pixels + pixel] = direction.z;
 }
 
-typedef struct {
-  float rows[6][9];  // camera axes to the axes of the faces; the last row of each is its axis
-} Faces;
-
 __kernel void lens_tiles(const int width,
                          const int height,
                          const int faces,
-                         const Faces axes_argument,
+                         const RsLensFaces axes_argument,
                          __global float* restrict directions,
                          __global RsLensTile* restrict tiles) {
   const int tiles_x = (width + TILE - 1) / TILE;
   const uint tile = get_global_id(0);
   if (tile >= (uint)(tiles_x * ((height + TILE - 1) / TILE))) return;
-  const Faces axes = axes_argument;
+  const RsLensFaces axes = axes_argument;
   const int begin_x = (int)(tile % tiles_x) * TILE, end_x = min(begin_x + TILE, width);
   const int begin_y = (int)(tile / tiles_x) * TILE, end_y = min(begin_y + TILE, height);
   __global float* xs = directions;

@@ -4,6 +4,7 @@
 // the exact outline, least depth). One work-item per VECTOR Gaussians from number `begin` on, any
 // local size; end - begin is a multiple of VECTOR. Lines of hidden Gaussians are undefined.
 #include "shared/color.h"
+#include "trace/arguments.h"
 #include "trace/view.h"
 
 #ifndef PEAK_ORDER
@@ -120,11 +121,7 @@ void write_colour(const ViewGaussian* g, __global const float* sh, gv* colour) {
 
 __kernel void prepare_view(const uint begin,
                            const uint end,
-                           __global const float* restrict means,
-                           __global const float* restrict quaternions,
-                           __global const float* restrict scales,
-                           __global const float* restrict opacities,
-                           __global const float* restrict sh,
+                           RS_GAUSSIAN_ARGUMENTS,
                            const RsCamera camera_argument,
                            const float quantile,
                            const float4 window,

@@ -34,7 +34,7 @@ typedef struct {
   // Read only.
   __global const float* records;
   LineSums sums;
-  float16 screen;   // as the kernel's argument
+  float16 screen;   // of RsRaySums
   float4 gradient;  // of the ray's colour and alpha
   float sky;        // background . gradient
   float total;      // final colour . gradient + final alpha * gradient of alpha
@@ -188,60 +188,40 @@ void blend_hits(const RayScene* scene,
 
 #include "trace/ray_walk.h"
 
-// Of the rays [first, last) in their order. rays, results, tree and order as in rays.cl; gradients:
-// dL/d(R, G, B, alpha) per ray; records:
-// whitening matrix and mean of every Gaussian (ray_gradients.cl); screen: a 3 x 3 matrix in 0..8,
-// row-major, from the gradient of a mean to its share on the screen for a mean at distance 1; limit
-// and sums: as for LineSums; slopes: with RAY_SLOPES of every ray the gradients of its origin and
-// direction, four floats each, zeros at first.
+// Of the rays [first, last) in their order. results: what trace_rays gave them; gradients:
+// dL/d(R, G, B, alpha) per ray; records: whitening matrix and mean of every Gaussian
+// (ray_gradients.cl); sums: as for LineSums; slopes: with RAY_SLOPES of every ray the gradients of
+// its origin and direction, four floats each, zeros at first.
 __kernel void ray_backward(const uint first,
                            const uint last,
                            const uint chunk,
                            const uint items,
-                           const uint gaussians,
-                           const int levels,
-                           __global const uint* restrict level_begin,
-                           __global const fv* restrict nodes,
-                           __global const fv* restrict blocks,
+                           RS_TREE_ARGUMENTS,
                            __global const float* restrict sh,
-                           const int sh_coefficients,
-                           const int color_from_origin,
-                           const float quantile,
-                           const float min_transmittance,
-                           const int max_hits,
-                           const float4 near,
-                           const float4 background,
-                           const float16 screen,
-                           __global const float8* restrict rays,
-                           const int ordered,
-                           __global const uint* restrict ray_order,
+                           const RsRayWalk walk_argument,
+                           RS_RAY_ARGUMENTS,
                            __global const float8* restrict results,
                            __global const float4* restrict gradients,
                            __global const float* restrict records,
-                           const float limit,
+                           const RsRaySums ray_sums,
                            __global float* restrict sums,
                            __global float8* restrict slopes) {
   const uint item = get_global_id(0);
   if (item >= items) return;
-  const RayScene scene = {level_begin, nodes,
-                          blocks,      sh,
-                          levels,      sh_coefficients,
-                          SH_DEGREE,   color_from_origin,
-                          quantile,    min_transmittance,
-                          max_hits,    near};
+  const RsRayWalk walk = walk_argument;
+  const float3 background = vload3(0, walk.background);
+  const RayScene scene = ray_scene(levels, level_begin, nodes, blocks, sh, &walk);
   RayState state;
   state.records = records;
 #if PRIVATE_COPIES
-  sums += (size_t)item * gaussians * RS_RAY_SUMS;
-#else
-  (void)gaussians;
+  sums += (size_t)item * ray_sums.gaussians * RS_RAY_SUMS;
 #endif
 #if !RAY_SLOPES
   (void)slopes;
 #endif
   state.sums.lines = sums;
-  state.sums.limit = limit;
-  state.screen = screen;
+  state.sums.limit = ray_sums.limit;
+  state.screen = vload16(0, ray_sums.screen);
   for (size_t begin = first + (size_t)item * chunk; begin < last; begin += (size_t)items * chunk) {
     const size_t end = min(begin + chunk, (size_t)last);
     for (size_t position = begin; position < end; ++position) {
@@ -255,7 +235,7 @@ __kernel void ray_backward(const uint first,
       float basis[25];
       basis_along_ray(&scene, &ray, basis);
       state.gradient = gradient;
-      state.sky = dot(background.xyz, gradient.xyz);
+      state.sky = dot(background, gradient.xyz);
       state.total = dot(result.s012, gradient.xyz) + result.s3 * gradient.w;
       state.total_hits = hits;
       state.transmittance = 1.0f;

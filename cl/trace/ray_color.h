@@ -7,6 +7,7 @@
 #include "shared/color.h"
 #include "shared/layout.h"
 #include "shared/sh.h"
+#include "trace/arguments.h"
 #include "trace/ray_block.h"
 #include "trace/ray_pending.h"
 
@@ -25,6 +26,22 @@ typedef struct {
   int max_hits;
   float4 near;  // of ray_meets_block()
 } RayScene;
+
+RayScene ray_scene(RS_TREE_ARGUMENTS, __global const float* restrict sh, const RsRayWalk* walk) {
+  const RayScene scene = {level_begin,
+                          nodes,
+                          blocks,
+                          sh,
+                          levels,
+                          walk->sh_coefficients,
+                          walk->active_degree,
+                          walk->color_from_origin,
+                          walk->quantile,
+                          walk->min_transmittance,
+                          walk->max_hits,
+                          vload4(0, walk->near)};
+  return scene;
+}
 
 // The basis along the ray, for colours that do not come from its origin.
 void basis_along_ray(const RayScene* scene, const RayData* ray, float* basis) {

@@ -6,6 +6,7 @@
 //   finish_ray_gradients  adds the private copies of the sums (ray_sums.h) in a fixed order, leaves
 //                         zeros in the copies behind the first, and carries the sums to the
 //                         parameters and to the screen statistics that density control reads
+#include "trace/arguments.h"
 #include "trace/gaussian.h"
 #include "trace/ray_sums.h"
 
@@ -76,35 +77,30 @@ gi load_sums(__global float* sums, const size_t copy_floats, const uint copies, 
   return touched != 0.0f;
 }
 
-// screen: 0..8 as for ray_backward, 9..11 the camera's centre, 12 the distance that counts: 0
+// ray_sums.screen: behind the matrix 9..11 the camera's centre, 12 the distance that counts: 0
 // straight from there, 1 along the axis 13..15, 2 none.
 __kernel void finish_ray_gradients(const uint begin,
                                    const uint end,
-                                   const uint count,
                                    const uint copies,
+                                   const RsRaySums ray_sums,
                                    __global float* restrict sums,
                                    __global const float* restrict records,
                                    __global const float* restrict quaternions,
                                    __global const float* restrict scales,
                                    __global const float* restrict opacities,
-                                   const float16 screen_argument,
-                                   __global float* restrict g_means,
-                                   __global float* restrict g_quaternions,
-                                   __global float* restrict g_scales,
-                                   __global float* restrict g_opacities,
-                                   __global float* restrict g_sh,
-                                   __global float* restrict g_screen) {
+                                   RS_GRADIENT_ARGUMENTS) {
   const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
   if (i >= end) return;
   gv v[RS_RAY_SUMS];
-  const gi touched = load_sums(sums + i * RS_RAY_SUMS, (size_t)count * RS_RAY_SUMS, copies, v);
+  const gi touched =
+      load_sums(sums + i * RS_RAY_SUMS, (size_t)ray_sums.gaussians * RS_RAY_SUMS, copies, v);
   if (!RS_ANY_GAUSSIAN(touched)) {
     clear_columns(g_means + 3 * i, 3);
     clear_columns(g_quaternions + 4 * i, 4);
     clear_columns(g_scales + 3 * i, 3);
     clear_columns(g_opacities + i, 1);
     clear_columns(g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
-    clear_columns(g_screen + 3 * i, 3);
+    clear_columns(screen + 3 * i, 3);
     return;
   }
 
@@ -119,25 +115,21 @@ __kernel void finish_ray_gradients(const uint begin,
   for (int j = 0; j < 3; ++j) {
     mean[j] = -(record[j] * v[0] + record[3 + j] * v[1] + record[6 + j] * v[2]);
   }
-  union {
-    float16 v;
-    float s[16];
-  } screen;
-  screen.v = screen_argument;
+  const RsRaySums shares = ray_sums;
   gv length2 = 0, along = 0, distance2 = 0;
   for (int k = 0; k < 3; ++k) {
-    const float* row = screen.s + 3 * k;
+    const float* row = shares.screen + 3 * k;
     const gv part = row[0] * mean[0] + row[1] * mean[1] + row[2] * mean[2];
     length2 += part * part;
-    const gv offset = record[9 + k] - screen.s[9 + k];
-    along += screen.s[13 + k] * offset;
+    const gv offset = record[9 + k] - shares.screen[9 + k];
+    along += shares.screen[13 + k] * offset;
     distance2 += offset * offset;
   }
   gv distance = 1.0f;
-  if (screen.s[12] == 0.0f) distance = sqrt(distance2);
-  if (screen.s[12] == 1.0f) distance = larger(along, zero);
+  if (shares.screen[12] == 0.0f) distance = sqrt(distance2);
+  if (shares.screen[12] == 1.0f) distance = larger(along, zero);
   store_columns3(touched ? sqrt(length2) * distance : zero, touched ? v[10] * distance : zero,
-                 touched ? (gv)(1.0f) : zero, g_screen + 3 * i);
+                 touched ? (gv)(1.0f) : zero, screen + 3 * i);
 
   gv c[3 * SH_COEFFICIENTS];
 #if SH_DEGREE == 0

@@ -60,45 +60,28 @@ void blend_hits(const RayScene* scene,
 
 #include "trace/ray_walk.h"
 
-// rays: 8 floats each (origin, t_min, direction, t_max). results: 8 words each (colour, alpha,
-// expected depth, median depth, hits, capped); with LEADING the word of the hits is the Gaussian
-// that leads them: of the median depth, or the one that shows most where there is none.
-// level_begin[l]: first node of level l, from 1; ray_order: which ray a work-item traces, read when
-// `ordered`. color_from_origin: 0 for colours along the rays, 1 from their origins, 2 as
-// from_origin[] says for each.
+// results: 8 words each (colour, alpha, expected depth, median depth, hits, capped); with LEADING
+// the word of the hits is the Gaussian that leads them: of the median depth, or the one that shows
+// most where there is none.
+// from_origin: of every ray, read where the launch's color_from_origin is 2.
 __kernel void trace_rays(const uint ray_count,
                          const uint rays_per_item,
-                         const int levels,
-                         __global const uint* restrict level_begin,
-                         __global const fv* restrict nodes,
-                         __global const fv* restrict blocks,
+                         RS_TREE_ARGUMENTS,
                          __global const float* restrict sh,
-                         const int sh_coefficients,
-                         const int active_degree,
-                         const int color_from_origin,
+                         const RsRayWalk walk_argument,
+                         RS_RAY_ARGUMENTS,
                          __global const uint* restrict from_origin,
-                         const float quantile,
-                         const float min_transmittance,
-                         const int max_hits,
-                         const float4 near,
-                         const float4 background,
-                         __global const float8* restrict rays,
-                         const int ordered,
-                         __global const uint* restrict ray_order,
                          __global float8* restrict results) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
-  RayScene scene = {level_begin,   nodes,
-                    blocks,        sh,
-                    levels,        sh_coefficients,
-                    active_degree, color_from_origin,
-                    quantile,      min_transmittance,
-                    max_hits,      near};
+  const RsRayWalk walk = walk_argument;
+  const float3 background = vload3(0, walk.background);
+  RayScene scene = ray_scene(levels, level_begin, nodes, blocks, sh, &walk);
   for (uint position = first; position < last; ++position) {
     const size_t id = ordered ? ray_order[position] : position;
     const float8 raw = rays[id];
     RayData ray = ray_data(raw);
-    if (color_from_origin == 2) scene.color_from_origin = (int)from_origin[id];
+    if (walk.color_from_origin == 2) scene.color_from_origin = (int)from_origin[id];
     float basis[25];
     basis_along_ray(&scene, &ray, basis);
     RayState state = {(float4)(0.0f), 1.0f, 0.0f, 0.0f, 0, false, false, -1.0f, 0};
@@ -107,7 +90,7 @@ __kernel void trace_rays(const uint ray_count,
     state.leading = 0;
 #endif
     walk_ray(&scene, raw.s7, basis, &ray, &state);
-    const float3 color = state.color.xyz + state.transmittance * background.xyz;
+    const float3 color = state.color.xyz + state.transmittance * background;
     const float weight = 1.0f - state.transmittance;
 #if LEADING
     const uint count = state.leading;

@@ -40,7 +40,7 @@ void GaussianBounds::compute(const Buffer<float>& means,
   boxes.ensure(*context_, count, "Gaussian bounds");
   const std::size_t items = (count + chunk_ - 1) / chunk_;
   kernel_.launch(Range::linear(items, chunk_ > 1 ? 1 : kGroup), means, quaternions, scales,
-                 opacities, boxes, quantile, static_cast<std::uint32_t>(count),
+                 opacities, BufferAs<float>{boxes.raw()}, quantile, static_cast<std::uint32_t>(count),
                  static_cast<std::uint32_t>(chunk_));
 }
 

@@ -67,6 +67,10 @@ class Lbvh {
   /// Behind the root, at scene_node(), lane 0 of a further node holds the box of everything.
   const Buffer<float>& nodes() const { return nodes_; }
   std::uint32_t scene_node() const { return scene_node_; }
+  /// RS_TREE_ARGUMENTS of cl/bvh/lbvh_node.h, with the owner's leaf blocks.
+  auto arguments(const Buffer<float>& blocks) const {
+    return argument_pack(levels(), level_begin_, nodes_, blocks);
+  }
   /// Box index of every slot (block times lanes plus lane).
   const Buffer<std::uint32_t>& slots() const { return order_; }
 

@@ -20,8 +20,9 @@
 namespace raysplats {
 namespace {
 
-// Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not.
-constexpr const char* kCompilerOptions = "-cl-std=CL1.2 -cl-mad-enable";
+// Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not. The types of
+// arguments are kept, for RAYSPLATS_CHECK_ARGUMENTS.
+constexpr const char* kCompilerOptions = "-cl-std=CL1.2 -cl-mad-enable -cl-kernel-arg-info";
 
 // Compilers print warnings, or how many there were, to the terminal behind our back: they are for
 // those who ask for them.
@@ -107,6 +108,7 @@ Context::Context(const DeviceInfo& device, const ContextOptions& options)
   if (options.tuning) impl_->info.tuning = TuningStore(options.cache_directory).find(device);
   impl_->device = devices[device.index].device;
   impl_->canaries = Canaries::from_environment();
+  impl_->check_arguments = arguments_are_checked();
   try {
     impl_->context = cl::Context(impl_->device);
     impl_->queue = cl::CommandQueue(

@@ -45,6 +45,7 @@ struct Context::Impl {
   Profiler profiler;
   std::unique_ptr<Canaries> canaries;  // usually none
   FaultInjection faults;
+  bool check_arguments = false;  // RAYSPLATS_CHECK_ARGUMENTS
   std::map<std::string, cl::Program> programs;  // by program path and build options
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;
@@ -69,6 +70,7 @@ struct Kernel::Impl {
   std::string program;
   std::string name;
   unsigned argument_count = 0;
+  std::vector<ArgumentType> checked;  // what was found right for every argument
 };
 
 struct RawBuffer::Impl {

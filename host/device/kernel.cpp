@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cstring>
+
 #include "device/context_impl.hpp"
 #include "raysplats/error.hpp"
 
@@ -14,6 +16,8 @@ std::size_t Kernel::max_work_group_size() const {
   return impl_->kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(impl_->context->device);
 }
 
+std::size_t Kernel::argument_count() const { return impl_->argument_count; }
+
 void Kernel::begin(std::size_t argument_count) {
   if (argument_count != impl_->argument_count) {
     throw DeviceError(fmt::format("Kernel {} takes {} arguments, {} were given", impl_->name,
@@ -21,7 +25,32 @@ void Kernel::begin(std::size_t argument_count) {
   }
 }
 
-void Kernel::set_buffer(unsigned index, const RawBuffer& buffer) {
+void Kernel::check(unsigned index, const ArgumentType& type) {
+  if (!impl_->context->check_arguments) return;
+  std::vector<ArgumentType>& checked = impl_->checked;
+  checked.resize(impl_->argument_count);
+  ArgumentType& last = checked[index];
+  if (last == type) return;
+  try {
+    const auto address = impl_->kernel.getArgInfo<CL_KERNEL_ARG_ADDRESS_QUALIFIER>(index);
+    std::string name = impl_->kernel.getArgInfo<CL_KERNEL_ARG_TYPE_NAME>(index);
+    name.resize(std::strlen(name.c_str()));
+    const ArgumentPlace place = address == CL_KERNEL_ARG_ADDRESS_PRIVATE ? ArgumentPlace::kValue
+                                : address == CL_KERNEL_ARG_ADDRESS_LOCAL ? ArgumentPlace::kLocal
+                                                                         : ArgumentPlace::kBuffer;
+    const std::string trouble = type.mismatch(name, place);
+    if (!trouble.empty()) {
+      throw DeviceError(fmt::format("Argument {} of kernel {} {}", index, impl_->name, trouble));
+    }
+  } catch (const cl::Error& error) {
+    throw_cl_error(
+        error, fmt::format("Asking for the type of argument {} of kernel {}", index, impl_->name));
+  }
+  last = type;
+}
+
+void Kernel::set_buffer(unsigned index, const RawBuffer& buffer, const ArgumentType& type) {
+  check(index, type);
   if (buffer.empty())
     throw DeviceError(
         fmt::format("Argument {} of kernel {} is an empty buffer", index, impl_->name));
@@ -30,6 +59,16 @@ void Kernel::set_buffer(unsigned index, const RawBuffer& buffer) {
   } catch (const cl::Error& error) {
     throw_cl_error(error, fmt::format("Argument {} of kernel {}", index, impl_->name));
   }
+}
+
+void Kernel::set_local(unsigned index, std::size_t bytes) {
+  check(index, {ArgumentPlace::kLocal, ArgumentNumbers::kWords, "", 0});
+  set_bytes(index, nullptr, bytes);
+}
+
+void Kernel::set_value(unsigned index, const void* value, const ArgumentType& type) {
+  check(index, type);
+  set_bytes(index, value, type.bytes);
 }
 
 void Kernel::set_bytes(unsigned index, const void* value, std::size_t bytes) {

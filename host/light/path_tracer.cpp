@@ -127,6 +127,10 @@ struct PathTracer::Impl {
   bool trace_packets(const Camera& camera, const std::function<bool(double)>& within);
   void take_packets(std::size_t first_pixel, std::size_t count);
   void gather_light(const RsWave& wave, std::size_t count, bool from_gaussians);
+  // RS_LIT_ARGUMENTS of cl/light/waves.cl.
+  auto lit_arguments() const {
+    return argument_pack(surfaces.lights(), surfaces.materials(), rays, results, met);
+  }
   void add_tallies(std::size_t count);
 
   Context& context;
@@ -318,9 +322,8 @@ void PathTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool 
   const int kind = from_gaussians ? 1 : 0;
   const auto make_rays = [&](int light, int k, int target) {
     kernel("shadow_rays")
-        .launch(each, u32(count), wave, light, k, target, gaussians.quaternions, gaussians.scales,
-                tracer.options().quantile, surfaces.lights(), surfaces.materials(), paths, rays,
-                results, met, shadow_rays, skip);
+        .launch(each, u32(count), wave, light, k, target, lit_arguments(), gaussians.quaternions,
+                gaussians.scales, tracer.options().quantile, paths, shadow_rays, skip);
   };
   for (std::size_t number = 0; number < lights.size(); ++number) {
     const bool soft = lights[number].kind == Light::Kind::kSphere && lights[number].radius > 0;
@@ -338,9 +341,8 @@ void PathTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool 
       }
       kernel("add_light")
           .launch(each, u32(count), wave, light, 1.0f / static_cast<float>(samples), kind,
-                  use_triangles ? 1 : 0, use_gaussians ? 1 : 0, surfaces.lights(),
-                  surfaces.materials(), rays, results, met, shadow_rays, passes, blocked,
-                  gaussian_light, surface_light);
+                  use_triangles ? 1 : 0, use_gaussians ? 1 : 0, lit_arguments(), shadow_rays,
+                  passes, blocked, gaussian_light, surface_light);
     }
   }
 }

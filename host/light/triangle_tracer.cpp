@@ -84,7 +84,7 @@ void TriangleTracer::launch_rays(const char* kernel,
                   context_->kernel("light/surface_rays.cl", kernel,
                                    BuildOptions().define("PACKET", tree_.lanes())),
                   (count + each - 1) / each, cpu ? 1 : kGroup, u32(count), u32(each),
-                  tree_.levels(), tree_.level_begin(), tree_.nodes(), blocks_, arguments...);
+                  tree_.arguments(blocks_), arguments...);
 }
 
 template <class Skip>
@@ -107,7 +107,8 @@ void TriangleTracer::nearest(const Buffer<Ray>& rays,
                              const Buffer<RsPath>& paths,
                              std::size_t count,
                              Buffer<RsSurfaceHit>& hits) {
-  launch_nearest(rays, paths, u32(sizeof(RsPath) / sizeof(std::int32_t)), count, hits);
+  launch_nearest(rays, BufferAs<std::int32_t>{paths.raw()},
+                 u32(sizeof(RsPath) / sizeof(std::int32_t)), count, hits);
 }
 
 void TriangleTracer::light_through(const Buffer<Ray>& rays,

@@ -36,10 +36,6 @@ constexpr double kWatchedMilliseconds = 300.0;
 
 const std::vector<int> kFront{0};
 
-std::array<float, 4> background_of(const TraceOptions& options) {
-  return {options.background[0], options.background[1], options.background[2], 0.0f};
-}
-
 }  // namespace
 
 struct CameraTracer::Impl {
@@ -62,6 +58,11 @@ struct CameraTracer::Impl {
   const std::vector<int>& faces() const { return lens_kind > 0 ? lens.faces() : kFront; }
   const Buffer<RsLensTile>& tiles() const { return lens_kind > 0 ? lens.tiles() : no_tiles; }
   const Buffer<float>& tangents() const { return lens_kind > 0 ? lens.tangents() : no_tangents; }
+  // RS_VIEW_ARGUMENTS and RS_STREAM_ARGUMENTS of cl/trace/arguments.h.
+  auto view_arguments() const { return argument_pack(camera, face, tiles(), tangents()); }
+  auto stream_arguments() const {
+    return argument_pack(transmittances, stream_ends, pool, pool_transmittance);
+  }
   void add_pose(const DeviceGaussians& gaussians, PoseGradient& sum);
   void backward_face(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient);
   void trace_rows(const DeviceGaussians& gaussians,
@@ -324,13 +325,18 @@ void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
   LaunchBudget& budget = watch && !forward_budget.bounded() ? watched_budget : forward_budget;
   const double all = static_cast<double>(lists.tiles_x()) * lists.tile_rows() *
                      static_cast<double>(std::size(faces()));
+  RsForward pass{};
+  pass.window[0] = window.column;
+  pass.window[1] = window.row;
+  pass.window[2] = window.columns;
+  pass.window[3] = window.rows;
+  std::copy(options.background.begin(), options.background.end(), pass.background);
+  pass.min_transmittance = options.min_transmittance;
+  pass.max_hits = options.max_hits;
+  pass.pool_capacity = static_cast<std::uint32_t>(keep ? pool_capacity() : 0);
   in_bands(context, budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    kernel.launch(packet_range(kernel, packet.block, columns, first, number), lists.lines(),
-                  lists.references(), lists.boxes(), lists.box_stride(), lists.limits(),
-                  lists.offsets(), camera, window, options.min_transmittance, options.max_hits,
-                  background_of(options), image, depth, transmittances, stream_ends, pool,
-                  pool_transmittance, static_cast<std::uint32_t>(keep ? pool_capacity() : 0),
-                  counters, face, tiles(), tangents());
+    kernel.launch(packet_range(kernel, packet.block, columns, first, number), lists.arguments(),
+                  view_arguments(), pass, stream_arguments(), image, depth, counters);
     if (!watch) return;
     context.finish();
     watched_tiles += std::size_t{number} * columns;
@@ -367,19 +373,25 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   Kernel kernel = packet.grouped
                       ? context.kernel("trace/group_backward.cl", "trace_backward_group", build)
                       : context.kernel("trace/backward.cl", "trace_backward", build);
+  RsBackward pass{};
+  pass.gaussians = static_cast<std::uint32_t>(count);
+  pass.copies = static_cast<std::uint32_t>(sums.copies());
+  pass.tiles_x = lists.tiles_x();
+  std::copy(options.background.begin(), options.background.end(), pass.background);
+  pass.screen_x = screen_x();
+  pass.screen_y = screen_y();
   // No ray meets a Gaussian twice.
-  const float limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet.lanes));
+  pass.limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet.lanes));
   const bool shared = !sums.is_private();
   in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
     const Range range = shared
                             ? packet_range(kernel, 1, lists.tiles_x(), first, number)
                             : Range{{sums.copies() * lane_items(), 1, 1}, {lane_items(), 1, 1}, {}};
     // Shared sums find their rows by the offset of the launch.
-    kernel.launch(range, static_cast<std::uint32_t>(count),
-                  static_cast<std::uint32_t>(sums.copies()), lists.lines(), image_gradient,
-                  transmittances, stream_ends, pool, pool_transmittance, camera, lists.tiles_x(),
-                  shared ? row : row + first, number, background_of(options), screen_x(),
-                  screen_y(), limit, sums.target(), face, tiles(), tangents());
+    pass.tile_row = shared ? row : row + first;
+    pass.tile_rows = number;
+    kernel.launch(range, view_arguments(), pass, stream_arguments(), lists.lines(), image_gradient,
+                  sums.target());
   });
 }
 
@@ -428,11 +440,10 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
   GaussianKernel kernel(context, "trace/finalize_gradients.cl", "finalize_gradients", build);
-  kernel.launch(n, static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(sums.copies()),
-                sums.lines(), lists.bounds(), lists.lines(), gaussians.means, gaussians.quaternions,
-                gaussians.scales, gaussians.opacities, gaussians.sh, camera, screen_x(), screen_y(),
-                gradients.means, gradients.quaternions, gradients.scales, gradients.opacities,
-                gradients.sh, gradients.screen, pose);
+  const RsFinalize pass{static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(sums.copies()),
+                        screen_x(), screen_y()};
+  kernel.launch(n, pass, camera, sums.lines(), lists.bounds(), lists.lines(), gaussians.arguments(),
+                gradients.arguments(), pose);
 }
 
 void CameraTracer::backward(const DeviceGaussians& gaussians,

@@ -153,9 +153,8 @@ void CandidateLists::prepare(const DeviceGaussians& gaussians,
                               (static_cast<float>(camera.width) - camera.cx) / camera.fx,
                               (static_cast<float>(camera.height) - camera.cy) / camera.fy};
   if (face.tiles != nullptr) window = face.tiles->window(face.face);
-  prepare_kernel_.launch(count_, gaussians.means, gaussians.quaternions, gaussians.scales,
-                         gaussians.opacities, gaussians.sh, camera, options.quantile, window,
-                         lines_, bounds_);
+  prepare_kernel_.launch(count_, gaussians.arguments(), camera, options.quantile, window, lines_,
+                         bounds_);
 }
 
 bool CandidateLists::build(const Buffer<RsAabb>& boxes,

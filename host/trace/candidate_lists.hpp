@@ -73,11 +73,10 @@ class CandidateLists {
 
   const Buffer<RsLine>& lines() const { return lines_; }
   const Buffer<RsViewBounds>& bounds() const { return bounds_; }
-  const Buffer<std::uint32_t>& references() const { return values_; }
-  const Buffer<std::uint32_t>& offsets() const { return tile_offsets_; }
-  const Buffer<float>& boxes() const { return boxes_; }
-  std::uint32_t box_stride() const { return stride_; }
-  const Buffer<std::array<float, 2>>& limits() const { return limits_; }
+  /// RS_LIST_ARGUMENTS of cl/trace/arguments.h.
+  auto arguments() const {
+    return argument_pack(lines_, values_, boxes_, stride_, limits_, tile_offsets_);
+  }
 
  private:
   void require_prepare_kernel(const DeviceGaussians& gaussians,

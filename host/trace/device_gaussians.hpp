@@ -39,6 +39,10 @@ struct GaussianGradients : Parameters {
   /// else 0}.
   Buffer<float> screen;  ///< 3 N
 
+  /// RS_GRADIENT_ARGUMENTS of cl/trace/arguments.h.
+  auto arguments() const {
+    return argument_pack(means, quaternions, scales, opacities, sh, screen);
+  }
   /// Makes room for those of `gaussians`; what is in them is lost where they have to grow.
   void ensure(Context& context, const DeviceGaussians& gaussians);
 };

@@ -15,15 +15,13 @@ constexpr std::size_t kGroup = 64;
 constexpr float kLeastCosine = 0.15f;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-using Rows = std::array<std::array<float, 9>, RS_FACES>;  // Faces of lens_tiles.cl
-
 // Right, down and forward of every face in camera axes.
-constexpr Rows kFaces{{{1, 0, 0, 0, 1, 0, 0, 0, 1},
-                       {0, 0, -1, 0, 1, 0, 1, 0, 0},
-                       {0, 0, 1, 0, 1, 0, -1, 0, 0},
-                       {1, 0, 0, 0, 0, -1, 0, 1, 0},
-                       {1, 0, 0, 0, 0, 1, 0, -1, 0},
-                       {-1, 0, 0, 0, 1, 0, 0, 0, -1}}};
+constexpr RsLensFaces kFaces{{{1, 0, 0, 0, 1, 0, 0, 0, 1},
+                              {0, 0, -1, 0, 1, 0, 1, 0, 0},
+                              {0, 0, 1, 0, 1, 0, -1, 0, 0},
+                              {1, 0, 0, 0, 0, -1, 0, 1, 0},
+                              {1, 0, 0, 0, 0, 1, 0, -1, 0},
+                              {-1, 0, 0, 0, 1, 0, 0, 0, -1}}};
 
 bool same_lens(const Camera& a, const Camera& b) {
   const Distortion &d = a.distortion, &e = b.distortion;
@@ -44,11 +42,11 @@ void grow(std::array<float, 4>& box, const RsLensTile& tile) {
 LensTiles::LensTiles(Context& context, int tile_size) : context_(&context), tile_size_(tile_size) {}
 
 glm::dmat3 LensTiles::rotation(int face) {
-  const std::array<float, 9>& rows = kFaces[static_cast<std::size_t>(face)];
+  const auto& rows = kFaces.rows[face];
   glm::dmat3 out;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column)
-      out[column][row] = static_cast<double>(rows[static_cast<std::size_t>(3 * row + column)]);
+      out[column][row] = static_cast<double>(rows[3 * row + column]);
   }
   return out;
 }

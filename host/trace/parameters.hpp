@@ -6,6 +6,7 @@
 #include <string>
 
 #include "device/buffer.hpp"
+#include "device/kernel.hpp"
 
 namespace raysplats {
 
@@ -30,6 +31,9 @@ struct Parameters {
 
   Buffer<float>& operator[](ParameterGroup group);
   const Buffer<float>& operator[](ParameterGroup group) const;
+
+  /// RS_GAUSSIAN_ARGUMENTS of cl/trace/arguments.h.
+  auto arguments() const { return argument_pack(means, quaternions, scales, opacities, sh); }
 
   /// Makes room for `count` Gaussians; what is in a buffer is lost where it has to grow. `what` is
   /// told where memory runs out ("gradients").

@@ -75,11 +75,14 @@ void RayBackward::begin(const DeviceGaussians& gaussians,
                         std::size_t rays) {
   tracer_->require_current(gaussians);
   for (std::size_t k = 0; k < 3; ++k) {
-    for (std::size_t j = 0; j < 3; ++j) screen_[3 * k + j] = static_cast<float>(screen.rows[k][j]);
-    screen_[9 + k] = static_cast<float>(screen.center[k]);
-    screen_[13 + k] = static_cast<float>(screen.axis[k]);
+    for (std::size_t j = 0; j < 3; ++j)
+      shares_.screen[3 * k + j] = static_cast<float>(screen.rows[k][j]);
+    shares_.screen[9 + k] = static_cast<float>(screen.center[k]);
+    shares_.screen[13 + k] = static_cast<float>(screen.axis[k]);
   }
-  screen_[12] = static_cast<float>(screen.distance);
+  shares_.screen[12] = static_cast<float>(screen.distance);
+  shares_.gaussians = u32(gaussians.count);
+  shares_.limit = GradientSums::limit(rays);
   degree_ = gaussians.active_sh_degree;
   count_ = gaussians.count;
   revision_ = gaussians.revision;
@@ -138,8 +141,8 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   // ray with the copy that it would go to without.
   const std::size_t group = cpu ? 1 : kGroup;
   const std::size_t row = chunk * (sums_.is_private() ? sums_.copies() : group);
-  const std::array<float, 4> background{options.background[0], options.background[1],
-                                        options.background[2], 0.0f};
+  const RsRayWalk walk = ray_walk(options, tracer_->near(), gaussians,
+                                  color_direction == ColorDirection::kFromOrigin ? 1 : 0);
   Kernel kernel = context_->kernel("trace/ray_backward.cl", "ray_backward", build);
   in_bands(*context_, budget_, u32((count + row - 1) / row), [&](std::size_t at, std::size_t rows) {
     const std::size_t first = at * row;
@@ -147,12 +150,8 @@ void RayBackward::add(const DeviceGaussians& gaussians,
     const std::size_t items =
         sums_.is_private() ? sums_.copies() : (last - first + chunk - 1) / chunk;
     kernel.launch(Range::linear(items, group), u32(first), u32(last), u32(chunk), u32(items),
-                  u32(gaussians.count), tree.levels(), tree.level_begin(), tree.nodes(),
-                  tracer_->tree().blocks(), gaussians.sh, sh_coefficients(gaussians.sh_degree),
-                  color_direction == ColorDirection::kFromOrigin ? 1 : 0, options.quantile,
-                  options.min_transmittance, options.max_hits, tracer_->near().plane, background,
-                  screen_, rays, ordered ? 1 : 0, order_.indices(), results, gradients, records_,
-                  GradientSums::limit(rays_), sums_.target(),
+                  tracer_->tree().arguments(), gaussians.sh, walk, order_.arguments(rays, ordered),
+                  results, gradients, records_, shares_, sums_.target(),
                   slopes != nullptr ? *slopes : no_slopes_);
   });
 }
@@ -169,10 +168,8 @@ void RayBackward::finish(const DeviceGaussians& gaussians, GaussianGradients& gr
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
   sums_.round();
   GaussianKernel kernel(*context_, kGradients, "finish_ray_gradients", build);
-  kernel.launch(n, u32(n), u32(sums_.copies()), sums_.lines(), records_, gaussians.quaternions,
-                gaussians.scales, gaussians.opacities, screen_, gradients.means,
-                gradients.quaternions, gradients.scales, gradients.opacities, gradients.sh,
-                gradients.screen);
+  kernel.launch(n, u32(sums_.copies()), shares_, sums_.lines(), records_, gaussians.quaternions,
+                gaussians.scales, gaussians.opacities, gradients.arguments());
   sums_.settle();
   begun_ = false;
 }

@@ -85,7 +85,7 @@ class RayBackward {
   RayOrder order_;
   bool begun_ = false;
   int degree_ = 0;
-  std::array<float, 16> screen_{};
+  RsRaySums shares_{};
   std::size_t count_ = 0;  // Gaussians of begin()
   std::uint64_t revision_ = 0;
   std::size_t rays_ = 0;   // that begin() was told

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "trace/ray_launch.hpp"
 
+#include <algorithm>
+
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
@@ -43,6 +45,22 @@ BuildOptions ray_walk_build(const DeviceInfo& device,
       .define("PENDING", device.type == DeviceType::kCpu ? kCpuPending : kPending)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
       .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
+}
+
+RsRayWalk ray_walk(const TraceOptions& options,
+                   const RayNear& near,
+                   const DeviceGaussians& gaussians,
+                   std::int32_t color_from_origin) {
+  RsRayWalk out{};
+  std::copy(near.plane.begin(), near.plane.end(), out.near);
+  std::copy(options.background.begin(), options.background.end(), out.background);
+  out.quantile = options.quantile;
+  out.min_transmittance = options.min_transmittance;
+  out.max_hits = options.max_hits;
+  out.sh_coefficients = sh_coefficients(gaussians.sh_degree);
+  out.active_degree = gaussians.active_sh_degree;
+  out.color_from_origin = color_from_origin;
+  return out;
 }
 
 RayOrder::RayOrder(Context& context) : context_(&context), sort_(context) {

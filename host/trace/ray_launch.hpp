@@ -12,11 +12,12 @@
 #include "primitives/radix_sort.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/device.hpp"
+#include "raysplats/rays.hpp"
 #include "raysplats/trace_options.hpp"
+#include "shared/trace_layout.h"
+#include "trace/device_gaussians.hpp"
 
 namespace raysplats {
-
-struct Ray;
 
 /// Whether the rays of cameras walk the tree where they could be traced by tiles as well.
 bool walks_tree(const TraceOptions& options, const DeviceInfo& device);
@@ -37,6 +38,12 @@ BuildOptions ray_walk_build(const DeviceInfo& device,
                             const RayNear& near,
                             int lanes);
 
+/// What all rays of a launch share. `color_from_origin` as in RsRayWalk.
+RsRayWalk ray_walk(const TraceOptions& options,
+                   const RayNear& near,
+                   const DeviceGaussians& gaussians,
+                   std::int32_t color_from_origin);
+
 /// The order in which a launch takes its rays, so that neighbours cross the same part of the scene.
 class RayOrder {
  public:
@@ -47,8 +54,11 @@ class RayOrder {
 
   /// False when the rays are taken as they come: there are too few for a sort to pay.
   bool compute(const Lbvh& tree, const Buffer<Ray>& rays, std::size_t count);
-  /// Ray of every position, after a compute() that returned true.
-  const Buffer<std::uint32_t>& indices() const { return indices_; }
+  /// RS_RAY_ARGUMENTS of cl/trace/arguments.h, after a compute() that returned `ordered` for these
+  /// rays.
+  auto arguments(const Buffer<Ray>& rays, bool ordered) const {
+    return argument_pack(rays, std::int32_t{ordered}, indices_);
+  }
 
  private:
   Context* context_;

@@ -25,7 +25,7 @@ static_assert(sizeof(Ray) == 32 && sizeof(RayResult) == 32,
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
-// color_from_origin of rays.cl.
+// RsRayWalk::color_from_origin.
 constexpr std::int32_t kFlagPerRay = 2;
 std::int32_t color_mode(ColorDirection direction) {
   return direction == ColorDirection::kFromOrigin ? 1 : 0;
@@ -118,17 +118,13 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   const Lbvh& tree = self.tree.tree();
   const bool ordered = self.order.compute(tree, rays, count);
   const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
-  const std::array<float, 4> background{options.background[0], options.background[1],
-                                        options.background[2], 0.0f};
   BuildOptions build = ray_walk_build(self.context.device(), options, self.near, tree.lanes());
   build.define("LEADING", color_mode == kFlagPerRay ? 1 : 0);
   launch_in_bands(
       self.context, self.budget, self.context.kernel("trace/rays.cl", "trace_rays", build),
       (count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup, u32(count), u32(rays_per_item),
-      tree.levels(), tree.level_begin(), tree.nodes(), self.tree.blocks(), gaussians.sh,
-      sh_coefficients(gaussians.sh_degree), gaussians.active_sh_degree, color_mode, from_origin,
-      options.quantile, options.min_transmittance, options.max_hits, self.near.plane, background,
-      rays, ordered ? 1 : 0, self.order.indices(), results);
+      self.tree.arguments(), gaussians.sh, ray_walk(options, self.near, gaussians, color_mode),
+      self.order.arguments(rays, ordered), from_origin, results);
 }
 
 void RayTracer::set_background(const std::array<float, 3>& background) {

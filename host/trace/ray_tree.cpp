@@ -71,9 +71,8 @@ void RayTree::fill(const DeviceGaussians& gaussians) {
   const std::size_t padded = tree_.padded_blocks();
   context_->kernel("trace/gaussian_blocks.cl", "fill_blocks", build)
       .launch(Range::linear(padded, kGroup), u32(gaussians.count), u32(padded), tree_.slots(),
-              boxes_, gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
-              gaussians.sh, sh_coefficients(gaussians.sh_degree), options_.quantile, blocks_,
-              tree_.nodes());
+              boxes_, gaussians.arguments(), sh_coefficients(gaussians.sh_degree),
+              options_.quantile, blocks_, tree_.nodes());
   tree_.merge();
 }
 

@@ -31,6 +31,7 @@ class RayTree {
   static constexpr double kGrowth = 1.1;
 
   const Lbvh& tree() const { return tree_; }
+  auto arguments() const { return tree_.arguments(blocks_); }
   const Buffer<float>& blocks() const { return blocks_; }
   /// Of the Gaussians, by their numbers.
   const Buffer<RsAabb>& boxes() const { return boxes_; }

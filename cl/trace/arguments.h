@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kernel arguments that come together, declared once. Functions of the host of the same name set
+// them in this order (host/trace/arguments.hpp, host/trace/camera_tracer.cpp).
+#ifndef RS_TRACE_ARGUMENTS_H
+#define RS_TRACE_ARGUMENTS_H
+
+#include "shared/trace_layout.h"
+
+// Parameters of all Gaussians, Gaussian-major; scales before their activation, opacities as logits.
+#define RS_GAUSSIAN_ARGUMENTS                                                          \
+  __global const float *restrict means, __global const float *restrict quaternions,    \
+      __global const float *restrict scales, __global const float *restrict opacities, \
+      __global const float *restrict sh
+
+// Gradients of the parameters, and what density control reads of them (3 floats a Gaussian).
+#define RS_GRADIENT_ARGUMENTS                                                  \
+  __global float *restrict g_means, __global float *restrict g_quaternions,    \
+      __global float *restrict g_scales, __global float *restrict g_opacities, \
+      __global float *restrict g_sh, __global float *restrict screen
+
+// The lists of the tiles of a window (tile_lists.cl): lines of all Gaussians, then per candidate
+// its Gaussian, its box in four planes of `stride` floats, its least depth and its quantile; the
+// first candidate of every tile, and behind them their number.
+#define RS_LIST_ARGUMENTS                                                          \
+  __global const RsLine *restrict lines, __global const uint *restrict references, \
+      __global const float *restrict boxes, const uint stride,                     \
+      __global const float2 *restrict limits, __global const uint *restrict offsets
+
+// The pinhole, or the face of a lens, that a launch traces; tiles and tangent coordinates of a lens
+// (lens_tiles.cl), not read for pinholes.
+#define RS_VIEW_ARGUMENTS                                                                    \
+  const RsCamera camera_argument, const int face, __global const RsLensTile *restrict tiles, \
+      __global const float *restrict tangents
+
+// Transmittances of the pixels behind the last hit and before it, and the streams of hits
+// (hit_stream.h); `access` is const for those who read them.
+#define RS_STREAM_ARGUMENTS(access)                                                            \
+  __global access float *restrict transmittances, __global access uint2 *restrict stream_ends, \
+      __global access uint2 *restrict pool, __global access float *restrict pool_transmittance
+
+// Rays of eight floats (origin, t_min, direction, t_max) and the order in which they are taken,
+// read when `ordered`.
+#define RS_RAY_ARGUMENTS \
+  __global const float8 *restrict rays, const int ordered, __global const uint *restrict ray_order
+
+#endif
