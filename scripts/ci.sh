@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# What CI checks beside the test suite: the form of the kernels that GPUs get, without a GPU. Each leg ends with PASS, FAIL
+# What CI checks beside the test suite: the Python module, and the form of the kernels that GPUs get, without a GPU. Each leg ends with PASS, FAIL
 # or SKIPPED (what it needs cannot be had here: a failed download is no failure) and its seconds.
 # usage: scripts/ci.sh [BUILD]     (default: build/release, with the tests built)
 set -euo pipefail
@@ -52,6 +52,7 @@ vendor() {
   python3 scripts/gpu_compile.py --quiet --skip-missing --targets "$1"
 }
 
+leg "Python" ./scripts/test_python.sh
 leg "GPU path on this OpenCL" gpu_path
 leg "AMD's compiler (gfx1030)" vendor gfx1030
 leg "NVIDIA's compiler (sm_86)" vendor sm_86

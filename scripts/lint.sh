@@ -30,7 +30,8 @@ sources=()
 kernels=()
 for file in "${files[@]}"; do
   case $file in
-    tests/package/consumer/*) ;; # built against an installed copy, not part of the compile database
+    # Not part of the compile database: built against an installed copy, and into the wheel.
+    tests/package/consumer/* | apps/python/* | scripts/cmake/bundle/*) ;;
     *.cpp) sources+=("$file") ;;
     *.cl) kernels+=("$file") ;;
   esac

@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 # raysplats_images: formats of pictures and networks (host/images). As a rule a library that raysplats_io loads when
-# the first picture is opened, found along the run path of the program; with RAYSPLATS_IMAGES_STATIC linked as any other.
+# the first picture is opened, found along the run path of the program; with RAYSPLATS_IMAGES_STATIC linked as any other. With RAYSPLATS_IMAGES_GIVEN there is none: the program that links
+# the library defines raysplats_images_codec() (io/image_codec.hpp).
+if(RAYSPLATS_IMAGES_GIVEN)
+  target_compile_definitions(raysplats_io PRIVATE RAYSPLATS_IMAGES_STATIC)
+  return()
+endif()
 file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/host/images/*.cpp)
 if(RAYSPLATS_IMAGES_STATIC)
   add_library(raysplats_images STATIC ${sources})

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gaussians.hpp"
+
+#include <fmt/format.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+
+#include <optional>
+
+#include "bindings.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats::python {
+namespace {
+
+using Self = nb::handle_t<Gaussians>;
+
+Gaussians& held(nb::handle self) { return nb::cast<Gaussians&>(self); }
+
+int degree_of(std::size_t coefficients) {
+  constexpr int kMaxDegree = 4;
+  for (int degree = 0; degree <= kMaxDegree; ++degree) {
+    if (static_cast<std::size_t>(sh_coefficients(degree)) == coefficients) return degree;
+  }
+  throw UsageError(fmt::format(
+      "sh has {} coefficients per Gaussian, but 1, 4, 9, 16 or 25 are needed", coefficients));
+}
+
+void require_rows(const Numbers<float>& array, const char* name, std::size_t count) {
+  if (array.shape[0] == count) return;
+  throw UsageError(
+      fmt::format("{} has {} rows, but there are {} means", name, array.shape[0], count));
+}
+
+Gaussians zeros(std::int64_t count, int sh_degree) {
+  constexpr int kMaxDegree = 4;
+  if (count < 0) throw UsageError(fmt::format("count is at least 0, not {}", count));
+  if (sh_degree < 0 || sh_degree > kMaxDegree) {
+    throw UsageError(fmt::format("sh_degree is 0 to {}, not {}", kMaxDegree, sh_degree));
+  }
+  Gaussians out;
+  out.sh_degree = sh_degree;
+  out.resize(static_cast<std::size_t>(count));
+  return out;
+}
+
+void bind_views(nb::class_<Gaussians>& type) {
+  type.def_prop_ro(
+          "means",
+          [](Self self) {
+            Gaussians& g = held(self);
+            return view(self, g.means.data(), {g.size(), 3});
+          },
+          "(N, 3), world units; a view.")
+      .def_prop_ro(
+          "quaternions",
+          [](Self self) {
+            Gaussians& g = held(self);
+            return view(self, g.quaternions.data(), {g.size(), 4});
+          },
+          "(N, 4), real part first, normalised when used; a view.")
+      .def_prop_ro(
+          "log_scales",
+          [](Self self) {
+            Gaussians& g = held(self);
+            return view(self, g.log_scales.data(), {g.size(), 3});
+          },
+          "(N, 3), natural logarithms of the standard deviations; a view.")
+      .def_prop_ro(
+          "opacities",
+          [](Self self) {
+            Gaussians& g = held(self);
+            return view(self, g.opacities.data(), {g.size()});
+          },
+          "(N,), logits; a view.")
+      .def_prop_ro(
+          "sh",
+          [](Self self) {
+            Gaussians& g = held(self);
+            return view(self, g.sh.data(),
+                        {g.size(), static_cast<std::size_t>(sh_coefficients(g.sh_degree)), 3});
+          },
+          "(N, (sh_degree + 1)^2, 3), coefficients of spherical harmonics; a view.");
+}
+
+}  // namespace
+
+Gaussians gaussians_of(const FloatArray& means,
+                       const FloatArray& quaternions,
+                       const FloatArray& log_scales,
+                       const FloatArray& opacities,
+                       const FloatArray& sh) {
+  const Numbers<float> m = numbers(means, "means", {kAny, 3});
+  const Numbers<float> q = numbers(quaternions, "quaternions", {kAny, 4});
+  const Numbers<float> s = numbers(log_scales, "log_scales", {kAny, 3});
+  const Numbers<float> o = numbers(opacities, "opacities", {kAny});
+  const Numbers<float> c = numbers(sh, "sh", {kAny, kAny, 3});
+  const std::size_t count = m.shape[0];
+  require_rows(q, "quaternions", count);
+  require_rows(s, "log_scales", count);
+  require_rows(o, "opacities", count);
+  require_rows(c, "sh", count);
+  return {degree_of(c.shape[1]), m.copy(), q.copy(), s.copy(), o.copy(), c.copy()};
+}
+
+void bind_gaussians(nb::module_& module) {
+  nb::class_<Gaussians> type(
+      module, "Gaussians",
+      "N Gaussians in the host's memory, parameters before activation as in a 3DGS PLY. The arrays "
+      "are views: writing to them changes the Gaussians. Their number is fixed.");
+  type.def(
+          "__init__",
+          [](Gaussians* self, const FloatArray& means, const FloatArray& quaternions,
+             const FloatArray& log_scales, const FloatArray& opacities, const FloatArray& sh) {
+            new (self) Gaussians(gaussians_of(means, quaternions, log_scales, opacities, sh));
+          },
+          nb::arg("means"), nb::arg("quaternions"), nb::arg("log_scales"), nb::arg("opacities"),
+          nb::arg("sh"), "Copies the arrays; the shapes are those of the views.")
+      .def_static("zeros", &zeros, nb::arg("count"), nb::arg("sh_degree") = 0,
+                  "Gaussians to be filled in: zeros and unit quaternions.")
+      .def_static("load", &read_ply, nb::arg("path"), nb::call_guard<nb::gil_scoped_release>(),
+                  "Reads a 3DGS PLY, SH degree 0 to 4.")
+      .def(
+          "save",
+          [](const Gaussians& self, const std::filesystem::path& path,
+             const std::optional<TraceOptions>& options) { write_ply(path, self, options); },
+          nb::arg("path"), nb::arg("options") = nb::none(),
+          nb::call_guard<nb::gil_scoped_release>(),
+          "Writes a binary 3DGS PLY; `options` go into its header, for TraceOptions.load().")
+      .def("with_sh_degree", &with_sh_degree, nb::arg("degree"),
+           "A copy with bands added (zero) or dropped.")
+      .def_ro("sh_degree", &Gaussians::sh_degree)
+      .def("__len__", &Gaussians::size)
+      .def("__repr__", [](const Gaussians& self) {
+        return fmt::format("<raysplats.Gaussians: {} of SH degree {}>", self.size(),
+                           self.sh_degree);
+      });
+  bind_views(type);
+}
+
+}  // namespace raysplats::python

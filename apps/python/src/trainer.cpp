@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "raysplats/trainer.hpp"
+
+#include <fmt/format.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/nearest_name.hpp"
+#include "bindings.hpp"
+#include "context.hpp"
+#include "raysplats/error.hpp"
+#include "train/train_config.hpp"
+#include "train/train_keys.hpp"
+
+namespace raysplats::python {
+namespace {
+
+namespace nb = nanobind;
+
+using HeldTrainer = Held<Trainer>;
+
+/// A value of Python as the words that configuration files have.
+std::string word(nb::handle value) {
+  if (value.is(Py_True)) return "true";
+  if (value.is(Py_False)) return "false";
+  return nb::cast<std::string>(nb::str(value));
+}
+
+std::vector<std::string> words(nb::handle value) {
+  if (!nb::isinstance<nb::list>(value) && !nb::isinstance<nb::tuple>(value)) return {word(value)};
+  std::vector<std::string> out;
+  for (const nb::handle each : value) out.push_back(word(each));
+  return out;
+}
+
+void set_option(TrainOptions& options, std::string key, nb::handle value) {
+  std::replace(key.begin(), key.end(), '_', '-');
+  std::vector<std::string> names;
+  for (const TrainKey& known : train_keys(options)) {
+    if (known.name == key) return known.set(words(value));
+    names.push_back(known.name);
+  }
+  throw UsageError(
+      fmt::format("unknown option '{}': did you mean '{}'?", key, nearest_name(key, names)));
+}
+
+std::string option_text(TrainOptions& options, std::string key) {
+  std::replace(key.begin(), key.end(), '_', '-');
+  std::vector<std::string> names;
+  for (const TrainKey& known : train_keys(options)) {
+    if (known.name == key) return known.text();
+    names.push_back(known.name);
+  }
+  throw UsageError(
+      fmt::format("unknown option '{}': did you mean '{}'?", key, nearest_name(key, names)));
+}
+
+void make_options(TrainOptions* self,
+                  const std::optional<std::filesystem::path>& config,
+                  const nb::kwargs& keys) {
+  TrainOptions options;
+  if (config) read_train_config(*config, options);
+  for (const auto& [key, value] : keys) {
+    set_option(options, nb::cast<std::string>(key), value);
+  }
+  validate(options);
+  new (self) TrainOptions(std::move(options));
+}
+
+using Callback = std::optional<nb::callable>;
+
+/// Sets what an iteration calls, and takes it back at the end: a trainer that kept its callback
+/// could keep itself alive by it. Made and gone with the interpreter's lock.
+class StepCallback {
+ public:
+  StepCallback(Trainer& trainer, const Callback& callback) : trainer_(trainer) {
+    trainer_.on_step([&callback](const TrainProgress& progress) {
+      const nb::gil_scoped_acquire acquire;
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+      if (callback) (*callback)(progress);
+    });
+  }
+  ~StepCallback() { trainer_.on_step(nullptr); }
+  StepCallback(const StepCallback&) = delete;
+  StepCallback& operator=(const StepCallback&) = delete;
+
+ private:
+  Trainer& trainer_;
+};
+
+TrainSummary run(HeldTrainer& self, bool show_progress, const Callback& on_step) {
+  Trainer& trainer = *self;
+  const nb::gil_scoped_release release;
+  const StepCallback callback(trainer, on_step);
+  return trainer.run(show_progress);
+}
+
+bool step(HeldTrainer& self, std::int64_t count, const Callback& on_step) {
+  Trainer& trainer = *self;
+  const nb::gil_scoped_release release;
+  const StepCallback callback(trainer, on_step);
+  return trainer.step(count);
+}
+
+void bind_records(nb::module_& module) {
+  nb::class_<EvaluationRow>(module, "EvaluationRow", "Mean over the test views at one iteration.")
+      .def_ro("iteration", &EvaluationRow::iteration)
+      .def_ro("training_seconds", &EvaluationRow::training_seconds)
+      .def_ro("psnr", &EvaluationRow::psnr, "Decibels.")
+      .def_ro("ssim", &EvaluationRow::ssim)
+      .def_ro("views", &EvaluationRow::views)
+      .def_ro("gaussians", &EvaluationRow::gaussians)
+      .def_ro("psnr_corrected", &EvaluationRow::psnr_corrected)
+      .def_ro("psnr_all", &EvaluationRow::psnr_all);
+  nb::class_<TrainSummary>(module, "TrainSummary")
+      .def_ro("iterations", &TrainSummary::iterations)
+      .def_ro("gaussians", &TrainSummary::gaussians)
+      .def_ro("loss", &TrainSummary::loss, "Of the last view reported.")
+      .def_ro("training_seconds", &TrainSummary::training_seconds)
+      .def_ro("evaluation_seconds", &TrainSummary::evaluation_seconds)
+      .def_ro("kernel_build_seconds", &TrainSummary::kernel_build_seconds)
+      .def_ro("evaluations", &TrainSummary::evaluations);
+  nb::class_<TrainProgress>(module, "TrainProgress", "Where a run is after a step.")
+      .def_ro("iteration", &TrainProgress::iteration, "Completed.")
+      .def_ro("iterations", &TrainProgress::iterations, "Of the whole run.")
+      .def_ro("gaussians", &TrainProgress::gaussians);
+  nb::class_<TrainLoss>(module, "TrainLoss", "The view that the last step was made with.")
+      .def_ro("total", &TrainLoss::total)
+      .def_ro("psnr", &TrainLoss::psnr, "Decibels.");
+}
+
+void bind_options(nb::module_& module) {
+  nb::class_<TrainOptions>(module, "TrainOptions",
+                           "Every key of the configuration files (docs/training.md), with _ or -.")
+      .def("__init__", &make_options, nb::arg("config") = nb::none(), nb::arg("keys"),
+           nb::sig("def __init__(self, config: str | os.PathLike | None = None, **keys: object) -> "
+                   "None"),
+           "The defaults, then a TOML file, then keywords.")
+      .def("__setitem__", &set_option, nb::arg("key"), nb::arg("value").none())
+      .def("text", &option_text, nb::arg("key"), "The value of a key as TOML.")
+      .def_static(
+          "keys",
+          [] {
+            TrainOptions options;
+            std::vector<std::string> names;
+            for (const TrainKey& key : train_keys(options)) names.push_back(key.name);
+            return names;
+          },
+          "The name of every key.")
+      .def("to_toml", &to_toml, "A configuration file with every key and what it means.");
+}
+
+}  // namespace
+
+void bind_trainer(nb::module_& module) {
+  bind_records(module);
+  bind_options(module);
+  using Guard = nb::call_guard<nb::gil_scoped_release>;
+  nb::class_<HeldTrainer>(
+      module, "Trainer",
+      "Trains a model of a data set and writes a run folder. Either run() does everything that the "
+      "options say, or step(), evaluate() and save() in a loop of your own.")
+      .def(
+          "__init__",
+          [](HeldTrainer* self, HeldContext& context, const Dataset& dataset,
+             const std::filesystem::path& run_folder, const std::optional<TrainOptions>& options,
+             bool overwrite) {
+            new (self) HeldTrainer(*context, dataset, options.value_or(TrainOptions{}), run_folder,
+                                   overwrite);
+          },
+          nb::arg("context"), nb::arg("dataset"), nb::arg("run_folder"),
+          nb::arg("options") = nb::none(), nb::kw_only(), nb::arg("overwrite") = false,
+          nb::keep_alive<1, 2>())
+      .def(
+          "resume",
+          [](HeldTrainer& self, const std::filesystem::path& source) { self->resume(source); },
+          nb::arg("source") = "latest", Guard(),
+          "Continues from a run folder, a checkpoint file, or 'latest': the run's own folder.")
+      .def("run", &run, nb::arg("show_progress") = false, nb::kw_only(),
+           nb::arg("on_step") = nb::none(),
+           "Trains up to the options' iterations. Ctrl-C saves a checkpoint and raises "
+           "KeyboardInterrupt. on_step(progress) hears of every iteration.")
+      .def("step", &step, nb::arg("count") = 1, nb::kw_only(), nb::arg("on_step") = nb::none(),
+           "At most `count` iterations more, without files and evaluations; returns whether any "
+           "are still to come.")
+      .def(
+          "stop", [](HeldTrainer& self) { self->stop(); },
+          "Ends run() or step() after the iteration under way; from any thread.")
+      .def(
+          "evaluate", [](HeldTrainer& self) { return self->evaluate(); }, Guard(),
+          "Traces the test views, writes RUN/eval and RUN/metrics.json.")
+      .def(
+          "save", [](HeldTrainer& self) { self->save(); }, Guard(),
+          "Writes the model and a checkpoint into the run folder.")
+      .def(
+          "loss", [](HeldTrainer& self) { return self->loss(); }, Guard(),
+          "Loss and PSNR of the last step's view.")
+      .def(
+          "gaussians", [](HeldTrainer& self) { return self->model(); }, Guard(),
+          "The model as it is now.")
+      .def_prop_ro(
+          "iteration", [](HeldTrainer& self) { return self->iteration(); },
+          "Completed iterations.");
+}
+
+}  // namespace raysplats::python

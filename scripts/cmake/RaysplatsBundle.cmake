@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+# raysplats_bundle: what fmt, spdlog, xxHash, tinyobjloader, tinygltf and toml++ define in shared libraries, built from
+# their headers instead, so that a wheel needs none of them. The library's own sources are compiled exactly as without.
+
+set(raysplats_bundled fmt::fmt spdlog::spdlog PkgConfig::XXHASH tinyobjloader::tinyobjloader TinyGLTF::TinyGLTF
+                      tomlplusplus::tomlplusplus)
+file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/bundle/*.cpp)
+add_library(raysplats_bundle STATIC ${sources})
+set_target_properties(raysplats_bundle PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
+target_compile_features(raysplats_bundle PUBLIC cxx_std_20)
+# The header of toml++ as the library reads it.
+target_include_directories(raysplats_bundle PRIVATE ${PROJECT_SOURCE_DIR}/host ${PROJECT_SOURCE_DIR}/include)
+foreach(target IN LISTS raysplats_bundled)
+  foreach(property INCLUDE_DIRECTORIES COMPILE_DEFINITIONS COMPILE_OPTIONS)
+    get_target_property(${property} ${target} INTERFACE_${property})
+    if(NOT ${property})
+      set(${property} "")
+    endif()
+  endforeach()
+  target_include_directories(raysplats_bundle SYSTEM PUBLIC ${INCLUDE_DIRECTORIES})
+  target_compile_definitions(raysplats_bundle PUBLIC ${COMPILE_DEFINITIONS})
+  target_compile_options(raysplats_bundle PUBLIC ${COMPILE_OPTIONS})
+endforeach()
+# tinygltf is given its files by callbacks and decodes no pictures.
+target_compile_definitions(raysplats_bundle PUBLIC TINYGLTF_NO_STB_IMAGE TINYGLTF_NO_STB_IMAGE_WRITE)
+
+# Replaces the names of the bundled libraries in a list of targets.
+function(raysplats_bundle list)
+  set(targets ${${list}})
+  list(REMOVE_ITEM targets ${raysplats_bundled})
+  if(NOT "${targets}" STREQUAL "${${list}}")
+    list(APPEND targets raysplats_bundle)
+  endif()
+  set(${list} ${targets} PARENT_SCOPE)
+endfunction()

@@ -1,0 +1,3 @@
+// SPDX-License-Identifier: Apache-2.0
+#define TINYGLTF_IMPLEMENTATION
+#include <tiny_gltf.h>

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What arrays are taken and given: views, never silent copies."""
+
+import gc
+
+import numpy as np
+import pytest
+
+import raysplats as rs
+from conftest import as_gaussians, random_arrays
+
+
+def test_views_write_through():
+    g = rs.Gaussians.zeros(3, sh_degree=1)
+    assert g.means.shape == (3, 3) and g.quaternions.shape == (3, 4)
+    assert g.log_scales.shape == (3, 3) and g.opacities.shape == (3,) and g.sh.shape == (3, 4, 3)
+    assert g.means.dtype == np.float32 and g.means.flags.c_contiguous and g.means.flags.writeable
+    g.means[1] = [1, 2, 3]
+    assert np.shares_memory(g.means, g.means)
+    assert g.means[1].tolist() == [1, 2, 3]
+    assert g.quaternions.tolist() == [[1, 0, 0, 0]] * 3
+
+
+def test_a_view_keeps_its_owner():
+    means = as_gaussians(random_arrays()).means
+    expected = means.copy()
+    gc.collect()
+    ballast = [rs.Gaussians.zeros(1000) for _ in range(50)]
+    assert np.array_equal(means, expected) and len(ballast) == 50
+
+
+def test_results_are_views(context, arrays):
+    model = rs.Model(context, as_gaussians(arrays))
+    picture = rs.Tracer(context).render(model, rs.Camera.look_at((0, 0, -3), (0, 0, 0), (0, -1, 0), 8, 6, 8))
+    assert picture.rgba.shape == (6, 8, 4)
+    assert np.shares_memory(picture.rgba, picture.color) and np.shares_memory(picture.rgba, picture.alpha)
+    assert np.array_equal(picture.rgba[..., :3], picture.color)
+    assert picture.expected_depth is None and picture.hits is None
+
+
+def test_a_model_outlives_the_name_of_its_context(arrays):
+    context = rs.Context()
+    model = rs.Model(context, as_gaussians(arrays))
+    tracer = rs.Tracer(context)
+    del context
+    gc.collect()
+    assert tracer.render(model, rs.Camera(4, 4, 4.0, translation=(0, 0, 3))).alpha.max() > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "sentence"),
+    [
+        (lambda a: a.astype(np.float64), TypeError, "means is an array of float64, but float32 is needed"),
+        (lambda a: a.astype(np.float16), TypeError, "means is an array of float16"),
+        (lambda a: a.astype(np.int32), TypeError, "means is an array of int32"),
+        (lambda a: a.tolist(), TypeError, "means has to be an array of float32 of the shape (N, 3), as numpy's, not list"),
+        (lambda a: a[:, :2].copy(), ValueError, "means has the shape (7, 2), but (N, 3) is needed"),
+        (lambda a: a.ravel(), ValueError, "means has the shape (21,), but (N, 3) is needed"),
+        (lambda a: np.asfortranarray(a), ValueError, "means is not C-contiguous"),
+        (lambda a: np.repeat(a, 2, axis=0)[::2], ValueError, "means is not C-contiguous"),
+        (lambda a: a[:-1].copy(), ValueError, "quaternions has 7 rows, but there are 6 means"),
+    ],
+)
+def test_wrong_arrays_are_refused_in_one_sentence(arrays, change, error, sentence):
+    given = {k: v.astype(np.float32) for k, v in arrays.items()}
+    given["means"] = change(given["means"])
+    with pytest.raises(error) as caught:
+        rs.Gaussians(**given)
+    assert sentence in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_read_only_arrays_are_enough(arrays):
+    given = {k: v.astype(np.float32) for k, v in arrays.items()}
+    for each in given.values():
+        each.flags.writeable = False
+    assert np.array_equal(rs.Gaussians(**given).sh, given["sh"])
+
+
+def test_odd_numbers_of_coefficients(arrays):
+    arrays["sh"] = arrays["sh"][:, :7]
+    with pytest.raises(rs.UsageError, match="sh has 7 coefficients"):
+        as_gaussians(arrays)
