@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# What CI checks beside the test suite: the Python module, and the form of the kernels that GPUs get, without a GPU. Each leg ends with PASS, FAIL
-# or SKIPPED (what it needs cannot be had here: a failed download is no failure) and its seconds.
+# What CI checks beside the test suite: the Python module, and the form of the kernels that GPUs get, without a GPU. Each
+# leg ends with PASS, FAIL or SKIPPED (what it needs cannot be had here: a failed download is no failure) and its seconds.
 # usage: scripts/ci.sh [BUILD]     (default: build/release, with the tests built)
 set -euo pipefail
 called_from=$PWD

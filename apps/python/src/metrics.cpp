@@ -16,6 +16,7 @@
 #include "images.hpp"
 #include "names.hpp"
 #include "raysplats/evaluation.hpp"
+#include "signals.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -36,11 +37,7 @@ EvaluationReport evaluate_renders(const nb::callable& render,
                                   std::size_t max_views) {
   EvaluationOptions options;
   options.max_views = max_views;
-  options.done = [](std::size_t) {
-    const nb::gil_scoped_acquire acquire;
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
-    return true;
-  };
+  options.done = [](std::size_t) { return heed_signals(0); };
   const auto call = [&render](const Camera& camera) {
     const nb::gil_scoped_acquire acquire;
     return image_of(FloatArray{render(camera)}, "what render returns");

@@ -40,10 +40,10 @@ NB_MODULE(_raysplats, module) {
   bind_cameras(module);
   bind_trace_options(module);
   bind_models(module);
+  bind_scenes(module);
   bind_tracer(module);
   bind_datasets(module);
   bind_metrics(module);
   bind_trainer(module);
-  bind_scenes(module);
   bind_path_tracer(module);
 }

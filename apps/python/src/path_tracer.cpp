@@ -9,6 +9,7 @@
 #include "bindings.hpp"
 #include "context.hpp"
 #include "images.hpp"
+#include "signals.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -16,16 +17,11 @@ namespace {
 using HeldPathTracer = Held<PathTracer>;
 
 FloatView render(HeldPathTracer& self, const Camera& camera) {
-  const auto within = [](double) {
-    const nb::gil_scoped_acquire acquire;
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
-    return true;
-  };
   PathTracer& tracer = *self;
   Image image;
   {
     const nb::gil_scoped_release release;
-    image = tracer.render(camera, within);
+    image = tracer.render(camera, &heed_signals);
   }
   return array_of(std::move(image));
 }

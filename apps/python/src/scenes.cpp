@@ -23,6 +23,7 @@
 #include "keywords.hpp"
 #include "names.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/mirrors.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -192,6 +193,17 @@ void bind_scene(nb::module_& module) {
       .def_rw("trace", &Scene::trace);
 }
 
+void bind_mirrors(nb::module_& module) {
+  nb::class_<Mirrors> type(
+      module, "Mirrors",
+      "Known mirrors for Tracer; every surface reflects from both sides, times "
+      "the colour of its material.");
+  def_keywords(type, "Mirrors");
+  type.def_rw("meshes", &Mirrors::meshes)
+      .def_rw("materials", &Mirrors::materials)
+      .def_rw("max_bounces", &Mirrors::max_bounces, "Mirrors that a ray may meet.");
+}
+
 void bind_loaded(nb::module_& module) {
   nb::class_<LoadedScene>(module, "LoadedScene", "A scene file (docs/scene.md) with what it names.")
       .def_static(
@@ -213,6 +225,7 @@ void bind_scenes(nb::module_& module) {
   bind_environment(module);
   bind_settings(module);
   bind_scene(module);
+  bind_mirrors(module);
   bind_loaded(module);
   module.def(
       "read_mesh",

@@ -20,6 +20,7 @@
 #include "context.hpp"
 #include "names.hpp"
 #include "raysplats/error.hpp"
+#include "signals.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -60,7 +61,7 @@ Picture render(HeldTracer& self, HeldModel& model, const Camera& camera, bool di
   const nb::gil_scoped_release release;
   const auto lock = gaussians.context().lock();
   Picture out;
-  out.rgba = tracer.render(gaussians, camera, differentiable);
+  out.rgba = tracer.render(gaussians, camera, differentiable, &heed_signals);
   if (tracer.options().depth) out.depth = tracer.depth();
   out.capped_rays = tracer.capped_rays();
   return out;
@@ -277,10 +278,13 @@ void bind_tracer(nb::module_& module) {
                          "your own. It remembers its last picture and its last rays.")
       .def(
           "__init__",
-          [](HeldTracer* self, HeldContext& context, const std::optional<TraceOptions>& options) {
-            new (self) HeldTracer(*context, options.value_or(TraceOptions{}));
+          [](HeldTracer* self, HeldContext& context, const std::optional<TraceOptions>& options,
+             const std::optional<Mirrors>& mirrors) {
+            new (self)
+                HeldTracer(*context, options.value_or(TraceOptions{}), mirrors.value_or(Mirrors{}));
           },
-          nb::arg("context"), nb::arg("options") = nb::none(), nb::keep_alive<1, 2>())
+          nb::arg("context"), nb::arg("options") = nb::none(), nb::kw_only(),
+          nb::arg("mirrors") = nb::none(), nb::keep_alive<1, 2>())
       .def("render", &render, nb::arg("model"), nb::arg("camera"),
            nb::arg("differentiable") = false,
            "The picture at the camera's size; differentiable keeps what backward() needs.")

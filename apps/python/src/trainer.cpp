@@ -18,6 +18,7 @@
 #include "bindings.hpp"
 #include "context.hpp"
 #include "raysplats/error.hpp"
+#include "signals.hpp"
 #include "train/train_config.hpp"
 #include "train/train_keys.hpp"
 
@@ -45,7 +46,7 @@ std::vector<std::string> words(nb::handle value) {
 void set_option(TrainOptions& options, std::string key, nb::handle value) {
   std::replace(key.begin(), key.end(), '_', '-');
   std::vector<std::string> names;
-  for (const TrainKey& known : train_keys(options)) {
+  for (const OptionRow& known : train_keys(options)) {
     if (known.name == key) return known.set(words(value));
     names.push_back(known.name);
   }
@@ -56,7 +57,7 @@ void set_option(TrainOptions& options, std::string key, nb::handle value) {
 std::string option_text(TrainOptions& options, std::string key) {
   std::replace(key.begin(), key.end(), '_', '-');
   std::vector<std::string> names;
-  for (const TrainKey& known : train_keys(options)) {
+  for (const OptionRow& known : train_keys(options)) {
     if (known.name == key) return known.text();
     names.push_back(known.name);
   }
@@ -84,8 +85,8 @@ class StepCallback {
  public:
   StepCallback(Trainer& trainer, const Callback& callback) : trainer_(trainer) {
     trainer_.on_step([&callback](const TrainProgress& progress) {
+      heed_signals(0);
       const nb::gil_scoped_acquire acquire;
-      if (PyErr_CheckSignals() != 0) throw nb::python_error();
       if (callback) (*callback)(progress);
     });
   }
@@ -152,7 +153,7 @@ void bind_options(nb::module_& module) {
           [] {
             TrainOptions options;
             std::vector<std::string> names;
-            for (const TrainKey& key : train_keys(options)) names.push_back(key.name);
+            for (const OptionRow& key : train_keys(options)) names.push_back(key.name);
             return names;
           },
           "The name of every key.")

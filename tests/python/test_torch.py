@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""raysplats.torch against autograd through the reference in double precision."""
+
+import inspect
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="no PyTorch: apt-get install python3-torch")
+
+import photos  # noqa: E402
+import raysplats as rs  # noqa: E402
+import raysplats.torch as rt  # noqa: E402
+import reference  # noqa: E402
+from conftest import random_arrays  # noqa: E402
+
+QUANTILE = 11.3449
+# Of the largest number of a class of parameters.
+TOLERANCE = 1e-3
+
+
+@pytest.fixture(scope="module")
+def renderer(context):
+    return rt.Renderer(context, rs.TraceOptions(quantile=QUANTILE, hit_order="peak"))
+
+
+def leaves(arrays):
+    """float32 leaves, and the same numbers in double precision."""
+    single = {k: torch.tensor(v, dtype=torch.float32, requires_grad=True) for k, v in arrays.items()}
+    double = {k: v.detach().double().requires_grad_() for k, v in single.items()}
+    return single, double
+
+
+def assert_close(name, found, expected):
+    assert found.dtype == torch.float32 and found.shape == expected.shape, name
+    scale = expected.abs().max()
+    assert scale > 1e-3, f"{name}: the test sees nothing"
+    assert (found - expected).abs().max() <= TOLERANCE * scale, name
+
+
+def test_rays_have_the_gradients_of_the_reference(renderer):
+    rng = np.random.default_rng(4)
+    origins = rng.normal(size=(40, 3))
+    origins *= 2.5 / np.linalg.norm(origins, axis=1, keepdims=True)
+    directions = rng.uniform(-0.3, 0.3, (40, 3)) - origins
+    single, double = leaves({**random_arrays(), "origins": origins, "directions": directions})
+    target = torch.tensor(rng.random((40, 3)))
+
+    def loss(color, alpha):
+        return ((color - target.to(color)) ** 2).sum() + (alpha ** 3).sum()
+
+    seen = renderer.trace(**single)
+    loss(seen.color, seen.alpha).backward()
+    rows = [
+        reference.trace(torch, double, o, d, QUANTILE, peak=True)
+        for o, d in zip(double["origins"], double["directions"])
+    ]
+    loss(torch.stack([c for c, _ in rows]), torch.stack([torch.as_tensor(a) for _, a in rows])).backward()
+    for name, each in single.items():
+        assert_close(name, each.grad, double[name].grad)
+    assert not seen.hits.requires_grad and seen.hits.max() >= 3
+
+
+def pose(parameters):
+    """A (4, 4) pose of a turn about y, one about x and a translation: a parametrisation of one's own."""
+    a, b, tx, ty, tz = parameters
+    zero, one = 0 * a, 0 * a + 1
+    about_y = torch.stack([torch.stack([a.cos(), zero, a.sin()]), torch.stack([zero, one, zero]),
+                           torch.stack([-a.sin(), zero, a.cos()])])
+    about_x = torch.stack([torch.stack([one, zero, zero]), torch.stack([zero, b.cos(), -b.sin()]),
+                           torch.stack([zero, b.sin(), b.cos()])])
+    top = torch.cat([about_y @ about_x, torch.stack([tx, ty, tz])[:, None]], dim=1)
+    return torch.cat([top, torch.stack([zero, zero, zero, one])[None]])
+
+
+def test_views_and_poses_have_the_gradients_of_the_reference(renderer):
+    camera = rs.Camera(6, 5, 7.0)
+    single, double = leaves({**random_arrays(sh_degree=1), "pose": np.array([0.2, -0.3, 0.1, 0.05, 2.4])})
+    weights = torch.tensor(np.random.default_rng(5).normal(size=(5, 6, 4)), dtype=torch.float32)
+    gaussians = {k: v for k, v in single.items() if k != "pose"}
+    rgba = renderer.render(camera, **gaussians, viewmat=pose(single["pose"])).rgba
+    (rgba * weights).sum().backward()
+
+    viewmat = pose(double["pose"])
+    turn = viewmat[:3, :3]
+    center = -turn.T @ viewmat[:3, 3]
+    rows = [
+        reference.trace(torch, double, center, d, QUANTILE, peak=True, from_origin=True)
+        for d in reference.camera_rays(torch, camera, turn, center)
+    ]
+    expected = torch.stack([torch.cat([c, torch.as_tensor(a).reshape(1)]) for c, a in rows]).reshape(5, 6, 4)
+    (expected * weights).sum().backward()
+    assert (rgba - expected).abs().max() < 2e-5
+    for name, each in single.items():
+        assert_close(name, each.grad, double[name].grad)
+
+
+def test_earlier_passes_are_run_again(renderer):
+    single, _ = leaves(random_arrays())
+    views = [rs.Camera.look_at((3 * np.cos(a), 3 * np.sin(a), 1), (0, 0, 0), (0, 0, 1), 12, 10, 14) for a in (0, 2)]
+    apart = []
+    for camera in views:
+        (g,) = torch.autograd.grad(renderer.render(camera, **single).rgba.sum(), [single["means"]])
+        apart.append(g)
+    total = sum(renderer.render(camera, **single).rgba.sum() for camera in views)
+    (together,) = torch.autograd.grad(total, [single["means"]])
+    assert torch.allclose(together, apart[0] + apart[1], rtol=1e-5, atol=1e-4 * together.abs().max())
+
+
+def test_wrong_tensors_are_refused_in_one_sentence(renderer):
+    single, double = leaves(random_arrays())
+    camera = rs.Camera(4, 4, 4.0, translation=(0, 0, 3))
+    with pytest.raises(TypeError, match="means is a tensor of torch.float64"):
+        renderer.render(camera, **{**single, "means": double["means"]})
+    with pytest.raises(ValueError, match="means is not contiguous"):
+        renderer.render(camera, **{**single, "means": torch.rand(3, 7).T})
+    with pytest.raises(TypeError, match="means has to be a tensor"):
+        renderer.render(camera, **{**single, "means": None})
+    with pytest.raises(ValueError, match="quaternions has 7 rows, but there are 6 means"):
+        renderer.render(camera, **{**single, "means": single["means"][:6]})
+
+
+def gsplat_scene(views=2):
+    arrays = random_arrays(sh_degree=0)
+    rng = np.random.default_rng(6)
+    values = {
+        "means": arrays["means"], "quats": arrays["quaternions"], "scales": np.exp(arrays["log_scales"]),
+        "opacities": rng.uniform(0.2, 0.9, 7), "colors": rng.random((7, 3)),
+        "viewmats": np.stack([np.eye(4)] * views), "Ks": np.stack([[[16, 0, 8], [0, 16, 6], [0, 0, 1]]] * views),
+    }
+    values["viewmats"][:, 2, 3] = 3
+    values["viewmats"][:, 0, 3] = np.linspace(0, 0.5, views)
+    return {k: torch.tensor(v, dtype=torch.float32) for k, v in values.items()} | {"width": 16, "height": 12}
+
+
+def test_rasterization_gives_what_the_tracer_gives(context):
+    scene = gsplat_scene()
+    backgrounds = torch.tensor([[0.1, 0.2, 0.3], [1.0, 0.5, 0.0]])
+    for name in ("means", "quats", "scales", "opacities", "colors", "viewmats"):
+        scene[name].requires_grad_()
+    colors, alphas, meta = rt.rasterization(**scene, backgrounds=backgrounds)
+    assert colors.shape == (2, 12, 16, 3) and alphas.shape == (2, 12, 16, 1) and meta["n_cameras"] == 2
+    with torch.no_grad():
+        g = rs.Gaussians(
+            scene["means"].numpy(), scene["quats"].numpy(), scene["scales"].log().numpy(),
+            torch.logit(scene["opacities"]).numpy(), ((scene["colors"] - 0.5) / reference.SH_0)[:, None].numpy(),
+        )
+    model = rs.Model(context, g)
+    for i in range(2):
+        options = rs.TraceOptions(
+            hit_order="peak", adaptive_radius=True, near_depth=0.01, background=backgrounds[i].tolist())
+        camera = rs.Camera(16, 12, 16.0, 16.0, 8, 6, translation=scene["viewmats"][i, :3, 3].tolist())
+        picture = rs.Tracer(context, options).render(model, camera)
+        assert np.abs(colors[i].detach().numpy() - picture.color).max() < 1e-5
+        assert np.abs(alphas[i, ..., 0].detach().numpy() - picture.alpha).max() < 1e-5
+    colors.square().sum().backward()
+    for name in ("means", "quats", "scales", "opacities", "colors", "viewmats"):
+        assert scene[name].grad.abs().max() > 0, name
+    with pytest.raises(KeyError, match="means2d"):
+        meta["means2d"]
+
+
+def test_rasterization_has_depths_and_harmonics():
+    scene = gsplat_scene(views=1)
+    with torch.no_grad():
+        both, alphas, _ = rt.rasterization(**scene, render_mode="RGB+ED")
+        summed, _, _ = rt.rasterization(**scene, render_mode="D")
+        assert both.shape == (1, 12, 16, 4) and 2 < both[..., 3].max() < 4
+        assert torch.allclose(summed, both[..., 3:] * alphas)
+        flat = scene.pop("colors")
+        sh = torch.zeros(7, 4, 3)
+        sh[:, 0] = (flat - 0.5) / reference.SH_0
+        colors, _, _ = rt.rasterization(**scene, colors=sh, sh_degree=1)
+        assert torch.allclose(colors, both[..., :3], atol=1e-5)
+        per_view, _, _ = rt.rasterization(**scene, colors=flat[None])
+        assert torch.allclose(per_view, both[..., :3], atol=1e-5)
+
+
+# What is not supported: every argument of gsplat's is used, or refused by its name.
+REFUSED = {
+    "far_plane": 10.0, "radius_clip": 1.0, "eps2d": 0.3, "packed": True, "tile_size": 16, "sparse_grad": True,
+    "absgrad": True, "rasterize_mode": "antialiased", "channel_chunk": 32, "distributed": True,
+    "camera_model": "ftheta", "segmented": True, "covars": torch.zeros(7, 3, 3), "with_ut": True,
+    "with_eval3d": True, "radial_coeffs": torch.zeros(1, 4), "tangential_coeffs": torch.zeros(1, 2),
+    "thin_prism_coeffs": torch.zeros(1, 4), "ftheta_coeffs": 1, "rolling_shutter": 1,
+    "viewmats_rs": torch.zeros(1, 4, 4),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_rasterization_refuses_by_name(name):
+    with pytest.raises(NotImplementedError, match=name):
+        rt.rasterization(**gsplat_scene(views=1), **{name: REFUSED[name]})
+
+
+def test_rasterization_knows_every_argument():
+    used = {"means", "quats", "scales", "opacities", "colors", "viewmats", "Ks", "width", "height", "near_plane",
+            "sh_degree", "backgrounds", "render_mode", "options"}
+    assert set(inspect.signature(rt.rasterization).parameters) == used | set(REFUSED)
+
+
+def test_rasterization_refuses_what_has_no_gradient():
+    scene = gsplat_scene(views=1)
+    scene["means"].requires_grad_()
+    with pytest.raises(NotImplementedError, match="those of depths are not computed"):
+        rt.rasterization(**scene, render_mode="ED")
+    scene["Ks"].requires_grad_()
+    with pytest.raises(NotImplementedError, match="gradients of Ks"):
+        rt.rasterization(**scene)
+    with pytest.raises(NotImplementedError, match="colors of other than 3 channels"):
+        rt.rasterization(**{**gsplat_scene(), "colors": torch.rand(7, 8)})
