@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "bindings.hpp"
@@ -19,12 +23,14 @@ Dataset load(const std::filesystem::path& path,
              double downscale,
              int test_every,
              bool undistort,
-             const std::string& masks) {
+             const std::string& masks,
+             const std::optional<std::array<double, 3>>& origin) {
   DatasetOptions options;
   options.downscale = downscale;
   options.test_every = test_every;
   options.undistort = undistort;
   options.masks = value_of(kMaskUses, "masks", masks);
+  options.origin = origin;
   return load_dataset(path, options);
 }
 
@@ -59,12 +65,16 @@ void bind_datasets(nb::module_& module) {
   nb::class_<Dataset>(module, "Dataset", "Photos, cameras and points of one scene.")
       .def_static("load", &load, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1.0,
                   nb::arg("test_every") = 8, nb::arg("undistort") = true,
-                  nb::arg("masks") = "ignore", nb::call_guard<nb::gil_scoped_release>(),
+                  nb::arg("masks") = "ignore", nb::arg("origin") = nb::none(),
+                  nb::call_guard<nb::gil_scoped_release>(),
                   "Reads a COLMAP, nerfstudio or Blender folder, everything but the pixels.")
       .def_prop_ro(
           "kind", [](const Dataset& self) { return name_of(kDatasetKinds, self.kind); },
           "'colmap', 'blender' or 'nerfstudio'.")
       .def_ro("root", &Dataset::root)
+      .def_ro("origin", &Dataset::origin,
+              "What was taken off all positions of the files: 0, but near the cameras where the "
+              "scene lies far away.")
       .def_ro("alpha_is_background", &Dataset::alpha_is_background,
               "Whether photos are blended over the background by their alpha; else it is a mask.")
       .def_prop_ro(

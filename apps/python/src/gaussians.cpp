@@ -2,9 +2,11 @@
 #include "gaussians.hpp"
 
 #include <fmt/format.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 
+#include <array>
 #include <optional>
 
 #include "bindings.hpp"
@@ -124,10 +126,14 @@ void bind_gaussians(nb::module_& module) {
       .def(
           "save",
           [](const Gaussians& self, const std::filesystem::path& path,
-             const std::optional<TraceOptions>& options) { write_ply(path, self, options); },
+             const std::optional<TraceOptions>& options,
+             const std::array<double, 3>& origin) { write_ply(path, self, options, origin); },
           nb::arg("path"), nb::arg("options") = nb::none(),
-          nb::call_guard<nb::gil_scoped_release>(),
-          "Writes a binary 3DGS PLY; `options` go into its header, for TraceOptions.load().")
+          nb::arg("origin") = std::array<double, 3>{}, nb::call_guard<nb::gil_scoped_release>(),
+          "Writes a binary 3DGS PLY; `options` and the `origin` from which positions count, as "
+          "Dataset.origin, go into its header.")
+      .def_static("load_origin", &read_ply_origin, nb::arg("path"),
+                  "The origin in the header of a PLY; 0 where it says none.")
       .def("with_sh_degree", &with_sh_degree, nb::arg("degree"),
            "A copy with bands added (zero) or dropped.")
       .def_ro("sh_degree", &Gaussians::sh_degree)
