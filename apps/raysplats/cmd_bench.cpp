@@ -81,7 +81,7 @@ BenchModel load_model(const Options& options, const ModelSource& source) {
     throw UsageError(fmt::format("--view {} is beyond the {} views of {}", options.view,
                                  cameras.size(), options.cameras));
   }
-  BenchModel model{name_of(options.model), read_ply(source.ply), cameras[options.view], false};
+  BenchModel model{name_of(options.model), read_model(source.file), cameras[options.view], false};
   if (options.resolution) {
     const auto [width, height] = parse_resolution(*options.resolution);
     model.camera = resized(model.camera, width, height);

@@ -35,7 +35,7 @@ struct Options {
 
 void run(const Options& options, const GlobalOptions& global) {
   const ModelSource source = find_model(options.model);
-  const Gaussians model = in_morton_order(read_ply(source.ply));
+  const Gaussians model = in_morton_order(read_model(source.file));
   const Dataset dataset =
       load_dataset(options.data.data, options.data.over(dataset_options(source)));
   const Split split = options.data.chosen_split();
@@ -58,7 +58,7 @@ void run(const Options& options, const GlobalOptions& global) {
   const Model on_device(*context, model);
   Tracer tracer(*context, trace, mirrors_of(source));
   make_output_directory(options.output);
-  spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), views);
+  spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(), views);
 
   FrameProgress progress("evaluating", views, global.quiet);
   std::uint64_t rays = 0;
@@ -86,7 +86,9 @@ void run(const Options& options, const GlobalOptions& global) {
 Command add_eval_command(CLI::App& app, const GlobalOptions& global) {
   CLI::App* command = app.add_subcommand("eval", "Compare a model with the photos of a data set");
   auto options = std::make_shared<Options>();
-  command->add_option("MODEL", options->model, "3DGS PLY, or the folder of a training run")
+  command
+      ->add_option("MODEL", options->model,
+                   "Model (PLY, .splat, SPZ, glTF), or the folder of a training run")
       ->required()
       ->type_name("");
   command->add_option("-o,--output", options->output, "Folder for metrics.json and pictures")

@@ -16,6 +16,7 @@
 
 #include "core/model_summary.hpp"
 #include "io/mesh_file.hpp"
+#include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
 #include "io/scene_file.hpp"
 #include "options.hpp"
@@ -315,11 +316,11 @@ void print_json(const Json& json) {
 
 void info_model(const Options& options) {
   const ModelSource source = find_model(options.path);
-  const ModelSummary summary = summarize(read_ply(source.ply));
+  const ModelSummary summary = summarize(read_model(source.file));
   const bool run = std::filesystem::is_directory(options.path);
   if (options.json) {
     Json json{
-        {"type", run ? "run" : "model"}, {"path", options.path}, {"model", source.ply.string()}};
+        {"type", run ? "run" : "model"}, {"path", options.path}, {"model", source.file.string()}};
     if (source.iteration) json["iteration"] = *source.iteration;
     if (source.trained) json["iterations"] = source.trained->iterations;
     if (source.header) json["trace"] = describe(*source.header);
@@ -330,7 +331,7 @@ void info_model(const Options& options) {
   }
   if (run) {
     fmt::print("run              {}\n", options.path);
-    fmt::print("model            {}\n", source.ply.string());
+    fmt::print("model            {}\n", source.file.string());
     if (source.trained)
       fmt::print("trained          {} of {} iterations\n", *source.iteration,
                  source.trained->iterations);
@@ -360,7 +361,8 @@ bool is_mesh(const std::filesystem::path& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension == ".ply") return is_mesh_ply(path);
-  return extension == ".obj" || extension == ".gltf" || extension == ".glb";
+  if (extension == ".gltf" || extension == ".glb") return !io::has_gltf_gaussians(path);
+  return extension == ".obj";
 }
 
 void info_mesh(const Options& options) {
@@ -418,7 +420,9 @@ Command add_info_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "info", "Describe a model, a mesh, a scene file, a data set or a training run");
   auto options = std::make_shared<Options>();
-  command->add_option("PATH", options->path, "3DGS PLY, mesh, scene file, data set or run folder")
+  command
+      ->add_option("PATH", options->path,
+                   "Model (PLY, .splat, SPZ, glTF), mesh, scene file, data set or run folder")
       ->required()
       ->type_name("");
   command->add_flag("--json", options->json, "Print JSON");

@@ -124,7 +124,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   }
   check(options);
   const ModelSource source = find_model(options.model);
-  const Gaussians model = in_morton_order(read_ply(source.ply));
+  const Gaussians model = in_morton_order(read_model(source.file));
   Dataset dataset;
   if (!options.data.data.empty()) {
     dataset = load_dataset(options.data.data, options.data.over(dataset_options(source)));
@@ -153,7 +153,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   const Model on_device(*context, model);
   Tracer tracer(*context, trace, mirrors_of(source));
   make_output_directory(options.output);
-  spdlog::info("{} Gaussians of {}, {} views", model.size(), source.ply.string(), cameras.size());
+  spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(), cameras.size());
 
   FrameProgress progress("rendering", cameras.size(), global.quiet);
   const FrameReport report = write_frames(
@@ -177,8 +177,9 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       "render", "Render a model or a scene file from a data set's cameras, a file's or an orbit");
   auto options = std::make_shared<RenderFlags>();
   command
-      ->add_option("MODEL", options->model,
-                   "3DGS PLY, the folder of a training run, or a scene file (.toml)")
+      ->add_option(
+          "MODEL", options->model,
+          "Model (PLY, .splat, SPZ, glTF), the folder of a training run, or a scene file (.toml)")
       ->required()
       ->type_name("");
   command->add_option("-o,--output", options->output, "Folder for the frames")

@@ -29,7 +29,7 @@ struct Options {
 void run(const Options& options) {
   const ModelSource source = find_model(options.model);
   const io::RayList list = io::read_rays(options.rays);
-  const Gaussians gaussians = in_morton_order(read_ply(source.ply));
+  const Gaussians gaussians = in_morton_order(read_model(source.file));
   const TraceOptions trace = options.trace.over(trace_options(source, false));
   const std::unique_ptr<Context> context = open_context(options.device);
   const Model model(*context, gaussians);
@@ -52,7 +52,9 @@ void run(const Options& options) {
 Command add_trace_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("trace", "Trace rays of your own through a model");
   auto options = std::make_shared<Options>();
-  command->add_option("MODEL", options->model, "3DGS PLY, or the folder of a training run")
+  command
+      ->add_option("MODEL", options->model,
+                   "Model (PLY, .splat, SPZ, glTF), or the folder of a training run")
       ->required()
       ->type_name("");
   command

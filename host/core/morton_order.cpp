@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/gaussian_selection.hpp"
+
 namespace raysplats {
 namespace {
 
@@ -64,23 +66,7 @@ std::vector<std::uint32_t> morton_order(std::span<const float> positions) {
 }
 
 Gaussians in_morton_order(const Gaussians& model) {
-  const std::vector<std::uint32_t> order = morton_order(model.means);
-  Gaussians out;
-  out.sh_degree = model.sh_degree;
-  out.resize(order.size());
-  const auto permute = [&](const std::vector<float>& from, std::vector<float>& to) {
-    const std::size_t width = order.empty() ? 0 : from.size() / order.size();
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(order[i] * width), width,
-                  to.begin() + static_cast<std::ptrdiff_t>(i * width));
-    }
-  };
-  permute(model.means, out.means);
-  permute(model.quaternions, out.quaternions);
-  permute(model.log_scales, out.log_scales);
-  permute(model.opacities, out.opacities);
-  permute(model.sh, out.sh);
-  return out;
+  return gathered(model, morton_order(model.means));
 }
 
 }  // namespace raysplats

@@ -372,8 +372,7 @@ ColmapModel read_colmap_model(const fs::path& folder) {
     throw DataError(fmt::format("{}: the image '{}' appears twice", images->string(), twice->name));
   }
   if (const std::optional<fs::path> points = model_file(folder, "points3D")) {
-    is_binary(*points) ? read_points_binary(*points, model)
-                       : read_points_text(*points, model);
+    is_binary(*points) ? read_points_binary(*points, model) : read_points_text(*points, model);
   } else {
     spdlog::warn("{} has no points3D.bin or points3D.txt: the data set has no points to start from",
                  folder.string());

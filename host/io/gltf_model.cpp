@@ -124,7 +124,8 @@ std::string first_sentence(const std::string& messages) {
 void check_extensions(const tinygltf::Model& model, const std::filesystem::path& path) {
   for (const std::string& name : model.extensionsRequired) {
     if (name.starts_with("KHR_materials_") || name == "KHR_texture_transform" ||
-        name == "KHR_mesh_quantization" || name == "KHR_lights_punctual") {
+        name == "KHR_mesh_quantization" || name == "KHR_lights_punctual" ||
+        name == "KHR_gaussian_splatting") {
       continue;
     }
     throw DataError(

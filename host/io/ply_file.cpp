@@ -68,9 +68,15 @@ double read_number(ByteReader& reader, PlyType type, std::endian order, const ch
 
 }  // namespace
 
-PlyFile::PlyFile(const std::filesystem::path& path) : path_(path), bytes_(read_file(path)) {
+PlyFile::PlyFile(const std::filesystem::path& path, std::string_view element)
+    : path_(path), element_(element), bytes_(read_file(path)) {
   parse_header();
   locate_rows();
+}
+
+bool PlyFile::has_later(std::string_view element) const {
+  return std::any_of(later_.begin(), later_.end(),
+                     [&](const LaterElement& each) { return each.name == element; });
 }
 
 std::optional<std::size_t> PlyFile::column(std::string_view name) const {
@@ -88,7 +94,7 @@ void PlyFile::parse_header() {
     throw DataError(
         fmt::format("{} is not a PLY file: its first line is not 'ply'", path_.string()));
   }
-  enum class At { kBefore, kVertex, kAfter } at = At::kBefore;
+  enum class At { kBefore, kTable, kAfter } at = At::kBefore;
   bool has_format = false;
   bool ended = false;
   std::uint64_t element_rows = 0;
@@ -117,13 +123,13 @@ void PlyFile::parse_header() {
       has_format = true;
     } else if (key == "element") {
       close_element();
-      if (at == At::kVertex) at = At::kAfter;
+      if (at == At::kTable) at = At::kAfter;
       const std::string name(reader.word());
-      const bool vertex = name == "vertex";
+      const bool table = name == element_;
       element_rows = reader.unsigned_integer("the element count");
-      if (vertex) {
-        if (at == At::kAfter) reader.fail("there is a second vertex element");
-        at = At::kVertex;
+      if (table) {
+        if (at == At::kAfter) reader.fail(fmt::format("there is a second {} element", element_));
+        at = At::kTable;
         rows_ = static_cast<std::size_t>(element_rows);
       } else if (at == At::kAfter) {
         later_.push_back({name, element_rows, {}});
@@ -144,14 +150,15 @@ void PlyFile::parse_header() {
       }
       const std::string_view type_name = reader.word();
       if (type_name == "list") {
-        reader.fail(at == At::kVertex
-                        ? "the vertex element has a list property, which is not supported"
-                        : "a list property precedes the vertices, which is not supported");
+        reader.fail(fmt::format("{} has a list property, which is not supported",
+                                at == At::kTable
+                                    ? fmt::format("the {} element", element_)
+                                    : fmt::format("an element before the {} element", element_)));
       }
       const std::optional<PlyType> type = type_named(type_name);
       if (!type) reader.fail(fmt::format("the property type '{}' is unknown", type_name));
       element_bytes += size_of(*type);
-      if (at != At::kVertex) continue;
+      if (at != At::kTable) continue;
       const std::string name(reader.word());
       if (name.empty()) reader.fail("a property has no name");
       if (column(name)) reader.fail(fmt::format("the property '{}' appears twice", name));
@@ -166,8 +173,8 @@ void PlyFile::parse_header() {
   }
   if (!ended) reader.fail("the PLY header has no end_header");
   if (!has_format) reader.fail("the PLY header has no format line");
-  if (at == At::kBefore) reader.fail("the PLY header has no vertex element");
-  if (properties_.empty()) reader.fail("the vertex element has no properties");
+  if (at == At::kBefore) reader.fail(fmt::format("the PLY header has no {} element", element_));
+  if (properties_.empty()) reader.fail(fmt::format("the {} element has no properties", element_));
   data_offset_ = std::min(reader.next_offset(), bytes_.size());
 }
 
@@ -178,17 +185,18 @@ void PlyFile::locate_rows() {
   const std::uint64_t before = ascii_ ? rows_before_ : bytes_before_;
   const std::uint64_t room = left + (ascii_ ? 1 : 0);
   if (before > room || saturating_product(rows_, least_row) > room - before) {
-    throw DataError(
-        fmt::format("{} is truncated or its header is wrong: it declares {} vertices of {} bytes, "
-                    "but only {} bytes "
-                    "follow the header, which ends at byte {}",
-                    path_.string(), rows_, least_row, left - std::min(left, before), data_offset_));
+    throw DataError(fmt::format(
+        "{} is truncated or its header is wrong: it declares {} rows of {} bytes in its {} "
+        "element, "
+        "but only {} bytes "
+        "follow the header, which ends at byte {}",
+        path_.string(), rows_, least_row, element_, left - std::min(left, before), data_offset_));
   }
 }
 
 ByteReader PlyFile::binary_rows() const {
   ByteReader reader(bytes_, path_);
-  reader.skip(data_offset_ + bytes_before_, "the vertex element");
+  reader.skip(data_offset_ + bytes_before_, element_.c_str());
   return reader;
 }
 
@@ -198,13 +206,13 @@ TextReader PlyFile::text_rows() const {
   while (reader.next_offset() < data_offset_ && reader.next_line()) {
   }
   for (std::uint64_t i = 0; i < rows_before_; ++i) {
-    if (!reader.next_line()) reader.fail("the file ends before the vertices");
+    if (!reader.next_line()) reader.fail("the file ends before its table");
   }
   return reader;
 }
 
 void PlyFile::read_text_row(TextReader& reader, std::span<double> values) const {
-  if (!reader.next_line()) reader.fail("the file is truncated, vertices are missing");
+  if (!reader.next_line()) reader.fail("the file is truncated, rows are missing");
   for (std::size_t i = 0; i < values.size(); ++i) {
     values[i] = reader.number(properties_[i].name.c_str());
   }
@@ -274,7 +282,7 @@ bool PlyFile::for_each_list(
         [&](const std::string& message) { reader.fail(message); });
   } else {
     ByteReader reader = binary_rows();
-    reader.skip(saturating_product(rows_, row_bytes_), "the vertex element");
+    reader.skip(saturating_product(rows_, row_bytes_), element_.c_str());
     read_rows(
         [] {},
         [&](PlyType type, const char* what) { return read_number(reader, type, order_, what); },

@@ -24,18 +24,20 @@ struct PlyProperty {
   PlyType type;
 };
 
-/// The vertex element of a PLY file (Turk 1994) as a table of numbers: ASCII or binary of both byte
-/// orders, scalar properties of every type. Elements with lists may follow it, but not precede it;
-/// their lists can be read too. Throws DataError for anything malformed or truncated, and for a
-/// count that the file cannot hold.
+/// An element of a PLY file (Turk 1994), as a rule the vertices, as a table of numbers: ASCII or
+/// binary of both byte orders, scalar properties of every type. Elements with lists may follow it,
+/// but not precede it; their lists can be read too. Throws DataError for anything malformed or
+/// truncated, and for a count that the file cannot hold.
 class PlyFile {
  public:
-  explicit PlyFile(const std::filesystem::path& path);
+  explicit PlyFile(const std::filesystem::path& path, std::string_view element = "vertex");
 
   std::size_t rows() const { return rows_; }
   const std::vector<PlyProperty>& properties() const { return properties_; }
   /// Column of a property, nothing when there is none.
   std::optional<std::size_t> column(std::string_view name) const;
+  /// The elements behind the table.
+  bool has_later(std::string_view element) const;
 
   /// Calls visit(row, values) for every row in order; values has one double per property.
   template <class Visit>
@@ -56,7 +58,7 @@ class PlyFile {
     }
   }
 
-  /// Calls visit(row, values) with a list of every row of an element behind the vertices, the
+  /// Calls visit(row, values) with a list of every row of an element behind the table, the
   /// property being the first one among `names`. False when there is no such element or property.
   bool for_each_list(
       std::string_view element,
@@ -64,7 +66,7 @@ class PlyFile {
       const std::function<void(std::size_t row, std::span<const double> values)>& visit) const;
 
  private:
-  /// A property of an element behind the vertices. Types that are unknown matter once it is read.
+  /// A property of an element behind the table. Types that are unknown matter once it is read.
   struct LaterProperty {
     std::string name;
     std::optional<PlyType> type;
@@ -85,6 +87,7 @@ class PlyFile {
   void read_binary_row(ByteReader& reader, std::span<double> values) const;
 
   std::filesystem::path path_;
+  std::string element_;
   std::vector<std::byte> bytes_;
   bool ascii_ = false;
   std::endian order_ = std::endian::little;
@@ -92,7 +95,7 @@ class PlyFile {
   std::size_t rows_ = 0;
   std::size_t row_bytes_ = 0;
   std::size_t data_offset_ = 0;     ///< end of the header
-  std::uint64_t rows_before_ = 0;   ///< rows of the elements before the vertices
+  std::uint64_t rows_before_ = 0;   ///< rows of the elements before the table
   std::uint64_t bytes_before_ = 0;  ///< their size in a binary file
   std::vector<LaterElement> later_;
 };

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/atomic_file.hpp"
+#include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
 #include "io/ply_options.hpp"
 #include "raysplats/error.hpp"
@@ -44,13 +45,6 @@ int degree_of_rest(std::size_t count, const std::filesystem::path& path) {
 }
 
 Columns find_columns(const io::PlyFile& file, const std::filesystem::path& path) {
-  if (file.column("packed_position")) {
-    throw DataError(
-        fmt::format("{} is a compressed PLY of SuperSplat, which is not supported: convert it to "
-                    "an uncompressed 3DGS "
-                    "PLY first, for example with splat-transform",
-                    path.string()));
-  }
   Columns columns;
   std::vector<std::string> missing;
   const auto find = [&](const std::string& name) -> std::size_t {
@@ -91,6 +85,7 @@ Columns find_columns(const io::PlyFile& file, const std::filesystem::path& path)
 
 Gaussians read_ply(const std::filesystem::path& path) {
   const io::PlyFile file(path);
+  if (file.column("packed_position")) return io::read_compressed_ply(path);
   const Columns columns = find_columns(file, path);
   Gaussians model;
   model.sh_degree = columns.sh_degree;

@@ -19,7 +19,7 @@ namespace raysplats {
 
 /// [[model]]: Gaussians and where they are.
 struct SceneModel {
-  std::filesystem::path file;  ///< a 3DGS PLY, or the folder of a training run
+  std::filesystem::path file;  ///< as read_model(), or the folder of a training run
   glm::dmat4 transform{1.0};
   std::string place;  ///< "FILE, line N" for messages
 };

@@ -28,9 +28,9 @@ Gaussians load_gaussians(const SceneFile& file) {
   std::vector<Gaussians> placed;
   for (const SceneModel& model : file.models) {
     const auto found = read.find(model.file);
-    const Gaussians& gaussians = found != read.end()
-                                     ? found->second
-                                     : read.emplace(model.file, read_ply(model.file)).first->second;
+    const Gaussians& gaussians =
+        found != read.end() ? found->second
+                            : read.emplace(model.file, read_model(model.file)).first->second;
     try {
       placed.push_back(transformed(gaussians, model.transform));
     } catch (const UsageError& error) {

@@ -14,6 +14,8 @@
 #include <numeric>
 
 #include "base/rng.hpp"
+#include "core/gaussian_selection.hpp"
+#include "io/model_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "train/photo_start.hpp"
@@ -175,24 +177,6 @@ Gaussians subset(const Gaussians& model, std::size_t limit) {
 
 }  // namespace
 
-Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indices) {
-  Gaussians out;
-  out.sh_degree = model.sh_degree;
-  out.resize(indices.size());
-  const auto copy = [&](const std::vector<float>& from, std::vector<float>& to, std::size_t width) {
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(indices[i] * width), width,
-                  to.begin() + static_cast<std::ptrdiff_t>(i * width));
-    }
-  };
-  copy(model.means, out.means, 3);
-  copy(model.quaternions, out.quaternions, 4);
-  copy(model.log_scales, out.log_scales, 3);
-  copy(model.opacities, out.opacities, 1);
-  copy(model.sh, out.sh, static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree)));
-  return out;
-}
-
 double scene_extent(std::span<const Camera> cameras) {
   const glm::dvec3 center = mean_center(cameras);
   double radius = 0;
@@ -318,8 +302,8 @@ Gaussians initial_model(const Dataset& dataset,
   const bool by_name = options.init == "auto" || options.init == "colmap" ||
                        options.init == "random" || options.init == "photos";
   if (!by_name) {
-    Gaussians start = with_sh_degree(read_ply(options.init), options.sh_degree);
-    const std::array<double, 3> origin = read_ply_origin(options.init);
+    Gaussians start = with_sh_degree(read_model(options.init), options.sh_degree);
+    const std::array<double, 3> origin = io::model_origin(options.init);
     for (std::size_t i = 0; i < start.means.size(); ++i) {
       start.means[i] = static_cast<float>(static_cast<double>(start.means[i]) +
                                           (origin[i % 3] - dataset.origin[i % 3]));

@@ -56,9 +56,6 @@ std::size_t fitted_limit(double pixels, std::int64_t iterations);
 /// `count` points uniform in the region, mid-grey with a little noise, a function of the seed.
 PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed);
 
-/// The Gaussians of the given indices, in their order.
-Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indices);
-
 /// Photos of the training views, loaded when they are first asked for.
 using PhotoSource = std::function<const std::vector<SmallPhoto>&()>;
 

@@ -34,7 +34,7 @@ Mirrors load_mirrors(const std::vector<std::string>& paths,
 
 Mirrors mirrors_of(const ModelSource& source) {
   if (!source.trained || source.trained->mirrors.empty()) return {};
-  spdlog::info("{} was trained with mirrors: its rays are traced one by one", source.ply.string());
+  spdlog::info("{} was trained with mirrors: its rays are traced one by one", source.file.string());
   return load_mirrors(source.trained->mirrors, source.trained->mirror_bounces, source.origin);
 }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "io/model_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "train/train_config.hpp"
@@ -37,8 +38,9 @@ void read_options(ModelSource& source, const std::filesystem::path& run) {
 }
 
 void read_header(ModelSource& source) {
-  if (!source.trained) source.header = read_ply_options(source.ply);
-  source.origin = read_ply_origin(source.ply);
+  if (!source.trained && io::model_format(source.file) == io::ModelFormat::kPly)
+    source.header = read_ply_options(source.file);
+  source.origin = io::model_origin(source.file);
 }
 
 }  // namespace
@@ -56,7 +58,7 @@ ModelSource find_model(const std::filesystem::path& path) {
     throw DataError(fmt::format("The model {} does not exist: check the path", path.string()));
   }
   if (!std::filesystem::is_directory(path, error)) {
-    source.ply = path;
+    source.file = path;
     const std::filesystem::path folder =
         std::filesystem::absolute(path, error).lexically_normal().parent_path();
     source.iteration = iteration_of(folder);
@@ -74,7 +76,7 @@ ModelSource find_model(const std::filesystem::path& path) {
     if (!iteration || (source.iteration && *iteration <= *source.iteration)) continue;
     if (!std::filesystem::is_regular_file(ply, ignored)) continue;
     source.iteration = iteration;
-    source.ply = ply;
+    source.file = ply;
   }
   if (!source.iteration) {
     throw DataError(
@@ -98,7 +100,7 @@ TraceOptions trace_options(const ModelSource& source, bool cut_out) {
   if (!source.trained) {
     spdlog::info(
         "{} does not say how it is traced: hits are taken in peak order, as rasterisers do",
-        source.ply.string());
+        source.file.string());
     return peak_order();
   }
   TraceOptions out = source.trained->trace;
@@ -110,7 +112,7 @@ void find_models(SceneFile& scene) {
   std::optional<ModelSource> first;  // that tells, or else of all
   for (SceneModel& model : scene.models) {
     const ModelSource source = find_model(model.file);
-    model.file = source.ply;
+    model.file = source.file;
     const bool tells = source.trained || source.header;
     const bool told = first && (first->trained || first->header);
     if (!first || (tells && !told)) first = source;

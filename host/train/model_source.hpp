@@ -14,7 +14,7 @@ namespace raysplats {
 
 /// A model on disk and the options it was trained with.
 struct ModelSource {
-  std::filesystem::path ply;
+  std::filesystem::path file;
   std::optional<TrainOptions>
       trained;  ///< of the run folder it is in; none for a PLY from elsewhere
   std::optional<TraceOptions> header;     ///< of a PLY that is in no run: what its header says
@@ -25,7 +25,7 @@ struct ModelSource {
 /// Whether `path` is the folder of a training run.
 bool is_run_folder(const std::filesystem::path& path);
 
-/// Finds the newest RUN/point_cloud/iteration_N/point_cloud.ply of a run folder; a PLY file is
+/// Finds the newest RUN/point_cloud/iteration_N/point_cloud.ply of a run folder; a file is
 /// taken as it is, and when it lies in a run folder at that depth, that run's configuration comes
 /// with it. Throws DataError when there is nothing to load, UsageError when the run's configuration
 /// is broken.

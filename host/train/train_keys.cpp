@@ -187,11 +187,11 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.text("init", o.init,
          "\"colmap\" (sparse points of the data set), \"photos\" (inside what cut-out photos show, "
          "else where neighbouring photos agree), \"random\" (the region that the cameras see), the "
-         "path of a 3DGS PLY, or \"auto\" (points when there are any, else photos)");
+         "path of a model, or \"auto\" (points when there are any, else photos)");
   t.number("init-count", o.init_count, 0, 1e9,
            "Gaussians of a start without points; 0 = a share of max-gaussians");
   t.number("init-opacity", o.init_opacity, 1e-4, 0.9999,
-           "opacity of the first Gaussians (not of a PLY)");
+           "opacity of the first Gaussians (not of a model)");
 
   t.section("Model");
   t.number("sh-degree", o.sh_degree, 0, 4,

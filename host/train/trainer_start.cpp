@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/gaussian_selection.hpp"
 #include "core/morton_order.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/train_config.hpp"

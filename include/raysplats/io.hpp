@@ -14,9 +14,34 @@
 
 namespace raysplats {
 
-/// Reads a 3DGS PLY (binary of both byte orders or ASCII; SH degree 0..4; further properties are
-/// ignored). Throws DataError with the byte offset for anything malformed, truncated, non-finite or
+/// Axes of SPZ files: most hold those of the PLY that they were made from, the specification wants
+/// x right, y up, z back. Nothing in the file tells.
+enum class SpzAxes { kPly, kRub };
+
+/// How files of models other than PLY are read and written.
+struct ModelEncoding {
+  SpzAxes spz_axes = SpzAxes::kPly;
+  int spz_version = 3;  ///< to write: 3 or 4
+};
+
+/// Reads Gaussians from a 3DGS PLY, PlayCanvas' compressed PLY, .splat, SPZ (1 to 4) or glTF with
+/// KHR_gaussian_splatting, recognised by their first bytes, .splat by its name. glTF is turned to
+/// the y down of captures. Throws DataError for anything malformed, truncated, non-finite or
 /// oversized.
+Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding = {});
+
+/// Writes atomically what the name's extension says: .ply, .splat, .spz or .glb. `trace` and
+/// `origin` as for write_ply(); other formats do not keep them. Throws UsageError for other names,
+/// DataError for what the format cannot hold.
+void write_model(const std::filesystem::path& path,
+                 const Gaussians& model,
+                 const ModelEncoding& encoding = {},
+                 const std::optional<TraceOptions>& trace = std::nullopt,
+                 const std::array<double, 3>& origin = {});
+
+/// Reads a 3DGS PLY (binary of both byte orders or ASCII; SH degree 0..4; further properties are
+/// ignored) or a compressed one of PlayCanvas. Throws DataError with the byte offset for anything
+/// malformed, truncated, non-finite or oversized.
 Gaussians read_ply(const std::filesystem::path& path);
 
 /// Writes an Inria-style binary little-endian 3DGS PLY atomically (temporary file, sync, rename).

@@ -30,6 +30,7 @@ TEST_CASE("docs/cli.md lists what -h lists") {
                                                   {"eval"},
                                                   {"trace"},
                                                   {"info"},
+                                                  {"convert"},
                                                   {"bench"},
                                                   {"bench", "compare"},
                                                   {"tune"}}) {

@@ -271,6 +271,28 @@ void make_meshes(const fs::path& root) {
   corpus.add("triangle.glb", glb.take(3));
 }
 
+void make_models(const fs::path& root) {
+  const Corpus corpus(root, "model");
+  const fs::path temporary = corpus.folder() / "temporary";
+  const auto add = [&](const char* name, char choice, const char* extension, int version) {
+    const fs::path path = fs::path(temporary).replace_extension(extension);
+    write_model(path, small_model(1, 2), {SpzAxes::kPly, version});
+    corpus.add_chosen(name, choice, path);
+  };
+  add("four.spz", 1, ".spz", 4);
+  add("three.spz", 1, ".spz", 3);
+  add("two.splat", 2, ".splat", 3);
+  add("two.glb", 3, ".glb", 3);
+  // What is compressed in SPZ of each older version.
+  for (std::uint32_t version = 1; version <= 3; ++version) {
+    Bytes bytes;
+    bytes.add('\0').add_text("NGSP").add(version).add(1u).add('\0').add('\x0c').add('\0').add('\0');
+    const std::size_t arrays = (version == 1 ? 6 : 9) + 1 + 3 + 3 + (version < 3 ? 3 : 4);
+    bytes.add_text(std::string(arrays, '\x40'));
+    corpus.add(fmt::format("version{}", version), bytes.take(1));
+  }
+}
+
 void make_scenes(const fs::path& root) {
   const Corpus corpus(root, "scene");
   corpus.add("small.toml", R"([[model]]
@@ -337,6 +359,7 @@ int main(int argc, char** argv) {
   make_reports(root);
   make_checkpoints(root);
   make_meshes(root);
+  make_models(root);
   make_scenes(root);
   return 0;
 }

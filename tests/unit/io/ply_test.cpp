@@ -231,7 +231,7 @@ TEST_CASE("malformed models are refused with a sentence that says what is wrong"
   CHECK(contains(error_of(overflow), "'x' of Gaussian 0 is not finite"));
   CHECK(contains(
       error_of(header("binary_little_endian", 0, {"packed_position", "packed_rotation"}, "uint")),
-      "SuperSplat"));
+      "no chunk element"));
   CHECK(contains(data_error([] { read_ply("/nonexistent/a.ply"); }), "does not exist"));
   CHECK(contains(data_error([] { read_ply("/tmp"); }), "not a file"));
 }

@@ -180,9 +180,9 @@ TEST_CASE("real trained models load, and survive writing and reading") {
     std::printf("%-40s %zu Gaussians, SH degree %d, read in %.3f s\n", expected.folder,
                 model.size(), model.sh_degree, seconds);
   }
-  const std::string refused =
-      data_error([&] { read_ply(*data / "trained_3dgs/guitar/guitar.compressed.ply"); });
-  CHECK(contains(refused, "SuperSplat"));
+  // Packed by PlayCanvas from the PLY beside it, in another order.
+  const Gaussians packed = read_model(*data / "trained_3dgs/guitar/guitar.compressed.ply");
+  CHECK(packed.size() == 90854);
   const std::vector<Camera> cameras =
       read_cameras(*data / "trained_3dgs/fox_opensplat/transforms.json");
   CHECK(cameras.size() == 50);
@@ -192,4 +192,40 @@ TEST_CASE("real trained models load, and survive writing and reading") {
   CHECK(lego.size() == 50);
   CHECK(lego.front().width == 400);
   CHECK(lego.front().fx == doctest::Approx(200.0 / std::tan(0.5 * 0.6911112070083618)));
+}
+
+TEST_CASE("foreign models of every format hold what their programs say") {
+  const auto data = test_data();
+  if (!data || !fs::exists(*data / "formats")) return;
+  const fs::path formats = *data / "formats";
+  for (const char* name : {"minimal-v3.spz", "minimal-v4.spz"}) {
+    const Gaussians model = read_model(formats / name);
+    CHECK(model.means == std::vector<float>{-1, 0, 1, 0, 0, 1, -1, 0, 0, 0, 0, 0});
+    CHECK(model.log_scales == std::vector<float>(12, -2.3125f));
+    CHECK(model.sh[0] == doctest::Approx(-0.58824).epsilon(1e-4));
+    CHECK(model.sh[2] == doctest::Approx(0.01307).epsilon(1e-3));
+    CHECK(1.0 / (1.0 + std::exp(-model.opacities[3])) == doctest::Approx(0.90196).epsilon(1e-4));
+    CHECK(model.quaternions[0] == doctest::Approx(1.0));
+  }
+  const Gaussians two = read_model(formats / "minimal-v2.spz");
+  CHECK(two.means[2] == -1.0f);
+  CHECK(two.sh[0] == doctest::Approx(-1.111).epsilon(1e-3));
+  CHECK(two.quaternions[0] == doctest::Approx(0.99998).epsilon(1e-5));
+  CHECK(two.quaternions[1] == doctest::Approx(0.0039).epsilon(0.01));
+  CHECK(contains(data_error([&] { read_model(formats / "minimal-raw.spz"); }), "gzip"));
+  const Gaussians splat = read_model(formats / "minimal.splat");
+  CHECK(splat.size() == 4);
+  CHECK(splat.log_scales[0] == doctest::Approx(std::log(0.1)));
+  const Gaussians packed = read_model(formats / "pc_test.compressed.ply");
+  REQUIRE(packed.size() == 64);
+  CHECK(packed.sh_degree == 3);
+  const auto check = [](const std::vector<float>& values, const std::vector<double>& expected) {
+    for (std::size_t i = 0; i < expected.size(); ++i)
+      CHECK(static_cast<double>(values[i]) == doctest::Approx(expected[i]).epsilon(1e-5));
+  };
+  check(packed.means, {-1.09285614, -0.81247817, 0.34936113});
+  check(packed.log_scales, {-2.446086, -14.426013, -5.735317});
+  check(packed.quaternions, {0.9346983, -0.1693462, -0.2702627, 0.1569044});
+  check({packed.opacities[0]}, {-1.4615});
+  check(packed.sh, {1.22985, 1.36279, 1.39178, 0.046875, 0.046875, 0.015625});
 }

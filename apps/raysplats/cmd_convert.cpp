@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "io/convert_model.hpp"
+#include "options.hpp"
+#include "raysplats/error.hpp"
+#include "train/model_source.hpp"
+
+namespace raysplats::cli {
+namespace {
+
+struct Options {
+  std::string input;
+  std::string output;
+  std::optional<std::string> rotate;
+  std::optional<std::string> translate;
+  std::optional<std::string> crop_min;
+  std::optional<std::string> crop_max;
+  std::string spz_axes = "ply";
+  int spz_version = ModelEncoding{}.spz_version;
+  bool overwrite = false;
+  ModelChanges changes;
+};
+
+glm::dvec3 vector_of(const std::string& text) {
+  const std::array<double, 3> v = parse_triple(text);
+  return {v[0], v[1], v[2]};
+}
+
+void run(Options& options) {
+  ModelChanges& changes = options.changes;
+  if (options.rotate) changes.rotate_degrees = vector_of(*options.rotate);
+  if (options.translate) changes.translate = vector_of(*options.translate);
+  if (options.crop_min || options.crop_max) {
+    const glm::dvec3 all(std::numeric_limits<double>::infinity());
+    changes.crop = CropBox{options.crop_min ? vector_of(*options.crop_min) : -all,
+                       options.crop_max ? vector_of(*options.crop_max) : all};
+  }
+  const ModelSource source = find_model(options.input);
+  std::optional<TraceOptions> trace = source.header;
+  if (source.trained) trace = trace_options(source, false);
+  const ModelEncoding encoding{options.spz_axes == "rub" ? SpzAxes::kRub : SpzAxes::kPly,
+                               options.spz_version};
+  const Conversion done =
+      convert_model(source.file, options.output, changes, encoding, trace, options.overwrite);
+  const std::string left = done.written == done.read ? "" : fmt::format(" of {}", done.read);
+  fmt::print("{}{} Gaussians, SH degree {}, in {}: {}\n", done.written, left, done.sh_degree,
+             options.output, done.losses);
+}
+
+}  // namespace
+
+Command add_convert_command(CLI::App& app) {
+  CLI::App* command =
+      app.add_subcommand("convert", "Write a model in another format, or a part of it");
+  auto options = std::make_shared<Options>();
+  ModelChanges& changes = options->changes;
+  command
+      ->add_option("MODEL", options->input,
+                   "PLY, compressed PLY, .splat, SPZ or glTF with Gaussians, or a run folder")
+      ->required()
+      ->type_name("");
+  command
+      ->add_option("-o,--output", options->output,
+                   "What to write, by its ending: .ply, .splat, .spz or .glb")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--sh-degree", changes.sh_degree, "Keep or fill up this many SH degrees")
+      ->transform(whole_between(0, 4));
+  command->add_option("--min-opacity", changes.min_opacity, "Leave out Gaussians that are fainter")
+      ->check(between(0.0, 1.0));
+  command->add_option("--scale", changes.scale, "Make the model this much larger")
+      ->check(above(0.0))
+      ->capture_default_str();
+  command
+      ->add_option("--rotate", options->rotate,
+                   "Degrees about the axes x, then y, then z; 180,0,0 turns a model over")
+      ->check(triple())
+      ->type_name("X,Y,Z");
+  command->add_option("--translate", options->translate, "Move the scaled and turned model")
+      ->check(triple())
+      ->type_name("X,Y,Z");
+  command
+      ->add_option("--crop-min", options->crop_min,
+                   "Leave out Gaussians below, in the coordinates of the result")
+      ->check(triple())
+      ->type_name("X,Y,Z");
+  command->add_option("--crop-max", options->crop_max, "Leave out Gaussians above")
+      ->check(triple())
+      ->type_name("X,Y,Z");
+  command
+      ->add_option(
+          "--spz-axes", options->spz_axes,
+          "Axes of an SPZ that is read or written: those of the PLY (what most files hold), "
+          "or right, up, back as its specification says (rub)")
+      ->check(one_of({"ply", "rub"}))
+      ->capture_default_str();
+  command->add_option("--spz-version", options->spz_version, "3 (gzip) or 4 (zstd)")
+      ->transform(whole_between(3, 4))
+      ->capture_default_str();
+  add_overwrite_flag(*command, options->overwrite);
+  return {command, [options] { run(*options); }};
+}
+
+}  // namespace raysplats::cli

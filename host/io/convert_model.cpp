@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/convert_model.hpp"
+
+#include <fmt/format.h>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/trigonometric.hpp>
+
+#include "core/gaussian_transform.hpp"
+#include "io/model_file.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+glm::dmat4 movement(const ModelChanges& changes) {
+  glm::dmat4 map = glm::translate(glm::dmat4(1.0), changes.translate);
+  map = glm::rotate(map, glm::radians(changes.rotate_degrees.z), glm::dvec3(0, 0, 1));
+  map = glm::rotate(map, glm::radians(changes.rotate_degrees.y), glm::dvec3(0, 1, 0));
+  map = glm::rotate(map, glm::radians(changes.rotate_degrees.x), glm::dvec3(1, 0, 0));
+  return glm::scale(map, glm::dvec3(changes.scale));
+}
+
+}  // namespace
+
+Gaussians changed(const Gaussians& model, const ModelChanges& changes) {
+  Gaussians out = changes.min_opacity ? with_opacity(model, *changes.min_opacity) : model;
+  const glm::dmat4 map = movement(changes);
+  if (map != glm::dmat4(1.0)) out = transformed(out, map);
+  if (changes.crop) out = within(out, *changes.crop);
+  if (changes.sh_degree) out = with_sh_degree(out, *changes.sh_degree);
+  return out;
+}
+
+Conversion convert_model(const std::filesystem::path& input,
+                         const std::filesystem::path& output,
+                         const ModelChanges& changes,
+                         const ModelEncoding& encoding,
+                         const std::optional<TraceOptions>& trace,
+                         bool overwrite) {
+  const io::ModelFormat format = io::output_format(output);
+  std::error_code error;
+  if (std::filesystem::equivalent(input, output, error)) {
+    throw UsageError(
+        fmt::format("{} is what is read: give another file to write", output.string()));
+  }
+  if (!overwrite && std::filesystem::exists(output, error)) {
+    throw UsageError(
+        fmt::format("{} is there already: give another name, or --overwrite", output.string()));
+  }
+  const Gaussians model = read_model(input, encoding);
+  const Gaussians result = changed(model, changes);
+  if (model.size() > 0 && result.size() == 0) {
+    throw UsageError(fmt::format(
+        "None of the {} Gaussians of {} is left: choose a larger box or a smaller opacity",
+        model.size(), input.string()));
+  }
+  const std::array<double, 3> origin = io::model_origin(input);
+  write_model(output, result, encoding, trace, origin);
+  std::string losses = io::losses(format, result);
+  if (format != io::ModelFormat::kPly && origin != std::array<double, 3>{}) {
+    losses += fmt::format(", positions count from {}, {}, {}, which is not said in the file",
+                          origin[0], origin[1], origin[2]);
+  }
+  return {model.size(), result.size(), result.sh_degree, losses};
+}
+
+}  // namespace raysplats

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+
+#include "core/gaussian_selection.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+
+/// What is changed between reading and writing, in this order; in the coordinates of the file,
+/// whose origin (read_ply_origin()) stays.
+struct ModelChanges {
+  std::optional<double> min_opacity;
+  double scale = 1.0;
+  glm::dvec3 rotate_degrees{0.0};  ///< about the axes x, then y, then z
+  glm::dvec3 translate{0.0};
+  std::optional<CropBox> crop;  ///< in the coordinates of the result
+  std::optional<int> sh_degree;
+};
+
+Gaussians changed(const Gaussians& model, const ModelChanges& changes);
+
+/// What a conversion did.
+struct Conversion {
+  std::size_t read = 0, written = 0;  ///< Gaussians
+  int sh_degree = 0;                  ///< of what was written, before the format's losses
+  std::string losses;                 ///< as io::losses()
+};
+
+/// Reads `input` with the encoding, changes it and writes `output`. Throws as read_model() and
+/// write_model(), and UsageError when both are the same file, when `output` is there without
+/// `overwrite`, and when nothing is left to write.
+Conversion convert_model(const std::filesystem::path& input,
+                         const std::filesystem::path& output,
+                         const ModelChanges& changes,
+                         const ModelEncoding& encoding,
+                         const std::optional<TraceOptions>& trace,
+                         bool overwrite);
+
+}  // namespace raysplats

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+/// How the numbers of a Gaussian are coded in files other than PLY.
+namespace raysplats::io {
+
+/// The value of the constant spherical harmonic.
+constexpr double kSh0 = 0.28209479177387814;
+
+/// Opacities of floats and of bytes are kept this far from 0 and 1, where the logit is infinite.
+constexpr double kFloatOpacityMargin = 1e-7;
+constexpr double kByteOpacityMargin = 0.5 / 255.0;
+
+inline double opacity_of(float logit) {
+  return 1.0 / (1.0 + std::exp(-static_cast<double>(logit)));
+}
+
+inline float logit_of(double opacity, double margin) {
+  const double inside = std::clamp(opacity, margin, 1.0 - margin);
+  return static_cast<float>(std::log(inside / (1.0 - inside)));
+}
+
+/// The nearest of 0..255.
+inline std::uint8_t to_byte(double value) {
+  return static_cast<std::uint8_t>(std::clamp(std::floor(value + 0.5), 0.0, 255.0));
+}
+
+/// Length 1 and real part first; what has no direction is not rotated.
+inline std::array<double, 4> unit_quaternion(const float* q) {
+  std::array<double, 4> out{};
+  double norm = 0.0;
+  for (std::size_t c = 0; c < 4; ++c) {
+    out[c] = static_cast<double>(q[c]);
+    norm += out[c] * out[c];
+  }
+  if (!(norm > 0.0)) return {1.0, 0.0, 0.0, 0.0};
+  for (double& value : out) value /= std::sqrt(norm);
+  return out;
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/atomic_file.hpp"
+#include "core/gaussian_transform.hpp"
+#include "io/gaussian_codes.hpp"
+#include "io/gltf_gaussians.hpp"
+#include "io/model_formats.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+using Json = nlohmann::ordered_json;
+static_assert(std::endian::native == std::endian::little, "floats are written as they are");
+
+constexpr int kPoints = 0;
+constexpr int kFloat = 5126;
+constexpr int kArrayBuffer = 34962;
+constexpr std::uint64_t kMostBytes = std::numeric_limits<std::uint32_t>::max();
+
+/// The arrays of the file one after the other, and the JSON that describes them.
+class Glb {
+ public:
+  Glb(const Gaussians& model) : count_(model.size()) {
+    json_["asset"] = {{"version", "2.0"},
+                      {"generator", fmt::format("RaySplats-CL {}", RAYSPLATS_VERSION)}};
+    json_["extensionsUsed"] = {kSplattingExtension};
+    json_["scene"] = 0;
+    json_["scenes"] = {{{"nodes", {0}}}};
+    json_["nodes"] = {{{"mesh", 0}}};
+  }
+
+  /// `value(i, k)` is number k of Gaussian i; `bounds` as glTF wants them of positions.
+  template <class Value>
+  void add(const std::string& name, std::size_t width, Value value, bool bounds = false) {
+    std::vector<float> numbers(width * count_);
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t k = 0; k < width; ++k) numbers[width * i + k] = value(i, k);
+    }
+    const std::array<const char*, 5> types{"", "SCALAR", "VEC2", "VEC3", "VEC4"};
+    const std::size_t bytes = numbers.size() * sizeof(float);
+    json_["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", bytes_}, {"byteLength", bytes}, {"target", kArrayBuffer}});
+    Json accessor{{"bufferView", arrays_.size()},
+                  {"componentType", kFloat},
+                  {"count", count_},
+                  {"type", types[width]}};
+    if (bounds) {
+      std::vector<float> low(width, std::numeric_limits<float>::max());
+      std::vector<float> high(width, std::numeric_limits<float>::lowest());
+      for (std::size_t i = 0; i < numbers.size(); ++i) {
+        low[i % width] = std::min(low[i % width], numbers[i]);
+        high[i % width] = std::max(high[i % width], numbers[i]);
+      }
+      accessor["min"] = low;
+      accessor["max"] = high;
+    }
+    attributes_[name] = arrays_.size();
+    json_["accessors"].push_back(std::move(accessor));
+    arrays_.push_back(std::move(numbers));
+    bytes_ += bytes;
+  }
+
+  void write(const std::filesystem::path& path) {
+    json_["meshes"] = {
+        {{"primitives",
+          {{{"attributes", attributes_},
+            {"mode", kPoints},
+            {"extensions",
+             {{kSplattingExtension,
+               {{"kernel", "ellipse"}, {"colorSpace", "srgb_rec709_display"}}}}}}}}}};
+    json_["buffers"] = {{{"byteLength", bytes_}}};
+    std::string text = json_.dump();
+    text.resize((text.size() + 3) / 4 * 4, ' ');
+    constexpr std::uint64_t kFrame = 12 + 8 + 8;
+    const std::uint64_t total = kFrame + text.size() + bytes_;
+    if (total > kMostBytes) {
+      throw DataError(fmt::format(
+          "{} cannot be written: a GLB has at most 4 GiB, but {} Gaussians need {} bytes: write a "
+          "PLY or an SPZ, or fewer SH degrees",
+          path.string(), count_, total));
+    }
+    AtomicFile file(path);
+    const auto word = [&](std::uint64_t value) {
+      const auto bits = static_cast<std::uint32_t>(value);
+      file.write(&bits, sizeof(bits));
+    };
+    file.write("glTF");
+    word(2);
+    word(total);
+    word(text.size());
+    file.write("JSON");
+    file.write(text);
+    word(bytes_);
+    file.write(std::string_view("BIN\0", 4));
+    for (const auto& numbers : arrays_) file.write(numbers.data(), numbers.size() * sizeof(float));
+    file.commit();
+  }
+
+ private:
+  std::size_t count_;
+  std::uint64_t bytes_ = 0;
+  Json json_;
+  Json attributes_;
+  std::vector<std::vector<float>> arrays_;
+};
+
+}  // namespace
+
+void write_glb(const std::filesystem::path& path, const Gaussians& model) {
+  if (model.size() == 0) {
+    throw DataError(fmt::format(
+        "{} cannot be written: glTF has no empty arrays, and the model has no Gaussians",
+        path.string()));
+  }
+  const Gaussians turned = transformed(
+      with_sh_degree(model, std::min(model.sh_degree, kSplattingMaxDegree)), splatting_turn());
+  Glb glb(turned);
+  glb.add(
+      "POSITION", 3, [&](std::size_t i, std::size_t k) { return turned.means[3 * i + k]; }, true);
+  glb.add(kSplattingRotation, 4, [&](std::size_t i, std::size_t k) {
+    return static_cast<float>(unit_quaternion(&turned.quaternions[4 * i])[(k + 1) % 4]);
+  });
+  glb.add(kSplattingScale, 3, [&](std::size_t i, std::size_t k) {
+    return static_cast<float>(std::exp(static_cast<double>(turned.log_scales[3 * i + k])));
+  });
+  glb.add(kSplattingOpacity, 1, [&](std::size_t i, std::size_t) {
+    return static_cast<float>(opacity_of(turned.opacities[i]));
+  });
+  const auto stride = static_cast<std::size_t>(3 * sh_coefficients(turned.sh_degree));
+  std::size_t coefficient = 0;
+  for (int degree = 0; degree <= turned.sh_degree; ++degree) {
+    for (int n = 0; n <= 2 * degree; ++n, ++coefficient) {
+      glb.add(splatting_harmonic(degree, n), 3, [&](std::size_t i, std::size_t k) {
+        return turned.sh[stride * i + 3 * coefficient + k];
+      });
+    }
+  }
+  glb.write(path);
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/mat4x4.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/gaussian_transform.hpp"
+#include "io/gaussian_codes.hpp"
+#include "io/gltf_gaussians.hpp"
+#include "io/gltf_model.hpp"
+#include "io/gltf_nodes.hpp"
+#include "io/model_formats.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+/// Smallest scale that has a logarithm to go on with.
+constexpr float kLeastScale = 1e-30f;
+/// Nodes may show a mesh again, but a small file is not to ask for all memory that way.
+constexpr std::size_t kMostCopies = 64;
+
+const tinygltf::Value* splatting(const tinygltf::Primitive& primitive) {
+  const auto found = primitive.extensions.find(kSplattingExtension);
+  return found == primitive.extensions.end() ? nullptr : &found->second;
+}
+
+bool has_gaussians(const tinygltf::Mesh& mesh) {
+  return std::any_of(mesh.primitives.begin(), mesh.primitives.end(),
+                     [](const tinygltf::Primitive& each) { return splatting(each) != nullptr; });
+}
+
+void check_kind(const GltfReader& reader, const tinygltf::Value& extension) {
+  const auto refuse = [&](const std::string& what) {
+    throw DataError(fmt::format("{} has Gaussians {}, which is not supported: export it otherwise",
+                                reader.path().string(), what));
+  };
+  if (extension.IsObject()) {
+    const auto text = [&](const char* key, const char* known) {
+      const tinygltf::Value& value = extension.Get(key);
+      if (value.IsString() && value.Get<std::string>() != known)
+        refuse(fmt::format("with the {} '{}'", key, value.Get<std::string>()));
+    };
+    text("kernel", "ellipse");
+    text("colorSpace", "srgb_rec709_display");
+    text("projection", "perspective");
+    if (extension.Has("extensions")) {
+      for (const std::string& name : extension.Get("extensions").Keys())
+        refuse(fmt::format("packed by {}", name));
+    }
+  }
+}
+
+int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
+  const auto found = primitive.attributes.find(name);
+  return found == primitive.attributes.end() ? -1 : found->second;
+}
+
+Gaussians read_primitive(const GltfReader& reader, const tinygltf::Primitive& primitive) {
+  check_kind(reader, *splatting(primitive));
+  if (primitive.mode != TINYGLTF_MODE_POINTS) reader.fail("Gaussians are not of the mode POINTS");
+  if (primitive.indices >= 0) reader.fail("Gaussians have indices");
+  std::size_t count = 0;
+  const auto numbers = [&](const std::string& name, std::size_t width) {
+    const int accessor = attribute(primitive, name);
+    if (accessor < 0) reader.fail(fmt::format("Gaussians have no {}", name));
+    std::vector<float> values = reader.floats(accessor, width);
+    if (name == "POSITION") count = values.size() / width;
+    if (values.size() != width * count) {
+      reader.fail(fmt::format("{} Gaussians have {} of {}", count, values.size() / width, name));
+    }
+    if (!std::all_of(values.begin(), values.end(), [](float x) { return std::isfinite(x); })) {
+      reader.fail(fmt::format("{} is not finite", name));
+    }
+    return values;
+  };
+  Gaussians model;
+  model.means = numbers("POSITION", 3);
+  for (int degree = 1; degree <= kSplattingMaxDegree; ++degree) {
+    if (attribute(primitive, splatting_harmonic(degree, 0)) >= 0) model.sh_degree = degree;
+  }
+  model.resize(count);
+  const std::vector<float> rotations = numbers(kSplattingRotation, 4);
+  const std::vector<float> scales = numbers(kSplattingScale, 3);
+  const std::vector<float> opacities = numbers(kSplattingOpacity, 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* xyzw = &rotations[4 * i];
+    const float wxyz[4] = {xyzw[3], xyzw[0], xyzw[1], xyzw[2]};
+    const std::array<double, 4> unit = unit_quaternion(wxyz);
+    for (std::size_t k = 0; k < 4; ++k) model.quaternions[4 * i + k] = static_cast<float>(unit[k]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float scale = scales[3 * i + k];
+      if (scale < 0.0f) reader.fail("a scale is negative");
+      model.log_scales[3 * i + k] = std::log(std::max(scale, kLeastScale));
+    }
+    model.opacities[i] = logit_of(static_cast<double>(opacities[i]), kFloatOpacityMargin);
+  }
+  const auto stride = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
+  std::size_t coefficient = 0;
+  for (int degree = 0; degree <= model.sh_degree; ++degree) {
+    for (int n = 0; n <= 2 * degree; ++n, ++coefficient) {
+      const std::vector<float> values = numbers(splatting_harmonic(degree, n), 3);
+      for (std::size_t i = 0; i < count; ++i) {
+        std::copy_n(&values[3 * i], 3, &model.sh[stride * i + 3 * coefficient]);
+      }
+    }
+  }
+  return model;
+}
+
+}  // namespace
+
+std::string splatting_harmonic(int degree, int n) {
+  return fmt::format("KHR_gaussian_splatting:SH_DEGREE_{}_COEF_{}", degree, n);
+}
+
+glm::dmat4 splatting_turn() {
+  glm::dmat4 turn(1.0);
+  turn[0][0] = turn[1][1] = -1.0;
+  return turn;
+}
+
+bool has_gltf_gaussians(const std::filesystem::path& path) {
+  const tinygltf::Model model = parse_gltf(path);
+  return std::any_of(model.meshes.begin(), model.meshes.end(), has_gaussians);
+}
+
+Gaussians read_gltf_gaussians(const std::filesystem::path& path) {
+  const tinygltf::Model file = parse_gltf(path);
+  const GltfReader reader(file, path);
+  std::vector<std::optional<Gaussians>> meshes(file.meshes.size());
+  std::vector<Gaussians> placed;
+  std::size_t own = 0;
+  std::size_t total = 0;
+  for_each_placed_mesh(reader, [&](int number, const glm::dmat4& matrix) {
+    const auto index = static_cast<std::size_t>(number);
+    const tinygltf::Mesh& mesh = file.meshes[index];
+    if (!has_gaussians(mesh)) return;
+    if (!meshes[index]) {
+      std::vector<Gaussians> parts;
+      for (const tinygltf::Primitive& primitive : mesh.primitives) {
+        if (splatting(primitive) != nullptr) parts.push_back(read_primitive(reader, primitive));
+      }
+      meshes[index] = joined(parts);
+      own += meshes[index]->size();
+    }
+    total += meshes[index]->size();
+    if (total > kMostCopies * own) {
+      reader.fail(fmt::format("its nodes show {} Gaussians, more than {} times what it holds",
+                              total, kMostCopies));
+    }
+    try {
+      placed.push_back(transformed(*meshes[index], splatting_turn() * matrix));
+    } catch (const UsageError& error) {
+      reader.fail(error.what());
+    }
+  });
+  if (placed.empty()) {
+    throw DataError(fmt::format("{} is no 3D Gaussian model: no mesh of its scene has {}",
+                                path.string(), kSplattingExtension));
+  }
+  return joined(placed);
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/model_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <fstream>
+#include <glm/mat4x4.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/gaussian_transform.hpp"
+#include "io/gltf_gaussians.hpp"
+#include "io/model_formats.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace io {
+namespace {
+
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+/// The first bytes of a file, fewer where it is shorter or cannot be read.
+std::string first_bytes(const std::filesystem::path& path) {
+  std::array<char, 4> bytes{};
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return "";
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(bytes.data(), bytes.size());
+  return std::string(bytes.data(), static_cast<std::size_t>(stream.gcount()));
+}
+
+/// Half a turn about x: from x right, y down, z forward to x right, y up, z back.
+glm::dmat4 rub_turn() {
+  glm::dmat4 turn(1.0);
+  turn[1][1] = turn[2][2] = -1.0;
+  return turn;
+}
+
+}  // namespace
+
+ModelFormat model_format(const std::filesystem::path& path) {
+  const std::string start = first_bytes(path);
+  if (start.starts_with("ply")) return ModelFormat::kPly;
+  if (start.starts_with("\x1f\x8b") || start == "NGSP") return ModelFormat::kSpz;
+  if (start == "glTF") return ModelFormat::kGltf;
+  const std::string extension = lower_extension(path);
+  if (extension == ".splat") return ModelFormat::kSplat;
+  if (extension == ".spz") return ModelFormat::kSpz;
+  if (extension == ".glb" || extension == ".gltf") return ModelFormat::kGltf;
+  // Files that are missing, too, are best explained by the reader.
+  const bool readable = !start.empty() && extension != ".ply";
+  return readable ? ModelFormat::kUnknown : ModelFormat::kPly;
+}
+
+std::array<double, 3> model_origin(const std::filesystem::path& path) {
+  return model_format(path) == ModelFormat::kPly ? read_ply_origin(path) : std::array<double, 3>{};
+}
+
+ModelFormat output_format(const std::filesystem::path& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".ply") {
+    if (lower_extension(path.stem()) == ".compressed") {
+      throw UsageError(fmt::format(
+          "{} cannot be written: compressed PLY is read only, give a name that ends in .ply, "
+          ".splat, .spz or .glb",
+          path.string()));
+    }
+    return ModelFormat::kPly;
+  }
+  if (extension == ".splat") return ModelFormat::kSplat;
+  if (extension == ".spz") return ModelFormat::kSpz;
+  if (extension == ".glb") return ModelFormat::kGltf;
+  throw UsageError(fmt::format(
+      "{} does not say what to write: give a name that ends in .ply, .splat, .spz or .glb",
+      path.string()));
+}
+
+std::string losses(ModelFormat format, const Gaussians& model) {
+  switch (format) {
+    case ModelFormat::kPly:
+      return "nothing is lost";
+    case ModelFormat::kSplat:
+      return fmt::format(
+          "{}colours are cut to 0..1, colours, opacities and rotations have 8 bits",
+          model.sh_degree > 0 ? "colours no longer change with the view (no SH), " : "");
+    case ModelFormat::kSpz: {
+      const bool beyond =
+          std::any_of(model.log_scales.begin(), model.log_scales.end(),
+                      [](float s) { return s < kSpzLeastLogScale || s > kSpzMostLogScale; });
+      return fmt::format(
+          "positions are kept to 1/4096, scales to 3 %, opacities and colours to 8 bits{}{}",
+          model.sh_degree > 0 ? ", SH to 4 or 5 bits" : "",
+          beyond ? ", and some scales are beyond what SPZ knows (4.5e-5 to 380) and are clamped"
+                 : "");
+    }
+    case ModelFormat::kGltf:
+      return model.sh_degree > kSplattingMaxDegree
+                 ? fmt::format("SH above degree {} is left out", kSplattingMaxDegree)
+                 : "nothing is lost";
+    case ModelFormat::kUnknown:
+      break;
+  }
+  return "";
+}
+
+}  // namespace io
+
+Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding) {
+  switch (io::model_format(path)) {
+    case io::ModelFormat::kSplat:
+      return io::read_splat(path);
+    case io::ModelFormat::kGltf:
+      return io::read_gltf_gaussians(path);
+    case io::ModelFormat::kSpz: {
+      Gaussians model = io::read_spz(path);
+      return encoding.spz_axes == SpzAxes::kRub ? transformed(model, io::rub_turn()) : model;
+    }
+    case io::ModelFormat::kPly:
+      return read_ply(path);
+    case io::ModelFormat::kUnknown:
+      break;
+  }
+  throw DataError(fmt::format(
+      "{} is no model that is known: those are PLY, .splat, SPZ and glTF with Gaussians",
+      path.string()));
+}
+
+void write_model(const std::filesystem::path& path,
+                 const Gaussians& model,
+                 const ModelEncoding& encoding,
+                 const std::optional<TraceOptions>& trace,
+                 const std::array<double, 3>& origin) {
+  switch (io::output_format(path)) {
+    case io::ModelFormat::kPly:
+      return write_ply(path, model, trace, origin);
+    case io::ModelFormat::kSplat:
+      return io::write_splat(path, model);
+    case io::ModelFormat::kGltf:
+      return io::write_glb(path, model);
+    case io::ModelFormat::kUnknown:
+      break;
+    case io::ModelFormat::kSpz:
+      if (encoding.spz_version != 3 && encoding.spz_version != 4) {
+        throw UsageError(
+            fmt::format("SPZ is written in version 3 or 4, not {}", encoding.spz_version));
+      }
+      io::write_spz(path,
+                    encoding.spz_axes == SpzAxes::kRub ? transformed(model, io::rub_turn()) : model,
+                    encoding.spz_version);
+  }
+}
+
+}  // namespace raysplats

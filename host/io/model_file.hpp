@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+
+#include "raysplats/gaussians.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats::io {
+
+enum class ModelFormat { kPly, kSplat, kSpz, kGltf, kUnknown };
+
+/// What a file is, by its first bytes, else by its extension.
+ModelFormat model_format(const std::filesystem::path& path);
+
+/// From where its positions count (read_ply_origin()); 0 for formats that do not say it.
+std::array<double, 3> model_origin(const std::filesystem::path& path);
+
+/// What a file of this name is written as. Throws UsageError for names that do not say it.
+ModelFormat output_format(const std::filesystem::path& path);
+
+/// What the format does not keep of a model, as part of a sentence.
+std::string losses(ModelFormat format, const Gaussians& model);
+
+}  // namespace raysplats::io

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+#include "raysplats/gaussians.hpp"
+#include "raysplats/io.hpp"
+
+/// Formats of Gaussians other than 3DGS PLY; read_model() and write_model() choose among them. All
+/// readers throw DataError, one sentence with the path, for whatever is malformed, truncated or not
+/// finite, and allocate nothing that the file's size does not bear out. Writers are atomic.
+namespace raysplats::io {
+
+/// The records of 32 bytes of antimatter15/splat (convert.py): position and scale as floats, colour
+/// and opacity as four bytes, rotation as four bytes, real part first.
+Gaussians read_splat(const std::filesystem::path& path);
+/// Most important (largest times most opaque) first, as streams want them. SH is left out.
+void write_splat(const std::filesystem::path& path, const Gaussians& model);
+
+/// Niantic's SPZ, versions 1 to 4 (nianticlabs/spz), SH to degree 4; axes as they are in the file.
+constexpr float kSpzLeastLogScale = -10.0f;
+constexpr float kSpzMostLogScale = 5.9375f;
+Gaussians read_spz(const std::filesystem::path& path);
+/// Version 3 or 4. Positions keep 12 bits behind the point, fewer where they are beyond +-2048.
+/// Throws DataError for positions beyond +-8388607.
+void write_spz(const std::filesystem::path& path, const Gaussians& model, int version);
+
+/// glTF 2.0, JSON or GLB, with KHR_gaussian_splatting (Khronos, release candidate of 2026): all
+/// Gaussians of its scene, turned from y up to the y down of captures.
+Gaussians read_gltf_gaussians(const std::filesystem::path& path);
+/// Whether a glTF file holds Gaussians; it may hold meshes too. Throws as read_gltf().
+bool has_gltf_gaussians(const std::filesystem::path& path);
+/// GLB with floats: nothing is lost up to SH degree 3, what is above is left out. Throws DataError
+/// for more than the 4 GiB that a GLB can have.
+void write_glb(const std::filesystem::path& path, const Gaussians& model);
+
+/// PlayCanvas' compressed PLY: chunks of 256 Gaussians in 16 bytes each, and SH in bytes.
+Gaussians read_compressed_ply(const std::filesystem::path& path);
+
+}  // namespace raysplats::io

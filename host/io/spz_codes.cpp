@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/spz_codes.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "io/byte_reader.hpp"
+#include "io/gaussian_codes.hpp"
+#include "io/model_formats.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+constexpr int kMaxShDegree = 4;
+constexpr int kMaxFractionalBits = 24;
+constexpr double kColorScale = 0.15;
+constexpr double kScaleStep = 16.0;
+constexpr double kPositionLimit = 8388607.0;  // 2^23 - 1
+constexpr std::uint32_t kRotationMask = 511;
+
+std::uint64_t higher_coefficients(int degree) {
+  return static_cast<std::uint64_t>(sh_coefficients(degree) - 1);
+}
+
+double byte_at(std::span<const std::byte> bytes, std::size_t i) {
+  return std::to_integer<int>(bytes[i]);
+}
+
+double half_at(std::span<const std::byte> bytes, std::size_t i) {
+  const unsigned bits =
+      std::to_integer<unsigned>(bytes[2 * i]) | std::to_integer<unsigned>(bytes[2 * i + 1]) << 8;
+  const int exponent = static_cast<int>(bits >> 10 & 31u);
+  const int fraction = static_cast<int>(bits & 1023u);
+  double value;
+  if (exponent == 31) {
+    value = fraction == 0 ? HUGE_VAL : std::nan("");
+  } else if (exponent == 0) {
+    value = std::ldexp(fraction, -24);
+  } else {
+    value = std::ldexp(1024 + fraction, exponent - 25);
+  }
+  return (bits & 0x8000u) != 0 ? -value : value;
+}
+
+double fixed_at(std::span<const std::byte> bytes, std::size_t i, int fractional_bits) {
+  const std::uint32_t bits = std::to_integer<std::uint32_t>(bytes[3 * i]) << 8 |
+                             std::to_integer<std::uint32_t>(bytes[3 * i + 1]) << 16 |
+                             std::to_integer<std::uint32_t>(bytes[3 * i + 2]) << 24;
+  return std::ldexp(static_cast<double>(std::bit_cast<std::int32_t>(bits) >> 8), -fractional_bits);
+}
+
+/// Three bytes: x, y and z of the quaternion whose real part is not negative.
+void first_three(std::span<const std::byte> bytes, std::size_t i, float* q) {
+  double rest = 1.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double part = byte_at(bytes, 3 * i + k) / 127.5 - 1.0;
+    q[k + 1] = static_cast<float>(part);
+    rest -= part * part;
+  }
+  q[0] = static_cast<float>(std::sqrt(std::max(rest, 0.0)));
+}
+
+/// Four bytes: which of x, y, z, w is the largest, and the three others in 10 bits each.
+void smallest_three(std::span<const std::byte> bytes, std::size_t i, float* q) {
+  std::uint32_t bits = 0;
+  for (std::size_t k = 4; k-- > 0;)
+    bits = bits << 8 | std::to_integer<std::uint32_t>(bytes[4 * i + k]);
+  const std::size_t largest = bits >> 30;
+  double rest = 1.0;
+  double xyzw[4];
+  for (std::size_t k = 4; k-- > 0;) {
+    if (k == largest) continue;
+    const double size =
+        static_cast<double>(bits & kRotationMask) / kRotationMask / std::numbers::sqrt2;
+    xyzw[k] = (bits & 512u) != 0 ? -size : size;
+    rest -= size * size;
+    bits >>= 10;
+  }
+  xyzw[largest] = std::sqrt(std::max(rest, 0.0));
+  q[0] = static_cast<float>(xyzw[3]);
+  for (std::size_t k = 0; k < 3; ++k) q[k + 1] = static_cast<float>(xyzw[k]);
+}
+
+std::uint32_t packed_rotation(const float* quaternion) {
+  const std::array<double, 4> q = unit_quaternion(quaternion);
+  const std::array<double, 4> xyzw{q[1], q[2], q[3], q[0]};
+  std::size_t largest = 0;
+  for (std::size_t k = 1; k < 4; ++k) {
+    if (std::abs(xyzw[k]) > std::abs(xyzw[largest])) largest = k;
+  }
+  auto bits = static_cast<std::uint32_t>(largest);
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (k == largest) continue;
+    const double size = std::abs(xyzw[k]) * std::numbers::sqrt2 * kRotationMask;
+    const bool negative = (xyzw[k] < 0.0) != (xyzw[largest] < 0.0);
+    bits = bits << 10 | (negative ? 512u : 0u) |
+           std::min(static_cast<std::uint32_t>(size + 0.5), kRotationMask);
+  }
+  return bits;
+}
+
+/// 5 bits of degree 1 and 4 bits of the others matter: coarser steps compress better.
+std::uint8_t packed_harmonic(float value, bool first_degree) {
+  const double step = first_degree ? 8.0 : 16.0;
+  const double code = std::floor(128.0 * static_cast<double>(value) + 0.5) + 128.0;
+  return to_byte(std::floor((code + step / 2.0) / step) * step);
+}
+
+int fractional_bits_for(const Gaussians& model, const std::filesystem::path& path) {
+  double largest = 0.0;
+  for (const float x : model.means) largest = std::max(largest, std::abs(static_cast<double>(x)));
+  int bits = 12;
+  while (bits > 0 && std::ldexp(largest, bits) > kPositionLimit) --bits;
+  if (largest > kPositionLimit) {
+    throw DataError(fmt::format(
+        "{} cannot be written: SPZ has no position beyond {:.0f}, but one is {:.6g}: scale the "
+        "model down",
+        path.string(), kPositionLimit, largest));
+  }
+  return bits;
+}
+
+}  // namespace
+
+void check_spz_header(const SpzHeader& header,
+                      std::uint64_t file_bytes,
+                      const std::filesystem::path& path) {
+  const auto fail = [&](const std::string& message) {
+    throw DataError(fmt::format("{} is no valid SPZ file: {}", path.string(), message));
+  };
+  if (header.version < 1 || header.version > static_cast<std::uint32_t>(kSpzLastVersion)) {
+    fail(fmt::format("its version is {}, but only 1 to {} are known", header.version,
+                     kSpzLastVersion));
+  }
+  if (header.sh_degree > kMaxShDegree) {
+    fail(fmt::format("its spherical-harmonics degree is {}", header.sh_degree));
+  }
+  if (header.fractional_bits > kMaxFractionalBits) {
+    fail(fmt::format("its positions have {} bits behind the point", header.fractional_bits));
+  }
+  if (header.points > file_bytes * kSpzMostShrinking / kSpzLeastBytes) {
+    fail(fmt::format("it declares {} Gaussians, more than {} bytes can hold", header.points,
+                     file_bytes));
+  }
+}
+
+SpzSizes spz_sizes(const SpzHeader& header) {
+  const std::uint64_t n = header.points;
+  return {n * (header.version == 1 ? 6 : 9),
+          n,
+          3 * n,
+          3 * n,
+          n * (header.version < 3 ? 3 : 4),
+          3 * n * higher_coefficients(header.sh_degree)};
+}
+
+Gaussians unpack_spz(const SpzHeader& header,
+                     const std::array<std::span<const std::byte>, kSpzArrays>& arrays,
+                     const std::filesystem::path& path) {
+  const auto& [positions, alphas, colors, scales, rotations, harmonics] = arrays;
+  Gaussians model;
+  model.sh_degree = header.sh_degree;
+  model.resize(header.points);
+  const auto higher = 3 * static_cast<std::size_t>(higher_coefficients(header.sh_degree));
+  for (std::size_t i = 0; i < 3 * model.size(); ++i) {
+    const double position = header.version == 1 ? half_at(positions, i)
+                                                : fixed_at(positions, i, header.fractional_bits);
+    if (!std::isfinite(position)) {
+      throw DataError(
+          fmt::format("{}: the position of Gaussian {} is not finite", path.string(), i / 3));
+    }
+    model.means[i] = static_cast<float>(position);
+    model.log_scales[i] = static_cast<float>(byte_at(scales, i) / kScaleStep +
+                                             static_cast<double>(kSpzLeastLogScale));
+  }
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    model.opacities[i] = logit_of(byte_at(alphas, i) / 255.0, kByteOpacityMargin);
+    float* q = &model.quaternions[4 * i];
+    if (header.version < 3) {
+      first_three(rotations, i, q);
+    } else {
+      smallest_three(rotations, i, q);
+    }
+    float* sh = &model.sh[(3 + higher) * i];
+    for (std::size_t k = 0; k < 3; ++k)
+      sh[k] = static_cast<float>((byte_at(colors, 3 * i + k) / 255.0 - 0.5) / kColorScale);
+    for (std::size_t k = 0; k < higher; ++k)
+      sh[3 + k] = static_cast<float>((byte_at(harmonics, higher * i + k) - 128.0) / 128.0);
+  }
+  return model;
+}
+
+std::array<std::vector<std::byte>, kSpzArrays> pack_spz(const Gaussians& model,
+                                                        SpzHeader& header,
+                                                        const std::filesystem::path& path) {
+  if (model.size() > UINT32_MAX) {
+    throw DataError(fmt::format("{} cannot be written: SPZ has at most {} Gaussians, not {}",
+                                path.string(), UINT32_MAX, model.size()));
+  }
+  header.points = static_cast<std::uint32_t>(model.size());
+  header.sh_degree = static_cast<std::uint8_t>(model.sh_degree);
+  header.fractional_bits = static_cast<std::uint8_t>(fractional_bits_for(model, path));
+  std::array<std::vector<std::byte>, kSpzArrays> arrays;
+  const SpzSizes sizes = spz_sizes(header);
+  for (std::size_t i = 0; i < kSpzArrays; ++i) arrays[i].reserve(sizes[i]);
+  auto& [positions, alphas, colors, scales, rotations, harmonics] = arrays;
+  const auto put = [](std::vector<std::byte>& to, std::uint8_t byte) {
+    to.push_back(std::byte{byte});
+  };
+  const auto put_low = [&](std::vector<std::byte>& to, std::uint32_t bits, int bytes) {
+    for (int i = 0; i < bytes; ++i, bits >>= 8) put(to, static_cast<std::uint8_t>(bits & 0xff));
+  };
+  const auto higher = 3 * static_cast<std::size_t>(higher_coefficients(model.sh_degree));
+  for (const float x : model.means) {
+    const double steps = std::round(std::ldexp(static_cast<double>(x), header.fractional_bits));
+    put_low(positions, std::bit_cast<std::uint32_t>(static_cast<std::int32_t>(steps)), 3);
+  }
+  for (const float logit : model.opacities) put(alphas, to_byte(255.0 * opacity_of(logit)));
+  for (const float s : model.log_scales)
+    put(scales,
+        to_byte(kScaleStep * (static_cast<double>(s) - static_cast<double>(kSpzLeastLogScale))));
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const float* sh = &model.sh[(3 + higher) * i];
+    for (std::size_t k = 0; k < 3; ++k)
+      put(colors, to_byte(255.0 * (kColorScale * static_cast<double>(sh[k]) + 0.5)));
+    put_low(rotations, packed_rotation(&model.quaternions[4 * i]), 4);
+    for (std::size_t k = 0; k < higher; ++k) put(harmonics, packed_harmonic(sh[3 + k], k < 9));
+  }
+  return arrays;
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/convert_model.hpp"
+
+#include <cmath>
+#include <string>
+
+#include "core/gaussian_transform.hpp"
+#include "io/model_file.hpp"
+#include "model_bytes.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+std::string usage_error(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("a file is what its first bytes say") {
+  const Scratch scratch;
+  const Gaussians model = trained_like(3, 1);
+  write_model(scratch / "a.spz", model);
+  fs::rename(scratch / "a.spz", scratch / "spz.bin");
+  CHECK(read_model(scratch / "spz.bin").size() == 3);
+  write_model(scratch / "a.glb", model);
+  fs::rename(scratch / "a.glb", scratch / "glb.ply");
+  CHECK(read_model(scratch / "glb.ply").sh_degree == 1);
+  write_model(scratch / "a.ply", model);
+  CHECK(read_model(scratch / "a.ply").sh == model.sh);
+  write_bytes(scratch / "a.txt", "hello");
+  CHECK(contains(data_error([&] { read_model(scratch / "a.txt"); }), "no model that is known"));
+  CHECK(contains(data_error([&] { read_model(scratch / "none.spz"); }), "does not exist"));
+  for (const char* name : {"a.obj", "a", "a.compressed.ply", "a.gltf"})
+    CHECK(contains(usage_error([&] { write_model(scratch / name, model); }), ".splat"));
+}
+
+TEST_CASE("conversion moves, crops and thins in the stated order") {
+  Gaussians model = trained_like(4, 2);
+  model.means = {1, 0, 0, 0, 1, 0, 0, 0, 1, 5, 5, 5};
+  model.opacities = {3, 3, -4, 3};
+  ModelChanges changes;
+  changes.min_opacity = 0.5;
+  changes.scale = 2.0;
+  changes.rotate_degrees = {0, 0, 90};
+  changes.translate = {0, 0, 1};
+  changes.crop = CropBox{{-4, -4, -4}, {4, 4, 4}};
+  changes.sh_degree = 1;
+  const Gaussians out = changed(model, changes);
+  REQUIRE(out.size() == 2);
+  CHECK(out.sh_degree == 1);
+  CHECK(farthest(out.means, {0, 2, 1, -2, 0, 1}) < 1e-6);
+  CHECK(out.log_scales[0] == doctest::Approx(model.log_scales[0] + std::log(2.0)));
+  CHECK(changed(model, {}).sh == model.sh);
+}
+
+TEST_CASE("conversion refuses what would be lost") {
+  const Scratch scratch;
+  write_model(scratch / "a.ply", trained_like(3, 0));
+  const auto convert = [&](const char* to, const ModelChanges& changes, bool overwrite) {
+    return convert_model(scratch / "a.ply", scratch / to, changes, {}, std::nullopt, overwrite);
+  };
+  const Conversion done = convert("b.splat", {}, false);
+  CHECK(done.written == 3);
+  CHECK(contains(done.losses, "8 bits"));
+  CHECK(contains(usage_error([&] { convert("b.splat", {}, false); }), "--overwrite"));
+  CHECK(convert("b.splat", {}, true).read == 3);
+  CHECK(contains(usage_error([&] { convert("a.ply", {}, true); }), "what is read"));
+  ModelChanges nothing;
+  nothing.crop = CropBox{{100, 100, 100}, {101, 101, 101}};
+  CHECK(contains(usage_error([&] { convert("c.ply", nothing, false); }), "None of the 3"));
+  CHECK(!fs::exists(scratch / "c.ply"));
+}
+
+TEST_CASE("losses are named for the model at hand") {
+  const Gaussians flat = trained_like(2, 0);
+  CHECK(contains(io::losses(io::ModelFormat::kSplat, trained_like(2, 2)), "SH"));
+  CHECK(!contains(io::losses(io::ModelFormat::kSplat, flat), "SH"));
+  CHECK(io::losses(io::ModelFormat::kGltf, trained_like(2, 3)) == "nothing is lost");
+  CHECK(contains(io::losses(io::ModelFormat::kGltf, trained_like(2, 4)), "degree 3"));
+  Gaussians needles = flat;
+  needles.log_scales[0] = -14;
+  CHECK(contains(io::losses(io::ModelFormat::kSpz, needles), "clamped"));
+  CHECK(!contains(io::losses(io::ModelFormat::kSpz, flat), "clamped"));
+}
