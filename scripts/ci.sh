@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# What CI checks beside the test suite: the Python module, and the form of the kernels that GPUs get, without a GPU. Each
-# leg ends with PASS, FAIL or SKIPPED (what it needs cannot be had here: a failed download is no failure) and its seconds.
+# What CI checks beside the test suite: the Python module, the viewer in a browser, and the form of the kernels that GPUs get,
+# without a GPU. Each leg ends with PASS, FAIL or SKIPPED (what it needs cannot be had here: a failed download is no failure)
+# and its seconds.
 # usage: scripts/ci.sh [BUILD]     (default: build/release, with the tests built)
 set -euo pipefail
 called_from=$PWD
@@ -52,8 +53,11 @@ vendor() {
   python3 scripts/gpu_compile.py --quiet --skip-missing --targets "$1"
 }
 
+browser() { ./scripts/test_browser.sh "$build/bin/raysplats"; }
+
 leg "Python" ./scripts/test_python.sh
 leg "GPU path on this OpenCL" gpu_path
+leg "browser" browser
 leg "AMD's compiler (gfx1030)" vendor gfx1030
 leg "NVIDIA's compiler (sm_86)" vendor sm_86
 leg "Intel's compiler (dg2-g10)" vendor dg2-g10

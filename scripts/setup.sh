@@ -13,6 +13,7 @@ packages=(
   libglm-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libcli11-dev libxxhash-dev doctest-dev
   libbenchmark-dev libtinyobjloader-dev libtinygltf-dev libtomlplusplus-dev
   zlib1g-dev libzstd-dev libopenimageio-dev openimageio-tools libopenexr-dev libopencv-dnn-dev
+  libboost1.81-dev
 )
 
 say() { printf '== %s\n' "$*"; }

@@ -39,7 +39,7 @@ void run(Options& options) {
   if (options.crop_min || options.crop_max) {
     const glm::dvec3 all(std::numeric_limits<double>::infinity());
     changes.crop = CropBox{options.crop_min ? vector_of(*options.crop_min) : -all,
-                       options.crop_max ? vector_of(*options.crop_max) : all};
+                           options.crop_max ? vector_of(*options.crop_max) : all};
   }
   const ModelSource source = find_model(options.input);
   std::optional<TraceOptions> trace = source.header;

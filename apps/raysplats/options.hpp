@@ -42,6 +42,7 @@ Command add_eval_command(CLI::App& app, const GlobalOptions& global);
 Command add_trace_command(CLI::App& app);
 Command add_info_command(CLI::App& app);
 Command add_convert_command(CLI::App& app);
+Command add_view_command(CLI::App& app);
 Command add_bench_command(CLI::App& app);
 Command add_tune_command(CLI::App& app);
 

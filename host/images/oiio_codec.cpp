@@ -98,8 +98,8 @@ class OiioCodec : public ImageCodec {
     OIIO::ImageSpec spec(image.width, image.height, channels, OIIO::TypeUInt8);
     spec.attribute("oiio:UnassociatedAlpha", 1);
     if (jpeg) {
-      spec.attribute("Compression", "jpeg:95");
-      spec.attribute("jpeg:subsampling", "4:4:4");
+      spec.attribute("Compression", fmt::format("jpeg:{}", encoding.quality));
+      spec.attribute("jpeg:subsampling", encoding.quality < 90 ? "4:2:0" : "4:4:4");
     }
     // Encoded in memory: OpenImageIO's encoders miss a full disk, and libjpeg ends the process on
     // one.

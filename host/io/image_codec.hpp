@@ -34,6 +34,7 @@ struct ImageEncoding {
   std::string format;                      ///< "png", "jpeg" or "openexr"
   std::vector<std::string> channel_names;  ///< of "openexr"
   std::string color_space;  ///< of "openexr": what "oiio:ColorSpace" says; may be empty
+  int quality = 95;         ///< of "jpeg", to 100; below 90 colours have half the resolution
 };
 
 /// What the library raysplats-images does: formats of pictures and networks. Everything behind it

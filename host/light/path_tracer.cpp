@@ -411,6 +411,14 @@ Image PathTracer::render(const Camera& camera, const std::function<bool(double)>
   return out;
 }
 
+void PathTracer::set_sampling(int samples, std::uint64_t seed) {
+  RenderSettings settings = impl_->settings;
+  settings.samples = samples;
+  settings.seed = seed;
+  check(settings);
+  impl_->settings = settings;
+}
+
 const Context& PathTracer::context() const { return impl_->context; }
 
 PathTracer::Statistics PathTracer::statistics() const { return impl_->statistics; }

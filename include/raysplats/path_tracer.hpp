@@ -39,6 +39,10 @@ class PathTracer {
   PathTracer(PathTracer&&) noexcept;
   PathTracer& operator=(PathTracer&&) noexcept;
 
+  /// Rays per pixel and the seed of everything random from the next render() on. Throws UsageError
+  /// for less than one sample.
+  void set_sampling(int samples, std::uint64_t seed);
+
   /// The same materials and Gaussians with other meshes (an animation's next frame).
   void set_meshes(const std::vector<Mesh>& meshes);
 

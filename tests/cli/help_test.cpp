@@ -31,6 +31,7 @@ TEST_CASE("docs/cli.md lists what -h lists") {
                                                   {"trace"},
                                                   {"info"},
                                                   {"convert"},
+                                                  {"view"},
                                                   {"bench"},
                                                   {"bench", "compare"},
                                                   {"tune"}}) {

@@ -29,7 +29,8 @@ void check_refused(const std::vector<std::string>& arguments,
 TEST_CASE("help and version") {
   const Outcome help = raysplats_program({"--help"});
   CHECK(help.code == 0);
-  for (const char* command : {"devices", "generate", "train", "render", "eval", "info", "convert", "bench", "tune"}) {
+  for (const char* command : {"devices", "generate", "train", "render", "eval", "info", "convert",
+                              "view", "bench", "tune"}) {
     CHECK(contains(help.out, command));
     const Outcome own = raysplats_program({command, "-h"});
     CHECK(own.code == 0);

@@ -28,6 +28,7 @@ const std::map<std::string, Names> kBelow{{"base", {}},
                                           {"images", {"io"}},
                                           {"eval", {"io", "light"}},
                                           {"train", {"eval"}},
+                                          {"view", {"train"}},
                                           {"synth", {"io"}},
                                           {"bench", {"train", "synth"}},
                                           {"reference", {"core"}}};

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page: what people do with mouse, fingers and keys becomes a camera, pictures of it come back.
+
+import { Rig } from './camera.js';
+import { Connection } from './connection.js';
+import { Keyframes } from './keyframes.js';
+import { TrainingCameras } from './cameras.js';
+import { Pointers } from './pointers.js';
+
+const $ = (id) => document.getElementById(id);
+const TURN = 0.006; // radians per pixel
+const KEY_TURN = 1.2; // radians per second
+const FLY = 0.5; // distances to the centre per second
+const CLICK = 4; // pixels that a click may slip
+
+const picture = $('picture');
+const overlay = $('overlay');
+let state = null;
+let rig = null;
+let link = null;
+let home = null;
+let saving = 0; // id of the picture to be saved as a file
+let picking = 0; // id of the last question for a point
+let frames = []; // when the last pictures of movements came
+const held = new Set(); // keys
+let paused = false;
+let nearChosen = false; // the model's own holds until somebody moves the slider
+
+// What automated tests look at; nothing here reads it.
+const seen = { pictures: 0, last: null, lost: 0, id: 0, errors: [] };
+window.raysplats = seen;
+
+function size() {
+  const density = Math.min(window.devicePixelRatio || 1, 2);
+  return [Math.max(1, Math.round(picture.clientWidth * density)),
+    Math.max(1, Math.round(picture.clientHeight * density))];
+}
+
+function wanted() {
+  const color = $('background').value;
+  const view = { c2w: rig.pose, fov: rig.fov, size: size(), output: $('output').value };
+  if (nearChosen) view.near = nearDepth();
+  if ($('own-background').checked) {
+    view.background = [1, 3, 5].map((i) => parseInt(color.slice(i, i + 2), 16) / 255);
+  }
+  return view;
+}
+
+function nearDepth() {
+  return Number($('near').value) ** 2 * state.radius;
+}
+
+function changed() {
+  $('fov').value = rig.fov;
+  $('fov-text').textContent = `${Math.round(rig.fov)}\u00b0`;
+  $('near-text').textContent = nearDepth().toPrecision(2);
+  link.changed();
+  drawOverlay();
+}
+
+function drawOverlay() {
+  const density = window.devicePixelRatio || 1;
+  overlay.width = Math.round(overlay.clientWidth * density);
+  overlay.height = Math.round(overlay.clientHeight * density);
+  const context = overlay.getContext('2d');
+  context.scale(density, density);
+  cameras.draw(context, rig, overlay.clientWidth, overlay.clientHeight);
+}
+
+async function show(header, blob) {
+  if (header.png && header.id === saving) {
+    saving = 0;
+    download(blob, 'view.png');
+  }
+  const bitmap = await createImageBitmap(blob);
+  if (header.id < seen.id) return; // a newer one has been quicker
+  picture.width = bitmap.width;
+  picture.height = bitmap.height;
+  picture.getContext('2d').drawImage(bitmap, 0, 0);
+  bitmap.close();
+  seen.id = header.id;
+  seen.pictures += 1;
+  seen.last = header;
+  const now = performance.now();
+  frames = frames.filter((time) => now - time < 1000);
+  frames.push(now);
+  const moving = header.samples === 1 && !header.last;
+  const speed = moving && frames.length > 2 ? `, ${frames.length} pictures a second` : '';
+  const samples = header.samples > 1 ? `, ${header.samples} samples` : '';
+  $('status').textContent =
+    `${header.width} \u00d7 ${header.height}${samples}, ${header.milliseconds.toFixed(0)} ms${speed}`;
+}
+
+function download(blob, name) {
+  const address = URL.createObjectURL(blob);
+  const anchor = document.createElement('a');
+  anchor.href = address;
+  anchor.download = name;
+  anchor.click();
+  setTimeout(() => URL.revokeObjectURL(address), 10000);
+}
+
+function heard(message) {
+  if (message.type === 'pick' && message.id === picking && message.point) {
+    rig.center(message.point);
+    changed();
+  } else if (message.type === 'error') {
+    seen.errors.push(message.text);
+    $('status').textContent = message.text;
+  } else if (message.type === 'progress') {
+    paused = message.paused;
+    $('run').hidden = false;
+    $('pause').textContent = paused ? 'Resume' : 'Pause';
+    $('progress').textContent = message.text;
+  }
+}
+
+function banner(text) {
+  $('banner').textContent = text;
+  $('banner').hidden = text === '';
+}
+
+function go(pose, fov) {
+  rig.pose = pose;
+  if (fov) rig.fov = fov;
+  rig.face(state.center);
+  changed();
+}
+
+function click(x, y) {
+  const found = cameras.at(rig, x, y, overlay.clientWidth, overlay.clientHeight);
+  if (found) go(found.c2w, found.fov);
+}
+
+function pick(x, y) {
+  if (!state.has_depth) return;
+  picking = link.nextId();
+  link.send({ type: 'pick', id: picking, ...wanted(), output: 'color',
+    px: [x / picture.clientWidth, y / picture.clientHeight] });
+}
+
+function drag(dx, dy, sideways) {
+  if (sideways) {
+    const unit = 2 * rig.distance * Math.tan(0.5 * rig.fov * Math.PI / 180) / picture.clientHeight;
+    rig.move(-dx * unit, -dy * unit, 0);
+  } else if ($('mode').value === 'fly') {
+    // What is under the pointer goes along: the camera turns the other way, ...
+    rig.look(0.5 * dx * TURN, 0.5 * dy * TURN);
+  } else {
+    // ... or around the centre, which is the opposite sense.
+    rig.orbit(-dx * TURN, -dy * TURN);
+  }
+  changed();
+}
+
+let clock = 0;
+function fly(now) {
+  const passed = Math.min((now - clock) / 1000, 0.1);
+  clock = now;
+  const key = (plus, minus) => (held.has(plus) ? 1 : 0) - (held.has(minus) ? 1 : 0);
+  const step = FLY * Math.max(rig.distance, 0.05 * state.radius) * passed * (held.has('shift') ? 4 : 1);
+  const [right, down, forward] = [key('d', 'a'), key('q', 'e'), key('w', 's')];
+  const [yaw, pitch] = [key('arrowleft', 'arrowright'), key('arrowup', 'arrowdown')];
+  if (right || down || forward) rig.move(right * step, down * step, forward * step);
+  if (yaw || pitch) rig.look(yaw * KEY_TURN * passed, pitch * KEY_TURN * passed);
+  if (right || down || forward || yaw || pitch) changed();
+  if (held.size > 0) requestAnimationFrame(fly);
+}
+
+function keyDown(event) {
+  if (event.target.matches('input, select') || event.ctrlKey || event.metaKey || event.altKey) return;
+  const key = event.key.toLowerCase();
+  const actions = {
+    '?': () => $('help').showModal(),
+    f: () => { $('mode').value = $('mode').value === 'fly' ? 'orbit' : 'fly'; },
+    r: () => { rig.keyframe = home; changed(); },
+    u: () => { rig.level(); changed(); },
+    k: () => keyframes.add(),
+    c: () => { $('show-cameras').click(); },
+    p: () => $('toggle').click(),
+  };
+  if (actions[key]) {
+    event.preventDefault();
+    actions[key]();
+  } else if ('wasdqe'.includes(key) || key.startsWith('arrow') || key === 'shift') {
+    if (key.startsWith('arrow')) event.preventDefault();
+    if (held.size === 0) {
+      clock = performance.now();
+      requestAnimationFrame(fly);
+    }
+    held.add(key);
+  }
+}
+
+const cameras = new TrainingCameras($('cameras'), (camera) => go(camera.c2w, camera.fov));
+const keyframes = new Keyframes({
+  list: $('keyframes'),
+  settings: () => ({
+    seconds: Number($('seconds').value) || 5,
+    fps: Number($('fps').value) || 30,
+    closed: $('closed').checked,
+    ...(([width, height]) => ({ width, height }))(size()),
+  }),
+  view: () => rig.keyframe,
+  go: (key) => { rig.keyframe = key; changed(); },
+  download,
+});
+
+function wire() {
+  new Pointers(picture, { drag, zoom: (factor) => { rig.zoom(factor); changed(); }, click, pick, slip: CLICK });
+  document.addEventListener('keydown', keyDown);
+  document.addEventListener('keyup', (event) => held.delete(event.key.toLowerCase()));
+  window.addEventListener('blur', () => held.clear());
+  new ResizeObserver(() => changed()).observe(picture);
+  $('fov').addEventListener('input', () => { rig.fov = Number($('fov').value); changed(); });
+  $('near').addEventListener('input', () => { nearChosen = true; });
+  $('output').addEventListener('change', changed);
+  for (const id of ['near', 'own-background', 'background']) {
+    $(id).addEventListener('input', changed);
+  }
+  $('home').addEventListener('click', () => { rig.keyframe = home; changed(); });
+  $('level').addEventListener('click', () => { rig.level(); changed(); });
+  $('png').addEventListener('click', () => { saving = link.rest({ png: true }); });
+  $('toggle').addEventListener('click', () => document.body.classList.toggle('bare'));
+  $('show-cameras').addEventListener('change', () => {
+    cameras.shown = $('show-cameras').checked;
+    drawOverlay();
+  });
+  $('add-key').addEventListener('click', () => keyframes.add());
+  $('clear-keys').addEventListener('click', () => keyframes.clear());
+  $('play').addEventListener('click', () => keyframes.play());
+  $('save-path').addEventListener('click', () => keyframes.save());
+  $('load-path').addEventListener('change', async (event) => {
+    const stored = await keyframes.load(event.target.files[0]);
+    event.target.value = '';
+    if (!stored) {
+      $('status').textContent = 'That file holds no keyframes of this page';
+      return;
+    }
+    $('seconds').value = stored.seconds;
+    $('fps').value = stored.fps;
+    $('closed').checked = stored.closed;
+  });
+  $('pause').addEventListener('click', () => link.send({ type: paused ? 'resume' : 'pause' }));
+  $('save').addEventListener('click', () => link.send({ type: 'save' }));
+}
+
+async function start() {
+  const reply = await fetch('api/state');
+  if (!reply.ok) throw new Error(await reply.text());
+  state = await reply.json();
+  rig = new Rig(state.up);
+  rig.pose = state.start.c2w;
+  rig.fov = state.start.fov;
+  rig.face(state.center);
+  home = rig.keyframe;
+  document.title = `${state.name} - RaySplats`;
+  $('title').textContent = state.name;
+  $('about').textContent = state.about;
+  $('camera-section').hidden = state.cameras.length === 0;
+  $('near').disabled = !state.has_near;
+  $('near').value = state.has_near ? Math.sqrt(Math.min(state.near / state.radius, 1)) : 0;
+  for (const option of $('output').options) {
+    if (option.value === 'depth') option.disabled = !state.has_depth;
+  }
+  cameras.fill(state.cameras, state.center);
+  link = new Connection(wanted, {
+    picture: show,
+    text: heard,
+    open: () => banner(''),
+    lost: () => {
+      seen.lost += 1;
+      banner('The program does not answer: it may have ended. Trying again.');
+    },
+  });
+  seen.rig = rig;
+  wire();
+  changed();
+}
+
+start().catch((error) => banner(`The page cannot start: ${error.message}`));

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// The list of keyframes: views to go back to, to play, to save as a camera path.
+
+import { keyframesOf, pathFile, viewAt } from './path.js';
+
+export class Keyframes {
+  #keys = [];
+  #playing = false;
+
+  // `page` has list (an element), settings(), view(), go(view) and download(blob, name).
+  constructor(page) {
+    this.page = page;
+  }
+
+  #changed() {
+    this.page.list.replaceChildren(...this.#keys.map((key, i) => {
+      const item = document.createElement('li');
+      const button = (text, title, action) => {
+        const made = document.createElement('button');
+        made.textContent = text;
+        made.title = title;
+        made.addEventListener('click', action);
+        return made;
+      };
+      item.append(
+        `view at ${key.fov.toFixed(0)}\u00b0`,
+        button('go', `Go to view ${i + 1}`, () => this.page.go(key)),
+        button('\u00d7', `Remove view ${i + 1}`, () => {
+          this.#keys.splice(i, 1);
+          this.#changed();
+        }),
+      );
+      return item;
+    }));
+  }
+
+  add() {
+    this.#keys.push(this.page.view());
+    this.#changed();
+  }
+
+  clear() {
+    this.#keys = [];
+    this.#changed();
+  }
+
+  // Shows the path from begin to end; a second call ends it.
+  play() {
+    if (this.#playing || this.#keys.length === 0) {
+      this.#playing = false;
+      return;
+    }
+    this.#playing = true;
+    const begin = performance.now();
+    const { seconds, closed } = this.page.settings();
+    const step = (now) => {
+      const share = Math.min((now - begin) / (1000 * seconds), 1);
+      if (!this.#playing) return;
+      this.page.go(viewAt(this.#keys, share, closed));
+      if (share < 1) requestAnimationFrame(step);
+      else this.#playing = false;
+    };
+    requestAnimationFrame(step);
+  }
+
+  save() {
+    if (this.#keys.length === 0) this.add();
+    const text = JSON.stringify(pathFile(this.#keys, this.page.settings()), null, 1);
+    this.page.download(new Blob([text], { type: 'application/json' }), 'path.json');
+  }
+
+  // Takes the keyframes of a file; its settings, or null where it has none.
+  async load(file) {
+    let stored = null;
+    try {
+      stored = keyframesOf(JSON.parse(await file.text()));
+    } catch {
+      return null;
+    }
+    if (!stored) return null;
+    this.#keys = stored.keys;
+    this.#changed();
+    return stored;
+  }
+}

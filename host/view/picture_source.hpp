@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+
+#include "raysplats/context.hpp"
+#include "raysplats/image.hpp"
+#include "raysplats/mirrors.hpp"
+#include "raysplats/model.hpp"
+#include "raysplats/scene.hpp"
+#include "raysplats/trace_options.hpp"
+#include "view/view_request.hpp"
+
+namespace raysplats::view {
+
+/// Hears the share of a picture that is done, several times a second, and returns false to stop.
+using Watch = std::function<bool(double share)>;
+
+/// Draws what the page sees.
+class PictureSource {
+ public:
+  virtual ~PictureSource() = default;
+
+  /// RGBA of request.camera, which may have another size than the page wants; the picture of sample
+  /// number `sample` of a still view. Empty when `watch` stopped it. Throws what the tracer throws,
+  /// UsageError for an output that there is not.
+  virtual Image draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) = 0;
+  /// The point of the world in front of the camera's centre ray; nothing where it meets nothing.
+  virtual std::optional<glm::dvec3> point(const ViewRequest& request) = 0;
+  /// How many samples of a still view are worth it.
+  virtual std::uint64_t samples() const = 0;
+  /// Whether there are depths.
+  virtual bool has_depth() const = 0;
+};
+
+/// Gaussians alone, or with mirrors: what `render MODEL` draws. The model and the context outlive
+/// it.
+std::unique_ptr<PictureSource> model_pictures(Context& context,
+                                              const Model& model,
+                                              const TraceOptions& options,
+                                              const Mirrors& mirrors);
+
+/// A scene file's: what `render scene.toml` draws, its first frame's meshes.
+std::unique_ptr<PictureSource> scene_pictures(Context& context, const Scene& scene);
+
+/// Grey of a depth: near white, far black, on the scale of the picture's own nearest and farthest.
+Image depth_picture(const Image& depth, const Image& rgba);
+
+}  // namespace raysplats::view

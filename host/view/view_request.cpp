@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/view_request.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+
+#include "core/gaussian_transform.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::view {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kFarthest = 1e6;
+constexpr double kRigid = 1e-2;  // deviation of a pose from a rotation that rounding may cause
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw UsageError(fmt::format("The message of the page {}", what));
+}
+
+const Json& member(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  if (found == json.end()) refuse(fmt::format("has no '{}'", key));
+  return *found;
+}
+
+double number(const Json& value, const char* what, double low, double high) {
+  if (!value.is_number()) refuse(fmt::format("has no number as '{}'", what));
+  const double x = value.get<double>();
+  if (!(x >= low && x <= high)) refuse(fmt::format("has '{}' out of range", what));
+  return x;
+}
+
+bool flag(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_boolean() && found->get<bool>();
+}
+
+std::string text(const Json& json, const char* key) {
+  const Json& value = member(json, key);
+  if (!value.is_string()) refuse(fmt::format("has no text as '{}'", key));
+  return value.get<std::string>();
+}
+
+template <std::size_t N>
+std::array<double, N> numbers(const Json& json, const char* key, double low, double high) {
+  const Json& list = member(json, key);
+  if (!list.is_array() || list.size() != N)
+    refuse(fmt::format("has no {} numbers as '{}'", N, key));
+  std::array<double, N> out{};
+  for (std::size_t i = 0; i < N; ++i) out[i] = number(list[i], key, low, high);
+  return out;
+}
+
+std::uint32_t id_of(const Json& json) {
+  return static_cast<std::uint32_t>(number(member(json, "id"), "id", 0.0, 4294967295.0));
+}
+
+/// `c2w` is 3 x 4 by rows, camera axes as Camera has them.
+void set_pose(Camera& camera, const std::array<double, 12>& c2w) {
+  glm::dmat3 axes;
+  glm::dvec3 eye;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      axes[column][row] = c2w[static_cast<std::size_t>(4 * row + column)];
+    eye[row] = c2w[static_cast<std::size_t>(4 * row + 3)];
+  }
+  const glm::dmat3 off = glm::transpose(axes) * axes - glm::dmat3(1.0);
+  for (int column = 0; column < 3; ++column) {
+    if (!(glm::length(off[column]) < kRigid)) refuse("has a 'c2w' that is no rotation");
+  }
+  if (!(glm::determinant(axes) > 0.0)) refuse("has a 'c2w' that is a reflection");
+  camera.rotation = glm::transpose(orthogonal_factor(axes));
+  camera.translation = -(camera.rotation * eye);
+}
+
+ViewRequest view_of(const Json& json, int max_side) {
+  ViewRequest request;
+  request.id = id_of(json);
+  set_pose(request.camera, numbers<12>(json, "c2w", -kFarthest, kFarthest));
+  const std::array<double, 2> size = numbers<2>(json, "size", 1.0, 1e5);
+  const double cut = std::min(1.0, max_side / std::max(size[0], size[1]));
+  Camera& camera = request.camera;
+  camera.width = std::max(1, static_cast<int>(std::lround(cut * size[0])));
+  camera.height = std::max(1, static_cast<int>(std::lround(cut * size[1])));
+  const double fov = number(member(json, "fov"), "fov", 1.0, 170.0);
+  camera.fy = camera.fx = 0.5 * camera.height / std::tan(fov * std::numbers::pi / 360.0);
+  camera.cx = 0.5 * camera.width;
+  camera.cy = 0.5 * camera.height;
+  request.moving = flag(json, "moving");
+  request.png = flag(json, "png");
+  if (json.contains("output")) {
+    const std::string output = text(json, "output");
+    if (output == "depth") {
+      request.output = Output::kDepth;
+    } else if (output == "alpha") {
+      request.output = Output::kAlpha;
+    } else if (output != "color") {
+      refuse("asks for an unknown 'output'");
+    }
+  }
+  if (json.contains("near"))
+    request.near_depth = static_cast<float>(number(json["near"], "near", 0.0, kFarthest));
+  if (json.contains("background")) {
+    const std::array<double, 3> color = numbers<3>(json, "background", 0.0, 1.0);
+    request.background = {static_cast<float>(color[0]), static_cast<float>(color[1]),
+                          static_cast<float>(color[2])};
+  }
+  return request;
+}
+
+}  // namespace
+
+Message parse_message(std::string_view message, int max_side) {
+  if (message.size() > kMaxMessage) refuse(fmt::format("has more than {} bytes", kMaxMessage));
+  const Json json = Json::parse(message, nullptr, false);
+  if (!json.is_object()) refuse("is no JSON object");
+  const std::string type = text(json, "type");
+  if (type == "view") return view_of(json, max_side);
+  if (type == "pick") {
+    const std::array<double, 2> place = numbers<2>(json, "px", 0.0, 1.0);
+    return PickRequest{id_of(json), view_of(json, max_side), place[0], place[1]};
+  }
+  if (type == "pause") return RunCommand::kPause;
+  if (type == "resume") return RunCommand::kResume;
+  if (type == "save") return RunCommand::kSave;
+  refuse("has an unknown 'type'");
+}
+
+}  // namespace raysplats::view

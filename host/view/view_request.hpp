@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "raysplats/camera.hpp"
+
+namespace raysplats::view {
+
+enum class Output { kColor, kDepth, kAlpha };
+
+/// A picture that the page wants to see.
+struct ViewRequest {
+  std::uint32_t id = 0;  ///< the page's own number, sent back with the picture
+  Camera camera;         ///< at its full size
+  Output output = Output::kColor;
+  bool moving = false;  ///< more are to follow: speed before size
+  bool png = false;     ///< without losses, to be kept
+  std::optional<float> near_depth;
+  std::optional<std::array<float, 3>> background;
+};
+
+/// Which point of the world is seen through a point of the picture.
+struct PickRequest {
+  std::uint32_t id = 0;
+  ViewRequest view;
+  double x = 0.5, y = 0.5;  ///< 0 to 1 from the picture's upper left corner
+};
+
+/// What a page may ask of a training run.
+enum class RunCommand { kPause, kResume, kSave };
+
+using Message = std::variant<ViewRequest, PickRequest, RunCommand>;
+
+/// Longest message that is parsed, in bytes.
+constexpr std::size_t kMaxMessage = 16384;
+
+/// Parses a message of a page, which may be anyone's. Throws UsageError, one sentence, for all that
+/// is not understood: other types, numbers that are not finite or out of range, a pose that is no
+/// rotation. Sizes are cut to `max_side` pixels, keeping the shape.
+Message parse_message(std::string_view text, int max_side);
+
+}  // namespace raysplats::view

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+#include <string>
+
+#include "core/orbit.hpp"
+#include "raysplats/camera.hpp"
+
+namespace raysplats::view {
+
+/// What the page has to know before its first picture.
+struct ViewState {
+  std::string name;    ///< of the model
+  std::string about;   ///< a line of facts
+  SceneExtent extent;  ///< what is looked at
+  glm::dvec3 up{0, -1, 0};
+  Camera start;                     ///< first view
+  std::span<const Camera> cameras;  ///< of the data set
+  float near_depth = 0.0f;
+  bool has_near = false;  ///< whether a near limit can be asked for
+  bool has_depth = false;
+};
+
+/// The JSON of /api/state: poses as view messages have them, vertical angles of view in degrees.
+/// Bytes of names that are no UTF-8 are replaced.
+std::string state_json(const ViewState& state);
+
+}  // namespace raysplats::view

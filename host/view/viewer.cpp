@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/viewer.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "raysplats/error.hpp"
+#include "view/pace.hpp"
+#include "view/page.hpp"
+#include "view/picture_file.hpp"
+#include "view/view_request.hpp"
+
+namespace raysplats::view {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kMovingQuality = 60;
+constexpr int kStillQuality = 85;
+constexpr int kLastQuality = 94;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Pictures are sent at 1, 2, 4, 8, ... samples, and at the last one.
+bool worth_sending(std::uint64_t samples, std::uint64_t most) {
+  return samples == most || (samples & (samples - 1)) == 0;
+}
+
+/// One page.
+struct Client {
+  std::optional<ViewRequest> wanted;  ///< its newest wish
+  std::uint64_t wish = 0;             ///< counts the wishes
+  std::uint64_t drawn = 0;            ///< samples of `sum`, of the wish in work
+  Image sum;
+  Pace pace{0.0};
+  std::uint64_t turn = 0;  ///< when it was served last
+};
+
+void add(Image& sum, const Image& image) {
+  if (sum.pixels() == 0) {
+    sum = image;
+    return;
+  }
+  for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += image.data[i];
+}
+
+Image divided(const Image& sum, std::uint64_t samples) {
+  Image out = sum;
+  const float scale = 1.0f / static_cast<float>(samples);
+  for (float& value : out.data) value *= scale;
+  return out;
+}
+
+}  // namespace
+
+struct Viewer::Impl {
+  explicit Impl(const ViewerOptions& options_in)
+      : options(options_in),
+        server(options.server,
+               {[this](std::string_view path) { return get(path); },
+                [this](ClientId id) { opened(id); },
+                [this](ClientId id, std::string_view text) { heard(id, text); },
+                [this](ClientId id) { closed(id); }}) {}
+
+  HttpReply get(std::string_view path) const {
+    if (path == "/api/state") return {200, "application/json", options.state};
+    if (const std::optional<PageFile> file = page_file(path))
+      return {200, file->type, file->content};
+    return {404, "text/plain", "Not found\n"};
+  }
+
+  void opened(ClientId id) {
+    const std::lock_guard<std::mutex> guard(mutex);
+    clients[id].pace = Pace(options.moving_seconds);
+  }
+  void closed(ClientId id) {
+    const std::lock_guard<std::mutex> guard(mutex);
+    clients.erase(id);
+  }
+  void heard(ClientId id, std::string_view text) {
+    try {
+      Message message = parse_message(text, options.max_side);
+      {
+        const std::lock_guard<std::mutex> guard(mutex);
+        Client& client = clients[id];
+        if (auto* view = std::get_if<ViewRequest>(&message)) {
+          client.wanted = std::move(*view);
+          client.wish = ++wishes;
+          client.drawn = 0;
+          client.sum = {};
+        } else if (auto* pick = std::get_if<PickRequest>(&message)) {
+          if (picks.size() < kMostWaiting) picks.emplace_back(id, std::move(*pick));
+        } else if (commands.size() < kMostWaiting) {
+          commands.push_back(std::get<RunCommand>(message));
+        }
+      }
+      news.notify_one();
+    } catch (const Error& error) {
+      complain(id, error.what());
+    }
+  }
+
+  void complain(ClientId id, const std::string& what) {
+    server.send_text(id, nlohmann::json{{"type", "error"}, {"text", what}}.dump(
+                             -1, ' ', false, nlohmann::json::error_handler_t::replace));
+  }
+
+  /// The page that has waited longest, those that move first; nothing when all have what they want.
+  std::optional<ClientId> next(std::uint64_t most) const {
+    std::optional<ClientId> best;
+    bool best_moves = false;
+    std::uint64_t best_turn = 0;
+    for (const auto& [id, client] : clients) {
+      if (!client.wanted || client.drawn >= samples_of(*client.wanted, most)) continue;
+      const bool moves = client.wanted->moving;
+      if (!best || (moves && !best_moves) || (moves == best_moves && client.turn < best_turn)) {
+        best = id;
+        best_moves = moves;
+        best_turn = client.turn;
+      }
+    }
+    return best;
+  }
+
+  static std::uint64_t samples_of(const ViewRequest& request, std::uint64_t most) {
+    // Depths of several samples have no common scale, and what moves has no time.
+    return request.moving || request.output == Output::kDepth ? 1 : most;
+  }
+
+  void answer(PictureSource& source, ClientId id, const PickRequest& pick);
+  void draw(PictureSource& source,
+            std::int64_t iteration,
+            ClientId id,
+            const std::function<bool()>& stop);
+
+  static constexpr std::size_t kMostWaiting = 16;
+
+  ViewerOptions options;
+  mutable std::mutex mutex;
+  std::condition_variable news;
+  std::map<ClientId, Client> clients;
+  std::deque<std::pair<ClientId, PickRequest>> picks;
+  std::deque<RunCommand> commands;
+  std::uint64_t wishes = 0;
+  std::uint64_t turns = 0;
+  std::function<void(RunCommand)> on_command;
+  Server server;  // last: its thread uses all of the above
+};
+
+void Viewer::Impl::answer(PictureSource& source, ClientId id, const PickRequest& pick) {
+  // A picture of one pixel, at the place that was pointed at.
+  ViewRequest request = pick.view;
+  Camera& camera = request.camera;
+  camera.cx += 0.5 - pick.x * camera.width;
+  camera.cy += 0.5 - pick.y * camera.height;
+  camera.width = camera.height = 1;
+  nlohmann::json reply{{"type", "pick"}, {"id", pick.id}, {"point", nullptr}};
+  try {
+    if (const std::optional<glm::dvec3> point = source.point(request))
+      reply["point"] = {point->x, point->y, point->z};
+    server.send_text(id, reply.dump());
+  } catch (const UsageError& error) {
+    complain(id, error.what());
+  }
+}
+
+void Viewer::Impl::draw(PictureSource& source,
+                        std::int64_t iteration,
+                        ClientId id,
+                        const std::function<bool()>& stop) {
+  ViewRequest request;
+  Pace pace(0.0);
+  std::uint64_t wish = 0;
+  std::uint64_t sample = 0;
+  {
+    const std::lock_guard<std::mutex> guard(mutex);
+    Client& client = clients.at(id);
+    request = *client.wanted;
+    pace = client.pace;
+    wish = client.wish;
+    sample = client.drawn;
+    client.turn = ++turns;
+  }
+  if (request.moving) request.camera = pace.sized(request.camera);
+  const auto watch = [&](double) {
+    if (stop && stop()) return false;
+    // Small pictures are done before a newer one could be; large ones make room at once for this
+    // page's newer wish and for whoever moves.
+    if (request.moving) return true;
+    const std::lock_guard<std::mutex> guard(mutex);
+    return std::none_of(clients.begin(), clients.end(), [&](const auto& each) {
+      const Client& client = each.second;
+      if (!client.wanted) return false;
+      if (each.first == id) return client.wish != wish;
+      return client.wanted->moving && client.drawn == 0;
+    });
+  };
+  const auto start = Clock::now();
+  Image picture;
+  try {
+    picture = source.draw(request, sample, watch);
+  } catch (const UsageError& error) {
+    complain(id, error.what());
+    const std::lock_guard<std::mutex> guard(mutex);
+    const auto found = clients.find(id);
+    if (found != clients.end() && found->second.wish == wish) found->second.wanted.reset();
+    return;
+  }
+  const double seconds = seconds_since(start);
+  if (picture.pixels() == 0) return;
+  const std::uint64_t most = samples_of(request, source.samples());
+  PictureHeader header;
+  header.view = request.id;
+  header.iteration = iteration;
+  header.milliseconds = static_cast<float>(1e3 * seconds);
+  {
+    const std::lock_guard<std::mutex> guard(mutex);
+    const auto found = clients.find(id);
+    if (found == clients.end()) return;
+    Client& client = found->second;
+    if (request.moving) client.pace.record(static_cast<double>(picture.pixels()), seconds);
+    // A still picture that is no longer wanted; one of a movement is better than none.
+    if (client.wish != wish && !request.moving) return;
+    if (client.wish == wish) {
+      client.drawn = sample + 1;
+      if (most > 1) {
+        add(client.sum, picture);
+        picture = client.sum;
+      }
+    }
+  }
+  const std::uint64_t samples = most > 1 ? sample + 1 : 1;
+  header.samples = static_cast<std::uint32_t>(samples);
+  header.last = samples == most && !request.moving;
+  header.png = request.png && header.last;
+  if (!request.moving && !worth_sending(samples, most)) return;
+  if (samples > 1) picture = divided(picture, samples);
+  const int quality =
+      request.moving ? kMovingQuality : (header.last ? kLastQuality : kStillQuality);
+  server.send_picture(id, picture_message(header, picture, quality));
+}
+
+Viewer::Viewer(const ViewerOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+
+Viewer::~Viewer() = default;
+
+std::string Viewer::url() const { return impl_->server.url(); }
+
+std::size_t Viewer::clients() const {
+  const std::lock_guard<std::mutex> guard(impl_->mutex);
+  return impl_->clients.size();
+}
+
+void Viewer::on_command(std::function<void(RunCommand)> handler) {
+  impl_->on_command = std::move(handler);
+}
+
+void Viewer::tell(const std::string& json) {
+  const std::lock_guard<std::mutex> guard(impl_->mutex);
+  for (const auto& each : impl_->clients) impl_->server.send_text(each.first, json);
+}
+
+void Viewer::refresh() {
+  const std::lock_guard<std::mutex> guard(impl_->mutex);
+  for (auto& each : impl_->clients) {
+    each.second.drawn = 0;
+    each.second.sum = {};
+  }
+}
+
+bool Viewer::work(PictureSource& source,
+                  std::int64_t iteration,
+                  double wait,
+                  const std::function<bool()>& stop) {
+  Impl& self = *impl_;
+  std::optional<ClientId> client;
+  std::optional<std::pair<ClientId, PickRequest>> pick;
+  std::deque<RunCommand> commands;
+  {
+    std::unique_lock<std::mutex> lock(self.mutex);
+    const auto something = [&] {
+      return !self.picks.empty() || !self.commands.empty() || self.next(source.samples());
+    };
+    if (!self.news.wait_for(lock, std::chrono::duration<double>(wait), something)) return false;
+    commands.swap(self.commands);
+    if (!self.picks.empty()) {
+      pick = std::move(self.picks.front());
+      self.picks.pop_front();
+    } else {
+      client = self.next(source.samples());
+    }
+  }
+  for (const RunCommand command : commands) {
+    if (self.on_command) self.on_command(command);
+  }
+  if (pick) {
+    self.answer(source, pick->first, pick->second);
+  } else if (client) {
+    self.draw(source, iteration, *client, stop);
+  }
+  return true;
+}
+
+}  // namespace raysplats::view

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "view/picture_source.hpp"
+#include "view/server.hpp"
+
+namespace raysplats::view {
+
+struct ViewerOptions {
+  ServerOptions server;
+  int max_side = 1920;                 ///< pixels of pictures
+  double moving_seconds = 1.0 / 15.0;  ///< for a picture while the camera moves
+  std::string state;                   ///< JSON of /api/state, for the page to start with
+};
+
+/// Shows a PictureSource to the pages that are open: takes what they want to see, the newest wish
+/// of each, and draws in the thread that calls work(). While a camera moves pictures are as large
+/// as `moving_seconds` allow; once it rests one picture of full size follows, then ever better ones
+/// of more samples, until the camera moves again, which stops a picture of full size in the middle.
+class Viewer {
+ public:
+  /// Listens; pages that open before work() wait. Throws as Server.
+  explicit Viewer(const ViewerOptions& options);
+  ~Viewer();
+
+  std::string url() const;
+  /// Pages that are open.
+  std::size_t clients() const;
+  /// Hears of commands for a run, in the thread of work().
+  void on_command(std::function<void(RunCommand)> handler);
+  /// Text for every open page.
+  void tell(const std::string& json);
+
+  /// Draws the next picture that a page waits for; `iteration` is that of the model. With nothing
+  /// to do waits for up to `wait` seconds and returns false. `stop` is asked within pictures, whose
+  /// drawing it ends.
+  bool work(PictureSource& source,
+            std::int64_t iteration,
+            double wait,
+            const std::function<bool()>& stop = {});
+  /// The model has changed: pages that rest get new pictures.
+  void refresh();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace raysplats::view

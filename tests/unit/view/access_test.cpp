@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/access.hpp"
+
+#include <doctest/doctest.h>
+
+#include <string>
+
+using namespace raysplats::view;
+
+TEST_CASE("only our own page, asked for under our own name with the secret, is let in") {
+  const std::string token = "0123456789abcdef0123456789abcdef";
+  const Access access(token, "127.0.0.1", 7000);
+  const std::string query = "token=" + token;
+  const std::string cookie = "a=b; raysplats-7000=" + token;
+  const auto judge = [&](std::string_view host, std::string_view origin, std::string_view sent,
+                         std::string_view asked) {
+    return access.judge({host, origin, sent, asked});
+  };
+  for (const char* host : {"127.0.0.1:7000", "localhost:7000", "[::1]:7000"}) {
+    INFO(host);
+    CHECK(judge(host, "", cookie, "") == Verdict::kAllowed);
+    CHECK(judge(host, "", "", query) == Verdict::kTakeCookie);
+    CHECK(judge(host, std::string("http://") + host, cookie, "") == Verdict::kAllowed);
+    CHECK(judge(host, "", "", "") == Verdict::kForbidden);
+  }
+  // Names that resolve to us, other ports, and names that only contain ours.
+  for (const char* host : {"", "evil.example:7000", "127.0.0.1", "127.0.0.1:7001",
+                           "127.0.0.1:7000.evil.example", "localhost:70000"}) {
+    INFO(host);
+    CHECK(judge(host, "", cookie, query) == Verdict::kForbidden);
+  }
+  for (const char* origin : {"null", "http://evil.example", "https://127.0.0.1:7000",
+                             "http://127.0.0.1:7000.evil.example", "http://localhost:7000"}) {
+    INFO(origin);
+    CHECK(judge("127.0.0.1:7000", origin, cookie, query) == Verdict::kForbidden);
+  }
+  // Wrong secrets: shorter, longer, empty, of another port, of another name.
+  for (const std::string& wrong :
+       {token.substr(1), token + "0", std::string(), std::string(32, '0')}) {
+    CHECK(judge("127.0.0.1:7000", "", "raysplats-7000=" + wrong, "") == Verdict::kForbidden);
+    CHECK(judge("127.0.0.1:7000", "", "", "token=" + wrong) == Verdict::kForbidden);
+  }
+  CHECK(judge("127.0.0.1:7000", "", "raysplats-7001=" + token, "") == Verdict::kForbidden);
+  CHECK(judge("127.0.0.1:7000", "", "", "nottoken=" + token) == Verdict::kForbidden);
+  CHECK(judge("127.0.0.1:7000", "", "", "a=b&token=" + token) == Verdict::kTakeCookie);
+  CHECK(access.url() == "http://127.0.0.1:7000/?token=" + token);
+  CHECK(access.cookie().find("HttpOnly; SameSite=Strict") != std::string::npos);
+  CHECK(Access(token, "::", 5).url() == "http://[::]:5/?token=" + token);
+}
+
+TEST_CASE("tokens are random and secrets are compared whole") {
+  const std::string one = random_token();
+  CHECK(one.size() == 32);
+  CHECK(one != random_token());
+  CHECK(one.find_first_not_of("0123456789abcdef") == std::string::npos);
+  CHECK(equal_secrets("abc", "abc"));
+  CHECK(!equal_secrets("abc", "abd"));
+  CHECK(!equal_secrets("abc", "ab"));
+  CHECK(equal_secrets("", ""));
+}

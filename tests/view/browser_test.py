@@ -1,0 +1,236 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The viewer's page in Chromium, as a person uses it.
+usage: browser_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
+import base64
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from selenium import webdriver
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.select import Select
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from program import Viewer, write_model  # noqa: E402
+
+PROGRAM = ""
+FOLDER = None
+PATIENCE = 120  # seconds; kernels may have to be compiled first
+
+
+def browser():
+    options = Options()
+    options.binary_location = shutil.which("chromium")
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu",
+                     "--window-size=1000,640"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    return webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+
+
+class BrowserTest(unittest.TestCase):
+    def setUp(self):
+        self.viewer = Viewer(PROGRAM, self.arguments())
+        self.addCleanup(self.viewer.folder.cleanup)
+        self.addCleanup(self.viewer.stop)
+        self.page = browser()
+        self.addCleanup(self.page.quit)
+        self.page.get(self.viewer.url)
+
+    def arguments(self):
+        """A model, and two cameras for the list."""
+        folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
+        model = os.path.join(folder, "model.ply")
+        write_model(model)
+        cameras = {"w": 64, "h": 48, "fl_x": 50, "fl_y": 50, "cx": 32, "cy": 24, "frames": [
+            {"file_path": f"{name}.png", "transform_matrix": matrix} for name, matrix in (
+                ("front", [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, -6], [0, 0, 0, 1]]),
+                ("side", [[0, 0, 1, 7], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]]))]}
+        self.cameras = os.path.join(folder, "cameras.json")
+        with open(self.cameras, "w") as file:
+            json.dump(cameras, file)
+        return [model, "--cameras", self.cameras]
+
+    def seen(self):
+        return self.page.execute_script(
+            "const {pictures, last, lost, id, errors} = window.raysplats || {};"
+            "return {pictures, last, lost, id, errors};")
+
+    def wait(self, what, condition):
+        end = time.time() + PATIENCE
+        while time.time() < end:
+            value = condition()
+            if value:
+                return value
+            time.sleep(0.05)
+        self.fail(f"{what}: nothing after {PATIENCE} s; {self.seen()}")
+
+    def rest(self, after=-1):
+        """Waits for the best picture of a view asked for after number `after`."""
+        return self.wait("the last picture", lambda: (
+            lambda s: s if s["last"] and s["last"]["last"] and s["last"]["id"] > after else None)(self.seen()))
+
+    def pixels(self):
+        """The picture on the page as a PNG file."""
+        data = self.page.execute_script(
+            "return document.getElementById('picture').toDataURL('image/png')")
+        return base64.b64decode(data.split(",", 1)[1])
+
+    def screenshot(self, name):
+        if FOLDER:
+            os.makedirs(FOLDER, exist_ok=True)
+            self.page.save_screenshot(os.path.join(FOLDER, f"{name}.png"))
+
+    def console(self):
+        return [entry for entry in self.page.get_log("browser") if entry["level"] == "SEVERE"]
+
+    def drag(self, dx, dy, steps=20):
+        stage = self.page.find_element(By.ID, "picture")
+        chain = ActionChains(self.page, duration=15).move_to_element(stage).click_and_hold()
+        for _ in range(steps):
+            chain = chain.move_by_offset(dx / steps, dy / steps)
+        chain.release().perform()
+
+    def test_the_page_shows_what_render_draws(self):
+        seen = self.rest()
+        self.assertEqual(seen["last"]["samples"], 16)
+        self.screenshot("first")
+        self.assertIn("103 Gaussians", self.page.find_element(By.ID, "about").text)
+        self.assertEqual(self.page.execute_script("return location.search"), "")
+        # The same camera by `render`, supersampled, against the page's 16 samples.
+        width, height = seen["last"]["width"], seen["last"]["height"]
+        pose, fov = self.page.execute_script(
+            "return [window.raysplats.rig.pose, window.raysplats.rig.fov]")
+        focal = 0.5 * height / math.tan(0.5 * math.radians(fov))
+        rows = [[pose[4 * i], -pose[4 * i + 1], -pose[4 * i + 2], pose[4 * i + 3]] for i in range(3)]
+        folder = self.viewer.folder.name
+        with open(os.path.join(folder, "one.json"), "w") as file:
+            json.dump({"w": width, "h": height, "fl_x": focal, "fl_y": focal, "cx": width / 2,
+                       "cy": height / 2, "frames": [{"file_path": "page.png",
+                                                     "transform_matrix": rows + [[0, 0, 0, 1]]}]}, file)
+        subprocess.run([PROGRAM, "render", self.viewer.model, "--cameras",
+                        os.path.join(folder, "one.json"), "-o", os.path.join(folder, "out"),
+                        "--supersample", "4", "-q"], check=True, stdout=subprocess.DEVNULL)
+        shown = os.path.join(folder, "shown.png")
+        with open(shown, "wb") as file:
+            file.write(self.pixels())
+        # Without alpha, as frames are; idiff says what it finds in the same line everywhere.
+        told = subprocess.run(["oiiotool", shown, "--ch", "R,G,B", os.path.join(folder, "out/page.png"),
+                               "--diff"], capture_output=True, text=True).stdout
+        found = re.search(r"Peak SNR = (\S+)", told)
+        self.assertTrue(found, told)
+        self.assertGreater(float(found.group(1)), 35, told)
+        self.assertEqual(self.console(), [])
+
+    def test_dragging_turns_and_the_last_picture_is_the_newest(self):
+        first = self.rest()
+        before = self.pixels()
+        eye = self.page.execute_script("return window.raysplats.rig.eye")
+        self.drag(120, 30)
+        after = self.rest(first["id"])
+        self.assertNotEqual(before, self.pixels())
+        moved = self.page.execute_script("return window.raysplats.rig.eye")
+        self.assertGreater(math.dist(eye, moved), 0.5)
+        self.assertLess(moved[0], eye[0])  # the model turned to the right: the camera went left
+        self.screenshot("dragged")
+        # 100 quick movements: pictures come in order, and the last one is that of the last wish.
+        self.page.execute_script(
+            "const p = document.getElementById('picture');"
+            "const fire = (t, x) => p.dispatchEvent(new PointerEvent(t, {pointerId: 1, clientX: x,"
+            " clientY: 200, buttons: 1, bubbles: true}));"
+            "p.setPointerCapture = () => {};"
+            "fire('pointerdown', 200);"
+            "for (let i = 0; i < 100; ++i) fire('pointermove', 200 + i);"
+            "fire('pointerup', 300);")
+        last = self.rest(after["id"])
+        self.assertLess(last["pictures"] - after["pictures"], 40)
+        self.assertEqual(self.console(), [])
+
+    def test_cameras_outputs_keys_and_paths(self):
+        first = self.rest()
+        Select(self.page.find_element(By.ID, "cameras")).select_by_index(1)
+        second = self.rest(first["id"])
+        eye = self.page.execute_script("return window.raysplats.rig.eye")
+        self.assertLess(math.dist(eye, (7, 0, 0)), 1e-6)
+        self.screenshot("camera")
+        Select(self.page.find_element(By.ID, "output")).select_by_value("depth")
+        third = self.rest(second["id"])
+        self.assertEqual(third["last"]["samples"], 1)
+        Select(self.page.find_element(By.ID, "output")).select_by_value("color")
+        fourth = self.rest(third["id"])
+        stage = self.page.find_element(By.ID, "picture")
+        # Back to the first view; a double click in the middle puts the centre on the ball there.
+        ActionChains(self.page).click(stage).send_keys("r").perform()
+        self.rest(fourth["id"])
+        ActionChains(self.page).double_click(stage).perform()
+        target = self.wait("a new centre", lambda: (
+            lambda t: t if math.dist(t, (0, 0, 0)) < 0.8 else None)(
+                self.page.execute_script("return window.raysplats.rig.target")))
+        self.assertEqual(len(target), 3)
+        ActionChains(self.page).send_keys("?").perform()
+        self.assertTrue(self.page.find_element(By.ID, "help").is_displayed())
+        self.screenshot("help")
+        self.page.execute_script("document.getElementById('help').close()")
+        ActionChains(self.page).key_down("w").pause(0.5).key_up("w").perform()
+        self.assertGreater(self.page.execute_script("return window.raysplats.rig.eye[2]"), -6)
+        ActionChains(self.page).send_keys("k").perform()
+        self.assertEqual(len(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")), 1)
+        # The path of two views is what `render --cameras` reads.
+        text = self.page.execute_script(
+            "return import('/path.js').then(m => JSON.stringify(m.pathFile("
+            "[{eye: [0, 0, -6], turn: [1, 0, 0, 0], fov: 50, distance: 6},"
+            " {eye: [1, 0, -6], turn: [1, 0, 0, 0], fov: 50, distance: 6}],"
+            "{seconds: 1, fps: 3, closed: false, width: 32, height: 24})))")
+        folder = self.viewer.folder.name
+        with open(os.path.join(folder, "path.json"), "w") as file:
+            file.write(text)
+        subprocess.run([PROGRAM, "render", self.viewer.model, "--cameras",
+                        os.path.join(folder, "path.json"), "-o", os.path.join(folder, "frames"), "-q"],
+                       check=True, stdout=subprocess.DEVNULL)
+        self.assertEqual(len(os.listdir(os.path.join(folder, "frames"))), 3)
+        frames = json.loads(text)["frames"]
+        for frame, x in zip(frames, (0, 0.5, 1)):
+            self.assertAlmostEqual(frame["transform_matrix"][0][3], x, places=6)
+        self.assertEqual(self.console(), [])
+
+    def test_reload_two_pages_touch_and_the_dark(self):
+        self.rest()
+        self.page.refresh()  # the cookie is enough
+        first = self.rest()
+        self.page.switch_to.new_window("tab")
+        self.page.get(f"http://{self.viewer.host}/")
+        self.rest()
+        self.page.close()
+        self.page.switch_to.window(self.page.window_handles[0])
+        self.page.execute_cdp_cmd("Emulation.setEmulatedMedia", {
+            "features": [{"name": "prefers-color-scheme", "value": "dark"}]})
+        for kind, x in (("touchStart", 300), ("touchMove", 340), ("touchMove", 400), ("touchEnd", None)):
+            points = [] if x is None else [{"x": x, "y": 250}]
+            self.page.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        self.rest(first["id"])
+        self.screenshot("dark")
+        self.assertEqual(self.console(), [])
+
+    def test_the_page_says_when_the_program_has_ended(self):
+        self.rest()
+        self.viewer.stop()
+        self.wait("the banner", lambda: self.page.find_element(By.ID, "banner").is_displayed())
+        self.assertIn("does not answer", self.page.find_element(By.ID, "banner").text)
+        self.screenshot("ended")
+
+
+if __name__ == "__main__":
+    PROGRAM = os.path.abspath(sys.argv.pop(1))
+    FOLDER = sys.argv.pop(1) if len(sys.argv) > 1 else None
+    unittest.main(verbosity=2)

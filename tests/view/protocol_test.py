@@ -1,0 +1,199 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What `raysplats view` says to its page, to strangers and to damaged messages.
+usage: protocol_test.py PROGRAM"""
+import json
+import os
+import sys
+import time
+import unittest
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from program import Channel, Viewer, view  # noqa: E402
+
+PROGRAM = ""
+LAST, PNG = 1, 2
+
+
+class ViewerTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.viewer = Viewer(PROGRAM)
+
+    @classmethod
+    def tearDownClass(cls):
+        code = cls.viewer.stop()
+        cls.viewer.folder.cleanup()
+        assert code == 0, f"Ctrl-C ended it with {code}"
+
+    def last_picture(self, channel, number):
+        """The last picture of view `number`, and how many came for it."""
+        count = 0
+        while True:
+            kind, *rest = channel.receive()
+            self.assertEqual(kind, "picture", rest)
+            header, data = rest
+            if header["view"] != number:
+                continue
+            count += 1
+            if header["flags"] & LAST:
+                return header, data, count
+
+    def test_strangers_are_refused(self):
+        ask, token, cookie = self.viewer.ask, self.viewer.token, self.viewer.cookie()
+        self.assertEqual(ask("/")[0], 403)
+        self.assertEqual(ask("/?token=" + "0" * 32)[0], 403)
+        self.assertEqual(ask("/app.js", Host="evil.example:80", Cookie=cookie)[0], 403)
+        self.assertEqual(ask("/app.js", Origin="http://evil.example", Cookie=cookie)[0], 403)
+        self.assertEqual(ask("/app.js", Host=None, Cookie=cookie)[0], 403)
+        port = self.viewer.address.port
+        for origin in ("null", "http://evil.example", f"http://127.0.0.1:{port}.evil.example",
+                       f"http://localhost:{port}"):
+            self.assertEqual(Channel(self.viewer, Origin=origin).status, 403, origin)
+        self.assertEqual(Channel(self.viewer, Cookie="a=b").status, 403)
+        self.assertEqual(Channel(self.viewer, Cookie=None, Origin=None).status, 403)
+        # A program that knows the token needs no origin.
+        with Channel(self.viewer, f"/ws?token={token}", Cookie=None, Origin=None) as channel:
+            self.assertEqual(channel.status, 101)
+
+    def test_the_token_becomes_a_cookie(self):
+        status, fields, _ = self.viewer.ask(f"/?token={self.viewer.token}")
+        self.assertEqual((status, fields["location"]), (303, "/"))
+        self.assertIn("HttpOnly", fields["set-cookie"])
+        self.assertIn("SameSite=Strict", fields["set-cookie"])
+        status, fields, body = self.viewer.ask("/", Cookie=fields["set-cookie"].split(";")[0])
+        self.assertEqual(status, 200)
+        self.assertIn(b"<!doctype html>", body)
+        self.assertIn("default-src 'none'", fields["content-security-policy"])
+        self.assertEqual(fields["x-content-type-options"], "nosniff")
+        self.assertNotIn("access-control-allow-origin", fields)
+
+    def test_only_reading_and_only_what_there_is(self):
+        ask, cookie = self.viewer.ask, self.viewer.cookie()
+        for method in ("POST", "PUT", "DELETE", "OPTIONS"):
+            self.assertEqual(ask("/api/state", method, Cookie=cookie)[0], 405, method)
+        for path in ("/../../etc/passwd", "/etc/passwd", "/%2e%2e/app.js", "/app.js/x", "/index.htm"):
+            self.assertEqual(ask(path, Cookie=cookie)[0], 404, path)
+        state = json.loads(ask("/api/state", Cookie=cookie)[2])
+        self.assertEqual(len(state["start"]["c2w"]), 12)
+        self.assertEqual(state["about"], "103 Gaussians, SH degree 0")
+        self.assertEqual(ask("/", "HEAD", Cookie=cookie)[2], b"")
+
+    def test_requests_have_limits(self):
+        ask, cookie = self.viewer.ask, self.viewer.cookie()
+        self.assertIn(ask("/", Cookie=cookie, X="x" * 20000)[0], (0, 431))
+        self.assertIn(ask("/" + "x" * 20000, Cookie=cookie)[0], (0, 431))
+        self.assertEqual(ask("/", "POST", b"x" * 100, Cookie=cookie, Content_Length=100)[0], 413)
+        with self.viewer.connect() as channel:
+            channel.sendall(b"\x16\x03\x01 this is no HTTP\r\n\r\n")
+            self.assertIn(channel.recv(100)[:5], (b"", b"HTTP/"))
+        self.assertEqual(ask("/", Cookie=cookie)[0], 200)
+
+    def test_pictures_arrive_and_get_better(self):
+        with Channel(self.viewer) as channel:
+            channel.send_json(**view(1))
+            header, data, count = self.last_picture(channel, 1)
+            self.assertEqual((header["width"], header["height"], header["samples"]), (64, 48, 16))
+            self.assertEqual(data[:2], b"\xff\xd8")
+            # Of 1, 2, 4, 8 and 16 samples; one that was not taken in time gives way to the next.
+            self.assertIn(count, range(1, 6))
+            channel.send_json(**view(2, png=True))
+            header, data, _ = self.last_picture(channel, 2)
+            self.assertEqual(header["flags"], LAST | PNG)
+            self.assertEqual(data[:4], b"\x89PNG")
+            channel.send_json(**view(3, output="depth"))
+            self.assertEqual(self.last_picture(channel, 3)[0]["samples"], 1)
+            # Too large is cut to --max-size, and the shape stays.
+            channel.send_json(**view(4, (8000, 4000), moving=True))
+            kind, header, _ = channel.receive()
+            self.assertEqual(kind, "picture")
+            self.assertAlmostEqual(header["width"] / header["height"], 2, delta=0.05)
+            self.assertLessEqual(header["width"], 1920)
+
+    def test_a_point_is_found_by_its_depth(self):
+        with Channel(self.viewer) as channel:
+            channel.send_json(**{**view(5), "type": "pick", "px": [0.5, 0.5]})
+            kind, answer = channel.receive()
+            self.assertEqual((kind, answer["type"], answer["id"]), ("text", "pick", 5))
+            x, y, z = answer["point"]  # the ball in the middle
+            self.assertAlmostEqual(x, 0, delta=0.05)
+            self.assertAlmostEqual(y, 0, delta=0.05)
+            self.assertAlmostEqual(z, 0, delta=0.7)
+            channel.send_json(**{**view(6, eye=(0, 0, 50)), "type": "pick", "px": [0.5, 0.5]})
+            self.assertIsNone(channel.receive()[1]["point"])
+
+    def test_the_newest_wish_wins(self):
+        with Channel(self.viewer) as channel:
+            for number in range(100, 200):
+                channel.send_json(**view(number, moving=True, eye=(0.01 * number, 0, -6)))
+            numbers = []
+            while not numbers or numbers[-1] != 199:
+                kind, header, _ = channel.receive()
+                self.assertEqual(kind, "picture")
+                numbers.append(header["view"])
+            self.assertEqual(numbers, sorted(numbers))
+            self.assertLess(len(numbers), 100)
+            # A still picture of full size makes room for a movement.
+            channel.send_json(**view(300, (1900, 1400)))
+            time.sleep(0.05)
+            channel.send_json(**view(301, moving=True))
+            numbers = []
+            while not numbers or numbers[-1] != 301:
+                numbers.append(channel.receive()[1]["view"])
+            self.assertLessEqual(len(numbers), 2)
+
+    def test_damaged_messages_are_answered_and_change_nothing(self):
+        with Channel(self.viewer) as channel:
+            for text in ("", "{", "[]", "null", '{"type":"view"}', '{"type":"delete"}',
+                         json.dumps(view(1, fov=0)), json.dumps(view(1, (0, 0))),
+                         json.dumps(view(1)).replace("50", "NaN"), "[" * 9000, "x" * 20000):
+                channel.send(text)
+                kind, answer = channel.receive()
+                self.assertEqual((kind, answer["type"]), ("text", "error"), text[:40])
+            channel.send(b"\x00" * 40, code=2)  # binary: nobody asked for it
+            channel.send_json(**view(8, moving=True))
+            self.assertEqual(channel.receive()[1]["view"], 8)
+        with Channel(self.viewer) as channel:
+            channel.send("x" * 100000)
+            with self.assertRaises(ConnectionError):
+                while channel.receive()[0] != "close":
+                    pass
+                raise ConnectionError("closed")
+        self.assertEqual(self.viewer.ask("/", Cookie=self.viewer.cookie())[0], 200)
+
+    def test_pages_beyond_the_limit_wait_outside(self):
+        time.sleep(0.3)  # the other tests' pages have gone
+        channels = [Channel(self.viewer) for _ in range(8)]
+        self.assertEqual([each.status for each in channels], [101] * 8)
+        self.assertEqual(Channel(self.viewer).status, 503)
+        # A page that reads nothing costs the others nothing.
+        for number in range(50):
+            channels[0].send_json(**view(number, (300, 200), moving=True))
+        channels[1].send_json(**view(9))
+        self.last_picture(channels[1], 9)
+        for each in channels:
+            each.socket.close()
+
+
+class ScenesTest(unittest.TestCase):
+    def test_scene_files_are_drawn_with_more_samples(self):
+        with Viewer(PROGRAM) as plain:
+            scene = os.path.join(plain.folder.name, "scene.toml")
+            with open(scene, "w") as file:
+                file.write('[[model]]\nfile = "model.ply"\n[camera]\norbit = { frames = 4 }\n')
+            with Viewer(PROGRAM, [scene]) as viewer, Channel(viewer) as channel:
+                channel.send_json(**view(1, (32, 24)))
+                seen = []
+                while not seen or not seen[-1]["flags"] & LAST:
+                    seen.append(channel.receive()[1])
+                samples = [each["samples"] for each in seen]
+                self.assertEqual(samples, sorted(set(samples)))
+                self.assertLessEqual(set(samples), {1, 2, 4, 8, 16, 32, 64})
+                self.assertEqual(samples[-1], 64)
+                channel.send_json(**view(2, output="depth"))
+                self.assertEqual(channel.receive()[1]["type"], "error")
+
+
+if __name__ == "__main__":
+    PROGRAM = sys.argv.pop(1)
+    unittest.main(verbosity=2)
