@@ -20,6 +20,7 @@
 
 #include "base/atomic_file.hpp"
 #include "base/output_directory.hpp"
+#include "io/data_origin.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "train/train_config.hpp"
@@ -56,8 +57,9 @@ EvaluationRow evaluation_from_json(const nlohmann::json& json) {
   return row;
 }
 
-constexpr std::array<const char*, 5> kReports{"config.toml", "cameras.json", "metrics.csv",
-                                              "metrics.json", "exposures.json"};
+constexpr std::array<const char*, 6> kReports{"config.toml",    "cameras.json",
+                                              "metrics.csv",    "metrics.json",
+                                              "exposures.json", "cameras_refined.json"};
 
 std::string iteration_name(std::int64_t iteration) {
   return fmt::format("iteration_{}", iteration);
@@ -168,6 +170,13 @@ void RunFolder::write_exposures(std::span<const Camera> cameras,
     json[cameras[i].name] = std::move(rows);
   }
   write_text_file(path_ / "exposures.json", json.dump(1) + "\n");
+}
+
+void RunFolder::write_refined_cameras(std::vector<Camera> cameras,
+                                      const std::array<double, 3>& origin) const {
+  for (Camera& camera : cameras)
+    io::move_origin(camera, -glm::dvec3(origin[0], origin[1], origin[2]));
+  raysplats::write_cameras(path_ / "cameras_refined.json", cameras);
 }
 
 void RunFolder::write_model(const Gaussians& model,

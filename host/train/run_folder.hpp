@@ -47,6 +47,10 @@ class RunFolder {
   /// Writes exposures.json: the 3 x 4 colour matrix of every training photo, by its name. `deltas`
   /// as in Exposure::State.
   void write_exposures(std::span<const Camera> cameras, std::span<const float> deltas) const;
+  /// cameras_refined.json, as write_cameras() of io.hpp does it, in the coordinates of the data
+  /// set's files, whose `origin` was taken off.
+  void write_refined_cameras(std::vector<Camera> cameras,
+                             const std::array<double, 3>& origin) const;
   /// `trace` goes into the header, for those who take the model elsewhere.
   void write_model(const Gaussians& model,
                    const TraceOptions& trace,

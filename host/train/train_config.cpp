@@ -225,7 +225,7 @@ void validate(const TrainOptions& options) {
   }
   for (const LearningRate& rate :
        {options.position_lr, options.rotation_lr, options.scale_lr, options.opacity_lr,
-        options.sh_lr, options.sh_rest_lr, options.exposure_lr}) {
+        options.sh_lr, options.sh_rest_lr, options.exposure_lr, options.pose_lr}) {
     if ((rate.initial > 0) != (rate.final_value > 0)) {
       throw UsageError(
           "A learning rate and its final value are both 0 (the group stays as it is) or both above "
@@ -237,6 +237,11 @@ void validate(const TrainOptions& options) {
         "The options 'deterministic' and 'gradient-sum' = atomic contradict each other, because "
         "atomic sums depend on the scheduling: use 'gradient-sum' = auto or leave 'deterministic' "
         "off");
+  }
+  if (options.poses && !options.mirrors.empty()) {
+    throw UsageError(
+        "The option 'poses' cannot be used with 'mirrors': behind a mirror the gradient of a pose "
+        "is not known");
   }
   if (options.background != "random") background_color(options, false);
 }

@@ -215,6 +215,11 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
          "or white balance changes; their mean stays the identity, which other views are shown "
          "with");
 
+  t.flag("poses", o.poses,
+         "train the poses of the training photos too, for captures whose poses are not exact; what "
+         "all of them have in common is taken off, so that the model stays where the data set has "
+         "it; cameras_refined.json in the run has them");
+
   t.section("Optimiser (Adam)");
   t.learning_rate("position-lr", o.position_lr, "the means, times the scene extent");
   t.learning_rate("rotation-lr", o.rotation_lr, "the quaternions");
@@ -223,6 +228,7 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.learning_rate("sh-lr", o.sh_lr, "colour (SH band 0)");
   t.learning_rate("sh-rest-lr", o.sh_rest_lr, "the SH bands above 0");
   t.learning_rate("exposure-lr", o.exposure_lr, "the photos' affine colours");
+  t.learning_rate("pose-lr", o.pose_lr, "the poses, in radians and shares of the scene extent");
   t.number("lr-decay", o.lr_decay, 0, 1,
            "rates fall as exp(-lr-decay * iteration) until they meet their final value; 0 = they "
            "reach it "

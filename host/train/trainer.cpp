@@ -79,6 +79,8 @@ Trainer::Impl::Impl(Context& device,
       order(options.seed, train_views.size()) {
   options.data.origin = dataset.origin;
   if (options.exposure) exposure.emplace(device, train_views.size());
+  if (options.poses)
+    poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
   if (train_views.empty()) {
     const bool held_out = options.data.test_every == 1 && !test_views.empty();
     throw UsageError(fmt::format(

@@ -24,6 +24,7 @@
 #include "train/initialization.hpp"
 #include "train/model_validator.hpp"
 #include "train/photo_set.hpp"
+#include "train/pose_refinement.hpp"
 #include "train/psnr_rise.hpp"
 #include "train/run_folder.hpp"
 #include "train/schedule.hpp"
@@ -112,7 +113,8 @@ struct Trainer::Impl {
   Adam adam;
   DensityControl density;
   Footprint footprint;
-  std::optional<Exposure> exposure;  // with the option
+  std::optional<Exposure> exposure;     // with the option
+  std::optional<PoseRefinement> poses;  // with the option
   StepGuard guard;
   std::optional<ModelValidator> validator;  // once it is asked for
   TargetCache targets;

@@ -91,6 +91,7 @@ void Trainer::Impl::save_model() {
   run.write_model(gaussians.download(), trace_options_of(options, background), iteration,
                   dataset.origin);
   if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
+  if (poses) run.write_refined_cameras(poses->cameras(), dataset.origin);
 }
 
 void Trainer::Impl::write_metrics(bool complete) {

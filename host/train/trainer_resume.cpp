@@ -24,6 +24,13 @@ Checkpoint Trainer::Impl::state() {
   checkpoint.capped_rays = capped_rays();
   store_state(gaussians, adam, density, checkpoint);
   if (footprint.lows().size() > 0) checkpoint.sections["footprint"] = footprint.lows().download();
+  if (poses) {
+    const PoseRefinement::State& state = poses->state();
+    checkpoint.sections["poses"] = state.deltas;
+    checkpoint.sections["poses.first"] = state.first;
+    checkpoint.sections["poses.second"] = state.second;
+    checkpoint.sections["poses.steps"] = state.steps;
+  }
   if (exposure) {
     Exposure::State colors = exposure->state();
     checkpoint.sections["exposure"] = std::move(colors.deltas);
@@ -73,6 +80,7 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   differs("test-every", before.data.test_every, options.data.test_every);
   differs("undistort", before.data.undistort, options.data.undistort);
   differs("exposure", before.exposure, options.exposure);
+  differs("poses", before.poses, options.poses);
   const auto cuts = [](const TrainOptions& o) { return o.data.masks == MaskUse::kCutout; };
   differs("masks = cutout", cuts(before), cuts(options));
 }
@@ -124,11 +132,13 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   } else {
     footprint.update(gaussians);  // of a version that had none
   }
+  const auto part = [&](const std::string& name) {
+    const auto found = checkpoint.sections.find(name);
+    return found == checkpoint.sections.end() ? std::vector<float>() : found->second;
+  };
+  if (poses)
+    poses->restore({part("poses"), part("poses.first"), part("poses.second"), part("poses.steps")});
   if (exposure) {
-    const auto part = [&](const std::string& name) {
-      const auto found = checkpoint.sections.find(name);
-      return found == checkpoint.sections.end() ? std::vector<float>() : found->second;
-    };
     exposure->restore({part("exposure"), part("exposure.first"), part("exposure.second"),
                        part("exposure.steps")});
   }

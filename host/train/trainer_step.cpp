@@ -7,12 +7,13 @@
 
 namespace raysplats {
 
-// One view: forward, loss, backward, statistics, Adam; nothing is waited for.
+// One view: forward, loss, backward, statistics, Adam; nothing is waited for, but the
+// gradient of a pose that is trained.
 void Trainer::Impl::step() {
   const std::size_t view = order.at(iteration);
   targets.prefetch(order.upcoming(kReadAhead - 1));
   const int divisor = resolution_divisor(options, iteration);
-  const Camera& full = train_cameras[view];
+  const Camera full = poses ? poses->camera(view) : train_cameras[view];
   const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
   const std::array<float, 3> behind = step_background(options, cut_out, background, iteration);
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
@@ -30,8 +31,10 @@ void Trainer::Impl::step() {
     exposure->step(tracer.image(), image_gradient, view, camera.width, camera.height,
                    learning_rate(options.exposure_lr, options, iteration), guard.mark());
   }
-  tracer.backward(gaussians, image_gradient, gradients);
+  PoseGradient slope;
+  tracer.backward(gaussians, image_gradient, gradients, poses ? &slope : nullptr);
   whole = false;
+  if (poses) poses->step(view, slope, learning_rate(options.pose_lr, options, iteration));
   if (density.accumulates_at(iteration)) density.accumulate(gaussians, gradients, &guard.mark());
   adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
   footprint.apply(gaussians, guard.mark());

@@ -95,6 +95,7 @@ struct TrainOptions {
   PixelLoss pixel_loss = PixelLoss::kL1;
   double ssim_weight = 0.2;
   bool exposure = false;  ///< an affine colour per training photo is trained too
+  bool poses = false;     ///< the poses of the training photos are trained too
 
   // Optimiser
   LearningRate position_lr{5e-4, 5e-6};  ///< times the scene extent
@@ -104,6 +105,7 @@ struct TrainOptions {
   LearningRate sh_lr{1e-2, 2.5e-3};
   LearningRate sh_rest_lr{5e-4, 1.25e-4};
   LearningRate exposure_lr{3e-2, 3e-3};
+  LearningRate pose_lr{5e-3, 5e-5};  ///< radians, and shares of the scene extent
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration
   bool scale_lr_by_extent = false;
   double adam_beta1 = 0.9;

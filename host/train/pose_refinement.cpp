@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/pose_refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <optional>
+#include <utility>
+
+#include "core/orbit.hpp"
+#include "core/statistics.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr double kBeta1 = 0.9;
+constexpr double kBeta2 = 0.999;
+constexpr double kEpsilon = 1e-15;
+constexpr std::size_t kMostPoints = 4000;  // that tell how far a camera sees
+constexpr double kLeastDistance = 0.01;    // of what a camera sees, in extents
+
+glm::dvec3 turn_of(const std::vector<float>& deltas, std::size_t view) {
+  const float* d = &deltas[PoseRefinement::kNumbers * view];
+  return {d[0], d[1], d[2]};
+}
+
+glm::dvec3 shift_of(const std::vector<float>& deltas, std::size_t view) {
+  const float* d = &deltas[PoseRefinement::kNumbers * view + 3];
+  return {d[0], d[1], d[2]};
+}
+
+glm::dmat3 rotation_by(const glm::dvec3& turn) {
+  const double angle = glm::length(turn);
+  if (angle == 0.0) return glm::dmat3(1.0);
+  return glm::mat3_cast(glm::angleAxis(angle, turn / angle));
+}
+
+}  // namespace
+
+PoseRefinement::PoseRefinement(std::vector<Camera> cameras,
+                               double extent,
+                               std::vector<double> distances)
+    : cameras_(std::move(cameras)), extent_(extent), distances_(std::move(distances)) {
+  const std::size_t numbers = kNumbers * cameras_.size();
+  state_.deltas.resize(numbers);
+  state_.first.resize(numbers);
+  state_.second.resize(numbers);
+  state_.steps.resize(cameras_.size());
+}
+
+Camera PoseRefinement::camera(std::size_t view) const {
+  Camera out = cameras_[view];
+  const glm::dvec3 center = out.center() + shift_of(state_.deltas, view);
+  out.rotation = rotation_by(turn_of(state_.deltas, view)) * out.rotation;
+  out.translation = -(out.rotation * center);
+  return out;
+}
+
+std::vector<Camera> PoseRefinement::cameras() const {
+  std::vector<Camera> out;
+  out.reserve(cameras_.size());
+  for (std::size_t view = 0; view < cameras_.size(); ++view) out.push_back(camera(view));
+  return out;
+}
+
+void PoseRefinement::step(std::size_t view, const PoseGradient& gradient, double rate) {
+  const glm::dvec3 by_turn(gradient.rotation[0], gradient.rotation[1], gradient.rotation[2]);
+  const glm::dvec3 by_center(gradient.center[0], gradient.center[1], gradient.center[2]);
+  const glm::dmat3 back = turn_back(view);
+  const glm::dvec3 around = extent_ * (by_center + glm::transpose(back) * by_turn);
+  const std::array<double, kNumbers> slope{by_turn.x, by_turn.y, by_turn.z,
+                                           around.x,  around.y,  around.z};
+  if (!std::all_of(slope.begin(), slope.end(), [](double s) { return std::isfinite(s); })) return;
+  const double steps = static_cast<double>(state_.steps[view] += 1.0f);
+  std::array<glm::dvec3, 2> change{glm::dvec3(0.0), glm::dvec3(0.0)};
+  for (std::size_t k = 0; k < kNumbers; ++k) {
+    const std::size_t i = kNumbers * view + k;
+    const double first = kBeta1 * state_.first[i] + (1.0 - kBeta1) * slope[k];
+    const double second = kBeta2 * state_.second[i] + (1.0 - kBeta2) * slope[k] * slope[k];
+    const double mean = first / (1.0 - std::pow(kBeta1, steps));
+    const double square = second / (1.0 - std::pow(kBeta2, steps));
+    const double unit = k < 3 ? 1.0 : extent_;
+    state_.first[i] = static_cast<float>(first);
+    state_.second[i] = static_cast<float>(second);
+    change.at(k / 3)[static_cast<int>(k % 3)] =
+        -rate * unit * mean / (std::sqrt(square) + kEpsilon);
+  }
+  const glm::dvec3 turn = change[0] + back * change[1];
+  for (int k = 0; k < 3; ++k) {
+    float* delta = &state_.deltas[kNumbers * view + static_cast<std::size_t>(k)];
+    delta[0] = static_cast<float>(delta[0] + turn[k]);
+    delta[3] = static_cast<float>(delta[3] + change[1][k]);
+  }
+  remove_common_motion();
+}
+
+glm::dmat3 PoseRefinement::turn_back(std::size_t view) const {
+  // A point at (0, 0, D) before the camera moves by -R d with the centre; a turn by w moves it by
+  // w x p = (w.y D, -w.x D, 0).
+  const glm::dmat3 axes = glm::transpose(cameras_[view].rotation);  // columns: the camera's axes
+  const double inverse = 1.0 / distances_[view];
+  return glm::transpose(glm::dmat3(-inverse * axes[1], inverse * axes[0], glm::dvec3(0.0)));
+}
+
+void PoseRefinement::remove_common_motion() {
+  const auto count = static_cast<double>(cameras_.size());
+  glm::dvec3 middle(0.0), shift(0.0);
+  for (std::size_t view = 0; view < cameras_.size(); ++view) {
+    middle += cameras_[view].center() / count;
+    shift += shift_of(state_.deltas, view) / count;
+  }
+  // A turn by W of everything moves the centre at r by W x r and turns the camera by -R W about its
+  // axes; a scale moves it along r. Shifts and turns count alike in units of the extent.
+  glm::dmat3 sum(0.0);
+  glm::dvec3 right(0.0);
+  double along = 0.0, square = 0.0;
+  for (std::size_t view = 0; view < cameras_.size(); ++view) {
+    const glm::dvec3 r = (cameras_[view].center() - middle) / extent_;
+    const glm::dvec3 d = (shift_of(state_.deltas, view) - shift) / extent_;
+    sum += glm::dmat3(1.0 + glm::dot(r, r)) - glm::outerProduct(r, r);
+    right +=
+        glm::cross(r, d) - glm::transpose(cameras_[view].rotation) * turn_of(state_.deltas, view);
+    along += glm::dot(r, d);
+    square += glm::dot(r, r);
+  }
+  const glm::dvec3 turn = glm::inverse(sum) * right;
+  const double scale = square > 0.0 ? along / square : 0.0;
+  for (std::size_t view = 0; view < cameras_.size(); ++view) {
+    const glm::dvec3 r = cameras_[view].center() - middle;
+    const glm::dvec3 moved = shift + glm::cross(turn, r) + scale * r;
+    const glm::dvec3 turned = cameras_[view].rotation * turn;
+    for (int k = 0; k < 3; ++k) {
+      float* delta = &state_.deltas[kNumbers * view + static_cast<std::size_t>(k)];
+      delta[0] = static_cast<float>(delta[0] + turned[k]);
+      delta[3] = static_cast<float>(delta[3] - moved[k]);
+    }
+  }
+}
+
+void PoseRefinement::restore(const State& state) {
+  if (state.deltas.size() != state_.deltas.size() || state.first.size() != state_.first.size() ||
+      state.second.size() != state_.second.size() || state.steps.size() != state_.steps.size()) {
+    throw DataError("The poses of the checkpoint are not of as many photos as the data set has");
+  }
+  state_ = state;
+}
+
+std::vector<double> subject_distances(std::span<const Camera> cameras,
+                                      const PointCloud& points,
+                                      double extent) {
+  const std::optional<glm::dvec3> target = common_target(cameras);
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / kMostPoints);
+  std::vector<double> out;
+  out.reserve(cameras.size());
+  for (const Camera& camera : cameras) {
+    const auto depth = [&](const glm::dvec3& point) {
+      return (camera.rotation * point + camera.translation).z;
+    };
+    std::vector<double> depths;
+    for (std::size_t i = 0; i < points.size(); i += stride) {
+      const float* p = &points.positions[3 * i];
+      const double z = depth({p[0], p[1], p[2]});
+      if (z > kLeastDistance * extent) depths.push_back(z);
+    }
+    double distance = target ? depth(*target) : 0.0;
+    if (!depths.empty()) {
+      const double half = 0.5;
+      distance = quantiles(std::move(depths), std::span<const double>(&half, 1))[0];
+    }
+    out.push_back(distance > kLeastDistance * extent ? distance : extent);
+  }
+  return out;
+}
+
+}  // namespace raysplats

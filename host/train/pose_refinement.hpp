@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <glm/mat3x3.hpp>
+#include <span>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/pose_gradient.hpp"
+
+namespace raysplats {
+
+/// Poses of the training photos, trained beside the model where those of the data set are not exact
+/// (phones, rigs, few matches): a turn about the camera's axes and a shift of its centre each, by
+/// Adam (0.9, 0.999) on the gradients of the pictures. Moving all cameras and the scene together
+/// changes no picture, so the motion that the cameras have in common (turn, shift and scale, by
+/// least squares) is taken off after every step: the model stays where the data set has it, and so
+/// do cameras that are not trained. On the host; equal inputs give equal bits.
+///
+/// A camera that moves sideways and turns back to what it looked at changes its picture far less
+/// than one that does either, so that gradients of centre and turn alone creep along that valley.
+/// The steps are therefore taken in turns and in motions around what the camera sees.
+class PoseRefinement {
+ public:
+  /// Of a camera: the turn in radians (axes of the camera), then the shift in world units.
+  static constexpr std::size_t kNumbers = 6;
+
+  /// The whole state: kNumbers a photo each, steps one.
+  struct State {
+    std::vector<float> deltas, first, second, steps;
+  };
+
+  /// `extent` is the length that a turn by one radian is weighed against (scene_extent()),
+  /// `distances` are those of what the cameras see (subject_distances()).
+  PoseRefinement(std::vector<Camera> cameras, double extent, std::vector<double> distances);
+
+  /// The camera of a photo where it is now, at the size of the data set.
+  Camera camera(std::size_t view) const;
+  std::vector<Camera> cameras() const;
+  /// One step for a photo, `rate` in radians and extents. A gradient that is not finite changes
+  /// nothing.
+  void step(std::size_t view, const PoseGradient& gradient, double rate);
+
+  const State& state() const { return state_; }
+  /// Throws DataError when it is not of as many photos.
+  void restore(const State& state);
+
+ private:
+  /// The turn by which a camera that has moved by d looks at what it saw: a matrix times d.
+  glm::dmat3 turn_back(std::size_t view) const;
+  void remove_common_motion();
+
+  std::vector<Camera> cameras_;
+  double extent_;
+  std::vector<double> distances_;
+  State state_;
+};
+
+/// How far along its axis what a camera sees lies: the median depth of the points before it,
+/// without points the depth of what all cameras look at (common_target()), else `extent`.
+std::vector<double> subject_distances(std::span<const Camera> cameras,
+                                      const PointCloud& points,
+                                      double extent);
+
+}  // namespace raysplats

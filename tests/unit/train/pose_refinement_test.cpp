@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/pose_refinement.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "base/rng.hpp"
+#include "raysplats/error.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+constexpr double kExtent = 4.0;
+
+glm::dvec3 random_vector(CounterRng& rng) { return {rng.normal(), rng.normal(), rng.normal()}; }
+
+std::vector<Camera> ring(std::size_t count) {
+  CounterRng rng(3, 0);
+  std::vector<Camera> cameras;
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 eye = kExtent * glm::normalize(random_vector(rng));
+    cameras.push_back(look_at(eye, 0.3 * random_vector(rng), {0, 0, 1}, 64, 48, 60.0));
+  }
+  return cameras;
+}
+
+PoseRefinement refinement(const std::vector<Camera>& cameras) {
+  return {cameras, kExtent, subject_distances(cameras, {}, kExtent)};
+}
+
+double angle_between(const Camera& a, const Camera& b) {
+  const glm::dmat3 turn = a.rotation * glm::transpose(b.rotation);
+  return std::acos(std::clamp(0.5 * (turn[0][0] + turn[1][1] + turn[2][2] - 1.0), -1.0, 1.0));
+}
+
+/// Gradient of the squared distance from a pose, in the coordinates of PoseGradient.
+PoseGradient towards(const Camera& now, const Camera& target) {
+  PoseGradient out;
+  const glm::dvec3 apart = now.center() - target.center();
+  // now = exp([w]) target: the turn that is too much.
+  const glm::dquat turn = glm::quat_cast(now.rotation * glm::transpose(target.rotation));
+  for (int k = 0; k < 3; ++k) {
+    out.center[static_cast<std::size_t>(k)] = 2.0 * apart[k] / (kExtent * kExtent);
+    out.rotation[static_cast<std::size_t>(k)] = 4.0 *
+                                                (k == 0   ? turn.x
+                                                 : k == 1 ? turn.y
+                                                          : turn.z) *
+                                                (turn.w < 0 ? -1.0 : 1.0);
+  }
+  return out;
+}
+
+/// The poses of a state after a step along no gradient.
+PoseRefinement settled(const std::vector<Camera>& cameras, const PoseRefinement::State& state) {
+  PoseRefinement out = refinement(cameras);
+  out.restore(state);
+  out.step(0, {}, 1e-3);
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("poses follow their gradients to where the photos were taken") {
+  const std::vector<Camera> start = ring(24);
+  CounterRng rng(5, 0);
+  PoseRefinement::State state = refinement(start).state();
+  for (std::size_t i = 0; i < state.deltas.size(); ++i) {
+    const double size = i % PoseRefinement::kNumbers < 3 ? 0.005 : 0.02;
+    state.deltas[i] = static_cast<float>(size * rng.normal());
+  }
+  // Without what they have in common, which nobody can know.
+  const std::vector<Camera> truth = settled(start, state).cameras();
+  PoseRefinement poses = refinement(start);
+  CHECK(angle_between(poses.camera(3), start[3]) < 1e-7);
+  CHECK(glm::distance(poses.camera(3).center(), start[3].center()) < 1e-12);
+  for (int pass = 0; pass < 200; ++pass) {
+    const double rate = 2e-3 * std::pow(0.01, pass / 200.0);
+    for (std::size_t view = 0; view < truth.size(); ++view)
+      poses.step(view, towards(poses.camera(view), truth[view]), rate);
+  }
+  double angle = 0.0, distance = 0.0, angle_before = 0.0, distance_before = 0.0;
+  for (std::size_t view = 0; view < truth.size(); ++view) {
+    angle = std::max(angle, angle_between(poses.camera(view), truth[view]));
+    distance = std::max(distance, glm::distance(poses.camera(view).center(), truth[view].center()));
+    angle_before = std::max(angle_before, angle_between(start[view], truth[view]));
+    distance_before =
+        std::max(distance_before, glm::distance(start[view].center(), truth[view].center()));
+  }
+  MESSAGE("turn ", angle, " of ", angle_before, ", shift ", distance, " of ", distance_before);
+  CHECK(angle < 0.05 * angle_before);
+  CHECK(distance < 0.05 * distance_before);
+}
+
+TEST_CASE("a motion that all cameras have in common is taken off, and nothing else") {
+  const std::vector<Camera> start = ring(40);
+  const glm::dvec3 turn(0.001, -0.002, 0.0015), shift(0.02, 0.01, -0.03);
+  PoseRefinement::State common = refinement(start).state();
+  PoseRefinement::State own = common;
+  for (std::size_t view = 0; view < start.size(); ++view) {
+    const glm::dvec3 turned = -(start[view].rotation * turn);
+    const glm::dvec3 moved =
+        glm::cross(turn, start[view].center()) + shift + 0.002 * start[view].center();
+    for (int k = 0; k < 3; ++k) {
+      const std::size_t i = PoseRefinement::kNumbers * view + static_cast<std::size_t>(k);
+      common.deltas[i] = static_cast<float>(turned[k]);
+      common.deltas[i + 3] = static_cast<float>(moved[k]);
+    }
+  }
+  const PoseRefinement still = settled(start, common);
+  for (const float delta : still.state().deltas) CHECK(std::abs(delta) < 1e-6f);
+  // One camera's own motion stays, but for its share of the mean.
+  own.deltas[6 * 7 + 1] = 0.01f;
+  own.deltas[6 * 7 + 5] = 0.1f;
+  const PoseRefinement kept = settled(start, own);
+  CHECK(kept.state().deltas[6 * 7 + 1] > 0.009f);
+  CHECK(kept.state().deltas[6 * 7 + 5] > 0.09f);
+  for (std::size_t i = 0; i < 6; ++i) CHECK(std::abs(kept.state().deltas[6 * 8 + i]) < 0.01f);
+}
+
+TEST_CASE("what a camera sees lies at its points, else where all look, else at the extent") {
+  const std::vector<Camera> cameras = ring(20);
+  for (const double distance : subject_distances(cameras, {}, kExtent))
+    CHECK(distance == doctest::Approx(kExtent).epsilon(0.2));
+  PointCloud points;
+  CounterRng rng(1, 0);
+  for (int i = 0; i < 9000; ++i) {
+    const glm::dvec3 p = cameras[0].center() + glm::transpose(cameras[0].rotation) *
+                                                   glm::dvec3(0, 0, 7.0 + 0.1 * rng.normal());
+    for (int k = 0; k < 3; ++k) points.positions.push_back(static_cast<float>(p[k]));
+  }
+  CHECK(subject_distances(cameras, points, kExtent)[0] == doctest::Approx(7.0).epsilon(0.01));
+  CHECK(subject_distances(std::vector<Camera>{cameras[0]}, {}, kExtent)[0] == kExtent);
+}
+
+TEST_CASE("poses go on from their state to the bit, and refuse what is no gradient or no state") {
+  const std::vector<Camera> truth = ring(6);
+  CounterRng rng(9, 0);
+  const auto random_gradient = [&] {
+    PoseGradient out;
+    for (std::size_t k = 0; k < 3; ++k) {
+      out.center[k] = rng.normal();
+      out.rotation[k] = rng.normal();
+    }
+    return out;
+  };
+  PoseRefinement poses = refinement(truth);
+  for (int i = 0; i < 20; ++i) poses.step(rng.below(6), random_gradient(), 1e-3);
+  PoseRefinement again = refinement(truth);
+  again.restore(poses.state());
+  const PoseGradient gradient = random_gradient();
+  poses.step(2, gradient, 1e-3);
+  again.step(2, gradient, 1e-3);
+  CHECK(poses.state().deltas == again.state().deltas);
+  CHECK(poses.state().second == again.state().second);
+
+  const std::vector<float> before = poses.state().deltas;
+  PoseGradient broken = gradient;
+  broken.rotation[1] = std::numeric_limits<double>::quiet_NaN();
+  poses.step(2, broken, 1e-3);
+  CHECK(poses.state().deltas == before);
+  PoseRefinement::State other = poses.state();
+  other.steps.pop_back();
+  CHECK_THROWS_AS(poses.restore(other), DataError);
+}
