@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # raysplats_bundle: what fmt, spdlog, xxHash, tinyobjloader, tinygltf and toml++ define in shared libraries, built from
-# their headers instead, so that a wheel needs none of them. The library's own sources are compiled exactly as without.
+# their headers instead, so that a wheel needs none of them, and the archive of zstd. The library's own sources are
+# compiled exactly as without.
 
 set(raysplats_bundled fmt::fmt spdlog::spdlog PkgConfig::XXHASH tinyobjloader::tinyobjloader TinyGLTF::TinyGLTF
                       tomlplusplus::tomlplusplus)
@@ -23,11 +24,14 @@ foreach(target IN LISTS raysplats_bundled)
 endforeach()
 # tinygltf is given its files by callbacks and decodes no pictures.
 target_compile_definitions(raysplats_bundle PUBLIC TINYGLTF_NO_STB_IMAGE TINYGLTF_NO_STB_IMAGE_WRITE)
+find_library(RAYSPLATS_ZSTD_ARCHIVE libzstd.a REQUIRED)
+mark_as_advanced(RAYSPLATS_ZSTD_ARCHIVE)
+target_link_libraries(raysplats_bundle PUBLIC ${RAYSPLATS_ZSTD_ARCHIVE})
 
 # Replaces the names of the bundled libraries in a list of targets.
 function(raysplats_bundle list)
   set(targets ${${list}})
-  list(REMOVE_ITEM targets ${raysplats_bundled})
+  list(REMOVE_ITEM targets ${raysplats_bundled} PkgConfig::ZSTD)
   if(NOT "${targets}" STREQUAL "${${list}}")
     list(APPEND targets raysplats_bundle)
   endif()

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "bindings.hpp"
+#include "names.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -122,17 +123,28 @@ void bind_gaussians(nb::module_& module) {
           nb::arg("sh"), "Copies the arrays; the shapes are those of the views.")
       .def_static("zeros", &zeros, nb::arg("count"), nb::arg("sh_degree") = 0,
                   "Gaussians to be filled in: zeros and unit quaternions.")
-      .def_static("load", &read_ply, nb::arg("path"), nb::call_guard<nb::gil_scoped_release>(),
-                  "Reads a 3DGS PLY, SH degree 0 to 4.")
+      .def_static(
+          "load",
+          [](const std::filesystem::path& path, const std::string& spz_axes) {
+            return read_model(path, {value_of(kSpzAxes, "spz_axes", spz_axes)});
+          },
+          nb::arg("path"), nb::kw_only(), nb::arg("spz_axes") = "ply",
+          nb::call_guard<nb::gil_scoped_release>(),
+          "Reads a 3DGS PLY, compressed PLY, .splat, SPZ or glTF (docs/formats.md).")
       .def(
           "save",
           [](const Gaussians& self, const std::filesystem::path& path,
-             const std::optional<TraceOptions>& options,
-             const std::array<double, 3>& origin) { write_ply(path, self, options, origin); },
+             const std::optional<TraceOptions>& options, const std::array<double, 3>& origin,
+             const std::string& spz_axes, int spz_version) {
+            const ModelEncoding encoding{value_of(kSpzAxes, "spz_axes", spz_axes), spz_version};
+            write_model(path, self, encoding, options, origin);
+          },
           nb::arg("path"), nb::arg("options") = nb::none(),
-          nb::arg("origin") = std::array<double, 3>{}, nb::call_guard<nb::gil_scoped_release>(),
-          "Writes a binary 3DGS PLY; `options` and the `origin` from which positions count, as "
-          "Dataset.origin, go into its header.")
+          nb::arg("origin") = std::array<double, 3>{}, nb::kw_only(), nb::arg("spz_axes") = "ply",
+          nb::arg("spz_version") = ModelEncoding{}.spz_version,
+          nb::call_guard<nb::gil_scoped_release>(),
+          "Writes .ply, .splat, .spz or .glb. `options` and the `origin` from which positions "
+          "count, as Dataset.origin, go into the header of a PLY.")
       .def_static("load_origin", &read_ply_origin, nb::arg("path"),
                   "The origin in the header of a PLY; 0 where it says none.")
       .def("with_sh_degree", &with_sh_degree, nb::arg("degree"),

@@ -12,6 +12,7 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
 #include "raysplats/rays.hpp"
 #include "raysplats/scene.hpp"
 #include "raysplats/trace_options.hpp"
@@ -47,6 +48,8 @@ inline constexpr std::array<Name<Split>, 3> kSplits{
     {{"train", Split::kTrain}, {"test", Split::kTest}, {"all", Split::kAll}}};
 inline constexpr std::array<Name<MaskUse>, 2> kMaskUses{
     {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}}};
+inline constexpr std::array<Name<SpzAxes>, 2> kSpzAxes{
+    {{"ply", SpzAxes::kPly}, {"rub", SpzAxes::kRub}}};
 inline constexpr std::array<Name<DatasetKind>, 3> kDatasetKinds{
     {{"colmap", DatasetKind::kColmap},
      {"blender", DatasetKind::kBlender},
