@@ -11,7 +11,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 choose_python() {
   local candidate
   for candidate in "${PYTHON:-}" python3 /usr/bin/python3; do
-    [[ -n $candidate ]] && command -v "$candidate" >/dev/null || continue
+    if [[ -z $candidate ]] || ! command -v "$candidate" >/dev/null; then continue; fi
     if [[ -n ${PYTHON:-} ]] || "$candidate" -c 'import torch' 2>/dev/null; then
       echo "$candidate"
       return

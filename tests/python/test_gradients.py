@@ -11,7 +11,7 @@ from conftest import as_gaussians, random_arrays
 QUANTILE = 11.3449
 STEP = 1e-6
 # Of the largest number of a class of parameters.
-TOLERANCE = 1e-3
+TOLERANCE = 1e-4
 
 
 def rays(count, seed):

@@ -16,7 +16,7 @@ from conftest import random_arrays  # noqa: E402
 
 QUANTILE = 11.3449
 # Of the largest number of a class of parameters.
-TOLERANCE = 1e-3
+TOLERANCE = 1e-4
 
 
 @pytest.fixture(scope="module")
