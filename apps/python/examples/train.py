@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A training loop in PyTorch: train.py DATA START.ply OUTPUT.ply [ITERATIONS]
 
-Trains the Gaussians of START.ply on a data set's photos with the loss, the learning rates and the optimiser of
+Trains the Gaussians of START.ply on a data set's photos, which have no masks, with the loss, the learning rates and the optimiser of
 `raysplats train`, without its density control.
 """
 
@@ -28,7 +28,8 @@ def ssim(image, photo, window=11, sigma=1.5):
 
 def train(renderer, dataset, start, iterations):
     views = [dataset.views[i] for i in dataset.indices("train")]
-    photos = [torch.from_numpy(view.picture()[..., :3].copy()) for view in views]
+    # Cut-out photos stand before black, as the renderer's Gaussians do.
+    photos = [torch.from_numpy(rgba[..., :3] * rgba[..., 3:]) for rgba in (view.picture() for view in views)]
     centers = np.array([view.camera.center for view in views])
     extent = 1.1 * np.linalg.norm(centers - centers.mean(0), axis=1).max()
     rates = {
