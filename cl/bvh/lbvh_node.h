@@ -13,6 +13,15 @@
 
 // A node: lo.x lo.y lo.z hi.x hi.y hi.z of its children, one vector each (RS_NODE_VECTORS). Missing
 // children are empty boxes (lo > hi).
+#ifndef TRAIL
+#define TRAIL 0  // of tree_walk.h
+#endif
+// What is not inlined passes its structures through private memory, which lies far away on GPUs.
+#if TRAIL
+#define RS_INLINE __attribute__((always_inline))
+#else
+#define RS_INLINE
+#endif
 // A child of every level stays behind: PACKET - 1 per level, and 2^31 things have 15 levels of 4 or
 // 7 of 16.
 #define RS_NODE_STACK 128
@@ -28,6 +37,17 @@ typedef union {
   float s[PACKET];
 } RayLanes;
 
+// One lane of a vector. On GPUs by choice: an array indexed by a number that is not known would lie
+// in memory.
+RS_INLINE float lane_value(const RayLanes* v, const uint lane) {
+#if TRAIL
+  const float2 half_of = lane & 2 ? v->v.hi : v->v.lo;
+  return lane & 1 ? half_of.y : half_of.x;
+#else
+  return v->s[lane];
+#endif
+}
+
 typedef struct {
   float3 o, d, inverse;
   float3 shift;  // o / d
@@ -37,7 +57,7 @@ typedef struct {
 
 // A ray whose numbers, or their squares, are not finite meets nothing. NaN would meet every box,
 // and those of children that do not exist.
-RayData ray_data(float8 ray) {
+RS_INLINE RayData ray_data(float8 ray) {
   RayData out;
   const bool sound = dot(ray.s012, ray.s012) + dot(ray.s456, ray.s456) <= FLT_MAX;
   out.o = sound ? ray.s012 : (float3)(0.0f, 0.0f, 0.0f);
@@ -64,7 +84,10 @@ RayData ray_data(float8 ray) {
 
 // Children of a node whose boxes the ray crosses within [t_min, t_end], one bit each; *entry their
 // entry depths.
-uint ray_meets_boxes(const RayData* ray, __global const fv* node, float t_end, fv* entry) {
+RS_INLINE uint ray_meets_boxes(const RayData* ray,
+                               __global const fv* node,
+                               float t_end,
+                               fv* entry) {
   const int sx = ray->side[0], sy = ray->side[1], sz = ray->side[2];
   const fv nx = RS_SLAB(node[sx], x);
   const fv fx = RS_SLAB(node[3 - sx], x);

@@ -25,8 +25,7 @@ __kernel void end_at_mirrors(const uint count,
   starts[i] = met && !last_level;
 }
 
-// vertices: per triangle three corners of eight floats (position, normal, uv); a flat triangle has
-// zero normals.
+// vertices: as for surface_point().
 __kernel void reflect_rays(const uint count,
                            __global const RsSurfaceHit* restrict hits,
                            __global const uint* restrict starts,
@@ -38,18 +37,10 @@ __kernel void reflect_rays(const uint count,
   if (i >= count || !goes_on(starts, i)) return;
   const RsSurfaceHit hit = hits[i];
   const float3 d = rays[i].s456;
-  __global const float* v = vertices + (size_t)hit.triangle * 24;
-  const float3 a = vload3(0, v), b = vload3(0, v + 8), c = vload3(0, v + 16);
-  const float w = 1.0f - hit.u - hit.v;
-  float3 normal = normalize(cross(b - a, c - a));
-  if (dot(d, normal) > 0.0f) normal = -normal;
-  float3 shading = w * vload3(0, v + 3) + hit.u * vload3(0, v + 11) + hit.v * vload3(0, v + 19);
-  const float length2 = dot(shading, shading);
-  shading = length2 > 1e-12f ? shading * rsqrt(length2) : normal;
-  float3 direction = reflected(d, shading);
-  if (dot(direction, normal) <= 0.0f) direction = reflected(d, normal);
-  const float3 p = w * a + hit.u * b + hit.v * c;
-  const float3 start = start_off_surface(p, normal, direction, surface_offset(p, a, b, c));
+  const SurfacePoint point = surface_point(vertices, &hit, d);
+  float3 direction = reflected(d, point.shading);
+  if (dot(direction, point.normal) <= 0.0f) direction = reflected(d, point.normal);
+  const float3 start = start_off_surface(point.position, point.normal, direction, point.offset);
   const uint to = starts[i];
   next_rays[to] = (float8)(start, 0.0f, direction, 3.402823466e38f);
   next_paths[to].skip = hit.triangle;

@@ -5,8 +5,10 @@
 
 #include "shared/light_layout.h"
 #include "shared/random.h"
+#include "shared/sh.h"
 
 #define RS_PI 3.14159265358979f
+#define RS_TRIANGLE_FLOATS 24  // of its vertices
 
 float3 load3(const float* p) { return (float3)(p[0], p[1], p[2]); }
 
@@ -120,16 +122,46 @@ float3 start_off_surface(float3 p, float3 n, float3 d, float offset) {
   return p + offset * (n - 0.5f * d);
 }
 
+// Where a ray along d meets a triangle. vertices: per triangle three corners of eight floats
+// (position, normal, uv); a flat triangle has zero normals.
+typedef struct {
+  float3 position;
+  float3 normal;   // of the triangle, turned against d
+  float3 shading;  // between those of the corners, on the same side
+  float offset;    // of rays that start there
+  bool entering;   // d comes from the triangle's outside
+} SurfacePoint;
+
+SurfacePoint surface_point(__global const float* vertices,
+                           const RsSurfaceHit* hit,
+                           const float3 d) {
+  __global const float* v = vertices + (size_t)hit->triangle * RS_TRIANGLE_FLOATS;
+  const float3 a = vload3(0, v), b = vload3(0, v + 8), c = vload3(0, v + 16);
+  const float w = 1.0f - hit->u - hit->v;
+  SurfacePoint out;
+  out.position = w * a + hit->u * b + hit->v * c;
+  const float3 normal = normalize(cross(b - a, c - a));
+  out.entering = dot(d, normal) < 0.0f;
+  out.normal = out.entering ? normal : -normal;
+  const float3 between =
+      w * vload3(0, v + 3) + hit->u * vload3(0, v + 11) + hit->v * vload3(0, v + 19);
+  const float length2 = dot(between, between);
+  const float3 shading = length2 > 1e-12f ? between * rsqrt(length2) : out.normal;
+  out.shading = dot(shading, out.normal) < 0.0f ? -shading : shading;
+  out.offset = surface_offset(out.position, a, b, c);
+  return out;
+}
+
+// Its texture coordinates.
+float2 surface_uv(__global const float* vertices, const RsSurfaceHit* hit) {
+  __global const float* v = vertices + (size_t)hit->triangle * RS_TRIANGLE_FLOATS;
+  return (1.0f - hit->u - hit->v) * vload2(0, v + 6) + hit->u * vload2(0, v + 14) +
+         hit->v * vload2(0, v + 22);
+}
+
 float3 environment_light(__global const RsEnvironment* environment, float3 n) {
-  const float basis[9] = {0.282094792f,
-                          0.488602512f * n.y,
-                          0.488602512f * n.z,
-                          0.488602512f * n.x,
-                          1.092548431f * n.x * n.y,
-                          1.092548431f * n.y * n.z,
-                          0.315391565f * (3.0f * n.z * n.z - 1.0f),
-                          1.092548431f * n.x * n.z,
-                          0.546274215f * (n.x * n.x - n.y * n.y)};
+  float basis[9];
+  rs_sh_basis(2, n.x, n.y, n.z, basis);
   float3 sum = (float3)(0.0f);
   for (int k = 0; k < 9; ++k) sum += basis[k] * vload3(k, environment->light);
   return fmax(sum, (float3)(0.0f));

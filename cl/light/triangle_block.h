@@ -7,7 +7,7 @@
 #define RS_LIGHT_TRIANGLE_BLOCK_H
 
 #define RS_EXACT_SLABS
-#include "bvh/lbvh_node.h"
+#include "bvh/tree_walk.h"
 #include "shared/light_layout.h"
 #include "shared/tree_layout.h"
 
@@ -25,20 +25,23 @@ typedef struct {
   float sx, sy, sz;
 } ShearedRay;
 
-ShearedRay sheared_ray(const RayData* ray) {
-  const float o[3] = {ray->o.x, ray->o.y, ray->o.z};
-  const float d[3] = {ray->d.x, ray->d.y, ray->d.z};
+// Not an array: indexed by a number that is not known, it would lie in memory.
+RS_INLINE float along_axis(const float3 v, const int axis) {
+  return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+}
+
+RS_INLINE ShearedRay sheared_ray(const RayData* ray) {
+  const float3 o = ray->o, d = ray->d;
   ShearedRay out;
-  out.z = fabs(d[0]) > fabs(d[1]) ? (fabs(d[0]) > fabs(d[2]) ? 0 : 2)
-                                  : (fabs(d[1]) > fabs(d[2]) ? 1 : 2);
+  out.z = fabs(d.x) > fabs(d.y) ? (fabs(d.x) > fabs(d.z) ? 0 : 2) : (fabs(d.y) > fabs(d.z) ? 1 : 2);
   out.x = out.z == 2 ? 0 : out.z + 1;
   out.y = out.x == 2 ? 0 : out.x + 1;
-  out.ox = o[out.x];
-  out.oy = o[out.y];
-  out.oz = o[out.z];
-  out.sx = d[out.x] / d[out.z];
-  out.sy = d[out.y] / d[out.z];
-  out.sz = 1.0f / d[out.z];
+  out.ox = along_axis(o, out.x);
+  out.oy = along_axis(o, out.y);
+  out.oz = along_axis(o, out.z);
+  out.sx = along_axis(d, out.x) / along_axis(d, out.z);
+  out.sy = along_axis(d, out.y) / along_axis(d, out.z);
+  out.sz = 1.0f / along_axis(d, out.z);
   return out;
 }
 
@@ -54,11 +57,11 @@ typedef struct {
 } TriangleMeeting;
 
 // Triangles whose plane the ray crosses inside, in (t_min, t_max], one bit each.
-uint ray_meets_triangles(const ShearedRay* ray,
-                         __global const fv* block,
-                         float t_min,
-                         float t_max,
-                         TriangleMeeting* meeting) {
+RS_INLINE uint ray_meets_triangles(const ShearedRay* ray,
+                                   __global const fv* block,
+                                   float t_min,
+                                   float t_max,
+                                   TriangleMeeting* meeting) {
   const fv az = block[ray->z] - ray->oz;
   const fv bz = block[3 + ray->z] - ray->oz;
   const fv cz = block[6 + ray->z] - ray->oz;

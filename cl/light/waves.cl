@@ -70,8 +70,7 @@ __kernel void results_of_picture(const uint count,
   results[i] = (float8)(at[0], at[plane], at[2 * plane], at[3 * plane], 0.0f, 0.0f, 0.0f, 0.0f);
 }
 
-// vertices: per triangle three corners of eight floats (position, normal, uv); a flat triangle has
-// zero normals. materials_of: one per triangle.
+// vertices: as for surface_point(). materials_of: one per triangle.
 __kernel void load_surfaces(const uint count,
                             __global const RsSurfaceHit* restrict hits,
                             __global const float* restrict vertices,
@@ -99,32 +98,22 @@ __kernel void load_surfaces(const uint count,
   s.offset = 0.0f;
   for (int k = 0; k < 3; ++k) s.position[k] = s.shading[k] = s.normal[k] = s.color[k] = 0.0f;
   if (hit.triangle >= 0 && !paths[i].blind) {
-    __global const float* v = vertices + (size_t)hit.triangle * 24;
-    const float3 a = vload3(0, v), b = vload3(0, v + 8), c = vload3(0, v + 16);
-    const float w = 1.0f - hit.u - hit.v;
-    const float3 d = ray.s456;
-    float3 normal = normalize(cross(b - a, c - a));
-    s.entering = dot(d, normal) < 0.0f;
-    if (!s.entering) normal = -normal;
-    float3 shading = w * vload3(0, v + 3) + hit.u * vload3(0, v + 11) + hit.v * vload3(0, v + 19);
-    const float length2 = dot(shading, shading);
-    shading = length2 > 1e-12f ? shading * rsqrt(length2) : normal;
-    if (dot(shading, normal) < 0.0f) shading = -shading;
-    const float3 p = w * a + hit.u * b + hit.v * c;
-    s.offset = surface_offset(p, a, b, c);
+    const SurfacePoint point = surface_point(vertices, &hit, ray.s456);
+    s.entering = point.entering;
+    s.offset = point.offset;
     s.material = (int)materials_of[hit.triangle];
     float3 color = vload3(0, materials[s.material].color);
     const int texture = materials[s.material].texture;
     if (texture >= 0) {
       const RsTexture t = textures[texture];
-      const float x = w * v[6] + hit.u * v[14] + hit.v * v[22];
-      const float y = w * v[7] + hit.u * v[15] + hit.v * v[23];
-      color *= bilinear(texels + 3 * (size_t)t.offset, t.width, t.height, (x - floor(x)) * t.width,
-                        (y - floor(y)) * t.height, true);
+      const float2 uv = surface_uv(vertices, &hit);
+      const float2 at = uv - floor(uv);
+      color *= bilinear(texels + 3 * (size_t)t.offset, t.width, t.height, at.x * t.width,
+                        at.y * t.height, true);
     }
-    vstore3(p, 0, s.position);
-    vstore3(shading, 0, s.shading);
-    vstore3(normal, 0, s.normal);
+    vstore3(point.position, 0, s.position);
+    vstore3(point.shading, 0, s.shading);
+    vstore3(point.normal, 0, s.normal);
     vstore3(color, 0, s.color);
   }
   surfaces[i] = s;

@@ -34,11 +34,11 @@ typedef struct {
   // Read only.
   __global const float* records;
   LineSums sums;
-  float16 screen;   // of RsRaySums
-  float4 gradient;  // of the ray's colour and alpha
-  float sky;        // background . gradient
-  float total;      // final colour . gradient + final alpha * gradient of alpha
-  int total_hits;   // of the ray
+  float3 screen_x, screen_y, screen_z;  // rows of RsRaySums::screen
+  float4 gradient;                      // of the ray's colour and alpha
+  float sky;                            // background . gradient
+  float total;                          // final colour . gradient + final alpha * gradient of alpha
+  int total_hits;                       // of the ray
   // What a walk needs, and the part of `total` that is blended.
   float transmittance;
   int hits;
@@ -53,14 +53,14 @@ typedef struct {
 
 // Adds what one hit contributes: `by_alpha` = dL/dalpha, `by_color` = dL/dcolour, zero where the
 // colour is clamped.
-void add_hit(const RayScene* scene,
-             const RayData* ray,
-             const float* basis_of_ray,
-             const uint index,
-             const float alpha,
-             const float by_alpha,
-             const float3 by_color,
-             RayState* state) {
+RS_INLINE void add_hit(const RayScene* scene,
+                       const RayData* ray,
+                       const float* basis_of_ray,
+                       const uint index,
+                       const float alpha,
+                       const float by_alpha,
+                       const float3 by_color,
+                       RayState* state) {
   const float16 record = *(__global const float16*)(state->records + (size_t)index * 16);
   const float3 x = record.s012, y = record.s345, z = record.s678;  // rows of M = S^-1 R^T
   const float3 offset = ray->o - record.s9ab;
@@ -77,9 +77,8 @@ void add_hit(const RayScene* scene,
   state->by_origin -= by_mean;
   state->by_direction += dot(o, d) / dot(d, d) * by_mean;
 #endif
-  const float16 s = state->screen;
-  const float3 on_screen =
-      (float3)(dot(s.s012, by_mean), dot(s.s345, by_mean), dot(s.s678, by_mean));
+  const float3 on_screen = (float3)(dot(state->screen_x, by_mean), dot(state->screen_y, by_mean),
+                                    dot(state->screen_z, by_mean));
   float16 sum;
   sum.s012 = by_v;
   sum.s345 = g * v.x * v;
@@ -135,12 +134,47 @@ void add_hit(const RayScene* scene,
   rs_add_line(&state->sums, (size_t)index * RS_RAY_LINES, sum);
 }
 
-void blend_hits(const RayScene* scene,
-                const RayData* ray,
-                const float* basis,
-                Pending* pending,
-                int count,
-                RayState* state) {
+#if KEPT
+// From the nearest hit on: what lies behind each is the known result minus what is blended, but for
+// the last of the ray.
+RS_INLINE void blend_hits(const RayScene* scene,
+                          const RayData* ray,
+                          const float* basis,
+                          const Pending* pending,
+                          const int count,
+                          RayState* state) {
+  const float3 gradient = state->gradient.xyz;
+  for (int k = 0; k < count && !state->stopped; ++k) {
+    if (state->hits == scene->max_hits) {
+      state->stopped = true;
+      return;
+    }
+    const uint index = pending_index(scene->tree.blocks, pending, k);
+    const float alpha = pending_alpha(pending, k);
+    const float3 color = hit_color(scene, ray, basis, pending, k).xyz;
+    const float projected = dot(color, gradient) + state->gradient.w;
+    const float before = state->transmittance;
+    state->blended += before * alpha * projected;
+    state->transmittance = before * (1.0f - alpha);
+    ++state->hits;
+    state->last_key = pending_key(pending, k);
+    state->last_index = index;
+    state->stopped = state->transmittance < scene->min_transmittance;
+    const bool last = state->stopped || state->hits == state->total_hits;
+    const float behind = last ? state->sky : (state->total - state->blended) / state->transmittance;
+    // Nothing passes where the colour is clamped.
+    const float3 by_color =
+        color > 0.0f && color < RS_MAX_COLOR ? before * alpha * gradient : (float3)(0.0f);
+    add_hit(scene, ray, basis, index, alpha, before * (projected - behind), by_color, state);
+  }
+}
+#else
+RS_INLINE void blend_hits(const RayScene* scene,
+                          const RayData* ray,
+                          const float* basis,
+                          Pending* pending,
+                          int count,
+                          RayState* state) {
   // Of evaluated entries the opacity is no longer needed: it makes room for the transmittance.
   float* before = pending->opacity;
   int blended = 0;
@@ -150,7 +184,7 @@ void blend_hits(const RayScene* scene,
       break;
     }
     const int i = pending->order[blended++];
-    pending->color[i] = hit_color(scene, ray, basis, pending, i);
+    pending->color[i] = hit_color(scene, ray, basis, pending, blended - 1);
     before[i] = state->transmittance;
     state->transmittance *= 1.0f - pending->alpha[i];
     ++state->hits;
@@ -185,6 +219,7 @@ void blend_hits(const RayScene* scene,
     behind = alpha * projected + (1.0f - alpha) * behind;
   }
 }
+#endif
 
 #include "trace/ray_walk.h"
 
@@ -192,25 +227,29 @@ void blend_hits(const RayScene* scene,
 // dL/d(R, G, B, alpha) per ray; records: whitening matrix and mean of every Gaussian
 // (ray_gradients.cl); sums: as for LineSums; slopes: with RAY_SLOPES of every ray the gradients of
 // its origin and direction, four floats each, zeros at first.
-__kernel void ray_backward(const uint first,
-                           const uint last,
-                           const uint chunk,
-                           const uint items,
-                           RS_TREE_ARGUMENTS,
-                           __global const float* restrict sh,
-                           const RsRayWalk walk_argument,
-                           RS_RAY_ARGUMENTS,
-                           __global const float8* restrict results,
-                           __global const float4* restrict gradients,
-                           __global const float* restrict records,
-                           const RsRaySums ray_sums,
-                           __global float* restrict sums,
-                           __global float8* restrict slopes) {
+RS_RAY_KERNEL __kernel void ray_backward(const uint first,
+                                         const uint last,
+                                         const uint chunk,
+                                         const uint items,
+                                         RS_TREE_ARGUMENTS,
+                                         __global const float* restrict sh,
+                                         const RsRayWalk walk_argument,
+                                         RS_RAY_ARGUMENTS,
+                                         __global const float8* restrict results,
+                                         __global const float4* restrict gradients,
+                                         __global const float* restrict records,
+                                         const RsRaySums ray_sums,
+                                         __global float* restrict sums,
+                                         __global float8* restrict slopes) {
   const uint item = get_global_id(0);
   if (item >= items) return;
   const RsRayWalk walk = walk_argument;
-  const float3 background = vload3(0, walk.background);
-  const RayScene scene = ray_scene(levels, level_begin, nodes, blocks, sh, &walk);
+  const float3 background = (float3)(walk.background[0], walk.background[1], walk.background[2]);
+  RayScene scene = ray_scene(levels, level_begin, nodes, blocks, sh, &walk);
+#if KEPT
+  __local HitMemory memory;
+  scene.memory = &memory;
+#endif
   RayState state;
   state.records = records;
 #if PRIVATE_COPIES
@@ -221,7 +260,9 @@ __kernel void ray_backward(const uint first,
 #endif
   state.sums.lines = sums;
   state.sums.limit = ray_sums.limit;
-  state.screen = vload16(0, ray_sums.screen);
+  state.screen_x = (float3)(ray_sums.screen[0], ray_sums.screen[1], ray_sums.screen[2]);
+  state.screen_y = (float3)(ray_sums.screen[3], ray_sums.screen[4], ray_sums.screen[5]);
+  state.screen_z = (float3)(ray_sums.screen[6], ray_sums.screen[7], ray_sums.screen[8]);
   for (size_t begin = first + (size_t)item * chunk; begin < last; begin += (size_t)items * chunk) {
     const size_t end = min(begin + chunk, (size_t)last);
     for (size_t position = begin; position < end; ++position) {
@@ -232,7 +273,7 @@ __kernel void ray_backward(const uint first,
       if (hits == 0 || !any(gradient != 0.0f)) continue;
       const float8 raw = rays[id];
       RayData ray = ray_data(raw);
-      float basis[25];
+      float basis[RS_RAY_FUNCTIONS];
       basis_along_ray(&scene, &ray, basis);
       state.gradient = gradient;
       state.sky = dot(background, gradient.xyz);

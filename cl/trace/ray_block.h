@@ -4,7 +4,7 @@
 #ifndef RS_TRACE_RAY_BLOCK_H
 #define RS_TRACE_RAY_BLOCK_H
 
-#include "bvh/lbvh_node.h"
+#include "bvh/tree_walk.h"
 #include "shared/layout.h"
 #include "shared/tree_layout.h"
 
@@ -33,49 +33,79 @@
 #error "the colours are the end of a block"
 #endif
 
+// On GPUs one Gaussian of the block after the other: four at once would take twice the registers.
+#if TRAIL
+typedef float bv;
+typedef int bi;
+typedef struct {
+  float v;
+} BlockLanes;
+#define RS_BLOCK_VALUE(block, k, lane) (((__global const float*)((block) + (k)))[lane])
+#define RS_BLOCK_MASK(comparison) (-(comparison))
+#define rs_block_any(mask) ((mask) != 0)
+#define rs_block_bits(mask) ((uint)((mask)&1))
+#else
+typedef fv bv;
+typedef iv bi;
+typedef RayLanes BlockLanes;
+#define RS_BLOCK_VALUE(block, k, lane) ((block)[k])
+#define RS_BLOCK_MASK(comparison) RS_MASK(comparison)
+#define rs_block_any(mask) rs_any(mask)
+#define rs_block_bits(mask) rs_lane_bits(mask)
+#endif
+
 // How a ray passes the Gaussians of a block, in the space where they are unit spheres.
 typedef struct {
-  RayLanes cross2;      // |o' x d'|^2
-  RayLanes direction2;  // |d'|^2
-  RayLanes along;       // <o', d'>
-  RayLanes origin2;     // |o'|^2
+  BlockLanes cross2;      // |o' x d'|^2
+  BlockLanes direction2;  // |d'|^2
+  BlockLanes along;       // <o', d'>
+  BlockLanes origin2;     // |o'|^2
 } BlockMeeting;
 
 // Gaussians whose ellipsoids the ray's line meets, without those that it cannot hit because of its
-// origin; one bit each. near: axis and depth from the origin that means have to reach, for
-// NEAR_PLANE. cross2 / direction2 is the squared distance of the line: no division.
-uint ray_meets_block(const RayData* ray,
-                     const float4 near,
-                     __global const fv* block,
-                     BlockMeeting* meeting) {
-  const fv a = block[0], b = block[1], c = block[2], d = block[3], e = block[4], f = block[5];
-  const fv x = ray->o.x - block[6], y = ray->o.y - block[7], z = ray->o.z - block[8];
-  const fv ox = a * x + b * y + c * z, oy = d * y + e * z, oz = f * z;
-  const fv dx = a * ray->d.x + b * ray->d.y + c * ray->d.z;
-  const fv dy = d * ray->d.y + e * ray->d.z;
-  const fv dz = f * ray->d.z;
-  const fv dd = dx * dx + dy * dy + dz * dz;
-  const fv cx = oy * dz - oz * dy, cy = oz * dx - ox * dz, cz = ox * dy - oy * dx;
-  const fv cc = cx * cx + cy * cy + cz * cz;
+// origin; one bit each; with TRAIL 1 or 0 for the one in `lane`. near: axis and depth from the
+// origin that means have to reach, for NEAR_PLANE. cross2 / direction2 is the squared distance of
+// the line: no division.
+RS_INLINE uint ray_meets_block(const RayData* ray,
+                               const float4 near,
+                               __global const fv* block,
+                               const uint lane,
+                               BlockMeeting* meeting) {
+  (void)lane;
+  const bv a = RS_BLOCK_VALUE(block, 0, lane), b = RS_BLOCK_VALUE(block, 1, lane);
+  const bv c = RS_BLOCK_VALUE(block, 2, lane), d = RS_BLOCK_VALUE(block, 3, lane);
+  const bv e = RS_BLOCK_VALUE(block, 4, lane), f = RS_BLOCK_VALUE(block, 5, lane);
+  const bv x = ray->o.x - RS_BLOCK_VALUE(block, 6, lane);
+  const bv y = ray->o.y - RS_BLOCK_VALUE(block, 7, lane);
+  const bv z = ray->o.z - RS_BLOCK_VALUE(block, 8, lane);
+  const bv ox = a * x + b * y + c * z, oy = d * y + e * z, oz = f * z;
+  const bv dx = a * ray->d.x + b * ray->d.y + c * ray->d.z;
+  const bv dy = d * ray->d.y + e * ray->d.z;
+  const bv dz = f * ray->d.z;
+  const bv dd = dx * dx + dy * dy + dz * dz;
+  const bv cx = oy * dz - oz * dy, cy = oz * dx - ox * dz, cz = ox * dy - oy * dx;
+  const bv cc = cx * cx + cy * cy + cz * cz;
 #if NEAR_PLANE == 1
-  const iv inside = RS_MASK(cc <= dd) & RS_MASK(-(near.x * x + near.y * y + near.z * z) >= near.w);
+  const bi inside =
+      RS_BLOCK_MASK(cc <= dd) & RS_BLOCK_MASK(-(near.x * x + near.y * y + near.z * z) >= near.w);
 #elif NEAR_PLANE == 2
-  const iv inside = RS_MASK(cc <= dd) & RS_MASK(x * x + y * y + z * z >= near.w * near.w);
+  const bi inside =
+      RS_BLOCK_MASK(cc <= dd) & RS_BLOCK_MASK(x * x + y * y + z * z >= near.w * near.w);
 #else
   (void)near;
-  const iv inside = RS_MASK(cc <= dd);
+  const bi inside = RS_BLOCK_MASK(cc <= dd);
 #endif
-  if (!rs_any(inside)) return 0;
-  const fv along = ox * dx + oy * dy + oz * dz;
-  const fv origin2 = ox * ox + oy * oy + oz * oz;
+  if (!rs_block_any(inside)) return 0;
+  const bv along = ox * dx + oy * dy + oz * dz;
+  const bv origin2 = ox * ox + oy * oy + oz * oz;
   meeting->cross2.v = cc;
   meeting->direction2.v = dd;
   meeting->along.v = along;
   meeting->origin2.v = origin2;
 #if PEAK_ORDER
-  return rs_lane_bits(inside & RS_MASK(along <= 0.0f));
+  return rs_block_bits(inside & RS_BLOCK_MASK(along <= 0.0f));
 #else
-  return rs_lane_bits(inside & RS_MASK(along < 0.0f) & RS_MASK(origin2 >= 1.0f));
+  return rs_block_bits(inside & RS_BLOCK_MASK(along < 0.0f) & RS_BLOCK_MASK(origin2 >= 1.0f));
 #endif
 }
 
@@ -93,7 +123,7 @@ uint block_index(__global const fv* block, uint lane) {
   return ((__global const uint*)(block + RS_BLOCK_INDEX))[lane];
 }
 
-float4 block_color(__global const fv* block, uint lane) {
+RS_INLINE float4 block_color(__global const fv* block, uint lane) {
   return vload4(lane, (__global const float*)(block + RS_BLOCK_COLOR));
 }
 

@@ -9,15 +9,21 @@
 #include "shared/sh.h"
 #include "trace/arguments.h"
 #include "trace/ray_block.h"
+
+// Hits that a ray keeps on GPUs (ray_nearest.h); 0 = all of a walk, in private memory.
+#ifndef KEPT
+#define KEPT 0
+#endif
+#if KEPT
+#include "trace/ray_nearest.h"
+#else
 #include "trace/ray_pending.h"
+#endif
 
 // What all rays of a launch share.
 typedef struct {
-  __global const uint* level_begin;  // first node of level l, from 1
-  __global const fv* nodes;
-  __global const fv* blocks;
+  RayTree tree;
   __global const float* sh;
-  int levels;
   int sh_coefficients;
   int active_degree;
   int color_from_origin;
@@ -25,56 +31,61 @@ typedef struct {
   float min_transmittance;
   int max_hits;
   float4 near;  // of ray_meets_block()
+#if KEPT
+  __local HitMemory* memory;
+#endif
 } RayScene;
 
-RayScene ray_scene(RS_TREE_ARGUMENTS, __global const float* restrict sh, const RsRayWalk* walk) {
-  const RayScene scene = {level_begin,
-                          nodes,
-                          blocks,
-                          sh,
-                          levels,
-                          walk->sh_coefficients,
-                          walk->active_degree,
-                          walk->color_from_origin,
-                          walk->quantile,
-                          walk->min_transmittance,
-                          walk->max_hits,
-                          vload4(0, walk->near)};
+RS_INLINE RayScene ray_scene(RS_TREE_ARGUMENTS,
+                             __global const float* restrict sh,
+                             const RsRayWalk* walk) {
+  RayScene scene = {{levels, level_begin, nodes, blocks},
+                    sh,
+                    walk->sh_coefficients,
+                    walk->active_degree,
+                    walk->color_from_origin,
+                    walk->quantile,
+                    walk->min_transmittance,
+                    walk->max_hits,
+                    (float4)(walk->near[0], walk->near[1], walk->near[2], walk->near[3])};
   return scene;
 }
 
 // The basis along the ray, for colours that do not come from its origin.
-void basis_along_ray(const RayScene* scene, const RayData* ray, float* basis) {
+RS_INLINE void basis_along_ray(const RayScene* scene, const RayData* ray, float* basis) {
   if (scene->active_degree == 0 || scene->color_from_origin) return;
   const float3 n = ray->d * rsqrt(fmax(dot(ray->d, ray->d), 1e-38f));
   rs_sh_basis(scene->active_degree, n.x, n.y, n.z, basis);
 }
 
-float4 hit_color(const RayScene* scene,
-                 const RayData* ray,
-                 const float* ray_basis,
-                 const Pending* pending,
-                 int entry) {
+// Of hit k from the nearest.
+RS_INLINE float4 hit_color(const RayScene* scene,
+                           const RayData* ray,
+                           const float* ray_basis,
+                           const Pending* pending,
+                           const int k) {
   const int degree = scene->active_degree;
-  if (degree == 0) return pending->color[entry];
-  const uint slot = pending->slot[entry];
+  __global const fv* blocks = scene->tree.blocks;
+  if (degree == 0) return pending_color(blocks, pending, k);
+  const uint slot = pending_slot(pending, k);
   float own_basis[25];
   const float* basis = ray_basis;
   if (scene->color_from_origin) {
     __global const float* mean =
-        (__global const float*)(scene->blocks + slot / PACKET * RS_BLOCK_VECTORS) + 6 * PACKET +
+        (__global const float*)(blocks + slot / PACKET * RS_BLOCK_VECTORS) + 6 * PACKET +
         slot % PACKET;
     const float3 v = (float3)(mean[0], mean[PACKET], mean[2 * PACKET]) - ray->o;
     const float3 n = v * rsqrt(fmax(dot(v, v), 1e-30f));
     rs_sh_basis(degree, n.x, n.y, n.z, own_basis);
     basis = own_basis;
   }
-  __global const float* c = scene->sh + (size_t)pending->index[entry] * 3 * scene->sh_coefficients;
+  __global const float* c =
+      scene->sh + (size_t)pending_index(blocks, pending, k) * 3 * scene->sh_coefficients;
   const int active = (degree + 1) * (degree + 1);
   float3 even = (float3)(0.5f), odd = (float3)(0.0f);
   even += basis[0] * vload3(0, c);
-  for (int k = 1; k < active; k += 2) odd += basis[k] * vload3(k, c);
-  for (int k = 2; k < active; k += 2) even += basis[k] * vload3(k, c);
+  for (int j = 1; j < active; j += 2) odd += basis[j] * vload3(j, c);
+  for (int j = 2; j < active; j += 2) even += basis[j] * vload3(j, c);
   return (float4)(fmin(fmax(even + odd, (float3)(0.0f)), (float3)(RS_MAX_COLOR)), 0.0f);
 }
 

@@ -175,6 +175,20 @@ void pending_sort(Pending* pending) {
   }
 }
 
+// Of hit k from the nearest, after pending_sort.
+float pending_key(const Pending* p, const int k) { return p->key.s[p->order[k]]; }
+float pending_alpha(const Pending* p, const int k) { return p->alpha[p->order[k]]; }
+float pending_peak(const Pending* p, const int k) { return p->peak[p->order[k]]; }
+uint pending_slot(const Pending* p, const int k) { return p->slot[p->order[k]]; }
+uint pending_index(__global const fv* blocks, const Pending* p, const int k) {
+  (void)blocks;
+  return p->index[p->order[k]];
+}
+float4 pending_color(__global const fv* blocks, const Pending* p, const int k) {
+  (void)blocks;
+  return p->color[p->order[k]];
+}
+
 // Keeps the entries whose keys are at most `end`.
 void pending_cut(Pending* pending, float end) {
   int kept = 0;

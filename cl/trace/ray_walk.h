@@ -9,6 +9,8 @@
 // blended. A full list blends what no unvisited box can precede; if that frees too little, the
 // farthest hits are dropped, and another walk continues behind the last blended (key, index).
 //
+// With KEPT, a walk ends with the nearest few hits (ray_nearest.h).
+//
 // Who includes this defines RayState, with at least the members
 //   float transmittance; int hits; bool stopped; float last_key; uint last_index;
 // (1, 0, false, -1, 0 before the walk) and
@@ -19,6 +21,78 @@
 #define RS_TRACE_RAY_WALK_H
 
 #include "trace/ray_color.h"
+
+#if KEPT
+
+#define RS_RAY_KERNEL __attribute__((reqd_work_group_size(GROUP, 1, 1)))
+
+RS_INLINE void walk_ray(
+    const RayScene* scene, const float t_max, const float* basis, RayData* ray, RayState* state) {
+  const float half_quantile = 0.5f * scene->quantile;
+  Pending pending;
+  pending.memory = scene->memory;
+  pending.column = get_local_id(0);
+  __global const fv* blocks = scene->tree.blocks;
+  float begin = ray->t_min;
+  uint begin_index = 0;  // least index that counts at `begin`
+  bool again = true;
+  while (again) {
+    float end = t_max;
+    pending.size = 0;
+    pending.remaining = state->transmittance;
+    TreeWalk walk;
+    walk_begin(&walk, &scene->tree, ray->t_min);
+    uint bits, first_block;
+    while ((bits = walk_next(&walk, &scene->tree, ray, end, &first_block)) != 0) {
+      for (; bits != 0; bits &= bits - 1) {
+        const uint number_of_block = first_block + rs_lowest_bit(bits);
+        __global const fv* block = blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
+        BlockMeeting meeting;
+#pragma unroll 1
+        for (uint lane = 0; lane < PACKET; ++lane) {
+          if (!ray_meets_block(ray, scene->near, block, lane, &meeting)) continue;
+          const float cross2 = meeting.cross2.v, direction2 = meeting.direction2.v;
+          const float along = meeting.along.v;
+          const float reciprocal = 1.0f / direction2;
+          const float peak = -along * reciprocal;
+#if PEAK_ORDER
+          const float key = peak;
+#else
+          // The far root times |d'|^2, then the near root by Viete's formula.
+          const float root = sqrt(fmax(direction2 - cross2, 0.0f)) - along;
+          if (!(root > 0.0f)) continue;
+          const float key = (meeting.origin2.v - 1.0f) / root;
+#endif
+          if (!(key >= begin && key <= end)) continue;
+          const uint index = block_index(block, lane);
+          if (key == begin && index < begin_index) continue;
+#if ADAPTIVE_RADIUS
+          const float exponent = block_half_quantile(block, lane);
+#else
+          const float exponent = half_quantile;
+#endif
+          const float alpha =
+              block_opacity(block, lane) * rs_exp((fv)(-exponent * cross2 * reciprocal)).x;
+          pending_insert(blocks, &pending, key, alpha, peak, number_of_block * PACKET + lane,
+                         index);
+          const bool ends = pending.remaining < scene->min_transmittance &&
+                            pending_end(&pending, scene->min_transmittance, state->transmittance);
+          if (ends || pending.size == KEPT) end = pending_key(&pending, pending.size - 1);
+        }
+      }
+    }
+    again = pending.size == KEPT;
+    blend_hits(scene, ray, basis, &pending, pending.size, state);
+    if (state->stopped) break;
+    // The next walk begins behind the last blended hit.
+    ray->t_min = begin = fmax(ray->t_min, state->last_key);
+    begin_index = state->last_index + 1;
+  }
+}
+
+#else
+
+#define RS_RAY_KERNEL
 
 // Slack that keeps a hit from being taken for nearer than an unvisited box by rounding.
 #define RS_BOUND_SLACK 0.999999f
@@ -42,52 +116,28 @@ int sort_to_end(const RayScene* scene, const RayState* state, Pending* pending, 
 }
 
 // The hits of a ray with keys up to t_max, from ray->t_min on, which moves with every further walk.
-void walk_ray(
+RS_INLINE void walk_ray(
     const RayScene* scene, const float t_max, const float* basis, RayData* ray, RayState* state) {
   const float half_quantile = 0.5f * scene->quantile;
   Pending pending;
   PendingRange range = {ray->t_min, t_max, 0, 0xffffffffu, false};
-  bool again = scene->levels > 0;
+  bool again = scene->tree.levels > 0;
   while (again) {
     again = false;
     pending.size = pending.evaluated = 0;
     float remaining = state->transmittance;  // behind all evaluated hits
     float hopeful = remaining;               // no more than is left behind all hits
     int sorted = 0;                          // size after the last sort
-    float stack_entry[RS_NODE_STACK];
-    uint stack_node[RS_NODE_STACK];  // level in the lowest four bits
-    int top = 1;
-    stack_entry[0] = ray->t_min;
-    stack_node[0] = (uint)scene->levels;
-    while (top > 0 && !state->stopped) {
-      const float node_entry = stack_entry[--top];
-      if (!(node_entry <= range.end)) continue;
-      const uint level = stack_node[top] & 15;
-      const uint number = stack_node[top] >> 4;
-      RayLanes entry;
-      uint bits = ray_meets_boxes(
-          ray, scene->nodes + (size_t)(scene->level_begin[level] + number) * RS_NODE_VECTORS,
-          range.end, &entry.v);
-      if (level > 1) {
-        const int bottom = top;
-        for (; bits != 0; bits &= bits - 1) {
-          const uint lane = rs_lowest_bit(bits);
-          const float t = entry.s[lane];
-          int j = top++;
-          for (; j > bottom && stack_entry[j - 1] < t; --j) {
-            stack_entry[j] = stack_entry[j - 1];
-            stack_node[j] = stack_node[j - 1];
-          }
-          stack_entry[j] = t;
-          stack_node[j] = (number * PACKET + lane) << 4 | (level - 1);
-        }
-        continue;
-      }
+    TreeWalk walk;
+    walk_begin(&walk, &scene->tree, ray->t_min);
+    uint bits, first_block;
+    while (!state->stopped &&
+           (bits = walk_next(&walk, &scene->tree, ray, range.end, &first_block)) != 0) {
       for (; bits != 0; bits &= bits - 1) {
-        const uint number_of_block = number * PACKET + rs_lowest_bit(bits);
-        __global const fv* block = scene->blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
+        const uint number_of_block = first_block + rs_lowest_bit(bits);
+        __global const fv* block = scene->tree.blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
         BlockMeeting meeting;
-        for (uint hits = ray_meets_block(ray, scene->near, block, &meeting); hits != 0;
+        for (uint hits = ray_meets_block(ray, scene->near, block, 0, &meeting); hits != 0;
              hits &= hits - 1) {
           const uint lane = rs_lowest_bit(hits);
           pending_append(&pending, &meeting, block, number_of_block * PACKET + lane, lane);
@@ -115,10 +165,7 @@ void walk_ray(
         if (count <= PENDING - PACKET) {
           if (end > 0) pending_cut(&pending, range.end);
         } else {
-          // Boxes on the stack and in this node begin behind `bound`.
-          float bound = node_entry;
-          for (int k = 0; k < top; ++k) bound = fmin(bound, stack_entry[k]);
-          bound *= RS_BOUND_SLACK;
+          const float bound = RS_BOUND_SLACK * walk_bound(&walk);
           int ready = 0;
           while (ready < count && pending.key.s[pending.order[ready]] < bound) ++ready;
           blend_hits(scene, ray, basis, &pending, ready, state);
@@ -149,5 +196,7 @@ void walk_ray(
     range.end_index = 0xffffffffu;
   }
 }
+
+#endif
 
 #endif

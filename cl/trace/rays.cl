@@ -22,22 +22,22 @@ typedef struct {
 #endif
 } RayState;
 
-void blend_hits(const RayScene* scene,
-                const RayData* ray,
-                const float* ray_basis,
-                const Pending* pending,
-                int count,
-                RayState* state) {
+RS_INLINE void blend_hits(const RayScene* scene,
+                          const RayData* ray,
+                          const float* ray_basis,
+                          const Pending* pending,
+                          int count,
+                          RayState* state) {
   for (int k = 0; k < count; ++k) {
     if (state->hits == scene->max_hits) {
       state->capped = state->stopped = true;
       return;
     }
-    const int i = pending->order[k];
-    const float alpha = pending->alpha[i], peak = pending->peak[i];
+    const float alpha = pending_alpha(pending, k), peak = pending_peak(pending, k);
+    const uint index = pending_index(scene->tree.blocks, pending, k);
     const float before = state->transmittance;
     const float weight = before * alpha;
-    state->color += weight * hit_color(scene, ray, ray_basis, pending, i);
+    state->color += weight * hit_color(scene, ray, ray_basis, pending, k);
     state->depth_sum += weight * peak;
     state->transmittance = before * (1.0f - alpha);
     const bool middle = before >= 0.5f && state->transmittance < 0.5f;
@@ -45,12 +45,12 @@ void blend_hits(const RayScene* scene,
 #if LEADING
     if (middle || (before >= 0.5f && weight > state->most)) {
       state->most = weight;
-      state->leading = pending->index[i];
+      state->leading = index;
     }
 #endif
     ++state->hits;
-    state->last_key = pending->key.s[i];
-    state->last_index = pending->index[i];
+    state->last_key = pending_key(pending, k);
+    state->last_index = index;
     if (state->transmittance < scene->min_transmittance) {
       state->stopped = true;
       return;
@@ -64,19 +64,23 @@ void blend_hits(const RayScene* scene,
 // the word of the hits is the Gaussian that leads them: of the median depth, or the one that shows
 // most where there is none.
 // from_origin: of every ray, read where the launch's color_from_origin is 2.
-__kernel void trace_rays(const uint ray_count,
-                         const uint rays_per_item,
-                         RS_TREE_ARGUMENTS,
-                         __global const float* restrict sh,
-                         const RsRayWalk walk_argument,
-                         RS_RAY_ARGUMENTS,
-                         __global const uint* restrict from_origin,
-                         __global float8* restrict results) {
+RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
+                                       const uint rays_per_item,
+                                       RS_TREE_ARGUMENTS,
+                                       __global const float* restrict sh,
+                                       const RsRayWalk walk_argument,
+                                       RS_RAY_ARGUMENTS,
+                                       __global const uint* restrict from_origin,
+                                       __global float8* restrict results) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
   const RsRayWalk walk = walk_argument;
-  const float3 background = vload3(0, walk.background);
+  const float3 background = (float3)(walk.background[0], walk.background[1], walk.background[2]);
   RayScene scene = ray_scene(levels, level_begin, nodes, blocks, sh, &walk);
+#if KEPT
+  __local HitMemory memory;
+  scene.memory = &memory;
+#endif
   for (uint position = first; position < last; ++position) {
     const size_t id = ordered ? ray_order[position] : position;
     const float8 raw = rays[id];

@@ -45,7 +45,7 @@ struct Context::Impl {
   Profiler profiler;
   std::unique_ptr<Canaries> canaries;  // usually none
   FaultInjection faults;
-  bool check_arguments = false;  // RAYSPLATS_CHECK_ARGUMENTS
+  bool check_arguments = false;                 // RAYSPLATS_CHECK_ARGUMENTS
   std::map<std::string, cl::Program> programs;  // by program path and build options
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "raysplats/error.hpp"
+#include "shared/sh.h"
 
 namespace raysplats {
 namespace {
@@ -35,16 +36,12 @@ Frame frame_of(const Environment& environment) {
   return frame;
 }
 
-std::array<double, 9> basis(const glm::dvec3& n) {
-  return {0.282094792,
-          0.488602512 * n.y,
-          0.488602512 * n.z,
-          0.488602512 * n.x,
-          1.092548431 * n.x * n.y,
-          1.092548431 * n.y * n.z,
-          0.315391565 * (3 * n.z * n.z - 1),
-          1.092548431 * n.x * n.z,
-          0.546274215 * (n.x * n.x - n.y * n.y)};
+// As the kernels take it.
+std::array<float, 9> basis(const glm::dvec3& n) {
+  std::array<float, 9> out;
+  rs_sh_basis(2, static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z),
+              out.data());
+  return out;
 }
 
 // Coefficients of the cosine-weighted mean over the hemisphere: those of the radiance times 1, 2/3
@@ -52,19 +49,19 @@ std::array<double, 9> basis(const glm::dvec3& n) {
 std::array<double, 27> light_coefficients(const Environment& environment, const Frame& frame) {
   std::array<double, 27> sums{};
   const auto add = [&](const glm::dvec3& direction, const glm::dvec3& color, double solid_angle) {
-    const std::array<double, 9> b = basis(direction);
+    const std::array<float, 9> b = basis(direction);
     for (std::size_t k = 0; k < 9; ++k) {
       const double band = k == 0 ? 1.0 : (k < 4 ? 2.0 / 3.0 : 0.25);
       for (std::size_t c = 0; c < 3; ++c) {
-        sums[3 * k + c] += band * b[k] * color[static_cast<int>(c)] * solid_angle *
-                           static_cast<double>(environment.color[c]);
+        sums[3 * k + c] += band * static_cast<double>(b[k]) * color[static_cast<int>(c)] *
+                           solid_angle * static_cast<double>(environment.color[c]);
       }
     }
   };
   const Image& image = environment.equirect;
   if (image.pixels() == 0) {
     for (std::size_t c = 0; c < 3; ++c) {
-      sums[c] = static_cast<double>(environment.color[c]) / 0.282094792;
+      sums[c] = static_cast<double>(environment.color[c]) / static_cast<double>(basis(frame.up)[0]);
     }
     return sums;
   }

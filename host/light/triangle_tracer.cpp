@@ -8,6 +8,7 @@
 
 #include "raysplats/error.hpp"
 #include "shared/tree_layout.h"
+#include "trace/ray_launch.hpp"
 
 namespace raysplats {
 namespace {
@@ -82,7 +83,7 @@ void TriangleTracer::launch_rays(const char* kernel,
   const std::size_t each = cpu ? kCpuRaysPerItem : 1;
   launch_in_bands(*context_, budget_,
                   context_->kernel("light/surface_rays.cl", kernel,
-                                   BuildOptions().define("PACKET", tree_.lanes())),
+                                   tree_walk_build(context_->device(), tree_.lanes())),
                   (count + each - 1) / each, cpu ? 1 : kGroup, u32(count), u32(each),
                   tree_.arguments(blocks_), arguments...);
 }

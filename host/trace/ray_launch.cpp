@@ -9,11 +9,19 @@ namespace raysplats {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-// Hits that a ray keeps before it blends; private memory is dear on GPUs.
-constexpr int kCpuPending = 256;
-constexpr int kPending = 64;
+// Hits that a ray keeps before it blends: in private memory on CPUs, else in local memory, of which
+// a group of 64 then takes 7.5 KiB, so that eight groups fit 64 KiB.
+constexpr int kPending = 256;
+constexpr int kKept = 10;
+// Lanes for which tree_walk.h has a trail.
+constexpr int kTrailLanes = 4;
 // Fewer rays than this share too little for a sort to pay.
 constexpr std::size_t kOrderedRays = 4096;
+
+// Private memory is dear on GPUs.
+bool keeps_trail(const DeviceInfo& device, int lanes) {
+  return device.type != DeviceType::kCpu && lanes == kTrailLanes;
+}
 
 }  // namespace
 
@@ -35,16 +43,24 @@ RayNear RayNear::of(const Camera& camera, float near_depth) {
   return out;
 }
 
+BuildOptions tree_walk_build(const DeviceInfo& device, int lanes) {
+  return BuildOptions().define("PACKET", lanes).define("TRAIL", keeps_trail(device, lanes) ? 1 : 0);
+}
+
 BuildOptions ray_walk_build(const DeviceInfo& device,
                             const TraceOptions& options,
                             const RayNear& near,
                             int lanes) {
-  return BuildOptions()
-      .define("PACKET", lanes)
-      .define("NEAR_PLANE", near.kind)
-      .define("PENDING", device.type == DeviceType::kCpu ? kCpuPending : kPending)
+  BuildOptions build = tree_walk_build(device, lanes);
+  build.define("NEAR_PLANE", near.kind)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
       .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
+  if (keeps_trail(device, lanes)) {
+    build.define("KEPT", kKept).define("GROUP", kGroup);
+  } else {
+    build.define("PENDING", kPending);
+  }
+  return build;
 }
 
 RsRayWalk ray_walk(const TraceOptions& options,

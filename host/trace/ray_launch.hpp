@@ -32,6 +32,9 @@ struct RayNear {
   static RayNear of(const Camera& camera, float near_depth);
 };
 
+/// Build options of a kernel that walks rays through an Lbvh (cl/bvh/tree_walk.h).
+BuildOptions tree_walk_build(const DeviceInfo& device, int lanes);
+
 /// Build options of a kernel that walks rays through Gaussians (cl/trace/ray_walk.h).
 BuildOptions ray_walk_build(const DeviceInfo& device,
                             const TraceOptions& options,

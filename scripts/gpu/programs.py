@@ -17,7 +17,7 @@ VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, NEAR_DISTANCE=0, S
 LISTS = dict(TILE=16, PEAK_ORDER=1, LENS=0, VECTOR=1)
 FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, ANGULAR=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1)
 # ray_launch.cpp, ray_backward.cpp.
-WALK = dict(PACKET=4, PENDING=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1)
+WALK = dict(PACKET=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1)
 RAY_BACKWARD = dict(WALK, SH_DEGREE=3, RAY_SLOPES=0, PRIVATE_COPIES=0)
 RAY_GRADIENTS = dict(SIGMOID_SCALE=0, VECTOR=1)
 # image_loss.cpp.
@@ -83,7 +83,7 @@ PROGRAMS = [
     ("validate", "train/validate.cl", {}),
     ("waves", "light/waves.cl", {}),
     ("mirror paths", "light/mirror_paths.cl", {}),
-    ("surface rays", "light/surface_rays.cl", dict(PACKET=4)),
+    ("surface rays", "light/surface_rays.cl", dict(PACKET=4, TRAIL=1)),
     ("triangle blocks", "light/triangle_blocks.cl", dict(PACKET=4)),
     ("ceilings", "bench/ceilings.cl", dict(CHAINS=8)),
 ]
