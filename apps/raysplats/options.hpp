@@ -36,6 +36,7 @@ struct Command {
 };
 Command add_devices_command(CLI::App& app);
 Command add_generate_command(CLI::App& app);
+Command add_prepare_command(CLI::App& app, const GlobalOptions& global);
 Command add_train_command(CLI::App& app, const GlobalOptions& global);
 Command add_render_command(CLI::App& app, const GlobalOptions& global);
 Command add_eval_command(CLI::App& app, const GlobalOptions& global);

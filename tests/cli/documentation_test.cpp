@@ -110,6 +110,8 @@ const std::vector<std::pair<std::string, std::string>> kNotRun{
     {"scripts/reliability/fuzz.sh", "needs a build by clang and 20 minutes"},
     {"build/release/bin/fuzz_seeds", "writes into the source tree"},
     {"cmake --preset asan-ubsan", "another build"},
+    {"raysplats prepare ", "needs COLMAP; tests/cli/prepare_test.cpp"},
+    {"$raysplats prepare ", "needs COLMAP; tests/cli/prepare_test.cpp"},
     {"raysplats view ", "runs until it is ended; tests/view"},
     {"$raysplats view ", "runs until it is ended; tests/view"},
     {"RUSTICL_ENABLE=", "needs another OpenCL platform"},

@@ -25,6 +25,7 @@ TEST_CASE("docs/cli.md lists what -h lists") {
   const std::string page = read_file(std::string(RAYSPLATS_SOURCE_DIR) + "/docs/cli.md");
   for (const std::vector<std::string>& command : {std::vector<std::string>{"devices"},
                                                   {"generate"},
+                                                  {"prepare"},
                                                   {"train"},
                                                   {"render"},
                                                   {"eval"},

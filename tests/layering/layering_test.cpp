@@ -29,6 +29,7 @@ const std::map<std::string, Names> kBelow{{"base", {}},
                                           {"eval", {"io", "light"}},
                                           {"train", {"eval"}},
                                           {"view", {"train"}},
+                                          {"prepare", {"io"}},
                                           {"synth", {"io"}},
                                           {"bench", {"train", "synth"}},
                                           {"reference", {"core"}}};

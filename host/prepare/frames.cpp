@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prepare/frames.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+
+#include "base/number_text.hpp"
+#include "prepare/program.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kCandidates = 3;  ///< frames of which the sharpest is kept
+
+bool is_photo(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array<const char*, 7> kKnown{".jpg",  ".jpeg", ".png", ".tif",
+                                              ".tiff", ".bmp",  ".webp"};
+  return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end();
+}
+
+double brightness(const Image& image, int x, int y) {
+  double sum = 0.0;
+  const int colors = std::min(image.channels, 3);
+  for (int c = 0; c < colors; ++c) sum += static_cast<double>(image.at(x, y, c));
+  return sum / colors;
+}
+
+double seconds_of(const fs::path& video, const fs::path& log, const std::function<bool()>& stop) {
+  std::string last;
+  run_program(
+      find_program("ffprobe", "ffmpeg"),
+      {"-v", "error", "-show_entries", "format=duration", "-of", "csv=p=0",
+       fs::absolute(video).string()},
+      log, [&](std::string_view line) { last = line; }, stop);
+  const std::optional<double> seconds = parse_real(last);
+  if (!seconds || !(*seconds > 0.0)) {
+    throw DataError(fmt::format("{} is no video that ffmpeg can read: its length is '{}'",
+                                video.string(), last));
+  }
+  return *seconds;
+}
+
+}  // namespace
+
+std::vector<std::string> photos_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file() && is_photo(entry.path()))
+      names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+double sharpness(const Image& image) {
+  double sum = 0.0;
+  for (int y = 1; y + 1 < image.height; ++y) {
+    for (int x = 1; x + 1 < image.width; ++x) {
+      const double laplacian = brightness(image, x - 1, y) + brightness(image, x + 1, y) +
+                               brightness(image, x, y - 1) + brightness(image, x, y + 1) -
+                               4.0 * brightness(image, x, y);
+      sum += laplacian * laplacian;
+    }
+  }
+  return sum / std::max<double>(1.0, static_cast<double>(image.pixels()));
+}
+
+void copy_photos(const fs::path& from,
+                 const fs::path& to,
+                 const std::vector<std::string>& names,
+                 const std::function<void(std::size_t)>& done) {
+  fs::create_directories(to);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    std::error_code error;
+    fs::copy_file(from / names[i], to / names[i], error);
+    if (error) {
+      throw DataError(fmt::format("{} cannot be copied to {}: {}", (from / names[i]).string(),
+                                  to.string(), error.message()));
+    }
+    done(i + 1);
+  }
+}
+
+void take_frames(const fs::path& video,
+                 const fs::path& images,
+                 std::size_t count,
+                 const fs::path& log,
+                 const std::function<bool(std::size_t, std::size_t)>& watch) {
+  const std::size_t total = kCandidates * count;
+  const fs::path ffmpeg = find_program("ffmpeg", "ffmpeg");
+  const double seconds = seconds_of(video, log, [&] { return !watch(0, total); });
+  const fs::path all = images.parent_path() / "frames.part";
+  fs::remove_all(all);
+  fs::create_directories(all);
+  std::size_t made = 0;
+  run_program(
+      ffmpeg,
+      {"-nostdin", "-hide_banner", "-v", "error", "-progress", "pipe:1", "-i",
+       fs::absolute(video).string(), "-vf",
+       fmt::format("fps={:.6f}", static_cast<double>(total) / seconds), "-q:v", "2",
+       (fs::absolute(all) / "frame_%06d.jpg").string()},
+      log,
+      [&](std::string_view line) {
+        if (line.starts_with("frame="))
+          std::from_chars(line.data() + 6, line.data() + line.size(), made);
+      },
+      [&] { return !watch(std::min(made, total), total); });
+  const std::vector<std::string> names = photos_in(all);
+  if (names.empty()) throw DataError(fmt::format("{} has no frames", video.string()));
+  fs::create_directories(images);
+  for (std::size_t first = 0; first < names.size(); first += kCandidates) {
+    std::size_t best = first;
+    double most = -1.0;
+    for (std::size_t i = first; i < std::min(first + kCandidates, names.size()); ++i) {
+      const double sharp = sharpness(read_image(all / names[i]));
+      if (sharp > most) best = i;
+      most = std::max(most, sharp);
+    }
+    fs::rename(all / names[best], images / names[best]);
+    if (!watch(first, names.size())) {
+      throw Error(ErrorCode::kInterrupted,
+                  "Interrupted among the frames of the video: the same command starts them anew");
+    }
+  }
+  fs::remove_all(all);
+}
+
+}  // namespace raysplats

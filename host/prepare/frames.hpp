@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "raysplats/image.hpp"
+
+namespace raysplats {
+
+/// Names of the files in a folder that are photos by their extension, sorted.
+std::vector<std::string> photos_in(const std::filesystem::path& folder);
+
+/// How sharp a picture is, compared with others of the same thing: the mean square of the Laplacian
+/// of its brightness (Pech-Pacheco et al. 2000).
+double sharpness(const Image& image);
+
+/// Copies photos to a new folder.
+void copy_photos(const std::filesystem::path& from,
+                 const std::filesystem::path& to,
+                 const std::vector<std::string>& names,
+                 const std::function<void(std::size_t done)>& done);
+
+/// Fills `images` with `count` sharp frames of a video. Throws as run_program().
+void take_frames(const std::filesystem::path& video,
+                 const std::filesystem::path& images,
+                 std::size_t count,
+                 const std::filesystem::path& log,
+                 const std::function<bool(std::size_t done, std::size_t total)>& watch);
+
+}  // namespace raysplats

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace raysplats {
+
+/// How photos are compared with each other.
+enum class Matching {
+  kAuto,        ///< sequential for videos and more than kMostExhaustive photos
+  kExhaustive,  ///< every pair
+  kSequential,  ///< neighbours in the order of the names
+};
+
+struct PrepareOptions {
+  std::size_t frames = 150;  ///< of a video
+  int max_size = 1600;       ///< longer side at which features are looked for, pixels
+  Matching matching = Matching::kAuto;
+  std::string camera_model = "OPENCV";  ///< one of COLMAP's that read_colmap_model() knows
+};
+
+constexpr std::size_t kMostExhaustive = 400;
+
+/// What came of it.
+struct Prepared {
+  std::size_t photos = 0;
+  std::vector<std::string> without_pose;  ///< photos that COLMAP could not place
+  std::size_t points = 0;
+};
+
+/// Hears which step runs ("features", ...), how far it is (`total` 0 = unknown), and returns false
+/// to stop; what is done by then is kept.
+using PrepareWatch =
+    std::function<bool(const std::string& step, std::size_t done, std::size_t total)>;
+
+/// Makes a data set of photos (a folder) or a video: `data`/images and `data`/sparse, by the
+/// programs colmap and ffmpeg in PATH, whose words are in `data`/prepare.log. Of a video three
+/// times as many frames as wanted are taken, and of each three the sharpest is kept. Steps that
+/// `data` has already from the same input with the same options are not done again. Throws
+/// UsageError for a missing program and for inputs that are neither; DataError for a folder without
+/// photos, for data made from something else, and when no pose was found; Error when a program
+/// fails or is interrupted.
+Prepared prepare_data(const std::filesystem::path& input,
+                      const std::filesystem::path& data,
+                      const PrepareOptions& options,
+                      const PrepareWatch& watch);
+
+}  // namespace raysplats

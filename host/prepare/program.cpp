@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prepare/program.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <deque>
+#include <fstream>
+
+#include "raysplats/error.hpp"
+
+extern char** environ;
+
+namespace raysplats {
+namespace {
+
+constexpr int kPollMilliseconds = 200;
+constexpr std::size_t kLastLines = 3;
+constexpr std::size_t kLongestLine = 4096;
+
+Error failure(const std::string& message) { return Error(ErrorCode::kRuntime, message); }
+
+/// Both ends of a pipe, closed when it goes.
+struct Pipe {
+  int ends[2] = {-1, -1};
+  Pipe() {
+    if (::pipe2(ends, O_CLOEXEC) != 0)
+      throw failure(fmt::format("A pipe cannot be made: {}", std::strerror(errno)));
+  }
+  ~Pipe() {
+    for (const int end : ends) {
+      if (end >= 0) ::close(end);
+    }
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+  void close_writing() {
+    ::close(ends[1]);
+    ends[1] = -1;
+  }
+};
+
+/// The child, with both of its streams in the pipe and nothing to read.
+pid_t start(const std::filesystem::path& program,
+            const std::vector<std::string>& arguments,
+            const Pipe& pipe) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDERR_FILENO);
+  std::vector<std::string> words{program.string()};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> pointers;
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+  pid_t child = -1;
+  const int error =
+      ::posix_spawn(&child, program.c_str(), &actions, nullptr, pointers.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0)
+    throw failure(fmt::format("{} cannot be started: {}", program.string(), std::strerror(error)));
+  return child;
+}
+
+/// Bytes become lines; those that programs write over (\r) count too.
+class Lines {
+ public:
+  explicit Lines(const std::function<void(std::string_view)>& hear) : hear_(hear) {}
+
+  void add(std::string_view bytes) {
+    for (const char c : bytes) {
+      if (c == '\n' || c == '\r' || line_.size() == kLongestLine) end();
+      if (c != '\n' && c != '\r') line_ += c;
+    }
+  }
+  void end() {
+    if (line_.empty()) return;
+    if (hear_) hear_(line_);
+    last_.push_back(line_);
+    if (last_.size() > kLastLines) last_.pop_front();
+    line_.clear();
+  }
+  std::string last() const { return fmt::format("{}", fmt::join(last_, " | ")); }
+
+ private:
+  const std::function<void(std::string_view)>& hear_;
+  std::string line_;
+  std::deque<std::string> last_;
+};
+
+int wait_for(pid_t child) {
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return status;
+}
+
+}  // namespace
+
+std::filesystem::path find_program(const std::string& name, const std::string& package) {
+  const char* value = std::getenv("PATH");
+  std::string_view rest = value == nullptr ? "" : value;
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find(':'), rest.size());
+    const std::filesystem::path path = std::filesystem::path(rest.substr(0, end)) / name;
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    std::error_code error;
+    // A relative folder of PATH would be another one after every change of directory.
+    if (path.is_absolute() && std::filesystem::is_regular_file(path, error) &&
+        ::access(path.c_str(), X_OK) == 0) {
+      return path;
+    }
+  }
+  throw UsageError(
+      fmt::format("The program {} is not in PATH: install it, on Debian with 'apt-get install {}'",
+                  name, package));
+}
+
+void run_program(const std::filesystem::path& program,
+                 const std::vector<std::string>& arguments,
+                 const std::filesystem::path& log,
+                 const std::function<void(std::string_view)>& line,
+                 const std::function<bool()>& stop) {
+  std::ofstream file(log, std::ios::app | std::ios::binary);
+  file << fmt::format("\n$ {} {}\n", program.string(), fmt::join(arguments, " "));
+  Pipe pipe;
+  const pid_t child = start(program, arguments, pipe);
+  pipe.close_writing();
+  Lines lines(line);
+  bool stopped = false;
+  for (bool open = true; open;) {
+    pollfd wanted{pipe.ends[0], POLLIN, 0};
+    const int ready = ::poll(&wanted, 1, kPollMilliseconds);
+    if (!stopped && stop && stop()) {
+      stopped = true;
+      ::kill(child, SIGTERM);
+    }
+    if (ready <= 0) continue;
+    char buffer[4096];
+    const ssize_t count = ::read(pipe.ends[0], buffer, sizeof(buffer));
+    if (count < 0 && errno == EINTR) continue;
+    open = count > 0;
+    if (!open) break;
+    const std::string_view bytes(buffer, static_cast<std::size_t>(count));
+    file << bytes;
+    lines.add(bytes);
+  }
+  lines.end();
+  const int status = wait_for(child);
+  if (stopped) {
+    throw Error(ErrorCode::kInterrupted,
+                fmt::format("Interrupted in {}: the same command goes on from here",
+                            program.filename().string()));
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  const std::string how = WIFSIGNALED(status)
+                              ? fmt::format("was ended by signal {}", WTERMSIG(status))
+                              : fmt::format("failed with exit code {}", WEXITSTATUS(status));
+  throw failure(fmt::format("{} {}: {} (all it said is in {})", program.filename().string(), how,
+                            lines.last(), log.string()));
+}
+
+}  // namespace raysplats

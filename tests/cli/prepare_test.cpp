@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// `prepare` with stand-ins for COLMAP and FFmpeg that note how they were called.
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+#include "raysplats/io.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// Places a.png and b.png, but not c.png.
+constexpr const char* kColmap = R"sh(#!/bin/sh
+echo "$@" >> "$CALLS"
+[ -n "$FAIL" ] && [ "$1" = "$FAIL" ] && { echo "the disk is on fire"; exit 7; }
+case $1 in
+feature_extractor) echo "Processed file [1/3]"; echo "Processed file [3/3]" ;;
+mapper)
+  while [ "$1" != --output_path ]; do shift; done
+  mkdir -p "$2/0"
+  echo "Registering image #1 (1)"
+  printf '1 PINHOLE 8 6 10 10 4 3\n' > "$2/0/cameras.txt"
+  printf '1 1 0 0 0 0 0 4 1 a.png\n\n2 1 0 0 0 0.1 0 4 1 b.png\n\n' > "$2/0/images.txt"
+  printf '1 0 0 0 255 0 0 0.5 1 0 2 0\n' > "$2/0/points3D.txt" ;;
+esac
+)sh";
+
+class Stage {
+ public:
+  Stage() {
+    write("bin/colmap", kColmap);
+    for (const char* name : {"a.png", "b.png", "c.png"}) {
+      raysplats::write_image(folder_ / ("photos/" + std::string(name)),
+                             raysplats::Image(8, 6, 3, 0.5f));
+    }
+  }
+  void write(const std::string& name, const std::string& text) const {
+    write_file(folder_ / name, text);
+    fs::permissions(folder_ / name, fs::perms::owner_all);
+  }
+  std::string path(const std::string& name) const { return folder_ / name; }
+
+  Outcome run(const std::vector<std::string>& arguments, const std::string& fail = "") const {
+    std::vector<std::string> words{"prepare"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    Surroundings there;
+    there.environment = {
+        {"PATH", path("bin") + ":/usr/bin:/bin"}, {"CALLS", path("calls")}, {"FAIL", fail}};
+    return raysplats_program(words, there);
+  }
+  /// What COLMAP was called with since the last time.
+  std::string calls() const {
+    const std::string text = fs::exists(path("calls")) ? read_file(path("calls")) : "";
+    fs::remove(path("calls"));
+    return text;
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+}  // namespace
+
+TEST_CASE("prepare makes a data set of photos and names those without a pose") {
+  const Stage stage;
+  const Outcome outcome = stage.run({stage.path("photos"), "-o", stage.path("data")});
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(has(outcome.out, "2 of 3 photos with poses and 1 points"));
+  CHECK(has(outcome.err, "1 photos have no pose"));
+  CHECK(has(outcome.err, "c.png"));
+  const std::string calls = stage.calls();
+  CHECK(has(calls, "feature_extractor"));
+  CHECK(has(calls, "--ImageReader.single_camera 0"));
+  CHECK(has(calls, "exhaustive_matcher"));
+  CHECK(has(read_file(stage.path("data/prepare.log")), "Processed file [3/3]"));
+  const Outcome info = raysplats_program({"info", stage.path("data")});
+  INFO(info.err);
+  CHECK(info.code == 0);
+  CHECK(has(info.out, "views            2"));
+
+  // All is done: COLMAP is not called again, unless something has changed.
+  CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
+  CHECK(stage.calls().empty());
+  CHECK(stage.run({stage.path("photos"), "-o", stage.path("data"), "--matching", "sequential"})
+            .code == 0);
+  const std::string again = stage.calls();
+  CHECK(!has(again, "feature_extractor"));
+  CHECK(has(again, "sequential_matcher"));
+  CHECK(has(again, "mapper"));
+}
+
+TEST_CASE("prepare goes on after the last finished step") {
+  const Stage stage;
+  const Outcome failed = stage.run({stage.path("photos"), "-o", stage.path("data")}, "mapper");
+  CHECK(failed.code == 1);
+  CHECK(has(failed.err, "colmap failed with exit code 7: "));
+  CHECK(has(failed.err, "the disk is on fire"));
+  CHECK(has(failed.err, "prepare.log"));
+  CHECK(!fs::exists(stage.path("data/sparse")));
+  stage.calls();
+  CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
+  const std::string calls = stage.calls();
+  CHECK(!has(calls, "feature_extractor"));
+  CHECK(!has(calls, "matcher"));
+  CHECK(has(calls, "mapper"));
+}
+
+TEST_CASE("prepare takes the sharpest of every three frames of a video") {
+  const Stage stage;
+  write_file(stage.path("walk.mp4"), "a video");
+  stage.write("bin/ffprobe", "#!/bin/sh\necho 12.5\n");
+  // Two groups of three frames, of which the second and the first have an edge.
+  raysplats::Image flat(8, 6, 3, 0.5f);
+  raysplats::Image sharp = flat;
+  for (int y = 0; y < 6; ++y) sharp.at(4, y, 0) = 1.0f;
+  raysplats::write_image(stage.path("flat.jpg"), flat);
+  raysplats::write_image(stage.path("sharp.jpg"), sharp);
+  std::string script =
+      "#!/bin/sh\necho \"$@\" >> \"$CALLS\"\nfor last; do :; done\n"
+      "cd \"$(dirname \"$last\")\" || exit 1\n";
+  const char* kinds[] = {"flat", "sharp", "flat", "sharp", "flat", "flat", "flat", "flat", "sharp"};
+  for (int i = 0; i < 9; ++i) {
+    script += "cp '" + stage.path(std::string(kinds[i]) + ".jpg") + "' frame_00000" +
+              std::to_string(i + 1) + ".jpg\n";
+  }
+  stage.write("bin/ffmpeg", script);
+  const Outcome outcome =
+      stage.run({stage.path("walk.mp4"), "-o", stage.path("data"), "--frames", "3"});
+  INFO(outcome.err);
+  CHECK(outcome.code == 0);
+  const std::string calls = stage.calls();
+  CHECK(has(calls, "fps=0.720000"));  // 9 frames of 12.5 s
+  CHECK(has(calls, "--ImageReader.single_camera 1"));
+  CHECK(has(calls, "sequential_matcher"));
+  CHECK(entries(stage.path("data/images")) == 3);
+  for (const char* name : {"frame_000002.jpg", "frame_000004.jpg", "frame_000009.jpg"})
+    CHECK(fs::exists(stage.path("data/images/" + std::string(name))));
+}
+
+TEST_CASE("prepare says in one sentence what is missing") {
+  const Stage stage;
+  const auto refused = [](const Outcome& outcome, int code, const std::string& part) {
+    INFO(outcome.err);
+    CHECK(outcome.code == code);
+    CHECK(one_sentence(outcome));
+    CHECK(has(outcome.err, part));
+  };
+  Surroundings without;
+  without.environment = {{"PATH", stage.path("empty")}};
+  refused(raysplats_program({"prepare", stage.path("photos"), "-o", stage.path("data")}, without),
+          2, "apt-get install colmap");
+  CHECK(!fs::exists(stage.path("data")));
+  refused(stage.run({stage.path("nothing"), "-o", stage.path("data")}), 3, "does not exist");
+  fs::create_directories(stage.path("few"));
+  refused(stage.run({stage.path("few"), "-o", stage.path("data")}), 3, "0 photos");
+  // Images of somebody else are not touched.
+  write_file(stage.path("mine/images/x.png"), "mine");
+  refused(stage.run({stage.path("photos"), "-o", stage.path("mine")}), 3, "another folder");
+  CHECK(read_file(stage.path("mine/images/x.png")) == "mine");
+}
