@@ -9,6 +9,7 @@
 #include "eval/output_check.hpp"
 #include "options.hpp"
 #include "raysplats/trainer.hpp"
+#include "report/run_report.hpp"
 #include "train/train_config.hpp"
 
 namespace raysplats::cli {
@@ -52,6 +53,9 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
     fmt::print("PSNR {:.2f} dB, SSIM {:.4f} on {} held-out views\n", last.psnr, last.ssim,
                last.views);
   }
+  const std::filesystem::path report = std::filesystem::path(options.output) / "report.html";
+  write_run_report(options.output, report);
+  fmt::print("Report: {}\n", report.string());
   if (options.device.profile) fmt::print("{}", context->profile_table());
 }
 

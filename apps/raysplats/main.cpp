@@ -66,7 +66,8 @@ int run(int argc, char** argv) {
       add_render_command(app, global),  add_eval_command(app, global),
       add_trace_command(app),           add_info_command(app),
       add_convert_command(app),         add_view_command(app),
-      add_bench_command(app),           add_tune_command(app)};
+      add_report_command(app),          add_bench_command(app),
+      add_tune_command(app)};
   try {
     std::vector<std::string> arguments = own_arguments(argc, argv);
     std::reverse(arguments.begin(), arguments.end());  // the order that CLI11 takes them in

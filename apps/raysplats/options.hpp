@@ -44,6 +44,7 @@ Command add_trace_command(CLI::App& app);
 Command add_info_command(CLI::App& app);
 Command add_convert_command(CLI::App& app);
 Command add_view_command(CLI::App& app);
+Command add_report_command(CLI::App& app);
 Command add_bench_command(CLI::App& app);
 Command add_tune_command(CLI::App& app);
 

@@ -57,9 +57,9 @@ EvaluationRow evaluation_from_json(const nlohmann::json& json) {
   return row;
 }
 
-constexpr std::array<const char*, 6> kReports{"config.toml",    "cameras.json",
-                                              "metrics.csv",    "metrics.json",
-                                              "exposures.json", "cameras_refined.json"};
+constexpr std::array<const char*, 7> kReports{
+    "config.toml",    "cameras.json",         "metrics.csv", "metrics.json",
+    "exposures.json", "cameras_refined.json", "report.html"};
 
 std::string iteration_name(std::int64_t iteration) {
   return fmt::format("iteration_{}", iteration);

@@ -33,6 +33,7 @@ TEST_CASE("docs/cli.md lists what -h lists") {
                                                   {"info"},
                                                   {"convert"},
                                                   {"view"},
+                                                  {"report"},
                                                   {"bench"},
                                                   {"bench", "compare"},
                                                   {"tune"}}) {

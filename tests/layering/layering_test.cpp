@@ -30,6 +30,7 @@ const std::map<std::string, Names> kBelow{{"base", {}},
                                           {"train", {"eval"}},
                                           {"view", {"train"}},
                                           {"prepare", {"io"}},
+                                          {"report", {"train"}},
                                           {"synth", {"io"}},
                                           {"bench", {"train", "synth"}},
                                           {"reference", {"core"}}};

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "report/html.hpp"
+#include "report/run_report.hpp"
+
+using namespace raysplats;
+namespace fs = std::filesystem;
+
+namespace {
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// What is wrong with the nesting and the escapes of a document, "" for nothing: a small part of
+/// what an XML parser checks.
+std::string fault(const std::string& text) {
+  std::vector<std::string> open;
+  std::size_t at = text.find("<html");
+  while (at < text.size()) {
+    const char c = text[at];
+    if (c == '&') {
+      const std::size_t end = text.find(';', at);
+      if (end == std::string::npos || end - at > 6) return "a bare & at " + text.substr(at, 20);
+    }
+    if (c != '<') {
+      ++at;
+      continue;
+    }
+    const std::size_t end = text.find('>', at);
+    if (end == std::string::npos) return "a tag without end";
+    const std::string tag = text.substr(at + 1, end - at - 1);
+    if (has(tag, "<")) return "a < in " + tag;
+    if (tag.starts_with("/")) {
+      if (open.empty() || open.back() != tag.substr(1)) return "an end that does not fit: " + tag;
+      open.pop_back();
+    } else if (!tag.ends_with("/")) {
+      open.push_back(tag.substr(0, tag.find_first_of(" \n")));
+    }
+    at = end + 1;
+  }
+  return open.empty() ? "" : "no end of " + open.back();
+}
+
+/// A run with two evaluations, the second below the first, of views with an awkward name.
+class Run {
+ public:
+  Run() : path_(fs::temp_directory_path() / ("raysplats_report_" + std::to_string(::getpid()))) {
+    const fs::path eval = path_ / "eval/iteration_200";
+    fs::create_directories(eval);
+    write("metrics.csv",
+          "iteration,seconds,loss,psnr,gaussians,it_per_s\n10,1.5,0.5,12,100,7\n"
+          "200,30,0.1,22,140,6\n210,cut");
+    write(
+        "metrics.json",
+        R"({"complete":true,"iteration":200,"iterations":200,"gaussians":140,"device":"<cpu> & co",
+            "traced_rays":1000,"capped_rays":50,"evaluations":[
+            {"iteration":100,"training_seconds":15,"psnr":21.5,"ssim":0.8,"views":3},
+            {"iteration":200,"training_seconds":30,"psnr":20.25,"ssim":0.75,"views":3}]})");
+    write("config.toml", "# a comment\niterations = 200\nname = \"<script>\"\n");
+    write("eval/iteration_200/metrics.json",
+          R"({"images":[{"name":"good.png","psnr":30,"ssim":0.9},
+            {"name":"a<b>&.png","psnr":10,"ssim":0.5},{"name":"mid.png","psnr":20,"ssim":0.7}]})");
+    for (const char* name : {"good.png", "a<b>&.png"})
+      write_image(eval / name, Image(12, 4, 3, 0.5f));
+  }
+  ~Run() { fs::remove_all(path_); }
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(path_ / name, std::ios::binary) << text;
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+}  // namespace
+
+TEST_CASE("a report holds what the run says, escaped, and nothing from elsewhere") {
+  const Run run;
+  const std::string page = run_report(run.path());
+  CHECK(fault(page) == "");
+  CHECK(has(page, "PSNR 20.25 dB"));
+  CHECK(has(page, "5.00 % of the rays stopped at --max-hits"));
+  CHECK(has(page, "ends 1.25 dB below its best, at iteration 100"));
+  CHECK(has(page, "&lt;cpu&gt; &amp; co"));
+  CHECK(has(page, "Worst: a&lt;b&gt;&amp;.png, 10.00 dB"));
+  CHECK(has(page, "Best: good.png, 30.00 dB"));
+  CHECK(!has(page, "Typical"));  // its picture is missing
+  CHECK(has(page, "data:image/jpeg;base64,/9j/"));
+  CHECK(has(page, "&quot;&lt;script&gt;&quot;"));
+  CHECK(!has(page, "<script"));
+  CHECK(!has(page, "http:"));
+  CHECK(!has(page, "https:"));
+  CHECK(has(page, "<polyline"));
+  write_run_report(run.path(), run.path() / "report.html");
+  CHECK(fs::file_size(run.path() / "report.html") == page.size());
+}
+
+TEST_CASE("a report of a run that is under way or damaged says so") {
+  const Run run;
+  run.write("metrics.json", R"({"iteration":7,"iterations":90})");
+  fs::remove(run.path() / "metrics.csv");
+  const std::string page = run_report(run.path());
+  CHECK(fault(page) == "");
+  CHECK(has(page, "7 of 90 iterations"));
+  CHECK(has(page, "no held-out views"));
+  run.write("metrics.json", "{");
+  CHECK_THROWS_AS(run_report(run.path()), DataError);
+  fs::remove(run.path() / "metrics.json");
+  CHECK_THROWS_AS(run_report(run.path()), DataError);
+}
+
+TEST_CASE("text, bytes and curves as HTML has them") {
+  CHECK(report::escaped("a<b>&\"'\x01\xff\xc3\xa9") ==
+        "a&lt;b&gt;&amp;&quot;&#39;\xef\xbf\xbd\xef\xbf\xbd\xc3\xa9");
+  const unsigned char bytes[] = {'M', 'a', 'n', 'M', 'a', 'M'};
+  CHECK(report::data_url("x/y", std::span(bytes, 3)) == "data:x/y;base64,TWFu");
+  CHECK(report::data_url("x/y", std::span(bytes, 2)) == "data:x/y;base64,TWE=");
+  CHECK(report::data_url("x/y", std::span(bytes, 1)) == "data:x/y;base64,TQ==");
+  CHECK(report::chart("none", "x", {}).empty());
+  report::Curve curve{"noise", {}};
+  for (int i = 0; i < 100000; ++i) curve.points.emplace_back(i, i == 77777 ? 5.0 : 0.0);
+  const std::string svg = report::chart("a & b", "x", std::span(&curve, 1));
+  CHECK(svg.size() < 30000);
+  CHECK(has(svg, "a &amp; b"));
+  CHECK(has(svg, ",30.0"));  // the spike reaches the top
+  report::Curve one{"one", {{3, 4}}};
+  CHECK(has(report::chart("one", "x", std::span(&one, 1)), "<circle"));
+}
