@@ -48,8 +48,10 @@ say "Done in $((SECONDS - started)) s after the build"
 cat <<END
 photos            $output/data/train, $output/data/test
 model (3DGS PLY)  $model
+report            $output/run/report.html
 training curve    $output/run/metrics.csv
 held-out metrics  $output/eval/metrics.json
 held-out images   $output/eval
 orbit frames      $output/orbit
+look around       $raysplats view $output/run --data $output/data
 END
