@@ -31,9 +31,9 @@ std::string ModelValidator::find_non_finite(const Buffer<float>& values,
   if (values.size() == 0) return "";
   found_.upload(std::array<std::uint32_t, 2>{0, 0xffffffffu});
   const std::size_t count = values.size() / width;
-  kernel_.launch(Range::linear((count + chunk_ - 1) / chunk_, kGroupSize), values, found_,
-                 static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(width),
-                 static_cast<std::uint32_t>(chunk_));
+  kernel_.launch(Range::linear((count + chunk_ - 1) / chunk_, kGroupSize),
+                 BufferAs<std::uint32_t>{values.raw()}, found_, static_cast<std::uint32_t>(count),
+                 static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(chunk_));
   const std::vector<std::uint32_t> found = found_.download();
   if (found[0] == 0) return "";
   return fmt::format("{} numbers of '{}' are not finite, the first of them in Gaussian {}",
