@@ -13,8 +13,9 @@ int lane_count(const DeviceInfo& device, int requested) {
     throw UsageError(
         fmt::format("There are no kernels for vectors of {}; use 1, 4, 8 or 16", requested));
   }
-  // GPUs hide latency by many work-items; a CPU fills its lanes from one.
-  if (device.type != DeviceType::kCpu) return 4;
+  // GPUs hide latency by many work-items, where vectors only take registers; a CPU fills its lanes
+  // from one.
+  if (device.type != DeviceType::kCpu) return 1;
   if (device.float_vector_width >= 16) return 16;
   return device.float_vector_width >= 8 ? 8 : 4;
 }
