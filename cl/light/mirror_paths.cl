@@ -121,11 +121,6 @@ __kernel void spread_gradients(const uint count,
 }
 
 // Adds a count of 64 bits to another. One work-item.
-__kernel void move_count(__global const uint* restrict from, volatile __global uint* restrict to) {
-  rs_count(to, from[0]);
-  to[1] += from[1];
-}
-
 // What the rays of the pixels from `first` on saw, as planes of a picture of `pixels`.
 __kernel void store_picture(const uint count,
                             const uint first,

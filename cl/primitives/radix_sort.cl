@@ -3,10 +3,11 @@
 // exclusive scan of the table counts[digit][group], scatter. O(n) work, 3 reads and 2 writes of an
 // element per pass. Between the passes key and value lie side by side (uint2): half as many places
 // are written at once, so that the lines being filled stay in the first cache.
-// Launch: work-groups of RS_GROUP work-items (1 or a power of two), each walks `chunk` consecutive
-// elements in order. RS_GROUP = 1 is the CPU's form: few long sequential loops with private
-// counters. Larger groups rank a tile of RS_GROUP elements at a time by eight stable one-bit splits
-// in local memory (Satish et al. 2009).
+// The elements are the first min(live[0], most): the host may know only how many there are at most.
+// Launch: work-groups of RS_GROUP work-items (1 or a power of two), each walks a chunk of
+// consecutive elements in order, at least `least`. RS_GROUP = 1 is the CPU's form: few long
+// sequential loops with private counters. Larger groups rank a tile of RS_GROUP elements at a time
+// by eight stable one-bit splits in local memory (Satish et al. 2009).
 //   RS_SOURCE_PAIRS, RS_TARGET_PAIRS   the elements come from / go to pairs; keys and values apart
 //                                      otherwise. The unused arguments may be any buffer.
 #include "primitives/group_scan.h"
@@ -46,16 +47,24 @@
   RS_PREFETCH_WRITE(values_out + (i) + 16)
 #endif
 
+// Elements of a group.
+uint chunk_size(uint count, uint groups, uint least) {
+  return (max((count + groups - 1) / groups, least) + RS_GROUP - 1) / RS_GROUP * RS_GROUP;
+}
+
 // counts[digit * groups + group] = how often the chunk of `group` has the digit.
 __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void count_digits(
     RS_EITHER __global const uint* keys,
     RS_EITHER __global const uint2* pairs,
     __global uint* counts,
-    uint count,
-    uint chunk,
+    __global const uint* live,
+    uint most,
+    uint least,
     uint shift) {
   const uint group = get_group_id(0);
   const uint groups = get_num_groups(0);
+  const uint count = min(live[0], most);
+  const uint chunk = chunk_size(count, groups, least);
   const uint begin = min(group * chunk, count);
   const uint end = min(begin + chunk, count);
 #if RS_GROUP > 1
@@ -89,8 +98,8 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void count_digits
 #endif
 }
 
-// `offsets` is the scanned table of count_digits, launched with the same groups and chunk, with the
-// total behind it.
+// `offsets` is the scanned table of count_digits, launched with the same groups and numbers,
+// with the total behind it.
 __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
     RS_EITHER __global const uint* keys,
     RS_EITHER __global const uint* values,
@@ -99,11 +108,14 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
     RS_EITHER __global uint* keys_out,
     RS_EITHER __global uint* values_out,
     RS_EITHER __global uint2* pairs_out,
-    uint count,
-    uint chunk,
+    __global const uint* live,
+    uint most,
+    uint least,
     uint shift) {
   const uint group = get_group_id(0);
   const uint groups = get_num_groups(0);
+  const uint count = min(live[0], most);
+  const uint chunk = chunk_size(count, groups, least);
   const uint begin = min(group * chunk, count);
   const uint end = min(begin + chunk, count);
 #if RS_GROUP > 1

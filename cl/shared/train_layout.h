@@ -10,7 +10,9 @@
 #define RS_TINY_MOMENT 1e-30f
 
 // Of the state of train/guard.cl.
-#define RS_GUARD_WORDS 5
+#define RS_GUARD_WORDS 7
+#define RS_GUARD_POISONED 1u  // bits of its first word
+#define RS_GUARD_REPEATED 2u
 
 // One step of Adam for one group of parameters.
 typedef struct {

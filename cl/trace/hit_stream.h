@@ -9,6 +9,7 @@
 #define RS_TRACE_HIT_STREAM_H
 
 #include "trace/packet.h"
+#include "trace/view_sizes.h"
 
 // Rows per chunk; row 0 links to the previous chunk.
 #ifndef CHUNK
@@ -24,7 +25,6 @@
 #define WINDOW 128
 #endif
 #endif
-#define RS_NO_CHUNK 0xffffffffu
 // Demand is not counted beyond this: the cursor must not come round to chunks that are taken.
 #define RS_MOST_CHUNKS 0x80000000u
 #define RS_NO_ROW 0xffffffffu

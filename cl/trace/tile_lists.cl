@@ -3,13 +3,15 @@
 //   count_tiles        counts[i] = tiles of the window that Gaussian i meets
 //   fill_tiles         key = tile << 16 | quantised least depth, value = Gaussian << 1 | general
 //                      form, written at offsets[i]
-//   gather_candidates  list records in sorted order, first candidate per tile   global: candidates
+//   gather_candidates  list records in sorted order, first candidate per tile   global: candidates,
+//                      or more
 // The first two take VECTOR Gaussians per work-item from number `begin` on, any local size; end -
 // begin is a multiple of VECTOR. Cost is O(Gaussians + candidates). An outline that the camera
 // plane makes unbounded is replaced by the box of the ellipsoid against the planes of the tile.
 // Quantised depths order the list and are a lower bound of the depth of this and every later hit of
 // the list, which is what the exact order of rays rests on. A window is a rectangle of tiles: first
-// column, first row, columns, rows; its tiles are numbered row by row.
+// column, first row, columns, rows; its tiles are numbered row by row. live[0] candidates are
+// listed: as many as were counted, or none (view_sizes.cl).
 #include "primitives/prefetch.h"
 #include "shared/layout.h"
 #include "trace/gaussian_lanes.h"
@@ -301,10 +303,11 @@ __kernel void fill_tiles(const uint begin,
                          __global const RsLensTile* restrict tiles,
                          __global const float4* restrict spans,
 #endif
+                         __global const uint* restrict live,
                          __global uint* restrict keys,
                          __global uint* restrict values) {
   const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
-  if (i >= end || offsets[i] == offsets[i + VECTOR]) return;
+  if (i >= end || live[0] == 0 || offsets[i] == offsets[i + VECTOR]) return;
   const RsCamera camera = camera_argument;
   gv b[8];
   load_records8((__global const float*)(bounds + i), b);
@@ -382,7 +385,7 @@ __kernel void fill_tiles(const uint begin,
 
 // boxes holds 4 planes of `stride` floats (x0, y0, x1, y1: they are tested in vectors); limits is
 // what a candidate needs alone. tile_offsets[t] .. tile_offsets[t + 1] is the list of tile t.
-__kernel void gather_candidates(const uint count,
+__kernel void gather_candidates(__global const uint* restrict live,
                                 const uint stride,
                                 const uint tiles,
                                 __global const uint* restrict keys,
@@ -391,8 +394,11 @@ __kernel void gather_candidates(const uint count,
                                 __global float* restrict boxes,
                                 __global float2* restrict limits,
                                 __global uint* restrict tile_offsets) {
-  const uint k = get_global_id(0);
-  if (k >= count) return;
+  const uint k = get_global_id(0), count = live[0];
+  if (k >= count) {
+    for (uint t = 0; k == 0 && t <= tiles; ++t) tile_offsets[t] = 0;
+    return;
+  }
   RS_PREFETCH_READ(bounds + (values[min(k + RS_GATHER_AHEAD, count - 1)] >> 1));
   const uint key = keys[k];
   const RsViewBounds b = bounds[values[k] >> 1];

@@ -84,10 +84,13 @@ BenchOperation SceneBench::Impl::view() {
           [this] { tracer().forward(gaussians(), model.camera); },
           {{"prepare-view", {"trace/prepare_view.cl"}, false, [this] { return prepare_work(); }},
            {"tile-lists",
-            {"trace/tile_lists.cl", "primitives/"},
+            {"trace/tile_lists.cl", "trace/view_sizes.cl:admit", "primitives/"},
             false,
             [this] { return lists_work(); }},
-           {"forward", {"trace/forward.cl"}, false, [this] { return forward_work(); }},
+           {"forward",
+            {"trace/forward.cl", "trace/group_forward.cl"},
+            false,
+            [this] { return forward_work(); }},
            {"view", {}, false, [this] {
               return together(forward_work(), together(prepare_work(), lists_work()));
             }}}};
@@ -112,7 +115,10 @@ BenchOperation SceneBench::Impl::backward() {
       },
       {},
       [this] { tracer().backward(gaussians(), image_gradient, gradients); },
-      {{"backward", {"trace/backward.cl", ":(fill)"}, false, [this] { return backward_work(); }},
+      {{"backward",
+        {"trace/backward.cl", "trace/group_backward.cl", ":(fill)"},
+        false,
+        [this] { return backward_work(); }},
        {"finalize", {"trace/finalize_gradients.cl"}, false, [this] { return finalize_work(); }}}};
 }
 
@@ -188,7 +194,7 @@ BenchOperation SceneBench::Impl::iteration() {
             CameraTracer& rays = *camera_tracer;
             DeviceGaussians& g = gaussians();
             rays.update(g);
-            rays.forward(g, model.camera, true);
+            rays.forward(g, model.camera, true, ViewSizes::kAhead);
             image_loss->evaluate(rays.image(), photo, false, {0, 0, 0}, model.camera.width,
                                  model.camera.height, image_gradient);
             rays.backward(g, image_gradient, gradients);

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "device/context_impl.hpp"
 #include "raysplats/error.hpp"
 
@@ -42,6 +44,7 @@ RawBuffer::Impl& RawBuffer::checked() const {
 
 void RawBuffer::write(const void* source, std::size_t bytes, std::size_t offset) {
   Impl& impl = checked();
+  ++impl.context->host_waits;
   try {
     impl.context->queue.enqueueWriteBuffer(impl.buffer, CL_TRUE, offset, bytes, source);
   } catch (const cl::Error& error) {
@@ -49,8 +52,21 @@ void RawBuffer::write(const void* source, std::size_t bytes, std::size_t offset)
   }
 }
 
+void RawBuffer::write_later(std::shared_ptr<const void> source, std::size_t bytes) {
+  Impl& impl = checked();
+  try {
+    cl::Event event;
+    impl.context->queue.enqueueWriteBuffer(impl.buffer, CL_FALSE, 0, bytes, source.get(), nullptr,
+                                           &event);
+    impl.context->keep_until(event, std::move(source));
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Writing {} bytes to '{}'", bytes, impl.label));
+  }
+}
+
 void RawBuffer::read(void* target, std::size_t bytes, std::size_t offset) const {
   Impl& impl = checked();
+  ++impl.context->host_waits;
   try {
     impl.context->queue.enqueueReadBuffer(impl.buffer, CL_TRUE, offset, bytes, target);
   } catch (const cl::Error& error) {

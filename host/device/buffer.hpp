@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "raysplats/error.hpp"
@@ -30,7 +31,9 @@ class RawBuffer {
 
   std::size_t bytes() const { return bytes_; }
   bool empty() const { return impl_ == nullptr; }
-  void write(const void* source, std::size_t bytes, std::size_t offset);
+  void write(const void* source, std::size_t bytes, std::size_t offset);  ///< blocks
+  /// Enqueues; `source` is kept until it is read.
+  void write_later(std::shared_ptr<const void> source, std::size_t bytes);
   void read(void* target, std::size_t bytes, std::size_t offset) const;  ///< blocks
   void fill(std::uint32_t pattern, std::size_t bytes, std::size_t offset);
   void copy_from(const RawBuffer& source,
@@ -69,6 +72,12 @@ class Buffer {
   }
   void upload(std::span<const T> source, std::size_t offset = 0) {
     if (!source.empty()) raw_.write(source.data(), source.size_bytes(), offset * sizeof(T));
+  }
+  /// The same, to the first elements, without waiting for the device.
+  void upload_later(std::vector<T> source) {
+    if (source.empty()) return;
+    const auto kept = std::make_shared<const std::vector<T>>(std::move(source));
+    raw_.write_later({kept, kept->data()}, kept->size() * sizeof(T));
   }
   void download(std::span<T> target, std::size_t offset = 0) const {
     if (!target.empty()) raw_.read(target.data(), target.size_bytes(), offset * sizeof(T));

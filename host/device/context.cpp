@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <new>
@@ -111,9 +112,8 @@ Context::Context(const DeviceInfo& device, const ContextOptions& options)
   impl_->check_arguments = arguments_are_checked();
   try {
     impl_->context = cl::Context(impl_->device);
-    impl_->queue = cl::CommandQueue(
-        impl_->context, impl_->device,
-        options.profile ? cl::QueueProperties::Profiling : cl::QueueProperties::None);
+    // For LaunchTimer as for options.profile: launches that nobody times cost no more by it.
+    impl_->queue = cl::CommandQueue(impl_->context, impl_->device, cl::QueueProperties::Profiling);
   } catch (const cl::Error& error) {
     throw_cl_error(error, fmt::format("Opening the OpenCL device {}", device.name));
   }
@@ -159,12 +159,17 @@ std::unique_lock<std::recursive_mutex> Context::lock() const {
 }
 
 void Context::finish() {
+  ++impl_->host_waits;
   try {
     impl_->queue.finish();
   } catch (const cl::Error& error) {
     throw_cl_error(error, fmt::format("Waiting for {}", impl_->info.name));
   }
 }
+
+std::uint64_t Context::host_waits() const { return impl_->host_waits; }
+
+FaultInjection& Context::faults() { return impl_->faults; }
 
 Profiler& Context::profiler() {
   impl_->collect_profile();
@@ -193,7 +198,7 @@ cl::Program& Context::Impl::program(const std::string& path, const BuildOptions&
 }
 
 cl::Program Context::Impl::make_program(const std::string& path, const BuildOptions& build) {
-  const std::string source = resolve_kernel_source(path);
+  const std::string source = resolve_kernel_source(path, options.kernel_directory);
   const std::string flags = compiler_flags(build);
   if (!options.kernel_cache || faults.due(Fault::kBuild))
     return compile(*this, path, source, flags);
@@ -227,9 +232,25 @@ cl::Program Context::Impl::make_program(const std::string& path, const BuildOpti
 void Context::Impl::timed(const std::string& path,
                           const std::string& kernel,
                           const cl::Event& event) {
+  if (timed_events != nullptr) timed_events->push_back(event);
   if (!options.profile) return;
   pending.push_back({path, kernel, event});
   if (pending.size() >= 4096) collect_profile();
+}
+
+void Context::Impl::keep_until(const cl::Event& event, std::shared_ptr<const void> memory) {
+  in_flight.push_back({event, std::move(memory)});
+  // In order: what is over stands in front. A command that failed says so where it is waited for.
+  const auto waits = [](const InFlight& operation) {
+    return operation.event.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>() > CL_COMPLETE;
+  };
+  in_flight.erase(in_flight.begin(), std::find_if(in_flight.begin(), in_flight.end(), waits));
+}
+
+bool is_over(const cl::Event& event) {
+  const cl_int status = event.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>();
+  if (status < 0) throw cl::Error(status, "clGetEventInfo");
+  return status == CL_COMPLETE;
 }
 
 void Context::Impl::collect_profile() {

@@ -36,6 +36,15 @@ struct PendingLaunch {
   cl::Event event;
 };
 
+/// What an operation that is on its way reads or writes.
+struct InFlight {
+  cl::Event event;
+  std::shared_ptr<const void> memory;
+};
+
+/// Whether the command has been carried out; throws cl::Error when it failed.
+bool is_over(const cl::Event& event);
+
 struct Context::Impl {
   DeviceInfo info;
   ContextOptions options;
@@ -49,6 +58,9 @@ struct Context::Impl {
   std::map<std::string, cl::Program> programs;  // by program path and build options
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;
+  std::vector<InFlight> in_flight;
+  std::vector<cl::Event>* timed_events = nullptr;  // of a LaunchTimer that runs
+  std::uint64_t host_waits = 0;
   std::size_t compiled = 0;  // programs that the compiler made
   double build_seconds = 0;
   std::shared_ptr<MemoryCount> memory = std::make_shared<MemoryCount>();
@@ -58,8 +70,12 @@ struct Context::Impl {
 
   cl::Program& program(const std::string& path, const BuildOptions& build);
   cl::Program make_program(const std::string& path, const BuildOptions& build);
+  /// Keeps host memory until the command that uses it is over.
+  void keep_until(const cl::Event& event, std::shared_ptr<const void> memory);
   /// What an enqueue call takes for its event: null unless launches are timed.
-  cl::Event* next_event(cl::Event& event) { return options.profile ? &event : nullptr; }
+  cl::Event* next_event(cl::Event& event) {
+    return options.profile || timed_events != nullptr ? &event : nullptr;
+  }
   void timed(const std::string& program, const std::string& kernel, const cl::Event& event);
   void collect_profile();
 };
@@ -83,7 +99,7 @@ struct RawBuffer::Impl {
 };
 
 /// The source of `path` with its `#include "..."` lines resolved from the embedded table (or from
-/// RAYSPLATS_KERNEL_DIR when that is set), each file once, with #line marks.
-std::string resolve_kernel_source(const std::string& path);
+/// `directory`, or RAYSPLATS_KERNEL_DIR when that is set), each file once, with #line marks.
+std::string resolve_kernel_source(const std::string& path, const std::string& directory = "");
 
 }  // namespace raysplats

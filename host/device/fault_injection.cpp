@@ -17,10 +17,12 @@ struct Description {
 };
 
 // In the order of Fault.
-constexpr std::array<Description, 3> kFaults{{
+constexpr std::array<Description, 5> kFaults{{
     {"RAYSPLATS_FAIL_ALLOC", "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE},
     {"RAYSPLATS_FAIL_BUILD", "clBuildProgram", CL_BUILD_PROGRAM_FAILURE},
     {"RAYSPLATS_FAIL_LAUNCH", "clEnqueueNDRangeKernel", CL_OUT_OF_RESOURCES},
+    {"RAYSPLATS_FAIL_LISTS", "", CL_SUCCESS},
+    {"RAYSPLATS_FAIL_HITS", "", CL_SUCCESS},
 }};
 
 }  // namespace
@@ -36,10 +38,13 @@ FaultInjection::FaultInjection() {
 }
 
 void FaultInjection::check(Fault fault) {
-  const auto index = static_cast<std::size_t>(fault);
-  std::size_t& left = left_[index];
-  if (left == 0 || --left > 0) return;
-  throw cl::Error(kFaults[index].status, kFaults[index].call);
+  const Description& description = kFaults[static_cast<std::size_t>(fault)];
+  if (strikes(fault)) throw cl::Error(description.status, description.call);
+}
+
+bool FaultInjection::strikes(Fault fault) {
+  std::size_t& left = left_[static_cast<std::size_t>(fault)];
+  return left > 0 && --left == 0;
 }
 
 bool FaultInjection::due(Fault fault) const { return left_[static_cast<std::size_t>(fault)] == 1; }

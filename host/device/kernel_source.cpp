@@ -13,12 +13,14 @@
 namespace raysplats {
 namespace {
 
-std::string load(const std::string& path) {
-  if (const char* directory = std::getenv("RAYSPLATS_KERNEL_DIR")) {
-    std::ifstream file(std::string(directory) + "/" + path, std::ios::binary);
+std::string load(const std::string& path, const std::string& directory) {
+  if (!directory.empty()) {
+    std::ifstream file(directory + "/" + path, std::ios::binary);
     if (!file) {
-      throw DeviceError(
-          fmt::format("Kernel file {}/{} (RAYSPLATS_KERNEL_DIR) cannot be read", directory, path));
+      throw DeviceError(fmt::format(
+          "Kernel file {}/{} cannot be read: give --kernels, or RAYSPLATS_KERNEL_DIR, a whole "
+          "folder of kernels like cl/ of the source",
+          directory, path));
     }
     std::ostringstream text;
     text << file.rdbuf();
@@ -30,16 +32,19 @@ std::string load(const std::string& path) {
   return found->second;
 }
 
-void append(const std::string& path, std::set<std::string>& seen, std::string& out) {
+void append(const std::string& path,
+            const std::string& directory,
+            std::set<std::string>& seen,
+            std::string& out) {
   if (!seen.insert(path).second) return;
-  std::istringstream lines(load(path));
+  std::istringstream lines(load(path, directory));
   out += fmt::format("#line 1 \"{}\"\n", path);
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
     static const std::string kInclude = "#include \"";
     if (line.compare(0, kInclude.size(), kInclude) == 0) {
       const std::size_t end = line.find('"', kInclude.size());
-      append(line.substr(kInclude.size(), end - kInclude.size()), seen, out);
+      append(line.substr(kInclude.size(), end - kInclude.size()), directory, seen, out);
       out += fmt::format("#line {} \"{}\"\n", number + 1, path);
     } else {
       out += line + "\n";
@@ -49,10 +54,12 @@ void append(const std::string& path, std::set<std::string>& seen, std::string& o
 
 }  // namespace
 
-std::string resolve_kernel_source(const std::string& path) {
+std::string resolve_kernel_source(const std::string& path, const std::string& directory) {
+  const char* named = std::getenv("RAYSPLATS_KERNEL_DIR");
+  const std::string place = !directory.empty() || named == nullptr ? directory : named;
   std::set<std::string> seen;
   std::string out;
-  append(path, seen, out);
+  append(path, place, seen, out);
   return out;
 }
 

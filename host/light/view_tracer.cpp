@@ -15,9 +15,9 @@
 #include "light/mirror_paths.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
-#include "trace/camera_tracer.hpp"
 #include "trace/memory_shares.hpp"
 #include "trace/ray_backward.hpp"
+#include "trace/view_sizes.h"
 
 namespace raysplats {
 namespace {
@@ -83,10 +83,8 @@ struct ViewTracer::Rays {
         paths(context, tracer, mirrors),
         sums(context, tracer),
         capped(context, 2, "capped rays"),
-        capped_before(context, 2, "capped rays of views before"),
         traced_again(context, 2, "capped rays that are counted already") {
     capped.clear();
-    capped_before.clear();
     traced_again.clear();
   }
 
@@ -97,10 +95,8 @@ struct ViewTracer::Rays {
   MirrorPaths paths;
   RayBackward sums;
   // Rays that stopped because of max_hits, as counters of 64 bits in two words.
-  Buffer<std::uint32_t> capped;         // of the last view
-  Buffer<std::uint32_t> capped_before;  // of the views before it that were kept
+  Buffer<std::uint32_t> capped;  // of the last view
   Buffer<std::uint32_t> traced_again;
-  bool last_kept = false;
   Buffer<RayBackward::Slopes> slopes;
 };
 
@@ -111,7 +107,10 @@ struct ViewTracer::Impl {
         background(options_in.background),
         mirrors(std::move(mirrors_in)),
         tree(walks_tree(options_in, context_in.device())),
-        packets(context_in, options_in) {}
+        packets(context_in, options_in),
+        kept_capped(context_in, 2, "capped rays of a view") {
+    kept_capped.clear();
+  }
 
   Rays& single_rays() {
     if (!rays) rays.emplace(context, options, mirrors);
@@ -139,8 +138,8 @@ struct ViewTracer::Impl {
   bool tree;  // rays walk it though they could be traced by tiles
   CameraTracer packets;
   std::uint64_t packets_revision = 0;
-  std::uint64_t packets_capped = 0;  // of views that were kept
-  std::optional<Rays> rays;          // once a view needs it
+  Buffer<std::uint32_t> kept_capped;  // rays that stopped because of max_hits, two words
+  std::optional<Rays> rays;           // once a view needs it
   std::function<void(double)> watch;
   // The last view.
   bool by_rays = false;
@@ -175,7 +174,10 @@ bool ViewTracer::by_rays(const Camera& camera) const {
   return self.options.traversal != Traversal::kTiles && !self.packets.traces(camera);
 }
 
-void ViewTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
+void ViewTracer::forward(const DeviceGaussians& gaussians,
+                         const Camera& camera,
+                         bool keep,
+                         ViewSizes sizes) {
   Impl& self = *impl_;
   require_pixels(camera);
   if (by_rays(camera)) {
@@ -186,8 +188,12 @@ void ViewTracer::forward(const DeviceGaussians& gaussians, const Camera& camera,
   if (self.packets_revision != gaussians.revision) self.packets.update(gaussians);
   self.packets_revision = gaussians.revision;
   self.packets.options().background = self.options.background = self.background;
-  self.packets.forward(gaussians, camera, keep);
-  if (keep) self.packets_capped += self.packets.statistics().capped_rays;
+  self.packets.forward(gaussians, camera, keep, sizes);
+  // Now: backward() may trace parts again.
+  if (keep) {
+    self.kept_capped.clear();
+    self.kept_capped.copy_from(self.packets.counters(), 1, RS_COUNT_CAPPED);
+  }
   self.by_rays = false;
   self.camera = camera;
   self.kept = keep;
@@ -218,8 +224,6 @@ void ViewTracer::Impl::trace_batch(const DeviceGaussians& gaussians,
 
 void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep) {
   MirrorPaths& paths = rays->paths;
-  if (rays->last_kept) kernel("move_count").launch(Range{}, rays->capped, rays->capped_before);
-  rays->last_kept = keep;
   rays->capped.clear();
   const std::size_t pixels = pixels_of(camera);
   image.ensure(context, 4 * pixels, "image");
@@ -239,6 +243,7 @@ void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep)
     context.finish();
     watch(static_cast<double>(first + count) / static_cast<double>(pixels));
   }
+  if (keep) kept_capped.copy_from(rays->capped, 2);
 }
 
 const Buffer<float>& ViewTracer::image() const {
@@ -348,13 +353,9 @@ std::uint64_t ViewTracer::capped_rays() const {
   return self.by_rays ? count_of(self.rays->capped) : self.packets.statistics().capped_rays;
 }
 
-std::uint64_t ViewTracer::kept_capped_rays() const {
-  const Impl& self = *impl_;
-  std::uint64_t sum = self.packets_capped;
-  if (!self.rays) return sum;
-  sum += count_of(self.rays->capped_before);
-  return self.rays->last_kept ? sum + count_of(self.rays->capped) : sum;
-}
+const Buffer<std::uint32_t>& ViewTracer::kept_capped_rays() const { return impl_->kept_capped; }
+const Buffer<std::uint32_t>& ViewTracer::overflow() const { return impl_->packets.overflow(); }
+void ViewTracer::clear_overflow() { impl_->packets.clear_overflow(); }
 
 const Context& ViewTracer::context() const { return impl_->context; }
 

@@ -13,6 +13,7 @@
 #include "raysplats/mirrors.hpp"
 #include "raysplats/pose_gradient.hpp"
 #include "raysplats/trace_options.hpp"
+#include "trace/camera_tracer.hpp"
 #include "trace/device_gaussians.hpp"
 
 namespace raysplats {
@@ -39,7 +40,14 @@ class ViewTracer {
   /// Traces one view. With `keep` backward() may follow; what it needs stays where the memory
   /// budget has room and is traced again where not. Throws UsageError for a camera without pixels
   /// or focal length, and for one that Traversal::kTiles cannot trace.
-  void forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep = false);
+  void forward(const DeviceGaussians& gaussians,
+               const Camera& camera,
+               bool keep = false,
+               ViewSizes sizes = ViewSizes::kAwaited);
+  /// Of views that were traced with ViewSizes::kAhead, as CameraTracer says; those that are traced
+  /// ray by ray wait for their sizes and always fit.
+  const Buffer<std::uint32_t>& overflow() const;
+  void clear_overflow();
   /// The same ray by ray, whatever the camera's model.
   void forward_rays(const DeviceGaussians& gaussians, const Camera& camera, bool keep = false);
 
@@ -70,9 +78,8 @@ class ViewTracer {
   void set_background(const std::array<float, 3>& background);
   /// Rays of the last view that stopped because of max_hits; blocks.
   std::uint64_t capped_rays() const;
-  /// Of every forward(keep = true) so far; blocks where any was traced ray by ray, else the device
-  /// has told already.
-  std::uint64_t kept_capped_rays() const;
+  /// The same of the last forward(keep = true) on the device: two words, the lower first.
+  const Buffer<std::uint32_t>& kept_capped_rays() const;
   const Context& context() const;
 
  private:

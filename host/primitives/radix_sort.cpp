@@ -18,7 +18,8 @@ RadixSort::RadixSort(Context& context)
     : RadixSort(context, ChunkShape::for_device(context.device())) {}
 
 RadixSort::RadixSort(Context& context, const ChunkShape& shape)
-    : context_(&context), shape_(shape), scan_(context, shape) {
+    : context_(&context), shape_(shape), scan_(context, shape), all_(context, 1, "all to sort") {
+  all_.fill(0xffffffffu);
   for (const bool from_pairs : {false, true}) {
     for (const bool to_pairs : {false, true}) {
       const BuildOptions options = BuildOptions()
@@ -35,44 +36,57 @@ void RadixSort::sort(Buffer<std::uint32_t>& keys,
                      Buffer<std::uint32_t>& values,
                      std::size_t count,
                      int bits) {
-  if (count >= kMaxCount || keys.size() < count || values.size() < count || bits < 0 || bits > 32) {
+  sort(keys, values, all_, count, bits);
+}
+
+void RadixSort::sort(Buffer<std::uint32_t>& keys,
+                     Buffer<std::uint32_t>& values,
+                     const Buffer<std::uint32_t>& live,
+                     std::size_t most,
+                     int bits) {
+  if (most >= kMaxCount || keys.size() < most || values.size() < most || bits < 0 || bits > 32) {
     throw UsageError(
         fmt::format("Cannot sort {} pairs by {} bits in buffers of {} keys and {} values: at most "
                     "2^31 pairs and 32 bits",
-                    count, bits, keys.size(), values.size()));
+                    most, bits, keys.size(), values.size()));
   }
-  if (count < 2 || bits == 0) return;
+  if (most < 2 || bits == 0) return;
   const int passes = (bits + 7) / 8;
   // A kernel cannot take no buffer: those that a pass does not use are one element long.
-  pairs_[0].ensure(*context_, passes > 1 ? count : 1, "sort pairs");
-  pairs_[1].ensure(*context_, passes > 2 ? count : 1, "sort pairs");
+  pairs_[0].ensure(*context_, passes > 1 ? most : 1, "sort pairs");
+  pairs_[1].ensure(*context_, passes > 2 ? most : 1, "sort pairs");
   if (passes == 1) {
-    keys_.ensure(*context_, count, "sort keys");
-    values_.ensure(*context_, count, "sort values");
-    pass({keys, values, pairs_[0], keys_, values_, pairs_[1]}, false, false, count, 0);
-    keys.copy_from(keys_, count);
-    values.copy_from(values_, count);
+    keys_.ensure(*context_, most, "sort keys");
+    values_.ensure(*context_, most, "sort values");
+    pass({keys, values, pairs_[0], keys_, values_, pairs_[1]}, false, false, live, most, 0);
+    keys.copy_from(keys_, most);
+    values.copy_from(values_, most);
     return;
   }
   for (int i = 0; i < passes; ++i) {
     Buffer<Pair>& from = pairs_[(i + 1) % 2];
     Buffer<Pair>& to = pairs_[i % 2];
-    pass({keys, values, from, keys, values, to}, i > 0, i + 1 < passes, count, 8 * i);
+    pass({keys, values, from, keys, values, to}, i > 0, i + 1 < passes, live, most, 8 * i);
   }
 }
 
-void RadixSort::pass(const Ends& ends, bool from_pairs, bool to_pairs, std::size_t count, int bit) {
-  const std::size_t groups = shape_.used_groups(count);
-  const auto n = static_cast<std::uint32_t>(count);
-  const auto chunk = static_cast<std::uint32_t>(shape_.chunk(count));
+void RadixSort::pass(const Ends& ends,
+                     bool from_pairs,
+                     bool to_pairs,
+                     const Buffer<std::uint32_t>& live,
+                     std::size_t most,
+                     int bit) {
+  const std::size_t groups = shape_.used_groups(most);
+  const auto limit = static_cast<std::uint32_t>(most);
+  const auto least = static_cast<std::uint32_t>(shape_.min_chunk);
   const auto shift = static_cast<std::uint32_t>(bit);
   const Range range = Range::linear(groups * shape_.group_size, shape_.group_size);
   table_.ensure(*context_, kDigits * groups + 1, "sort digit table");
-  count_digits_[from_pairs].launch(range, ends.keys, ends.pairs, table_, n, chunk, shift);
+  count_digits_[from_pairs].launch(range, ends.keys, ends.pairs, table_, live, limit, least, shift);
   scan_.exclusive(table_, kDigits * groups);
   scatter_[from_pairs][to_pairs].launch(range, ends.keys, ends.values, ends.pairs, table_,
-                                        ends.keys_out, ends.values_out, ends.pairs_out, n, chunk,
-                                        shift);
+                                        ends.keys_out, ends.values_out, ends.pairs_out, live, limit,
+                                        least, shift);
 }
 
 }  // namespace raysplats

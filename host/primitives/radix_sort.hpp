@@ -31,6 +31,12 @@ class RadixSort {
             Buffer<std::uint32_t>& values,
             std::size_t count,
             int bits = 32);
+  /// The same for the first live[0] pairs, a number that only the device knows, of `most` at most.
+  void sort(Buffer<std::uint32_t>& keys,
+            Buffer<std::uint32_t>& values,
+            const Buffer<std::uint32_t>& live,
+            std::size_t most,
+            int bits = 32);
 
  private:
   struct Ends {
@@ -41,13 +47,19 @@ class RadixSort {
     Buffer<std::uint32_t>& values_out;
     Buffer<Pair>& pairs_out;
   };
-  void pass(const Ends& ends, bool from_pairs, bool to_pairs, std::size_t count, int bit);
+  void pass(const Ends& ends,
+            bool from_pairs,
+            bool to_pairs,
+            const Buffer<std::uint32_t>& live,
+            std::size_t most,
+            int bit);
 
   Context* context_;
   ChunkShape shape_;
   Scan scan_;
-  Kernel count_digits_[2];  // of keys, of pairs
-  Kernel scatter_[2][2];    // from keys and values or from pairs, to the same
+  Kernel count_digits_[2];     // of keys, of pairs
+  Kernel scatter_[2][2];       // from keys and values or from pairs, to the same
+  Buffer<std::uint32_t> all_;  // more than there can be
   Buffer<Pair> pairs_[2];
   Buffer<std::uint32_t> keys_;
   Buffer<std::uint32_t> values_;

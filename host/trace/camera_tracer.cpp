@@ -12,6 +12,7 @@
 
 #include "bvh/gaussian_bounds.hpp"
 #include "core/planes.hpp"
+#include "device/fault_injection.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/candidate_lists.hpp"
@@ -20,6 +21,7 @@
 #include "trace/launch_budget.hpp"
 #include "trace/memory_shares.hpp"
 #include "trace/packet_shape.hpp"
+#include "trace/view_sizes.h"
 
 namespace raysplats {
 namespace {
@@ -28,6 +30,7 @@ using Stream = std::array<std::uint32_t, 2>;
 
 // Private copies of gradients per compute unit: more share the tiles out more evenly.
 constexpr std::size_t kCopiesPerUnit = 2;
+constexpr std::size_t kStreamGroup = 64;
 constexpr std::uint32_t kChunkEntries =
     16;  // entries of a hit-stream chunk, the CHUNK of hit_stream.h
 
@@ -48,13 +51,24 @@ struct CameraTracer::Impl {
         no_tiles(context_in, 1, "no tiles of a lens"),
         no_tangents(context_in, 1, "no tangents of a lens"),
         forward_budget(options_in.launch_budget_ms, context_in.device().type),
-        backward_budget(forward_budget),
+        backward_budget(options_in.launch_budget_ms, context_in.device().type),
         watched_budget(kWatchedMilliseconds, context_in.device().type),
-        counters(context_in, 4, "trace counters"),
-        sums(context_in, "line gradients") {}
+        counters(context_in, RS_COUNT_WORDS, "trace counters"),
+        overflow(context_in, 1, "overflow of a view"),
+        sums(context_in, "line gradients") {
+    overflow.clear();
+    check_streams = context.kernel("trace/view_sizes.cl", "check_streams");
+  }
 
   void set_face(const DeviceGaussians& gaussians, int face);
   void trace_faces(const DeviceGaussians& gaussians, bool keep);
+  bool can_trace_ahead() const;
+  void trace_ahead(const DeviceGaussians& gaussians);
+  TileWindow whole() const { return tile_window(0, lists.tile_rows()); }
+  TileWindow tile_window(std::uint32_t row, std::uint32_t rows) const {
+    return {0, static_cast<std::int32_t>(row), static_cast<std::int32_t>(lists.tiles_x()),
+            static_cast<std::int32_t>(rows)};
+  }
   const std::vector<int>& faces() const { return lens_kind > 0 ? lens.faces() : kFront; }
   const Buffer<RsLensTile>& tiles() const { return lens_kind > 0 ? lens.tiles() : no_tiles; }
   const Buffer<float>& tangents() const { return lens_kind > 0 ? lens.tangents() : no_tangents; }
@@ -65,10 +79,7 @@ struct CameraTracer::Impl {
   }
   void add_pose(const DeviceGaussians& gaussians, PoseGradient& sum);
   void backward_face(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient);
-  void trace_rows(const DeviceGaussians& gaussians,
-                  std::uint32_t row,
-                  std::uint32_t rows,
-                  bool keep);
+  void trace_rows(const DeviceGaussians& gaussians, std::uint32_t row, std::uint32_t rows);
   void trace_window(const DeviceGaussians& gaussians, const TileWindow& window, bool keep);
   void launch_forward(const TileWindow& window, bool keep);
   void launch_backward(const Buffer<float>& image_gradient, std::uint32_t row, std::uint32_t rows);
@@ -100,6 +111,8 @@ struct CameraTracer::Impl {
     return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   }
   std::size_t pool_capacity() const { return pool.size() / kChunkEntries; }
+  // Of a whole view: a row of tiles that needed more than its share left the pool larger.
+  std::size_t view_room() const { return std::min(pool_capacity(), pool_limit()); }
   std::size_t packet_count() const {
     return static_cast<std::size_t>((camera.width + packet.width - 1) / packet.width) *
            static_cast<std::size_t>((camera.height + packet.height - 1) / packet.height);
@@ -135,7 +148,8 @@ struct CameraTracer::Impl {
   Camera view;                    // of the last forward()
   int lens_kind = 0;
   int face = 0;
-  RsCamera camera{};                      // of the face that is being traced
+  RsCamera camera{};  // of the face that is being traced
+  Kernel check_streams;
   std::array<Kernel, 2> forward_kernels;  // without and with kept hits
   int forward_variant = -1;
   Buffer<float> image;
@@ -144,8 +158,10 @@ struct CameraTracer::Impl {
   Buffer<Stream> stream_ends;
   Buffer<Stream> pool;
   Buffer<float> pool_transmittance;
-  Buffer<std::uint32_t> counters;  // chunks wanted, capped rays, hits (two words)
-  std::uint64_t candidates = 0;
+  Buffer<std::uint32_t> counters;  // trace/view_sizes.h
+  Buffer<std::uint32_t> overflow;
+  std::uint32_t room = 0;     // chunks of the pool that launches may use
+  bool traced_whole = false;  // the last view that was waited for fits the memory budget
   Statistics saved;
   bool statistics_saved = false;
   bool hits_kept = false;      // the last forward() was asked to keep hits
@@ -179,11 +195,20 @@ void CameraTracer::update(const DeviceGaussians& gaussians) {
                         self.options.adaptive_radius);
   bounds.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,
                  gaussians.count, self.options.quantile, self.boxes);
+  // Another model may fit.
+  if (self.count != gaussians.count) self.traced_whole = self.pool.size() > 0;
   self.count = gaussians.count;
   self.revision = gaussians.revision;
 }
 
-void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits) {
+const Buffer<std::uint32_t>& CameraTracer::overflow() const { return impl_->overflow; }
+void CameraTracer::clear_overflow() { impl_->overflow.clear(); }
+const Buffer<std::uint32_t>& CameraTracer::counters() const { return impl_->counters; }
+
+void CameraTracer::forward(const DeviceGaussians& gaussians,
+                           const Camera& camera,
+                           bool keep_hits,
+                           ViewSizes sizes) {
   Impl& self = *impl_;
   require_pixels(camera);
   if (self.count != gaussians.count || self.revision != gaussians.revision) {
@@ -202,23 +227,53 @@ void CameraTracer::forward(const DeviceGaussians& gaussians, const Camera& camer
   self.depth.ensure(self.context, self.options.depth ? 3 * self.pixels() : 1, "depth");
   self.transmittances.ensure(self.context, keep_hits ? 2 * self.pixels() : 1, "transmittances");
   self.stream_ends.ensure(self.context, keep_hits ? self.packet_count() : 1, "hit streams");
-  if (self.pool.size() == 0) self.grow_pool(keep_hits ? 2 * self.packet_count() : 1);
   self.hits_kept = keep_hits;
   self.statistics_saved = false;
-  self.candidates = 0;
   self.watched_tiles = 0;
   self.counters.clear();
+  if (keep_hits && sizes == ViewSizes::kAhead && self.can_trace_ahead()) {
+    self.trace_ahead(gaussians);
+    return;
+  }
+  if (self.pool.size() == 0) self.grow_pool(keep_hits ? 2 * self.packet_count() : 1);
+  if (keep_hits) self.traced_whole = true;
   self.trace_faces(gaussians, keep_hits);
   if (!keep_hits) return;
   const std::size_t wanted = self.chunks_wanted();
-  self.hits_complete = wanted <= self.pool_capacity();
+  self.hits_complete = wanted <= self.view_room();
   if (self.hits_complete) return;
   self.grow_pool(wanted);
-  if (wanted > self.pool_limit()) return;  // backward() traces again, band by band
+  if (wanted > self.pool_limit()) {  // backward() traces again, band by band
+    self.traced_whole = false;
+    return;
+  }
   self.counters.clear();
-  self.candidates = 0;
   self.trace_faces(gaussians, true);
-  self.hits_complete = self.chunks_wanted() <= self.pool_capacity();
+  self.hits_complete = self.chunks_wanted() <= self.view_room();
+}
+
+bool CameraTracer::Impl::can_trace_ahead() const {
+  const auto across = [this](int pixels) {
+    return static_cast<std::size_t>((pixels + packet.tile - 1) / packet.tile);
+  };
+  return traced_whole && lists.can_build_ahead(across(camera.width) * across(camera.height));
+}
+
+// With the room that there is, without asking the device whether it is enough.
+void CameraTracer::Impl::trace_ahead(const DeviceGaussians& gaussians) {
+  FaultInjection& faults = context.faults();
+  room = faults.strikes(Fault::kHits) ? 0 : static_cast<std::uint32_t>(view_room());
+  const std::size_t budget =
+      faults.strikes(Fault::kLists) ? 0 : MemoryShares(options.memory_budget).tile_lists();
+  for (const int number : faces()) {
+    set_face(gaussians, number);
+    lists.build_ahead(boxes, camera, whole(), budget, counters, overflow);
+    launch_forward(whole(), true);
+  }
+  const std::size_t packets = packet_count();
+  check_streams.launch(Range::linear(packets, kStreamGroup), static_cast<std::uint32_t>(packets),
+                       room, counters, overflow, stream_ends);
+  hits_complete = true;
 }
 
 bool CameraTracer::traces(const Camera& camera) {
@@ -235,31 +290,31 @@ void CameraTracer::Impl::set_face(const DeviceGaussians& gaussians, int number) 
 }
 
 void CameraTracer::Impl::trace_faces(const DeviceGaussians& gaussians, bool keep) {
+  room = static_cast<std::uint32_t>(keep ? view_room() : 0);
   for (const int number : faces()) {
     set_face(gaussians, number);
-    trace_rows(gaussians, 0, lists.tile_rows(), keep);
+    trace_window(gaussians, whole(), keep);
   }
 }
 
+// With the whole pool.
 void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
                                     std::uint32_t row,
-                                    std::uint32_t rows,
-                                    bool keep) {
-  trace_window(gaussians,
-               {0, static_cast<std::int32_t>(row), static_cast<std::int32_t>(lists.tiles_x()),
-                static_cast<std::int32_t>(rows)},
-               keep);
+                                    std::uint32_t rows) {
+  room = static_cast<std::uint32_t>(pool_capacity());
+  trace_window(gaussians, tile_window(row, rows), true);
 }
 
 // Splits the window until the candidate lists of each part fit their share of the budget.
 void CameraTracer::Impl::trace_window(const DeviceGaussians& gaussians,
                                       const TileWindow& window,
                                       bool keep) {
-  if (!lists.build(boxes, camera, window, MemoryShares(options.memory_budget).tile_lists())) {
+  if (!lists.build(boxes, camera, window, MemoryShares(options.memory_budget).tile_lists(),
+                   counters)) {
+    if (keep) traced_whole = false;
     for (const TileWindow& half : window.halves()) trace_window(gaussians, half, keep);
     return;
   }
-  candidates += lists.candidates();
   launch_forward(window, keep);
 }
 
@@ -333,7 +388,7 @@ void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
   std::copy(options.background.begin(), options.background.end(), pass.background);
   pass.min_transmittance = options.min_transmittance;
   pass.max_hits = options.max_hits;
-  pass.pool_capacity = static_cast<std::uint32_t>(keep ? pool_capacity() : 0);
+  pass.pool_capacity = keep ? room : 0;
   in_bands(context, budget, rows, [&](std::uint32_t first, std::uint32_t number) {
     kernel.launch(packet_range(kernel, packet.block, columns, first, number), lists.arguments(),
                   view_arguments(), pass, stream_arguments(), image, depth, counters);
@@ -346,8 +401,11 @@ void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
 
 CameraTracer::Statistics CameraTracer::Impl::count_statistics() const {
   const std::vector<std::uint32_t> words = counters.download();
-  const std::uint64_t hits = std::uint64_t{words[3]} << 32 | words[2];
-  return {words[1], candidates, hits, words[0] * chunk_bytes()};
+  const auto wide = [&](std::size_t low) {
+    return std::uint64_t{words[low + 1]} << 32 | words[low];
+  };
+  return {words[RS_COUNT_CAPPED], wide(RS_COUNT_CANDIDATES), wide(RS_COUNT_HITS),
+          words[RS_COUNT_CHUNKS] * chunk_bytes()};
 }
 
 // Of the pass just enqueued, whose statistics stay: waits for the device.
@@ -402,8 +460,8 @@ void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
                                        std::uint32_t row,
                                        std::uint32_t rows) {
   counters.clear();
-  trace_rows(gaussians, row, rows, true);
-  const std::size_t wanted = counters.read(0);
+  trace_rows(gaussians, row, rows);
+  const std::size_t wanted = counters.read(RS_COUNT_CHUNKS);
   if (wanted > pool_capacity() && rows > 1) {
     backward_rows(gaussians, image_gradient, row, rows / 2);
     backward_rows(gaussians, image_gradient, row + rows / 2, rows - rows / 2);
@@ -420,7 +478,7 @@ void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
     }
     grow_pool(wanted, wanted);
     counters.clear();
-    trace_rows(gaussians, row, rows, true);
+    trace_rows(gaussians, row, rows);
   }
   launch_backward(image_gradient, row, rows);
 }

@@ -14,6 +14,14 @@
 
 namespace raysplats {
 
+/// Whether forward() waits for the device to tell how much room a view needs.
+enum class ViewSizes {
+  kAwaited,  ///< and makes that room
+  kAhead     ///< no: it takes the room of the views before, and overflow() tells where that was
+             ///< too little. Waits all the same where no view was traced before, and where the
+             ///< memory budget had too little room for the last one that was waited for.
+};
+
 /// Traces the rays of a central camera in packets (docs/model.md, "The camera line"), forward and
 /// backward: a pinhole, or a lens whose tiles are seen by pinholes on the faces of a cube around it
 /// (LensTiles).
@@ -38,7 +46,14 @@ class CameraTracer {
 
   /// Traces one view. With `keep_hits` the hit lists stay for backward() when they fit the memory
   /// budget and are recomputed there when they do not.
-  void forward(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits = false);
+  void forward(const DeviceGaussians& gaussians,
+               const Camera& camera,
+               bool keep_hits = false,
+               ViewSizes sizes = ViewSizes::kAwaited);
+  /// Not 0 in its word once a view with ViewSizes::kAhead had too little room: that view and those
+  /// after it show the background alone and have no gradients, until clear_overflow().
+  const Buffer<std::uint32_t>& overflow() const;
+  void clear_overflow();
 
   /// From the next forward() on `watch` hears the share of the picture that is done after every
   /// launch, which then are short ones; what it throws ends forward(). Nothing is heard with {}.
@@ -62,8 +77,10 @@ class CameraTracer {
                 GaussianGradients& gradients,
                 PoseGradient* pose = nullptr);
 
-  /// Of the last forward(); waits for the device unless that one kept its hits.
+  /// Of the last forward(); waits for the device unless that one kept its hits and waited itself.
   Statistics statistics() const;
+  /// The same on the device: RS_COUNT_WORDS words (cl/trace/view_sizes.h).
+  const Buffer<std::uint32_t>& counters() const;
   TraceOptions& options();
 
  private:

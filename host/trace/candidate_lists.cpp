@@ -106,6 +106,10 @@ CandidateLists::CandidateLists(Context& context, int tile_size)
   BuildOptions build;
   build.define("TILE", tile_size);
   gather_kernel_ = context.kernel("trace/tile_lists.cl", "gather_candidates", build);
+  admit_kernel_ = context.kernel("trace/view_sizes.cl", "admit_candidates");
+  live_ = Buffer<std::uint32_t>(context, 1, "listed candidates");
+  fitted_ = Buffer<std::uint32_t>(context, 1, "no overflow");
+  fitted_.clear();
 }
 
 void CandidateLists::require_prepare_kernel(const DeviceGaussians& gaussians,
@@ -157,51 +161,90 @@ void CandidateLists::prepare(const DeviceGaussians& gaussians,
                          bounds_);
 }
 
+std::size_t CandidateLists::allowed(std::size_t budget) const {
+  return std::min<std::size_t>(
+      {budget / kBytesPerCandidate, context_->device().max_allocation / 16, kMaxCandidates});
+}
+
+// Leaves the number of candidates at the end of offsets_.
+void CandidateLists::count(const Buffer<RsAabb>& boxes,
+                           const RsCamera& camera,
+                           const TileWindow& window) {
+  tile_offsets_.ensure(*context_, window.tiles() + 1, "tile offsets");
+  offsets_.ensure(*context_, count_ + 1, "candidate offsets");
+  if (count_ == 0) {
+    offsets_.clear();
+    return;
+  }
+  if (face_.tiles != nullptr) {
+    count_kernel_.launch(count_, bounds_, boxes, camera, window, offsets_, face_.face,
+                         face_.tiles->tiles(), face_.tiles->spans(face_.face));
+  } else {
+    count_kernel_.launch(count_, bounds_, boxes, camera, window, offsets_);
+  }
+  scan_.exclusive(offsets_, count_);
+}
+
+// Lists what count() found when that is `capacity` at most: launches are made for so many.
+void CandidateLists::fill(const Buffer<RsAabb>& boxes,
+                          const RsCamera& camera,
+                          const TileWindow& window,
+                          std::size_t capacity,
+                          std::size_t room,
+                          Buffer<std::uint32_t>& counters,
+                          Buffer<std::uint32_t>& overflow) {
+  const auto tiles = static_cast<std::uint32_t>(window.tiles());
+  stride_ = static_cast<std::uint32_t>(room + kBoxPadding);
+  admit_kernel_.launch(Range{{1, 1, 1}, {1, 1, 1}, {}}, offsets_,
+                       static_cast<std::uint32_t>(count_), static_cast<std::uint32_t>(capacity),
+                       live_, counters, overflow);
+  if (face_.tiles != nullptr) {
+    fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, face_.face,
+                        face_.tiles->tiles(), face_.tiles->spans(face_.face), live_, keys_,
+                        values_);
+  } else {
+    fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, live_, keys_,
+                        values_);
+  }
+  sort_.sort(keys_, values_, live_, room, 16 + std::bit_width(tiles - 1));
+  gather_kernel_.launch(Range::linear(std::max<std::size_t>(room, 1), kGatherGroup), live_, stride_,
+                        tiles, keys_, values_, bounds_, boxes_, limits_, tile_offsets_);
+}
+
 bool CandidateLists::build(const Buffer<RsAabb>& boxes,
                            const RsCamera& camera,
                            const TileWindow& window,
-                           std::size_t budget) {
+                           std::size_t budget,
+                           Buffer<std::uint32_t>& counters) {
   if (window.tiles() > kMaxTiles) return false;
-  const auto tiles = static_cast<std::uint32_t>(window.tiles());
-  tile_offsets_.ensure(*context_, tiles + 1, "tile offsets");
-  offsets_.ensure(*context_, count_ + 1, "candidate offsets");
-  candidates_ = 0;
-  if (count_ > 0) {
-    if (face_.tiles != nullptr) {
-      count_kernel_.launch(count_, bounds_, boxes, camera, window, offsets_, face_.face,
-                           face_.tiles->tiles(), face_.tiles->spans(face_.face));
-    } else {
-      count_kernel_.launch(count_, bounds_, boxes, camera, window, offsets_);
-    }
-    scan_.exclusive(offsets_, count_);
-    candidates_ = offsets_.read(count_);
-  }
-  const std::size_t allowed = std::min<std::size_t>(
-      {budget / kBytesPerCandidate, context_->device().max_allocation / 16, kMaxCandidates});
-  if (candidates_ > allowed && tiles > 1) return false;
-  stride_ = static_cast<std::uint32_t>(candidates_ + kBoxPadding);
-  if (keys_.size() < candidates_ || keys_.size() == 0) {
-    const std::size_t room = std::min(with_headroom(candidates_), std::max(allowed, candidates_));
+  count(boxes, camera, window);
+  const std::size_t found = count_ > 0 ? offsets_.read(count_) : 0;
+  const std::size_t most = allowed(budget);
+  if (found > most && window.tiles() > 1) return false;
+  if (keys_.size() < found || keys_.size() == 0) {
+    const std::size_t room = std::min(with_headroom(found), std::max(most, found));
     keys_.ensure(*context_, room, "candidate keys");
     values_.ensure(*context_, room, "candidate references");
     limits_.ensure(*context_, room, "candidate limits");
     boxes_.ensure(*context_, 4 * (room + kBoxPadding), "candidate boxes");
   }
-  if (candidates_ == 0) {
-    tile_offsets_.clear();
-    return true;
-  }
-  if (face_.tiles != nullptr) {
-    fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, face_.face,
-                        face_.tiles->tiles(), face_.tiles->spans(face_.face), keys_, values_);
-  } else {
-    fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, keys_, values_);
-  }
-  sort_.sort(keys_, values_, candidates_, 16 + std::bit_width(tiles - 1));
-  gather_kernel_.launch(Range::linear(candidates_, kGatherGroup),
-                        static_cast<std::uint32_t>(candidates_), stride_, tiles, keys_, values_,
-                        bounds_, boxes_, limits_, tile_offsets_);
+  fill(boxes, camera, window, found, found, counters, fitted_);
   return true;
+}
+
+bool CandidateLists::can_build_ahead(std::size_t tiles) const {
+  return keys_.size() > 0 && tiles <= kMaxTiles;
+}
+
+void CandidateLists::build_ahead(const Buffer<RsAabb>& boxes,
+                                 const RsCamera& camera,
+                                 const TileWindow& window,
+                                 std::size_t budget,
+                                 Buffer<std::uint32_t>& counters,
+                                 Buffer<std::uint32_t>& overflow) {
+  const std::size_t room = std::min(keys_.size(), allowed(budget));
+  count(boxes, camera, window);
+  fill(boxes, camera, window, room, room, counters, overflow);
 }
 
 }  // namespace raysplats

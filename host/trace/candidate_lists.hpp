@@ -59,17 +59,29 @@ class CandidateLists {
                const ViewFace& face,
                const TraceOptions& options);
 
-  /// Lists of the tiles of a window. `boxes` are the world boxes of the confidence ellipsoids, for
-  /// those that the camera plane cuts. Returns false, having made nothing, when there is more than
-  /// one tile and they would take more than `budget` bytes or are more than can be numbered.
+  /// Lists of the tiles of a window; waits for the device to tell how many candidates there are,
+  /// and adds them to `counters` (trace/view_sizes.h). `boxes` are the world boxes of the
+  /// confidence ellipsoids, for those that the camera plane cuts. Returns false, having made
+  /// nothing, when there is more than one tile and they would take more than `budget` bytes or are
+  /// more than can be numbered.
   bool build(const Buffer<RsAabb>& boxes,
              const RsCamera& camera,
              const TileWindow& window,
-             std::size_t budget);
+             std::size_t budget,
+             Buffer<std::uint32_t>& counters);
+  /// The same without waiting: where there are more candidates than the lists before had room for,
+  /// or the budget allows, the lists are empty and overflow[0] becomes 1.
+  void build_ahead(const Buffer<RsAabb>& boxes,
+                   const RsCamera& camera,
+                   const TileWindow& window,
+                   std::size_t budget,
+                   Buffer<std::uint32_t>& counters,
+                   Buffer<std::uint32_t>& overflow);
+  /// Whether build_ahead() has any room, and numbers for so many tiles.
+  bool can_build_ahead(std::size_t tiles) const;
 
   std::uint32_t tiles_x() const { return tiles_x_; }
   std::uint32_t tile_rows() const { return tile_rows_; }
-  std::size_t candidates() const { return candidates_; }
 
   const Buffer<RsLine>& lines() const { return lines_; }
   const Buffer<RsViewBounds>& bounds() const { return bounds_; }
@@ -82,6 +94,15 @@ class CandidateLists {
   void require_prepare_kernel(const DeviceGaussians& gaussians,
                               const ViewFace& face,
                               const TraceOptions& options);
+  std::size_t allowed(std::size_t budget) const;
+  void count(const Buffer<RsAabb>& boxes, const RsCamera& camera, const TileWindow& window);
+  void fill(const Buffer<RsAabb>& boxes,
+            const RsCamera& camera,
+            const TileWindow& window,
+            std::size_t capacity,
+            std::size_t room,
+            Buffer<std::uint32_t>& counters,
+            Buffer<std::uint32_t>& overflow);
 
   Context* context_;
   int tile_size_;
@@ -91,15 +112,17 @@ class CandidateLists {
   GaussianKernel count_kernel_;
   GaussianKernel fill_kernel_;
   Kernel gather_kernel_;
+  Kernel admit_kernel_;
   RadixSort sort_;
   Scan scan_;
   std::size_t count_ = 0;
-  std::size_t candidates_ = 0;
   std::uint32_t tiles_x_ = 1;
   std::uint32_t tile_rows_ = 1;
   std::uint32_t stride_ = 0;
   Buffer<RsLine> lines_;
   Buffer<RsViewBounds> bounds_;
+  Buffer<std::uint32_t> live_;     // candidates that are listed
+  Buffer<std::uint32_t> fitted_;   // an overflow that cannot be
   Buffer<std::uint32_t> offsets_;  // first candidate per Gaussian
   Buffer<std::uint32_t> tile_offsets_;
   Buffer<std::uint32_t> keys_;

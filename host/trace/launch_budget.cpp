@@ -17,14 +17,32 @@ LaunchBudget::LaunchBudget(double milliseconds, DeviceType device)
                        : device == DeviceType::kCpu ? 0.0
                                                     : kDefault)) {}
 
-std::uint32_t LaunchBudget::rows(std::uint32_t left) const {
-  return bounded() ? std::clamp(rows_, 1u, std::max(left, 1u)) : left;
+std::uint32_t LaunchBudget::rows(std::uint32_t left) {
+  if (!bounded()) return left;
+  while (!launches_.empty() && (!settled_ || launches_.front().timer.ready())) {
+    record(launches_.front().rows, launches_.front().timer.seconds());
+    launches_.pop_front();
+  }
+  return std::clamp(rows_, 1u, std::max(left, 1u));
 }
 
+// A launch that took too long says that those to come must be smaller, and only one as large as they
+// are that they may grow: of several that ran before the first was looked at, one does.
 void LaunchBudget::record(std::uint32_t rows, double seconds) {
   const double fit = seconds > 0 ? rows * seconds_ / seconds : kMostRows;
-  const double most = std::min(kMostGrowth * std::max(rows, rows_), kMostRows);
-  rows_ = static_cast<std::uint32_t>(std::clamp(fit, 1.0, most));
+  const double most = std::min(kMostGrowth * rows, kMostRows);
+  settled_ = settled_ || fit <= most;
+  const auto size = static_cast<std::uint32_t>(std::clamp(fit, 1.0, most));
+  if (seconds > seconds_) {
+    rows_ = std::min(rows_, size);
+  } else if (rows >= rows_) {
+    rows_ = size;
+  }
+}
+
+void LaunchBudget::record(std::uint32_t rows, bool all, LaunchTimer timer) {
+  settled_ = settled_ || all;
+  launches_.push_back({rows, std::move(timer)});
 }
 
 }  // namespace raysplats

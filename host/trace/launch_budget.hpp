@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
 #include <cstdint>
+#include <deque>
+#include <utility>
 
 #include "device/context.hpp"
+#include "device/launch_timer.hpp"
 #include "raysplats/device.hpp"
 
 namespace raysplats {
 
 /// How many rows (of tiles, or of rays) one launch may do, so that it ends within a time: the
 /// watchdogs of GPUs that also draw a screen stop kernels after some seconds, and a long kernel
-/// freezes the screen. The size follows the times of the launches before.
+/// freezes the screen. The size follows the times of the launches before, by the device's clock:
+/// the first ones are waited for until one took the time that it should, the others are looked at
+/// when they have run.
 class LaunchBudget {
  public:
   /// `milliseconds` per launch; 0 = no bound, negative = none on CPUs and kDefault elsewhere.
@@ -21,28 +25,37 @@ class LaunchBudget {
 
   bool bounded() const { return seconds_ > 0; }
   /// Rows of the next launch when `left` are to be done; at least 1.
-  std::uint32_t rows(std::uint32_t left) const;
+  std::uint32_t rows(std::uint32_t left);
   /// A launch of `rows` rows took `seconds`.
   void record(std::uint32_t rows, double seconds);
+  /// The same for one that is enqueued, `all` if nothing was left behind it.
+  void record(std::uint32_t rows, bool all, LaunchTimer timer);
 
  private:
+  struct Launch {
+    std::uint32_t rows;
+    LaunchTimer timer;
+  };
+
   double seconds_;
   std::uint32_t rows_ = 4;
+  bool settled_ = false;  // rows_ fits what a launch took, or all rows fit one
+  std::deque<Launch> launches_;  // whose time is not known yet
 };
 
 /// Calls launch(first, number) until all `rows` are done, as many at once as the budget of time
-/// allows; waits for each where there is one.
+/// allows.
 template <class Launch>
 void in_bands(Context& context, LaunchBudget& budget, std::uint32_t rows, const Launch& launch) {
   for (std::uint32_t row = 0; row < rows;) {
     const std::uint32_t now = budget.rows(rows - row);
-    if (budget.bounded()) context.finish();
-    const auto begin = std::chrono::steady_clock::now();
-    launch(row, now);
     if (budget.bounded()) {
-      context.finish();
-      budget.record(
-          now, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+      LaunchTimer timer(context);
+      launch(row, now);
+      timer.stop();
+      budget.record(now, row == 0 && now == rows, std::move(timer));
+    } else {
+      launch(row, now);
     }
     row += now;
   }

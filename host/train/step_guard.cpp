@@ -23,24 +23,30 @@ StepGuard::StepGuard(Context& context)
 
 void StepGuard::check_loss(const Buffer<std::array<float, 4>>& pixel_partials,
                            const Buffer<float>& ssim_partials,
-                           int tiles) {
-  check_.launch(Range{{kItems, 1, 1}, {0, 0, 0}, {}}, pixel_partials, ssim_partials, tiles, state_);
+                           int tiles,
+                           const Buffer<std::uint32_t>& overflow) {
+  check_.launch(Range{{kItems, 1, 1}, {0, 0, 0}, {}}, pixel_partials, ssim_partials, tiles,
+                overflow, state_);
 }
 
-void StepGuard::close(const Buffer<std::uint32_t>& refused, std::size_t count) {
-  close_.launch(Range{{1, 1, 1}, {1, 1, 1}, {}}, refused, static_cast<std::uint32_t>(count), kLimit,
-                state_);
+void StepGuard::close(const Buffer<std::uint32_t>& refused,
+                      const Buffer<std::uint32_t>& capped,
+                      std::size_t count) {
+  close_.launch(Range{{1, 1, 1}, {1, 1, 1}, {}}, refused, capped, static_cast<std::uint32_t>(count),
+                kLimit, state_);
 }
 
 StepGuard::Counts StepGuard::counts() const {
   const std::vector<std::uint32_t> words = state_.download();
-  return {words[1], words[2], words[3] != 0};
+  return {words[1], words[2], words[3] != 0, std::uint64_t{words[6]} << 32 | words[5]};
 }
 
 void StepGuard::restore(const Counts& counts) {
   const std::uint32_t stopped = counts.stopped ? 1 : 0;
-  state_.upload(std::array<std::uint32_t, RS_GUARD_WORDS>{stopped, counts.in_a_row,
-                                                          counts.bad_steps, stopped, 0});
+  state_.upload(std::array<std::uint32_t, RS_GUARD_WORDS>{
+      stopped, counts.in_a_row, counts.bad_steps, stopped, 0,
+      static_cast<std::uint32_t>(counts.capped_rays),
+      static_cast<std::uint32_t>(counts.capped_rays >> 32)});
 }
 
 }  // namespace raysplats

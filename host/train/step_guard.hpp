@@ -13,7 +13,8 @@ namespace raysplats {
 /// any of them: a step whose loss is not finite changes nothing, and a Gaussian whose gradient is
 /// not finite keeps its parameters (Adam). Steps of the first kind, and those in which more than
 /// one Gaussian in a thousand refused its gradient, are bad; after kLimit in a row nothing changes
-/// any more, so that the model stays as it was until the host looks.
+/// any more, so that the model stays as it was until the host looks. A step whose view had no room
+/// (ViewTracer::overflow()) changes nothing either and counts as if it had not been.
 class StepGuard {
  public:
   static constexpr std::uint32_t kLimit = 10;
@@ -22,17 +23,22 @@ class StepGuard {
     std::uint32_t in_a_row = 0;
     std::uint32_t bad_steps = 0;
     bool stopped = false;
+    std::uint64_t capped_rays = 0;  ///< of all steps, that the cap on hits stopped
   };
 
   explicit StepGuard(Context& context);
 
-  /// Marks the present step when the partial sums of its loss are not finite (ImageLoss).
+  /// Marks the present step when the partial sums of its loss are not finite (ImageLoss), or the
+  /// word of `overflow` is not 0.
   void check_loss(const Buffer<std::array<float, 4>>& pixel_partials,
                   const Buffer<float>& ssim_partials,
-                  int tiles);
+                  int tiles,
+                  const Buffer<std::uint32_t>& overflow);
   /// After the update: counts. `refused` is Adam's count of refused gradients, `count` the
-  /// Gaussians.
-  void close(const Buffer<std::uint32_t>& refused, std::size_t count);
+  /// Gaussians, `capped` the step's ViewTracer::kept_capped_rays().
+  void close(const Buffer<std::uint32_t>& refused,
+             const Buffer<std::uint32_t>& capped,
+             std::size_t count);
 
   /// Not 0 in its first word: the kernels of this step change nothing.
   const Buffer<std::uint32_t>& mark() const { return state_; }

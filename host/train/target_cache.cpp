@@ -58,7 +58,7 @@ const Buffer<std::uint32_t>& TargetCache::get(std::size_t view, int width, int h
   target.width = width;
   target.height = height;
   target.pixels = Buffer<std::uint32_t>(context_, words.size(), "photo");
-  target.pixels.upload(words);
+  target.pixels.upload_later(std::move(words));
   if (stays) cached_ += bytes;
   return target.pixels;
 }

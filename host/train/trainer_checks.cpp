@@ -12,7 +12,7 @@
 namespace raysplats {
 
 // Stops the run when the guard has stopped the steps; waits for the device.
-void Trainer::Impl::check_guard() {
+StepGuard::Counts Trainer::Impl::check_guard() {
   const StepGuard::Counts counts = guard.counts();
   if (counts.stopped) {
     write_dump();
@@ -28,6 +28,7 @@ void Trainer::Impl::check_guard() {
                  iteration, counts.bad_steps);
     reported_bad_steps = counts.bad_steps;
   }
+  return counts;
 }
 
 // Stops the run at a fault that no step may leave behind.

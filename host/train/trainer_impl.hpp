@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -12,6 +13,7 @@
 
 #include "base/file_lock.hpp"
 #include "base/progress.hpp"
+#include "device/read_back.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
@@ -39,6 +41,14 @@ std::size_t pixels_of(const Camera& camera);
 /// Photos decoded ahead of their turn.
 constexpr std::size_t kReadAhead = 8;
 
+/// A step that is enqueued and may not be done, with what its beginning found on the host.
+struct SentStep {
+  std::int64_t iteration;
+  std::int64_t optimiser_steps;
+  std::uint64_t traced_rays;
+  ReadBack overflow;  ///< ViewTracer::overflow() after it
+};
+
 // The state of a run. Its functions stand in files by what they are for.
 struct Trainer::Impl {
   Impl(Context& device,
@@ -56,11 +66,18 @@ struct Trainer::Impl {
   std::size_t ray_views() const;
 
   // trainer_step.cpp: one step, and what happens between two of them.
-  void step();
+  void enqueue_step();
   void control_density();
 
+  // trainer_pace.cpp: steps on their way.
+  void step();
+  void follow(bool all);
+  void settle();
+  void abandon();
+  void go_back();
+
   // trainer_checks.cpp: what stops a run.
-  void check_guard();
+  StepGuard::Counts check_guard();
   void validate_model();
   void write_dump();
 
@@ -69,9 +86,8 @@ struct Trainer::Impl {
   void evaluate_views(bool last);
   void save_model();
   void write_metrics(bool complete);
-  std::uint64_t capped_rays() const { return capped_before + tracer.kept_capped_rays(); }
-  std::string capped_share();
-  void warn_of_capped_rays() const;
+  std::string capped_share(std::uint64_t capped);
+  void warn_of_capped_rays(std::uint64_t capped) const;
   void warn_of_no_progress() const;
 
   // trainer_resume.cpp: checkpoints.
@@ -129,8 +145,9 @@ struct Trainer::Impl {
   bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
   std::int64_t saved = -1;  // iteration of the newest checkpoint of this run
   std::uint32_t reported_bad_steps = 0;
-  std::uint64_t traced_rays = 0;    // of all training views of the run
-  std::uint64_t capped_before = 0;  // rays that stopped at max-hits before it was resumed
+  std::uint64_t traced_rays = 0;  // of all training views of the run
+  std::deque<SentStep> sent;      // the oldest first
+  bool await_sizes = false;       // of the next step: its view had too little room
   bool cap_reported = false;
   PsnrRise rise;
   Stopwatch training{context};

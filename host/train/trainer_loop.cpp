@@ -47,7 +47,7 @@ void Trainer::Impl::run_iterations(std::int64_t until,
                                    Progress& progress,
                                    const std::function<bool()>& interrupted) {
   const auto pause = [&](const auto& work) {
-    context.finish();
+    settle();
     training.stop();
     progress.suspend();
     work();
@@ -84,7 +84,7 @@ void Trainer::Impl::run_iterations(std::int64_t until,
     if (asked || (scheduled && (stop || last || every(options.checkpoint_every, iteration))))
       pause([this] { save_checkpoint(); });
   }
-  context.finish();
+  settle();
 }
 
 // A run that is resumed where it ends: its results may not be in this folder.
@@ -138,7 +138,8 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   }
   advance(options.iterations, true, show_progress, [&] { return interrupt.requested(); });
   write_metrics(iteration == options.iterations);
-  if (capped_rays() > 0) warn_of_capped_rays();
+  if (const std::uint64_t capped = guard.counts().capped_rays; capped > 0)
+    warn_of_capped_rays(capped);
   if (iteration == options.iterations) warn_of_no_progress();
   if (const auto best = better_before(run.evaluations())) {
     spdlog::warn(

@@ -19,8 +19,9 @@ constexpr double kManyCapped = 1e-3;  // share of rays at which the cap on hits 
 
 // Waits for the device and reports the step just done.
 void Trainer::Impl::report(Progress& progress) {
+  settle();
   const ImageLoss::Value value = loss.value();
-  check_guard();
+  const StepGuard::Counts counts = check_guard();
   last_loss = value.total;
   const double psnr = std::min(value.psnr, kMostPsnr);
   rise.note(order.at(iteration - 1), resolution_divisor(options, iteration - 1), psnr);
@@ -30,28 +31,28 @@ void Trainer::Impl::report(Progress& progress) {
               elapsed > 0 ? static_cast<double>(iteration - row_iteration) / elapsed : 0.0});
   row_iteration = iteration;
   row_seconds = seconds;
-  progress.update(iteration, fmt::format("loss {:.4f}, PSNR {:.2f} of this view, {} Gaussians{}",
-                                         value.total, psnr, gaussians.count, capped_share()));
+  progress.update(iteration,
+                  fmt::format("loss {:.4f}, PSNR {:.2f} of this view, {} Gaussians{}", value.total,
+                              psnr, gaussians.count, capped_share(counts.capped_rays)));
 }
 
 // What the progress line says of rays that the cap on hits cut off; the first time that they are
 // many, a warning does too.
-std::string Trainer::Impl::capped_share() {
-  const std::uint64_t capped = capped_rays();
+std::string Trainer::Impl::capped_share(std::uint64_t capped) {
   if (capped == 0) return "";
   const double share = static_cast<double>(capped) / static_cast<double>(traced_rays);
   if (share >= kManyCapped && !cap_reported) {
     cap_reported = true;
-    warn_of_capped_rays();
+    warn_of_capped_rays(capped);
   }
   return fmt::format(", {:.2g} % of rays capped", 100.0 * share);
 }
 
-void Trainer::Impl::warn_of_capped_rays() const {
+void Trainer::Impl::warn_of_capped_rays(std::uint64_t capped) const {
   spdlog::warn(
       "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
       "behind: raise it",
-      iteration, capped_rays(), traced_rays, options.trace.max_hits);
+      iteration, capped, traced_rays, options.trace.max_hits);
 }
 
 // Of a run whose pictures never came nearer to the photos.
@@ -95,6 +96,7 @@ void Trainer::Impl::save_model() {
 }
 
 void Trainer::Impl::write_metrics(bool complete) {
+  const StepGuard::Counts counts = guard.counts();
   run.write_metrics({{"complete", complete},
                      {"iteration", iteration},
                      {"iterations", options.iterations},
@@ -104,10 +106,10 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"evaluation_seconds", evaluating.seconds()},
                      {"kernel_build_seconds", context.build_seconds()},
                      {"traced_rays", traced_rays},
-                     {"capped_rays", capped_rays()},
+                     {"capped_rays", counts.capped_rays},
                      {"psnr_rise", rise.most() ? nlohmann::json(*rise.most()) : nullptr},
                      {"skipped_updates", adam.skipped()},
-                     {"bad_steps", guard.counts().bad_steps},
+                     {"bad_steps", counts.bad_steps},
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", context.device().name}});
 }

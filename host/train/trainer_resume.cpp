@@ -21,7 +21,7 @@ Checkpoint Trainer::Impl::state() {
   checkpoint.bad_steps = counts.bad_steps;
   checkpoint.bad_steps_in_a_row = counts.in_a_row;
   checkpoint.traced_rays = traced_rays;
-  checkpoint.capped_rays = capped_rays();
+  checkpoint.capped_rays = counts.capped_rays;
   store_state(gaussians, adam, density, checkpoint);
   if (footprint.lows().size() > 0) checkpoint.sections["footprint"] = footprint.lows().download();
   if (poses) {
@@ -51,9 +51,16 @@ void Trainer::Impl::save_checkpoint() {
 // can do then.
 std::string Trainer::Impl::rescue() {
   const auto turn = context.lock();
+  if (whole) {
+    try {
+      abandon();
+    } catch (const std::exception& error) {
+      spdlog::warn("the steps on their way to iteration {} are lost: {}", iteration, error.what());
+      whole = false;
+    }
+  }
   if (whole && saved != iteration) {
     try {
-      context.finish();
       write_checkpoint(checkpoint_path(run.path(), iteration), state());
       saved = iteration;
     } catch (const std::exception& error) {
@@ -146,10 +153,10 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   if (options.background == "auto" && !checkpoint.config.empty())
     options.background = parse_train_config(checkpoint.config).background;
   background = background_color(options, cut_out);
-  guard.restore({checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false});
+  guard.restore(
+      {checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false, checkpoint.capped_rays});
   reported_bad_steps = checkpoint.bad_steps;
   traced_rays = checkpoint.traced_rays;
-  capped_before = checkpoint.capped_rays;
   iteration = checkpoint.iteration;
   training.set(recorded_seconds(folder, iteration));
   started = true;

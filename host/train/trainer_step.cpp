@@ -7,9 +7,10 @@
 
 namespace raysplats {
 
-// One view: forward, loss, backward, statistics, Adam; nothing is waited for, but the
-// gradient of a pose that is trained.
-void Trainer::Impl::step() {
+// One view: forward, loss, backward, statistics, Adam. Nothing is waited for, but sizes where
+// await_sizes says so and, where poses are trained, their gradients: then sizes as well, because
+// what the host does of a step cannot be turned off by the device.
+void Trainer::Impl::enqueue_step() {
   const std::size_t view = order.at(iteration);
   targets.prefetch(order.upcoming(kReadAhead - 1));
   const int divisor = resolution_divisor(options, iteration);
@@ -18,14 +19,15 @@ void Trainer::Impl::step() {
   const std::array<float, 3> behind = step_background(options, cut_out, background, iteration);
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
   tracer.set_background(behind);
-  tracer.forward(gaussians, camera, true);
+  tracer.forward(gaussians, camera, true,
+                 await_sizes || poses ? ViewSizes::kAwaited : ViewSizes::kAhead);
   const Buffer<float>& shown =
       exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
                : tracer.image();
   loss.evaluate(shown, targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
   const ImageLoss::Partials partials = loss.partials();
-  guard.check_loss(partials.pixel, partials.ssim, partials.tiles);
+  guard.check_loss(partials.pixel, partials.ssim, partials.tiles, tracer.overflow());
   if (exposure) {
     whole = false;
     exposure->step(tracer.image(), image_gradient, view, camera.width, camera.height,
@@ -38,7 +40,7 @@ void Trainer::Impl::step() {
   if (density.accumulates_at(iteration)) density.accumulate(gaussians, gradients, &guard.mark());
   adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
   footprint.apply(gaussians, guard.mark());
-  guard.close(adam.refused(), gaussians.count);
+  guard.close(adam.refused(), tracer.kept_capped_rays(), gaussians.count);
   traced_rays += pixels_of(camera);
   ++iteration;
   whole = true;
@@ -50,6 +52,7 @@ void Trainer::Impl::control_density() {
   const bool refines = density.refines_at(iteration);
   const bool resets = density.resets_at(iteration);
   if (!refines && !resets) return;
+  settle();
   check_guard();
   whole = false;
   if (refines) {

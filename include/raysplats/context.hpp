@@ -15,15 +15,18 @@
 namespace raysplats {
 
 class BuildOptions;
+class FaultInjection;
 class Kernel;
 class Profiler;
 
 struct ContextOptions {
-  bool profile = false;         ///< time every launch by device events
-  bool keep_launches = false;   ///< with profile: also keep each time for take_launches()
-  bool kernel_cache = true;     ///< keep compiled programs in the user's cache directory
-  bool tuning = true;           ///< use what `raysplats tune` stored for the device
-  std::string cache_directory;  ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
+  bool profile = false;          ///< time every launch by device events
+  bool keep_launches = false;    ///< with profile: also keep each time for take_launches()
+  bool kernel_cache = true;      ///< keep compiled programs in the user's cache directory
+  bool tuning = true;            ///< use what `raysplats tune` stored for the device
+  std::string kernel_directory;  ///< kernels are read from here; "" = those that are built in, or
+                                 ///< of the folder that RAYSPLATS_KERNEL_DIR names
+  std::string cache_directory;   ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
   /// Hears of every program that the compiler, not the cache, makes: before (its number from 1, its
   /// file below cl/), and when it is done (its number, "").
   std::function<void(std::size_t number, const std::string& program)> compiling;
@@ -60,6 +63,10 @@ class Context {
   /// Blocks until everything enqueued has finished; errors of earlier launches surface here.
   void finish();
 
+  /// How often the host has waited until the device had nothing left to do: finish(), and reads and
+  /// writes of buffers that block.
+  std::uint64_t host_waits() const;
+
   /// What making programs has taken so far, from the cache or by the compiler: it is no part of any
   /// work, and happens once.
   double build_seconds() const;
@@ -83,6 +90,7 @@ class Context {
   Kernel kernel(const std::string& program, const std::string& name, const BuildOptions& options);
   Kernel kernel(const std::string& program, const std::string& name);
   Profiler& profiler();
+  FaultInjection& faults();
   /// A number that this context has not given before.
   std::uint64_t new_revision();
   struct Impl;

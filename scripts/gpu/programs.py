@@ -79,6 +79,7 @@ PROGRAMS = [
     ("densify", "train/densify.cl", dict(SH_COEFFICIENTS=16, SIGMOID_SCALE=0)),
     ("footprint", "train/footprint.cl", dict(SIGMOID_SCALE=0)),
     ("guard", "train/guard.cl", {}),
+    ("view sizes", "trace/view_sizes.cl", {}),
     ("exposure", "train/exposure.cl", {}),
     ("validate", "train/validate.cl", {}),
     ("waves", "light/waves.cl", {}),

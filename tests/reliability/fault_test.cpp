@@ -48,6 +48,39 @@ TEST_CASE("a failed launch is exit code 4, and the run goes on where it was") {
   for (const int n : {150, 402, 403}) check_fault("RAYSPLATS_FAIL_LAUNCH", n, 4);
 }
 
+TEST_CASE("a view without room costs a step and changes no byte of the result") {
+  for (const char* variable : {"RAYSPLATS_FAIL_LISTS", "RAYSPLATS_FAIL_HITS"}) {
+    for (const int n : {2, 13, 24}) {  // of the 29 views that are not waited for
+      CAPTURE(variable);
+      CAPTURE(n);
+      const TemporaryFolder folder;
+      const std::string run = folder / "run";
+      const Outcome outcome =
+          raysplats_program(tiny_training(run), {{{variable, std::to_string(n)}}});
+      INFO(outcome.err);
+      REQUIRE(outcome.code == 0);
+      CHECK(same_result(run, undisturbed()));
+    }
+  }
+}
+
+TEST_CASE("rays that the cap on hits stops in a step that fails count once") {
+  const Words capped{"--max-hits", "3"};
+  const TemporaryFolder folder;
+  const std::string whole = folder / "whole";
+  REQUIRE(raysplats_program(tiny_training(whole) + capped).code == 0);
+  REQUIRE(raysplats::read_checkpoint(checkpoint_of(whole, kIterations)).capped_rays > 100);
+  for (const int n : {400, 405, 410, 415, 420}) {  // a step has some 25 launches
+    CAPTURE(n);
+    const std::string run = folder / ("run" + std::to_string(n));
+    const Outcome failed = raysplats_program(tiny_training(run) + capped,
+                                             {{{"RAYSPLATS_FAIL_LAUNCH", std::to_string(n)}}});
+    REQUIRE(failed.code == 4);
+    REQUIRE(raysplats_program(tiny_training(run) + capped + Words{"--resume", "latest"}).code == 0);
+    CHECK(same_result(run, whole));
+  }
+}
+
 TEST_CASE("a loss that stays infinite stops the run with a dump and the model as it was") {
   const TemporaryFolder folder;
   const std::string start = folder / "start.ply";

@@ -137,3 +137,17 @@ TEST_CASE("queues and buffers that do not fit are refused") {
   CHECK(contains(refusal([&] { trace(tracer, model, small(), 2, large()); }), "64 are needed"));
   CHECK(contains(refusal([&] { trace(tracer, model, large(), 2, nullptr); }), "missing"));
 }
+
+TEST_CASE("launches keep to their time on a caller's queue that takes no times as well") {
+  const Own own;
+  const auto context = make_context(own.queue());
+  const Gaussians gaussians = reference::random_scene(200, 7, 1);
+  const Camera camera = reference::cube_camera(64, 60);
+  TraceOptions options;
+  options.launch_budget_ms = 0.0;
+  const Image whole = trace_image(*context, gaussians, options, camera);
+  options.launch_budget_ms = 0.001;
+  const std::uint64_t waits = context->host_waits();
+  CHECK(trace_image(*context, gaussians, options, camera).data == whole.data);
+  CHECK(context->host_waits() > waits + 4);  // two for every band
+}

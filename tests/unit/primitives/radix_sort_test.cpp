@@ -125,3 +125,32 @@ TEST_CASE("radix sort: wrong sizes are refused") {
   CHECK_THROWS_AS(sorter.sort(ten, nine, 10), UsageError);
   CHECK_THROWS_AS(sorter.sort(ten, ten, 5, 33), UsageError);
 }
+
+TEST_CASE("radix sort: as many pairs as only the device knows") {
+  Context context(select_device(""));
+  constexpr std::size_t kMost = 20000;
+  const Words keys = random_keys(kMost, std::uint64_t{1} << 32, 19);
+  Buffer<std::uint32_t> live(context, 1, "live");
+  for (const ChunkShape& shape : {ChunkShape{8, 1, 4096}, ChunkShape{16, 64, 256}}) {
+    RadixSort sorter(context, shape);
+    for (const std::uint32_t count : {0u, 1u, 700u, 19999u, 20000u}) {
+      CAPTURE(count);
+      Words values(kMost);
+      std::iota(values.begin(), values.end(), 0u);
+      Buffer<std::uint32_t> device_keys(context, kMost, "keys");
+      Buffer<std::uint32_t> device_values(context, kMost, "values");
+      device_keys.upload(keys);
+      device_values.upload(values);
+      live.fill(count);
+      sorter.sort(device_keys, device_values, live, kMost, 24);
+      Words expected = values;
+      std::stable_sort(expected.begin(), expected.begin() + count,
+                       [&](std::uint32_t a, std::uint32_t b) {
+                         return (keys[a] & 0xffffffu) < (keys[b] & 0xffffffu);
+                       });
+      const Words sorted = device_values.download();
+      // What lies behind the live pairs is of no concern.
+      CHECK(std::equal(sorted.begin(), sorted.begin() + count, expected.begin()));
+    }
+  }
+}

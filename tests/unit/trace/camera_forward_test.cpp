@@ -6,6 +6,7 @@
 
 #include "raysplats/error.hpp"
 #include "trace/candidate_lists.hpp"
+#include "trace/view_sizes.h"
 #include "trace_fixture.hpp"
 
 using namespace raysplats;
@@ -373,10 +374,16 @@ TEST_CASE("lists that 32 bits cannot count are refused before anything is writte
   const RsCamera converted = device_camera(camera, 0.0f);
   CandidateLists lists(context, 1);
   lists.prepare(gaussians, converted, {}, options);
-  CHECK_FALSE(lists.build(boxes, converted, {0, 0, 256, 255}, std::size_t{1} << 30));
-  CHECK(lists.candidates() == Scan::kMost);
-  REQUIRE(lists.build(boxes, converted, {200, 7, 3, 2}, std::size_t{1} << 30));
-  CHECK(lists.candidates() == 6 * kCount);
+  Buffer<std::uint32_t> counters(context, RS_COUNT_WORDS, "counters");
+  counters.clear();
+  CHECK_FALSE(lists.build(boxes, converted, {0, 0, 256, 255}, std::size_t{1} << 30, counters));
+  CHECK(counters.read(RS_COUNT_CANDIDATES) == 0);
+  REQUIRE(lists.build(boxes, converted, {200, 7, 3, 2}, std::size_t{1} << 30, counters));
+  CHECK(counters.read(RS_COUNT_CANDIDATES) == 6 * kCount);
+  Buffer<std::uint32_t> overflow(context, 1, "overflow");
+  overflow.clear();
+  lists.build_ahead(boxes, converted, {0, 0, 256, 255}, std::size_t{1} << 30, counters, overflow);
+  CHECK(overflow.read(0) == 1);
 }
 
 TEST_CASE("pictures as wide as can be are traced to their last pixel") {

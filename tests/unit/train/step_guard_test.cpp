@@ -28,11 +28,15 @@ struct Fixture {
   Buffer<std::uint32_t> photo{context, kPixels, "photo"};
   Buffer<float> gradient;
   Buffer<std::uint32_t> refused{context, 1, "refused"};
+  Buffer<std::uint32_t> overflow{context, 1, "overflow"};
+  Buffer<std::uint32_t> capped{context, 2, "capped"};
   std::uint32_t refused_so_far = 0;
 
   Fixture() {
     photo.fill(0xff804020u);
     refused.clear();
+    overflow.clear();
+    capped.clear();
   }
 
   // A step whose picture has `value` in one pixel and in which Adam refuses `refusals` of `count`.
@@ -42,11 +46,11 @@ struct Fixture {
     image.upload(pixels);
     loss.evaluate(image, photo, false, {0, 0, 0}, kSide, kSide, gradient);
     const ImageLoss::Partials partials = loss.partials();
-    guard.check_loss(partials.pixel, partials.ssim, partials.tiles);
+    guard.check_loss(partials.pixel, partials.ssim, partials.tiles, overflow);
     marked = guard.mark().read(0) != 0;
     refused_so_far += refusals;
     refused.upload(std::array<std::uint32_t, 1>{refused_so_far});
-    guard.close(refused, count);
+    guard.close(refused, capped, count);
   }
   bool marked = false;  // the last step
 };
@@ -138,4 +142,29 @@ TEST_CASE("a marked step changes neither parameters nor moments nor statistics")
   adam.step(gaussians, gradients, rates, &guard);
   CHECK(gaussians.means.download() != model.means);
   CHECK(density.statistics().download() == std::vector<float>(260, 1.0f));
+}
+
+TEST_CASE("a step whose view had no room is marked and counts as if it had not been") {
+  Fixture f;
+  f.capped.upload(std::array<std::uint32_t, 2>{0xfffffff0u, 2});
+  f.step(kNan);
+  CHECK(f.guard.counts().bad_steps == 1);
+  CHECK(f.guard.counts().capped_rays == 0x2fffffff0u);
+  f.overflow.fill(1);
+  for (const float value : {0.5f, kNan}) {
+    f.step(value);
+    CHECK(f.marked);
+    CHECK(f.guard.mark().read(0) == 0);
+    CHECK(f.guard.counts().in_a_row == 1);
+    CHECK(f.guard.counts().bad_steps == 1);
+    CHECK(f.guard.counts().capped_rays == 0x2fffffff0u);
+  }
+  f.overflow.clear();
+  f.step(0.5f);
+  CHECK(!f.marked);
+  CHECK(f.guard.counts().in_a_row == 0);
+  CHECK(f.guard.counts().capped_rays == 0x5ffffffe0u);  // over both words
+  StepGuard resumed(f.context);
+  resumed.restore(f.guard.counts());
+  CHECK(resumed.counts().capped_rays == 0x5ffffffe0u);
 }

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Steps are enqueued without waiting for the device to say how much room their views need. One that
+// finds too little changes nothing, nor does any step behind it; when the host sees that, it goes
+// back to that step and makes it again with the room that it needs. So parameters do not depend on
+// the sizes of buffers.
+#include "train/trainer_impl.hpp"
+
+namespace raysplats {
+namespace {
+
+// The host stays this far ahead at most: enough for the device never to run dry, few enough for a
+// step that is made again and for a signal not to cost much.
+constexpr std::size_t kMostAhead = 4;
+
+}  // namespace
+
+void Trainer::Impl::step() {
+  follow(false);
+  const std::int64_t begun = iteration;
+  const std::int64_t optimiser_steps = adam.steps();
+  const std::uint64_t rays = traced_rays;
+  enqueue_step();
+  await_sizes = false;
+  sent.push_back({begun, optimiser_steps, rays, ReadBack(context, tracer.overflow(), 1)});
+}
+
+// Takes note of the steps that are done, of all of them with `all`. Goes back to the first one
+// that had too little room.
+void Trainer::Impl::follow(bool all) {
+  while (!sent.empty()) {
+    const SentStep& oldest = sent.front();
+    if (!all && sent.size() <= kMostAhead && !oldest.overflow.ready()) return;
+    if (oldest.overflow.words()[0] != 0) {
+      go_back();
+    } else {
+      sent.pop_front();
+    }
+  }
+}
+
+// To the state that the device is in since the oldest step of `sent` found too little room.
+void Trainer::Impl::go_back() {
+  iteration = sent.front().iteration;
+  adam.set_steps(sent.front().optimiser_steps);
+  traced_rays = sent.front().traced_rays;
+  sent.clear();
+  tracer.clear_overflow();
+  await_sizes = true;
+}
+
+// Waits until all steps up to this iteration are done and count.
+void Trainer::Impl::settle() {
+  const std::int64_t wanted = iteration;
+  do {
+    while (iteration < wanted) step();
+    follow(true);
+  } while (iteration < wanted);
+}
+
+// Waits for what is on its way and leaves out what would have to be made again.
+void Trainer::Impl::abandon() {
+  follow(true);
+  context.finish();
+}
+
+}  // namespace raysplats

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "device/context.hpp"
+#include "raysplats/io.hpp"
+#include "raysplats/trainer.hpp"
+#include "short_training.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+// Generated photos in a folder that goes with the object.
+struct Photos {
+  std::filesystem::path folder;
+  Photos()
+      : folder(std::filesystem::temp_directory_path() /
+               ("raysplats_trainer_pace_" + std::to_string(::getpid()))) {
+    make_photos(folder / "data", 48, 6, 1);
+  }
+  ~Photos() { std::filesystem::remove_all(folder); }
+};
+
+// Without density control and with a report at the end alone.
+TrainOptions quiet_training() {
+  TrainOptions options = short_training(60);
+  options.init_count = 400;
+  options.sh_degree = 1;
+  options.densify_until = 0;
+  options.log_every = 1000;
+  options.trace.deterministic = true;
+  return options;
+}
+
+Gaussians trained(const Photos& photos, const TrainOptions& options, const char* fault, int at) {
+  ::setenv(fault, std::to_string(at).c_str(), 1);
+  Context context(select_device(""));
+  ::unsetenv(fault);
+  Trainer trainer(context, load_dataset((photos.folder / "data").string()), options,
+                  photos.folder / "run", true);
+  trainer.step(30);
+  CHECK(trainer.iteration() == 30);
+  return trainer.model();
+}
+
+}  // namespace
+
+TEST_CASE("between reports and density passes the host never waits for the device to run dry") {
+  const Photos photos;
+  Context context(select_device(""));
+  TrainOptions options = quiet_training();
+  for (const double budget : {-1.0, 1000.0}) {
+    CAPTURE(budget);
+    options.trace.launch_budget_ms = budget;
+    Trainer trainer(context, load_dataset((photos.folder / "data").string()), options,
+                    photos.folder / "run", true);
+    trainer.step(20);  // every view: photos, room and sizes of launches are there now
+    const std::uint64_t waits = context.host_waits();
+    trainer.step(20);
+    CHECK(context.host_waits() == waits);
+    trainer.step(20);  // with the report of the last one
+    CHECK(context.host_waits() > waits);
+  }
+}
+
+TEST_CASE("steps whose views had no room are made again and leave the same parameters") {
+  const Photos photos;
+  const TrainOptions options = quiet_training();
+  const Gaussians undisturbed = trained(photos, options, "RAYSPLATS_FAIL_HITS", 0);
+  CHECK(undisturbed.size() == 400);
+  for (const char* fault : {"RAYSPLATS_FAIL_HITS", "RAYSPLATS_FAIL_LISTS"}) {
+    for (const int at : {1, 5, 29}) {  // the last view of step() among them
+      CAPTURE(fault);
+      CAPTURE(at);
+      const Gaussians model = trained(photos, options, fault, at);
+      CHECK(model.means == undisturbed.means);
+      CHECK(model.log_scales == undisturbed.log_scales);
+      CHECK(model.opacities == undisturbed.opacities);
+      CHECK(model.sh == undisturbed.sh);
+    }
+  }
+}
