@@ -10,6 +10,8 @@
 #include "base/atomic_file.hpp"
 #include "bench/bench.hpp"
 #include "bench/compare.hpp"
+#include "bench/device_report.hpp"
+#include "bench/kernel_folders.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -30,6 +32,9 @@ struct Options {
   std::size_t view = 0;
   std::optional<std::string> resolution;
   bool list = false;
+  std::string report;
+  std::string kernels;
+  std::string against;
   std::string json;
   std::string csv;
   BenchOptions bench;
@@ -103,12 +108,30 @@ void check_used(const CLI::App& command, const Options& options) {
   }
 }
 
+// Reports and comparisons of kernels are about generated scenes and have a form of their own.
+void check_alone(const CLI::App& command, const Options& options) {
+  if (options.kernels.empty() != options.against.empty()) {
+    throw UsageError(
+        "--kernels and --against name the two folders of kernels to compare: give both");
+  }
+  const char* whole = !options.report.empty() ? "--report" : "--kernels";
+  if (options.report.empty() && options.kernels.empty()) return;
+  if (!options.report.empty() && !options.kernels.empty()) {
+    throw UsageError("--report measures the kernels that are built in: leave out --kernels");
+  }
+  for (const char* name : {"--model", "--cameras", "--json", "--csv", "--list", "--profile"}) {
+    if (command.get_option(name)->count() > 0)
+      throw UsageError(fmt::format("{} does not go with {}: leave it out", name, whole));
+  }
+}
+
 void check_result_file(const std::string& path) {
   if (!path.empty()) AtomicFile probe(path);
 }
 
 void run(const CLI::App& command, const Options& options) {
   check_used(command, options);
+  check_alone(command, options);
   BenchOptions bench = options.bench;
   bench.sizes.clear();
   for (const std::string& text : parts_of(options.sizes))
@@ -137,10 +160,28 @@ void run(const CLI::App& command, const Options& options) {
   // Before anything is measured: a result without a place to go is lost.
   check_result_file(options.json);
   check_result_file(options.csv);
+  check_result_file(options.report);
   ContextOptions timed;
   timed.profile = timed.keep_launches = true;
   timed.kernel_cache = !options.device.no_kernel_cache;
-  Context context(select_device(options.device.device), timed);
+  const DeviceInfo device = select_device(options.device.device);
+  if (!options.kernels.empty()) {
+    fmt::print("{}", kernel_comparison_table(
+                         compare_kernels(device, timed, options.kernels, options.against, bench)));
+    return;
+  }
+  Context context(device, timed);
+  if (!options.report.empty()) {
+    const DeviceReport report = make_device_report(context, bench);
+    fmt::print("{}", device_report_text(report));
+    write_text_file(options.report, device_report_json(report));
+    if (!report.passed()) {
+      throw DeviceError(fmt::format(
+          "The device {} does not compute what it should: please send us {}, and see docs/gpu.md",
+          device.name, options.report));
+    }
+    return;
+  }
   const BenchReport report = run_bench(context, bench, chosen);
   fmt::print("{}", bench_table(report));
   if (!options.json.empty()) write_text_file(options.json, bench_json(report));
@@ -197,6 +238,18 @@ Command add_bench_command(CLI::App& app) {
   command->add_option("--repeat", options->bench.repeat, "Repetitions of every row")
       ->transform(whole_between(1, 1000))
       ->capture_default_str();
+  command
+      ->add_option(
+          "--report", options->report,
+          "Self-test, all rows, frames/s and training iterations/s as one file, in at most "
+          "8 minutes")
+      ->type_name("FILE");
+  command
+      ->add_option("--kernels", options->kernels,
+                   "Compare the kernels of this folder (like cl/ of the source) ...")
+      ->type_name("DIR");
+  command->add_option("--against", options->against, "... with those of this one, in turns")
+      ->type_name("DIR");
   command->add_option("--json", options->json, "Also write the result as JSON")->type_name("FILE");
   command->add_option("--csv", options->csv, "Also write the result as CSV")->type_name("FILE");
   add_trace_flags(*command, options->trace);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "device/device_json.hpp"
 #include "device/program_cache.hpp"
 #include "device/tuning.hpp"
 #include "options.hpp"
@@ -16,55 +17,9 @@ struct Options {
   bool clear_cache = false;
 };
 
-const char* type_name(DeviceType type) {
-  switch (type) {
-    case DeviceType::kCpu:
-      return "CPU";
-    case DeviceType::kGpu:
-      return "GPU";
-    case DeviceType::kAccelerator:
-      return "accelerator";
-    case DeviceType::kOther:
-      break;
-  }
-  return "other";
-}
-
-nlohmann::ordered_json to_json(const DeviceInfo& device) {
-  nlohmann::ordered_json tuning;
-  if (device.tuning) {
-    tuning = {{"packet_shape", device.tuning->grouped ? "group" : "vector"},
-              {"packet_width", device.tuning->packet_width},
-              {"tile", device.tuning->tile},
-              {"pending", device.tuning->pending},
-              {"group", device.tuning->group}};
-  }
-  return {{"index", device.index},
-          {"name", device.name},
-          {"vendor", device.vendor},
-          {"type", type_name(device.type)},
-          {"platform", device.platform},
-          {"platform_version", device.platform_version},
-          {"version", device.version},
-          {"language_version", device.language_version},
-          {"driver_version", device.driver_version},
-          {"compute_units", device.compute_units},
-          {"float_vector_width", device.float_vector_width},
-          {"max_work_group_size", device.max_work_group_size},
-          {"global_memory", device.global_memory},
-          {"max_allocation", device.max_allocation},
-          {"local_memory", device.local_memory},
-          {"fp64", device.has_fp64},
-          {"float_atomics", device.has_float_atomics},
-          {"int64_atomics", device.has_int64_atomics},
-          {"tuning", tuning},
-          {"usable", device.usable()},
-          {"problems", device.problems}};
-}
-
 void print(const DeviceInfo& device) {
   const auto yes = [](bool value) { return value ? "yes" : "no"; };
-  fmt::print("[{}] {} ({})\n", device.index, device.name, type_name(device.type));
+  fmt::print("[{}] {} ({})\n", device.index, device.name, device_type_name(device.type));
   fmt::print("    platform        {}, {}\n", device.platform, device.platform_version);
   fmt::print("    version         {}, {}, driver {}\n", device.version, device.language_version,
              device.driver_version);
@@ -96,7 +51,7 @@ void run(const Options& options) {
   for (DeviceInfo& device : devices) device.tuning = store.find(device);
   if (options.json) {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
-    for (const DeviceInfo& device : devices) list.push_back(to_json(device));
+    for (const DeviceInfo& device : devices) list.push_back(device_json(device));
     fmt::print("{}\n", nlohmann::ordered_json{{"devices", list}}.dump(2));
   } else {
     for (const DeviceInfo& device : devices) print(device);

@@ -56,8 +56,9 @@ BenchComparison compare_reports(const BenchReport& before, const BenchReport& af
     difference.before = row.seconds.median;
     difference.after = other->seconds.median;
     difference.ratio = row.seconds.median > 0 ? other->seconds.median / row.seconds.median : 0.0;
-    difference.significant = std::abs(difference.after - difference.before) >
-                             spread_of(row.seconds) + spread_of(other->seconds);
+    const double spread = spread_of(row.seconds) + spread_of(other->seconds);
+    difference.spread = row.seconds.median > 0 ? spread / row.seconds.median : 0.0;
+    difference.significant = std::abs(difference.after - difference.before) > spread;
     out.rows.push_back(difference);
   }
   for (const BenchRow& row : after.rows) {
@@ -71,10 +72,12 @@ std::string comparison_table(const BenchComparison& comparison) {
   for (const std::string& text : comparison.differing) out += text + "\n";
   std::size_t widest = 3;
   for (const BenchDifference& row : comparison.rows) widest = std::max(widest, row.id.size());
-  out += fmt::format("{:<{}} {:>12} {:>12} {:>8}\n", "row", widest, "A ms", "B ms", "B/A");
+  out +=
+      fmt::format("{:<{}} {:>12} {:>12} {:>8} {:>7}\n", "row", widest, "A ms", "B ms", "B/A", "+-");
   for (const BenchDifference& row : comparison.rows) {
-    out += fmt::format("{:<{}} {:>12.4f} {:>12.4f} {:>8.3f}{}\n", row.id, widest, 1e3 * row.before,
-                       1e3 * row.after, row.ratio, row.significant ? " *" : "");
+    out += fmt::format("{:<{}} {:>12.4f} {:>12.4f} {:>8.3f} {:>7.3f}{}\n", row.id, widest,
+                       1e3 * row.before, 1e3 * row.after, row.ratio, row.spread,
+                       row.significant ? " *" : "");
   }
   for (const std::string& id : comparison.only_before) out += fmt::format("only in A: {}\n", id);
   for (const std::string& id : comparison.only_after) out += fmt::format("only in B: {}\n", id);

@@ -13,6 +13,7 @@ struct BenchDifference {
   double before = 0;         ///< median seconds in A
   double after = 0;          ///< in B
   double ratio = 0;          ///< after / before
+  double spread = 0;         ///< of both medians together, over `before`
   bool significant = false;  ///< the medians differ by more than both spreads together
 };
 

@@ -95,6 +95,43 @@ TEST_CASE("bench measures a model seen by a camera") {
   check_refused(with(model, {"--view", "1"}), 2, "--view 1 is beyond");
 }
 
+TEST_CASE("bench writes one file for the owner of a device to send") {
+  const TemporaryFolder folder;
+  const std::vector<std::string> report{"bench",    "--report",     folder / "report.json",
+                                        "--sizes",  "1k",           "--resolution",
+                                        "32x32",    "--repeat",     "1",
+                                        "--filter", "^(adam|view)", "-q"};
+  const Outcome outcome = raysplats_program(report);
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(contains(outcome.out, "self-test passed"));
+  CHECK(contains(outcome.out, "1600x1064"));
+  const nlohmann::json json = nlohmann::json::parse(read_file(folder / "report.json"));
+  CHECK(json.at("self_test_passed") == true);
+  CHECK(json.at("frames").size() == 2);
+  CHECK(json.at("device").contains("driver_version"));
+  check_refused(with(report, {"--json", folder / "a.json"}), 2, "--json does not go with --report");
+  check_refused(with(report, {"--kernels", "a", "--against", "b"}), 2, "leave out --kernels");
+  check_refused({"bench", "--kernels", "cl"}, 2, "give both");
+  check_refused({"bench", "--report", folder / "none" / "report.json", "-q"}, 3, "none");
+}
+
+TEST_CASE("bench compares two folders of kernels") {
+  const TemporaryFolder folder;
+  const std::string kernels = std::string(RAYSPLATS_SOURCE_DIR) + "/cl";
+  const std::vector<std::string> both{"bench", "--kernels", kernels, "--against", kernels};
+  const Outcome outcome =
+      raysplats_program(with(both, {"--sizes", "1k", "--resolution", "32x32", "--repeat", "2",
+                                    "--filter", "^adam", "-q"}));
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(contains(outcome.out, "equal to the last bit"));
+  CHECK(contains(outcome.out, "adam/random/1000"));
+  check_refused(
+      {"bench", "--kernels", kernels, "--against", folder / "none", "--sizes", "1k", "-q"}, 4,
+      "cannot be read");
+}
+
 TEST_CASE("bench refuses what it cannot measure") {
   const TemporaryFolder folder;
   write_file(folder / "balls.ply", ply_file(2));

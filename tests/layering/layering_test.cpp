@@ -32,7 +32,7 @@ const std::map<std::string, Names> kBelow{{"base", {}},
                                           {"prepare", {"io"}},
                                           {"report", {"train"}},
                                           {"synth", {"io"}},
-                                          {"bench", {"train", "synth"}},
+                                          {"bench", {"train", "synth", "reference"}},
                                           {"reference", {"core"}}};
 
 /// The module that a public header is the face of.

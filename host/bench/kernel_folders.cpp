@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/kernel_folders.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "base/rng.hpp"
+#include "bench/bench_cases.hpp"
+#include "bench/scene_bench.hpp"
+#include "light/view_tracer.hpp"
+#include "trace/ray_tracer.hpp"
+#include "train/adam.hpp"
+#include "train/image_loss.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr double kRate = 1e-3;  // of the step of Adam that is compared
+
+struct NamedNumbers {
+  std::string name;
+  std::vector<float> numbers;
+};
+
+void add(std::vector<NamedNumbers>& out, const std::string& name, const Parameters& parameters) {
+  for (const ParameterGroup group : kParameterGroups)
+    out.push_back({name + group_name(group), parameters[group].download()});
+}
+
+// A step of training by one of the ways to trace.
+void add_step(Context& context,
+              const BenchModel& model,
+              const TraceOptions& trace,
+              const std::string& way,
+              std::vector<NamedNumbers>& out) {
+  DeviceGaussians gaussians =
+      DeviceGaussians::upload(context, model.gaussians, ScaleActivation::kExp);
+  const int width = model.camera.width, height = model.camera.height;
+  ViewTracer tracer(context, trace);
+  tracer.forward(gaussians, model.camera, true);
+  out.push_back({way + "image", tracer.image().download()});
+  CounterRng random(7, 1);
+  std::vector<std::uint32_t> photo(static_cast<std::size_t>(width) *
+                                   static_cast<std::size_t>(height));
+  for (std::uint32_t& pixel : photo) pixel = static_cast<std::uint32_t>(random.bits());
+  Buffer<std::uint32_t> target(context, photo.size(), "photo");
+  target.upload(photo);
+  ImageLoss loss(context, PixelLoss::kL1, 0.2f);
+  Buffer<float> slopes;
+  loss.evaluate(tracer.image(), target, false, {0, 0, 0}, width, height, slopes);
+  out.push_back({way + "gradient of the image", slopes.download()});
+  GaussianGradients gradients;
+  tracer.backward(gaussians, slopes, gradients);
+  add(out, way + "gradients of ", gradients);
+  Adam adam(context, {});
+  adam.step(gaussians, gradients, {kRate, kRate, kRate, kRate, kRate, kRate});
+  add(out, way + "after a step: ", gaussians);
+}
+
+std::vector<NamedNumbers> results_of(Context& context,
+                                     const BenchModel& model,
+                                     const BenchOptions& options) {
+  TraceOptions trace = options.trace;
+  trace.deterministic = true;
+  std::vector<NamedNumbers> out;
+  trace.traversal = Traversal::kTiles;
+  add_step(context, model, trace, "tiles, ", out);
+  trace.traversal = Traversal::kBvh;
+  add_step(context, model, trace, "tree, ", out);
+  return out;
+}
+
+ResultDifference difference_of(const NamedNumbers& a, const NamedNumbers& b) {
+  ResultDifference out;
+  out.name = a.name;
+  out.numbers = a.numbers.size();
+  double largest = 0, scale = 0;
+  for (std::size_t i = 0; i < a.numbers.size(); ++i) {
+    scale = std::max(scale, std::abs(static_cast<double>(a.numbers[i])));
+    if (std::bit_cast<std::uint32_t>(a.numbers[i]) == std::bit_cast<std::uint32_t>(b.numbers[i]))
+      continue;
+    ++out.differing;
+    const double difference =
+        std::abs(static_cast<double>(a.numbers[i]) - static_cast<double>(b.numbers[i]));
+    // What is no number stays.
+    if (!(difference <= largest)) largest = difference;
+  }
+  out.largest = scale > 0 ? largest / scale : largest;
+  return out;
+}
+
+// One folder's side of the comparison of one scene.
+struct Side {
+  Side(Context& context_in,
+       const BenchModel& model,
+       const BenchOptions& options,
+       const IdFilter& keep)
+      : context(context_in),
+        bench(context_in, model, options),
+        operations(selected(bench.operations(), keep, model.name, model.gaussians.size())),
+        samples(operations.size()) {
+    for (std::size_t i = 0; i < operations.size(); ++i)
+      samples[i].resize(operations[i].stages.size());
+  }
+
+  void measure(double min_seconds) {
+    const auto more = run_operations(context, operations, 1, min_seconds);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      for (std::size_t k = 0; k < samples[i].size(); ++k) {
+        StageSamples& all = samples[i][k];
+        const StageSamples& now = more[i][k];
+        all.seconds.insert(all.seconds.end(), now.seconds.begin(), now.seconds.end());
+        all.wall.insert(all.wall.end(), now.wall.begin(), now.wall.end());
+      }
+    }
+  }
+
+  void add_rows(const BenchModel& model, BenchReport& report) const {
+    for (std::size_t i = 0; i < operations.size(); ++i) {
+      for (std::size_t k = 0; k < operations[i].stages.size(); ++k) {
+        report.rows.push_back(
+            row_of(operations[i].stages[k], samples[i][k], model.name, model.gaussians.size()));
+      }
+    }
+  }
+
+  Context& context;
+  SceneBench bench;
+  std::vector<BenchOperation> operations;
+  std::vector<std::vector<StageSamples>> samples;
+};
+
+}  // namespace
+
+bool KernelComparison::equal() const {
+  return std::all_of(results.begin(), results.end(),
+                     [](const ResultDifference& result) { return result.differing == 0; });
+}
+
+KernelComparison compare_kernels(const DeviceInfo& device,
+                                 const ContextOptions& context_options,
+                                 const std::string& folder,
+                                 const std::string& other,
+                                 const BenchOptions& options) {
+  const std::vector<BenchCase> cases = wanted_cases(options);
+  const IdFilter keep = id_filter(options.filter);
+  ContextOptions own = context_options;
+  own.kernel_directory = folder;
+  Context first(device, own);
+  own.kernel_directory = other;
+  Context second(device, own);
+  KernelComparison out;
+  BenchReport before = bench_header(first, options, nullptr);
+  BenchReport after = bench_header(second, options, nullptr);
+  for (const BenchCase& one : cases) {
+    spdlog::info("{}: {} Gaussians", one.scene, one.size);
+    const BenchModel model = generated(one, options);
+    const std::vector<NamedNumbers> a = results_of(first, model, options);
+    const std::vector<NamedNumbers> b = results_of(second, model, options);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      out.results.push_back(difference_of(a[i], b[i]));
+      out.results.back().name = fmt::format("{}/{}: {}", one.scene, one.size, a[i].name);
+    }
+    Side left(first, model, options, keep), right(second, model, options, keep);
+    for (int round = 0; round < options.repeat; ++round) {
+      // Whoever is second finds warmer caches: they take turns at that, too.
+      Side* order[2] = {&left, &right};
+      if (round % 2 == 1) std::swap(order[0], order[1]);
+      for (Side* side : order) side->measure(options.min_seconds);
+    }
+    left.add_rows(model, before);
+    right.add_rows(model, after);
+  }
+  out.rows = compare_reports(before, after);
+  return out;
+}
+
+std::string kernel_comparison_table(const KernelComparison& comparison) {
+  std::string out;
+  for (const ResultDifference& result : comparison.results) {
+    if (result.differing == 0) continue;
+    out += fmt::format("{}: {} of {} numbers differ, by {:.2e} of the largest\n", result.name,
+                       result.differing, result.numbers, result.largest);
+  }
+  if (comparison.equal())
+    out += fmt::format("all {} results are equal to the last bit\n", comparison.results.size());
+  return out + comparison_table(comparison.rows);
+}
+
+}  // namespace raysplats

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/device_report.hpp"
+
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+
+#include "bench/kernel_folders.hpp"
+#include "raysplats/error.hpp"
+#include "unit/device/temporary_directory.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+BenchOptions tiny() {
+  BenchOptions options;
+  options.sizes = {1000};
+  options.width = options.height = 64;
+  options.repeat = 1;
+  options.min_seconds = 1e-4;
+  options.rays = 256;
+  options.triangles = 2000;
+  return options;
+}
+
+ContextOptions timed() {
+  ContextOptions options;
+  options.profile = options.keep_launches = true;
+  options.tuning = false;
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE("a device's report holds its self-test, every size that fits the time, and its speeds") {
+  Context context(select_device(""), timed());
+  BenchOptions options = tiny();
+  options.filter = "^(adam|view)/";
+  const DeviceReport report = make_device_report(context, options);
+  CHECK(report.checks.size() == 14);
+  for (const SelfTestCheck& check : report.checks) {
+    CAPTURE(check.name);
+    CHECK(check.error > 0);
+    CHECK(check.passed());
+  }
+  CHECK(report.passed());
+  REQUIRE(report.runs.size() == 2);
+  CHECK(report.runs[1].options.at("resolution") == "1600x1064");
+  REQUIRE(report.frames.size() == 2);
+  CHECK(report.frames[0].per_second > report.frames[1].per_second);
+  REQUIRE(report.iterations.size() == 1);
+  CHECK(report.left_out.empty());
+  const nlohmann::json json = nlohmann::json::parse(device_report_json(report));
+  CHECK(json.at("schema") == "raysplats-device-report");
+  CHECK(json.at("self_test_passed") == true);
+  CHECK(json.at("device").at("name") == context.device().name);
+  CHECK(json.at("runs").at(1).at("rows").size() == report.runs[1].rows.size());
+  CHECK(device_report_text(report).find("self-test passed") != std::string::npos);
+
+  options.sizes = {options.sizes[0], 1'000'000'000};  // nothing is made of what cannot end in time
+  const DeviceReport short_of_time = make_device_report(context, options, 300.0);
+  CHECK(short_of_time.left_out.size() == 2);
+  CHECK(short_of_time.runs.size() == 2);
+  CHECK(make_device_report(context, options, 0.0).runs.empty());
+
+  DeviceReport wrong = report;
+  wrong.checks[3].error = std::numeric_limits<double>::quiet_NaN();
+  CHECK(!wrong.passed());
+  CHECK(device_report_text(wrong).find("FAILED") != std::string::npos);
+}
+
+TEST_CASE("two folders of kernels are compared by what they compute, then by time in turns") {
+  const TemporaryDirectory folder;
+  const std::filesystem::path own = std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "cl";
+  const std::filesystem::path changed = folder.path() / "cl";
+  std::filesystem::copy(own, changed, std::filesystem::copy_options::recursive);
+  BenchOptions options = tiny();
+  options.filter = "^adam/";
+  options.repeat = 3;
+  const DeviceInfo device = select_device("");
+  const KernelComparison same =
+      compare_kernels(device, timed(), own.string(), changed.string(), options);
+  CHECK(same.equal());
+  REQUIRE(same.rows.rows.size() == 1);
+  CHECK(same.rows.rows[0].before > 0);
+  CHECK(same.rows.rows[0].spread > 0);
+  CHECK(kernel_comparison_table(same).find("equal to the last bit") != std::string::npos);
+
+  // A step of Adam that goes further.
+  const std::filesystem::path adam = changed / "train" / "adam.cl";
+  std::stringstream text;
+  text << std::ifstream(adam).rdbuf();
+  std::string source = text.str();
+  const std::string root = "* adam->root_scale";
+  REQUIRE(source.find(root) != std::string::npos);
+  source.replace(source.find(root), root.size(), "* 0.5f * adam->root_scale");
+  std::ofstream(adam) << source;
+  const KernelComparison other =
+      compare_kernels(device, timed(), own.string(), changed.string(), options);
+  CHECK(!other.equal());
+  for (const ResultDifference& result : other.results) {
+    CAPTURE(result.name);
+    const bool stepped = result.name.find("after a step") != std::string::npos;
+    CHECK((result.differing > 0) == stepped);
+  }
+  CHECK_THROWS_AS(
+      compare_kernels(device, timed(), own.string(), (folder.path() / "none").string(), options),
+      DeviceError);
+}
