@@ -10,6 +10,7 @@
 #include "options.hpp"
 #include "raysplats/trainer.hpp"
 #include "report/run_report.hpp"
+#include "train/quality_preset.hpp"
 #include "train/train_config.hpp"
 
 namespace raysplats::cli {
@@ -19,6 +20,8 @@ struct Options {
   std::string data;
   std::string output;
   std::string resume;
+  std::string time;
+  std::string quality;
   bool overwrite = false;
   TrainOptions train;
   DeviceFlags device;
@@ -35,13 +38,51 @@ void keep_run_options(CLI::App& command, Options& options) {
   validate(options.train);
 }
 
-void run(CLI::App& command, Options& options, const GlobalOptions& global) {
-  keep_run_options(command, options);
+/// --time and --quality choose for a new run what its configuration then names.
+void check_choices(const CLI::App& command, const Options& options) {
+  const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
+  if (!options.resume.empty() && (!options.time.empty() || !options.quality.empty())) {
+    throw UsageError(
+        "--time and --quality are about new runs: a resumed one has its length, which "
+        "--iterations changes");
+  }
+  if (!options.time.empty() && given("--iterations")) {
+    throw UsageError("--time and --iterations contradict each other: leave one of them out");
+  }
+}
+
+Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device) {
   Dataset dataset = load_dataset(options.data, options.train.data);
-  check_not_data(options.output, dataset);
+  if (options.quality.empty()) return dataset;
+  const QualityChoice choice = choose_quality(parse_quality(options.quality), dataset, device.type);
+  const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
+  if (!given("--iterations")) options.train.iterations = choice.iterations;
+  if (given("--downscale") || choice.downscale == 1) return dataset;
+  options.train.data.downscale = choice.downscale;
+  return load_dataset(options.data, options.train.data);
+}
+
+/// Sets the length of a run by --time, and says beforehand how long it will take.
+void announce(Trainer& trainer, const Options& options, const GlobalOptions& global) {
+  constexpr double kMeasureSeconds = 3;
+  const bool fits = !options.time.empty();
+  if (!fits && (global.quiet || !options.resume.empty())) return;
+  const RunEstimate estimate = fits ? trainer.fit_time(parse_duration("--time", options.time))
+                                    : trainer.estimate(kMeasureSeconds);
+  spdlog::info("{} iterations, up to {} Gaussians: about {} of training", estimate.iterations,
+               estimate.gaussians, format_duration(estimate.seconds));
+}
+
+void run(CLI::App& command, Options& options, const GlobalOptions& global) {
+  check_choices(command, options);
+  if (!options.time.empty()) parse_duration("--time", options.time);  // before anything is loaded
+  keep_run_options(command, options);
   const std::unique_ptr<Context> context = open_context(options.device);
+  Dataset dataset = load(command, options, context->device());
+  check_not_data(options.output, dataset);
   Trainer trainer(*context, std::move(dataset), options.train, options.output, options.overwrite);
   if (!options.resume.empty()) trainer.resume(options.resume);
+  announce(trainer, options, global);
   const TrainSummary summary = trainer.run(!global.quiet);
 
   fmt::print("{} iterations in {}: {} Gaussians in {}\n", summary.iterations,
@@ -75,6 +116,17 @@ Command add_train_command(CLI::App& app, const GlobalOptions& global) {
                    "Go on from the newest whole checkpoint of a run, with its options; 'latest' "
                    "means that of --output, or a new start while there is none")
       ->type_name("RUN");
+  command
+      ->add_option("--time", options->time,
+                   "Train for that long (90s, 15m, 1.5h): measures a twentieth of it, then fixes "
+                   "--iterations and --max-gaussians, which RUN/config.toml names")
+      ->type_name("TIME");
+  command
+      ->add_option("--quality", options->quality,
+                   "Choose --iterations and --downscale from the photos and the device: preview, "
+                   "low, medium or high; what is given beside it stays")
+      ->check(one_of(quality_names()))
+      ->type_name("LEVEL");
   command->add_flag("--overwrite", options->overwrite,
                     "Take the place of a run that is in the folder: its files are removed");
   add_device_flags(*command, options->device);

@@ -398,6 +398,21 @@ std::size_t parse_count(const std::string& option, const std::string& text) {
   return static_cast<std::size_t>(value * factor);
 }
 
+double parse_duration(const std::string& option, const std::string& text) {
+  double unit = 1;
+  std::string digits = text;
+  if (!digits.empty() && std::string_view("smh").find(digits.back()) != std::string_view::npos) {
+    unit = digits.back() == 'h' ? 3600 : digits.back() == 'm' ? 60 : 1;
+    digits.pop_back();
+  }
+  const std::optional<double> value = parse_real(digits);
+  if (!value || !(*value * unit > 0) || *value * unit > 1e9) {
+    throw UsageError(
+        fmt::format("{} '{}' is no time to train in, as in 90s, 15m or 1.5h", option, text));
+  }
+  return *value * unit;
+}
+
 std::pair<int, int> parse_resolution(const std::string& text) {
   int width = 0, height = 0;
   const char* end = text.data() + text.size();

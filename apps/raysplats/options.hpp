@@ -118,6 +118,8 @@ std::vector<std::string> names_of(const std::string& option,
                                   const std::vector<std::string>& known);
 /// A number of Gaussians: "100k", "1.5M" or plain digits.
 std::size_t parse_count(const std::string& option, const std::string& text);
+/// Seconds of a duration: "90", "90s", "1.5m" or "2h".
+double parse_duration(const std::string& option, const std::string& text);
 /// Width and height of "800x600".
 std::pair<int, int> parse_resolution(const std::string& text);
 

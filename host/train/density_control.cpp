@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "train/mcmc.hpp"
 
 namespace raysplats {
 namespace {
@@ -15,11 +17,13 @@ namespace {
 constexpr char kProgram[] = "train/densify.cl";
 constexpr std::size_t kGroup = 64;
 constexpr std::uint64_t kSplitStream = 0x73706c6974;
+constexpr std::uint64_t kMoveStream = 0x6d6f7665;
 
 constexpr std::int64_t kLeastPeriod = 50;   // iterations between passes
 constexpr double kPeriodShare = 0.01;       // of the run
 constexpr double kLongestPassShare = 0.05;  // longer passes over the photos are not waited for
 constexpr double kLeastOpacity = 0.004;     // that fading leaves
+constexpr double kMcmcGrowth = 1.05;        // of the count in a pass of 3DGS-MCMC, at least
 
 // Iterations between two passes when the options leave them open.
 std::int64_t fitted_period(std::int64_t iterations, std::int64_t views) {
@@ -40,21 +44,23 @@ DensityControl::DensityControl(Context& context,
                                const TrainOptions& options,
                                double extent,
                                std::size_t views)
-    : context_(context),
-      options_(options),
-      extent_(extent),
-      limit_(static_cast<std::size_t>(options.max_gaussians)),
-      first_(options.densify_from.of(options.iterations)),
-      growth_end_(options.densify_until.of(options.iterations)),
-      last_(growth_end_),
-      period_(options.densify_every.of(options.iterations)),
-      open_guard_(context, 1, "density guard") {
+    : context_(context), extent_(extent), open_guard_(context, 1, "density guard") {
+  open_guard_.clear();
+  follow(options, views);
+}
+
+void DensityControl::follow(const TrainOptions& options, std::size_t views) {
+  options_ = options;
+  limit_ = static_cast<std::size_t>(options.max_gaussians);
+  first_ = options.densify_from.of(options.iterations);
+  growth_end_ = options.densify_until.of(options.iterations);
+  last_ = growth_end_;
+  period_ = options.densify_every.of(options.iterations);
   const auto pass = static_cast<std::int64_t>(std::max<std::size_t>(views, 1));
   if (period_ == 0) period_ = fitted_period(options.iterations, pass);
   whole_passes_ = period_ % pass == 0;
-  if (options.strategy == DensityStrategy::kBudget && growth_end_ > 0)
+  if (options.strategy != DensityStrategy::kAdc && growth_end_ > 0)
     last_ = std::max(last_, options.replace_until.of(options.iterations));
-  open_guard_.clear();
 }
 
 void DensityControl::accumulate(const DeviceGaussians& gaussians,
@@ -76,6 +82,10 @@ void DensityControl::accumulate(const DeviceGaussians& gaussians,
 
 bool DensityControl::refines_at(std::int64_t iteration) const {
   return iteration >= first_ && iteration <= last_ && iteration % period_ == 0;
+}
+
+bool DensityControl::idles_at(std::int64_t iteration) const {
+  return iteration > last_ && iteration % period_ == 0;
 }
 
 bool DensityControl::resets_at(std::int64_t iteration) const {
@@ -109,6 +119,7 @@ DensityPlan DensityControl::plan(const DeviceGaussians& gaussians, std::int64_t 
     BudgetRules rules;
     rules.target = target(gaussians.count, iteration);
     rules.min_opacity = options_.prune_opacity;
+    rules.bounds = options_.bounds;
     rules.remove_unseen = known && whole_passes_ && iteration >= first_ + period_;
     return plan_budget(means, scales, opacities, statistics, rules);
   }
@@ -120,17 +131,37 @@ DensityPlan DensityControl::plan(const DeviceGaussians& gaussians, std::int64_t 
   rules.min_size = options_.prune_scale_min * extent_;
   rules.max_count = limit_;
   rules.activation = gaussians.activation;
+  rules.bounds = options_.bounds;
   return plan_density(means, scales, opacities, statistics, rules);
 }
 
+RelocationPlan DensityControl::plan_moves(const DeviceGaussians& gaussians,
+                                          std::int64_t iteration) const {
+  const std::size_t count = gaussians.count;
+  const auto grown = static_cast<std::size_t>(kMcmcGrowth * static_cast<double>(count));
+  RelocationRules rules;
+  rules.target = count;
+  if (iteration <= growth_end_)
+    rules.target = std::min(limit_, std::max(grown, target(count, iteration)));
+  rules.dead_opacity = options_.prune_opacity;
+  rules.bounds = options_.bounds;
+  rules.seed = CounterRng(options_.seed, kMoveStream, static_cast<std::uint64_t>(iteration)).bits();
+  return plan_relocation(gaussians.means.download(), gaussians.scales.download(),
+                         gaussians.opacities.download(), rules);
+}
+
 DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iteration) {
-  DensityPlan plan = this->plan(gaussians, iteration);
+  const bool moves = options_.strategy == DensityStrategy::kMcmc;
+  RelocationPlan relocation;
+  if (moves) relocation = plan_moves(gaussians, iteration);
+  DensityPlan plan = moves ? std::move(relocation.density) : this->plan(gaussians, iteration);
   if (plan.source.empty()) {
     throw Error(ErrorCode::kRuntime,
                 fmt::format("Density control at iteration {} would remove all {} Gaussians: {}",
                             iteration, gaussians.count, plan.remedy()));
   }
   if (plan.changes()) gather(gaussians, plan, iteration);
+  if (moves && plan.changes()) apply_shares(context_, relocation.shares, gaussians);
   if (options_.strategy == DensityStrategy::kBudget && options_.opacity_decay > 0)
     fade_opacities(gaussians);
   // Without changes the statistics start anew all the same, as in 3DGS.
@@ -139,6 +170,17 @@ DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iter
   } else {
     statistics_ = Buffer<float>();
   }
+  return plan;
+}
+
+DensityPlan DensityControl::split_evenly(DeviceGaussians& gaussians, std::size_t most) {
+  BudgetRules rules;
+  rules.target = most;
+  const std::vector<float> alike(2 * gaussians.count, 1.0f);
+  const DensityPlan plan = plan_budget(gaussians.means.download(), gaussians.scales.download(),
+                                       gaussians.opacities.download(), alike, rules);
+  if (plan.changes()) gather(gaussians, plan, 0);
+  statistics_ = Buffer<float>();
   return plan;
 }
 

@@ -7,6 +7,7 @@
 #include "raysplats/train_options.hpp"
 #include "trace/device_gaussians.hpp"
 #include "train/density_plan.hpp"
+#include "train/relocation.hpp"
 
 namespace raysplats {
 
@@ -18,6 +19,9 @@ class DensityControl {
   /// `extent` is the scene extent that the relative sizes of the options refer to, `views` the
   /// number of training views.
   DensityControl(Context& context, const TrainOptions& options, double extent, std::size_t views);
+
+  /// Goes on by other options, as if made with them: the length of a run may be fixed late.
+  void follow(const TrainOptions& options, std::size_t views);
 
   /// The count that max-gaussians = 0 stands for.
   void set_limit(std::size_t limit) { limit_ = limit; }
@@ -35,10 +39,16 @@ class DensityControl {
   bool refines_at(std::int64_t iteration) const;
   bool resets_at(std::int64_t iteration) const;
 
+  /// Whether a pass would be due if passes had not ended: what follows them goes on until the end.
+  bool idles_at(std::int64_t iteration) const;
+
   /// Replaces `gaussians` by the new set and starts new statistics. The returned plan says where
   /// each new Gaussian comes from, for whoever keeps state per Gaussian. Throws RuntimeError-coded
   /// Error when no Gaussian is left.
   DensityPlan refine(DeviceGaussians& gaussians, std::int64_t iteration);
+
+  /// Splits Gaussians, none twice and without regard to the statistics, until there are `most`.
+  DensityPlan split_evenly(DeviceGaussians& gaussians, std::size_t most);
 
   /// Lowers opacities to opacity-reset-value.
   void reset_opacities(DeviceGaussians& gaussians);
@@ -50,6 +60,7 @@ class DensityControl {
 
  private:
   DensityPlan plan(const DeviceGaussians& gaussians, std::int64_t iteration) const;
+  RelocationPlan plan_moves(const DeviceGaussians& gaussians, std::int64_t iteration) const;
   std::size_t target(std::size_t count, std::int64_t iteration) const;
   void fade_opacities(DeviceGaussians& gaussians);
   void gather(DeviceGaussians& gaussians, const DensityPlan& plan, std::int64_t iteration);
@@ -57,9 +68,9 @@ class DensityControl {
   Context& context_;
   TrainOptions options_;
   double extent_;
-  std::size_t limit_;
-  std::int64_t first_, growth_end_, last_, period_;  // iterations
-  bool whole_passes_;                                // a period sees every view
+  std::size_t limit_ = 0;
+  std::int64_t first_ = 0, growth_end_ = 0, last_ = 0, period_ = 0;  // iterations
+  bool whole_passes_ = false;                                        // a period sees every view
   Buffer<float> statistics_;
   Buffer<std::uint32_t> open_guard_;
 };

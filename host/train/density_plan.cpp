@@ -20,15 +20,6 @@ struct Candidate {
   std::uint32_t index;
 };
 
-// A sum is finite when all of its terms are.
-bool is_finite(std::span<const float> means,
-               std::span<const float> scales,
-               std::span<const float> opacities,
-               std::size_t i) {
-  return std::isfinite(means[3 * i] + means[3 * i + 1] + means[3 * i + 2] + scales[3 * i] +
-                       scales[3 * i + 1] + scales[3 * i + 2] + opacities[i]);
-}
-
 // The first `room` candidates by score; the others keep their fate.
 void choose(std::vector<Candidate>& candidates,
             std::size_t room,
@@ -77,6 +68,19 @@ void arrange(std::span<const float> means, const std::vector<Fate>& fates, Densi
 
 }  // namespace
 
+// A sum is finite when all of its terms are.
+bool is_finite(std::span<const float> means,
+               std::span<const float> scales,
+               std::span<const float> opacities,
+               std::size_t i) {
+  return std::isfinite(means[3 * i] + means[3 * i + 1] + means[3 * i + 2] + scales[3 * i] +
+                       scales[3 * i + 1] + scales[3 * i + 2] + opacities[i]);
+}
+
+bool is_outside(const std::optional<Bounds>& bounds, std::span<const float> means, std::size_t i) {
+  return bounds && !bounds->contains(means[3 * i], means[3 * i + 1], means[3 * i + 2]);
+}
+
 std::vector<std::uint32_t> DensityPlan::state_source() const {
   std::vector<std::uint32_t> out(source);
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -86,8 +90,9 @@ std::vector<std::uint32_t> DensityPlan::state_source() const {
 }
 
 std::string DensityPlan::remedy() const {
-  const std::array<std::pair<std::size_t, const char*>, 5> reasons{
-      {{faint, "most are too faint: lower --prune-opacity or --opacity-lr"},
+  const std::array<std::pair<std::size_t, const char*>, 6> reasons{
+      {{outside, "most are outside of --bounds: give a larger box"},
+       {faint, "most are too faint: lower --prune-opacity or --opacity-lr"},
        {large, "most are too large: raise --prune-scale, or set it to 0"},
        {small, "most are too small: lower --prune-scale-min"},
        {unseen, "no view meets most of them: see whether cameras and points belong together"},
@@ -113,6 +118,7 @@ DensityPlan plan_density(std::span<const float> means,
                             : sigmoid(parameter);
     const bool finite = is_finite(means, scales, opacities, i);
     std::size_t* const reason = !finite                                         ? &plan.not_finite
+                                : is_outside(rules.bounds, means, i)            ? &plan.outside
                                 : !(sigmoid(opacities[i]) >= rules.min_opacity) ? &plan.faint
                                 : !(rules.max_size <= 0 || size <= rules.max_size) ? &plan.large
                                 : !(rules.min_size <= 0 || size >= rules.min_size) ? &plan.small
@@ -150,6 +156,7 @@ DensityPlan plan_budget(std::span<const float> means,
   for (std::size_t i = 0; i < count; ++i) {
     const float views = statistics[2 * i + 1];
     std::size_t* const reason = !is_finite(means, scales, opacities, i)         ? &plan.not_finite
+                                : is_outside(rules.bounds, means, i)            ? &plan.outside
                                 : !(sigmoid(opacities[i]) >= rules.min_opacity) ? &plan.faint
                                 : !(views > 0 || !rules.remove_unseen)          ? &plan.unseen
                                                                                 : nullptr;

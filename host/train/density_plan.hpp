@@ -3,11 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "raysplats/trace_options.hpp"
+#include "raysplats/train_options.hpp"
 
 namespace raysplats {
 
@@ -31,13 +33,15 @@ struct DensityRules {
   double min_size = 0;     ///< remove below; 0 = off
   std::size_t max_count = 0;
   ScaleActivation activation = ScaleActivation::kExp;
+  std::optional<Bounds> bounds;  ///< remove outside
 };
 
 /// Rules of one pass that keeps to a number of Gaussians.
 struct BudgetRules {
-  std::size_t target = 0;      ///< Gaussians after the pass; fewer when there are no candidates
-  double min_opacity = 0;      ///< remove below
-  bool remove_unseen = false;  ///< remove what no ray of any view met
+  std::size_t target = 0;        ///< Gaussians after the pass; fewer when there are no candidates
+  double min_opacity = 0;        ///< remove below
+  bool remove_unseen = false;    ///< remove what no ray of any view met
+  std::optional<Bounds> bounds;  ///< remove outside
 };
 
 /// The new set of Gaussians: entry i comes from source[i] in the role role[i]; ordered along the
@@ -49,7 +53,7 @@ struct DensityPlan {
   std::size_t split = 0;
   std::size_t pruned = 0;
   /// Of the pruned, by the first of these that holds.
-  std::size_t not_finite = 0, faint = 0, large = 0, small = 0, unseen = 0;
+  std::size_t not_finite = 0, outside = 0, faint = 0, large = 0, small = 0, unseen = 0;
   std::size_t refused = 0;  ///< candidates left as they are because of max_count
   /// source[i] where i keeps its state, 0xffffffff where it is new.
   std::vector<std::uint32_t> state_source() const;
@@ -57,6 +61,14 @@ struct DensityPlan {
   /// What the user can do when too many are pruned: about the most frequent reason.
   std::string remedy() const;
 };
+
+/// Whether all parameters of Gaussian i that plans read are finite.
+bool is_finite(std::span<const float> means,
+               std::span<const float> scales,
+               std::span<const float> opacities,
+               std::size_t i);
+/// Whether the mean of Gaussian i lies outside of the box, if there is one.
+bool is_outside(const std::optional<Bounds>& bounds, std::span<const float> means, std::size_t i);
 
 /// Decides from host copies of the parameters (means 3 N, scales 3 N and opacities N before
 /// activation) and of the statistics (2 N: summed signal, number of views). A Gaussian that is

@@ -288,12 +288,32 @@ PointCloud random_points(const Region& region, std::size_t count, std::uint64_t 
   return out;
 }
 
+std::optional<Bounds> about_origin(const std::optional<Bounds>& bounds,
+                                   const std::array<double, 3>& origin) {
+  if (!bounds) return std::nullopt;
+  Bounds out = *bounds;
+  for (std::size_t k = 0; k < 3; ++k) out.low[k] -= origin[k], out.high[k] -= origin[k];
+  return out;
+}
+
+Gaussians inside(const Gaussians& model, const std::optional<Bounds>& bounds) {
+  if (!bounds) return model;
+  std::vector<std::uint32_t> indices;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const float* mean = model.means.data() + 3 * i;
+    if (bounds->contains(mean[0], mean[1], mean[2]))
+      indices.push_back(static_cast<std::uint32_t>(i));
+  }
+  return gathered(model, indices);
+}
+
 Gaussians initial_model(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const PhotoSource& photos,
                         std::size_t limit,
                         const TrainOptions& options) {
   const bool has_points = dataset.points.size() > 0;
+  const std::optional<Bounds> bounds = about_origin(options.bounds, dataset.origin);
   if (options.init == "colmap" && !has_points) {
     throw UsageError(
         fmt::format("The data set {} has no sparse points to start from: use --init photos",
@@ -302,19 +322,27 @@ Gaussians initial_model(const Dataset& dataset,
   const bool by_name = options.init == "auto" || options.init == "colmap" ||
                        options.init == "random" || options.init == "photos";
   if (!by_name) {
-    Gaussians start = with_sh_degree(read_model(options.init), options.sh_degree);
+    Gaussians model = with_sh_degree(read_model(options.init), options.sh_degree);
     const std::array<double, 3> origin = io::model_origin(options.init);
-    for (std::size_t i = 0; i < start.means.size(); ++i) {
-      start.means[i] = static_cast<float>(static_cast<double>(start.means[i]) +
+    for (std::size_t i = 0; i < model.means.size(); ++i) {
+      model.means[i] = static_cast<float>(static_cast<double>(model.means[i]) +
                                           (origin[i % 3] - dataset.origin[i % 3]));
     }
-    return subset(std::move(start), limit);
+    model = inside(model, bounds);
+    if (model.size() > limit) {
+      spdlog::warn(
+          "{} has {} Gaussians, but this run may have {}: it starts from an even choice of them "
+          "(--max-gaussians)",
+          options.init, model.size(), limit);
+    }
+    return subset(model, limit);
   }
   const auto share = [limit](double part) {
     return std::max<std::size_t>(1, static_cast<std::size_t>(part * static_cast<double>(limit)));
   };
   const auto start = [&](const PointCloud& points) {
-    return gaussians_from_points(points, options.sh_degree, options.init_opacity, cameras);
+    return inside(gaussians_from_points(points, options.sh_degree, options.init_opacity, cameras),
+                  bounds);
   };
   if (has_points && (options.init == "auto" || options.init == "colmap"))
     return subset(start(reliable_points(dataset.points)), share(kStartShare));

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -56,11 +58,19 @@ std::size_t fitted_limit(double pixels, std::int64_t iterations);
 /// `count` points uniform in the region, mid-grey with a little noise, a function of the seed.
 PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed);
 
+/// A box of the world as a model counts positions, from `origin` (Dataset::origin).
+std::optional<Bounds> about_origin(const std::optional<Bounds>& bounds,
+                                   const std::array<double, 3>& origin);
+
+/// The Gaussians whose mean lies in the box; all of them without one.
+Gaussians inside(const Gaussians& model, const std::optional<Bounds>& bounds);
+
 /// Photos of the training views, loaded when they are first asked for.
 using PhotoSource = std::function<const std::vector<SmallPhoto>&()>;
 
 /// The model a run starts from, by options.init, at most `limit` Gaussians (an even subset of more;
-/// of points and photos at most half of it, so that there is room to grow). Throws UsageError when
+/// of points and photos at most half of it, so that there is room to grow), all within
+/// options.bounds. Throws UsageError when
 /// the data set has no points and `colmap` is asked for, DataError for a bad PLY.
 Gaussians initial_model(const Dataset& dataset,
                         std::span<const Camera> cameras,

@@ -191,14 +191,19 @@ bool RunFolder::has_model(std::int64_t iteration) const {
   return std::filesystem::exists(model_file(path_, iteration), error);
 }
 
+void RunFolder::remove_model(std::int64_t iteration) const {
+  if (!has_model(iteration)) return;
+  const std::filesystem::path file = model_file(path_, iteration);
+  remove_file(file);
+  remove_if_empty(file.parent_path());
+}
+
 void RunFolder::remove_after(std::int64_t iteration) const {
   for (const auto& [number, file] : numbered(path_ / "checkpoints", "step_", ".rsck")) {
     if (number > iteration) remove_file(file);
   }
   for (const auto& [number, folder] : numbered(path_ / "point_cloud", "iteration_", "")) {
-    if (number <= iteration) continue;
-    remove_file(folder / "point_cloud.ply");
-    remove_if_empty(folder);
+    if (number > iteration) remove_model(number);
   }
   for (const auto& [number, folder] : numbered(path_ / "eval", "iteration_", "")) {
     if (number <= iteration) continue;
@@ -216,6 +221,7 @@ void RunFolder::remove_after(std::int64_t iteration) const {
 
 void RunFolder::begin_metrics(std::int64_t iteration) {
   evaluations_.clear();
+  validations_.clear();
   std::string csv = kCsvHeader;
   if (iteration > 0) {
     std::ifstream rows(path_ / "metrics.csv");
@@ -233,6 +239,10 @@ void RunFolder::begin_metrics(std::int64_t iteration) {
       for (const nlohmann::json& entry : old.at("evaluations")) {
         const EvaluationRow row = evaluation_from_json(entry);
         if (row.iteration <= iteration) evaluations_.push_back(row);
+      }
+      for (const nlohmann::json& entry : old.value("validations", nlohmann::json::array())) {
+        const EvaluationRow row = evaluation_from_json(entry);
+        if (row.iteration <= iteration) validations_.push_back(row);
       }
     } catch (const nlohmann::json::exception&) {
       // Reports of an earlier run that cannot be read are no reason not to train.
@@ -258,6 +268,10 @@ void RunFolder::write_metrics(const nlohmann::json& summary) const {
   nlohmann::json json = summary;
   json["evaluations"] = nlohmann::json::array();
   for (const EvaluationRow& row : evaluations_) json["evaluations"].push_back(to_json(row));
+  if (!validations_.empty()) {
+    json["validations"] = nlohmann::json::array();
+    for (const EvaluationRow& row : validations_) json["validations"].push_back(to_json(row));
+  }
   json["note"] = "training_seconds exclude evaluation and compiling kernels";
   write_text_file(path_ / "metrics.json", json.dump(2) + "\n");
 }

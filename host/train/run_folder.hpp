@@ -57,6 +57,7 @@ class RunFolder {
                    std::int64_t iteration,
                    const std::array<double, 3>& origin = {}) const;
   bool has_model(std::int64_t iteration) const;
+  void remove_model(std::int64_t iteration) const;
 
   /// Keeps other runs out of the folder until the lock goes, and removes temporary files that a
   /// killed run left. Throws DataError when another run has the folder.
@@ -72,12 +73,15 @@ class RunFolder {
   void append(const TrainRow& row);
   void record(const EvaluationRow& row);
   const std::vector<EvaluationRow>& evaluations() const { return evaluations_; }
+  /// The same of validation views, with the PSNR that decides in `psnr`.
+  void record_validation(const EvaluationRow& row) { validations_.push_back(row); }
+  const std::vector<EvaluationRow>& validations() const { return validations_; }
   /// metrics.json: the evaluations, and `summary` when the run is over or interrupted.
   void write_metrics(const nlohmann::json& summary) const;
 
  private:
   std::filesystem::path path_;
-  std::vector<EvaluationRow> evaluations_;
+  std::vector<EvaluationRow> evaluations_, validations_;
 };
 
 /// Throws UsageError when a folder holds files of a run, with which another one would mix.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <utility>
 
@@ -13,6 +14,9 @@ namespace {
 
 constexpr std::uint64_t kViewStream = 0x7669657773;
 constexpr std::uint64_t kBackgroundStream = 0x6261636b;
+constexpr std::uint64_t kJoinedPass = std::uint64_t{1} << 48;  // of passes over all views
+constexpr double kValidationShare = 0.9;  // of the run; then validation views are trained on too
+constexpr int kValidations = 9;
 
 }  // namespace
 
@@ -61,16 +65,52 @@ std::array<float, 3> step_background(const TrainOptions& options,
   return color;
 }
 
+std::int64_t validation_end(const TrainOptions& options) {
+  return std::llround(kValidationShare * static_cast<double>(options.iterations));
+}
+
+bool validates_at(const TrainOptions& options, std::int64_t iteration) {
+  if (options.validate_views == 0 || iteration > validation_end(options)) return false;
+  for (int tenth = 1; tenth <= kValidations; ++tenth) {
+    const double share = kValidationShare * tenth / kValidations;
+    if (std::llround(share * static_cast<double>(options.iterations)) == iteration) return true;
+  }
+  return false;
+}
+
+std::vector<std::size_t> validation_views(std::size_t views, int count) {
+  const std::size_t most = views > kLeastTrained ? views - kLeastTrained : 0;
+  std::vector<std::size_t> out(std::min(static_cast<std::size_t>(std::max(count, 0)), most));
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = (2 * i + 1) * views / (2 * out.size());
+  return out;
+}
+
+ViewOrder::ViewOrder(std::uint64_t seed,
+                     std::size_t views,
+                     std::span<const std::size_t> apart,
+                     std::int64_t join)
+    : seed_(seed), all_(views), join_(apart.empty() ? 0 : join) {
+  std::iota(all_.begin(), all_.end(), std::size_t{0});
+  std::set_difference(all_.begin(), all_.end(), apart.begin(), apart.end(),
+                      std::back_inserter(first_));
+}
+
 std::size_t ViewOrder::at(std::int64_t iteration) {
-  const auto views = static_cast<std::int64_t>(permutation_.size());
-  if (iteration / views != epoch_) {
-    epoch_ = iteration / views;
-    std::iota(permutation_.begin(), permutation_.end(), std::size_t{0});
-    CounterRng rng(seed_, kViewStream + static_cast<std::uint64_t>(epoch_));
+  const bool joined = iteration >= join_;
+  const std::vector<std::size_t>& views = joined ? all_ : first_;
+  const auto size = static_cast<std::int64_t>(views.size());
+  const std::int64_t since = joined ? iteration - join_ : iteration;
+  // Passes of both kinds are numbered apart.
+  const std::uint64_t pass =
+      2 * static_cast<std::uint64_t>(since / size) + (joined && join_ > 0 ? 1 : 0);
+  if (permutation_.size() != views.size() || pass != pass_) {
+    pass_ = pass;
+    permutation_ = views;
+    CounterRng rng(seed_, kViewStream + (pass & 1 ? kJoinedPass : 0) + pass / 2);
     for (std::size_t i = permutation_.size(); i > 1; --i)
       std::swap(permutation_[i - 1], permutation_[rng.below(i)]);
   }
-  position_ = static_cast<std::size_t>(iteration % views);
+  position_ = static_cast<std::size_t>(since % size);
   return permutation_[position_];
 }
 

@@ -32,10 +32,28 @@ std::array<float, 3> step_background(const TrainOptions& options,
                                      const std::array<float, 3>& constant,
                                      std::int64_t iteration);
 
+/// Completed iterations after which the views of validate-views join the others: 0.9 of the run.
+std::int64_t validation_end(const TrainOptions& options);
+
+/// Whether the validation views are looked at after `iteration` completed ones: every tenth of the
+/// run, as long as they are kept apart.
+bool validates_at(const TrainOptions& options, std::int64_t iteration);
+
+/// Training views that validation leaves.
+constexpr std::size_t kLeastTrained = 2;
+
+/// `count` of `views` positions, evenly spread; fewer when that would leave less than two others.
+std::vector<std::size_t> validation_views(std::size_t views, int count);
+
 /// Order in which views are trained: a new random permutation for every pass over them.
 class ViewOrder {
  public:
-  ViewOrder(std::uint64_t seed, std::size_t views) : seed_(seed), permutation_(views) {}
+  /// Of all positions in [0, views); those in `apart` (ascending) come in from iteration `join` on
+  /// only, where a new pass begins.
+  ViewOrder(std::uint64_t seed,
+            std::size_t views,
+            std::span<const std::size_t> apart = {},
+            std::int64_t join = 0);
   /// Position in [0, views) of the view of an iteration.
   std::size_t at(std::int64_t iteration);
   /// The views of the iterations after the last one asked for, at most `count` and up to the end of
@@ -44,7 +62,9 @@ class ViewOrder {
 
  private:
   std::uint64_t seed_;
-  std::int64_t epoch_ = -1;
+  std::vector<std::size_t> all_, first_;  // views of a pass, from `join_` on and before
+  std::int64_t join_;
+  std::uint64_t pass_ = 0;  // streams of random numbers are numbered by it
   std::size_t position_ = 0;
   std::vector<std::size_t> permutation_;
 };

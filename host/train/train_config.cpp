@@ -232,6 +232,16 @@ void validate(const TrainOptions& options) {
           "0");
     }
   }
+  if (options.max_gaussians > 0 && options.init_count > options.max_gaussians) {
+    throw UsageError(
+        fmt::format("The start of 'init-count' = {} Gaussians is above 'max-gaussians' = {}: lower "
+                    "the one or raise the other",
+                    options.init_count, options.max_gaussians));
+  }
+  if (options.patience > 0 && options.validate_views == 0) {
+    throw UsageError(
+        "The option 'patience' counts validations, but there are none: set 'validate-views'");
+  }
   if (options.trace.deterministic && options.trace.gradient_sum == GradientSum::kAtomic) {
     throw UsageError(
         "The options 'deterministic' and 'gradient-sum' = atomic contradict each other, because "

@@ -112,6 +112,38 @@ class TrainTable : public OptionTable {
         OptionRow::List::kNumbers);
   }
 
+  // Six numbers, the corners with the least and the greatest coordinates; none = unbounded.
+  void box(const std::string& name, std::optional<Bounds>& target, const std::string& help) {
+    add(
+        name, help,
+        [name, &target](const Values& values) {
+          const std::vector<std::string> entries = option_items(name, values);
+          target.reset();
+          if (entries.empty()) return;
+          Bounds box;
+          bool good = entries.size() == 6;
+          for (std::size_t k = 0; good && k < 3; ++k) {
+            const std::optional<double> low = parse_real(entries[k]);
+            const std::optional<double> high = parse_real(entries[k + 3]);
+            good = low && high && *low < *high;
+            if (good) box.low[k] = *low, box.high[k] = *high;
+          }
+          if (!good) {
+            throw UsageError(
+                fmt::format("The option '{}' is the least and then the greatest x, y and z of a "
+                            "box as in -1,-1,0,1,1,2, not '{}'",
+                            name, fmt::join(values, " ")));
+          }
+          target = box;
+        },
+        [&target] {
+          if (!target) return std::string("[]");
+          return fmt::format("[{}, {}]", fmt::join(target->low, ", "),
+                             fmt::join(target->high, ", "));
+        },
+        OptionRow::List::kNumbers);
+  }
+
   void learning_rate(const std::string& name, LearningRate& rate, const std::string& help) {
     number(name, rate.initial, 0, 1e3, "learning rate of " + help);
     number(name + "-final", rate.final_value, 0, 1e3, "value that " + name + " decays to");
@@ -135,6 +167,13 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.number("downscale", o.data.downscale, 1, 1024, "photos are reduced by this factor");
   t.number("test-every", o.data.test_every, 0, 1e9,
            "every n-th view is held out when the data set has no split of its own; 0 = none");
+  t.number(
+      "validate-views", o.validate_views, 0, 1e6,
+      "training views that are kept out of the loss until 0.9 of the run, to judge it by every "
+      "tenth of it (test views influence no run); the best model so far is kept; 0 = none");
+  t.number("patience", o.patience, 0, 10,
+           "end the run when so many validations in a row were no better than the best one; 0 = "
+           "never");
   t.flag("undistort", o.data.undistort,
          "turn photos through lenses with OpenCV distortion into pinhole pictures; false = their "
          "own pixels and rays");
@@ -192,6 +231,9 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
            "Gaussians of a start without points; 0 = a share of max-gaussians");
   t.number("init-opacity", o.init_opacity, 1e-4, 0.9999,
            "opacity of the first Gaussians (not of a model)");
+  t.box("bounds", o.bounds,
+        "box of the model in world units, least and greatest x, y, z as in -1,-1,0,1,1,2: "
+        "Gaussians with their mean outside are not made and not kept; [] = everywhere");
 
   t.section("Model");
   t.number("sh-degree", o.sh_degree, 0, 4,
@@ -246,10 +288,12 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.section("Density control");
   t.choice<DensityStrategy>(
       "strategy", o.strategy,
-      {{"budget", DensityStrategy::kBudget}, {"adc", DensityStrategy::kAdc}},
+      {{"budget", DensityStrategy::kBudget},
+       {"adc", DensityStrategy::kAdc},
+       {"mcmc", DensityStrategy::kMcmc}},
       "budget: the count grows along a curve to max-gaussians, those with the highest signals are "
       "split along their longest axis; adc: whatever exceeds densify-grad-threshold is cloned or "
-      "split (3DGS)");
+      "split (3DGS); mcmc: faint ones become parts of others, and noise moves them (3DGS-MCMC)");
   t.share("densify-from", o.densify_from, true,
           "first share of the run, or iteration, that may add or remove Gaussians");
   t.share("densify-until", o.densify_until, true, "last one that may; 0 = never");
@@ -284,6 +328,14 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
       "iterations and the device's memory");
   t.number("opacity-decay", o.opacity_decay, 0, 0.5,
            "taken off every opacity in each pass of the budget strategy");
+  t.number("opacity-reg", o.opacity_reg, 0, 1e3,
+           "weight of the mean opacity in the loss of the mcmc strategy");
+  t.number("scale-reg", o.scale_reg, 0, 1e3,
+           "weight of the mean standard deviation, over the scene extent, in the loss of the mcmc "
+           "strategy");
+  t.number("mcmc-noise", o.mcmc_noise, 0, 1e6,
+           "noise that the mcmc strategy adds to the means of Gaussians whose opacity is near "
+           "0.005, times their covariance over the scene extent; falls as position-lr does");
   t.number("footprint", o.footprint, 0, 10,
            "least standard deviation of a Gaussian, in pixels of the view that resolves it best; 0 "
            "= none");

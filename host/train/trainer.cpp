@@ -69,15 +69,18 @@ Trainer::Impl::Impl(Context& device,
              load_mirrors(options.mirrors, options.mirror_bounces, dataset.origin)),
       loss(device, options.pixel_loss, static_cast<float>(options.ssim_weight)),
       adam(device, adam_options_of(options)),
-      density(device, options, extent, train_views.size()),
+      apart(validation_views(train_views.size(), options.validate_views)),
+      density(device, options, extent, train_views.size() - apart.size()),
       footprint(device, train_cameras, options.footprint),
       guard(device),
       targets(device,
               views_of(dataset, train_views),
               static_cast<std::size_t>(options.image_budget) * kMiB,
               host_image_budget(options, train_cameras)),
-      order(options.seed, train_views.size()) {
+      order(options.seed, train_views.size(), apart, validation_end(options)) {
   options.data.origin = dataset.origin;
+  follow_options();
+  if (options.strategy == DensityStrategy::kMcmc) mcmc.emplace(device, options, extent);
   if (options.exposure) exposure.emplace(device, train_views.size());
   if (options.poses)
     poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
@@ -86,6 +89,12 @@ Trainer::Impl::Impl(Context& device,
     throw UsageError(fmt::format(
         "The data set {} has no training views: {}", dataset.root.string(),
         held_out ? "--test-every 1 holds all of them out" : "its files name none to train on"));
+  }
+  if (apart.size() < static_cast<std::size_t>(options.validate_views)) {
+    throw UsageError(fmt::format(
+        "The option 'validate-views' = {} leaves less than {} of the {} training views to train "
+        "on: keep fewer apart",
+        options.validate_views, kLeastTrained, train_views.size()));
   }
 }
 
@@ -104,6 +113,16 @@ void Trainer::resume(const std::filesystem::path& source) {
 }
 
 TrainSummary Trainer::run(bool show_progress) { return impl_->train(show_progress); }
+
+RunEstimate Trainer::estimate(double seconds) {
+  const auto turn = impl_->context.lock();
+  return impl_->estimate(seconds);
+}
+
+RunEstimate Trainer::fit_time(double seconds) {
+  const auto turn = impl_->context.lock();
+  return impl_->fit_time(seconds);
+}
 
 bool Trainer::step(std::int64_t count) { return impl_->train_some(count); }
 

@@ -24,11 +24,13 @@
 #include "train/footprint.hpp"
 #include "train/image_loss.hpp"
 #include "train/initialization.hpp"
+#include "train/mcmc.hpp"
 #include "train/model_validator.hpp"
 #include "train/photo_set.hpp"
 #include "train/pose_refinement.hpp"
 #include "train/psnr_rise.hpp"
 #include "train/run_folder.hpp"
+#include "train/run_time.hpp"
 #include "train/schedule.hpp"
 #include "train/step_guard.hpp"
 #include "train/stopwatch.hpp"
@@ -59,15 +61,35 @@ struct Trainer::Impl {
 
   // trainer_start.cpp: from a data set to the first step.
   void start();
+  void upload_start(std::size_t most);
+  std::vector<std::size_t> first_views() const;
   const std::vector<SmallPhoto>& photos();
   void choose_background();
-  std::size_t limit();
+  std::size_t limit() { return most_gaussians(options.iterations); }
+  std::size_t most_gaussians(std::int64_t iterations);
   std::size_t largest_photo() const;
   std::size_t ray_views() const;
 
   // trainer_step.cpp: one step, and what happens between two of them.
   void enqueue_step();
   void control_density();
+  void follow_plan(const DensityPlan& plan);
+
+  // trainer_pilot.cpp: how long a run will take.
+  struct Pilot;
+  void check_not_begun(const char* function) const;
+  void follow_options();
+  double seconds_of(const Pilot& pilot, std::int64_t iterations, std::size_t most) const;
+  Pilot run_pilot(double seconds, std::optional<double> run_time);
+  void time_steps(double seconds, std::optional<double> run, Pilot& pilot);
+  void forget_pilot();
+  RunEstimate estimate(double seconds);
+  RunEstimate fit_time(double seconds);
+
+  // trainer_validation.cpp: training views that judge the run.
+  void judge();
+  bool out_of_patience() const;
+  void settle_validation();
 
   // trainer_pace.cpp: steps on their way.
   void step();
@@ -127,10 +149,13 @@ struct Trainer::Impl {
   ViewTracer tracer;
   ImageLoss loss;
   Adam adam;
+  // Positions in train_views that stay out of the loss until validation_end().
+  std::vector<std::size_t> apart;
   DensityControl density;
   Footprint footprint;
   std::optional<Exposure> exposure;     // with the option
   std::optional<PoseRefinement> poses;  // with the option
+  std::optional<Mcmc> mcmc;             // with the strategy
   StepGuard guard;
   std::optional<ModelValidator> validator;  // once it is asked for
   TargetCache targets;
@@ -141,7 +166,9 @@ struct Trainer::Impl {
   Buffer<float> image_gradient;
   std::int64_t iteration = 0;            // completed
   std::vector<SmallPhoto> small_photos;  // once they are asked for
+  std::optional<Gaussians> first_model;  // that estimate() has made
   bool started = false;
+  bool ended = false;  // before its time, by patience
   bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
   std::int64_t saved = -1;  // iteration of the newest checkpoint of this run
   std::uint32_t reported_bad_steps = 0;

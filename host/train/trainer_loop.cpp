@@ -72,12 +72,25 @@ void Trainer::Impl::run_iterations(std::int64_t until,
     }
     // Asked once: a signal that comes later is seen after the next step.
     stop = interrupted() || stop_asked;
+    bool ends = false;
+    if (scheduled && validates_at(options, iteration)) {
+      pause([this] { judge(); });
+      ends = out_of_patience();
+    }
+    if (ends) {
+      stop = ended = true;
+      spdlog::info(
+          "iteration {}: the validation views have not gained {} times in a row: the run "
+          "ends here",
+          iteration, options.patience);
+    }
     const bool evaluates = last || every(options.eval_every, iteration) ||
                            contains(options.eval_at, options.iterations, iteration);
     const bool saves = stop || last || contains(options.save_at, options.iterations, iteration);
     // Before density control, as in 3DGS: fresh clones and children have not settled yet.
     if (scheduled && saves) pause([this] { save_model(); });
-    if (scheduled && evaluates && (last || !stop)) pause([this, last] { evaluate_views(last); });
+    if (scheduled && (ends || (evaluates && (last || !stop))))
+      pause([this, last, ends] { evaluate_views(last || ends); });
     if (!last) control_density();
     const bool asked = save_asked.exchange(false);
     if (asked && !(scheduled && saves)) pause([this] { save_model(); });
@@ -137,7 +150,8 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     start();
   }
   advance(options.iterations, true, show_progress, [&] { return interrupt.requested(); });
-  write_metrics(iteration == options.iterations);
+  settle_validation();
+  write_metrics(ended || iteration == options.iterations);
   if (const std::uint64_t capped = guard.counts().capped_rays; capped > 0)
     warn_of_capped_rays(capped);
   if (iteration == options.iterations) warn_of_no_progress();
@@ -147,7 +161,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
         "run learns its photos by heart or its rates are too high",
         run.evaluations().back().psnr, best->iteration, best->psnr);
   }
-  if (iteration < options.iterations && !stop_asked) {
+  if (iteration < options.iterations && !stop_asked && !ended) {
     throw Error(
         ErrorCode::kInterrupted,
         fmt::format("Interrupted at iteration {}; everything is saved: continue with --resume {}",

@@ -89,8 +89,8 @@ void Trainer::Impl::evaluate_views(bool last) {
 }
 
 void Trainer::Impl::save_model() {
-  run.write_model(gaussians.download(), trace_options_of(options, background), iteration,
-                  dataset.origin);
+  run.write_model(inside(gaussians.download(), about_origin(options.bounds, dataset.origin)),
+                  trace_options_of(options, background), iteration, dataset.origin);
   if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
   if (poses) run.write_refined_cameras(poses->cameras(), dataset.origin);
 }

@@ -86,6 +86,7 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   differs("downscale", before.data.downscale, options.data.downscale);
   differs("test-every", before.data.test_every, options.data.test_every);
   differs("undistort", before.data.undistort, options.data.undistort);
+  differs("validate-views", before.validate_views, options.validate_views);
   differs("exposure", before.exposure, options.exposure);
   differs("poses", before.poses, options.poses);
   const auto cuts = [](const TrainOptions& o) { return o.data.masks == MaskUse::kCutout; };

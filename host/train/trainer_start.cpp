@@ -14,38 +14,48 @@ namespace raysplats {
 namespace {
 
 constexpr int kSmallPhoto = 200;         // longer side of photos that the start looks at, in pixels
+constexpr std::size_t kFewViews = 3;     // below, photos say next to nothing of depth
 constexpr std::size_t kMeanPhotos = 24;  // whose typical colour is the background
 
 }  // namespace
 
 const std::vector<SmallPhoto>& Trainer::Impl::photos() {
-  if (small_photos.empty()) small_photos = load_small_photos(dataset, train_views, kSmallPhoto);
+  if (small_photos.empty()) small_photos = load_small_photos(dataset, first_views(), kSmallPhoto);
   return small_photos;
+}
+
+// Those that a run may look at from its beginning.
+std::vector<std::size_t> Trainer::Impl::first_views() const {
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < train_views.size(); ++i) {
+    if (!std::binary_search(apart.begin(), apart.end(), i)) out.push_back(train_views[i]);
+  }
+  return out;
 }
 
 // What shows through where no Gaussian is. No photo says what lies there, and of all colours the
 // typical one is the least wrong. The run's configuration names it from then on.
 void Trainer::Impl::choose_background() {
   if (options.background != "auto" || cut_out) return;
+  const std::vector<std::size_t> all = first_views();
   std::vector<std::size_t> some;
-  const std::size_t count = std::min(kMeanPhotos, train_views.size());
-  for (std::size_t i = 0; i < count; ++i)
-    some.push_back(train_views[i * train_views.size() / count]);
+  const std::size_t count = std::min(kMeanPhotos, all.size());
+  for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
   const std::array<float, 3> color = typical_color(
       small_photos.empty() ? load_small_photos(dataset, some, kSmallPhoto) : small_photos);
   options.background = fmt::format("{:.4f},{:.4f},{:.4f}", color[0], color[1], color[2]);
   background = background_color(options, cut_out);
 }
 
-// The most Gaussians of this run.
-std::size_t Trainer::Impl::limit() {
+// The most Gaussians of a run of these photos.
+std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {
   if (options.max_gaussians > 0) return static_cast<std::size_t>(options.max_gaussians);
   double pixels = 0;
   for (const Camera& camera : train_cameras) pixels += static_cast<double>(pixels_of(camera));
   pixels /= static_cast<double>(train_cameras.size());
   if (cut_out) pixels *= opaque_share(photos());
-  const MemoryDemand demand{fitted_limit(pixels, options.iterations), largest_photo(),
-                            train_views.size(), ray_views(), tracer.triangles()};
+  const MemoryDemand demand{fitted_limit(pixels, iterations), largest_photo(), train_views.size(),
+                            ray_views(), tracer.triangles()};
   return std::max<std::size_t>(1, gaussians_that_fit(options, demand, context.device()));
 }
 
@@ -61,6 +71,25 @@ std::size_t Trainer::Impl::ray_views() const {
                     [this](const Camera& camera) { return tracer.by_rays(camera); }));
 }
 
+// The first model on the device, with at most that many Gaussians.
+void Trainer::Impl::upload_start(std::size_t most) {
+  Gaussians model = first_model
+                        ? std::move(*first_model)
+                        : initial_model(
+                              dataset, train_cameras, [this]() -> const auto& { return photos(); },
+                              most, options);
+  first_model.reset();
+  if (model.size() == 0) {
+    throw UsageError(options.bounds
+                         ? "No Gaussian of the start lies within --bounds: give a larger box"
+                         : "The first model has no Gaussians: use --init random");
+  }
+  gaussians = DeviceGaussians::upload(context, gathered(model, morton_order(model.means)),
+                                      options.scale_activation);
+  adam.initialize(gaussians.count, gaussians.sh_degree);
+  footprint.update(gaussians);
+}
+
 // Makes the first model, unless resume() has brought one.
 void Trainer::Impl::start() {
   if (!continues && !overwrite) check_no_run(run.path());
@@ -70,14 +99,7 @@ void Trainer::Impl::start() {
     if (overwrite) run.remove_after(continues ? iteration : 0);
     run.begin_metrics(iteration);
   } else {
-    Gaussians model = initial_model(
-        dataset, train_cameras, [this]() -> const auto& { return photos(); }, most, options);
-    if (model.size() == 0) throw UsageError("The first model has no Gaussians: use --init random");
-    const std::vector<std::uint32_t> along_curve = morton_order(model.means);
-    gaussians =
-        DeviceGaussians::upload(context, gathered(model, along_curve), options.scale_activation);
-    adam.initialize(gaussians.count, gaussians.sh_degree);
-    footprint.update(gaussians);
+    upload_start(most);
     choose_background();
     if (overwrite) run.remove_after(0);
     run.begin_metrics(0);
@@ -85,6 +107,12 @@ void Trainer::Impl::start() {
     whole = true;
   }
   small_photos = {};
+  if (train_views.size() < kFewViews) {
+    spdlog::warn("{} training view{} of {}: depth is open, and other views will look wrong",
+                 train_views.size(), train_views.size() == 1 ? "" : "s", dataset.root.string());
+  }
+  if (test_views.empty())
+    spdlog::info("no view is held out, so nothing is measured: --test-every 8 does");
   const bool grows = density.accumulates_at(iteration);
   check_memory(options,
                {grows ? std::max(gaussians.count, most) : gaussians.count, largest_photo(),

@@ -38,7 +38,9 @@ void Trainer::Impl::enqueue_step() {
   whole = false;
   if (poses) poses->step(view, slope, learning_rate(options.pose_lr, options, iteration));
   if (density.accumulates_at(iteration)) density.accumulate(gaussians, gradients, &guard.mark());
+  if (mcmc) mcmc->press(gaussians, gradients, guard.mark());
   adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
+  if (mcmc) mcmc->disturb(gaussians, iteration, guard.mark());
   footprint.apply(gaussians, guard.mark());
   guard.close(adam.refused(), tracer.kept_capped_rays(), gaussians.count);
   traced_rays += pixels_of(camera);
@@ -49,6 +51,11 @@ void Trainer::Impl::enqueue_step() {
 
 // What happens between this step and the next one: density control.
 void Trainer::Impl::control_density() {
+  // Means move on after the last pass, and with them the least sizes.
+  if (density.idles_at(iteration)) {
+    settle();
+    footprint.update(gaussians);
+  }
   const bool refines = density.refines_at(iteration);
   const bool resets = density.resets_at(iteration);
   if (!refines && !resets) return;
@@ -57,13 +64,7 @@ void Trainer::Impl::control_density() {
   whole = false;
   if (refines) {
     const DensityPlan plan = density.refine(gaussians, iteration);
-    if (plan.changes()) {
-      const std::vector<std::uint32_t> source = plan.state_source();
-      Buffer<std::uint32_t> device_source(context, source.size(), "state sources");
-      device_source.upload(source);
-      adam.remap(device_source, gaussians.count);
-    }
-    footprint.update(gaussians);
+    follow_plan(plan);
     spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",
                   iteration, plan.cloned, plan.split, plan.pruned, plan.refused, gaussians.count);
   }
@@ -72,6 +73,17 @@ void Trainer::Impl::control_density() {
     adam.reset(ParameterGroup::kOpacities);
   }
   whole = true;
+}
+
+// Optimiser and least sizes follow the new set of Gaussians.
+void Trainer::Impl::follow_plan(const DensityPlan& plan) {
+  if (plan.changes()) {
+    const std::vector<std::uint32_t> source = plan.state_source();
+    Buffer<std::uint32_t> device_source(context, source.size(), "state sources");
+    device_source.upload(source);
+    adam.remap(device_source, gaussians.count);
+  }
+  footprint.update(gaussians);
 }
 
 }  // namespace raysplats

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,7 @@ enum class PixelLoss {
 enum class DensityStrategy {
   kBudget,  ///< a curve up to a count; the Gaussians with the highest signals are split
   kAdc,     ///< whatever exceeds a threshold is cloned or split (Kerbl et al. 2023)
+  kMcmc,    ///< what is faint moves to what is not, with noise (Kheradmand et al. 2024)
 };
 
 /// Gradient statistic that decides which Gaussians are densified.
@@ -49,6 +52,17 @@ struct ResolutionStep {
   bool operator==(const ResolutionStep&) const = default;
 };
 
+/// An axis-aligned box, world units; every `high` lies above its `low`.
+struct Bounds {
+  std::array<double, 3> low{};
+  std::array<double, 3> high{};
+  bool contains(float x, float y, float z) const {
+    return x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1] && z >= low[2] &&
+           z <= high[2];
+  }
+  bool operator==(const Bounds&) const = default;
+};
+
 /// Learning rate of one parameter group: `initial` decays exponentially to `final_value`.
 struct LearningRate {
   double initial = 0;
@@ -74,6 +88,8 @@ struct TrainOptions {
 
   // Data
   DatasetOptions data;
+  int validate_views = 0;  ///< training views kept out of the loss until 0.9 of the run
+  int patience = 0;        ///< validations in a row without gain that end the run; 0 = off
   /// "auto" (white behind cut-out photos, else the photos' typical colour), "random" or "r,g,b".
   std::string background = "auto";
   std::int64_t image_budget = 1024;  ///< MiB
@@ -85,6 +101,7 @@ struct TrainOptions {
   std::string init = "auto";    ///< "auto", "colmap", "random" or the path of a PLY
   std::int64_t init_count = 0;  ///< 0 = a share of max_gaussians
   double init_opacity = 0.1;
+  std::optional<Bounds> bounds;  ///< where Gaussians may be
 
   // Model
   int sh_degree = 3;
@@ -132,6 +149,9 @@ struct TrainOptions {
   double prune_scale_min = 0.0;    ///< times the scene extent; 0 = off
   std::int64_t max_gaussians = 0;  ///< 0 = from photos, iterations and device memory
   double opacity_decay = 0.0;      ///< taken off every opacity in each pass
+  double opacity_reg = 0.01;       ///< weight of the mean opacity in the loss of kMcmc
+  double scale_reg = 0.01;         ///< weight of the mean size over the extent in the loss of kMcmc
+  double mcmc_noise = 80.0;        ///< strength of the noise on faint Gaussians' means with kMcmc
   double footprint = 0.3;          ///< least standard deviation in pixels; 0 = off
   std::int64_t opacity_reset_every = 0;
   double opacity_reset_value = 0.01;

@@ -41,6 +41,13 @@ struct TrainSummary {
       evaluations;  ///< the last one is that of the final model, when there are test views
 };
 
+/// What a run will take, from steps that were timed.
+struct RunEstimate {
+  std::int64_t iterations = 0;
+  std::size_t gaussians = 0;  ///< at its end, if densification reaches its limit
+  double seconds = 0;         ///< of training, as TrainSummary::training_seconds
+};
+
 /// Where a run is after a step.
 struct TrainProgress {
   std::int64_t iteration = 0;   ///< completed
@@ -79,6 +86,15 @@ class Trainer {
   /// Throws UsageError when it does not fit the options or was made with other data, DataError when
   /// there is none that is whole or another run has the folder.
   void resume(const std::filesystem::path& source);
+
+  /// How long the run will take. Trains a small run of the same shape for at most about `seconds`
+  /// (less when the estimate is that short) and puts everything back: the run is as without. Throws
+  /// UsageError once training has begun.
+  RunEstimate estimate(double seconds);
+  /// Sets options.iterations, and max_gaussians where that is 0, so that measuring (a twentieth of
+  /// it) and training take `seconds`; RUN/config.toml names both. Throws UsageError once training
+  /// has begun, and for a time in which nothing can be trained.
+  RunEstimate fit_time(double seconds);
 
   /// Trains up to options.iterations. SIGINT and SIGTERM finish the iteration, save a checkpoint
   /// and the model and throw Error(kInterrupted). Ten steps in a row that are not finite

@@ -78,6 +78,7 @@ PROGRAMS = [
     ("adam means", "train/adam.cl", dict(VECTOR=1, BLOCK=256, GROUP=64, WIDTH=3, SPAN=1)),
     ("densify", "train/densify.cl", dict(SH_COEFFICIENTS=16, SIGMOID_SCALE=0)),
     ("footprint", "train/footprint.cl", dict(SIGMOID_SCALE=0)),
+    ("mcmc", "train/mcmc.cl", dict(SIGMOID_SCALE=0)),
     ("guard", "train/guard.cl", {}),
     ("view sizes", "trace/view_sizes.cl", {}),
     ("exposure", "train/exposure.cl", {}),

@@ -26,6 +26,7 @@ def arguments():
     parser.add_argument("--only", default="", help="comma-separated scene names")
     parser.add_argument("--seeds", default="42", help="comma-separated; the table shows means")
     parser.add_argument("--compare", type=pathlib.Path, help="result.json of an earlier state")
+    parser.add_argument("--grid", action="store_true", help="tabulate the settings of scripts/quality/grid.toml instead")
     parser.add_argument("--raysplats", type=pathlib.Path, default=ROOT / "build/release/bin/raysplats")
     parser.add_argument("--device", help="OpenCL device")
     args, extra = parser.parse_known_args()
@@ -48,16 +49,16 @@ def scenes(args):
             print(f"{scene['name']}: not below {args.data}, left out", file=sys.stderr)
 
 
-def train(args, scene, seed):
+def train(args, scene, seed, setting="", options=()):
     """Runs one training unless it is finished; returns its metrics or None."""
     size = scene["screen" if args.screen else "full"]
-    run = args.output / f"{scene['name']}-{seed}"
+    run = args.output / (f"{scene['name']}-{seed}" + (f"-{setting.replace(' ', '_')}" if setting else ""))
     metrics = run / "metrics.json"
     if not metrics.exists() or not json.loads(metrics.read_text()).get("complete"):
         command = [args.raysplats, "train", args.data / scene["path"], "-o", run, "--overwrite", "--seed", seed, "-q",
                    "-n", size["iterations"], "--downscale", size["downscale"], "--checkpoint-every", 0]
         command += ["--device", args.device] if args.device else []
-        done = subprocess.run([str(part) for part in command] + args.extra, capture_output=True, text=True)
+        done = subprocess.run([str(part) for part in command] + args.extra + list(options), capture_output=True, text=True)
         if done.returncode != 0:
             print(f"{scene['name']}: {done.stderr.strip()}", file=sys.stderr)
             return None
@@ -84,9 +85,33 @@ def mean(results):
     return {key: sum(result[key] for result in results) / len(results) for key in results[0]}
 
 
+def grid(args):
+    """PSNR of every setting on every scene, as the rows of a Markdown table; returns the exit status."""
+    settings = tomllib.loads((HERE / "grid.toml").read_text())["setting"]
+    seed = args.seeds.split(",")[0]
+    print("| scene | " + " | ".join(setting["name"] for setting in settings) + " |")
+    print("|---" * (len(settings) + 1) + "|", flush=True)
+    failed = False
+    for scene in scenes(args):
+        cells, count = [], None
+        for setting in settings:
+            options = setting.get("options", [])
+            if "share" in setting and count:
+                options = ["--max-gaussians", str(round(setting["share"] * count))]
+            result = train(args, scene, seed, setting["name"], options)
+            failed = failed or result is None
+            cells.append("failed" if result is None else f"{result['psnr']:.2f}")
+            if result and setting["name"] == "default":
+                count = result["gaussians"]
+        print(f"| {scene['name']} | " + " | ".join(cells) + " |", flush=True)
+    return 1 if failed else 0
+
+
 def main():
     args = arguments()
     args.output.mkdir(parents=True, exist_ok=True)
+    if args.grid:
+        return grid(args)
     before = json.loads(args.compare.read_text())["scenes"] if args.compare else {}
     table, failed = {}, False
     print(f"{'scene':18} {'PSNR':>6} {'SSIM':>7} {'gap':>6} {'below best':>10} {'Gaussians':>9} {'seconds':>8}"

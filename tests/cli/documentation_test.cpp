@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <iterator>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -214,7 +215,14 @@ class Place {
     const std::string command = words.at(0);
     if (command == "train") {
       const bool resumed = has(words, "--resume");
-      words.insert(words.end(), {"-n", resumed ? "3" : "2", "--init-count", "50"});
+      words.insert(words.end(), {"--init-count", "50"});
+      // A run by time has no number of iterations.
+      const auto time = std::find(words.begin(), words.end(), "--time");
+      if (time != words.end()) {
+        *std::next(time) = "1s";
+      } else {
+        words.insert(words.end(), {"-n", resumed ? "3" : "2"});
+      }
     } else if (command == "generate") {
       for (std::size_t i = 1; i < words.size(); ++i) {
         if (words[i - 1] == "--size") words[i] = std::string("16");

@@ -58,6 +58,15 @@ TEST_CASE("a wrong command line is one sentence, exit code 2") {
   check_refused({"render", "m.ply", "--loglevel=info", "-o", "x"}, 2, "did you mean --log-level");
   check_refused({"train", "data", "-o", "x", "--ssim-wieght", "0.1"}, 2,
                 "did you mean --ssim-weight");
+  check_refused({"train", "data", "-o", "x", "--time", "0"}, 2, "no time to train in");
+  check_refused({"train", "data", "-o", "x", "--time", "soon"}, 2, "90s, 15m or 1.5h");
+  check_refused({"train", "data", "-o", "x", "--time", "9s", "-n", "100"}, 2, "contradict");
+  check_refused({"train", "data", "-o", "x", "--time", "9s", "--resume", "x"}, 2, "new runs");
+  check_refused({"train", "data", "-o", "x", "--quality", "best"}, 2, "preview, low");
+  check_refused({"train", "data", "-o", "x", "--patience", "2"}, 2, "validate-views");
+  check_refused({"train", "data", "-o", "x", "--bounds", "1,1,1,0,0,0"}, 2, "greatest x, y and z");
+  check_refused({"train", "data", "-o", "x", "--init-count", "9", "--max-gaussians", "5"}, 2,
+                "init-count");
   check_refused({"info", "a", "b"}, 2, "Unexpected argument 'b'");
   check_refused({"info"}, 2, "PATH");
   check_refused({"render", "m.ply", "--orbit", "0", "-o", "x"}, 2, "--orbit");

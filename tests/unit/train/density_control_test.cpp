@@ -291,12 +291,12 @@ TEST_CASE("a budget removes what is transparent or unseen and halves the highest
     return std::pair(plan.source.size(), out);
   };
   using Set = std::multiset<std::uint32_t>;
-  CHECK(halved({5, 0.005, false}) == std::pair(std::size_t{5}, Set{}));
-  CHECK(halved({6, 0.005, false}) == std::pair(std::size_t{6}, Set{3}));
-  CHECK(halved({6, 0.005, true}) == std::pair(std::size_t{6}, Set{3, 4}));
-  CHECK(halved({7, 0.005, true}) == std::pair(std::size_t{7}, Set{2, 3, 4}));
-  CHECK(halved({100, 0.005, true}) == std::pair(std::size_t{8}, Set{2, 3, 4, 5}));
-  CHECK(halved({1, 0.005, true}).first == 4);
+  CHECK(halved({5, 0.005, false, {}}) == std::pair(std::size_t{5}, Set{}));
+  CHECK(halved({6, 0.005, false, {}}) == std::pair(std::size_t{6}, Set{3}));
+  CHECK(halved({6, 0.005, true, {}}) == std::pair(std::size_t{6}, Set{3, 4}));
+  CHECK(halved({7, 0.005, true, {}}) == std::pair(std::size_t{7}, Set{2, 3, 4}));
+  CHECK(halved({100, 0.005, true, {}}) == std::pair(std::size_t{8}, Set{2, 3, 4, 5}));
+  CHECK(halved({1, 0.005, true, {}}).first == 4);
 }
 
 TEST_CASE("the budget's count follows its curve to the limit and stays there [small]") {

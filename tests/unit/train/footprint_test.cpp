@@ -4,13 +4,19 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <numbers>
 #include <vector>
 
 #include "base/rng.hpp"
 #include "core/camera_model.hpp"
+#include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
+#include "raysplats/trainer.hpp"
+#include "train/checkpoint.hpp"
+#include "unit/device/temporary_directory.hpp"
+#include "unit/train/short_training.hpp"
 
 using namespace raysplats;
 
@@ -113,4 +119,37 @@ TEST_CASE("a marked step, a share of 0 and NaN leave scales as they are [small] 
   CHECK(raised[0] > -10.0f);
   CHECK(std::isnan(raised[3]));
   CHECK(raised[4] == raised[0]);
+}
+
+TEST_CASE("a run finds the least sizes anew where density control has ended") {
+  const TemporaryDirectory folder;
+  const std::filesystem::path data = folder.path() / "data", run = folder.path() / "run";
+  make_photos(data, 32, 6, 1);
+  Context context(select_device(""));
+  TrainOptions options = short_training(130);
+  options.densify_every = 40;
+  options.densify_until = 0;
+  options.checkpoint_every = 40;
+  options.keep_checkpoints = 9;
+  options.max_gaussians = 400;
+  const Dataset dataset = load_dataset(data);
+  Trainer(context, dataset, options, run).run(false);
+  std::vector<Camera> cameras;
+  for (const std::size_t i : dataset.indices(Split::kTrain))
+    cameras.push_back(dataset.views[i].camera);
+  std::vector<float> before;
+  for (const std::int64_t iteration : {40, 80, 120}) {
+    const Checkpoint state = read_checkpoint(checkpoint_path(run, iteration));
+    Gaussians model;
+    model.resize(state.count);
+    model.means = state.sections.at("means");
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+    Footprint footprint(context, cameras, options.footprint);
+    footprint.update(gaussians);
+    const std::vector<float> lows = footprint.lows().download();
+    CHECK(state.sections.at("footprint") == lows);
+    CHECK(lows != before);
+    before = lows;
+  }
 }

@@ -86,6 +86,42 @@ TEST_CASE("every pass sees every view once, in another order, and a new object c
   CHECK(seeded != first);
 }
 
+TEST_CASE("validation views are evenly spread and come into the order late") {
+  CHECK(validation_views(10, 2) == std::vector<std::size_t>{2, 7});
+  CHECK(validation_views(10, 0).empty());
+  CHECK(validation_views(4, 3).size() == 2);
+  CHECK(validation_views(2, 1).empty());
+  const std::vector<std::size_t> apart{2, 7};
+  ViewOrder order(1, 10, apart, 20);
+  std::multiset<std::size_t> before, after;
+  for (int i = 0; i < 16; ++i) before.insert(order.at(i));
+  for (int i = 16; i < 20; ++i) CHECK(order.at(i) % 5 != 2);
+  for (int i = 20; i < 30; ++i) after.insert(order.at(i));
+  for (std::size_t v = 0; v < 10; ++v) {
+    CHECK(before.count(v) == (v % 5 == 2 ? 0 : 2));
+    CHECK(after.count(v) == 1);
+  }
+  ViewOrder resumed(1, 10, apart, 20);
+  CHECK(resumed.at(23) == order.at(23));
+  CHECK(resumed.at(5) == order.at(5));
+  // Without views apart the order is that of a run that knows of none.
+  ViewOrder none(1, 10, {}, 20), plain(1, 10);
+  for (int i = 0; i < 40; ++i) CHECK(none.at(i) == plain.at(i));
+}
+
+TEST_CASE("validation takes place every tenth of a run until its views join") {
+  TrainOptions options;
+  options.iterations = 1000;
+  CHECK_FALSE(validates_at(options, 100));
+  options.validate_views = 1;
+  int times = 0;
+  for (std::int64_t i = 1; i <= 1000; ++i) times += validates_at(options, i) ? 1 : 0;
+  CHECK(times == 9);
+  CHECK(validation_end(options) == 900);
+  CHECK(validates_at(options, 900));
+  CHECK_FALSE(validates_at(options, 1000));
+}
+
 TEST_CASE("a random background is a function of seed and iteration, for cut-out photos only") {
   TrainOptions options;
   const std::array<float, 3> white{1, 1, 1};

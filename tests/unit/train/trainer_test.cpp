@@ -242,6 +242,7 @@ TEST_CASE("training improves held-out views and leaves the files of a run") {
   // Photos on black ground: that is their background, which the configuration names.
   CHECK(read.background.starts_with("0.00"));
   options.background = read.background;
+  options.data.origin = read.data.origin;  // which the run has found
   CHECK(to_toml(read) == to_toml(options));
   CHECK(nlohmann::json::parse(std::ifstream(folder / "cameras.json")).size() == 8);
   CHECK(read_ply(folder / "point_cloud" / "iteration_250" / "point_cloud.ply").size() ==

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/mcmc.hpp"
+
+#include "base/rng.hpp"
+#include "train/schedule.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr char kProgram[] = "train/mcmc.cl";
+constexpr std::size_t kGroup = 64;
+constexpr std::uint64_t kNoiseStream = 0x6e6f697365;
+
+Kernel kernel(Context& context, const char* name, const DeviceGaussians& gaussians) {
+  BuildOptions build;
+  build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0);
+  return context.kernel(kProgram, name, build);
+}
+
+}  // namespace
+
+Mcmc::Mcmc(Context& context, const TrainOptions& options, double extent)
+    : context_(context), options_(options), extent_(extent) {}
+
+void Mcmc::press(const DeviceGaussians& gaussians,
+                 GaussianGradients& gradients,
+                 const Buffer<std::uint32_t>& guard) {
+  const auto count = static_cast<double>(gaussians.count);
+  kernel(context_, "mcmc_press", gaussians)
+      .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
+              static_cast<float>(options_.opacity_reg / count),
+              static_cast<float>(options_.scale_reg / (3.0 * count * extent_)), guard,
+              gaussians.opacities, gaussians.scales, gradients.opacities, gradients.scales);
+}
+
+void Mcmc::disturb(DeviceGaussians& gaussians,
+                   std::int64_t iteration,
+                   const Buffer<std::uint32_t>& guard) {
+  if (options_.mcmc_noise <= 0 || options_.position_lr.initial <= 0) return;
+  const double decay =
+      learning_rate(options_.position_lr, options_, iteration) / options_.position_lr.initial;
+  const std::uint64_t key =
+      CounterRng(options_.seed, kNoiseStream, static_cast<std::uint64_t>(iteration)).bits();
+  kernel(context_, "mcmc_noise", gaussians)
+      .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
+              static_cast<std::uint32_t>(key), static_cast<std::uint32_t>(key >> 32),
+              static_cast<float>(options_.mcmc_noise * decay / extent_), guard,
+              gaussians.quaternions, gaussians.scales, gaussians.opacities, gaussians.means);
+  gaussians.changed(context_);
+}
+
+void apply_shares(Context& context,
+                  std::span<const std::array<float, 2>> shares,
+                  DeviceGaussians& gaussians) {
+  Buffer<std::array<float, 2>> device(context, shares.size(), "shares of Gaussians");
+  device.upload(shares);
+  kernel(context, "mcmc_share", gaussians)
+      .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
+              device, gaussians.opacities, gaussians.scales);
+  gaussians.changed(context);
+}
+
+}  // namespace raysplats

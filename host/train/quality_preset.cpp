@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/quality_preset.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+struct Level {
+  std::int64_t passes;       // over the training photos
+  std::int64_t least, most;  // iterations
+  int side;                  // longest side of a photo on CPUs, in pixels
+};
+
+constexpr std::array<Level, 4> kLevels{{{4, 300, 1000, 240},
+                                        {12, 1000, 3000, 400},
+                                        {40, 3000, 10000, 800},
+                                        {120, 10000, 30000, 1600}}};
+constexpr int kFasterDevices = 2;  // times that side elsewhere
+
+}  // namespace
+
+const std::vector<std::string>& quality_names() {
+  static const std::vector<std::string> names{"preview", "low", "medium", "high"};
+  return names;
+}
+
+Quality parse_quality(const std::string& name) {
+  const std::vector<std::string>& names = quality_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) {
+    throw UsageError(
+        fmt::format("The option 'quality' is {}, not '{}'", fmt::join(names, " or "), name));
+  }
+  return static_cast<Quality>(found - names.begin());
+}
+
+QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device) {
+  const Level& level = kLevels[static_cast<std::size_t>(quality)];
+  const std::vector<std::size_t> views = dataset.indices(Split::kTrain);
+  int longest = 1;
+  for (const std::size_t i : views) {
+    const Camera& camera = dataset.views[i].camera;
+    longest = std::max({longest, camera.width, camera.height});
+  }
+  const int side = level.side * (device == DeviceType::kCpu ? 1 : kFasterDevices);
+  QualityChoice out;
+  out.iterations =
+      std::clamp(level.passes * static_cast<std::int64_t>(views.size()), level.least, level.most);
+  out.downscale = (longest + side - 1) / side;
+  return out;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "raysplats/dataset.hpp"
+#include "raysplats/device.hpp"
+
+namespace raysplats {
+
+/// How good a model has to be, for those who do not want to choose numbers.
+enum class Quality { kPreview, kLow, kMedium, kHigh };
+
+/// "preview", "low", "medium", "high", in the order of Quality.
+const std::vector<std::string>& quality_names();
+/// Throws UsageError for another name.
+Quality parse_quality(const std::string& name);
+
+/// What a quality means for a capture on a device. The number of Gaussians follows from both by the
+/// rule of max-gaussians = 0.
+struct QualityChoice {
+  std::int64_t iterations = 0;
+  int downscale = 1;  ///< by a whole number, so that reduced photos of a data set can be used
+};
+
+/// `dataset` at its full size. Iterations are passes over the training photos within limits; photos
+/// are reduced to a longest side that is half as long on CPUs as elsewhere.
+QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device);
+
+}  // namespace raysplats

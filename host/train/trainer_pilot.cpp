@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <vector>
+
+#include "raysplats/error.hpp"
+#include "train/run_time.hpp"
+#include "train/trainer_impl.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr double kMeasuredShare = 0.05;  // of the time of a run that measuring may take
+constexpr int kLeastSteps = 3;           // of a kind that are timed
+constexpr double kCoarseShare = 0.2;     // of the time for steps that coarse ones take
+constexpr double kFullShare = 0.5;       // and these together with those at full size
+constexpr int kMostPasses = 12;          // that double the count
+constexpr std::int64_t kLeastIterations = 10;
+constexpr double kShortRun = 20;    // seconds of a run that is not worth more measuring
+constexpr double kFillShare = 0.5;  // of the limit that a start takes at most
+
+class Timer {
+ public:
+  explicit Timer(const Context& context) : watch_(context) { watch_.start(); }
+  double seconds() const { return watch_.seconds(); }
+
+ private:
+  Stopwatch watch_;
+};
+
+double mean_pixels(const std::vector<Camera>& cameras) {
+  double sum = 0;
+  for (const Camera& camera : cameras) sum += static_cast<double>(pixels_of(camera));
+  return sum / static_cast<double>(cameras.size());
+}
+
+}  // namespace
+
+// What a small run of the same shape told.
+struct Trainer::Impl::Pilot {
+  StepCost cost;
+  double start_seconds = 0;  // of making the first model
+  double photo_seconds = 0;  // of getting one photo
+  double seconds = 0;        // all of it
+  std::size_t first = 0;     // Gaussians of the start
+};
+
+void Trainer::Impl::check_not_begun(const char* function) const {
+  if (!started && !prepared && iteration == 0) return;
+  throw UsageError(fmt::format(
+      "Trainer::{}() is about a run that has not begun: call it before training and resume()",
+      function));
+}
+
+// What was derived from the options when this was made, from options that have changed.
+void Trainer::Impl::follow_options() {
+  TrainOptions centred = options;
+  centred.bounds = about_origin(options.bounds, dataset.origin);
+  density.follow(centred, train_views.size() - apart.size());
+  order = ViewOrder(options.seed, train_views.size(), apart, validation_end(options));
+}
+
+double Trainer::Impl::seconds_of(const Pilot& pilot,
+                                 std::int64_t iterations,
+                                 std::size_t most) const {
+  TrainOptions shaped = options;
+  shaped.iterations = iterations;
+  const auto limit = static_cast<double>(most);
+  const double first = std::min(static_cast<double>(pilot.first), kFillShare * limit);
+  const auto photos =
+      static_cast<double>(std::min(iterations, static_cast<std::int64_t>(train_views.size())));
+  return pilot.start_seconds + photos * pilot.photo_seconds +
+         run_seconds(shaped, pilot.cost, mean_pixels(train_cameras), first, limit);
+}
+
+// Times steps from the start on the device: coarse ones, ones at full size, and ones with as many
+// Gaussians as the run will have at its end. `run`: the seconds of the run, if they are given.
+void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot& pilot) {
+  const Timer clock(context);
+  std::vector<StepSample> samples;
+  double photo_seconds = 0;
+  int photos = 0;
+  const auto timed_step = [&] {
+    const std::size_t view = order.at(iteration);
+    const int divisor = resolution_divisor(options, iteration);
+    const Camera camera =
+        divisor > 1 ? downscaled(train_cameras[view], divisor) : train_cameras[view];
+    const Timer photo(context);
+    targets.get(view, camera.width, camera.height);
+    context.finish();
+    photo_seconds += photo.seconds();
+    ++photos;
+    const Timer timer(context);
+    step();
+    settle();
+    return StepSample{static_cast<double>(pixels_of(camera)), static_cast<double>(gaussians.count),
+                      timer.seconds()};
+  };
+  // The first step of a kind compiles kernels and makes buffers: it does not count.
+  const auto stage = [&](double until) {
+    timed_step();
+    for (int i = 0; i < kLeastSteps || clock.seconds() < until * seconds; ++i)
+      samples.push_back(timed_step());
+  };
+  iteration = 0;
+  stage(kCoarseShare);
+  // One size tells no more than this; the rays cost most.
+  double pixels = 0, coarse_seconds = 0;
+  for (const StepSample& s : samples) pixels += s.pixels, coarse_seconds += s.seconds;
+  pilot.cost = {0, coarse_seconds / pixels, 0};
+  const auto rough = [&](std::int64_t iterations) {
+    return seconds_of(pilot, iterations, gaussians.count);
+  };
+  if (run || rough(options.iterations) > kShortRun) {
+    const std::int64_t middle = options.iterations / 2;
+    iteration = middle;
+    stage(kFullShare);
+    pilot.cost = fit_step_cost(samples);
+    const std::size_t most =
+        most_gaussians(run ? iterations_within(*run, kLeastIterations, rough) : options.iterations);
+    for (int pass = 0; pass < kMostPasses && density.accumulates_at(0) && gaussians.count < most;
+         ++pass)
+      follow_plan(density.split_evenly(gaussians, most));
+    stage(1);
+    pilot.cost = fit_step_cost(samples);
+  }
+  for (const StepSample& s : samples)
+    spdlog::debug("a step of {} rays and {} Gaussians took {:.2f} ms", s.pixels, s.gaussians,
+                  1e3 * s.seconds);
+  pilot.photo_seconds = photo_seconds / photos;
+}
+
+// Everything as it was before the first step.
+void Trainer::Impl::forget_pilot() {
+  follow_options();
+  density.restore_statistics({});
+  gaussians = DeviceGaussians();
+  guard.restore({});
+  if (exposure) exposure.emplace(context, train_views.size());
+  if (poses)
+    poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
+  iteration = 0;
+  traced_rays = 0;
+  whole = stepped = false;
+}
+
+Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<double> run_time) {
+  if (!continues && !overwrite) check_no_run(run.path());
+  const Timer clock(context);
+  Pilot pilot;
+  const std::size_t most = limit();
+  choose_background();
+  first_model = initial_model(
+      dataset, train_cameras, [this]() -> const auto& { return photos(); }, most, options);
+  std::optional<Gaussians> made = first_model;
+  pilot.start_seconds = clock.seconds();
+  upload_start(most);
+  pilot.first = gaussians.count;
+  time_steps(std::max(seconds - clock.seconds(), 0.0), run_time, pilot);
+  forget_pilot();
+  first_model = std::move(made);
+  pilot.seconds = clock.seconds();
+  return pilot;
+}
+
+RunEstimate Trainer::Impl::estimate(double seconds) {
+  check_not_begun("estimate");
+  const Pilot pilot = run_pilot(seconds, std::nullopt);
+  const std::size_t most = most_gaussians(options.iterations);
+  const bool grows = density.accumulates_at(0);
+  return {options.iterations, grows ? most : pilot.first,
+          seconds_of(pilot, options.iterations, grows ? most : pilot.first)};
+}
+
+RunEstimate Trainer::Impl::fit_time(double seconds) {
+  check_not_begun("fit_time");
+  if (!(seconds > 0)) {
+    throw UsageError(fmt::format("A run of {} s trains nothing: give it more time", seconds));
+  }
+  const Pilot pilot = run_pilot(kMeasuredShare * seconds, seconds);
+  const double left = seconds - pilot.seconds;
+  const auto duration = [&](std::int64_t iterations) {
+    return seconds_of(pilot, iterations, most_gaussians(iterations));
+  };
+  const double least = duration(kLeastIterations);
+  if (least > left) {
+    throw UsageError(fmt::format(
+        "A run of {:.3g} s is too short: measuring, the start and {} iterations take {:.2g} s here",
+        seconds, kLeastIterations, pilot.seconds + least));
+  }
+  options.iterations = iterations_within(left, kLeastIterations, duration);
+  options.max_gaussians = static_cast<std::int64_t>(most_gaussians(options.iterations));
+  first_model.reset();  // it was made for another limit
+  follow_options();
+  training.set(pilot.seconds);
+  return {options.iterations, static_cast<std::size_t>(options.max_gaussians),
+          pilot.seconds + duration(options.iterations)};
+}
+
+}  // namespace raysplats

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs whose length is not given in iterations.
+#include <doctest/doctest.h>
+
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+
+namespace {
+
+using Words = std::vector<std::string>;
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+Outcome succeed(const Words& arguments) {
+  Outcome outcome = raysplats_program(arguments);
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  return outcome;
+}
+
+/// The value of a key in the configuration of a run.
+std::string value_of(const std::string& run, const std::string& key) {
+  const std::string text = read_file(run + "/config.toml");
+  const std::string mark = "\n" + key + " = ";
+  const std::size_t at = text.find(mark);
+  REQUIRE(at != std::string::npos);
+  const std::size_t begin = at + mark.size();
+  return text.substr(begin, text.find('\n', begin) - begin);
+}
+
+}  // namespace
+
+TEST_CASE("the length of a run follows from a time or a quality, and is said beforehand") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", timed = folder / "timed", look = folder / "look";
+  succeed({"generate", data, "--size", "48", "--train-views", "5", "--test-views", "1", "-q"});
+
+  const Outcome outcome = succeed({"train", data, "-o", timed, "--time", "2s"});
+  CHECK(contains(outcome.err, "iterations, up to"));
+  CHECK(contains(outcome.err, "of training"));
+  const std::string iterations = value_of(timed, "iterations");
+  CHECK(iterations != "10000");
+  CHECK(value_of(timed, "max-gaussians") != "0");
+  CHECK(contains(outcome.out, iterations + " iterations in"));
+  succeed({"train", data, "-o", folder / "again", "--config", timed + "/config.toml", "-q"});
+  const std::string model = "/point_cloud/iteration_" + iterations + "/point_cloud.ply";
+  CHECK(read_file(timed + model) == read_file(folder / "again" + model));
+
+  succeed({"train", data, "-o", look, "--quality", "preview", "--downscale", "4", "-q"});
+  CHECK(value_of(look, "iterations") == "300");
+  CHECK(value_of(look, "downscale") == "4");
+}

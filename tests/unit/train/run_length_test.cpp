@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// Trainer::estimate() and Trainer::fit_time().
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "raysplats/context.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/device.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/trainer.hpp"
+#include "train/train_config.hpp"
+#include "unit/device/temporary_directory.hpp"
+#include "unit/train/short_training.hpp"
+
+using namespace raysplats;
+namespace fs = std::filesystem;
+
+namespace {
+
+Context& context() {
+  static Context instance(select_device(""));
+  return instance;
+}
+
+void check_equal(const Gaussians& a, const Gaussians& b) {
+  CHECK(a.means == b.means);
+  CHECK(a.quaternions == b.quaternions);
+  CHECK(a.log_scales == b.log_scales);
+  CHECK(a.opacities == b.opacities);
+  CHECK(a.sh == b.sh);
+}
+
+}  // namespace
+
+TEST_CASE("an estimate leaves no trace in the run, whatever its strategy and options") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data";
+  make_photos(data, 32, 8, 1);
+  for (const DensityStrategy strategy :
+       {DensityStrategy::kBudget, DensityStrategy::kAdc, DensityStrategy::kMcmc}) {
+    TrainOptions options = short_training(60);
+    options.strategy = strategy;
+    options.exposure = strategy == DensityStrategy::kBudget;
+    options.poses = strategy == DensityStrategy::kAdc;
+    options.trace.deterministic = true;
+    options.max_gaussians = 900;
+    const std::string name = std::to_string(static_cast<int>(strategy));
+    Trainer plain(context(), load_dataset(data), options, folder.path() / ("plain" + name));
+    plain.run(false);
+    Trainer judged(context(), load_dataset(data), options, folder.path() / ("judged" + name));
+    const RunEstimate estimate = judged.estimate(0.3);
+    CHECK(estimate.iterations == 60);
+    CHECK(estimate.seconds > 0);
+    CHECK(judged.iteration() == 0);
+    const TrainSummary summary = judged.run(false);
+    CHECK(summary.gaussians <= estimate.gaussians);
+    check_equal(plain.model(), judged.model());
+    CHECK_THROWS_AS(judged.estimate(0.3), UsageError);
+    CHECK_THROWS_AS(judged.fit_time(10), UsageError);
+  }
+}
+
+TEST_CASE("a run by time names its length, and a replay of its configuration gives its bytes") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data", run = folder.path() / "run";
+  make_photos(data, 48, 8, 1);
+  TrainOptions options = short_training(10000);
+  options.trace.deterministic = true;
+  Trainer trainer(context(), load_dataset(data), options, run);
+  CHECK_THROWS_AS(trainer.fit_time(0), UsageError);
+  CHECK_THROWS_AS(trainer.fit_time(1e-4), UsageError);
+  const RunEstimate estimate = trainer.fit_time(4);
+  CHECK(estimate.seconds <= 4.0);
+  const TrainSummary summary = trainer.run(false);
+  CHECK(summary.iterations == estimate.iterations);
+  MESSAGE("4 s asked, " << summary.training_seconds << " s taken, " << summary.iterations
+                        << " iterations, " << summary.gaussians << " Gaussians");
+  // Far looser than what a device that nobody else uses keeps to.
+  CHECK(summary.training_seconds > 1.0);
+  CHECK(summary.training_seconds < 16.0);
+
+  TrainOptions replayed;
+  read_train_config(run / "config.toml", replayed);
+  CHECK(replayed.iterations == estimate.iterations);
+  CHECK(replayed.max_gaussians == static_cast<std::int64_t>(estimate.gaussians));
+  Trainer again(context(), load_dataset(data), replayed, folder.path() / "again");
+  again.run(false);
+  check_equal(trainer.model(), again.model());
+}
