@@ -47,7 +47,7 @@ for program in "$build"/bin/test_*; do
   say "$name: $count test cases"
   log=$work/$name.log
   : >"$log"
-  if ! oclgrind --data-races --check-api --build-options -cl-opt-disable --log "$log" \
+  if ! oclgrind --data-races --check-api --build-options "-cl-opt-disable -DRS_CALLS" --log "$log" \
     "$program" --test-case="$filter"; then
     failed+=("$name: a test failed")
   fi

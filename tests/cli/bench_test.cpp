@@ -113,7 +113,8 @@ TEST_CASE("bench writes one file for the owner of a device to send") {
   check_refused(with(report, {"--json", folder / "a.json"}), 2, "--json does not go with --report");
   check_refused(with(report, {"--kernels", "a", "--against", "b"}), 2, "leave out --kernels");
   check_refused({"bench", "--kernels", "cl"}, 2, "give both");
-  check_refused({"bench", "--report", folder / "none" / "report.json", "-q"}, 3, "none");
+  write_file(folder / "file", "no folder");
+  check_refused({"bench", "--report", folder / "file/report.json", "-q"}, 3, "file");
 }
 
 TEST_CASE("bench compares two folders of kernels") {

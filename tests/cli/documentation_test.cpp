@@ -233,6 +233,17 @@ class Place {
       if (scene || has(words, "--orbit")) add("--width", "16");
       if (!scene && has(words, "--orbit")) add("--height", "16");
       if (scene && !has(words, "--frames")) add("--samples", "1");
+    } else if (command == "bench" && (has(words, "--report") || has(words, "--kernels"))) {
+      // Folders of kernels that a reader has.
+      for (std::size_t i = 1; i < words.size(); ++i) {
+        if (words[i - 1] == "--kernels" || words[i - 1] == "--against")
+          words[i] = std::string(RAYSPLATS_SOURCE_DIR) + "/cl";
+        if (words[i - 1] == "--sizes") words[i] = std::string("1k");
+      }
+      add("--sizes", "1k");
+      add("--resolution", "16x16");
+      add("--repeat", "1");
+      add("--filter", "^adam");
     } else if (command == "bench" && !has(words, "compare")) {
       words.emplace_back("--list");
     } else if (command == "tune" && !has(words, "--reset")) {

@@ -41,12 +41,17 @@ struct SortsFolder : TemporaryDirectory {
   SortsFolder() { write("sorts.cl", kSorts); }
 };
 
+ContextOptions uncached() {
+  ContextOptions options;
+  options.kernel_cache = false;
+  return options;
+}
+
 struct Sorts {
   SortsFolder folder;
   ScopedVariable kernels{"RAYSPLATS_KERNEL_DIR", folder.path().string()};
   ScopedVariable checked{"RAYSPLATS_CHECK_ARGUMENTS", "1"};
-  ContextOptions options{.kernel_cache = false};
-  Context context{select_device(""), options};
+  Context context{select_device(""), uncached()};
   Kernel kernel = context.kernel("sorts.cl", "sorts");
   Buffer<float> vectors{context, 8, "vectors"};
   Buffer<std::int32_t> integers{context, 8, "integers"};
