@@ -40,8 +40,8 @@ void GaussianBounds::compute(const Buffer<float>& means,
   boxes.ensure(*context_, count, "Gaussian bounds");
   const std::size_t items = (count + chunk_ - 1) / chunk_;
   kernel_.launch(Range::linear(items, chunk_ > 1 ? 1 : kGroup), means, quaternions, scales,
-                 opacities, BufferAs<float>{boxes.raw()}, quantile, static_cast<std::uint32_t>(count),
-                 static_cast<std::uint32_t>(chunk_));
+                 opacities, BufferAs<float>{boxes.raw()}, quantile,
+                 static_cast<std::uint32_t>(count), static_cast<std::uint32_t>(chunk_));
 }
 
 }  // namespace raysplats

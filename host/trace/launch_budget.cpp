@@ -26,8 +26,8 @@ std::uint32_t LaunchBudget::rows(std::uint32_t left) {
   return std::clamp(rows_, 1u, std::max(left, 1u));
 }
 
-// A launch that took too long says that those to come must be smaller, and only one as large as they
-// are that they may grow: of several that ran before the first was looked at, one does.
+// A launch that took too long says that those to come must be smaller, and only one as large as
+// they are that they may grow: of several that ran before the first was looked at, one does.
 void LaunchBudget::record(std::uint32_t rows, double seconds) {
   const double fit = seconds > 0 ? rows * seconds_ / seconds : kMostRows;
   const double most = std::min(kMostGrowth * rows, kMostRows);

@@ -39,7 +39,7 @@ class LaunchBudget {
 
   double seconds_;
   std::uint32_t rows_ = 4;
-  bool settled_ = false;  // rows_ fits what a launch took, or all rows fit one
+  bool settled_ = false;         // rows_ fits what a launch took, or all rows fit one
   std::deque<Launch> launches_;  // whose time is not known yet
 };
 
