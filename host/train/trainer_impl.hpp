@@ -106,6 +106,7 @@ struct Trainer::Impl {
   // trainer_report.cpp: what a run says of itself.
   void report(Progress& progress);
   void evaluate_views(bool last);
+  Gaussians model_to_save() const;  // without what has left --bounds
   void save_model();
   void write_metrics(bool complete);
   std::string capped_share(std::uint64_t capped);

@@ -69,8 +69,13 @@ void Trainer::Impl::evaluate_views(bool last) {
   if (test_views.empty()) return;
   evaluating.start();
   tracer.set_background(background);
-  const auto render = [this](const Camera& camera) {
-    tracer.forward(gaussians, camera);
+  // What the PLY holds: between passes of density control some may have left the box.
+  std::optional<DeviceGaussians> cropped;
+  if (options.bounds)
+    cropped = DeviceGaussians::upload(context, model_to_save(), ScaleActivation::kExp);
+  const DeviceGaussians& shown = cropped ? *cropped : gaussians;
+  const auto render = [&](const Camera& camera) {
+    tracer.forward(shown, camera);
     return tracer.download_image();
   };
   EvaluationOptions choice;
@@ -79,8 +84,7 @@ void Trainer::Impl::evaluate_views(bool last) {
   const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
                                                       run.evaluation_folder(iteration), choice);
   run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
-              report.images.size(), gaussians.count, report.mean.psnr_corrected,
-              report.mean.psnr_all});
+              report.images.size(), shown.count, report.mean.psnr_corrected, report.mean.psnr_all});
   write_metrics(false);
   evaluating.stop();
   spdlog::info("iteration {}: PSNR {:.2f} dB, SSIM {:.4f} over {} test views after {} of training",
@@ -88,9 +92,13 @@ void Trainer::Impl::evaluate_views(bool last) {
                format_duration(training.seconds()));
 }
 
+Gaussians Trainer::Impl::model_to_save() const {
+  return inside(gaussians.download(), about_origin(options.bounds, dataset.origin));
+}
+
 void Trainer::Impl::save_model() {
-  run.write_model(inside(gaussians.download(), about_origin(options.bounds, dataset.origin)),
-                  trace_options_of(options, background), iteration, dataset.origin);
+  run.write_model(model_to_save(), trace_options_of(options, background), iteration,
+                  dataset.origin);
   if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
   if (poses) run.write_refined_cameras(poses->cameras(), dataset.origin);
 }

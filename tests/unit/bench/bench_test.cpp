@@ -9,28 +9,11 @@
 #include "bench/operation.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
+#include "unit/bench/report_fixture.hpp"
 
 using namespace raysplats;
 
 namespace {
-
-BenchOptions tiny() {
-  BenchOptions options;
-  options.sizes = {1000};
-  options.width = options.height = 64;
-  options.repeat = 2;
-  options.min_seconds = 1e-4;
-  options.rays = 256;
-  options.triangles = 2000;
-  return options;
-}
-
-Context timed_context() {
-  ContextOptions options;
-  options.profile = options.keep_launches = true;
-  options.tuning = false;
-  return Context(select_device(""), options);
-}
 
 void check_row(const BenchRow& row, const Ceilings& ceilings) {
   INFO(row.id());
@@ -55,7 +38,7 @@ void check_row(const BenchRow& row, const Ceilings& ceilings) {
 }  // namespace
 
 TEST_CASE("bench: ids follow scenes, sizes and the filter") {
-  BenchOptions options = tiny();
+  BenchOptions options = tiny_bench(2);
   options.scenes = {"random", "surface"};
   options.sizes = {10, 20};
   const std::vector<std::string> all = bench_ids(options);
@@ -70,8 +53,8 @@ TEST_CASE("bench: ids follow scenes, sizes and the filter") {
 }
 
 TEST_CASE("bench: every row has a time, work and a share of the limits") {
-  Context context = timed_context();
-  const BenchOptions options = tiny();
+  Context context(select_device(""), timed_options());
+  const BenchOptions options = tiny_bench(2);
   const BenchReport report = run_bench(context, options);
   CHECK(report.device == context.device().name);
   CHECK(report.ceilings.copy_bytes_per_second > 1e8);
@@ -92,8 +75,8 @@ TEST_CASE("bench: every row has a time, work and a share of the limits") {
 }
 
 TEST_CASE("bench: a model and a filter") {
-  Context context = timed_context();
-  BenchOptions options = tiny();
+  Context context(select_device(""), timed_options());
+  BenchOptions options = tiny_bench(2);
   options.filter = "forward|rays/";
   const BenchModel model{"my model", bench_scene("surface", 500, 3, 1), bench_camera(32, 48)};
   const BenchReport report = run_bench(context, options, &model);
@@ -109,7 +92,7 @@ TEST_CASE("bench: a model and a filter") {
 }
 
 TEST_CASE("operations: launches go to their stages and failures come out") {
-  Context context = timed_context();
+  Context context(select_device(""), timed_options());
   Buffer<std::uint32_t> layout(context, 256, "layout");
   Kernel kernel = context.kernel("primitives/layout_probe.cl", "layout_probe");
   int prepared = 0, reset = 0, run = 0;

@@ -12,35 +12,14 @@
 
 #include "bench/kernel_folders.hpp"
 #include "raysplats/error.hpp"
+#include "unit/bench/report_fixture.hpp"
 #include "unit/device/temporary_directory.hpp"
 
 using namespace raysplats;
 
-namespace {
-
-BenchOptions tiny() {
-  BenchOptions options;
-  options.sizes = {1000};
-  options.width = options.height = 64;
-  options.repeat = 1;
-  options.min_seconds = 1e-4;
-  options.rays = 256;
-  options.triangles = 2000;
-  return options;
-}
-
-ContextOptions timed() {
-  ContextOptions options;
-  options.profile = options.keep_launches = true;
-  options.tuning = false;
-  return options;
-}
-
-}  // namespace
-
 TEST_CASE("a device's report holds its self-test, every size that fits the time, and its speeds") {
-  Context context(select_device(""), timed());
-  BenchOptions options = tiny();
+  Context context(select_device(""), timed_options());
+  BenchOptions options = tiny_bench(1);
   options.filter = "^(adam|view)/";
   const DeviceReport report = make_device_report(context, options);
   CHECK(report.checks.size() == 14);
@@ -80,12 +59,12 @@ TEST_CASE("two folders of kernels are compared by what they compute, then by tim
   const std::filesystem::path own = std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "cl";
   const std::filesystem::path changed = folder.path() / "cl";
   std::filesystem::copy(own, changed, std::filesystem::copy_options::recursive);
-  BenchOptions options = tiny();
+  BenchOptions options = tiny_bench(1);
   options.filter = "^adam/";
   options.repeat = 3;
   const DeviceInfo device = select_device("");
   const KernelComparison same =
-      compare_kernels(device, timed(), own.string(), changed.string(), options);
+      compare_kernels(device, timed_options(), own.string(), changed.string(), options);
   CHECK(same.equal());
   REQUIRE(same.rows.rows.size() == 1);
   CHECK(same.rows.rows[0].before > 0);
@@ -102,14 +81,14 @@ TEST_CASE("two folders of kernels are compared by what they compute, then by tim
   source.replace(source.find(root), root.size(), "* 0.5f * adam->root_scale");
   std::ofstream(adam) << source;
   const KernelComparison other =
-      compare_kernels(device, timed(), own.string(), changed.string(), options);
+      compare_kernels(device, timed_options(), own.string(), changed.string(), options);
   CHECK(!other.equal());
   for (const ResultDifference& result : other.results) {
     CAPTURE(result.name);
     const bool stepped = result.name.find("after a step") != std::string::npos;
     CHECK((result.differing > 0) == stepped);
   }
-  CHECK_THROWS_AS(
-      compare_kernels(device, timed(), own.string(), (folder.path() / "none").string(), options),
-      DeviceError);
+  CHECK_THROWS_AS(compare_kernels(device, timed_options(), own.string(),
+                                  (folder.path() / "none").string(), options),
+                  DeviceError);
 }

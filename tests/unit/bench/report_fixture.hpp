@@ -1,7 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "bench/bench.hpp"
 #include "bench/report.hpp"
+
+/// Every operation in little time.
+inline raysplats::BenchOptions tiny_bench(int repeat) {
+  raysplats::BenchOptions options;
+  options.sizes = {1000};
+  options.width = options.height = 64;
+  options.repeat = repeat;
+  options.min_seconds = 1e-4;
+  options.rays = 256;
+  options.triangles = 2000;
+  return options;
+}
+
+/// Of a context that benchmarks run in.
+inline raysplats::ContextOptions timed_options() {
+  raysplats::ContextOptions options;
+  options.profile = options.keep_launches = true;
+  options.tuning = false;
+  return options;
+}
 
 /// Two rows with figures that are easy to compute with.
 inline raysplats::BenchReport sample_report() {

@@ -11,20 +11,6 @@
 
 namespace raysplats {
 
-/// Gradients on the host.
-struct HostGradients {
-  std::vector<float> means, quaternions, scales, opacities, sh, screen;
-
-  explicit HostGradients(const GaussianGradients& g)
-      : means(g.means.download()),
-        quaternions(g.quaternions.download()),
-        scales(g.scales.download()),
-        opacities(g.opacities.download()),
-        sh(g.sh.download()),
-        screen(g.screen.download()) {}
-  bool operator==(const HostGradients&) const = default;
-};
-
 template <class Expected>
 void check_gradients(const HostGradients& got, const Expected& expected, double limit) {
   const auto check = [&](const char* what, const std::vector<float>& a, const auto& b) {

@@ -13,16 +13,12 @@ struct Errors {
   double worst() const { return std::max({means, quaternions, scales, opacities, sh}); }
 };
 
-struct Host {
-  std::vector<float> means, quaternions, scales, opacities, sh, screen;
-};
-
-Host gradients_on_device(Context& context,
-                         const Gaussians& model,
-                         const TraceOptions& options,
-                         const Camera& camera,
-                         ScaleActivation activation,
-                         const std::vector<float>& image_gradient) {
+HostGradients gradients_on_device(Context& context,
+                                  const Gaussians& model,
+                                  const TraceOptions& options,
+                                  const Camera& camera,
+                                  ScaleActivation activation,
+                                  const std::vector<float>& image_gradient) {
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
   CameraTracer tracer(context, options);
   tracer.update(gaussians);
@@ -31,8 +27,7 @@ Host gradients_on_device(Context& context,
   gradient.upload(image_gradient);
   GaussianGradients out;
   tracer.backward(gaussians, gradient, out);
-  return {out.means.download(),     out.quaternions.download(), out.scales.download(),
-          out.opacities.download(), out.sh.download(),          out.screen.download()};
+  return HostGradients(out);
 }
 
 // The image gradient with zeros where single precision may order or cut hits otherwise than double.
@@ -56,7 +51,8 @@ Errors compare_gradients(Context& context,
   const std::vector<double> wide(image_gradient.begin(), image_gradient.end());
   const reference::Gradient expected =
       reference::render_gradient(parameters, options, camera, wide);
-  const Host got = gradients_on_device(context, model, options, camera, activation, image_gradient);
+  const HostGradients got =
+      gradients_on_device(context, model, options, camera, activation, image_gradient);
   return {relative_error(got.means, expected.parameters.means),
           relative_error(got.quaternions, expected.parameters.quaternions),
           relative_error(got.scales, expected.parameters.scales),
@@ -173,11 +169,11 @@ TEST_CASE("packet widths, every way of adding and recomputed hits give the same 
   TraceOptions options;
   const std::vector<float> image_gradient = random_image_gradient(70 * 66, 5);
   options.packet_width = 16;
-  const Host base =
+  const HostGradients base =
       gradients_on_device(context, model, options, camera, ScaleActivation::kExp, image_gradient);
   const auto check = [&](const TraceOptions& variant, const char* what) {
     CAPTURE(what);
-    const Host got =
+    const HostGradients got =
         gradients_on_device(context, model, variant, camera, ScaleActivation::kExp, image_gradient);
     const auto error = [](const std::vector<float>& a, const std::vector<float>& b) {
       return relative_error(a, std::vector<double>(b.begin(), b.end()));
@@ -245,9 +241,9 @@ TEST_CASE("the backward pass gives the same bits every time on a CPU") {
   const Gaussians model = reference::random_scene(1000, 27, 1);
   const Camera camera = reference::cube_camera(100, 90);
   const std::vector<float> image_gradient = random_image_gradient(9000, 7);
-  const Host a =
+  const HostGradients a =
       gradients_on_device(context, model, {}, camera, ScaleActivation::kExp, image_gradient);
-  const Host b =
+  const HostGradients b =
       gradients_on_device(context, model, {}, camera, ScaleActivation::kExp, image_gradient);
   CHECK(a.means == b.means);
   CHECK(a.quaternions == b.quaternions);
@@ -273,7 +269,7 @@ TEST_CASE("a tracer used again for other views and other counts keeps no gradien
       gradient.upload(image_gradient);
       tracer.forward(gaussians, camera, true);
       tracer.backward(gaussians, gradient, out);
-      const Host fresh =
+      const HostGradients fresh =
           gradients_on_device(context, model, {}, camera, ScaleActivation::kExp, image_gradient);
       const auto error = [](const Buffer<float>& got, const std::vector<float>& expected) {
         return relative_error(got.download(),

@@ -113,17 +113,6 @@ void check_picture(const Image& image, const Image& depth, const Expected& expec
   CHECK(3 * hit > image.pixels());
 }
 
-struct Host {
-  explicit Host(const GaussianGradients& g)
-      : means(g.means.download()),
-        quaternions(g.quaternions.download()),
-        scales(g.scales.download()),
-        opacities(g.opacities.download()),
-        sh(g.sh.download()),
-        screen(g.screen.download()) {}
-  std::vector<float> means, quaternions, scales, opacities, sh, screen;
-};
-
 std::vector<float> gradient_without_ties(const Expected& expected) {
   const std::size_t pixels = expected.rays.size();
   std::vector<float> gradient = random_image_gradient(pixels, 7);
@@ -134,18 +123,20 @@ std::vector<float> gradient_without_ties(const Expected& expected) {
   return gradient;
 }
 
-Host backward(Context& context,
-              CameraTracer& tracer,
-              const DeviceGaussians& gaussians,
-              const std::vector<float>& gradient) {
+HostGradients backward(Context& context,
+                       CameraTracer& tracer,
+                       const DeviceGaussians& gaussians,
+                       const std::vector<float>& gradient) {
   Buffer<float> uploaded(context, gradient.size(), "image gradient");
   uploaded.upload(gradient);
   GaussianGradients out;
   tracer.backward(gaussians, uploaded, out);
-  return Host(out);
+  return HostGradients(out);
 }
 
-void check_gradients(const Host& got, const reference::Parameters& expected, double limit) {
+void check_gradients(const HostGradients& got,
+                     const reference::Parameters& expected,
+                     double limit) {
   CHECK(relative_error(got.means, expected.means) < limit);
   CHECK(relative_error(got.quaternions, expected.quaternions) < limit);
   CHECK(relative_error(got.scales, expected.scales) < limit);
@@ -228,8 +219,8 @@ TEST_CASE("packets through a lens in little memory are traced band by band") {
     CHECK(tight.statistics().hits == roomy.statistics().hits);
     const std::size_t pixels = roomy.download_image().pixels();
     const std::vector<float> gradient = random_image_gradient(pixels, 3);
-    const Host a = backward(context, roomy, gaussians, gradient);
-    const Host b = backward(context, tight, gaussians, gradient);
+    const HostGradients a = backward(context, roomy, gaussians, gradient);
+    const HostGradients b = backward(context, tight, gaussians, gradient);
     const auto wide = [](const std::vector<float>& v) {
       return std::vector<double>(v.begin(), v.end());
     };
@@ -292,7 +283,7 @@ TEST_CASE("the screen gradients of a lens are those of its rays one by one") {
     CameraTracer tracer(context, options);
     tracer.update(gaussians);
     tracer.forward(gaussians, view.camera, true);
-    const Host packets = backward(context, tracer, gaussians, gradient);
+    const HostGradients packets = backward(context, tracer, gaussians, gradient);
 
     RayTracer ray_tracer(context, options);
     ray_tracer.update(gaussians);
@@ -312,7 +303,7 @@ TEST_CASE("the screen gradients of a lens are those of its rays one by one") {
     ray_backward.add(gaussians, rays, pixels, results, uploaded, ColorDirection::kFromOrigin);
     GaussianGradients out;
     ray_backward.finish(gaussians, out);
-    const Host single(out);
+    const HostGradients single(out);
     std::vector<float> screen, absolute;
     std::vector<double> expected_screen, expected_absolute;
     for (std::size_t i = 0; i < model.size(); ++i) {

@@ -31,21 +31,8 @@ struct Errors {
     CHECK(e_.worst() < (limit));                                                     \
   } while (false)
 
-struct Host {
-  std::vector<float> means, quaternions, scales, opacities, sh, screen;
-
-  explicit Host(const GaussianGradients& g)
-      : means(g.means.download()),
-        quaternions(g.quaternions.download()),
-        scales(g.scales.download()),
-        opacities(g.opacities.download()),
-        sh(g.sh.download()),
-        screen(g.screen.download()) {}
-  bool operator==(const Host&) const = default;
-};
-
 template <class Expected>
-Errors errors_of(const Host& got, const Expected& expected) {
+Errors errors_of(const HostGradients& got, const Expected& expected) {
   const auto error = [](const std::vector<float>& a, const auto& b) {
     return relative_error(a, std::vector<double>(b.begin(), b.end()));
   };
@@ -108,13 +95,13 @@ struct Batch {
   Buffer<RayResult> results;
 };
 
-Host gradients_on_device(Context& context,
-                         const DeviceGaussians& gaussians,
-                         const TraceOptions& options,
-                         const std::vector<Ray>& rays,
-                         const Gradients& gradients,
-                         ColorDirection direction,
-                         int lanes = 0) {
+HostGradients gradients_on_device(Context& context,
+                                  const DeviceGaussians& gaussians,
+                                  const TraceOptions& options,
+                                  const std::vector<Ray>& rays,
+                                  const Gradients& gradients,
+                                  ColorDirection direction,
+                                  int lanes = 0) {
   RayTracer tracer(context, options, lanes);
   tracer.update(gaussians);
   Batch batch(context, rays, gradients);
@@ -124,7 +111,7 @@ Host gradients_on_device(Context& context,
   backward.add(gaussians, batch.rays, rays.size(), batch.results, batch.gradients, direction);
   GaussianGradients out;
   backward.finish(gaussians, out);
-  return Host(out);
+  return HostGradients(out);
 }
 
 // Random gradients, zero where single precision may order or cut hits otherwise than double.
@@ -331,7 +318,7 @@ TEST_CASE("the gradients of camera rays are those of the camera tracer") {
   image_gradient.upload(planar);
   GaussianGradients out;
   tracer.backward(gaussians, image_gradient, out);
-  const Host expected(out);
+  const HostGradients expected(out);
 
   RayTracer ray_tracer(context, options);
   ray_tracer.update(gaussians);
@@ -342,7 +329,7 @@ TEST_CASE("the gradients of camera rays are those of the camera tracer") {
   backward.add(gaussians, batch.rays, pixels, batch.results, batch.gradients,
                ColorDirection::kFromOrigin);
   backward.finish(gaussians, out);
-  const Host got(out);
+  const HostGradients got(out);
   CHECK_ERRORS(errors_of(got, expected), 1e-3);
   // What the camera tracer leaves out of the mean's screen gradient, the change of the outline's
   // shape, is of the order of size over distance.
@@ -365,7 +352,7 @@ TEST_CASE("several batches of rays add up, and a new begin starts from zero") {
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   const std::vector<Ray> rays = random_rays(9000, 29);  // enough to be ordered
   const Gradients gradients = random_gradients(rays.size(), 5);
-  const Host whole =
+  const HostGradients whole =
       gradients_on_device(context, gaussians, {}, rays, gradients, ColorDirection::kRay);
   RayTracer tracer(context, {});
   tracer.update(gaussians);
@@ -386,7 +373,7 @@ TEST_CASE("several batches of rays add up, and a new begin starts from zero") {
                    ColorDirection::kRay);
     }
     backward.finish(gaussians, out);
-    CHECK_ERRORS(errors_of(Host(out), whole), 1e-5);
+    CHECK_ERRORS(errors_of(HostGradients(out), whole), 1e-5);
   }
   // Abandoned sums do not reach the next gradients.
   Batch batch(context, rays, gradients);
@@ -397,7 +384,7 @@ TEST_CASE("several batches of rays add up, and a new begin starts from zero") {
                  ColorDirection::kRay);
   }
   backward.finish(gaussians, out);
-  CHECK_ERRORS(errors_of(Host(out), whole), 1e-5);
+  CHECK_ERRORS(errors_of(HostGradients(out), whole), 1e-5);
 }
 
 TEST_CASE("every way of adding the gradients of rays equals the double reference") {
@@ -438,12 +425,12 @@ TEST_CASE("gradients of rays are the same to the bit but for atomics, exact ones
     return gradients_on_device(context, gaussians, options, rays, gradients, ColorDirection::kRay);
   };
   options.gradient_sum = GradientSum::kCopies;
-  const Host copies = run();
+  const HostGradients copies = run();
   CHECK(run() == copies);
   options.gradient_sum = GradientSum::kAtomic;
   CHECK_ERRORS(errors_of(run(), copies), 1e-5);
   options.gradient_sum = GradientSum::kExact;
-  const Host exact = run();
+  const HostGradients exact = run();
   CHECK_ERRORS(errors_of(exact, copies), 1e-5);
   CHECK(run() == exact);
   // Copies that do not fit give way to exact sums.
@@ -470,7 +457,7 @@ TEST_CASE("gradients of rays are the same to the bit but for atomics, exact ones
     }
     GaussianGradients out;
     backward.finish(gaussians, out);
-    CHECK(Host(out) == exact);
+    CHECK(HostGradients(out) == exact);
   }
   // Nor does it matter in which order they come.
   std::reverse(rays.begin(), rays.end());
@@ -500,7 +487,7 @@ TEST_CASE("launches of rays keep to a budget of time and give the same bits") {
       return gradients_on_device(context, gaussians, options, rays, gradients,
                                  ColorDirection::kFromOrigin);
     };
-    const Host whole = run(0);
+    const HostGradients whole = run(0);
     std::vector<LaunchTime> launches = context.take_launches();
     CHECK(launches_of("trace_rays", launches) == 1);
     CHECK(launches_of("ray_backward", launches) == 1);

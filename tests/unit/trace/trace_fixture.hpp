@@ -104,6 +104,20 @@ inline double relative_error(const std::vector<float>& a, const std::vector<doub
   return std::sqrt(difference / std::max(norm, 1e-300));
 }
 
+/// Gradients on the host.
+struct HostGradients {
+  std::vector<float> means, quaternions, scales, opacities, sh, screen;
+
+  explicit HostGradients(const GaussianGradients& g)
+      : means(g.means.download()),
+        quaternions(g.quaternions.download()),
+        scales(g.scales.download()),
+        opacities(g.opacities.download()),
+        sh(g.sh.download()),
+        screen(g.screen.download()) {}
+  bool operator==(const HostGradients&) const = default;
+};
+
 inline std::vector<float> random_image_gradient(std::size_t pixels, std::uint64_t seed) {
   CounterRng rng(seed, 77);
   std::vector<float> out(4 * pixels);

@@ -10,7 +10,10 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/evaluation.hpp"
 #include "raysplats/io.hpp"
+#include "raysplats/model.hpp"
+#include "raysplats/tracer.hpp"
 #include "raysplats/trainer.hpp"
 #include "unit/device/temporary_directory.hpp"
 #include "unit/train/short_training.hpp"
@@ -62,10 +65,7 @@ TEST_CASE("the mcmc strategy learns, grows to its limit and resumes exactly") {
   resumed.resume("latest");
   CHECK(resumed.iteration() == 170);
   resumed.run(false);
-  const Gaussians a = straight.model(), b = resumed.model();
-  CHECK(a.means == b.means);
-  CHECK(a.opacities == b.opacities);
-  CHECK(a.sh == b.sh);
+  check_equal(straight.model(), resumed.model());
 }
 
 TEST_CASE("a run in a box starts, grows and ends in it") {
@@ -81,8 +81,9 @@ TEST_CASE("a run in a box starts, grows and ends in it") {
     options.bounds = Bounds{{-0.4, -0.3, -2}, {0.4, 0.5, 2}};
     const fs::path run = folder.path() / std::to_string(static_cast<int>(strategy));
     Trainer trainer(context(), load_dataset(data), options, run);
-    trainer.run(false);
-    const Gaussians model = read_ply(run / "point_cloud/iteration_150/point_cloud.ply");
+    const EvaluationRow row = trainer.run(false).evaluations.back();
+    const fs::path ply = run / "point_cloud/iteration_150/point_cloud.ply";
+    const Gaussians model = read_ply(ply);
     REQUIRE(model.size() > 20);
     std::size_t outside = 0;
     for (std::size_t i = 0; i < model.size(); ++i) {
@@ -90,6 +91,15 @@ TEST_CASE("a run in a box starts, grows and ends in it") {
       outside += options.bounds->contains(m[0], m[1], m[2]) ? 0 : 1;
     }
     CHECK(outside == 0);
+    // What was measured is what was saved.
+    CHECK(row.gaussians == model.size());
+    const TraceOptions trace = read_ply_options(ply).value();
+    Tracer tracer(context(), trace);
+    const Model saved(context(), model);
+    const EvaluationReport report =
+        evaluate([&](const Camera& camera) { return tracer.render(saved, camera); },
+                 load_dataset(data), Split::kTest, trace.background);
+    CHECK(row.psnr == doctest::Approx(report.mean.psnr).epsilon(1e-5));
     // Passes have kept the model in the box, not only what was saved.
     CHECK(trainer.model().size() < 2 * model.size());
   }

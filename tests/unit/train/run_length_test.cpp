@@ -24,14 +24,6 @@ Context& context() {
   return instance;
 }
 
-void check_equal(const Gaussians& a, const Gaussians& b) {
-  CHECK(a.means == b.means);
-  CHECK(a.quaternions == b.quaternions);
-  CHECK(a.log_scales == b.log_scales);
-  CHECK(a.opacities == b.opacities);
-  CHECK(a.sh == b.sh);
-}
-
 }  // namespace
 
 TEST_CASE("an estimate leaves no trace in the run, whatever its strategy and options") {

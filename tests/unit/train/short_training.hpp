@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <doctest/doctest.h>
+
 #include <filesystem>
 
+#include "raysplats/gaussians.hpp"
 #include "raysplats/train_options.hpp"
 #include "synth/synthetic_dataset.hpp"
 
@@ -17,6 +20,14 @@ inline TrainOptions short_training(int iterations) {
   options.eval_renders = 0;
   options.checkpoint_every = 0;
   return options;
+}
+
+inline void check_equal(const Gaussians& a, const Gaussians& b) {
+  CHECK(a.means == b.means);
+  CHECK(a.quaternions == b.quaternions);
+  CHECK(a.log_scales == b.log_scales);
+  CHECK(a.opacities == b.opacities);
+  CHECK(a.sh == b.sh);
 }
 
 /// Small generated photos in `folder`, which is made.

@@ -20,6 +20,7 @@
 #include "train/checkpoint.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/train_config.hpp"
+#include "unit/train/short_training.hpp"
 
 using namespace raysplats;
 
@@ -96,14 +97,6 @@ TrainOptions small_options() {
   options.checkpoint_every = 0;
   options.trace.memory_budget = std::size_t{64} << 20;
   return options;
-}
-
-void check_equal(const Gaussians& a, const Gaussians& b) {
-  CHECK(a.means == b.means);
-  CHECK(a.quaternions == b.quaternions);
-  CHECK(a.log_scales == b.log_scales);
-  CHECK(a.opacities == b.opacities);
-  CHECK(a.sh == b.sh);
 }
 
 std::vector<std::string> lines_of(const std::filesystem::path& path) {
