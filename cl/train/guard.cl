@@ -17,15 +17,16 @@
 
 __kernel void guard_loss(const __global float4* pixel_partials,
                          const __global float* ssim_partials,
-                         int tiles,
+                         int pixel_sums,
+                         int ssim_sums,
                          const __global uint* overflow,
                          volatile __global uint* state) {
   const int items = get_global_size(0);
   // By the bits of the exponent: compilers may take zero times anything for zero.
   uint poisoned = 0;
-  for (int i = get_global_id(0); i < tiles; i += items)
+  for (int i = get_global_id(0); i < pixel_sums; i += items)
     poisoned |= (as_uint(pixel_partials[i].x) & 0x7f800000u) == 0x7f800000u;
-  for (int i = get_global_id(0); i < 3 * tiles; i += items)
+  for (int i = get_global_id(0); i < ssim_sums; i += items)
     poisoned |= (as_uint(ssim_partials[i]) & 0x7f800000u) == 0x7f800000u;
   if (overflow[0] != 0) {
     atomic_or(state, RS_GUARD_REPEATED);

@@ -10,31 +10,14 @@
 //             the same, and m is the plane of words 0 to 255 behind the photo's pixels
 //   partials  per tile {sum m rho(x - y), sum m (clamp(x) - y)^2, 3 sum m, 0} over R, G, B
 // Complexity: one pass over the pixels.
+#include "train/loss_pixel.h"
 #include "train/ssim_window.h"
 
-#ifndef PIXEL_L2
-#define PIXEL_L2 0
-#endif
-
-typedef struct {
-  lanes pixel, square, weight;
-} TileSums;
-
 void store_pair(
-    lanes x, lanes y, lanes mask, __global float* u, __global float* v, TileSums* sums) {
-  const lanes difference = x - y;
-  const lanes masked = mask * difference;
+    lanes x, lanes y, lanes mask, __global float* u, __global float* v, LossSums* sums) {
+  const lanes masked = rs_add_pixel(x, y, mask, sums);
   rs_store(masked + 2.0f * y, u);
   rs_store(masked, v);
-#if PIXEL_L2
-  sums->pixel += masked * difference;
-#else
-  sums->pixel += fabs(masked);
-#endif
-  lanes shown = rs_pick(x > 1.0f, 1.0f, x);
-  shown = rs_pick(shown < 0.0f, 0.0f, shown);
-  sums->square += mask * (shown - y) * (shown - y);
-  sums->weight += mask;
 }
 
 __kernel void prepare_pair(const __global float* image,
@@ -59,7 +42,7 @@ __kernel void prepare_pair(const __global float* image,
   const int bottom = min(top + ROWS, height);
   const int pixels = width * height;
 
-  TileSums sums = {(lanes)(0.0f), (lanes)(0.0f), (lanes)(0.0f)};
+  LossSums sums = {(lanes)(0.0f), (lanes)(0.0f), (lanes)(0.0f)};
   for (int row = top; row < bottom; ++row) {
     for (int column = first; column < last; column += VECTOR) {
       const int in = row * width + column;
@@ -84,10 +67,10 @@ __kernel void prepare_pair(const __global float* image,
         valid = rs_load_private(tail[3]);
       }
       lanes y[3];
-      y[0] = rs_to_float(words & 255u) * (1.0f / 255.0f);
-      y[1] = rs_to_float((words >> 8) & 255u) * (1.0f / 255.0f);
-      y[2] = rs_to_float((words >> 16) & 255u) * (1.0f / 255.0f);
-      const lanes alpha = rs_to_float(words >> 24) * (1.0f / 255.0f);
+      y[0] = rs_photo_byte(words, 0);
+      y[1] = rs_photo_byte(words, 8);
+      y[2] = rs_photo_byte(words, 16);
+      const lanes alpha = rs_photo_byte(words, 24);
       lanes mask = alpha;
       if (composite) {
         const lanes rest = valid - alpha;

@@ -7,11 +7,12 @@
 __kernel void fold_loss(const __global float4* pixel_partials,
                         const __global float* ssim_partials,
                         __global float4* sums,
-                        int tiles) {
+                        int pixel_sums,
+                        int ssim_sums) {
   const int items = get_global_size(0);
   float4 sum = (float4)(0.0f);
-  for (int i = get_global_id(0); i < tiles; i += items) sum += pixel_partials[i];
+  for (int i = get_global_id(0); i < pixel_sums; i += items) sum += pixel_partials[i];
   sum.w = 0.0f;
-  for (int i = get_global_id(0); i < 3 * tiles; i += items) sum.w += ssim_partials[i];
+  for (int i = get_global_id(0); i < ssim_sums; i += items) sum.w += ssim_partials[i];
   sums[get_global_id(0)] = sum;
 }

@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSIM (Wang et al. 2004) of the pair u = x + y, v = x - y and its gradient with respect to x.
-//
-// With a = mu_u^2, b = mu_v^2, p = sigma_u^2, q = sigma_v^2 (window moments of u and v)
-//   SSIM = (a - b + 2 C1)(p - q + 2 C2) / ((a + b + 2 C1)(p + q + 2 C2)),
-// which needs four moments instead of five and has no cancellation where x is close to y. The
-// gradient of sum SSIM is three windowed sums (model.md, "Loss"): w * E + u (w * F) + v (w * G)
-// with E = dS/dmu_u + dS/dmu_v, F = 2 dS/d(w * u^2), G = 2 dS/d(w * v^2); the window is symmetric.
+// SSIM of the pair u = x + y, v = x - y and its gradient with respect to x (train/ssim.h).
 //
 // Launch of both kernels: one work-item per tile of TILE x ROWS pixels and channel, grid tiles_x x
 // tiles_y x 3.
@@ -13,18 +7,14 @@
 //   zero)
 // Complexity: 2 x 11 multiply-adds per moment and pixel: a column pass into private memory, then a
 // row pass.
+#include "train/loss_pixel.h"
+#include "train/ssim.h"
 #include "train/ssim_window.h"
 
-#ifndef PIXEL_L2
-#define PIXEL_L2 0
-#endif
 // 0 when SSIM is only reported and has no weight in the loss.
 #ifndef SSIM_GRADIENT
 #define SSIM_GRADIENT 1
 #endif
-
-#define C1 0.0001f
-#define C2 0.0009f
 
 // partials[channel * tiles + tile] = sum of SSIM over the tile.
 __kernel void ssim_slopes(const __global float* pair,
@@ -82,29 +72,15 @@ __kernel void ssim_slopes(const __global float* pair,
     }
     __global float* out = slopes + 3 * channel * plane + RS_PADDED(row, stride) + first;
     for (int i = 0; first + i < last; i += VECTOR) {
-      const lanes mu = rs_window_row(mean_u + HALO + i);
-      const lanes mv = rs_window_row(mean_v + HALO + i);
-      const lanes a = mu * mu;
-      const lanes b = mv * mv;
-      const lanes p = rs_window_row(square_u + HALO + i) - a;
-      const lanes q = rs_window_row(square_v + HALO + i) - b;
-      const lanes bottom1 = a + b + 2.0f * C1;
-      const lanes bottom2 = p + q + 2.0f * C2;
-      const lanes inverse = 1.0f / (bottom1 * bottom2);
-      const lanes inverse1 = inverse * bottom2;
-      const lanes inverse2 = inverse * bottom1;
-      const lanes ratio1 = (a - b + 2.0f * C1) * inverse1;
-      const lanes ratio2 = (p - q + 2.0f * C2) * inverse2;
+      const Ssim ssim =
+          rs_ssim(rs_window_row(mean_u + HALO + i), rs_window_row(mean_v + HALO + i),
+                  rs_window_row(square_u + HALO + i), rs_window_row(square_v + HALO + i));
       const lane_mask inside = first + i + RS_LANE_IDS < last;
-      sum += rs_pick(inside, ratio1 * ratio2, 0.0f);
+      sum += rs_pick(inside, ssim.value, 0.0f);
 #if SSIM_GRADIENT
-      const lanes slope_p = 2.0f * q * ratio1 * inverse2 * inverse2;
-      const lanes slope_q = -ratio1 * (1.0f + ratio2) * inverse2;
-      const lanes slope_a = 2.0f * b * ratio2 * inverse1 * inverse1 - slope_p;
-      const lanes slope_b = -ratio2 * (1.0f + ratio1) * inverse1 - slope_q;
-      rs_store(rs_pick(inside, 2.0f * (mu * slope_a + mv * slope_b), 0.0f), out + i);
-      rs_store(rs_pick(inside, 2.0f * slope_p, 0.0f), out + plane + i);
-      rs_store(rs_pick(inside, 2.0f * slope_q, 0.0f), out + 2 * plane + i);
+      rs_store(rs_pick(inside, ssim.e, 0.0f), out + i);
+      rs_store(rs_pick(inside, ssim.f, 0.0f), out + plane + i);
+      rs_store(rs_pick(inside, ssim.g, 0.0f), out + 2 * plane + i);
 #endif
     }
   }
@@ -163,12 +139,7 @@ __kernel void loss_gradient(const __global float* pair,
           mask = rs_to_float(rs_load_private_words(tail) >> shift) * (1.0f / 255.0f);
         }
       }
-#if PIXEL_L2
-      // v is m (x - y) already.
-      lanes result = 2.0f * pixel_scale * v;
-#else
-      lanes result = mask * rs_pick(v > 0.0f, pixel_scale, rs_pick(v < 0.0f, -pixel_scale, v));
-#endif
+      lanes result = rs_pixel_slope(v, mask, pixel_scale);
 #if SSIM_GRADIENT
       const lanes u = rs_load(center);
       result += ssim_scale * mask *

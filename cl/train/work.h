@@ -17,6 +17,13 @@
 // Per channel: three windows along the column 48 and the row 48, sum 10.
 #define RS_WORK_LOSS_GRADIENT_FLOPS 318
 
+// The same in groups, which make the pair anew from image and photo instead of storing it: image
+// 12, photo 4, slopes 36; then gradient 16. Windows along the rows are taken of 26 rows for 16.
+#define RS_WORK_GROUP_LOSS_VALUE_BYTES 52
+#define RS_WORK_GROUP_LOSS_VALUE_FLOPS 848
+#define RS_WORK_GROUP_LOSS_GRADIENT_BYTES 68
+#define RS_WORK_GROUP_LOSS_GRADIENT_FLOPS 432
+
 // Adam, per parameter: gradient read to choose; parameter, gradient and two moments read; all but
 // the gradient written.
 #define RS_WORK_ADAM_BYTES 32

@@ -142,12 +142,14 @@ BenchOperation SceneBench::Impl::loss() {
             image_loss->value();
           },
           {{"loss-value",
-            {"train/loss_prepare.cl", "train/loss_ssim.cl:ssim_slopes", "train/loss_reduce.cl"},
+            {"train/loss_prepare.cl", "train/loss_ssim.cl:ssim_slopes",
+             "train/group_loss.cl:group_slopes", "train/loss_reduce.cl"},
             false,
             [this] { return loss_value_work(); }},
-           {"loss-gradient", {"train/loss_ssim.cl:loss_gradient"}, false, [this] {
-              return loss_gradient_work();
-            }}}};
+           {"loss-gradient",
+            {"train/loss_ssim.cl:loss_gradient", "train/group_loss.cl:group_gradient"},
+            false,
+            [this] { return loss_gradient_work(); }}}};
 }
 
 // Rates of zero leave the model as it is, so that every repetition does the same work.

@@ -91,15 +91,17 @@ BenchWork SceneBench::Impl::rays_work() const {
 }
 
 BenchWork SceneBench::Impl::loss_value_work() const {
+  const bool grouped = image_loss->grouped();
   return {{{"pixels", pixels()}},
-          RS_WORK_LOSS_VALUE_BYTES * pixels(),
-          RS_WORK_LOSS_VALUE_FLOPS * pixels()};
+          (grouped ? RS_WORK_GROUP_LOSS_VALUE_BYTES : RS_WORK_LOSS_VALUE_BYTES) * pixels(),
+          (grouped ? RS_WORK_GROUP_LOSS_VALUE_FLOPS : RS_WORK_LOSS_VALUE_FLOPS) * pixels()};
 }
 
 BenchWork SceneBench::Impl::loss_gradient_work() const {
+  const bool grouped = image_loss->grouped();
   return {{{"pixels", pixels()}},
-          RS_WORK_LOSS_GRADIENT_BYTES * pixels(),
-          RS_WORK_LOSS_GRADIENT_FLOPS * pixels()};
+          (grouped ? RS_WORK_GROUP_LOSS_GRADIENT_BYTES : RS_WORK_LOSS_GRADIENT_BYTES) * pixels(),
+          (grouped ? RS_WORK_GROUP_LOSS_GRADIENT_FLOPS : RS_WORK_LOSS_GRADIENT_FLOPS) * pixels()};
 }
 
 BenchWork SceneBench::Impl::adam_work() const {

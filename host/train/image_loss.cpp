@@ -18,6 +18,13 @@ namespace {
 constexpr int kPad = 16;
 constexpr int kRadius = 5;
 constexpr std::size_t kFoldItems = 64;
+// Of cl/train/group_loss.cl: work-items along the side of a group, and the local memory it takes.
+constexpr int kSide = 16;
+constexpr std::uint64_t kGroupLocalMemory = 14336;
+
+bool takes_groups(const DeviceInfo& device) {
+  return device.max_work_group_size >= kSide * kSide && device.local_memory >= kGroupLocalMemory;
+}
 
 }  // namespace
 
@@ -26,43 +33,60 @@ struct ImageLoss::Impl {
 
   Context& context;
   float ssim_weight;
+  bool grouped;  // a work-group per tile and channel, a work-item per pixel
+  bool serial;   // one work-item per group: work-items are long and nothing is gained by grouping
+                 // them
   int tile;
   int rows;
-  bool serial;  // one work-item per group: work-items are long and nothing is gained by grouping
-                // them
   Kernel prepare, slopes_kernel, gradient_kernel, fold;
   Buffer<float> pair, slopes, ssim_partials;
   Buffer<Sums> pixel_partials, sums;
   int width = 0;
   int height = 0;
+  // Of the padded planes of work-items that take tiles.
   int stride = 0;
   int plane = 0;
 
   Impl(Context& owner, PixelLoss pixel_loss, float weight, int vector)
-      : context(owner), ssim_weight(weight), serial(owner.device().type == DeviceType::kCpu) {
+      : context(owner),
+        ssim_weight(weight),
+        grouped(vector == kGroups || (vector == 0 && owner.device().type != DeviceType::kCpu &&
+                                      takes_groups(owner.device()))),
+        serial(!grouped && owner.device().type == DeviceType::kCpu),
+        tile(serial ? 128 : kSide),
+        rows(serial ? 8 : (grouped ? kSide : 1)) {
     if (!(weight >= 0.0f && weight <= 1.0f)) {
       throw UsageError(
           fmt::format("The weight of SSIM in the loss is {}; give a value from 0 to 1", weight));
     }
-    tile = serial ? 128 : 16;
-    rows = serial ? 8 : 1;
+    if (grouped && !takes_groups(owner.device())) {
+      throw DeviceError(fmt::format(
+          "{} has {} work-items and {} bytes of local memory a work-group, the loss in groups "
+          "needs {} and {}",
+          owner.device().name, owner.device().max_work_group_size, owner.device().local_memory,
+          kSide * kSide, kGroupLocalMemory));
+    }
     BuildOptions build;
-    build.define("VECTOR", lane_count(owner.device(), vector))
-        .define("TILE", tile)
-        .define("ROWS", rows);
     build.define("PIXEL_L2", pixel_loss == PixelLoss::kL2 ? 1 : 0);
-    prepare = owner.kernel("train/loss_prepare.cl", "prepare_pair", build);
+    if (!grouped) {
+      build.define("VECTOR", lane_count(owner.device(), vector))
+          .define("TILE", tile)
+          .define("ROWS", rows);
+      prepare = owner.kernel("train/loss_prepare.cl", "prepare_pair", build);
+    }
     build.define("SSIM_GRADIENT", weight > 0.0f ? 1 : 0);
-    slopes_kernel = owner.kernel("train/loss_ssim.cl", "ssim_slopes", build);
-    gradient_kernel = owner.kernel("train/loss_ssim.cl", "loss_gradient", build);
+    const char* program = grouped ? "train/group_loss.cl" : "train/loss_ssim.cl";
+    slopes_kernel = owner.kernel(program, grouped ? "group_slopes" : "ssim_slopes", build);
+    gradient_kernel = owner.kernel(program, grouped ? "group_gradient" : "loss_gradient", build);
     fold = owner.kernel("train/loss_reduce.cl", "fold_loss");
     sums = Buffer<Sums>(owner, kFoldItems, "loss sums");
   }
 
   std::size_t tiles_x() const { return static_cast<std::size_t>((width + tile - 1) / tile); }
   std::size_t tiles_y() const { return static_cast<std::size_t>((height + rows - 1) / rows); }
+  std::size_t ssim_sums() const { return 3 * tiles_x() * tiles_y(); }
+  std::size_t pixel_sums() const { return grouped ? ssim_sums() : tiles_x() * tiles_y(); }
 
-  // The kernels never write the borders, so they are cleared when the layout changes only.
   void resize(int new_width, int new_height) {
     if (new_width == width && new_height == height) return;
     width = new_width;
@@ -76,16 +100,47 @@ struct ImageLoss::Impl {
           "An image of {}x{} is too large for the loss; use --downscale", width, height));
     }
     plane = static_cast<int>(size);
-    pair.ensure(context, 6 * size, "loss image pair");
-    pair.clear();
-    if (ssim_weight > 0.0f) {
-      slopes.ensure(context, 9 * size, "loss SSIM slopes");
-      slopes.clear();
-    } else {
-      slopes.ensure(context, 1, "loss SSIM slopes");
+    if (!grouped) {
+      // The kernels never write the borders, so they are cleared when the layout changes only.
+      pair.ensure(context, 6 * size, "loss image pair");
+      pair.clear();
     }
-    pixel_partials.ensure(context, tiles_x() * tiles_y(), "loss pixel sums");
-    ssim_partials.ensure(context, 3 * tiles_x() * tiles_y(), "loss SSIM sums");
+    slopes.ensure(context, ssim_weight > 0.0f ? 9 * size : 1, "loss SSIM slopes");
+    if (ssim_weight > 0.0f && !grouped) slopes.clear();
+    pixel_partials.ensure(context, pixel_sums(), "loss pixel sums");
+    ssim_partials.ensure(context, ssim_sums(), "loss SSIM sums");
+  }
+
+  void evaluate_tiles(const Buffer<float>& image,
+                      const Buffer<std::uint32_t>& target,
+                      int composite,
+                      std::array<float, 3> background,
+                      std::array<float, 2> scales,
+                      Buffer<float>& gradient) {
+    Range range{{tiles_x(), tiles_y(), 1}, {0, 0, 0}};
+    if (serial) range.local = {1, 1, 1};
+    prepare.launch(range, image, target, pair, pixel_partials, width, height, stride, plane,
+                   composite, background[0], background[1], background[2]);
+    range.global[2] = 3;
+    slopes_kernel.launch(range, pair, slopes, ssim_partials, width, height, stride, plane);
+    const int masked = composite == 0 ? 1 : (composite == 1 ? 0 : 2);
+    gradient_kernel.launch(range, pair, slopes, target, gradient, width, height, stride, plane,
+                           masked, scales[0], scales[1]);
+  }
+
+  void evaluate_groups(const Buffer<float>& image,
+                       const Buffer<std::uint32_t>& target,
+                       int composite,
+                       std::array<float, 3> background,
+                       std::array<float, 2> scales,
+                       Buffer<float>& gradient) {
+    Range range = Range::plane(static_cast<std::size_t>(width), static_cast<std::size_t>(height),
+                               kSide, kSide);
+    range.global[2] = 3;
+    slopes_kernel.launch(range, image, target, slopes, pixel_partials, ssim_partials, width, height,
+                         composite, background[0], background[1], background[2]);
+    gradient_kernel.launch(range, image, target, slopes, gradient, width, height, composite,
+                           background[0], background[1], background[2], scales[0], scales[1]);
   }
 };
 
@@ -111,30 +166,29 @@ void ImageLoss::evaluate(const Buffer<float>& image,
   gradient.ensure(s.context, 4 * pixels, "image gradient");
 
   const bool weighted = alpha_is_background && target.size() >= 2 * pixels;
-  Range range{{s.tiles_x(), s.tiles_y(), 1}, {0, 0, 0}};
-  if (s.serial) range.local = {1, 1, 1};
-  s.prepare.launch(range, image, target, s.pair, s.pixel_partials, width, height, s.stride, s.plane,
-                   alpha_is_background ? (weighted ? 2 : 1) : 0, background[0], background[1],
-                   background[2]);
-  range.global[2] = 3;
-  s.slopes_kernel.launch(range, s.pair, s.slopes, s.ssim_partials, width, height, s.stride,
-                         s.plane);
+  const int composite = alpha_is_background ? (weighted ? 2 : 1) : 0;
   const float share = 1.0f / (3.0f * static_cast<float>(pixels));
-  s.gradient_kernel.launch(range, s.pair, s.slopes, target, gradient, width, height, s.stride,
-                           s.plane, alpha_is_background ? (weighted ? 2 : 0) : 1,
-                           (1.0f - s.ssim_weight) * share, -s.ssim_weight * share);
+  const std::array<float, 2> scales{(1.0f - s.ssim_weight) * share, -s.ssim_weight * share};
+  if (s.grouped) {
+    s.evaluate_groups(image, target, composite, background, scales, gradient);
+  } else {
+    s.evaluate_tiles(image, target, composite, background, scales, gradient);
+  }
 }
+
+bool ImageLoss::grouped() const { return impl_->grouped; }
 
 ImageLoss::Partials ImageLoss::partials() const {
   const Impl& s = *impl_;
-  return {s.pixel_partials, s.ssim_partials, static_cast<int>(s.tiles_x() * s.tiles_y())};
+  return {s.pixel_partials, s.ssim_partials, static_cast<int>(s.pixel_sums()),
+          static_cast<int>(s.ssim_sums())};
 }
 
 ImageLoss::Value ImageLoss::value() {
   Impl& s = *impl_;
   if (s.width == 0) throw UsageError("The loss has no value before an image was evaluated");
   s.fold.launch(Range{{kFoldItems, 1, 1}, {0, 0, 0}}, s.pixel_partials, s.ssim_partials, s.sums,
-                static_cast<int>(s.tiles_x() * s.tiles_y()));
+                static_cast<int>(s.pixel_sums()), static_cast<int>(s.ssim_sums()));
   std::array<double, 4> total{};
   for (const Impl::Sums& part : s.sums.download()) {
     for (std::size_t i = 0; i < total.size(); ++i) total[i] += static_cast<double>(part[i]);

@@ -24,13 +24,17 @@ namespace raysplats {
 /// 1 everywhere, or what the photo's plane of weights says.
 class ImageLoss {
  public:
-  /// Where evaluate() leaves its sums: per tile {pixel term, squared error, weight, 0}, and SSIM
-  /// per tile and channel.
+  /// Where evaluate() leaves its sums: {pixel term, squared error, weight, 0} per tile or per tile
+  /// and channel, and SSIM per tile and channel.
   struct Partials {
     const Buffer<std::array<float, 4>>& pixel;
     const Buffer<float>& ssim;
-    int tiles;
+    int pixel_sums;
+    int ssim_sums;
   };
+
+  /// In place of a number of pixels per vector: work-groups of 16 x 16 pixels, a work-item each.
+  static constexpr int kGroups = -1;
 
   struct Value {
     double total = 0;
@@ -41,7 +45,8 @@ class ImageLoss {
   };
 
   /// `ssim_weight` is lambda, in [0, 1]. `vector` is the number of pixels per vector (1, 4, 8 or
-  /// 16); 0 = the device's own. Throws UsageError for other values.
+  /// 16) or kGroups; 0 = the device's own on CPUs, groups elsewhere. Throws UsageError for other
+  /// values, DeviceError for groups that the device has no room for.
   ImageLoss(Context& context, PixelLoss pixel_loss, float ssim_weight, int vector = 0);
   ~ImageLoss();
 
@@ -60,6 +65,9 @@ class ImageLoss {
   /// Loss of the last evaluate(); blocks. Sums are taken in a fixed order: equal inputs give equal
   /// values.
   Value value();
+
+  /// Whether it works in groups of kGroups.
+  bool grouped() const;
 
   /// Of the last evaluate().
   Partials partials() const;

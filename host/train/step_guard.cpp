@@ -21,12 +21,9 @@ StepGuard::StepGuard(Context& context)
   state_.clear();
 }
 
-void StepGuard::check_loss(const Buffer<std::array<float, 4>>& pixel_partials,
-                           const Buffer<float>& ssim_partials,
-                           int tiles,
-                           const Buffer<std::uint32_t>& overflow) {
-  check_.launch(Range{{kItems, 1, 1}, {0, 0, 0}, {}}, pixel_partials, ssim_partials, tiles,
-                overflow, state_);
+void StepGuard::check_loss(const ImageLoss::Partials& loss, const Buffer<std::uint32_t>& overflow) {
+  check_.launch(Range{{kItems, 1, 1}, {0, 0, 0}, {}}, loss.pixel, loss.ssim, loss.pixel_sums,
+                loss.ssim_sums, overflow, state_);
 }
 
 void StepGuard::close(const Buffer<std::uint32_t>& refused,

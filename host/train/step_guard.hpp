@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 
 #include "device/context.hpp"
+#include "train/image_loss.hpp"
 
 namespace raysplats {
 
@@ -28,12 +28,9 @@ class StepGuard {
 
   explicit StepGuard(Context& context);
 
-  /// Marks the present step when the partial sums of its loss are not finite (ImageLoss), or the
-  /// word of `overflow` is not 0.
-  void check_loss(const Buffer<std::array<float, 4>>& pixel_partials,
-                  const Buffer<float>& ssim_partials,
-                  int tiles,
-                  const Buffer<std::uint32_t>& overflow);
+  /// Marks the present step when the sums of its loss are not finite, or the word of `overflow` is
+  /// not 0.
+  void check_loss(const ImageLoss::Partials& loss, const Buffer<std::uint32_t>& overflow);
   /// After the update: counts. `refused` is Adam's count of refused gradients, `count` the
   /// Gaussians, `capped` the step's ViewTracer::kept_capped_rays().
   void close(const Buffer<std::uint32_t>& refused,

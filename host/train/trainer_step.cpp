@@ -26,8 +26,7 @@ void Trainer::Impl::enqueue_step() {
                : tracer.image();
   loss.evaluate(shown, targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
-  const ImageLoss::Partials partials = loss.partials();
-  guard.check_loss(partials.pixel, partials.ssim, partials.tiles, tracer.overflow());
+  guard.check_loss(loss.partials(), tracer.overflow());
   if (exposure) {
     whole = false;
     exposure->step(tracer.image(), image_gradient, view, camera.width, camera.height,

@@ -20,7 +20,7 @@ FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, ANGULAR=0, SH_DEGREE=3, S
 WALK = dict(PACKET=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1)
 RAY_BACKWARD = dict(WALK, SH_DEGREE=3, RAY_SLOPES=0, PRIVATE_COPIES=0)
 RAY_GRADIENTS = dict(SIGMOID_SCALE=0, VECTOR=1)
-# image_loss.cpp.
+# image_loss.cpp: groups, or what devices get whose groups are smaller.
 LOSS = dict(VECTOR=1, TILE=16, ROWS=1, PIXEL_L2=0)
 # chunk_shape.cpp.
 GROUP = dict(RS_GROUP=256)
@@ -71,6 +71,7 @@ PROGRAMS = [
     ("sort pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=1)),
     ("sort from pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=0)),
     ("scan", "primitives/scan.cl", GROUP),
+    ("loss group", "train/group_loss.cl", dict(PIXEL_L2=0, SSIM_GRADIENT=1)),
     ("loss prepare", "train/loss_prepare.cl", LOSS),
     ("loss ssim", "train/loss_ssim.cl", dict(LOSS, SSIM_GRADIENT=1)),
     ("loss reduce", "train/loss_reduce.cl", {}),

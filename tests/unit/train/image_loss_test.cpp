@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "base/rng.hpp"
@@ -78,6 +79,13 @@ double photo_weight(const Scene& s, std::size_t pixel) {
   if (s.target.size() > s.pixels()) return s.target[s.pixels() + pixel] / 255.0;
   return s.alpha_is_background ? 1.0 : (s.target[pixel] >> 24) / 255.0;
 }
+
+// What a work-item takes: a vector's pixels of whole tiles, or one pixel of a group.
+constexpr int kForms[] = {0, ImageLoss::kGroups};
+constexpr std::pair<PixelLoss, int> kLossForms[] = {{PixelLoss::kL1, 0},
+                                                    {PixelLoss::kL2, 0},
+                                                    {PixelLoss::kL1, ImageLoss::kGroups},
+                                                    {PixelLoss::kL2, ImageLoss::kGroups}};
 
 struct Reference {
   double total, pixel, ssim, psnr;
@@ -181,17 +189,20 @@ TEST_CASE("image loss: value and gradient agree with the definition in double pr
   struct Size {
     int width, height;
   };
-  for (const Size size :
-       {Size{1, 1}, Size{3, 2}, Size{7, 5}, Size{17, 9}, Size{16, 11}, Size{33, 19}}) {
+  for (const Size size : {Size{1, 1}, Size{1, 23}, Size{40, 1}, Size{3, 2}, Size{7, 5}, Size{17, 9},
+                          Size{16, 11}, Size{16, 16}, Size{33, 19}, Size{31, 33}}) {
+    const Scene s = make_scene(size.width, size.height, 3, false);
     for (const PixelLoss pixel_loss : {PixelLoss::kL1, PixelLoss::kL2}) {
       for (const float weight : {0.0f, 0.2f, 1.0f}) {
-        CAPTURE(size.width);
-        CAPTURE(size.height);
-        CAPTURE(weight);
-        const Scene s = make_scene(size.width, size.height, 3, false);
-        const Result result = run(s, pixel_loss, weight, 0);
-        check_value(s, pixel_loss, weight, result.value);
-        check_gradient(s, pixel_loss, weight, result.gradient);
+        for (const int form : kForms) {
+          CAPTURE(size.width);
+          CAPTURE(size.height);
+          CAPTURE(weight);
+          CAPTURE(form);
+          const Result result = run(s, pixel_loss, weight, form);
+          check_value(s, pixel_loss, weight, result.value);
+          check_gradient(s, pixel_loss, weight, result.gradient);
+        }
       }
     }
   }
@@ -200,12 +211,13 @@ TEST_CASE("image loss: value and gradient agree with the definition in double pr
 TEST_CASE(
     "image loss: masks weigh pixels, alpha over a background composites the photo [small] [tiny]") {
   for (const bool alpha_is_background : {false, true}) {
-    for (const PixelLoss pixel_loss : {PixelLoss::kL1, PixelLoss::kL2}) {
+    for (const auto& [pixel_loss, form] : kLossForms) {
+      CAPTURE(form);
       CAPTURE(alpha_is_background);
       Scene s = make_scene(21, 14, 5, true);
       s.alpha_is_background = alpha_is_background;
       s.background = {1.0f, 0.5f, 0.25f};
-      const Result result = run(s, pixel_loss, 0.2f, 0);
+      const Result result = run(s, pixel_loss, 0.2f, form);
       check_value(s, pixel_loss, 0.2f, result.value);
       check_gradient(s, pixel_loss, 0.2f, result.gradient);
       if (alpha_is_background) continue;
@@ -220,13 +232,14 @@ TEST_CASE(
 TEST_CASE("image loss: a plane of weights ignores pixels of cut-out photos [small]") {
   for (const int width : {21, 32}) {
     CAPTURE(width);
-    for (const PixelLoss pixel_loss : {PixelLoss::kL1, PixelLoss::kL2}) {
+    for (const auto& [pixel_loss, form] : kLossForms) {
+      CAPTURE(form);
       Scene s = make_scene(width, 14, 6, true);
       s.alpha_is_background = true;
       s.background = {1.0f, 0.5f, 0.25f};
       for (std::size_t i = 0; i < s.pixels(); ++i)
         s.target.push_back(i % 5 == 0 ? 0U : i % 5 == 1 ? 97U : 255U);
-      const Result result = run(s, pixel_loss, 0.2f, 0);
+      const Result result = run(s, pixel_loss, 0.2f, form);
       check_value(s, pixel_loss, 0.2f, result.value);
       check_gradient(s, pixel_loss, 0.2f, result.gradient);
       for (std::size_t i = 0; i < s.pixels(); i += 5) {
@@ -251,10 +264,10 @@ TEST_CASE("image loss: what lies under a mask changes nothing") {
   }
 }
 
-TEST_CASE("image loss: every vector width gives the same result") {
+TEST_CASE("image loss: every vector width and groups give the same result") {
   Scene s = make_scene(150, 37, 7, true);
   const Result narrow = run(s, PixelLoss::kL1, 0.2f, 1);
-  for (const int vector : {4, 8, 16}) {
+  for (const int vector : {4, 8, 16, ImageLoss::kGroups}) {
     CAPTURE(vector);
     const Result wide = run(s, PixelLoss::kL1, 0.2f, vector);
     CHECK(wide.value.total == doctest::Approx(narrow.value.total).epsilon(1e-6));
@@ -289,16 +302,19 @@ TEST_CASE("image loss: finite differences through value()") {
 }
 
 TEST_CASE("image loss: one object serves images of changing size, and repeats to the bit") {
-  ImageLoss loss(context(), PixelLoss::kL1, 0.2f);
   const Scene large = make_scene(61, 45, 17, true);
   const Scene small = make_scene(9, 30, 19, false);
-  const Result first = run(large, loss);
-  const Result second = run(small, loss);
-  const Result third = run(large, loss);
-  check_value(large, PixelLoss::kL1, 0.2f, first.value);
-  check_value(small, PixelLoss::kL1, 0.2f, second.value);
-  CHECK(first.value.total == third.value.total);
-  CHECK(first.gradient == third.gradient);
+  for (const int form : kForms) {
+    CAPTURE(form);
+    ImageLoss loss(context(), PixelLoss::kL1, 0.2f, form);
+    const Result first = run(large, loss);
+    const Result second = run(small, loss);
+    const Result third = run(large, loss);
+    check_value(large, PixelLoss::kL1, 0.2f, first.value);
+    check_value(small, PixelLoss::kL1, 0.2f, second.value);
+    CHECK(first.value.total == third.value.total);
+    CHECK(first.gradient == third.gradient);
+  }
 }
 
 TEST_CASE("image loss: equal images have no loss, and bad arguments are refused") {

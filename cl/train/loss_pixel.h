@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the loss takes from a pixel by itself: values of a packed photo and the sums of the pixel
+// term. With the mask m the images compared are y and x' = y + m (x - y).
+#ifndef RS_TRAIN_LOSS_PIXEL_H
+#define RS_TRAIN_LOSS_PIXEL_H
+
+#include "train/lanes.h"
+
+#ifndef PIXEL_L2
+#define PIXEL_L2 0
+#endif
+
+// Byte `shift` / 8 of words as a number of [0, 1].
+#define rs_photo_byte(words, shift) (rs_to_float(((words) >> (shift)) & 255u) * (1.0f / 255.0f))
+
+typedef struct {
+  lanes pixel, square, weight;  // sums of m rho(x - y), m (clamp(x) - y)^2, m
+} LossSums;
+
+// Adds a pixel of one channel; returns m (x - y).
+lanes rs_add_pixel(lanes x, lanes y, lanes mask, LossSums* sums) {
+  const lanes difference = x - y;
+  const lanes masked = mask * difference;
+#if PIXEL_L2
+  sums->pixel += masked * difference;
+#else
+  sums->pixel += fabs(masked);
+#endif
+  lanes shown = rs_pick(x > 1.0f, 1.0f, x);
+  shown = rs_pick(shown < 0.0f, 0.0f, shown);
+  sums->square += mask * (shown - y) * (shown - y);
+  sums->weight += mask;
+  return masked;
+}
+
+// scale m rho'(x - y), from v = m (x - y).
+lanes rs_pixel_slope(lanes v, lanes mask, float scale) {
+#if PIXEL_L2
+  return 2.0f * scale * v;
+#else
+  return mask * rs_pick(v > 0.0f, scale, rs_pick(v < 0.0f, -scale, v));
+#endif
+}
+
+#endif

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// SSIM (Wang et al. 2004) of a pixel of the pair u = x + y, v = x - y and its slopes.
+//
+// With a = mu_u^2, b = mu_v^2, p = sigma_u^2, q = sigma_v^2 (window moments of u and v)
+//   SSIM = (a - b + 2 C1)(p - q + 2 C2) / ((a + b + 2 C1)(p + q + 2 C2)),
+// which needs four moments instead of five and has no cancellation where x is close to y. The
+// gradient of sum SSIM is three windowed sums (model.md, "Loss"): w * E + u (w * F) + v (w * G)
+// with E = dS/dmu_u + dS/dmu_v, F = 2 dS/d(w * u^2), G = 2 dS/d(w * v^2); the window is symmetric.
+#ifndef RS_TRAIN_SSIM_H
+#define RS_TRAIN_SSIM_H
+
+#include "train/lanes.h"
+
+#define C1 0.0001f
+#define C2 0.0009f
+
+typedef struct {
+  lanes value, e, f, g;
+} Ssim;
+
+// From the windowed means of u, v, u^2 and v^2.
+Ssim rs_ssim(lanes mu, lanes mv, lanes square_u, lanes square_v) {
+  const lanes a = mu * mu;
+  const lanes b = mv * mv;
+  const lanes p = square_u - a;
+  const lanes q = square_v - b;
+  const lanes bottom1 = a + b + 2.0f * C1;
+  const lanes bottom2 = p + q + 2.0f * C2;
+  const lanes inverse = 1.0f / (bottom1 * bottom2);
+  const lanes inverse1 = inverse * bottom2;
+  const lanes inverse2 = inverse * bottom1;
+  const lanes ratio1 = (a - b + 2.0f * C1) * inverse1;
+  const lanes ratio2 = (p - q + 2.0f * C2) * inverse2;
+  const lanes slope_p = 2.0f * q * ratio1 * inverse2 * inverse2;
+  const lanes slope_q = -ratio1 * (1.0f + ratio2) * inverse2;
+  const lanes slope_a = 2.0f * b * ratio2 * inverse1 * inverse1 - slope_p;
+  const lanes slope_b = -ratio2 * (1.0f + ratio1) * inverse1 - slope_q;
+  Ssim out;
+  out.value = ratio1 * ratio2;
+  out.e = 2.0f * (mu * slope_a + mv * slope_b);
+  out.f = 2.0f * slope_p;
+  out.g = 2.0f * slope_q;
+  return out;
+}
+
+#endif
