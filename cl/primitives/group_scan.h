@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exclusive prefix sum over one work-group, which stops at 2^32 - 1 (Hillis and Steele 1986,
-// log2(RS_GROUP) steps). Every work-item of the group must call it; RS_GROUP is a power of two and
-// `scratch` holds RS_GROUP elements.
+// Exclusive prefix sum over one work-group, which stops at 2^32 - 1: rows of RS_SCAN_ROW values are
+// summed by a work-item each, then everybody adds the sums of the rows before its own. Three
+// barriers; a scan by doubling takes 2 log2(RS_GROUP). Every work-item of the group must call it;
+// RS_GROUP is a power of two and `scratch` holds RS_SCAN_WORDS words.
 #ifndef RS_PRIMITIVES_GROUP_SCAN_H
 #define RS_PRIMITIVES_GROUP_SCAN_H
 
@@ -10,18 +11,36 @@
 #endif
 
 #if RS_GROUP > 1
+#define RS_SCAN_ROW (RS_GROUP < 16 ? RS_GROUP : 16)
+#define RS_SCAN_ROWS (RS_GROUP / RS_SCAN_ROW)
+// The sum of a row lies behind it, which lets rows begin on different banks.
+#define RS_SCAN_STRIDE (RS_SCAN_ROW + 1)
+#define RS_SCAN_WORDS (RS_SCAN_ROWS * RS_SCAN_STRIDE)
+
 inline uint group_scan(uint value, __local uint* scratch, uint* total) {
   const uint lane = get_local_id(0);
-  scratch[lane] = value;
+  const uint row = lane / RS_SCAN_ROW;
+  const uint place = row * RS_SCAN_STRIDE + lane % RS_SCAN_ROW;
+  scratch[place] = value;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint step = 1; step < RS_GROUP; step <<= 1) {
-    const uint before = lane >= step ? scratch[lane - step] : 0;
-    barrier(CLK_LOCAL_MEM_FENCE);
-    scratch[lane] = add_sat(scratch[lane], before);
-    barrier(CLK_LOCAL_MEM_FENCE);
+  if (lane < RS_SCAN_ROWS) {
+    __local uint* values = scratch + lane * RS_SCAN_STRIDE;
+    uint sum = 0;
+    for (uint i = 0; i < RS_SCAN_ROW; ++i) {
+      const uint next = values[i];
+      values[i] = sum;
+      sum = add_sat(sum, next);
+    }
+    values[RS_SCAN_ROW] = sum;
   }
-  const uint exclusive = lane > 0 ? scratch[lane - 1] : 0;
-  *total = scratch[RS_GROUP - 1];
+  barrier(CLK_LOCAL_MEM_FENCE);
+  uint before = 0, all = 0;
+  for (uint i = 0; i < RS_SCAN_ROWS; ++i) {
+    before = i == row ? all : before;
+    all = add_sat(all, scratch[i * RS_SCAN_STRIDE + RS_SCAN_ROW]);
+  }
+  const uint exclusive = add_sat(before, scratch[place]);
+  *total = all;
   barrier(CLK_LOCAL_MEM_FENCE);  // scratch may be written again
   return exclusive;
 }

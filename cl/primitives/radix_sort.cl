@@ -6,8 +6,11 @@
 // The elements are the first min(live[0], most): the host may know only how many there are at most.
 // Launch: work-groups of RS_GROUP work-items (1 or a power of two), each walks a chunk of
 // consecutive elements in order, at least `least`. RS_GROUP = 1 is the CPU's form: few long
-// sequential loops with private counters. Larger groups rank a tile of RS_GROUP elements at a time
-// by eight stable one-bit splits in local memory (Satish et al. 2009).
+// sequential loops with private counters. Larger groups rank a tile of RS_ROUNDS elements a
+// work-item at a time: in each round RS_GROUP neighbouring elements set their bits in a mask per
+// digit and block of work-items, and count the bits before their own. The tile is written in the
+// order of its digits, so that neighbours mostly write to neighbouring addresses. 27 barriers for
+// 6 RS_GROUP elements, and 15 kB of local memory.
 //   RS_SOURCE_PAIRS, RS_TARGET_PAIRS   the elements come from / go to pairs; keys and values apart
 //                                      otherwise. The unused arguments may be any buffer.
 #include "primitives/group_scan.h"
@@ -98,6 +101,66 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void count_digits
 #endif
 }
 
+#if RS_GROUP > RS_DIGITS
+#error "RS_GROUP is at most 256"
+#elif RS_GROUP > 1
+#define RS_ROUNDS 6
+#define RS_TILE (RS_ROUNDS * RS_GROUP)
+// Words that hold a bit per work-item.
+#define RS_BLOCKS ((RS_GROUP + 31) / 32)
+// Digits that a work-item adds up.
+#define RS_SHARE (RS_DIGITS / RS_GROUP)
+
+typedef struct {
+  uint mask[RS_BLOCKS][RS_DIGITS];   // which work-items' elements have the digit
+  ushort rank[RS_ROUNDS][RS_GROUP];  // among the elements of the tile with the same digit
+} RankMemory;
+
+typedef union {
+  RankMemory ranking;
+  uint2 elements[RS_TILE];  // in the order of their digits
+} TileMemory;
+
+// How many elements of the tile with the digit of this work-item's lie before it, where a round
+// takes one of every work-item; `live` when there is one. Adds the round to `count`.
+uint rank_round(uint digit, bool live, __local RankMemory* memory, __local uint* count) {
+  const uint lane = get_local_id(0);
+  const uint block = lane / 32;
+  const uint bit = 1u << lane % 32;
+  if (live) atomic_or(&memory->mask[block][digit], bit);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  uint before = 0, all = 0;
+  for (uint b = 0; b < RS_BLOCKS; ++b) {
+    const uint found = popcount(memory->mask[b][digit]);
+    before += b < block ? found : 0;
+    all += found;
+  }
+  const uint nearer = popcount(memory->mask[block][digit] & (bit - 1));
+  before += nearer;
+  const uint rank = count[digit] + before;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  // The first one of a block cleans up, the last one of the round counts.
+  if (live && nearer == 0) memory->mask[block][digit] = 0;
+  if (live && before + 1 == all) count[digit] = rank + 1;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  return rank;
+}
+
+// Each digit's count becomes the sum of the counts before it.
+void find_starts(__local uint* counts, __local uint* scratch) {
+  const uint first = get_local_id(0) * RS_SHARE;
+  uint sum = 0, total;
+  for (uint d = first; d < first + RS_SHARE; ++d) sum += counts[d];
+  uint before = group_scan(sum, scratch, &total);
+  for (uint d = first; d < first + RS_SHARE; ++d) {
+    const uint count = counts[d];
+    counts[d] = before;
+    before += count;
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+}
+#endif
+
 // `offsets` is the scanned table of count_digits, launched with the same groups and numbers,
 // with the total behind it.
 __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
@@ -119,38 +182,52 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
   const uint begin = min(group * chunk, count);
   const uint end = min(begin + chunk, count);
 #if RS_GROUP > 1
-  __local uint next[RS_DIGITS];
-  __local uint start[RS_DIGITS];
-  __local uint2 tile[RS_GROUP];
-  __local uint scratch[RS_GROUP];
+  __local TileMemory tile;
+  __local uint start[RS_DIGITS];  // of a digit in the tile; first, how many there are so far
+  __local uint next[RS_DIGITS];   // where the group's next element of a digit goes
+  __local uint scratch[RS_SCAN_WORDS];
   const uint lane = get_local_id(0);
   for (uint d = lane; d < RS_DIGITS; d += RS_GROUP) next[d] = offsets[d * groups + group];
-  for (uint base = begin; base < end; base += RS_GROUP) {
-    const uint size = min((uint)RS_GROUP, end - base);
-    // Padding has the largest digit and comes last, so that it stays behind the tile's elements.
-    uint2 element = (uint2)(0xffffffffu, 0);
-    if (lane < size) element = RS_ELEMENT(base + lane);
-    for (uint bit = shift; bit < shift + 8; ++bit) {
-      const uint one = (element.x >> bit) & 1;
-      uint zeros;
-      const uint zeros_before = group_scan(1 - one, scratch, &zeros);
-      tile[one ? zeros + lane - zeros_before : zeros_before] = element;
-      barrier(CLK_LOCAL_MEM_FENCE);
-      element = tile[lane];
-      barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint base = begin; base < end; base += RS_TILE) {
+    const uint size = min((uint)RS_TILE, end - base);
+    for (uint d = lane; d < RS_DIGITS; d += RS_GROUP) {
+      start[d] = 0;
+      for (uint b = 0; b < RS_BLOCKS; ++b) tile.ranking.mask[b][d] = 0;
     }
-    const uint digit = RS_DIGIT(element.x, shift);
-    scratch[lane] = digit;
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (lane == 0 || scratch[lane - 1] != digit) start[digit] = lane;
+    uint key = lane < size ? RS_KEY(base + lane) : 0;
+    // Compilers that unroll take twice the registers.
+#pragma unroll 1
+    for (uint r = 0; r < RS_ROUNDS; ++r) {
+      const uint i = r * RS_GROUP + lane;
+      const uint following = i + RS_GROUP < size ? RS_KEY(base + i + RS_GROUP) : 0;
+      tile.ranking.rank[r][lane] = rank_round(RS_DIGIT(key, shift), i < size, &tile.ranking, start);
+      key = following;
+    }
+    find_starts(start, scratch);
+    ushort rank[RS_ROUNDS];
+#pragma unroll
+    for (uint r = 0; r < RS_ROUNDS; ++r) rank[r] = tile.ranking.rank[r][lane];
+    barrier(CLK_LOCAL_MEM_FENCE);  // the elements lie where the ranks were
+#pragma unroll
+    for (uint r = 0; r < RS_ROUNDS; ++r) {
+      const uint i = r * RS_GROUP + lane;
+      if (i < size) {
+        const uint2 element = RS_ELEMENT(base + i);
+        tile.elements[start[RS_DIGIT(element.x, shift)] + rank[r]] = element;
+      }
+    }
     barrier(CLK_LOCAL_MEM_FENCE);
-    const uint rank = lane - start[digit];
-    if (lane < size) {
-      const uint target = next[digit] + rank;
+    for (uint i = lane; i < size; i += RS_GROUP) {
+      const uint2 element = tile.elements[i];
+      const uint digit = RS_DIGIT(element.x, shift);
+      const uint target = next[digit] + (i - start[digit]);
       RS_STORE(element, target);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (lane < size && (lane == size - 1 || scratch[lane + 1] != digit)) next[digit] += rank + 1;
+    for (uint d = lane; d < RS_DIGITS; d += RS_GROUP) {
+      next[d] += (d + 1 < RS_DIGITS ? start[d + 1] : size) - start[d];
+    }
     barrier(CLK_LOCAL_MEM_FENCE);
   }
 #else

@@ -14,7 +14,7 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void sum_chunks(
   uint sum = 0;
   for (uint i = begin + get_local_id(0); i < end; i += RS_GROUP) sum = add_sat(sum, values[i]);
 #if RS_GROUP > 1
-  __local uint scratch[RS_GROUP];
+  __local uint scratch[RS_SCAN_WORDS];
   uint total;
   group_scan(sum, scratch, &total);
   sum = total;
@@ -31,7 +31,7 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scan_values(
   const uint end = min(begin + chunk, count);
   uint running = get_num_groups(0) > 1 ? bases[group] : 0;
 #if RS_GROUP > 1
-  __local uint scratch[RS_GROUP];
+  __local uint scratch[RS_SCAN_WORDS];
   const uint lane = get_local_id(0);
   for (uint base = begin; base < end; base += RS_GROUP) {
     const uint i = base + lane;

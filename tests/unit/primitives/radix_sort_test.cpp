@@ -102,6 +102,25 @@ TEST_CASE("radix sort: every division of the work gives the same result") {
   }
 }
 
+// Groups of 256 take tiles of 1536 elements: sizes around both, equal keys, and a million.
+TEST_CASE("radix sort: groups of work-items at the ends of their tiles and chunks") {
+  Context context(select_device(""));
+  for (const std::size_t least : {1u, 1024u, 5000u}) {
+    CAPTURE(least);
+    RadixSort sorter(context, ChunkShape{13, 256, least});
+    for (const std::size_t count :
+         {0u, 1u, 255u, 256u, 257u, 1535u, 1536u, 1537u, 13u * 1536u, 13u * 1536u + 1u}) {
+      const std::size_t room = std::max<std::size_t>(count, 1);
+      check_sort(context, sorter, random_keys(room, 1ull << 32, count), count);
+      check_sort(context, sorter, Words(room, 0x01020304u), count);
+      check_sort(context, sorter, random_keys(room, 3, count), count, 8);
+    }
+  }
+  RadixSort sorter(context, ChunkShape{64, 256, 1024});
+  check_sort(context, sorter, random_keys(1u << 20, 1ull << 32, 21), 1u << 20);
+  check_sort(context, sorter, random_keys(1000003, 700, 22), 1000003, 16);
+}
+
 TEST_CASE("radix sort: one to four passes, some with one digit, in both forms [small] [tiny]") {
   Context context(select_device(""));
   for (const std::size_t size : {1u, 16u}) {
