@@ -21,14 +21,17 @@
 namespace raysplats {
 namespace {
 
-// Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not. The types of
-// arguments are kept, for RAYSPLATS_CHECK_ARGUMENTS.
-constexpr const char* kCompilerOptions = "-cl-std=CL1.2 -cl-mad-enable -cl-kernel-arg-info";
+// Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not.
+constexpr const char* kCompilerOptions = "-cl-std=CL1.2 -cl-mad-enable";
+
+// Drivers that have the binary at hand copy some hundred kilobytes.
+constexpr std::chrono::milliseconds kSlowBinary{100};
 
 // Compilers print warnings, or how many there were, to the terminal behind our back: they are for
 // those who ask for them.
-std::string compiler_flags(const BuildOptions& build) {
+std::string compiler_flags(const BuildOptions& build, bool check_arguments) {
   std::string flags = kCompilerOptions;
+  if (check_arguments) flags += " -cl-kernel-arg-info";
   if (!spdlog::should_log(spdlog::level::debug)) flags += " -w";
   if (!build.text().empty()) flags += " " + build.text();
   return flags;
@@ -52,6 +55,7 @@ cl::Program compile(Context::Impl& context,
     if (context.options.compiling) context.options.compiling(context.compiled, what);
   };
   ++context.compiled;
+  context.keeping.postpone();
   tell(path);
   try {
     context.faults.check(Fault::kBuild);
@@ -95,6 +99,26 @@ std::optional<cl::Program> from_binary(Context::Impl& context,
   }
 }
 
+void store_binary(const ProgramCache& cache, const std::string& key, const cl::Program& program) {
+  const cl::Program::Binaries binaries = program.getInfo<CL_PROGRAM_BINARIES>();
+  if (binaries.size() == 1 && !binaries[0].empty()) cache.store(key, binaries[0]);
+}
+
+// Programs made from binaries need not (OpenCL 1.2, section 5.7.3).
+bool tells_arguments(const cl::Program& program) {
+  std::vector<cl::Kernel> kernels;
+  try {
+    cl::Program(program).createKernels(&kernels);
+    for (const cl::Kernel& kernel : kernels) {
+      if (kernel.getInfo<CL_KERNEL_NUM_ARGS>() > 0)
+        static_cast<void>(kernel.getArgInfo<CL_KERNEL_ARG_TYPE_NAME>(0));
+    }
+    return true;
+  } catch (const cl::Error&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 Context::Context(const DeviceInfo& device, const ContextOptions& options)
@@ -112,7 +136,7 @@ Context::Context(const DeviceInfo& device, const ContextOptions& options)
   impl_->check_arguments = arguments_are_checked();
   try {
     impl_->context = cl::Context(impl_->device);
-    // For LaunchTimer as for options.profile: launches that nobody times cost no more by it.
+    // GPUs always need it, because LaunchTimer bounds their launches; elsewhere it costs nothing.
     impl_->queue = cl::CommandQueue(impl_->context, impl_->device, cl::QueueProperties::Profiling);
   } catch (const cl::Error& error) {
     throw_cl_error(error, fmt::format("Opening the OpenCL device {}", device.name));
@@ -199,7 +223,7 @@ cl::Program& Context::Impl::program(const std::string& path, const BuildOptions&
 
 cl::Program Context::Impl::make_program(const std::string& path, const BuildOptions& build) {
   const std::string source = resolve_kernel_source(path, options.kernel_directory);
-  const std::string flags = compiler_flags(build);
+  const std::string flags = compiler_flags(build, check_arguments);
   if (!options.kernel_cache || faults.due(Fault::kBuild))
     return compile(*this, path, source, flags);
 
@@ -210,6 +234,7 @@ cl::Program Context::Impl::make_program(const std::string& path, const BuildOpti
     if (!binary) return std::nullopt;
     auto program = from_binary(*this, *binary, flags);
     if (!program) cache.remove(cache_key);
+    if (program && check_arguments && !tells_arguments(*program)) return std::nullopt;
     return program;
   };
   std::optional<cl::Program> program = cached();
@@ -220,13 +245,30 @@ cl::Program Context::Impl::make_program(const std::string& path, const BuildOpti
     program = cached();
     if (!program) {
       program = compile(*this, path, source, flags);
-      const cl::Program::Binaries binaries = program->getInfo<CL_PROGRAM_BINARIES>();
-      if (binaries.size() == 1 && !binaries[0].empty()) cache.store(cache_key, binaries[0]);
+      keep(cache, cache_key, *program);
       return *program;
     }
   }
   faults.check(Fault::kBuild);
   return *program;
+}
+
+void Context::Impl::keep(const ProgramCache& cache,
+                         const std::string& key,
+                         const cl::Program& program) {
+  if (cache.gives_slowly(info)) {
+    keeping.add([cache, key, program] {
+      try {
+        store_binary(cache, key, program);
+      } catch (const cl::Error& error) {
+        spdlog::debug("a compiled program is not kept: {}", cl_error_name(error.err()));
+      }
+    });
+    return;
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  store_binary(cache, key, program);
+  if (std::chrono::steady_clock::now() - begin > kSlowBinary) cache.note_gives_slowly(info);
 }
 
 void Context::Impl::timed(const std::string& path,

@@ -5,7 +5,7 @@ import os
 
 KERNELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "cl")
 # Context::Impl::program (host/device/context.cpp).
-COMPILER = ["-cl-std=CL1.2", "-cl-mad-enable", "-cl-kernel-arg-info"]
+COMPILER = ["-cl-std=CL1.2", "-cl-mad-enable"]
 
 # packet_shape.cpp and camera_tracer.cpp: a packet per work-group, or one ray per work-item, in tiles of 16.
 CAMERA = dict(PACKET=1, TILE=16, CHUNK=16, LENS=0)

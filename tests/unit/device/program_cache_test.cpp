@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <thread>
@@ -33,10 +34,20 @@ std::string read_all(const fs::path& path) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
+// All but the mark of a slow driver.
 std::vector<fs::path> entries(const fs::path& directory) {
   std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(directory)) found.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(directory)) {
+    if (entry.path().extension() != ".slow") found.push_back(entry.path());
+  }
   return found;
+}
+
+// So that the next program is stored at once.
+void forget_slow(const fs::path& directory) {
+  for (const auto& entry : fs::directory_iterator(directory)) {
+    if (entry.path().extension() == ".slow") fs::remove(entry.path());
+  }
 }
 
 // Runs a kernel that needs no arguments but a buffer in a context with this cache; the words it
@@ -114,6 +125,8 @@ TEST_CASE("program cache: the key depends on source, options, device and driver"
 }
 
 TEST_CASE("program cache: a context fills it, uses it and repairs it") {
+  // Where programs from binaries cannot tell their arguments, checking them passes the cache by.
+  const ScopedVariable unchecked("RAYSPLATS_CHECK_ARGUMENTS", "0");
   const TemporaryDirectory folder;
   const std::uint32_t expected = probe(folder.path());
   CHECK(expected > 1);
@@ -128,10 +141,35 @@ TEST_CASE("program cache: a context fills it, uses it and repairs it") {
        {good.substr(0, good.size() / 2), good.substr(0, 100) + std::string(good.size() - 100, 'x'),
         std::string()}) {
     folder.write(file.filename().string(), bad);
+    forget_slow(folder.path());
     CHECK(probe(folder.path()) == expected);
     CHECK(read_all(file).size() > 100);
     CHECK(read_all(file) != bad);
   }
+}
+
+TEST_CASE("program cache: what a slow driver makes is stored when nothing is compiled any more") {
+  const TemporaryDirectory folder;
+  ProgramCache(folder.path().string()).note_gives_slowly(select_device(""));
+  CHECK(ProgramCache(folder.path().string()).gives_slowly(select_device("")));
+  CHECK(probe(folder.path()) > 1);
+  CHECK(entries(folder.path()).empty());  // the context was gone before
+  ContextOptions options;
+  options.cache_directory = folder.path().string();
+  Context context(select_device(""), options);
+  context.kernel("primitives/layout_probe.cl", "layout_probe");
+  const auto begin = std::chrono::steady_clock::now();
+  const auto stored = [&] {
+    const std::vector<fs::path> found = entries(folder.path());
+    return !found.empty() && found[0].extension() == ".bin";
+  };
+  while (!stored() && std::chrono::steady_clock::now() - begin < std::chrono::seconds(60)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  CHECK(std::chrono::steady_clock::now() - begin > std::chrono::seconds(5));
+  CHECK(entries(folder.path()).size() == 1);
+  CHECK(clear_program_cache(folder.path()) == 1);
+  CHECK_FALSE(ProgramCache(folder.path().string()).gives_slowly(select_device("")));
 }
 
 TEST_CASE("program cache: a sound entry with a binary the driver refuses is replaced") {
@@ -140,6 +178,7 @@ TEST_CASE("program cache: a sound entry with a binary the driver refuses is repl
   const fs::path file = entries(folder.path()).at(0);
   const ProgramCache cache(folder.path().string());
   cache.store(file.stem().string(), pattern(5000, 3));
+  forget_slow(folder.path());
   CHECK(probe(folder.path()) == expected);
   CHECK(cache.load(file.stem().string()) != pattern(5000, 3));
 }
