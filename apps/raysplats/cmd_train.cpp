@@ -10,8 +10,12 @@
 #include "options.hpp"
 #include "raysplats/trainer.hpp"
 #include "report/run_report.hpp"
+#include "train/mirror_meshes.hpp"
 #include "train/quality_preset.hpp"
 #include "train/train_config.hpp"
+#include "view/run_view.hpp"
+#include "view/view_state.hpp"
+#include "viewer_flags.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -23,6 +27,8 @@ struct Options {
   std::string time;
   std::string quality;
   bool overwrite = false;
+  bool view = false;
+  view::ViewerOptions viewer = view_options();
   TrainOptions train;
   DeviceFlags device;
 };
@@ -62,15 +68,41 @@ Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device
   return load_dataset(options.data, options.train.data);
 }
 
-/// Sets the length of a run by --time, and says beforehand how long it will take.
-void announce(Trainer& trainer, const Options& options, const GlobalOptions& global) {
+/// Sets the length of a run by --time, and says beforehand how long it will take. Returns its
+/// iterations.
+std::int64_t announce(Trainer& trainer, const Options& options, const GlobalOptions& global) {
   constexpr double kMeasureSeconds = 3;
   const bool fits = !options.time.empty();
-  if (!fits && (global.quiet || !options.resume.empty())) return;
+  if (!fits && (global.quiet || !options.resume.empty())) return options.train.iterations;
   const RunEstimate estimate = fits ? trainer.fit_time(parse_duration("--time", options.time))
                                     : trainer.estimate(kMeasureSeconds);
   spdlog::info("{} iterations, up to {} Gaussians: about {} of training", estimate.iterations,
                estimate.gaussians, format_duration(estimate.seconds));
+  return estimate.iterations;
+}
+
+/// Opens the run to browsers.
+std::unique_ptr<view::RunView> show(Context& context,
+                                    Trainer& trainer,
+                                    const Options& options,
+                                    const std::vector<Camera>& cameras,
+                                    const std::array<double, 3>& origin) {
+  const Mirrors mirrors = load_mirrors(options.train.mirrors, options.train.mirror_bounces, origin);
+  view::ViewState state = view::first_look(view::extent_before(cameras), cameras, std::nullopt);
+  state.name = std::filesystem::path(options.output).filename().string();
+  state.about = fmt::format("in training on {} photos of {}", cameras.size(),
+                            std::filesystem::path(options.data).filename().string());
+  state.has_near = state.has_depth = mirrors.meshes.empty();
+  state.near_depth = options.train.trace.near_depth;
+  state.trains = true;
+  view::ViewerOptions viewer = options.viewer;
+  viewer.state = view::state_json(state);
+  auto shown = std::make_unique<view::RunView>(context, trainer.gaussians(), options.train.trace,
+                                               mirrors, options.train.iterations, viewer);
+  trainer.set_watcher(shown.get());
+  fmt::print("Open {} in a browser to watch\n", shown->url());
+  std::fflush(stdout);
+  return shown;
 }
 
 void run(CLI::App& command, Options& options, const GlobalOptions& global) {
@@ -80,9 +112,15 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   const std::unique_ptr<Context> context = open_context(options.device);
   Dataset dataset = load(command, options, context->device());
   check_not_data(options.output, dataset);
+  std::vector<Camera> cameras;
+  for (const std::size_t index : dataset.indices(Split::kTrain))
+    cameras.push_back(dataset.views[index].camera);
+  const std::array<double, 3> origin = dataset.origin;
   Trainer trainer(*context, std::move(dataset), options.train, options.output, options.overwrite);
   if (!options.resume.empty()) trainer.resume(options.resume);
-  announce(trainer, options, global);
+  options.train.iterations = announce(trainer, options, global);
+  std::unique_ptr<view::RunView> shown;
+  if (options.view) shown = show(*context, trainer, options, cameras, origin);
   const TrainSummary summary = trainer.run(!global.quiet);
 
   fmt::print("{} iterations in {}: {} Gaussians in {}\n", summary.iterations,
@@ -97,6 +135,7 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   const std::filesystem::path report = std::filesystem::path(options.output) / "report.html";
   write_run_report(options.output, report);
   fmt::print("Report: {}\n", report.string());
+  if (shown) shown->finish(fmt::format("The run has ended: raysplats view {}", options.output));
   if (options.device.profile) fmt::print("{}", context->profile_table());
 }
 
@@ -129,6 +168,10 @@ Command add_train_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("LEVEL");
   command->add_flag("--overwrite", options->overwrite,
                     "Take the place of a run that is in the folder: its files are removed");
+  CLI::Option* view = command->add_flag(
+      "--view", options->view,
+      "Show the model in a browser while it trains; the page pauses, resumes and saves the run");
+  for (CLI::Option* option : add_viewer_flags(*command, options->viewer)) option->needs(view);
   add_device_flags(*command, options->device);
   add_train_options(*command, options->train);
   return {command, [command, options, &global] { run(*command, *options, global); }};

@@ -173,6 +173,12 @@ Gaussians Trainer::model() const {
 }
 
 const DeviceGaussians& Trainer::gaussians() const { return impl_->gaussians; }
+
+void Trainer::set_watcher(RunWatcher* watcher) {
+  const auto turn = impl_->context.lock();
+  impl_->watcher = watcher;
+}
+
 std::int64_t Trainer::iteration() const { return impl_->iteration; }
 
 }  // namespace raysplats

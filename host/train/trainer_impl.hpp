@@ -30,6 +30,7 @@
 #include "train/pose_refinement.hpp"
 #include "train/psnr_rise.hpp"
 #include "train/run_folder.hpp"
+#include "train/run_watcher.hpp"
 #include "train/run_time.hpp"
 #include "train/schedule.hpp"
 #include "train/step_guard.hpp"
@@ -133,6 +134,7 @@ struct Trainer::Impl {
                       Progress& progress,
                       const std::function<bool()>& interrupted);
   void finish_resumed();
+  void show(const std::function<bool()>& interrupted);
 
   Context& context;
   Dataset dataset;
@@ -185,6 +187,7 @@ struct Trainer::Impl {
   double row_seconds = 0;
 
   std::function<void(const TrainProgress&)> callback;
+  RunWatcher* watcher = nullptr;
   std::atomic<bool> stop_asked = false;
   std::atomic<bool> save_asked = false;
   std::atomic<bool> busy = false;  // in run() or step()

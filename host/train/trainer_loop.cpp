@@ -96,8 +96,21 @@ void Trainer::Impl::run_iterations(std::int64_t until,
     if (asked && !(scheduled && saves)) pause([this] { save_model(); });
     if (asked || (scheduled && (stop || last || every(options.checkpoint_every, iteration))))
       pause([this] { save_checkpoint(); });
+    if (watcher && !stop && watcher->wants_look()) pause([&] { show(interrupted); });
   }
   settle();
+}
+
+// Lets the watcher look at the state between two steps, and hold it as long as it wishes.
+void Trainer::Impl::show(const std::function<bool()>& interrupted) {
+  const auto stopping = [&] { return stop_asked || interrupted(); };
+  RunWish wish;
+  do {
+    wish = watcher->look({iteration, background}, stopping);
+    if (!wish.save) continue;
+    save_model();
+    if (saved != iteration) save_checkpoint();
+  } while (wish.wait && !stopping());
 }
 
 // A run that is resumed where it ends: its results may not be in this folder.

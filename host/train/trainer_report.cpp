@@ -27,8 +27,14 @@ void Trainer::Impl::report(Progress& progress) {
   rise.note(order.at(iteration - 1), resolution_divisor(options, iteration - 1), psnr);
   const double seconds = training.seconds();
   const double elapsed = seconds - row_seconds;
-  run.append({iteration, seconds, value.total, psnr, gaussians.count,
-              elapsed > 0 ? static_cast<double>(iteration - row_iteration) / elapsed : 0.0});
+  const TrainRow row{iteration,
+                     seconds,
+                     value.total,
+                     psnr,
+                     gaussians.count,
+                     elapsed > 0 ? static_cast<double>(iteration - row_iteration) / elapsed : 0.0};
+  run.append(row);
+  if (watcher) watcher->noted(row);
   row_iteration = iteration;
   row_seconds = seconds;
   progress.update(iteration,
@@ -85,6 +91,7 @@ void Trainer::Impl::evaluate_views(bool last) {
                                                       run.evaluation_folder(iteration), choice);
   run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
               report.images.size(), shown.count, report.mean.psnr_corrected, report.mean.psnr_all});
+  if (watcher) watcher->evaluated(run.evaluations().back());
   write_metrics(false);
   evaluating.stop();
   spdlog::info("iteration {}: PSNR {:.2f} dB, SSIM {:.4f} over {} test views after {} of training",

@@ -47,7 +47,4 @@ std::unique_ptr<PictureSource> model_pictures(Context& context,
 /// A scene file's: what `render scene.toml` draws, its first frame's meshes.
 std::unique_ptr<PictureSource> scene_pictures(Context& context, const Scene& scene);
 
-/// Grey of a depth: near white, far black, on the scale of the picture's own nearest and farthest.
-Image depth_picture(const Image& depth, const Image& rgba);
-
 }  // namespace raysplats::view

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
@@ -13,6 +14,7 @@
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <deque>
+#include <future>
 #include <map>
 #include <optional>
 #include <thread>
@@ -39,6 +41,7 @@ constexpr std::size_t kMostConnections = 64;  ///< open at once
 constexpr auto kRequestTime = 10s;
 constexpr auto kIdleTime = 60s;
 constexpr auto kAcceptPause = 200ms;
+constexpr auto kFlushPause = 5ms;
 
 std::string_view view_of(beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -121,6 +124,8 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
       self->read();
     });
   }
+
+  bool idle() const { return texts_.empty() && !writing_; }
 
   void send_text(std::string text) {
     if (texts_.size() >= kMostTexts) return;
@@ -303,6 +308,19 @@ void Server::send_text(ClientId client, std::string text) {
     const auto found = impl->channels.find(client);
     if (found != impl->channels.end()) found->second->send_text(std::move(text));
   });
+}
+
+void Server::flush(double seconds) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  for (bool idle = false; !idle && std::chrono::steady_clock::now() < end;) {
+    std::promise<bool> answer;
+    net::post(impl_->io, [&] {
+      answer.set_value(std::all_of(impl_->channels.begin(), impl_->channels.end(),
+                                   [](const auto& each) { return each.second->idle(); }));
+    });
+    idle = answer.get_future().get();
+    if (!idle) std::this_thread::sleep_for(kFlushPause);
+  }
 }
 
 }  // namespace raysplats::view

@@ -52,6 +52,8 @@ class Server {
   /// From any thread. A picture replaces the one that still waits; texts wait in line.
   void send_picture(ClientId client, std::vector<std::byte> bytes);
   void send_text(ClientId client, std::string text);
+  /// Waits up to `seconds` until the texts that were sent are on their way.
+  void flush(double seconds);
 
  private:
   struct Impl;

@@ -19,6 +19,7 @@ std::string Server::url() const { return {}; }
 
 void Server::send_picture(ClientId, std::vector<std::byte>) {}
 
+void Server::flush(double) {}
 void Server::send_text(ClientId, std::string) {}
 
 }  // namespace raysplats::view

@@ -129,9 +129,14 @@ Message parse_message(std::string_view message, int max_side) {
     const std::array<double, 2> place = numbers<2>(json, "px", 0.0, 1.0);
     return PickRequest{id_of(json), view_of(json, max_side), place[0], place[1]};
   }
-  if (type == "pause") return RunCommand::kPause;
-  if (type == "resume") return RunCommand::kResume;
-  if (type == "save") return RunCommand::kSave;
+  using Kind = RunCommand::Kind;
+  if (type == "pause") return RunCommand{Kind::kPause};
+  if (type == "resume") return RunCommand{Kind::kResume};
+  if (type == "save") return RunCommand{Kind::kSave};
+  if (type == "share") {
+    return RunCommand{Kind::kShare, number(member(json, "share"), "share", 0.0, kMostShare)};
+  }
+  if (type == "leave") return Leave{};
   refuse("has an unknown 'type'");
 }
 

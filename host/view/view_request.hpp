@@ -32,9 +32,17 @@ struct PickRequest {
 };
 
 /// What a page may ask of a training run.
-enum class RunCommand { kPause, kResume, kSave };
+struct RunCommand {
+  enum class Kind { kPause, kResume, kSave, kShare };
+  Kind kind = Kind::kPause;
+  double share = 0;  ///< of kShare: of the run's time that pictures may take, 0 to kMostShare
+};
+constexpr double kMostShare = 0.9;
 
-using Message = std::variant<ViewRequest, PickRequest, RunCommand>;
+/// The page is out of sight: it wants nothing until its next ViewRequest.
+struct Leave {};
+
+using Message = std::variant<ViewRequest, PickRequest, RunCommand, Leave>;
 
 /// Longest message that is parsed, in bytes.
 constexpr std::size_t kMaxMessage = 16384;

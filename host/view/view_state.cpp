@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <vector>
 
 namespace raysplats::view {
 namespace {
@@ -47,6 +49,36 @@ Json camera_json(const Camera& camera) {
 
 }  // namespace
 
+ViewState first_look(const SceneExtent& extent,
+                     std::span<const Camera> cameras,
+                     const std::optional<glm::dvec3>& up) {
+  ViewState state;
+  state.cameras = cameras;
+  state.extent = extent;
+  state.extent.center = common_target(cameras).value_or(extent.center);
+  state.up = up.value_or(estimate_up(cameras));
+  OrbitOptions orbit;
+  orbit.up = state.up;
+  state.start = cameras.empty() ? orbit_cameras(state.extent, orbit).front() : cameras.front();
+  return state;
+}
+
+SceneExtent extent_before(std::span<const Camera> cameras) {
+  SceneExtent extent;
+  if (cameras.empty()) return extent;
+  glm::dvec3 middle(0.0);
+  for (const Camera& camera : cameras) middle += camera.center();
+  middle /= static_cast<double>(cameras.size());
+  extent.center = common_target(cameras).value_or(middle);
+  std::vector<double> distances;
+  for (const Camera& camera : cameras)
+    distances.push_back(glm::distance(camera.center(), extent.center));
+  const auto median = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), median, distances.end());
+  if (*median > 0.0) extent.radius = *median;
+  return extent;
+}
+
 std::string state_json(const ViewState& state) {
   Json cameras = Json::array();
   for (const Camera& camera : state.cameras) cameras.push_back(camera_json(camera));
@@ -60,7 +92,8 @@ std::string state_json(const ViewState& state) {
                   {"cameras", cameras},
                   {"near", state.near_depth},
                   {"has_near", state.has_near},
-                  {"has_depth", state.has_depth}};
+                  {"has_depth", state.has_depth},
+                  {"trains", state.trains}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

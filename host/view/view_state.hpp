@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -21,7 +22,19 @@ struct ViewState {
   float near_depth = 0.0f;
   bool has_near = false;  ///< whether a near limit can be asked for
   bool has_depth = false;
+  bool trains = false;  ///< whether there is /api/run
 };
+
+/// Where to begin: at the first camera, or on an orbit where there is none, looking at what most
+/// cameras look at (`extent` where that is nothing), upright as they are or as `up` says. Refers to
+/// `cameras`.
+ViewState first_look(const SceneExtent& extent,
+                     std::span<const Camera> cameras,
+                     const std::optional<glm::dvec3>& up);
+
+/// What cameras look at, before there is a model: their common target, or the middle between them
+/// where they have none, out to the median camera.
+SceneExtent extent_before(std::span<const Camera> cameras);
 
 /// The JSON of /api/state: poses as view messages have them, vertical angles of view in degrees.
 /// Bytes of names that are no UTF-8 are replaced.

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -44,7 +45,8 @@ struct Client {
   std::uint64_t wish = 0;             ///< counts the wishes
   std::uint64_t drawn = 0;            ///< samples of `sum`, of the wish in work
   Image sum;
-  Pace pace{0.0};
+  Pace pace{0.0};          ///< of movements
+  Pace rest{0.0};          ///< of pictures in a hurry
   std::uint64_t turn = 0;  ///< when it was served last
 };
 
@@ -76,6 +78,7 @@ struct Viewer::Impl {
 
   HttpReply get(std::string_view path) const {
     if (path == "/api/state") return {200, "application/json", options.state};
+    if (path == "/api/run" && options.run) return {200, "application/json", options.run()};
     if (const std::optional<PageFile> file = page_file(path))
       return {200, file->type, file->content};
     return {404, "text/plain", "Not found\n"};
@@ -84,6 +87,7 @@ struct Viewer::Impl {
   void opened(ClientId id) {
     const std::lock_guard<std::mutex> guard(mutex);
     clients[id].pace = Pace(options.moving_seconds);
+    clients[id].rest = Pace(hurry);
   }
   void closed(ClientId id) {
     const std::lock_guard<std::mutex> guard(mutex);
@@ -100,6 +104,9 @@ struct Viewer::Impl {
           client.wish = ++wishes;
           client.drawn = 0;
           client.sum = {};
+          if (client.wanted->moving) last_motion = Clock::now();
+        } else if (std::holds_alternative<Leave>(message)) {
+          client.wanted.reset();
         } else if (auto* pick = std::get_if<PickRequest>(&message)) {
           if (picks.size() < kMostWaiting) picks.emplace_back(id, std::move(*pick));
         } else if (commands.size() < kMostWaiting) {
@@ -134,9 +141,9 @@ struct Viewer::Impl {
     return best;
   }
 
-  static std::uint64_t samples_of(const ViewRequest& request, std::uint64_t most) {
+  std::uint64_t samples_of(const ViewRequest& request, std::uint64_t most) const {
     // Depths of several samples have no common scale, and what moves has no time.
-    return request.moving || request.output == Output::kDepth ? 1 : most;
+    return request.moving || hurry > 0.0 || request.output == Output::kDepth ? 1 : most;
   }
 
   void answer(PictureSource& source, ClientId id, const PickRequest& pick);
@@ -155,6 +162,8 @@ struct Viewer::Impl {
   std::deque<RunCommand> commands;
   std::uint64_t wishes = 0;
   std::uint64_t turns = 0;
+  double hurry = 0.0;  ///< seconds for a picture of a page that rests; 0 = as long as it takes
+  std::optional<Clock::time_point> last_motion;
   std::function<void(RunCommand)> on_command;
   Server server;  // last: its thread uses all of the above
 };
@@ -181,19 +190,23 @@ void Viewer::Impl::draw(PictureSource& source,
                         ClientId id,
                         const std::function<bool()>& stop) {
   ViewRequest request;
-  Pace pace(0.0);
+  std::optional<Pace> pace;
   std::uint64_t wish = 0;
   std::uint64_t sample = 0;
   {
     const std::lock_guard<std::mutex> guard(mutex);
     Client& client = clients.at(id);
     request = *client.wanted;
-    pace = client.pace;
+    if (request.moving) {
+      pace = client.pace;
+    } else if (hurry > 0.0 && !request.png) {
+      pace = client.rest;
+    }
     wish = client.wish;
     sample = client.drawn;
     client.turn = ++turns;
   }
-  if (request.moving) request.camera = pace.sized(request.camera);
+  if (pace) request.camera = pace->sized(request.camera);
   const auto watch = [&](double) {
     if (stop && stop()) return false;
     // Small pictures are done before a newer one could be; large ones make room at once for this
@@ -230,11 +243,15 @@ void Viewer::Impl::draw(PictureSource& source,
     const auto found = clients.find(id);
     if (found == clients.end()) return;
     Client& client = found->second;
-    if (request.moving) client.pace.record(static_cast<double>(picture.pixels()), seconds);
+    if (pace) {
+      Pace& own = request.moving ? client.pace : client.rest;
+      own.record(static_cast<double>(picture.pixels()), seconds);
+    }
     // A still picture that is no longer wanted; one of a movement is better than none.
     if (client.wish != wish && !request.moving) return;
     if (client.wish == wish) {
       client.drawn = sample + 1;
+      if (sample + 1 == most) client.wanted->png = false;  // it is kept once
       if (most > 1) {
         add(client.sum, picture);
         picture = client.sum;
@@ -258,9 +275,30 @@ Viewer::~Viewer() = default;
 
 std::string Viewer::url() const { return impl_->server.url(); }
 
-std::size_t Viewer::clients() const {
+std::size_t Viewer::watchers() const {
   const std::lock_guard<std::mutex> guard(impl_->mutex);
-  return impl_->clients.size();
+  return static_cast<std::size_t>(
+      std::count_if(impl_->clients.begin(), impl_->clients.end(),
+                    [](const auto& each) { return each.second.wanted.has_value(); }));
+}
+
+bool Viewer::awaited() const {
+  const std::lock_guard<std::mutex> guard(impl_->mutex);
+  return std::any_of(impl_->clients.begin(), impl_->clients.end(), [](const auto& each) {
+    const Client& client = each.second;
+    return client.wanted && client.wanted->moving && client.drawn == 0;
+  });
+}
+
+bool Viewer::asked() const {
+  const std::lock_guard<std::mutex> guard(impl_->mutex);
+  return !impl_->commands.empty() || !impl_->picks.empty();
+}
+
+double Viewer::seconds_since_motion() const {
+  const std::lock_guard<std::mutex> guard(impl_->mutex);
+  return impl_->last_motion ? seconds_since(*impl_->last_motion)
+                            : std::numeric_limits<double>::infinity();
 }
 
 void Viewer::on_command(std::function<void(RunCommand)> handler) {
@@ -272,12 +310,25 @@ void Viewer::tell(const std::string& json) {
   for (const auto& each : impl_->clients) impl_->server.send_text(each.first, json);
 }
 
+void Viewer::tell_last(const std::string& json) {
+  tell(json);
+  impl_->server.flush(1.0);
+}
+
 void Viewer::refresh() {
   const std::lock_guard<std::mutex> guard(impl_->mutex);
   for (auto& each : impl_->clients) {
+    if (!each.second.wanted || each.second.wanted->moving) continue;
     each.second.drawn = 0;
     each.second.sum = {};
   }
+}
+
+void Viewer::set_hurry(double seconds) {
+  const std::lock_guard<std::mutex> guard(impl_->mutex);
+  if (impl_->hurry == seconds) return;
+  impl_->hurry = seconds;
+  for (auto& each : impl_->clients) each.second.rest = Pace(seconds);
 }
 
 bool Viewer::work(PictureSource& source,

@@ -16,6 +16,8 @@ struct ViewerOptions {
   int max_side = 1920;                 ///< pixels of pictures
   double moving_seconds = 1.0 / 15.0;  ///< for a picture while the camera moves
   std::string state;                   ///< JSON of /api/state, for the page to start with
+  /// JSON of /api/run, asked for from another thread than that of work(); none: there is no run.
+  std::function<std::string()> run;
 };
 
 /// Shows a PictureSource to the pages that are open: takes what they want to see, the newest wish
@@ -29,12 +31,20 @@ class Viewer {
   ~Viewer();
 
   std::string url() const;
-  /// Pages that are open.
-  std::size_t clients() const;
+  /// Pages that want to see something.
+  std::size_t watchers() const;
+  /// Whether a page that moves waits for its picture.
+  bool awaited() const;
+  /// Whether commands or questions wait for work().
+  bool asked() const;
+  /// Since the last time that a page moved; infinite before.
+  double seconds_since_motion() const;
   /// Hears of commands for a run, in the thread of work().
   void on_command(std::function<void(RunCommand)> handler);
   /// Text for every open page.
   void tell(const std::string& json);
+  /// The same as the last word: waits up to a second until it is on its way.
+  void tell_last(const std::string& json);
 
   /// Draws the next picture that a page waits for; `iteration` is that of the model. With nothing
   /// to do waits for up to `wait` seconds and returns false. `stop` is asked within pictures, whose
@@ -45,6 +55,9 @@ class Viewer {
             const std::function<bool()>& stop = {});
   /// The model has changed: pages that rest get new pictures.
   void refresh();
+  /// From now on pages that rest get one sample, as large as it can be in that time: pictures of a
+  /// model that changes. 0 ends that.
+  void set_hurry(double seconds);
 
  private:
   struct Impl;

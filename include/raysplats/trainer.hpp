@@ -17,6 +17,7 @@
 namespace raysplats {
 
 struct DeviceGaussians;
+class RunWatcher;
 
 /// Mean over the test views at one iteration.
 struct EvaluationRow {
@@ -130,8 +131,12 @@ class Trainer {
   /// Completed iterations.
   std::int64_t iteration() const;
 
-  /// Of the library itself; its type is not installed.
+  // What follows serves the library itself; its types are not installed.
+
+  /// The model on the device, the same object as long as the trainer lives.
   const DeviceGaussians& gaussians() const;
+  /// Lets `watcher`, which outlives the run, look at it between steps; nullptr ends that.
+  void set_watcher(RunWatcher* watcher);
 
  private:
   struct Impl;

@@ -39,28 +39,16 @@ def browser():
     return webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
 
 
-class BrowserTest(unittest.TestCase):
+class PageCase(unittest.TestCase):
+    command = "view"
+
     def setUp(self):
-        self.viewer = Viewer(PROGRAM, self.arguments())
+        self.viewer = Viewer(PROGRAM, self.arguments(), self.command)
         self.addCleanup(self.viewer.folder.cleanup)
         self.addCleanup(self.viewer.stop)
         self.page = browser()
         self.addCleanup(self.page.quit)
         self.page.get(self.viewer.url)
-
-    def arguments(self):
-        """A model, and two cameras for the list."""
-        folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
-        model = os.path.join(folder, "model.ply")
-        write_model(model)
-        cameras = {"w": 64, "h": 48, "fl_x": 50, "fl_y": 50, "cx": 32, "cy": 24, "frames": [
-            {"file_path": f"{name}.png", "transform_matrix": matrix} for name, matrix in (
-                ("front", [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, -6], [0, 0, 0, 1]]),
-                ("side", [[0, 0, 1, 7], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]]))]}
-        self.cameras = os.path.join(folder, "cameras.json")
-        with open(self.cameras, "w") as file:
-            json.dump(cameras, file)
-        return [model, "--cameras", self.cameras]
 
     def seen(self):
         return self.page.execute_script(
@@ -101,6 +89,22 @@ class BrowserTest(unittest.TestCase):
         for _ in range(steps):
             chain = chain.move_by_offset(dx / steps, dy / steps)
         chain.release().perform()
+
+
+class ViewTest(PageCase):
+    def arguments(self):
+        """A model, and two cameras for the list."""
+        folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
+        model = os.path.join(folder, "model.ply")
+        write_model(model)
+        cameras = {"w": 64, "h": 48, "fl_x": 50, "fl_y": 50, "cx": 32, "cy": 24, "frames": [
+            {"file_path": f"{name}.png", "transform_matrix": matrix} for name, matrix in (
+                ("front", [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, -6], [0, 0, 0, 1]]),
+                ("side", [[0, 0, 1, 7], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]]))]}
+        self.cameras = os.path.join(folder, "cameras.json")
+        with open(self.cameras, "w") as file:
+            json.dump(cameras, file)
+        return [model, "--cameras", self.cameras]
 
     def test_the_page_shows_what_render_draws(self):
         seen = self.rest()
@@ -228,6 +232,58 @@ class BrowserTest(unittest.TestCase):
         self.wait("the banner", lambda: self.page.find_element(By.ID, "banner").is_displayed())
         self.assertIn("does not answer", self.page.find_element(By.ID, "banner").text)
         self.screenshot("ended")
+
+
+class TrainTest(PageCase):
+    """A run of generated photos, watched from its first step to its end."""
+    command = "train"
+
+    def arguments(self):
+        folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
+        photos = os.path.join(folder, "photos")
+        subprocess.run([PROGRAM, "generate", photos, "--size", "96", "--train-views", "16", "--test-views", "2",
+                        "-q"], check=True, stdout=subprocess.DEVNULL)
+        self.run_folder = os.path.join(folder, "run")
+        return [photos, "-o", self.run_folder, "--view", "-n", "1500", "--eval-at", "200,400", "--eval-renders", "0"]
+
+    def iteration(self):
+        return self.page.execute_script("const s = window.raysplats.run && window.raysplats.run.state;"
+                                        "return s && s.rows.length ? s.rows[s.rows.length - 1][0] : 0;")
+
+    def painted(self, canvas):
+        return self.page.execute_script(
+            "const c = document.getElementById(arguments[0]);"
+            "return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v > 0);", canvas)
+
+    def test_a_run_is_watched_paused_saved_and_resumed(self):
+        self.wait("iterations", lambda: self.iteration() > 420)
+        shown = self.seen()
+        self.assertGreater(shown["pictures"], 1)
+        self.drag(80, 10)
+        self.wait("a picture of the movement", lambda: self.seen()["id"] > shown["id"])
+        newer = self.seen()["last"]["iteration"]
+        self.wait("pictures of newer models", lambda: self.seen()["last"]["iteration"] > newer)
+        self.page.find_element(By.ID, "pause").click()
+        self.wait("the pause", lambda: self.page.find_element(By.ID, "pause").text == "Resume")
+        self.wait("all samples", lambda: self.seen()["last"]["samples"] == 16)
+        held = self.seen()
+        self.wait("the state", lambda: self.iteration() == held["last"]["iteration"] // 10 * 10)
+        before = self.iteration()
+        time.sleep(1.5)
+        self.assertEqual(self.iteration(), before)
+        for canvas in ("curve-loss", "curve-psnr", "curve-count"):
+            self.assertTrue(self.painted(canvas), canvas)
+        self.assertIn("test views", self.page.find_element(By.ID, "text-psnr").text)
+        self.screenshot("training")
+        self.page.find_element(By.ID, "save").click()
+        saved = os.path.join(self.run_folder, "point_cloud", f"iteration_{held['last']['iteration']}")
+        self.wait("the saved model", lambda: os.path.exists(os.path.join(saved, "point_cloud.ply")))
+        self.page.find_element(By.ID, "pause").click()
+        self.wait("more iterations", lambda: self.iteration() > before)
+        self.wait("the end", lambda: self.page.find_element(By.ID, "banner").is_displayed())
+        self.assertIn("The run has ended: raysplats view", self.page.find_element(By.ID, "banner").text)
+        self.assertEqual(self.viewer.process.wait(timeout=60), 0)
+        self.screenshot("trained")
 
 
 if __name__ == "__main__":

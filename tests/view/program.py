@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`raysplats view` as a child, and a WebSocket client of the standard library alone."""
+"""`raysplats view` and `raysplats train --view` as children, and a WebSocket client of the standard library alone."""
 import base64
 import json
 import os
@@ -13,14 +13,15 @@ import urllib.parse
 
 
 class Viewer:
-    """Runs `raysplats view` on a small model until the end of a with block."""
+    """Runs `raysplats view` on a small model until the end of a with block, or `command` with
+    `arguments`."""
 
-    def __init__(self, program, arguments=()):
+    def __init__(self, program, arguments=(), command="view"):
         self.folder = tempfile.TemporaryDirectory(prefix="raysplats_view_")
         model = os.path.join(self.folder.name, "model.ply")
         write_model(model)
         self.process = subprocess.Popen(
-            [program, "view", *(arguments or [model]), "--port", "0", "-q"],
+            [program, command, *(arguments or [model]), "--port", "0", "-q"],
             stdout=subprocess.PIPE, text=True)
         line = self.process.stdout.readline()
         found = re.search(r"http://\S+", line)

@@ -6,6 +6,7 @@ import { Connection } from './connection.js';
 import { Keyframes } from './keyframes.js';
 import { TrainingCameras } from './cameras.js';
 import { Pointers } from './pointers.js';
+import { Run } from './run.js';
 
 const $ = (id) => document.getElementById(id);
 const TURN = 0.006; // radians per pixel
@@ -23,7 +24,8 @@ let saving = 0; // id of the picture to be saved as a file
 let picking = 0; // id of the last question for a point
 let frames = []; // when the last pictures of movements came
 const held = new Set(); // keys
-let paused = false;
+let run = null; // while the model trains
+let over = false; // the run has said that it ends
 let nearChosen = false; // the model's own holds until somebody moves the slider
 
 // What automated tests look at; nothing here reads it.
@@ -85,10 +87,11 @@ async function show(header, blob) {
   frames = frames.filter((time) => now - time < 1000);
   frames.push(now);
   const moving = header.samples === 1 && !header.last;
+  const step = run ? `, iteration ${header.iteration}` : '';
   const speed = moving && frames.length > 2 ? `, ${frames.length} pictures a second` : '';
   const samples = header.samples > 1 ? `, ${header.samples} samples` : '';
   $('status').textContent =
-    `${header.width} \u00d7 ${header.height}${samples}, ${header.milliseconds.toFixed(0)} ms${speed}`;
+    `${header.width} \u00d7 ${header.height}${samples}, ${header.milliseconds.toFixed(0)} ms${speed}${step}`;
 }
 
 function download(blob, name) {
@@ -107,11 +110,9 @@ function heard(message) {
   } else if (message.type === 'error') {
     seen.errors.push(message.text);
     $('status').textContent = message.text;
-  } else if (message.type === 'progress') {
-    paused = message.paused;
-    $('run').hidden = false;
-    $('pause').textContent = paused ? 'Resume' : 'Pause';
-    $('progress').textContent = message.text;
+  } else if (message.type === 'run' && run) {
+    if (message.ended) run.ended(message.ended);
+    else run.ask();
   }
 }
 
@@ -241,8 +242,10 @@ function wire() {
     $('fps').value = stored.fps;
     $('closed').checked = stored.closed;
   });
-  $('pause').addEventListener('click', () => link.send({ type: paused ? 'resume' : 'pause' }));
-  $('save').addEventListener('click', () => link.send({ type: 'save' }));
+  document.addEventListener('visibilitychange', () => {
+    if (document.hidden) link.leave();
+    else link.rest();
+  });
 }
 
 async function start() {
@@ -270,9 +273,16 @@ async function start() {
     open: () => banner(''),
     lost: () => {
       seen.lost += 1;
-      banner('The program does not answer: it may have ended. Trying again.');
+      if (!over) banner('The program does not answer: it may have ended. Trying again.');
     },
   });
+  if (state.trains) {
+    run = new Run((message) => link.send(message), (text) => {
+      over = true;
+      banner(text);
+    });
+    seen.run = run;
+  }
   seen.rig = rig;
   wire();
   changed();

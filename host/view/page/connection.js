@@ -85,6 +85,14 @@ export class Connection {
     this.send({ type: 'view', id, moving: true, ...this.view() });
   }
 
+  // Nobody looks: nothing is wanted until the next movement.
+  leave() {
+    clearTimeout(this.#timer);
+    this.#dirty = false;
+    this.#waiting = null;
+    this.send({ type: 'leave' });
+  }
+
   // Nothing moves: the picture of full size.
   rest(extra = {}) {
     clearTimeout(this.#timer);

@@ -8,7 +8,7 @@
 #include "view/pace.hpp"
 #include "view/page.hpp"
 #include "view/picture_file.hpp"
-#include "view/picture_source.hpp"
+#include "view/sampling.hpp"
 #include "view/view_state.hpp"
 
 using namespace raysplats;
@@ -95,7 +95,7 @@ TEST_CASE("the library holds the page, and nothing else is served") {
   // No script, style or picture from elsewhere.
   for (const char* path :
        {"/", "/app.js", "/style.css", "/connection.js", "/cameras.js", "/keyframes.js", "/path.js",
-        "/pointers.js", "/vectors.js", "/camera.js"}) {
+        "/pointers.js", "/vectors.js", "/camera.js", "/run.js", "/curves.js"}) {
     INFO(path);
     REQUIRE(page_file(path).has_value());
     CHECK(page_file(path)->content.find("https:") == std::string::npos);

@@ -80,8 +80,19 @@ TEST_CASE("picks and commands are understood") {
   const auto request = std::get<PickRequest>(parse_message(pick.dump(), 1000));
   CHECK(request.x == 0.25);
   CHECK(request.y == 1.0);
-  CHECK(std::get<RunCommand>(parse_message(R"({"type":"pause"})", 9)) == RunCommand::kPause);
-  CHECK(std::get<RunCommand>(parse_message(R"({"type":"save"})", 9)) == RunCommand::kSave);
+  const auto command = [](const char* text) {
+    return std::get<RunCommand>(parse_message(text, 9));
+  };
+  CHECK(command(R"({"type":"pause"})").kind == RunCommand::Kind::kPause);
+  CHECK(command(R"({"type":"resume"})").kind == RunCommand::Kind::kResume);
+  CHECK(command(R"({"type":"save"})").kind == RunCommand::Kind::kSave);
+  CHECK(command(R"({"type":"share","share":0.25})").kind == RunCommand::Kind::kShare);
+  CHECK(command(R"({"type":"share","share":0.25})").share == 0.25);
+  CHECK(std::holds_alternative<Leave>(parse_message(R"({"type":"leave"})", 9)));
+  for (const char* share : {"-0.1", "0.95", "\"1\"", "null"}) {
+    CHECK(refusal(std::string(R"({"type":"share","share":)") + share + "}").find("share") !=
+          std::string::npos);
+  }
 }
 
 TEST_CASE("messages that are not understood are refused in one sentence") {

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/gaussian_pictures.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <utility>
+
+#include "core/camera_model.hpp"
+#include "raysplats/error.hpp"
+#include "view/sampling.hpp"
+
+namespace raysplats::view {
+namespace {
+
+constexpr std::uint64_t kSamples = 16;
+/// Alpha from which on a ray has met something to turn around.
+constexpr float kMet = 0.5f;
+constexpr int kMedian = 1;  ///< channel of the depths
+
+/// Lets a tracer be watched while it lives.
+class Watched {
+ public:
+  Watched(ViewTracer& tracer, const Watch& watch) : tracer_(tracer) {
+    if (watch) tracer_.set_watch(watch);
+  }
+  ~Watched() { tracer_.set_watch({}); }
+  Watched(const Watched&) = delete;
+  Watched& operator=(const Watched&) = delete;
+
+ private:
+  ViewTracer& tracer_;
+};
+
+}  // namespace
+
+GaussianPictures::GaussianPictures(Context& context,
+                                   const DeviceGaussians& gaussians,
+                                   const TraceOptions& options,
+                                   Mirrors mirrors)
+    : context_(context),
+      gaussians_(gaussians),
+      options_(options),
+      mirrors_(std::move(mirrors)),
+      near_(options.near_depth) {}
+
+std::uint64_t GaussianPictures::samples() const { return kSamples; }
+
+void GaussianPictures::release() {
+  color_.reset();
+  depth_.reset();
+}
+
+ViewTracer& GaussianPictures::tracer(bool depth, const std::optional<float>& near_depth) {
+  if (depth && !has_depth()) throw UsageError("A scene with mirrors has no single depth");
+  // With mirrors there is no camera that could be near.
+  const float wanted = has_depth() ? near_depth.value_or(options_.near_depth) : near_;
+  if (wanted != near_) release();
+  near_ = wanted;
+  std::unique_ptr<ViewTracer>& tracer = depth ? depth_ : color_;
+  if (!tracer) {
+    TraceOptions options = options_;
+    options.near_depth = near_;
+    options.depth = depth;
+    tracer = std::make_unique<ViewTracer>(context_, options, mirrors_);
+  }
+  return *tracer;
+}
+
+Image GaussianPictures::draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) {
+  const auto turn = context_.lock();
+  const bool depth = request.output == Output::kDepth;
+  ViewTracer& views = tracer(depth, request.near_depth);
+  views.set_background(request.background.value_or(options_.background));
+  const Watched watched(views, watch);
+  try {
+    views.forward(gaussians_, jittered(request.camera, sample));
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kInterrupted) throw;
+    return {};
+  }
+  const Image rgba = views.download_image();
+  if (depth) return depth_picture(views.download_depth(), rgba);
+  return request.output == Output::kAlpha ? alpha_picture(rgba) : rgba;
+}
+
+std::optional<glm::dvec3> GaussianPictures::point(const ViewRequest& request) {
+  if (!has_depth()) return std::nullopt;
+  const auto turn = context_.lock();
+  ViewTracer& views = tracer(true, request.near_depth);
+  views.forward(gaussians_, request.camera);
+  const int x = request.camera.width / 2;
+  const int y = request.camera.height / 2;
+  const float z = views.download_depth().at(x, y, kMedian);
+  if (!(views.download_image().at(x, y, 3) > kMet) || !(z > 0.0f)) return std::nullopt;
+  const CameraRay ray = camera_ray(request.camera, x + 0.5, y + 0.5);
+  // Depth is along the axis.
+  const glm::dvec3 axis = glm::transpose(request.camera.rotation)[2];
+  return ray.origin + static_cast<double>(z) / glm::dot(axis, ray.direction) * ray.direction;
+}
+
+}  // namespace raysplats::view

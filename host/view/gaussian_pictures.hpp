@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "light/view_tracer.hpp"
+#include "raysplats/context.hpp"
+#include "raysplats/mirrors.hpp"
+#include "raysplats/trace_options.hpp"
+#include "trace/device_gaussians.hpp"
+#include "view/picture_source.hpp"
+
+namespace raysplats::view {
+
+/// Pictures of Gaussians that may change between them, as they do during training; context and
+/// Gaussians outlive it.
+class GaussianPictures : public PictureSource {
+ public:
+  /// Nothing is made on the device before the first picture.
+  GaussianPictures(Context& context,
+                   const DeviceGaussians& gaussians,
+                   const TraceOptions& options,
+                   Mirrors mirrors);
+
+  Image draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) override;
+  std::optional<glm::dvec3> point(const ViewRequest& request) override;
+  std::uint64_t samples() const override;
+  bool has_depth() const override { return mirrors_.meshes.empty(); }
+
+  /// Behind everything where a page wishes nothing else.
+  void set_background(const std::array<float, 3>& background) { options_.background = background; }
+  /// Gives the device's memory back until the next picture.
+  void release();
+
+ private:
+  ViewTracer& tracer(bool depth, const std::optional<float>& near_depth);
+
+  Context& context_;
+  const DeviceGaussians& gaussians_;
+  TraceOptions options_;
+  Mirrors mirrors_;
+  float near_;  // of the tracers
+  std::unique_ptr<ViewTracer> color_;
+  std::unique_ptr<ViewTracer> depth_;
+};
+
+}  // namespace raysplats::view

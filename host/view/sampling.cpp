@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view/sampling.hpp"
+
+#include <algorithm>
+
+#include "eval/frame_writer.hpp"
+
+namespace raysplats::view {
+namespace {
+
+/// The radical inverse.
+double halton(std::uint64_t index, std::uint64_t base) {
+  double value = 0.0;
+  double digit = 1.0;
+  for (; index > 0; index /= base) {
+    digit /= static_cast<double>(base);
+    value += digit * static_cast<double>(index % base);
+  }
+  return value;
+}
+
+}  // namespace
+
+Camera jittered(Camera camera, std::uint64_t sample) {
+  if (sample == 0) return camera;
+  camera.cx += halton(sample, 2) - 0.5;
+  camera.cy += halton(sample, 3) - 0.5;
+  return camera;
+}
+
+Image alpha_picture(const Image& rgba) {
+  Image out = rgba;
+  for (std::size_t i = 0; i < rgba.pixels(); ++i) {
+    float* pixel = &out.data[4 * i];
+    pixel[0] = pixel[1] = pixel[2] = pixel[3];
+  }
+  return out;
+}
+
+Image depth_picture(const Image& depth, const Image& rgba) {
+  Image expected(depth.width, depth.height, 1);
+  for (std::size_t i = 0; i < expected.pixels(); ++i)
+    expected.data[i] = depth.data[i * static_cast<std::size_t>(depth.channels)];
+  const Image grey = depth_preview(expected, rgba);
+  Image out(rgba.width, rgba.height, 4, 1.0f);
+  for (std::size_t i = 0; i < grey.pixels(); ++i) std::fill_n(&out.data[4 * i], 3, grey.data[i]);
+  return out;
+}
+
+}  // namespace raysplats::view

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/image.hpp"
+
+namespace raysplats::view {
+
+/// The camera of a sample: the places of a pixel's rays fill it evenly, however many there are
+/// (Halton 1960). The first goes through its centre, as those of `render` do.
+Camera jittered(Camera camera, std::uint64_t sample);
+
+/// Alpha as grey, opaque.
+Image alpha_picture(const Image& rgba);
+/// Grey of a depth (its first channel): near white, far black, on the scale of the picture's own
+/// nearest and farthest.
+Image depth_picture(const Image& depth, const Image& rgba);
+
+}  // namespace raysplats::view
