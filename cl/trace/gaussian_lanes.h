@@ -242,7 +242,16 @@ void store_columns(const gv* columns, const uint count, __global float* p, const
 // rotations, as in transpose().
 void load_records8(__global const float* p, gv* columns) {
 #if VECTOR == 1
-  for (int k = 0; k < 8; ++k) columns[k] = p[k];
+  // Records lie at multiples of their 32 bytes.
+  const float4 low = ((__global const float4*)p)[0], high = ((__global const float4*)p)[1];
+  columns[0] = low.x;
+  columns[1] = low.y;
+  columns[2] = low.z;
+  columns[3] = low.w;
+  columns[4] = high.x;
+  columns[5] = high.y;
+  columns[6] = high.z;
+  columns[7] = high.w;
 #else
   gv part[8];
 #pragma unroll

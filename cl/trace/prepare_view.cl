@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // prepare_view: everything that tracing one camera view reads of one Gaussian, in one pass: the
 // 64-byte line (camera line or general form, docs/model.md) and the record that culls it (box of
-// the exact outline, least depth). One work-item per VECTOR Gaussians from number `begin` on, any
-// local size; end - begin is a multiple of VECTOR. Lines of hidden Gaussians are undefined.
+// the exact outline, least depth). One work-item per VECTOR Gaussians from number `begin` on; end -
+// begin is a multiple of VECTOR. Work-groups of any size, of GROUP where that is not 0. Lines of
+// hidden Gaussians are undefined.
 #include "shared/color.h"
 #include "trace/arguments.h"
+#include "trace/staged_rows.h"
 #include "trace/view.h"
 
 #ifndef PEAK_ORDER
@@ -100,35 +102,87 @@ gv least_peak(const ViewGaussian* g, const gv Q, const gv szz, const gv whitened
   return g->m[2] - nearer - sqrt(Q * across2);
 }
 
-void write_colour(const ViewGaussian* g, __global const float* sh, gv* colour) {
+// Direction in which the camera sees the mean.
+void sh_basis_of(const ViewGaussian* g, gv* basis) {
   const gv* d = g->offset;
   const gv inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
-  gv basis[RS_SH_FUNCTIONS];
   rs_sh_basis(SH_DEGREE, d[0] * inverse, d[1] * inverse, d[2] * inverse, basis);
-  gv c[3 * RS_SH_FUNCTIONS];
-  load_columns(sh, 3 * SH_COEFFICIENTS, 3 * RS_SH_FUNCTIONS, c);
-  gv r = 0.5f, green = 0.5f, b = 0.5f;
-  for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
-    r += basis[k] * c[3 * k];
-    green += basis[k] * c[3 * k + 1];
-    b += basis[k] * c[3 * k + 2];
-  }
-  const gv most = (gv)(RS_MAX_COLOR);
-  colour[0] = smaller(larger(r, (gv)(0.0f)), most);
-  colour[1] = smaller(larger(green, (gv)(0.0f)), most);
-  colour[2] = smaller(larger(b, (gv)(0.0f)), most);
 }
 
-__kernel void prepare_view(const uint begin,
-                           const uint end,
-                           RS_GAUSSIAN_ARGUMENTS,
-                           const RsCamera camera_argument,
-                           const float quantile,
-                           const float4 window,
-                           __global RsLine* restrict lines,
-                           __global RsViewBounds* restrict bounds) {
+void clamp_colour(const gv* sum, gv* colour) {
+  const gv most = (gv)(RS_MAX_COLOR);
+  for (int j = 0; j < 3; ++j) colour[j] = smaller(larger(sum[j], (gv)(0.0f)), most);
+}
+
+#if GROUP
+// Adds the terms of RS_STAGE floats of the SH coefficients from number `column` on.
+void add_colour(const int column,
+                __global const float* sh,
+                const float* basis,
+                __local StagedRows* staged,
+                float* sum) {
+  const int count = min(3 * RS_SH_FUNCTIONS - column, RS_STAGE);
+  if (count <= 0) return;
+  stage_fetch(sh, 3 * SH_COEFFICIENTS, column, count, staged);
+  const uint lane = get_local_id(0);
+#pragma unroll
+  for (int t = 0; t < RS_STAGE; ++t) {
+    const int k = column + t;
+    if (t < count) sum[k % 3] += basis[k / 3] * staged->rows[lane][t];
+  }
+}
+
+// Of Gaussians whose rows are present, from `sh` of the group's first one on.
+void write_colour(const ViewGaussian* g,
+                  __global const float* sh,
+                  __local StagedRows* staged,
+                  float* colour) {
+  float basis[RS_SH_FUNCTIONS];
+  sh_basis_of(g, basis);
+  float sum[3] = {0.5f, 0.5f, 0.5f};
+  add_colour(0, sh, basis, staged, sum);
+  add_colour(RS_STAGE, sh, basis, staged, sum);
+  add_colour(2 * RS_STAGE, sh, basis, staged, sum);
+  add_colour(3 * RS_STAGE, sh, basis, staged, sum);
+  add_colour(4 * RS_STAGE, sh, basis, staged, sum);
+  clamp_colour(sum, colour);
+}
+#else
+void write_colour(const ViewGaussian* g, __global const float* sh, gv* colour) {
+  gv basis[RS_SH_FUNCTIONS];
+  sh_basis_of(g, basis);
+  gv c[3 * RS_SH_FUNCTIONS];
+  load_columns(sh, 3 * SH_COEFFICIENTS, 3 * RS_SH_FUNCTIONS, c);
+  gv sum[3] = {0.5f, 0.5f, 0.5f};
+  for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
+    for (int j = 0; j < 3; ++j) sum[j] += basis[k] * c[3 * k + j];
+  }
+  clamp_colour(sum, colour);
+}
+#endif
+
+#if GROUP
+__attribute__((reqd_work_group_size(GROUP, 1, 1)))
+#endif
+__kernel void
+prepare_view(const uint begin,
+             const uint end,
+             RS_GAUSSIAN_ARGUMENTS,
+             const RsCamera camera_argument,
+             const float quantile,
+             const float4 window,
+             __global RsLine* restrict lines,
+             __global RsViewBounds* restrict bounds) {
+#if GROUP
+  __local StagedRows staged;
+  const uint lane = get_local_id(0);
+  const size_t first = begin + get_group_id(0) * GROUP;
+  const bool exists = first + lane < end;
+  const size_t i = exists ? first + lane : first;
+#else
   const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
   if (i >= end) return;
+#endif
   const RsCamera camera = camera_argument;
   ViewGaussian g;
   const gi finite = load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
@@ -175,13 +229,26 @@ __kernel void prepare_view(const uint begin,
   box[5] = Q;
   box[6] = RS_AS_FLOAT(visible ? kind : (gi)(RS_LINE_HIDDEN));
   box[7] = (gv)(0.0f);
+#if GROUP
+  for (int k = 0; k < 8; ++k) staged.rows[lane][k] = box[k];
+  staged.present[lane] = exists;
+  stage_store(&staged, 0, 8, (__global float*)(bounds + first), 8, 0, 0);
+  staged.present[lane] = exists && visible;
+#else
   store_records8(box, (__global float*)(bounds + i));
   if (!RS_ANY_GAUSSIAN(visible)) return;
+#endif
 
   gv v[16];
   write_projective(&g, v);
   if (RS_ANY_GAUSSIAN(visible & !projective)) write_general(&g, !projective, v);
   v[12] = g.opacity;
+#if GROUP
+  write_colour(&g, sh + first * 3 * SH_COEFFICIENTS, &staged, v + 13);
+  for (int k = 0; k < 16; ++k) staged.rows[lane][k] = v[k];
+  stage_store(&staged, 0, 16, (__global float*)(lines + first), 16, 0, 0);
+#else
   write_colour(&g, sh + i * 3 * SH_COEFFICIENTS, v + 13);
   store_columns(v, 16, (__global float*)(lines + i), 16);
+#endif
 }

@@ -38,6 +38,12 @@ typedef struct {
   gv opacity;
 } ViewGaussian;
 
+// Means minus camera centre of the Gaussians from number i on.
+void load_offset(const size_t i, __global const float* means, const RsCamera* camera, gv* offset) {
+  load_columns3(means + 3 * i, offset);
+  for (int j = 0; j < 3; ++j) offset[j] -= camera->center[j];
+}
+
 // Loads the Gaussians from number i on; false in lanes where a parameter is not finite.
 gi load_view_gaussian(const size_t i,
                       __global const float* means,
@@ -47,8 +53,7 @@ gi load_view_gaussian(const size_t i,
                       const RsCamera* camera,
                       ViewGaussian* g) {
   const float* V = camera->rotation;
-  load_columns3(means + 3 * i, g->offset);
-  for (int j = 0; j < 3; ++j) g->offset[j] -= camera->center[j];
+  load_offset(i, means, camera, g->offset);
   for (int j = 0; j < 3; ++j) {
     g->m[j] = V[3 * j] * g->offset[0] + V[3 * j + 1] * g->offset[1] + V[3 * j + 2] * g->offset[2];
   }

@@ -162,17 +162,17 @@ __kernel void adam_step(__global float* parameter,
   }
 }
 
-// Row i of `to` becomes row source[i] of `from`, or zeros where source[i] is 0xffffffff. Launch:
-// one work-item per new Gaussian; `width` floats per row.
+// Row i of `to`, `width` floats, becomes row source[i] of `from`, or zeros where source[i] is
+// 0xffffffff. Launch: a work-item for every `span` floats of the new rows, which are in one row.
 __kernel void remap_rows(const __global float* from,
                          __global float* to,
                          const __global uint* source,
-                         int width,
+                         uint width,
+                         uint span,
                          uint count) {
-  const size_t i = get_global_id(0);
-  if (i >= count) return;
-  const uint old = source[i];
-  for (int k = 0; k < width; ++k) {
-    to[i * width + k] = old == 0xffffffffu ? 0.0f : from[(size_t)old * width + k];
-  }
+  const size_t first = get_global_id(0) * (size_t)span;
+  if (first >= (size_t)count * width) return;
+  const uint old = source[first / width];
+  const __global float* row = from + (size_t)old * width + first % width;
+  for (uint k = 0; k < span; ++k) to[first + k] = old == 0xffffffffu ? 0.0f : row[k];
 }

@@ -106,20 +106,21 @@ BenchOperation SceneBench::Impl::view_by_bvh() {
 }
 
 BenchOperation SceneBench::Impl::backward() {
-  return {
-      [this] {
-        make_loss();
-        forward_with_hits();
-        image_loss->evaluate(picture, photo, false, {0, 0, 0}, model.camera.width,
-                             model.camera.height, image_gradient);
-      },
-      {},
-      [this] { tracer().backward(gaussians(), image_gradient, gradients); },
-      {{"backward",
-        {"trace/backward.cl", "trace/group_backward.cl", ":(fill)"},
-        false,
-        [this] { return backward_work(); }},
-       {"finalize", {"trace/finalize_gradients.cl"}, false, [this] { return finalize_work(); }}}};
+  return {[this] {
+            make_loss();
+            forward_with_hits();
+            image_loss->evaluate(picture, photo, false, {0, 0, 0}, model.camera.width,
+                                 model.camera.height, image_gradient);
+          },
+          {},
+          [this] { tracer().backward(gaussians(), image_gradient, gradients); },
+          {{"backward",
+            {"trace/backward.cl", "trace/group_backward.cl", ":(fill)"},
+            false,
+            [this] { return backward_work(); }},
+           {"finalize", {"trace/finalize_gradients.cl", "trace/group_finalize.cl"}, false, [this] {
+              return finalize_work();
+            }}}};
 }
 
 BenchOperation SceneBench::Impl::rays() {

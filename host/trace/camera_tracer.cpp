@@ -497,7 +497,9 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
       .define("ANGULAR", lens_kind == 2 ? 1 : 0)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
-  GaussianKernel kernel(context, "trace/finalize_gradients.cl", "finalize_gradients", build);
+  const bool cpu = context.device().type == DeviceType::kCpu;
+  GaussianKernel kernel(context, cpu ? "trace/finalize_gradients.cl" : "trace/group_finalize.cl",
+                        cpu ? "finalize_gradients" : "finalize_group", build);
   const RsFinalize pass{static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(sums.copies()),
                         screen_x(), screen_y()};
   kernel.launch(n, pass, camera, sums.lines(), lists.bounds(), lists.lines(), gaussians.arguments(),

@@ -28,7 +28,10 @@ GaussianKernel::GaussianKernel(Context& context,
       width_(gaussians_per_item(context.device())),
       group_(context.device().type == DeviceType::kCpu ? kCpuGroup : kGpuGroup) {
   BuildOptions wide = build;
-  wide_ = context.kernel(file, name, wide.define("VECTOR", width_));
+  wide.define("VECTOR", width_);
+  // Rows of the group's Gaussians go through local memory (cl/trace/staged_rows.h).
+  if (context.device().type != DeviceType::kCpu) wide.define("GROUP", group_);
+  wide_ = context.kernel(file, name, wide);
 }
 
 Kernel& GaussianKernel::single() {

@@ -149,8 +149,10 @@ void Adam::remap(const Buffer<std::uint32_t>& source, std::size_t new_count) {
           const std::size_t width = group_width(group, sh_degree_);
           Buffer<float> to(context_, width * new_count, "Adam moments");
           if (new_count > 0) {
-            remap_kernel_.launch(Range{{new_count, 1, 1}, {0, 0, 0}}, from, to, source,
-                                 static_cast<std::int32_t>(width), u32(new_count));
+            // Neighbours of GPUs touch neighbouring addresses.
+            const std::size_t span = cpu_ ? width : 1;
+            remap_kernel_.launch(Range{{new_count * width / span, 1, 1}, {0, 0, 0}}, from, to,
+                                 source, u32(width), u32(span), u32(new_count));
           }
           from = std::move(to);
         },

@@ -13,13 +13,13 @@ GROUP_CAMERA = dict(CAMERA, GROUP=32)
 GROUP_FORWARD = dict(GROUP_CAMERA, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 FORWARD = dict(CAMERA, BLOCK=1, PENDING=48, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 # candidate_lists.cpp, gaussian_kernel.cpp.
-VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, NEAR_DISTANCE=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1)
-LISTS = dict(TILE=16, PEAK_ORDER=1, LENS=0, VECTOR=1)
-FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, ANGULAR=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1)
+VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, NEAR_DISTANCE=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1, GROUP=64)
+LISTS = dict(TILE=16, PEAK_ORDER=1, LENS=0, VECTOR=1, GROUP=64)
+FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, ANGULAR=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1, GROUP=64)
 # ray_launch.cpp, ray_backward.cpp.
 WALK = dict(PACKET=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1)
 RAY_BACKWARD = dict(WALK, SH_DEGREE=3, RAY_SLOPES=0, PRIVATE_COPIES=0)
-RAY_GRADIENTS = dict(SIGMOID_SCALE=0, VECTOR=1)
+RAY_GRADIENTS = dict(SIGMOID_SCALE=0, VECTOR=1, GROUP=64)
 # image_loss.cpp: groups, or what devices get whose groups are smaller.
 LOSS = dict(VECTOR=1, TILE=16, ROWS=1, PIXEL_L2=0)
 # chunk_shape.cpp.
@@ -45,8 +45,9 @@ PROGRAMS = [
     ("backward exact", "trace/backward.cl", dict(CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=1)),
     ("prepare sh3", "trace/prepare_view.cl", VIEW),
     ("prepare sh0", "trace/prepare_view.cl", dict(VIEW, SH_DEGREE=0, SH_COEFFICIENTS=1)),
-    ("finalize sh3", "trace/finalize_gradients.cl", FINALIZE),
-    ("finalize pose", "trace/finalize_gradients.cl", dict(FINALIZE, POSE=1)),
+    ("finalize group sh3", "trace/group_finalize.cl", FINALIZE),
+    ("finalize group pose", "trace/group_finalize.cl", dict(FINALIZE, POSE=1)),
+    ("finalize group further", "trace/group_finalize.cl", dict(FINALIZE, ACCUMULATE=1)),
     ("lists", "trace/tile_lists.cl", LISTS),
     ("lists lens", "trace/tile_lists.cl", dict(LISTS, LENS=1)),
     ("lens tiles", "trace/lens_tiles.cl", dict(CAMERA_MODEL=1, TILE=16)),
@@ -91,10 +92,13 @@ PROGRAMS = [
     ("ceilings", "bench/ceilings.cl", dict(CHAINS=8)),
 ]
 
+# What GPUs never get.
+CPU_ONLY = {"trace/finalize_gradients.cl"}
+
 
 def unlisted():
     """Kernel files that no program above names. Probes are for tests."""
-    listed = {path for _, path, _ in PROGRAMS}
+    listed = {path for _, path, _ in PROGRAMS} | CPU_ONLY
     found = set()
     for folder, _, names in os.walk(KERNELS):
         for name in names:

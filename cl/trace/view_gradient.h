@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the gradients of Gaussians' lines (prepare_view.cl) to those of their parameters: mean,
+// unnormalised quaternion, scale parameter under either activation, opacity logit, SH coefficients
+// (with the direction's dependence on the mean), the screen statistics that density control reads
+// and the camera's gradient. Lanes that no ray touched may hold anything; they come out as zeros.
+#ifndef RS_TRACE_VIEW_GRADIENT_H
+#define RS_TRACE_VIEW_GRADIENT_H
+
+#include "trace/view.h"
+
+// The screen gradient counts the angle in which the mean is seen (LENS 2 of packet.h).
+#ifndef ANGULAR
+#define ANGULAR 0
+#endif
+
+typedef struct {
+  gv m[3];
+  gv axis[9];
+  gv w[3];
+} ViewGradient;
+
+void projective_gradient(const ViewGaussian* g, const gv* v, ViewGradient* out) {
+  const gv mx = g->m[0], my = g->m[1], mz = g->m[2];
+  const gv iz = 1.0f / mz;
+  const gv x0 = mx * iz, y0 = my * iz;
+  gv ex = 0, ey = 0, d0 = 0;
+  gv P[3], gP[3];
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    P[k] = g->w[(k + 1) % 3] * g->w[(k + 2) % 3];
+    out->m[k] = 0;
+  }
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const gv rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
+    const gv w = g->w[k];
+    const gv A = ry * mz - rz * my;
+    const gv B = rz * mx - rx * mz;
+    const gv gA = P[k] * P[k] * (2.0f * v[3] * A + v[4] * B);
+    const gv gB = P[k] * P[k] * (2.0f * v[5] * B + v[4] * A);
+    gP[k] = 2.0f * P[k] * (v[3] * A * A + v[4] * A * B + v[5] * B * B);
+    const gv along = rx * mx + ry * my + rz * mz;
+    const gv q = along * w;
+    d0 += q * q;
+    ex += q * rx * w;
+    ey += q * ry * w;
+    const gv ge = v[7] * rx + v[8] * ry;
+    const gv gq = 2.0f * v[6] * q * iz * iz + ge * w * iz;
+    out->w[k] =
+        ge * q * iz + 2.0f * w * (v[9] * rx * rx + v[10] * rx * ry + v[11] * ry * ry) + gq * along;
+    out->axis[3 * k] =
+        v[7] * q * w * iz + w * w * (2.0f * v[9] * rx + v[10] * ry) + gq * w * mx - gB * mz;
+    out->axis[3 * k + 1] =
+        v[8] * q * w * iz + w * w * (2.0f * v[11] * ry + v[10] * rx) + gq * w * my + gA * mz;
+    out->axis[3 * k + 2] = gq * w * mz - gA * my + gB * mx;
+    out->m[0] += gq * w * rx + gB * rz;
+    out->m[1] += gq * w * ry - gA * rz;
+    out->m[2] += gq * w * rz + gA * ry - gB * rx;
+  }
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    out->w[i] += gP[k] * g->w[j];
+    out->w[j] += gP[k] * g->w[i];
+  }
+  out->m[0] += v[0] * iz;
+  out->m[1] += v[1] * iz;
+  out->m[2] -= (v[0] * x0 + v[1] * y0) * iz + 2.0f * v[6] * d0 * iz * iz * iz +
+               (v[7] * ex + v[8] * ey) * iz * iz;
+}
+
+// In place of the projective gradient in the lanes where `general` holds.
+void general_gradient(const ViewGaussian* g, const gv* v, const gi general, ViewGradient* out) {
+  gv m[3] = {0, 0, 0};
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const gv w = g->w[k];
+    const gv go = v[9 + k];
+    gv along = 0, gw = 0;
+#pragma unroll
+    for (int j = 0; j < 3; ++j) {
+      const gv r = g->axis[3 * k + j];
+      along += r * g->m[j];
+      gw += v[3 * k + j] * r;
+      out->axis[3 * k + j] = general ? (v[3 * k + j] - go * g->m[j]) * w : out->axis[3 * k + j];
+      m[j] -= go * w * r;
+    }
+    out->w[k] = general ? gw - go * along : out->w[k];
+  }
+#pragma unroll
+  for (int j = 0; j < 3; ++j) out->m[j] = general ? m[j] : out->m[j];
+}
+
+// Of a line with gradient v.
+void line_gradient(
+    const ViewGaussian* g, const gv* v, const gi touched, const gi kind, ViewGradient* out) {
+  projective_gradient(g, v, out);
+  const gi general = kind == RS_LINE_GENERAL;
+  if (RS_ANY_GAUSSIAN(touched & general)) general_gradient(g, v, general, out);
+}
+
+// What density control reads: screen gradient, the sum of its absolute values, 1 where a ray met.
+void screen_statistics(const ViewGaussian* g,
+                       const gv* v,
+                       const gi touched,
+                       const gi kind,
+                       const float screen_x,
+                       const float screen_y,
+                       gv* out) {
+  const gv zero = (gv)(0.0f);
+  const gi counts = touched & (kind == RS_LINE_PROJECTIVE);
+#if ANGULAR
+  const gv x0 = g->m[0] / g->m[2], y0 = g->m[1] / g->m[2];
+  const gv across = x0 * v[0] + y0 * v[1];
+  const gv slope =
+      screen_x * sqrt((1.0f + x0 * x0 + y0 * y0) * (v[0] * v[0] + v[1] * v[1] + across * across));
+#else
+  const gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
+#endif
+  out[0] = counts ? slope : zero;
+  out[1] = counts ? v[2] : zero;
+  out[2] = touched ? (gv)(1.0f) : zero;
+}
+
+// What the colour of a Gaussian depends on: its direction n = (m - c) / |m - c| and max(0, .),
+// which passes nothing where it clamps.
+typedef struct {
+  gv n[3];
+  gv inverse;  // 1 / |m - c|
+  gv basis[RS_SH_FUNCTIONS];
+  gv slope[3];  // of R, G, B before they are clamped
+} ColourGradient;
+
+void colour_gradient(
+    const gv* offset, const gv* line, const gv* v, const gi touched, ColourGradient* out) {
+  const gv zero = (gv)(0.0f);
+  const gv* d = offset;
+  out->inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
+#pragma unroll
+  for (int j = 0; j < 3; ++j) {
+    out->n[j] = d[j] * out->inverse;
+    out->slope[j] = (touched & (line[13 + j] > 0.0f)) ? v[13 + j] : zero;
+  }
+  rs_sh_basis(SH_DEGREE, out->n[0], out->n[1], out->n[2], out->basis);
+}
+
+// The share of the mean's gradient that comes from the colour; `along` holds per function the
+// product of its coefficients with the slope.
+void direction_gradient(const ColourGradient* colour, const gv* along, gv* mean) {
+  const gv* n = colour->n;
+  gv gn[3];
+  rs_sh_gradient(SH_DEGREE, n[0], n[1], n[2], along, gn);
+  const gv radial = gn[0] * n[0] + gn[1] * n[1] + gn[2] * n[2];
+#pragma unroll
+  for (int j = 0; j < 3; ++j) mean[j] = (gn[j] - radial * n[j]) * colour->inverse;
+}
+
+typedef struct {
+  gv mean[3];  // holds the share of the colour before
+  gv quaternion[4];
+  gv scale[3];
+  gv opacity;
+} ParameterGradient;
+
+void parameter_gradient(const ViewGaussian* g,
+                        const ViewGradient* view,
+                        const gv opacity,
+                        const gi touched,
+                        const RsCamera* camera,
+                        ParameterGradient* out) {
+  const gv zero = (gv)(0.0f);
+  const float* V = camera->rotation;
+  gv gR[9];
+#pragma unroll
+  for (int j = 0; j < 3; ++j) {
+    const gv mean = V[j] * view->m[0] + V[3 + j] * view->m[1] + V[6 + j] * view->m[2];
+    out->mean[j] = touched ? mean + out->mean[j] : zero;
+#pragma unroll
+    for (int k = 0; k < 3; ++k) {
+      gR[3 * j + k] = V[j] * view->axis[3 * k] + V[3 + j] * view->axis[3 * k + 1] +
+                      V[6 + j] * view->axis[3 * k + 2];
+    }
+  }
+  gv gq[4];
+  rotation_gradient(g->q, gR, gq);
+  const gv along = gq[0] * g->q[0] + gq[1] * g->q[1] + gq[2] * g->q[2] + gq[3] * g->q[3];
+#pragma unroll
+  for (int j = 0; j < 4; ++j) {
+    const gv value = (gq[j] - g->q[j] * along) / g->q_norm;
+    out->quaternion[j] = touched ? value : zero;
+  }
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const gi moves = touched & (g->raw_scale[k] >= g->scale[k]);
+    const gv value = -view->w[k] * g->w[k] * scale_log_derivative(g->scale[k]);
+    out->scale[k] = moves ? value : zero;
+  }
+  out->opacity = touched ? opacity * g->opacity * (1.0f - g->opacity) : zero;
+}
+
+// Contribution to the camera's gradient: centre in world axes, left rotation vector in camera axes.
+// The mean enters only through m - c, so the centre takes the opposite of its gradient.
+void pose_gradient(
+    const ViewGaussian* g, const ViewGradient* view, const gv* mean, const gi touched, gv* out) {
+  gv rotation[3];
+  rotation[0] = g->m[1] * view->m[2] - g->m[2] * view->m[1];
+  rotation[1] = g->m[2] * view->m[0] - g->m[0] * view->m[2];
+  rotation[2] = g->m[0] * view->m[1] - g->m[1] * view->m[0];
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const gv* r = g->axis + 3 * k;
+    const gv* gr = view->axis + 3 * k;
+    rotation[0] += r[1] * gr[2] - r[2] * gr[1];
+    rotation[1] += r[2] * gr[0] - r[0] * gr[2];
+    rotation[2] += r[0] * gr[1] - r[1] * gr[0];
+  }
+#pragma unroll
+  for (int j = 0; j < 3; ++j) {
+    out[j] = -mean[j];
+    out[3 + j] = touched ? rotation[j] : (gv)(0.0f);
+  }
+}
+
+#endif
