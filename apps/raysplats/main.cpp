@@ -72,7 +72,9 @@ int run(int argc, char** argv) {
                                       add_view_command(app),
                                       add_report_command(app),
                                       add_bench_command(app),
-                                      add_tune_command(app)};
+                                      add_tune_command(app),
+                                      add_completion_command(app),
+                                      add_manual_command(app)};
   try {
     std::vector<std::string> arguments = own_arguments(argc, argv);
     std::reverse(arguments.begin(), arguments.end());  // the order that CLI11 takes them in

@@ -259,12 +259,13 @@ CLI::Validator seed() {
 }
 
 CLI::Validator one_of(std::vector<std::string> names) {
+  const std::string name = fmt::format("{}", fmt::join(names, "|"));
   return CLI::Validator(
       [names = std::move(names)](const std::string& text) {
         if (std::find(names.begin(), names.end(), text) != names.end()) return std::string();
         return fmt::format("'{}' is none of {}", text, fmt::join(names, ", "));
       },
-      "");
+      "", name);
 }
 
 CLI::Validator triple() {

@@ -47,6 +47,8 @@ Command add_view_command(CLI::App& app);
 Command add_report_command(CLI::App& app);
 Command add_bench_command(CLI::App& app);
 Command add_tune_command(CLI::App& app);
+Command add_completion_command(CLI::App& app);
+Command add_manual_command(CLI::App& app);
 
 struct DeviceFlags {
   std::string device;
@@ -98,6 +100,7 @@ CLI::Validator between(double low, double high);
 CLI::Validator whole_between(double low, double high);
 /// 0 to 2^64 - 1.
 CLI::Validator seed();
+/// Its name is the words with '|' between them (command_tree()).
 CLI::Validator one_of(std::vector<std::string> names);
 /// Three numbers with commas, for example a colour or a direction.
 CLI::Validator triple();

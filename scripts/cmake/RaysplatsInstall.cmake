@@ -10,7 +10,7 @@ set(images_archive "")
 if(RAYSPLATS_IMAGES_STATIC)
   set(images_archive raysplats_images)
 else()
-  install(TARGETS raysplats_images LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS raysplats_images LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime)
 endif()
 install(
   TARGETS raysplats
@@ -26,13 +26,18 @@ install(
           raysplats_train
           ${images_archive}
   EXPORT raysplatsTargets
-  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(TARGETS raysplats_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY include/raysplats DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
-install(DIRECTORY configs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/raysplats/configs FILES_MATCHING PATTERN "*.toml")
-install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/raysplats)
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
+install(TARGETS raysplats_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+install(DIRECTORY include/raysplats DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY configs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/raysplats/configs COMPONENT runtime
+        FILES_MATCHING PATTERN "*.toml")
+install(FILES LICENSE CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/raysplats COMPONENT runtime)
+# Debian looks for this name.
+install(FILES scripts/cmake/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/raysplats COMPONENT runtime)
+install(FILES scripts/cmake/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/raysplats-dev COMPONENT dev)
+include(RaysplatsManual)
 
-install(EXPORT raysplatsTargets NAMESPACE raysplats:: DESTINATION ${package_directory})
+install(EXPORT raysplatsTargets NAMESPACE raysplats:: DESTINATION ${package_directory} COMPONENT dev)
 set(RAYSPLATS_USES_OPENCV ${OpenCV_FOUND})
 if(NOT RAYSPLATS_IMAGES_STATIC)
   set(RAYSPLATS_USES_OPENCV FALSE)
@@ -46,4 +51,5 @@ write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/package/raysplatsCo
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/package/raysplatsConfig.cmake
               ${CMAKE_CURRENT_BINARY_DIR}/package/raysplatsConfigVersion.cmake
               scripts/cmake/RaysplatsOpenCV.cmake
-        DESTINATION ${package_directory})
+        DESTINATION ${package_directory} COMPONENT dev)
+include(RaysplatsPackage)

@@ -36,7 +36,9 @@ TEST_CASE("docs/cli.md lists what -h lists") {
                                                   {"report"},
                                                   {"bench"},
                                                   {"bench", "compare"},
-                                                  {"tune"}}) {
+                                                  {"tune"},
+                                                  {"completion"},
+                                                  {"manual"}}) {
     std::vector<std::string> words = command;
     words.emplace_back("-h");
     const Outcome help = raysplats_program(words);

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+# cpack: Debian packages of the program and of the library's headers, and one archive that runs from anywhere.
+set(RAYSPLATS_MAINTAINER "RaySplats-CL contributors <raysplats@example.org>" CACHE STRING
+                                                                             "Name and address in Debian packages")
+set(CPACK_PACKAGE_NAME raysplats)
+set(CPACK_PACKAGE_VENDOR "RaySplats-CL")
+set(CPACK_PACKAGE_CONTACT ${RAYSPLATS_MAINTAINER})
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "train and ray trace 3D Gaussians on any OpenCL device")
+set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
+set(CPACK_GENERATOR DEB TGZ)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_ALL runtime dev)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
+                                                WORLD_EXECUTE)
+
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_MAINTAINER ${RAYSPLATS_MAINTAINER})
+set(CPACK_DEBIAN_PACKAGE_HOMEPAGE "")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME raysplats)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "pocl-opencl-icd | opencl-icd")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "ffmpeg, colmap")
+set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
+    "Photos go in, a standard 3D Gaussian Splatting model comes out, on GPUs of every vendor and on CPUs.")
+set(CPACK_DEBIAN_DEV_PACKAGE_NAME raysplats-dev)
+set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
+    "raysplats (= ${PROJECT_VERSION}), ocl-icd-opencl-dev, opencl-clhpp-headers, libglm-dev, libfmt-dev, libspdlog-dev, \
+nlohmann-json3-dev, libxxhash-dev, libtinyobjloader-dev, libtinygltf-dev, libtomlplusplus-dev, zlib1g-dev, libzstd-dev")
+set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers, static libraries and the CMake package of RaySplats-CL.")
+include(CPack)
