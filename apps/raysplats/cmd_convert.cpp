@@ -67,7 +67,7 @@ Command add_convert_command(CLI::App& app) {
       ->type_name("");
   command
       ->add_option("-o,--output", options->output,
-                   "What to write, by its ending: .ply, .splat, .spz or .glb")
+                   "What to write, by its ending: .ply, .compressed.ply, .splat, .spz or .glb")
       ->required()
       ->type_name("FILE");
   command->add_option("--sh-degree", changes.sh_degree, "Keep or fill up this many SH degrees")

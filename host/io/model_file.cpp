@@ -69,19 +69,15 @@ std::array<double, 3> model_origin(const std::filesystem::path& path) {
 ModelFormat output_format(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
   if (extension == ".ply") {
-    if (lower_extension(path.stem()) == ".compressed") {
-      throw UsageError(fmt::format(
-          "{} cannot be written: compressed PLY is read only, give a name that ends in .ply, "
-          ".splat, .spz or .glb",
-          path.string()));
-    }
-    return ModelFormat::kPly;
+    return lower_extension(path.stem()) == ".compressed" ? ModelFormat::kCompressedPly
+                                                         : ModelFormat::kPly;
   }
   if (extension == ".splat") return ModelFormat::kSplat;
   if (extension == ".spz") return ModelFormat::kSpz;
   if (extension == ".glb") return ModelFormat::kGltf;
   throw UsageError(fmt::format(
-      "{} does not say what to write: give a name that ends in .ply, .splat, .spz or .glb",
+      "{} does not say what to write: give a name that ends in .ply, .compressed.ply, .splat, .spz "
+      "or .glb",
       path.string()));
 }
 
@@ -89,6 +85,12 @@ std::string losses(ModelFormat format, const Gaussians& model) {
   switch (format) {
     case ModelFormat::kPly:
       return "nothing is lost";
+    case ModelFormat::kCompressedPly:
+      return fmt::format(
+          "positions, scales, colours and opacities are kept to 1/1000 of their range among 256 "
+          "neighbours (8 bits for colours), rotations to 1/700{}{}",
+          model.sh_degree > 0 ? ", SH to 8 bits between -4 and 4" : "",
+          model.sh_degree > 3 ? ", SH above degree 3 is left out" : "");
     case ModelFormat::kSplat:
       return fmt::format(
           "{}colours are cut to 0..1, colours, opacities and rotations have 8 bits",
@@ -126,6 +128,7 @@ Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& enc
       return encoding.spz_axes == SpzAxes::kRub ? transformed(model, io::rub_turn()) : model;
     }
     case io::ModelFormat::kPly:
+    case io::ModelFormat::kCompressedPly:
       return read_ply(path);
     case io::ModelFormat::kUnknown:
       break;
@@ -143,6 +146,8 @@ void write_model(const std::filesystem::path& path,
   switch (io::output_format(path)) {
     case io::ModelFormat::kPly:
       return write_ply(path, model, trace, origin);
+    case io::ModelFormat::kCompressedPly:
+      return io::write_compressed_ply(path, model);
     case io::ModelFormat::kSplat:
       return io::write_splat(path, model);
     case io::ModelFormat::kGltf:

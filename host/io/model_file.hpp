@@ -10,7 +10,8 @@
 
 namespace raysplats::io {
 
-enum class ModelFormat { kPly, kSplat, kSpz, kGltf, kUnknown };
+/// A compressed PLY is read as kPly, which its first bytes say.
+enum class ModelFormat { kPly, kCompressedPly, kSplat, kSpz, kGltf, kUnknown };
 
 /// What a file is, by its first bytes, else by its extension.
 ModelFormat model_format(const std::filesystem::path& path);

@@ -38,5 +38,7 @@ void write_glb(const std::filesystem::path& path, const Gaussians& model);
 
 /// PlayCanvas' compressed PLY: chunks of 256 Gaussians in 16 bytes each, and SH in bytes.
 Gaussians read_compressed_ply(const std::filesystem::path& path);
+/// Along the Morton curve, so that chunks are small. SH above degree 3 is left out.
+void write_compressed_ply(const std::filesystem::path& path, const Gaussians& model);
 
 }  // namespace raysplats::io

@@ -30,9 +30,9 @@ struct ModelEncoding {
 /// oversized.
 Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding = {});
 
-/// Writes atomically what the name's extension says: .ply, .splat, .spz or .glb. `trace` and
-/// `origin` as for write_ply(); other formats do not keep them. Throws UsageError for other names,
-/// DataError for what the format cannot hold.
+/// Writes atomically what the name's extension says: .ply, .compressed.ply, .splat, .spz or .glb.
+/// `trace` and `origin` as for write_ply(); other formats do not keep them. Throws UsageError for
+/// other names, DataError for what the format cannot hold.
 void write_model(const std::filesystem::path& path,
                  const Gaussians& model,
                  const ModelEncoding& encoding = {},

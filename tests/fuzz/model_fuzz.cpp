@@ -28,7 +28,7 @@ void parse(std::span<const std::uint8_t> input) {
     path = scratch().write(kNames[choice], input);
   }
   const Gaussians model = read_model(path);
-  for (const char* name : {"copy.ply", "copy.spz", "copy.splat"}) {
+  for (const char* name : {"copy.ply", "copy.compressed.ply", "copy.spz", "copy.splat"}) {
     const std::filesystem::path copy = scratch().path() / name;
     write_model(copy, model);
     if (read_model(copy).size() != model.size()) std::abort();

@@ -143,7 +143,8 @@ void bind_gaussians(nb::module_& module) {
           nb::arg("origin") = std::array<double, 3>{}, nb::kw_only(), nb::arg("spz_axes") = "ply",
           nb::arg("spz_version") = ModelEncoding{}.spz_version,
           nb::call_guard<nb::gil_scoped_release>(),
-          "Writes .ply, .splat, .spz or .glb. `options` and the `origin` from which positions "
+          "Writes .ply, .compressed.ply, .splat, .spz or .glb. `options` and the `origin` from "
+          "which positions "
           "count, as Dataset.origin, go into the header of a PLY.")
       .def_static("load_origin", &read_ply_origin, nb::arg("path"),
                   "The origin in the header of a PLY; 0 where it says none.")

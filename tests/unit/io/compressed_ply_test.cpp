@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
+#include "core/morton_order.hpp"
 #include "model_bytes.hpp"
 
 using namespace raysplats;
@@ -91,6 +93,63 @@ TEST_CASE("compressed PLY: chunks, old colours and sizes around a chunk") {
   const Scratch scratch;
   write_bytes(scratch / "a.ply", compressed(5, 24));
   CHECK(read_ply(scratch / "a.ply").sh_degree == 2);
+}
+
+TEST_CASE("compressed PLY: what is written is read again within the steps of the format") {
+  const Scratch scratch;
+  for (const std::size_t count : {0u, 1u, 255u, 256u, 257u, 1500u}) {
+    for (const int degree : {0, 1, 2, 3, 4}) {
+      CAPTURE(count);
+      CAPTURE(degree);
+      // Along the curve already, so that nothing changes places.
+      const Gaussians model = in_morton_order(trained_like(count, degree));
+      write_model(scratch / "a.compressed.ply", model);
+      const Gaussians back = read_model(scratch / "a.compressed.ply");
+      REQUIRE(back.size() == count);
+      CHECK(back.sh_degree == std::min(degree, 3));
+      // Half a step of the widest chunk: 11 bits of a range below 24, 10 bits of the middle axis.
+      CHECK(farthest(back.means, model.means) <= 24.0 / 1023 / 2);
+      CHECK(farthest(back.log_scales, model.log_scales) <= 10.0 / 1023 / 2);
+      const auto stride = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
+      const auto kept = static_cast<std::size_t>(3 * sh_coefficients(back.sh_degree));
+      for (std::size_t i = 0; i < count; ++i) {
+        double cosine = 0;
+        for (std::size_t k = 0; k < 4; ++k)
+          cosine += static_cast<double>(model.quaternions[4 * i + k] * back.quaternions[4 * i + k]);
+        CHECK(std::abs(cosine) > 1 - 4e-6);
+        const auto opacity = [](float logit) { return 1 / (1 + std::exp(-logit)); };
+        CHECK(std::abs(opacity(model.opacities[i]) - opacity(back.opacities[i])) <= 0.0021f);
+        for (std::size_t k = 0; k < kept; ++k) {
+          const double step = k < 3 ? 2.0 / 255 / 2 / 0.28 : 8.0 / 256;
+          CHECK(std::abs(model.sh[stride * i + k] - back.sh[kept * i + k]) <= step);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("compressed PLY: equal Gaussians, ends of the ranges and sizes are exact") {
+  const Scratch scratch;
+  const Gaussians model = read(compressed(300, 9));
+  write_model(scratch / "a.compressed.ply", model);
+  const Gaussians back = read_model(scratch / "a.compressed.ply");
+  CHECK(back.means == model.means);
+  CHECK(back.log_scales == model.log_scales);
+  // Those of the file do not leave out their largest number.
+  double cosine = 0;
+  for (std::size_t k = 0; k < 4; ++k)
+    cosine += static_cast<double>(model.quaternions[k] * back.quaternions[k]);
+  CHECK(std::abs(cosine) > 1 - 4e-6);
+  CHECK(back.opacities == model.opacities);
+  CHECK(back.sh == model.sh);
+  // 16 bytes each, 9 of SH, 72 for each of two chunks.
+  const std::string bytes = read_bytes(scratch / "a.compressed.ply");
+  CHECK(bytes.size() - bytes.find("end_header\n") - 11 == 300 * (16 + 9) + 2 * 72);
+  Gaussians huge = trained_like(2, 0);
+  huge.log_scales[0] = 90;
+  write_model(scratch / "b.compressed.ply", huge);
+  const Gaussians cut = read_model(scratch / "b.compressed.ply");
+  CHECK(std::max(cut.log_scales[0], cut.log_scales[3]) == 20.0f);
 }
 
 TEST_CASE("compressed PLY: damage ends in one sentence") {

@@ -38,7 +38,7 @@ TEST_CASE("a file is what its first bytes say") {
   write_bytes(scratch / "a.txt", "hello");
   CHECK(contains(data_error([&] { read_model(scratch / "a.txt"); }), "no model that is known"));
   CHECK(contains(data_error([&] { read_model(scratch / "none.spz"); }), "does not exist"));
-  for (const char* name : {"a.obj", "a", "a.compressed.ply", "a.gltf"})
+  for (const char* name : {"a.obj", "a", "a.compressed.spz.x", "a.gltf"})
     CHECK(contains(usage_error([&] { write_model(scratch / name, model); }), ".splat"));
 }
 
