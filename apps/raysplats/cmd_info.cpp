@@ -112,6 +112,7 @@ const char* source_name(SceneCamera::Source source) {
       return "data set";
     case SceneCamera::Source::kOrbit:
       return "orbit";
+    case SceneCamera::Source::kGiven:
     case SceneCamera::Source::kNone:
       break;
   }

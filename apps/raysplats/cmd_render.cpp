@@ -8,17 +8,19 @@
 #include <cstdio>
 #include <memory>
 
-#include "base/output_directory.hpp"
+#include "core/camera_path.hpp"
 #include "core/morton_order.hpp"
 #include "core/orbit.hpp"
 #include "eval/frame_writer.hpp"
 #include "eval/output_check.hpp"
 #include "frame_progress.hpp"
 #include "io/data_origin.hpp"
+#include "io/scene_camera.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render_flags.hpp"
+#include "render_output.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/model_source.hpp"
 
@@ -38,25 +40,41 @@ void check(const RenderFlags& options) {
                                    options.model));
     }
   }
-  const int sources = (options.data.data.empty() ? 0 : 1) + (options.cameras.empty() ? 0 : 1);
-  if (sources == 0 && !options.orbit) {
+  options.check_path_options();
+  const bool data = !options.data.data.empty();
+  const int along =
+      (options.ellipse ? 1 : 0) + (options.spiral ? 1 : 0) + (options.interpolate ? 1 : 0);
+  const int made = along + (options.orbit ? 1 : 0);
+  const int files = (options.cameras.empty() ? 0 : 1) + (options.path.empty() ? 0 : 1);
+  if (!data && made + files == 0) {
     throw UsageError(
-        "There are no cameras to render from: give --data DATASET, --cameras transforms.json or "
-        "--orbit N");
+        "There are no cameras to render from: give --data DATASET, --cameras transforms.json, "
+        "--path FILE or --orbit N");
   }
-  if (sources == 2 || (options.orbit && !options.cameras.empty())) {
+  if (made > 1 || files > 1) {
     throw UsageError(
-        "--cameras is a path of its own: leave out --data and --orbit, or leave out --cameras "
-        "(--orbit goes with --data)");
+        "--orbit, --ellipse, --spiral, --interpolate, --cameras and --path are paths of their "
+        "own: choose one");
   }
-  const bool shaped = options.width || options.height || options.fov || options.elevation ||
-                      options.distance || options.up || options.camera_model;
+  if (files > 0 && (made > 0 || data)) {
+    throw UsageError(
+        "--cameras and --path bring their own cameras: leave out --data and --orbit, --ellipse, "
+        "--spiral and --interpolate, which go with --data");
+  }
+  if (along > 0 && !data)
+    throw UsageError("--ellipse, --spiral and --interpolate follow photos: add --data DATASET");
+  const bool shaped =
+      options.fov || options.elevation || options.distance || options.up || options.camera_model;
   if (shaped && !options.orbit) {
     throw UsageError(
-        "--width, --height, --fov, --elevation, --distance, --up and --camera-model shape an "
-        "orbit: add --orbit N");
+        "--fov, --elevation, --distance, --up and --camera-model shape an orbit: add --orbit N");
   }
-  options.data.check_used(options.orbit.has_value());
+  if ((options.width || options.height) && made == 0 && options.path.empty()) {
+    throw UsageError(
+        "--width and --height are for --path and --orbit, --ellipse, --spiral or --interpolate: "
+        "other cameras have their sizes, which --downscale reduces");
+  }
+  options.data.check_used(made > 0);
   if (options.fov && options.camera_model == "equirectangular") {
     throw UsageError(
         "--fov is for other camera models: an equirectangular picture shows everything around");
@@ -73,6 +91,16 @@ CameraModel camera_model(const std::string& name) {
 std::vector<Camera> cameras_of(const Dataset& dataset, Split split) {
   std::vector<Camera> cameras;
   for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
+  return cameras;
+}
+
+/// Cameras that follow the photos of a data set.
+std::vector<Camera> along(const RenderFlags& options, const std::vector<Camera>& photos) {
+  std::vector<Camera> cameras = options.ellipse ? ellipse_cameras(photos, *options.ellipse)
+                                : options.spiral
+                                    ? spiral_cameras(photos, *options.spiral)
+                                    : interpolated_cameras(photos, *options.interpolate);
+  for (Camera& camera : cameras) camera = resized(camera, options.width, options.height);
   return cameras;
 }
 
@@ -131,41 +159,53 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   }
 
   std::vector<Camera> cameras;
+  std::optional<double> fps;
+  bool closed = options.orbit || options.ellipse || options.spiral;
   if (options.orbit) {
     cameras = orbit(options, model, cameras_of(dataset, Split::kAll));
-  } else if (!options.cameras.empty()) {
-    for (const Camera& camera : read_cameras(options.cameras)) {
-      cameras.push_back(downscaled(camera, options.data.downscale.value_or(1.0)));
-      io::move_origin(cameras.back(), {source.origin[0], source.origin[1], source.origin[2]});
+  } else if (options.ellipse || options.spiral || options.interpolate) {
+    cameras = along(options, cameras_of(dataset, Split::kAll));
+  } else if (!options.cameras.empty() || !options.path.empty()) {
+    if (!options.path.empty()) {
+      CameraPathFile path = read_path(options);
+      cameras = std::move(path.cameras);
+      fps = path.fps;
+      closed = path.closed;
+    } else {
+      cameras = read_cameras(options.cameras);
+    }
+    for (Camera& camera : cameras) {
+      camera = downscaled(camera, options.data.downscale.value_or(1.0));
+      io::move_origin(camera, {source.origin[0], source.origin[1], source.origin[2]});
     }
   } else {
     cameras = cameras_of(dataset, options.data.chosen_split());
   }
   if (cameras.empty()) throw no_views(options.data);
-  if (!options.data.data.empty()) check_not_data(options.output, dataset);
-  if (!options.cameras.empty()) check_not_data(options.output, options.cameras);
-  check_leftovers(options.output, frame_names(cameras), options.frame_options().format,
-                  options.overwrite);
+  if (!options.data.data.empty() && !options.output.empty())
+    check_not_data(options.output, dataset);
+  RenderOutput output(options, cameras, cameras.size(), fps, closed);
 
   TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   trace.depth = options.depth;
   const std::unique_ptr<Context> context = open_context(options.device);
   const Model on_device(*context, model);
   Tracer tracer(*context, trace, mirrors_of(source));
-  make_output_directory(options.output);
+  output.begin();
   spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(), cameras.size());
 
   FrameProgress progress("rendering", cameras.size(), global.quiet);
   const FrameReport report = write_frames(
-      tracer, on_device, cameras, options.output, options.frame_options(),
+      tracer, on_device, cameras, options.output, output.options(),
       [&](std::size_t done) { return progress.done(done); },
       [&](double share) { return progress.within(share); });
-  progress.finish(report.frames, "frames: what is in " + options.output + " is whole");
+  progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
+  output.finish();
   warn_of_capped_rays(report.capped_rays, report.rays, trace);
   const std::string speed =
       fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,
                   1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
-  fmt::print("{} frames in {} ({})\n", report.frames, options.output,
+  fmt::print("{} frames in {} ({})\n", report.frames, output.name(),
              with_compiling(speed, context->build_seconds()));
   if (options.device.profile) fmt::print("{}", context->profile_table());
 }
@@ -182,9 +222,11 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
           "Model (PLY, .splat, SPZ, glTF), the folder of a training run, or a scene file (.toml)")
       ->required()
       ->type_name("");
-  command->add_option("-o,--output", options->output, "Folder for the frames")
-      ->required()
-      ->type_name("DIR");
+  command->add_option("-o,--output", options->output, "Folder for the frames")->type_name("DIR");
+  command
+      ->add_option("--video", options->video,
+                   "All frames as one file: .mp4 or .webm (by ffmpeg), .gif or .apng")
+      ->type_name("FILE");
   add_overwrite_flag(*command, options->overwrite);
   command->add_option("--format", options->format, "exr (float RGBA), png or jpg (8-bit RGB)")
       ->check(one_of({"exr", "png", "jpg"}))
@@ -206,6 +248,59 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->group(where)
       ->transform(whole_between(1, 1e6))
       ->type_name("N");
+
+  command
+      ->add_option("--path", options->path,
+                   "Camera path: JSON of nerfstudio or the viewer's page, or keyframes in TOML")
+      ->group(where)
+      ->type_name("FILE");
+  command
+      ->add_option("--ellipse", options->ellipse,
+                   "N cameras on the ellipse along which --data's photos lie")
+      ->group(where)
+      ->transform(whole_between(1, 1e6))
+      ->type_name("N");
+  command
+      ->add_option("--spiral", options->spiral, "N cameras on a spiral about --data's mean photo")
+      ->group(where)
+      ->transform(whole_between(1, 1e6))
+      ->type_name("N");
+  command
+      ->add_option("--interpolate", options->interpolate,
+                   "From photo to photo of --data, N frames each")
+      ->group(where)
+      ->transform(whole_between(1, 1e4))
+      ->type_name("N");
+
+  const std::string time = "Time";
+  command->add_option("--seconds", options->seconds, "Of --path (the file's)")
+      ->group(time)
+      ->transform(between(1e-3, 86400));
+  command
+      ->add_option("--fps", options->fps,
+                   "Frames a second of --path and --video (the file's, or 30)")
+      ->group(time)
+      ->transform(between(1e-3, 1000));
+  command
+      ->add_flag("--constant-speed", options->constant_speed,
+                 "The eye of --path moves at one speed, whatever the file says of seconds")
+      ->group(time);
+  command
+      ->add_option("--path-transform", options->path_transform,
+                   "dataparser_transforms.json of nerfstudio, for paths in its scaled world")
+      ->group(time)
+      ->type_name("FILE");
+  command
+      ->add_option("--shutter-samples", options->shutter_samples,
+                   "Motion blur: moments of every frame that are averaged (models alone)")
+      ->group(time)
+      ->transform(whole_between(1, 1024))
+      ->type_name("N");
+  command
+      ->add_option("--shutter", options->shutter,
+                   "Share of the time to the next frame in which they lie (0.5)")
+      ->group(time)
+      ->transform(between(1e-3, 1));
 
   const std::string orbit = "Orbit";
   command

@@ -16,7 +16,18 @@ struct RenderFlags {
   DataFlags data;
   std::string cameras;
   std::optional<int> orbit;
+  std::string path;
+  std::string path_transform;
+  std::optional<double> seconds;
+  std::optional<double> fps;
+  bool constant_speed = false;
+  std::optional<int> ellipse;
+  std::optional<int> spiral;
+  std::optional<int> interpolate;
   std::string output;
+  std::string video;
+  std::optional<double> shutter;
+  std::optional<int> shutter_samples;
   bool overwrite = false;
   std::string format = "png";
   std::string exr;  ///< "linear", "display" or "" = not given
@@ -38,6 +49,8 @@ struct RenderFlags {
 
   /// Throws UsageError for options that do not go with the format.
   FrameOptions frame_options() const;
+  /// Throws UsageError for those of a camera path without one.
+  void check_path_options() const;
 };
 
 /// Whether the first argument of `render` is a scene file: its name ends in .toml.

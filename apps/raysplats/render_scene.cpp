@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/output_directory.hpp"
 #include "eval/output_check.hpp"
 #include "eval/scene_frames.hpp"
 #include "frame_progress.hpp"
@@ -15,6 +14,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/path_tracer.hpp"
 #include "render_flags.hpp"
+#include "render_output.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats::cli {
@@ -35,11 +35,22 @@ void check(const RenderFlags& flags) {
     throw UsageError(
         "--near is for models alone: rays that leave a mirror have no camera that could be near");
   }
-  const bool data = !flags.data.data.empty();
-  if (!flags.cameras.empty() && (data || flags.orbit)) {
+  if (flags.shutter_samples) {
     throw UsageError(
-        "--cameras is a path of its own: leave out --data and --orbit, or leave out --cameras "
-        "(--orbit goes with --data)");
+        "--shutter-samples is for models alone: what moves in a scene file has no blur");
+  }
+  if (flags.ellipse || flags.spiral || flags.interpolate) {
+    throw UsageError(
+        "--ellipse, --spiral and --interpolate are for models: give a scene file --path or "
+        "--orbit");
+  }
+  flags.check_path_options();
+  const bool data = !flags.data.data.empty();
+  const int files = (flags.cameras.empty() ? 0 : 1) + (flags.path.empty() ? 0 : 1);
+  if (files > 1 || (files > 0 && (data || flags.orbit))) {
+    throw UsageError(
+        "--cameras and --path bring their own cameras: give one of them, without --data and "
+        "--orbit (which go together)");
   }
   if ((flags.fov || flags.elevation || flags.distance || flags.up) && !flags.orbit) {
     throw UsageError("--fov, --elevation, --distance and --up shape an orbit: add --orbit N");
@@ -61,8 +72,8 @@ void check_angle(const RenderFlags& flags, const SceneCamera& camera) {
   }
 }
 
-/// What the command line says goes over what the file says.
-void override_camera(const RenderFlags& flags, SceneFile& scene) {
+/// What the command line says goes over what the file says. `fps` is that of a path.
+void override_camera(const RenderFlags& flags, SceneFile& scene, std::optional<double>& fps) {
   SceneCamera& camera = scene.camera;
   scene.width = flags.width;
   scene.height = flags.height;
@@ -96,12 +107,21 @@ void override_camera(const RenderFlags& flags, SceneFile& scene) {
     camera.file = flags.data.data;
     camera.split = flags.data.chosen_split();
     camera.data_options = flags.data.over({});
+  } else if (!flags.path.empty()) {
+    CameraPathFile path = read_path(flags);
+    camera = {};
+    camera.source = Source::kGiven;
+    camera.given = std::move(path.cameras);
+    scene.width = scene.height = std::nullopt;  // they have it already
+    // One frame for each, unless the file's animation is longer or shorter.
+    if (!scene.frames) scene.frames = static_cast<int>(camera.given.size());
+    fps = path.fps;
   } else if (!flags.cameras.empty()) {
     camera = {};
     camera.source = Source::kFile;
     camera.file = flags.cameras;
   }
-  if (data || !flags.cameras.empty()) camera.place = scene.path.string();
+  if (data || camera.source == Source::kFile) camera.place = scene.path.string();
   if (!data) scene.downscale = flags.data.downscale.value_or(1.0);
 }
 
@@ -142,19 +162,6 @@ void print_summary(const SceneReport& report, const std::string& output, double 
 
 }  // namespace
 
-FrameOptions RenderFlags::frame_options() const {
-  FrameOptions out;
-  if (format == "exr") out.format = FrameFormat::kExr;
-  if (format == "jpg") out.format = FrameFormat::kJpg;
-  if (!exr.empty() && format != "exr") {
-    throw UsageError(fmt::format("--exr {} is for --format exr, not {}", exr, format));
-  }
-  out.linear_exr = exr != "display";
-  out.supersample = supersample;
-  out.depth = depth;
-  return out;
-}
-
 bool is_scene_file(const std::string& model) {
   return std::filesystem::path(model).extension() == ".toml";
 }
@@ -164,7 +171,8 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   SceneFile file = read_scene_file(flags.model);
   find_models(file);
   check_angle(flags, file.camera);
-  override_camera(flags, file);
+  std::optional<double> fps;
+  override_camera(flags, file, fps);
   file.trained = flags.trace.over(file.trace.over(file.trained));
   file.trace = {};
   if (flags.samples) file.render.samples = *flags.samples;
@@ -172,23 +180,24 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   if (flags.seed) file.render.seed = *flags.seed;
   const LoadedScene loaded = load_scene(file);
   const auto [first, last] = parse_frames(flags.frames, loaded.cameras.size());
-  if (!file.camera.file.empty()) check_not_data(flags.output, file.camera.file);
-  check_leftovers(flags.output, frame_names(loaded.cameras), flags.frame_options().format,
-                  flags.overwrite);
+  if (!file.camera.file.empty() && !flags.output.empty())
+    check_not_data(flags.output, file.camera.file);
+  RenderOutput output(flags, loaded.cameras, last - first, fps, false);
 
   const std::unique_ptr<Context> context = open_context(flags.device);
   PathTracer tracer(*context, loaded.scene);
-  make_output_directory(flags.output);
+  output.begin();
   spdlog::info("{}: {} Gaussians, {} meshes, {} lights, {} frames", flags.model,
                loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
                loaded.scene.lights.size(), last - first);
 
   FrameProgress progress("rendering", last - first, global.quiet);
   const SceneReport report = write_scene_frames(
-      tracer, loaded, first, last, flags.output, flags.frame_options(),
+      tracer, loaded, first, last, flags.output, output.options(),
       [&](std::size_t done) { return progress.done(done); },
       [&](double share) { return progress.within(share); });
-  progress.finish(report.frames, "frames: what is in " + flags.output + " is whole");
+  progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
+  output.finish();
   const PathTracer::Statistics& rays = report.rays;
   warn_of_capped_rays(rays.capped_rays, rays.camera_rays + rays.continued_rays + rays.shadow_rays,
                       loaded.scene.trace);
@@ -196,7 +205,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
     spdlog::info("{} paths ended after --max-bounces {}", rays.ended_by_bounces,
                  loaded.scene.render.max_bounces);
   }
-  print_summary(report, flags.output, context->build_seconds());
+  print_summary(report, output.name(), context->build_seconds());
   if (flags.device.profile) fmt::print("{}", context->profile_table());
 }
 

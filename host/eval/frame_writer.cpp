@@ -10,6 +10,7 @@
 #include <map>
 #include <set>
 
+#include "core/camera_path.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -62,6 +63,42 @@ Image average_depth(const Image& depth, const Image& rgba, int factor) {
     out.data[i] = alpha > 0.0f ? mean.data[2 * i] / alpha : 0.0f;
   }
   return out;
+}
+
+/// The camera `share` of the way from a frame to the next one.
+Camera later(std::span<const Camera> cameras, std::size_t frame, double share, bool closed) {
+  const Camera& now = cameras[frame];
+  if (share == 0.0 || cameras.size() < 2) return now;
+  if (frame + 1 < cameras.size()) return between(now, cameras[frame + 1], share);
+  if (closed) return between(now, cameras.front(), share);
+  return between(cameras[frame - 1], now, 1.0 + share);
+}
+
+/// A frame at its number of rays per pixel, as the mean of the moments at which the shutter is
+/// open; empty when `within` stopped it.
+Image exposed(Tracer& tracer,
+              const Model& model,
+              std::span<const Camera> cameras,
+              std::size_t frame,
+              const FrameOptions& options,
+              const std::function<bool(double)>& within) {
+  const int moments = options.shutter_samples;
+  Image sum;
+  for (int k = 0; k < moments; ++k) {
+    const Camera camera = later(cameras, frame, options.shutter * k / moments, options.closed);
+    const Image moment =
+        tracer.render(model, downscaled(camera, 1.0 / options.supersample), false,
+                      [&](double share) { return !within || within((k + share) / moments); });
+    if (moment.data.empty()) return {};
+    if (k == 0) {
+      sum = moment;
+    } else {
+      for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += moment.data[i];
+    }
+  }
+  const float scale = 1.0f / static_cast<float>(moments);
+  for (float& value : sum.data) value *= scale;
+  return sum;
 }
 
 }  // namespace
@@ -138,6 +175,8 @@ void write_frame(const std::filesystem::path& stem,
                  const Image& rgba,
                  const Image& depth,
                  const FrameOptions& options) {
+  if (options.video) options.video->add(rgba);
+  if (!options.files) return;
   const auto file = [&](const char* suffix, const std::filesystem::path& type) {
     std::filesystem::path path = stem;
     path += suffix;
@@ -173,13 +212,17 @@ FrameReport write_frames(Tracer& tracer,
     throw UsageError(fmt::format("--supersample {} is out of range: use 1 to {}",
                                  options.supersample, kMaxSupersample));
   }
+  if (options.shutter_samples < 1 || !(options.shutter > 0.0 && options.shutter <= 1.0)) {
+    throw UsageError(fmt::format(
+        "--shutter-samples {} over --shutter {} are no motion blur: use 1 or more, over 0 to 1",
+        options.shutter_samples, options.shutter));
+  }
   const std::vector<std::string> names = frame_names(cameras);
   FrameReport report;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const Camera camera = downscaled(cameras[i], 1.0 / options.supersample);
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
-    const Image samples = tracer.render(model, camera, false, within);
+    const Image samples = exposed(tracer, model, cameras, i, options, within);
     if (samples.data.empty()) break;
     Image depth;
     if (options.depth) depth = average_depth(tracer.depth(), samples, options.supersample);
@@ -187,7 +230,7 @@ FrameReport write_frames(Tracer& tracer,
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
         (tracer.context().build_seconds() - built);
     report.capped_rays += tracer.capped_rays();
-    report.rays += samples.pixels();
+    report.rays += samples.pixels() * static_cast<std::uint64_t>(options.shutter_samples);
     write_frame(folder / names[i], box_average(samples, options.supersample), depth, options);
     ++report.frames;
     if (done && !done(report.frames)) break;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "io/video_file.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
 #include "raysplats/model.hpp"
@@ -32,6 +33,11 @@ struct FrameOptions {
       false;  ///< EXR: channel Z; PNG and JPG: a file NAME_depth.png, near white, far black
   bool linear_exr = true;  ///< EXR: proportional to light, as other programs expect; false = the
                            ///< values as trained, which PNG and JPG hold
+  bool files = true;       ///< one for every frame, as above
+  VideoFile* video = nullptr;  ///< takes every frame as well
+  int shutter_samples = 1;     ///< moments of a frame that are averaged (motion blur)
+  double shutter = 0.5;        ///< share of the time to the next frame that they are taken in
+  bool closed = false;         ///< the frame after the last one is the first
 };
 
 struct FrameReport {
@@ -53,18 +59,19 @@ Image box_average(const Image& image, int factor);
 /// alpha (channel 3 of `rgba`) is below one half are 0 and do not count.
 Image depth_preview(const Image& depth, const Image& rgba);
 
-/// Writes one frame: `stem` with the format's extension, RGB of `rgba` for 8-bit formats. `depth`
-/// is used where options.depth is set. Throws DataError when a file fails.
+/// Gives a frame to options.video, and where options.files says so writes it: `stem` with the
+/// format's extension, RGB of `rgba` for 8-bit formats. `depth` is used where options.depth is set.
+/// Throws DataError when a file fails.
 void write_frame(const std::filesystem::path& stem,
                  const Image& rgba,
                  const Image& depth,
                  const FrameOptions& options);
 
-/// Traces every camera and writes its files to `folder`, which exists. `done` hears the number of
-/// finished frames and returns false to stop early; so does `within` with the share of the frame
-/// that is being traced, which is not written then. The tracer was made with the option depth when
-/// options.depth is set. Throws UsageError for a supersampling
-/// factor outside 1..16, DataError when a file fails.
+/// Traces every camera and writes its files to `folder`, which exists where there are files. `done`
+/// hears the number of finished frames and returns false to stop early; so does `within` with the
+/// share of the frame that is being traced, which is not written then. The tracer was made with the
+/// option depth when options.depth is set. Throws UsageError for a supersampling factor
+/// outside 1..16 and shutters out of range, DataError when a file fails.
 FrameReport write_frames(Tracer& tracer,
                          const Model& model,
                          std::span<const Camera> cameras,

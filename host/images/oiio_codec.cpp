@@ -80,6 +80,38 @@ class OiioDecoder : public ImageDecoder {
   std::unique_ptr<OIIO::ImageInput> input_;
 };
 
+class OiioGif : public MovieEncoder {
+ public:
+  OiioGif(const std::filesystem::path& path, int width, int height, double fps)
+      : path_(path.string()),
+        spec_(width, height, 3, OIIO::TypeUInt8),
+        output_(OIIO::ImageOutput::create("gif")) {
+    spec_.attribute("oiio:Movie", 1);
+    spec_.attribute("gif:Interlacing", 0);
+    spec_.attribute("FramesPerSecond", static_cast<float>(fps));
+  }
+  void add(const Image& frame) override {
+    using Mode = OIIO::ImageOutput::OpenMode;
+    const Mode mode = first_ ? OIIO::ImageOutput::Create : OIIO::ImageOutput::AppendSubimage;
+    require(output_ && output_->open(path_, spec_, mode));
+    first_ = false;
+    require(output_->write_image(OIIO::TypeUInt8, to_bytes(frame, 3).data()));
+  }
+  void finish() override { require(output_ && output_->close()); }
+
+ private:
+  void require(bool done) {
+    if (done) return;
+    throw DataError(
+        fmt::format("The video {} cannot be written: {}", path_,
+                    output_ ? reason(output_->geterror()) : "OpenImageIO lacks the format GIF"));
+  }
+  std::string path_;
+  OIIO::ImageSpec spec_;
+  std::unique_ptr<OIIO::ImageOutput> output_;
+  bool first_ = true;
+};
+
 class OiioCodec : public ImageCodec {
  public:
   std::unique_ptr<ImageDecoder> open(const std::string& format,
@@ -114,6 +146,12 @@ class OiioCodec : public ImageCodec {
                       output ? reason(output->geterror()) : "OpenImageIO lacks the format"));
     }
     return encoded.buffer();
+  }
+  std::unique_ptr<MovieEncoder> open_gif(const std::filesystem::path& path,
+                                         int width,
+                                         int height,
+                                         double fps) const override {
+    return std::make_unique<OiioGif>(path, width, height, fps);
   }
   bool has_networks() const override { return networks_available(); }
   std::unique_ptr<PerceptualNetwork> open_network(

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "raysplats/error.hpp"
 #include "raysplats/image.hpp"
 
 namespace raysplats::io {
@@ -37,6 +38,15 @@ struct ImageEncoding {
   int quality = 95;         ///< of "jpeg", to 100; below 90 colours have half the resolution
 };
 
+/// A picture that moves, written frame by frame.
+class MovieEncoder {
+ public:
+  virtual ~MovieEncoder() = default;
+  /// RGB of the size given at the start. Throws DataError.
+  virtual void add(const Image& frame) = 0;
+  virtual void finish() = 0;
+};
+
 /// What the library raysplats-images does: formats of pictures and networks. Everything behind it
 /// (OpenImageIO, OpenEXR, OpenCV) drags in some hundreds of shared libraries, so it lies in a
 /// library of its own that is loaded when the first picture is opened.
@@ -53,6 +63,16 @@ class ImageCodec {
   virtual std::vector<unsigned char> encode(const std::filesystem::path& path,
                                             const Image& image,
                                             const ImageEncoding& encoding) const = 0;
+  /// A GIF that repeats for ever. Throws DataError that names `path`, UsageError where there is no
+  /// encoder.
+  virtual std::unique_ptr<MovieEncoder> open_gif(const std::filesystem::path& path,
+                                                 int width,
+                                                 int height,
+                                                 double fps) const {
+    static_cast<void>(path), static_cast<void>(width), static_cast<void>(height);
+    static_cast<void>(fps);
+    throw UsageError("This build has no encoder for GIF: use another format");
+  }
   /// Whether networks can be run, and one of an ONNX file. Throws DataError, UsageError.
   virtual bool has_networks() const = 0;
   virtual std::unique_ptr<PerceptualNetwork> open_network(

@@ -271,6 +271,8 @@ std::vector<Camera> scene_cameras(const SceneCamera& camera,
     }
     case Source::kData:
       return chosen(camera, views_of(load_dataset(camera.file, camera.data_options), camera.split));
+    case Source::kGiven:
+      return camera.given;
     case Source::kOrbit:
       return on_orbit(camera, extent, frames);
     case Source::kNone:

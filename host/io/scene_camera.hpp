@@ -26,6 +26,7 @@ struct SceneCamera {
     kPlaced,  ///< `position` and `target`
     kFile,    ///< a transforms.json
     kData,    ///< the views of a data set
+    kGiven,   ///< `given`
     kOrbit,   ///< a circle around the scene; with `file` set, as the cameras of that data set
   };
   Source source = Source::kNone;
@@ -42,6 +43,7 @@ struct SceneCamera {
   Split split = Split::kTest;
   DatasetOptions data_options;
   std::vector<std::size_t> views;  ///< of kFile and kData: these only; empty = all
+  std::vector<Camera> given;       ///< of kGiven
   std::optional<int> frames;       ///< of kOrbit
   std::optional<double> elevation, distance;
 };

@@ -9,7 +9,7 @@
 #include <charconv>
 
 #include "base/number_text.hpp"
-#include "prepare/program.hpp"
+#include "base/program.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 

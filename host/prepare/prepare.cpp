@@ -13,7 +13,7 @@
 #include "base/atomic_file.hpp"
 #include "io/colmap_model.hpp"
 #include "prepare/frames.hpp"
-#include "prepare/program.hpp"
+#include "base/program.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {

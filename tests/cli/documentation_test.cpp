@@ -290,7 +290,8 @@ TEST_CASE("every command and TOML block of the documents is run") {
       INFO(block.document);
       if (block.language == "python") continue;  // run by tests/python/test_documents.py
       std::string toml;
-      bool inside = false;  // of cat > scene.toml <<'END'
+      bool inside = false;  // of cat > NAME <<'END'
+      std::string written;  // its NAME
       for (const std::string& line : block.lines) {
         INFO(line);
         if (block.language == "toml") {
@@ -298,8 +299,9 @@ TEST_CASE("every command and TOML block of the documents is run") {
         } else if (inside) {
           inside = line != "END";
           if (inside) toml += line + "\n";
-          if (!inside) place.write("scene.toml", toml);
-        } else if (line == "cat > scene.toml <<'END'") {
+          if (!inside) place.write(written, toml);
+        } else if (line.starts_with("cat > ") && line.ends_with(" <<'END'")) {
+          written = line.substr(6, line.find(" <<") - 6);
           inside = true;
           toml.clear();
         } else if (line.empty() || listed(line)) {

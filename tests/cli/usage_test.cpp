@@ -70,7 +70,14 @@ TEST_CASE("a wrong command line is one sentence, exit code 2") {
   check_refused({"info", "a", "b"}, 2, "Unexpected argument 'b'");
   check_refused({"info"}, 2, "PATH");
   check_refused({"render", "m.ply", "--orbit", "0", "-o", "x"}, 2, "--orbit");
-  check_refused({"render", "m.ply", "--orbit", "3"}, 2, "--output");
+  check_refused({"render", "m.ply", "--orbit", "3"}, 2, "--video");
+  check_refused({"render", "m.ply", "-o", "x", "--path", "p", "--orbit", "3"}, 2, "--path");
+  check_refused({"render", "m.ply", "-o", "x", "--spiral", "3"}, 2, "--data");
+  check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--seconds", "3"}, 2, "--path");
+  check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--fps", "3"}, 2, "--video");
+  check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--shutter", "0.5"}, 2,
+                "--shutter-samples");
+  check_refused({"render", "m.ply", "--orbit", "3", "--video", "x.mp4", "--depth"}, 2, "-o");
   check_refused({"render", "m.ply", "-o", "x"}, 2, "no cameras");
   check_refused({"render", "m.ply", "-o", "x", "--data", "d", "--cameras", "c"}, 2, "--cameras");
   check_refused({"render", "m.ply", "-o", "x", "--data", "d", "--fov", "30"}, 2, "--orbit");

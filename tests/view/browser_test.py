@@ -190,7 +190,7 @@ class ViewTest(PageCase):
         self.assertGreater(self.page.execute_script("return window.raysplats.rig.eye[2]"), -6)
         ActionChains(self.page).send_keys("k").perform()
         self.assertEqual(len(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")), 1)
-        # The path of two views is what `render --cameras` reads.
+        # The path of two views is what `render --path` reads, and the page again.
         text = self.page.execute_script(
             "return import('/path.js').then(m => JSON.stringify(m.pathFile("
             "[{eye: [0, 0, -6], turn: [1, 0, 0, 0], fov: 50, distance: 6},"
@@ -199,13 +199,33 @@ class ViewTest(PageCase):
         folder = self.viewer.folder.name
         with open(os.path.join(folder, "path.json"), "w") as file:
             file.write(text)
-        subprocess.run([PROGRAM, "render", self.viewer.model, "--cameras",
-                        os.path.join(folder, "path.json"), "-o", os.path.join(folder, "frames"), "-q"],
+        subprocess.run([PROGRAM, "render", self.viewer.model, "--path", os.path.join(folder, "path.json"),
+                        "-o", os.path.join(folder, "frames"), "--video", os.path.join(folder, "path.apng"), "-q"],
                        check=True, stdout=subprocess.DEVNULL)
         self.assertEqual(len(os.listdir(os.path.join(folder, "frames"))), 3)
-        frames = json.loads(text)["frames"]
-        for frame, x in zip(frames, (0, 0.5, 1)):
-            self.assertAlmostEqual(frame["transform_matrix"][0][3], x, places=6)
+        path = json.loads(text)
+        for frame, x in zip(path["camera_path"], (0, 0.5, 1)):
+            self.assertAlmostEqual(frame["camera_to_world"][3], x, places=6)
+        # nerfstudio's add-ons write matrices as text, by columns.
+        matrix = path["keyframes"][1]["matrix"]
+        path["keyframes"][1]["matrix"] = json.dumps([matrix[4 * (i % 4) + i // 4] for i in range(16)])
+        back = self.page.execute_async_script(
+            "const done = arguments[1];"
+            "import('/path.js').then(m => done(m.keyframesOf(arguments[0], 6)))", path)
+        self.assertEqual((back["fps"], back["seconds"], back["closed"]), (3, 1, False))
+        for key, x in zip(back["keys"], (0, 1)):
+            self.assertLess(math.dist(key["eye"], (x, 0, -6)), 1e-6)
+            self.assertLess(math.dist(key["turn"], (1, 0, 0, 0)), 1e-6)
+            self.assertEqual((key["fov"], key["distance"]), (50, 6))
+        # Chromium plays the file without losses.
+        with open(os.path.join(folder, "path.apng"), "rb") as file:
+            video = base64.b64encode(file.read()).decode()
+        played = self.page.execute_async_script(
+            "const done = arguments[1]; const image = new Image();"
+            "image.onload = () => done([image.naturalWidth, image.naturalHeight]);"
+            "image.onerror = () => done(null);"
+            "image.src = 'data:image/apng;base64,' + arguments[0];", video)
+        self.assertEqual(played, [32, 24])
         self.assertEqual(self.console(), [])
 
     def test_reload_two_pages_touch_and_the_dark(self):

@@ -235,7 +235,7 @@ function wire() {
     const stored = await keyframes.load(event.target.files[0]);
     event.target.value = '';
     if (!stored) {
-      $('status').textContent = 'That file holds no keyframes of this page';
+      $('status').textContent = 'That file holds no camera path';
       return;
     }
     $('seconds').value = stored.seconds;

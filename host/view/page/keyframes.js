@@ -73,7 +73,7 @@ export class Keyframes {
   async load(file) {
     let stored = null;
     try {
-      stored = keyframesOf(JSON.parse(await file.text()));
+      stored = keyframesOf(JSON.parse(await file.text()), this.page.view().distance);
     } catch {
       return null;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Camera paths through keyframes, and the file that `raysplats render --cameras` reads.
+// Camera paths through keyframes, and their files: what `raysplats render --path` and nerfstudio read.
 
 import * as v from './vectors.js';
 
@@ -22,46 +22,80 @@ function smooth(p0, p1, p2, p3, t) {
 export function viewAt(keys, share, closed) {
   if (keys.length === 1) return keys[0];
   const spans = closed ? keys.length : keys.length - 1;
-  const place = Math.min(share * spans, spans - 1e-9);
-  const index = Math.floor(place);
-  const t = place - index;
+  const at = Math.min(share * spans, spans - 1e-9);
+  const index = Math.floor(at);
+  const t = at - index;
   const key = (i) => (closed ? keys[(i + keys.length) % keys.length]
     : keys[Math.min(Math.max(i, 0), keys.length - 1)]);
   const [a, b] = [key(index), key(index + 1)];
+  // Beyond an end the path goes on as it came.
+  const place = (i, from, to) => (closed || (i >= 0 && i < keys.length) ? key(i).eye
+    : v.sub(v.scale(from, 2), to));
   return {
-    eye: smooth(key(index - 1).eye, a.eye, b.eye, key(index + 2).eye, t),
+    eye: smooth(place(index - 1, a.eye, b.eye), a.eye, b.eye, place(index + 2, b.eye, a.eye), t),
     turn: v.slerp(a.turn, b.turn, t),
     fov: a.fov + t * (b.fov - a.fov),
     distance: a.distance + t * (b.distance - a.distance),
   };
 }
 
-// A transforms.json of nerfstudio: OpenGL camera axes (right, up, back), one frame per picture.
+// 4 x 4 by rows, with nerfstudio's camera axes (right, up, back).
+function matrixOf({ eye, turn }) {
+  const [right, down, forward] = v.axesOf(turn);
+  return [...[0, 1, 2].flatMap((k) => [right[k], -down[k], -forward[k], eye[k]]), 0, 0, 0, 1];
+}
+
+// The view of such a matrix; as text it is by columns, as nerfstudio's add-ons write it.
+function viewOf(matrix, fov, distance) {
+  let m = matrix;
+  if (typeof matrix === 'string') {
+    const columns = (matrix.match(/-?[\d.]+(?:e[-+]?\d+)?/gi) || []).map(Number);
+    m = columns.map((_, i) => columns[4 * (i % 4) + Math.floor(i / 4)]);
+  }
+  m = m.flat();
+  const axis = (k, sign) => v.normalized([sign * m[k], sign * m[4 + k], sign * m[8 + k]]);
+  return {
+    eye: [m[3], m[7], m[11]],
+    turn: v.quaternionOf([axis(0, 1), axis(1, -1), axis(2, -1)]),
+    fov,
+    distance,
+  };
+}
+
+// A camera path of nerfstudio: its frames one by one, and the keyframes that they are made of.
 export function pathFile(keys, { seconds, fps, closed, width, height }) {
   const count = Math.max(1, Math.round(seconds * fps));
   const last = closed ? count : Math.max(count - 1, 1);
-  const frames = [];
+  const aspect = width / height;
+  const camera_path = [];
   for (let i = 0; i < count; ++i) {
     const view = viewAt(keys, i / last, closed);
-    const [right, down, forward] = v.axesOf(view.turn);
-    const focal = 0.5 * height / Math.tan(0.5 * view.fov * Math.PI / 180);
-    frames.push({
-      file_path: `frame_${String(i).padStart(5, '0')}.png`,
-      fl_x: focal, fl_y: focal, cx: width / 2, cy: height / 2, w: width, h: height,
-      transform_matrix: [
-        ...[0, 1, 2].map((k) => [right[k], -down[k], -forward[k], view.eye[k]]),
-        [0, 0, 0, 1],
-      ],
-    });
+    camera_path.push({ camera_to_world: matrixOf(view), fov: view.fov, aspect });
   }
-  return { camera_model: 'PINHOLE', fps, frames, raysplats_keyframes: { keys, seconds, fps, closed } };
+  return {
+    camera_type: 'perspective',
+    render_width: width,
+    render_height: height,
+    fps,
+    seconds,
+    is_cycle: closed,
+    default_transition_sec: seconds / Math.max(closed ? keys.length : keys.length - 1, 1),
+    keyframes: keys.map((key) => ({
+      matrix: matrixOf(key), fov: key.fov, aspect, raysplats_distance: key.distance,
+    })),
+    camera_path,
+  };
 }
 
-// The keyframes of a file that pathFile() made; null for any other.
-export function keyframesOf(file) {
-  const stored = file && file.raysplats_keyframes;
-  const numbers = (list, n) => Array.isArray(list) && list.length === n && list.every(Number.isFinite);
-  const sound = stored && Array.isArray(stored.keys) && stored.keys.every((key) => key
-    && numbers(key.eye, 3) && numbers(key.turn, 4) && numbers([key.fov, key.distance], 2));
-  return sound ? stored : null;
+// The keyframes of a camera path, of this page or of nerfstudio; null for any other file.
+// `distance` is that of the centre to turn around where the file does not say it.
+export function keyframesOf(file, distance) {
+  const list = file && (file.keyframes?.length ? file.keyframes : file.camera_path);
+  if (!Array.isArray(list) || list.length === 0) return null;
+  const keys = list.map((key) => viewOf(key.matrix ?? key.camera_to_world,
+    Number(key.fov ?? file.default_fov ?? 50), Number(key.raysplats_distance ?? distance)));
+  const sound = keys.every((key) => [...key.eye, ...key.turn, key.fov, key.distance].every(Number.isFinite));
+  if (!sound) return null;
+  const fps = Number(file.fps) || 30;
+  return { keys, fps, closed: file.is_cycle === true, seconds: Number(file.seconds) || list.length / fps };
 }

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "prepare/program.hpp"
+#include "base/program.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
 #include <fstream>
+#include <utility>
 
 #include "raysplats/error.hpp"
 
@@ -49,15 +53,20 @@ struct Pipe {
   }
 };
 
-/// The child, with both of its streams in the pipe and nothing to read.
+/// The child, with both of its streams in `output`, reading `input`, or nothing where that is -1.
 pid_t start(const std::filesystem::path& program,
             const std::vector<std::string>& arguments,
-            const Pipe& pipe) {
+            int input,
+            int output) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, pipe.ends[1], STDERR_FILENO);
+  if (input < 0) {
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  } else {
+    posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  }
+  posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
   std::vector<std::string> words{program.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> pointers;
@@ -75,7 +84,7 @@ pid_t start(const std::filesystem::path& program,
 /// Bytes become lines; those that programs write over (\r) count too.
 class Lines {
  public:
-  explicit Lines(const std::function<void(std::string_view)>& hear) : hear_(hear) {}
+  explicit Lines(std::function<void(std::string_view)> hear) : hear_(std::move(hear)) {}
 
   void add(std::string_view bytes) {
     for (const char c : bytes) {
@@ -93,7 +102,7 @@ class Lines {
   std::string last() const { return fmt::format("{}", fmt::join(last_, " | ")); }
 
  private:
-  const std::function<void(std::string_view)>& hear_;
+  std::function<void(std::string_view)> hear_;
   std::string line_;
   std::deque<std::string> last_;
 };
@@ -103,6 +112,11 @@ int wait_for(pid_t child) {
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   return status;
+}
+
+std::string ending(int status) {
+  return WIFSIGNALED(status) ? fmt::format("was ended by signal {}", WTERMSIG(status))
+                             : fmt::format("ended with exit code {}", WEXITSTATUS(status));
 }
 
 }  // namespace
@@ -134,7 +148,7 @@ void run_program(const std::filesystem::path& program,
   std::ofstream file(log, std::ios::app | std::ios::binary);
   file << fmt::format("\n$ {} {}\n", program.string(), fmt::join(arguments, " "));
   Pipe pipe;
-  const pid_t child = start(program, arguments, pipe);
+  const pid_t child = start(program, arguments, -1, pipe.ends[1]);
   pipe.close_writing();
   Lines lines(line);
   bool stopped = false;
@@ -163,11 +177,66 @@ void run_program(const std::filesystem::path& program,
                             program.filename().string()));
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
-  const std::string how = WIFSIGNALED(status)
-                              ? fmt::format("was ended by signal {}", WTERMSIG(status))
-                              : fmt::format("failed with exit code {}", WEXITSTATUS(status));
-  throw failure(fmt::format("{} {}: {} (all it said is in {})", program.filename().string(), how,
-                            lines.last(), log.string()));
+  throw failure(fmt::format("{} {}: {} (all it said is in {})", program.filename().string(),
+                            ending(status), lines.last(), log.string()));
+}
+
+ProgramInput::ProgramInput(const std::filesystem::path& program,
+                           const std::vector<std::string>& arguments)
+    : program_(program) {
+  // Writing to a socket whose reader is gone is an error, to a pipe a signal.
+  int ends[2] = {-1, -1};
+  said_ = ::memfd_create("raysplats-program", MFD_CLOEXEC);
+  if (said_ < 0 || ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+    throw failure(
+        fmt::format("A channel to {} cannot be made: {}", program.string(), std::strerror(errno)));
+  input_ = ends[1];
+  try {
+    child_ = start(program, arguments, ends[0], said_);
+  } catch (...) {
+    ::close(ends[0]);
+    ::close(input_);
+    ::close(said_);
+    throw;
+  }
+  ::close(ends[0]);
+}
+
+ProgramInput::~ProgramInput() {
+  if (child_ > 0) {
+    ::kill(child_, SIGTERM);
+    wait_for(child_);
+  }
+  if (input_ >= 0) ::close(input_);
+  if (said_ >= 0) ::close(said_);
+}
+
+void ProgramInput::write(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::send(input_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail(wait_for(std::exchange(child_, -1)));
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
+
+void ProgramInput::finish() {
+  ::close(std::exchange(input_, -1));
+  const int status = wait_for(std::exchange(child_, -1));
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) fail(status);
+}
+
+void ProgramInput::fail(int status) {
+  std::string text(kLongestLine, '\0');
+  const off_t size = ::lseek(said_, 0, SEEK_END);
+  const off_t from = std::max<off_t>(0, size - static_cast<off_t>(text.size()));
+  const ssize_t count = ::pread(said_, text.data(), text.size(), from);
+  Lines lines({});
+  lines.add(
+      std::string_view(text).substr(0, static_cast<std::size_t>(std::max<ssize_t>(count, 0))));
+  lines.end();
+  throw failure(
+      fmt::format("{} {}: {}", program_.filename().string(), ending(status), lines.last()));
 }
 
 }  // namespace raysplats

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames of `render` as videos, by a stand-in for ffmpeg and by the formats that need no program.
+#include <doctest/doctest.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Words = std::vector<std::string>;
+
+Words operator+(Words first, const Words& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
+/// Writes a model of three balls; `render` of an orbit of `frames` small pictures of it.
+Words orbit(const TemporaryFolder& folder, const std::string& frames) {
+  const std::string path = folder / "balls.ply";
+  if (!fs::exists(path)) write_file(path, ply_file(3));
+  return {"render", path, "--orbit", frames, "--width", "33", "--height", "24", "-q"};
+}
+
+/// A program `ffmpeg` that keeps its words and what it reads, and ends with `code`.
+Surroundings with_ffmpeg(const TemporaryFolder& folder, const std::string& body) {
+  const std::string path = folder / "bin/ffmpeg";
+  write_file(path, "#!/bin/sh\nfor word; do :; done\n" + body);
+  fs::permissions(path, fs::perms::owner_all);
+  return {{{"PATH", (folder / "bin") + ":/usr/bin:/bin"}}};
+}
+
+std::uint32_t big_endian(const std::string& bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<std::uint8_t>(bytes[at + i]);
+  return value;
+}
+
+}  // namespace
+
+TEST_CASE("ffmpeg gets every frame as bytes, and the file appears when it is done") {
+  const TemporaryFolder folder;
+  const std::string video = folder / "out.mp4";
+  const Surroundings around =
+      with_ffmpeg(folder, "echo \"$@\" > '" + (folder / "words") + "'; cat > \"$word\"; exit 0\n");
+  const Words command = orbit(folder, "3") + Words{"--video", video, "--fps", "12"};
+  const Outcome outcome = raysplats_program(command, around);
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  const std::string bytes = read_file(video);
+  CHECK(bytes.size() == 3 * 3 * 33 * 24);
+  CHECK(bytes.find_first_not_of('\0') != std::string::npos);
+  const std::string words = read_file(folder / "words");
+  for (const char* part : {"-s 33x24", "-r 12 ", "-pix_fmt yuv420p", "libx264", "crop="})
+    CHECK_MESSAGE(words.find(part) != std::string::npos, part);
+  // A video that is there stays.
+  CHECK(raysplats_program(command, around).code == 2);
+  CHECK(raysplats_program(command + Words{"--overwrite"}, around).code == 0);
+}
+
+TEST_CASE("what ffmpeg says when it fails is told, and no file is left") {
+  const TemporaryFolder folder;
+  for (const char* body : {"echo 'Unknown encoder libx264' >&2; exit 8\n",
+                           "cat > /dev/null; echo 'Unknown encoder libx264' >&2; exit 8\n"}) {
+    const Outcome outcome = raysplats_program(
+        orbit(folder, "2") + Words{"--video", folder / "out.mp4"}, with_ffmpeg(folder, body));
+    INFO(outcome.err);
+    CHECK(outcome.code == 1);
+    CHECK(outcome.err.find("Unknown encoder libx264") != std::string::npos);
+    CHECK(!fs::exists(folder / "out.mp4"));
+  }
+  fs::remove_all(fs::path(folder / "bin"));
+  const Outcome outcome = raysplats_program(
+      orbit(folder, "2") + Words{"--video", folder / "a.webm"}, {{{"PATH", folder / "bin"}}});
+  CHECK(outcome.code == 2);
+  CHECK(outcome.err.find("apt-get install ffmpeg") != std::string::npos);
+  CHECK(raysplats_program(orbit(folder, "2") + Words{"--video", folder / "a.avi"}).code == 2);
+}
+
+TEST_CASE("GIF and APNG need no program and hold every frame") {
+  const TemporaryFolder folder;
+  const Words command = orbit(folder, "4") + Words{"--fps", "25"};
+  REQUIRE(raysplats_program(command + Words{"--video", folder / "a.apng", "-o", folder / "frames"})
+              .code == 0);
+  CHECK(fs::exists(folder / "frames/frame_0003.png"));
+  const std::string png = read_file(folder / "a.apng");
+  REQUIRE(png.starts_with("\x89PNG\r\n\x1a\n"));
+  // The chunks one after the other: an animation of four frames of 40 ms, numbered in order.
+  std::size_t frames = 0;
+  std::uint32_t number = 0;
+  std::string last;
+  for (std::size_t at = 8; at + 12 <= png.size();) {
+    const std::uint32_t size = big_endian(png, at);
+    last = png.substr(at + 4, 4);
+    const std::size_t data = at + 8;
+    if (last == "IHDR") {
+      CHECK(big_endian(png, data) == 33);
+      CHECK(big_endian(png, data + 4) == 24);
+    } else if (last == "acTL") {
+      CHECK(big_endian(png, data) == 4);
+    } else if (last == "fcTL") {
+      ++frames;
+      CHECK(big_endian(png, data) == number++);
+      CHECK(png.substr(data + 20, 4) == std::string("\x00\x28\x03\xe8", 4));  // 40 / 1000 s
+    } else if (last == "fdAT") {
+      CHECK(big_endian(png, data) == number++);
+    }
+    at = data + size + 4;
+  }
+  CHECK(last == "IEND");
+  CHECK(frames == 4);
+  REQUIRE(raysplats_program(command + Words{"--video", folder / "a.gif"}).code == 0);
+  const std::string gif = read_file(folder / "a.gif");
+  CHECK(gif.starts_with("GIF89a"));
+  CHECK(gif.find("NETSCAPE2.0") != std::string::npos);
+  CHECK(static_cast<std::uint8_t>(gif.back()) == 0x3b);
+  std::size_t pictures = 0;
+  const std::string control("\x21\xf9\x04", 3);
+  for (std::size_t at = gif.find(control); at != std::string::npos; at = gif.find(control, at + 1))
+    ++pictures;
+  CHECK(pictures == 4);
+}
+
+TEST_CASE("motion blur is the mean of the moments, and one moment is the frame itself") {
+  const TemporaryFolder folder;
+  const auto frames = [&](const std::string& name, const Words& more) {
+    const Outcome outcome =
+        raysplats_program(orbit(folder, "6") + Words{"-o", folder / name} + more);
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    return read_file(folder / (name + "/frame_0002.png"));
+  };
+  const std::string sharp = frames("sharp", {});
+  CHECK(frames("one", {"--shutter-samples", "1"}) == sharp);
+  CHECK(frames("many", {"--shutter-samples", "4", "--shutter", "1"}) != sharp);
+}
