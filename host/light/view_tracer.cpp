@@ -353,6 +353,9 @@ std::uint64_t ViewTracer::capped_rays() const {
   return self.by_rays ? count_of(self.rays->capped) : self.packets.statistics().capped_rays;
 }
 
+CameraTracer::Statistics ViewTracer::statistics() const {
+  return impl_->by_rays ? CameraTracer::Statistics() : impl_->packets.statistics();
+}
 const Buffer<std::uint32_t>& ViewTracer::kept_capped_rays() const { return impl_->kept_capped; }
 const Buffer<std::uint32_t>& ViewTracer::overflow() const { return impl_->packets.overflow(); }
 void ViewTracer::clear_overflow() { impl_->packets.clear_overflow(); }

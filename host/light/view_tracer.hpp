@@ -78,7 +78,10 @@ class ViewTracer {
   void set_background(const std::array<float, 3>& background);
   /// Rays of the last view that stopped because of max_hits; blocks.
   std::uint64_t capped_rays() const;
-  /// The same of the last forward(keep = true) on the device: two words, the lower first.
+  /// What the last view took, on every device the same; zeros where it was traced ray by ray.
+  /// Blocks.
+  CameraTracer::Statistics statistics() const;
+  /// capped_rays() of the last forward(keep = true) on the device: two words, the lower first.
   const Buffer<std::uint32_t>& kept_capped_rays() const;
   const Context& context() const;
 

@@ -28,7 +28,7 @@
 namespace raysplats {
 namespace {
 
-constexpr char kCsvHeader[] = "iteration,seconds,loss,psnr,gaussians,it_per_s\n";
+constexpr char kCsvHeader[] = "iteration,seconds,loss,psnr,gaussians,it_per_s,candidates,hits\n";
 
 std::ptrdiff_t columns(std::string_view row) { return std::count(row.begin(), row.end(), ','); }
 
@@ -253,8 +253,9 @@ void RunFolder::begin_metrics(std::int64_t iteration) {
 
 void RunFolder::append(const TrainRow& row) {
   std::ofstream stream(path_ / "metrics.csv", std::ios::app);
-  stream << fmt::format("{},{:.3f},{:.7g},{:.4f},{},{:.3f}\n", row.iteration, row.seconds, row.loss,
-                        row.psnr, row.gaussians, row.iterations_per_second);
+  stream << fmt::format("{},{:.3f},{:.7g},{:.4f},{},{:.3f},{},{}\n", row.iteration, row.seconds,
+                        row.loss, row.psnr, row.gaussians, row.iterations_per_second,
+                        row.candidates, row.hits);
   stream.flush();
   if (!stream.good()) {
     throw DataError(fmt::format("{} cannot be written: {}", (path_ / "metrics.csv").string(),

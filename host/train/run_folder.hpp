@@ -27,6 +27,8 @@ struct TrainRow {
   double psnr = 0;  ///< of the view just trained
   std::size_t gaussians = 0;
   double iterations_per_second = 0;
+  std::uint64_t candidates = 0;  ///< (tile, Gaussian) pairs of the last view, 0 ray by ray
+  std::uint64_t hits = 0;        ///< blended (ray, Gaussian) pairs of the last view, 0 ray by ray
 };
 
 /// The folder of one training run: config.toml, cameras.json, metrics.csv, metrics.json,

@@ -2,92 +2,57 @@
 #include "train/run_time.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
-#include <glm/vec3.hpp>
+#include <utility>
 #include <vector>
 
+#include "core/statistics.hpp"
 #include "raysplats/error.hpp"
 #include "train/schedule.hpp"
 
 namespace raysplats {
 namespace {
 
-constexpr double kOutlier = 3.0;
+// Of a pixel and of a hit beside that of a Gaussian.
+constexpr double kPixelWork = 0.58;
+constexpr double kHitWork = 0.016;
+constexpr double kLeastHits = 48.0;    // of a trained model, per pixel that shows something
+constexpr double kHitGrowth = 1.15;    // from the first steps at full size to the end
+constexpr double kLarge = 0.5;         // of the largest view: steps that tell the speed
 constexpr std::int64_t kSlices = 400;  // of a run, when its steps are added up
 constexpr std::int64_t kMostIterations = 10'000'000;
 
-// The best fit that uses only the terms of `used` (bits 0 to 2), or none that is valid.
-bool solve(std::span<const StepSample> samples, unsigned used, glm::dvec3& out) {
-  glm::dmat3 normal(0.0);
-  glm::dvec3 right(0.0);
-  for (const StepSample& s : samples) {
-    const glm::dvec3 row = glm::dvec3(1.0, s.pixels, s.gaussians) / s.seconds;
-    for (int i = 0; i < 3; ++i) {
-      if (!(used >> i & 1u)) continue;
-      right[i] += row[i];
-      for (int j = 0; j < 3; ++j) {
-        if (used >> j & 1u) normal[j][i] += row[i] * row[j];
-      }
-    }
+// From when on photos have their full size, as a share of the run.
+double full_size_from(const TrainOptions& options) {
+  double share = 0.0;
+  for (const ResolutionStep& step : options.resolution_schedule) {
+    const auto until = static_cast<double>(step.until.of(options.iterations));
+    share =
+        std::max(share, until / static_cast<double>(std::max<std::int64_t>(options.iterations, 1)));
   }
-  // Numbers of very different size: every unknown in units that make its own sum of squares 1.
-  glm::dvec3 unit(1.0);
-  for (int i = 0; i < 3; ++i) {
-    if (used >> i & 1u)
-      unit[i] = std::sqrt(normal[i][i]);
-    else
-      normal[i][i] = 1.0;
-  }
-  for (int i = 0; i < 3; ++i) {
-    if (!(unit[i] > 0)) return false;
-    right[i] /= unit[i];
-    for (int j = 0; j < 3; ++j) normal[j][i] /= unit[i] * unit[j];
-  }
-  if (std::abs(glm::determinant(normal)) < 1e-9) return false;
-  out = glm::inverse(normal) * right / unit;
-  return out.x >= 0 && out.y >= 0 && out.z >= 0;
-}
-
-double error_of(std::span<const StepSample> samples, const glm::dvec3& terms) {
-  double sum = 0;
-  for (const StepSample& s : samples) {
-    const double relative =
-        (terms.x + terms.y * s.pixels + terms.z * s.gaussians) / s.seconds - 1.0;
-    sum += relative * relative;
-  }
-  return sum;
-}
-
-// Of all choices of terms without a negative one the best: least squares under that condition.
-StepCost fit(std::span<const StepSample> samples) {
-  glm::dvec3 best(0.0);
-  double least = error_of(samples, best);
-  for (unsigned used = 1; used < 8; ++used) {
-    glm::dvec3 terms;
-    if (!solve(samples, used, terms)) continue;
-    const double error = error_of(samples, terms);
-    if (error < least) least = error, best = terms;
-  }
-  return {best.x, best.y, best.z};
+  return std::min(share, 1.0);
 }
 
 }  // namespace
 
-StepCost fit_step_cost(std::span<const StepSample> samples) {
-  std::vector<StepSample> sound;
+double step_work(double pixels, double gaussians, double hits) {
+  return gaussians + kPixelWork * pixels + kHitWork * hits;
+}
+
+double seconds_per_work(std::span<const StepSample> samples) {
+  double most = 0;
+  for (const StepSample& s : samples) most = std::max(most, s.seconds > 0 ? s.pixels : 0.0);
+  std::vector<double> speeds;
   for (const StepSample& s : samples) {
-    if (s.seconds > 0) sound.push_back(s);
+    if (s.seconds > 0 && s.pixels >= kLarge * most)
+      speeds.push_back(s.seconds / step_work(s.pixels, s.gaussians, s.hits));
   }
-  if (sound.empty()) throw UsageError("No step was timed: there is nothing to estimate from");
-  const StepCost all = fit(sound);
-  std::vector<StepSample> usual;
-  for (const StepSample& s : sound) {
-    if (s.seconds <= kOutlier * all.seconds(s.pixels, s.gaussians)) usual.push_back(s);
-  }
-  return usual.empty() ? all : fit(usual);
+  if (speeds.empty()) throw UsageError("No step was timed: there is nothing to estimate from");
+  const double half = 0.5;
+  return quantiles(std::move(speeds), std::span<const double>(&half, 1))[0];
+}
+
+HitCurve expected_hits(double at_start, double at_full_size, double opaque_share) {
+  return {at_start, std::max(kHitGrowth * at_full_size, kLeastHits * opaque_share)};
 }
 
 double expected_gaussians(const TrainOptions& options,
@@ -101,18 +66,22 @@ double expected_gaussians(const TrainOptions& options,
   return limit - (limit - first) * (1.0 - x) * (1.0 - x);
 }
 
-double run_seconds(
-    const TrainOptions& options, const StepCost& cost, double pixels, double first, double limit) {
+double run_work(
+    const TrainOptions& options, double pixels, const HitCurve& hits, double first, double limit) {
   const std::int64_t slices = std::min(kSlices, options.iterations);
+  const double full = full_size_from(options);
   double sum = 0;
   for (std::int64_t k = 0; k < slices; ++k) {
     const std::int64_t begin = k * options.iterations / slices;
     const std::int64_t end = (k + 1) * options.iterations / slices;
     const std::int64_t middle = (begin + end) / 2;
+    const double share = static_cast<double>(middle) / static_cast<double>(options.iterations);
+    const double risen = full > 0 ? std::min(share / full, 1.0) : 1.0;
     const double divisor = resolution_divisor(options, middle);
+    const double rays = pixels / (divisor * divisor);
     sum += static_cast<double>(end - begin) *
-           cost.seconds(pixels / (divisor * divisor),
-                        expected_gaussians(options, middle, first, limit));
+           step_work(rays, expected_gaussians(options, middle, first, limit),
+                     rays * (hits.first + (hits.last - hits.first) * risen));
   }
   return sum;
 }

@@ -14,22 +14,30 @@ namespace raysplats {
 struct StepSample {
   double pixels = 0;     ///< rays of the view
   double gaussians = 0;  ///< of the model
+  double hits = 0;       ///< blended (ray, Gaussian) pairs; 0 where they are not counted
   double seconds = 0;
 };
 
-/// Seconds of a step as fixed + per_pixel * pixels + per_gaussian * Gaussians, none of them
-/// negative.
-struct StepCost {
-  double fixed = 0, per_pixel = 0, per_gaussian = 0;
-  double seconds(double pixels, double gaussians) const {
-    return fixed + per_pixel * pixels + per_gaussian * gaussians;
-  }
+/// What a step costs, in units of what one Gaussian of the model does: each Gaussian is moved by
+/// Adam and put into lists, each pixel has a loss, each hit is blended and has a gradient. The
+/// ratios are those of nine captures on two CPU cores (docs/training.md).
+double step_work(double pixels, double gaussians, double hits);
+
+/// Seconds of a unit of work: the median of the steps that have the most pixels, so that a step
+/// that had to wait (a photo was decoded, a buffer grew) counts no more than any other. Throws
+/// UsageError without samples.
+double seconds_per_work(std::span<const StepSample> samples);
+
+/// Hits per pixel in a run: they rise evenly from the first steps until the photos have their full
+/// size, and stay.
+struct HitCurve {
+  double first = 0, last = 0;
 };
 
-/// Least squares of the relative errors; samples that take more than three times what the others
-/// make of them (a photo was decoded, a buffer grew) are left out in a second round. Throws
-/// UsageError without samples.
-StepCost fit_step_cost(std::span<const StepSample> samples);
+/// The curve from a run's first steps, and from steps at full size with the Gaussians of its end,
+/// both per pixel. A start that leaves the rays much light fills up: few trained models have less
+/// than about 48 hits per pixel that shows something, `opaque_share` of all.
+HitCurve expected_hits(double at_start, double at_full_size, double opaque_share);
 
 /// The Gaussians of a run after `iteration` steps, on the curve of the budget strategy from `first`
 /// at its start to `limit`.
@@ -38,10 +46,10 @@ double expected_gaussians(const TrainOptions& options,
                           double first,
                           double limit);
 
-/// Seconds of all steps of a run with these options. `pixels` is the mean of the training views at
-/// full size.
-double run_seconds(
-    const TrainOptions& options, const StepCost& cost, double pixels, double first, double limit);
+/// Work of all steps of a run with these options. `pixels` is the mean of the training views at
+/// full size, `first` and `limit` are its Gaussians at the start and the most that it may have.
+double run_work(
+    const TrainOptions& options, double pixels, const HitCurve& hits, double first, double limit);
 
 /// The most iterations, from `least` on, whose run takes no more than `seconds`;
 /// `seconds_of(iterations)` must not fall.

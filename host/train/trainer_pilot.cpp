@@ -42,10 +42,13 @@ double mean_pixels(const std::vector<Camera>& cameras) {
 
 // What a small run of the same shape told.
 struct Trainer::Impl::Pilot {
-  StepCost cost;
+  double per_work = 0;       // seconds of a unit of work
+  double first_hits = 0;     // per pixel, of the first steps
+  double last_hits = 0;      // per pixel, of the steps that are most like those of the end
   double start_seconds = 0;  // of making the first model
   double photo_seconds = 0;  // of getting one photo
   double seconds = 0;        // all of it
+  double opaque_share = 1;   // of the photos' pixels
   std::size_t first = 0;     // Gaussians of the start
 };
 
@@ -73,8 +76,9 @@ double Trainer::Impl::seconds_of(const Pilot& pilot,
   const double first = std::min(static_cast<double>(pilot.first), kFillShare * limit);
   const auto photos =
       static_cast<double>(std::min(iterations, static_cast<std::int64_t>(train_views.size())));
+  const HitCurve hits = expected_hits(pilot.first_hits, pilot.last_hits, pilot.opaque_share);
   return pilot.start_seconds + photos * pilot.photo_seconds +
-         run_seconds(shaped, pilot.cost, mean_pixels(train_cameras), first, limit);
+         pilot.per_work * run_work(shaped, mean_pixels(train_cameras), hits, first, limit);
 }
 
 // Times steps from the start on the device: coarse ones, ones at full size, and ones with as many
@@ -97,40 +101,42 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
     const Timer timer(context);
     step();
     settle();
+    const double seconds_of_step = timer.seconds();
     return StepSample{static_cast<double>(pixels_of(camera)), static_cast<double>(gaussians.count),
-                      timer.seconds()};
+                      static_cast<double>(tracer.statistics().hits), seconds_of_step};
   };
-  // The first step of a kind compiles kernels and makes buffers: it does not count.
+  // The first step of a kind compiles kernels and makes buffers: it does not count. Returns the
+  // hits per pixel.
   const auto stage = [&](double until) {
     timed_step();
+    const std::size_t begin = samples.size();
     for (int i = 0; i < kLeastSteps || clock.seconds() < until * seconds; ++i)
       samples.push_back(timed_step());
+    double hits = 0, pixels = 0;
+    for (std::size_t i = begin; i < samples.size(); ++i)
+      hits += samples[i].hits, pixels += samples[i].pixels;
+    pilot.per_work = seconds_per_work(samples);
+    return hits / pixels;
   };
   iteration = 0;
-  stage(kCoarseShare);
-  // One size tells no more than this; the rays cost most.
-  double pixels = 0, coarse_seconds = 0;
-  for (const StepSample& s : samples) pixels += s.pixels, coarse_seconds += s.seconds;
-  pilot.cost = {0, coarse_seconds / pixels, 0};
+  pilot.first_hits = pilot.last_hits = stage(kCoarseShare);
   const auto rough = [&](std::int64_t iterations) {
     return seconds_of(pilot, iterations, gaussians.count);
   };
   if (run || rough(options.iterations) > kShortRun) {
     const std::int64_t middle = options.iterations / 2;
     iteration = middle;
-    stage(kFullShare);
-    pilot.cost = fit_step_cost(samples);
+    pilot.last_hits = stage(kFullShare);
     const std::size_t most =
         most_gaussians(run ? iterations_within(*run, kLeastIterations, rough) : options.iterations);
     for (int pass = 0; pass < kMostPasses && density.accumulates_at(0) && gaussians.count < most;
          ++pass)
       follow_plan(density.split_evenly(gaussians, most));
-    stage(1);
-    pilot.cost = fit_step_cost(samples);
+    pilot.last_hits = stage(1);
   }
   for (const StepSample& s : samples)
-    spdlog::debug("a step of {} rays and {} Gaussians took {:.2f} ms", s.pixels, s.gaussians,
-                  1e3 * s.seconds);
+    spdlog::debug("a step of {} rays, {} Gaussians and {} hits took {:.2f} ms", s.pixels,
+                  s.gaussians, s.hits, 1e3 * s.seconds);
   pilot.photo_seconds = photo_seconds / photos;
 }
 
@@ -160,6 +166,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   pilot.start_seconds = clock.seconds();
   upload_start(most);
   pilot.first = gaussians.count;
+  if (cut_out) pilot.opaque_share = opaque_share(photos());
   time_steps(std::max(seconds - clock.seconds(), 0.0), run_time, pilot);
   forget_pilot();
   first_model = std::move(made);

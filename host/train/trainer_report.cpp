@@ -27,12 +27,12 @@ void Trainer::Impl::report(Progress& progress) {
   rise.note(order.at(iteration - 1), resolution_divisor(options, iteration - 1), psnr);
   const double seconds = training.seconds();
   const double elapsed = seconds - row_seconds;
-  const TrainRow row{iteration,
-                     seconds,
-                     value.total,
-                     psnr,
-                     gaussians.count,
-                     elapsed > 0 ? static_cast<double>(iteration - row_iteration) / elapsed : 0.0};
+  const CameraTracer::Statistics work = tracer.statistics();
+  const TrainRow row{
+      iteration,       seconds,
+      value.total,     psnr,
+      gaussians.count, elapsed > 0 ? static_cast<double>(iteration - row_iteration) / elapsed : 0.0,
+      work.candidates, work.hits};
   run.append(row);
   if (watcher) watcher->noted(row);
   row_iteration = iteration;
