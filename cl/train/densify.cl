@@ -18,6 +18,7 @@
 #define ROLE_CLONE 1u
 #define ROLE_FIRST_CHILD 2u
 #define ROLE_FIRST_HALF 4u
+#define ROLE_PART 6u
 
 // Halves of a split along the longest axis (as "Improved-GS", with the constants of LichtFeld
 // Studio's IGS+, arXiv 2603.08661): offset in standard deviations, what is left of the longest and
@@ -43,6 +44,20 @@ kernel void accumulate_screen(uint count,
     statistics[2 * i] += screen[3 * i + signal];
     statistics[2 * i + 1] += 1.0f;
   }
+}
+
+// statistics[i] = {how far the mean has moved since `before`, in units of 1 / inverse_unit; 1}. A
+// guard word that is not 0 turns it off.
+kernel void measure_step(uint count,
+                         float inverse_unit,
+                         global const float* before,
+                         global const float* means,
+                         global const uint* guard,
+                         global float* statistics) {
+  const uint i = get_global_id(0);
+  if (i >= count || guard[0] != 0) return;
+  const float way = inverse_unit * distance(vload3(i, means), vload3(i, before));
+  if (isfinite(way)) vstore2((float2)(way, 1.0f), i, statistics);
 }
 
 // Four independent 32-bit words from four (Jarzynski and Olano 2020, "Hash Functions for GPU
@@ -104,7 +119,8 @@ float half_opacity(float logit) {
 
 // Gaussian i of the new set comes from source[i] of the old one in the role role[i]. The two
 // children of a split are drawn from the parent's own distribution and are smaller by split_factor;
-// the two halves lie side by side along the parent's longest axis.
+// the two halves lie side by side along the parent's longest axis. Parts are drawn from the parent's
+// distribution, because equal ones in one place would have equal gradients and stay together.
 kernel void gather_gaussians(uint count,
                              uint key_low,
                              uint key_high,
@@ -129,7 +145,10 @@ kernel void gather_gaussians(uint count,
   const float4 quaternion = vload4(from, quaternions);
   float3 scale = vload3(from, scales);
   float opacity = opacities[from];
-  if (role[i] >= ROLE_FIRST_HALF) {
+  if (role[i] == ROLE_PART) {
+    const float3 s = (float3)(scale_value(scale.x), scale_value(scale.y), scale_value(scale.z));
+    mean += rotate(quaternion, s * child_offset(key_low, key_high, (uint)from, i));
+  } else if (role[i] >= ROLE_FIRST_HALF) {
     float3 s = (float3)(scale_value(scale.x), scale_value(scale.y), scale_value(scale.z));
     const float longest = fmax(s.x, fmax(s.y, s.z));
     const float3 axis = s.x == longest   ? (float3)(1.0f, 0.0f, 0.0f)

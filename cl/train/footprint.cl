@@ -49,6 +49,20 @@ __kernel void footprint_floor(uint count,
   lows[i] = low;
 }
 
+// Keeps all scale parameters within two limits. A guard word that is not 0 turns it off.
+__kernel void limit_scales(uint count,
+                           float low,
+                           float high,
+                           __global const uint* guard,
+                           __global float* scales) {
+  const size_t i = get_global_id(0);
+  if (i >= count || guard[0] != 0) return;
+  const float3 scale = vload3(i, scales);
+  // Comparisons with a NaN are false: it stays what it is.
+  const float3 raised = select(scale, (float3)(low), scale < (float3)(low));
+  vstore3(select(raised, (float3)(high), raised > (float3)(high)), i, scales);
+}
+
 // Raises scale parameters to their least value. A guard word that is not 0 turns it off.
 __kernel void raise_scales(uint count,
                            __global const float* lows,

@@ -66,6 +66,7 @@ void DensityControl::follow(const TrainOptions& options, std::size_t views) {
 void DensityControl::accumulate(const DeviceGaussians& gaussians,
                                 const GaussianGradients& gradients,
                                 const Buffer<std::uint32_t>* guard) {
+  if (options_.densify_signal == DensifySignal::kStep) return;
   if (statistics_.size() != 2 * gaussians.count) {
     statistics_ = Buffer<float>(context_, 2 * gaussians.count, "density statistics");
     statistics_.clear();
@@ -78,6 +79,24 @@ void DensityControl::accumulate(const DeviceGaussians& gaussians,
   context_.kernel(kProgram, "accumulate_screen")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               signal, gradients.screen, guard != nullptr ? *guard : open_guard_, statistics_);
+}
+
+bool DensityControl::measures_step(std::int64_t iteration) const {
+  return options_.densify_signal == DensifySignal::kStep && refines_at(iteration + 1);
+}
+
+void DensityControl::begin_step(const DeviceGaussians& gaussians) {
+  old_means_.ensure(context_, 3 * gaussians.count, "means before a step");
+  old_means_.copy_from(gaussians.means, 3 * gaussians.count, 0);
+}
+
+void DensityControl::end_step(const DeviceGaussians& gaussians,
+                              const Buffer<std::uint32_t>& guard) {
+  statistics_ = Buffer<float>(context_, 2 * gaussians.count, "density statistics");
+  statistics_.clear();
+  context_.kernel(kProgram, "measure_step")
+      .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
+              static_cast<float>(1.0 / extent_), old_means_, gaussians.means, guard, statistics_);
 }
 
 bool DensityControl::refines_at(std::int64_t iteration) const {
@@ -129,6 +148,7 @@ DensityPlan DensityControl::plan(const DeviceGaussians& gaussians, std::int64_t 
   rules.min_opacity = options_.prune_opacity;
   rules.max_size = options_.prune_scale * extent_;
   rules.min_size = options_.prune_scale_min * extent_;
+  rules.measure = options_.densify_measure;
   rules.max_count = limit_;
   rules.activation = gaussians.activation;
   rules.bounds = options_.bounds;

@@ -32,6 +32,13 @@ class DensityControl {
                   const GaussianGradients& gradients,
                   const Buffer<std::uint32_t>* guard = nullptr);
 
+  /// Whether `signal = step` wants the step after so many iterations measured: then begin_step()
+  /// comes before the optimiser's step, end_step() behind it. They enqueue without waiting; a guard
+  /// whose first word is not 0 measures nothing.
+  bool measures_step(std::int64_t iteration) const;
+  void begin_step(const DeviceGaussians& gaussians);
+  void end_step(const DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard);
+
   /// Whether the statistics of a step are of use.
   bool accumulates_at(std::int64_t iteration) const { return iteration < last_; }
 
@@ -72,6 +79,7 @@ class DensityControl {
   std::int64_t first_ = 0, growth_end_ = 0, last_ = 0, period_ = 0;  // iterations
   bool whole_passes_ = false;                                        // a period sees every view
   Buffer<float> statistics_;
+  Buffer<float> old_means_;  // before a step that is measured
   Buffer<std::uint32_t> open_guard_;
 };
 

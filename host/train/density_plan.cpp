@@ -20,6 +20,18 @@ struct Candidate {
   std::uint32_t index;
 };
 
+double size_of(const float* parameters, const DensityRules& rules) {
+  double longest = 0, squares = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double parameter = parameters[axis];
+    const double size =
+        rules.activation == ScaleActivation::kExp ? std::exp(parameter) : sigmoid(parameter);
+    longest = std::max(longest, size);
+    squares += size * size;
+  }
+  return rules.measure == SizeMeasure::kNorm ? std::sqrt(squares) : longest;
+}
+
 // The first `room` candidates by score; the others keep their fate.
 void choose(std::vector<Candidate>& candidates,
             std::size_t room,
@@ -112,10 +124,7 @@ DensityPlan plan_density(std::span<const float> means,
   std::vector<Fate> fates(count, Fate::kKeep);
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < count; ++i) {
-    const float parameter = std::max({scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]});
-    const double size = rules.activation == ScaleActivation::kExp
-                            ? std::exp(static_cast<double>(parameter))
-                            : sigmoid(parameter);
+    const double size = size_of(&scales[3 * i], rules);
     const bool finite = is_finite(means, scales, opacities, i);
     std::size_t* const reason = !finite                                         ? &plan.not_finite
                                 : is_outside(rules.bounds, means, i)            ? &plan.outside

@@ -21,16 +21,17 @@ enum class DensityRole : std::uint32_t {
   kSecondChild = 3,
   kFirstHalf = 4,
   kSecondHalf = 5,
+  kPart = 6,  ///< of 3DGS-MCMC; what it shares with the others follows (apply_shares())
 };
 
 /// Thresholds of one pass of density control, in world units.
 struct DensityRules {
-  double gradient = 0;  ///< densify at and above this mean signal
-  double split_size =
-      0;  ///< longest standard deviation above which a candidate is split, else cloned
+  double gradient = 0;     ///< densify at and above this mean signal
+  double split_size = 0;   ///< size above which a candidate is split, else cloned
   double min_opacity = 0;  ///< remove below
   double max_size = 0;     ///< remove above; 0 = off
   double min_size = 0;     ///< remove below; 0 = off
+  SizeMeasure measure = SizeMeasure::kLongest;  ///< of all sizes
   std::size_t max_count = 0;
   ScaleActivation activation = ScaleActivation::kExp;
   std::optional<Bounds> bounds;  ///< remove outside

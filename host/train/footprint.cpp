@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -15,6 +18,14 @@ constexpr char kProgram[] = "train/footprint.cl";
 constexpr std::size_t kGroup = 64;
 constexpr double kMargin =
     0.15;  // of the picture's size: Gaussians reach in from beyond its border
+
+constexpr float kNoLimit = std::numeric_limits<float>::infinity();
+
+// The number that is trained for a standard deviation; a sigmoid has none from 1 on.
+float scale_parameter(double size, ScaleActivation activation) {
+  if (activation == ScaleActivation::kExp) return static_cast<float>(std::log(size));
+  return size < 1.0 ? static_cast<float>(std::log(size / (1.0 - size))) : kNoLimit;
+}
 
 BuildOptions build_options(const DeviceGaussians& gaussians) {
   BuildOptions build;
@@ -63,8 +74,14 @@ RsFootprintView footprint_view(const Camera& camera) {
   return view;
 }
 
-Footprint::Footprint(Context& context, std::span<const Camera> cameras, double share)
-    : context_(context), share_(share), views_(static_cast<std::uint32_t>(cameras.size())) {
+Footprint::Footprint(Context& context,
+                     std::span<const Camera> cameras,
+                     double share,
+                     const ScaleLimits& limits)
+    : context_(context),
+      share_(share),
+      limits_(limits),
+      views_(static_cast<std::uint32_t>(cameras.size())) {
   if (share <= 0) return;
   std::vector<RsFootprintView> views;
   views.reserve(cameras.size());
@@ -89,6 +106,14 @@ void Footprint::restore(std::span<const float> lows) {
 }
 
 void Footprint::apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard) {
+  if (limits_.least > 0 || limits_.greatest > 0) {
+    const double low = limits_.least, high = limits_.greatest;
+    context_.kernel(kProgram, "limit_scales", build_options(gaussians))
+        .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
+                low > 0 ? scale_parameter(low, gaussians.activation) : -kNoLimit,
+                high > 0 ? scale_parameter(high, gaussians.activation) : kNoLimit, guard,
+                gaussians.scales);
+  }
   if (share_ <= 0) return;
   if (lows_.size() < gaussians.count) {
     throw UsageError(fmt::format("The least sizes are known for {} Gaussians, not {}: update first",

@@ -11,29 +11,38 @@
 
 namespace raysplats {
 
+/// Limits of all standard deviations, world units; 0 = none.
+struct ScaleLimits {
+  double least = 0, greatest = 0;
+};
+
 /// Keeps Gaussians from becoming thinner than a share of a pixel in the view that resolves them
-/// best: see cl/train/footprint.cl. What it changes are the parameters themselves, so the model
-/// that is written needs nothing else to look as it did in training.
+/// best, and within fixed limits: see cl/train/footprint.cl. What it changes are the parameters
+/// themselves, so the model that is written needs nothing else to look as it did in training.
 class Footprint {
  public:
-  /// `share` of a pixel as a standard deviation; 0 turns everything off.
-  Footprint(Context& context, std::span<const Camera> cameras, double share);
+  /// `share` of a pixel as a standard deviation; 0 = without.
+  Footprint(Context& context,
+            std::span<const Camera> cameras,
+            double share,
+            const ScaleLimits& limits = {});
 
   /// Finds the least sizes for the Gaussians' present means; enqueues without waiting.
   void update(const DeviceGaussians& gaussians);
 
-  /// The least scale parameters found last, for checkpoints; empty when everything is off.
+  /// The least scale parameters found last, for checkpoints; empty without a share.
   const Buffer<float>& lows() const { return lows_; }
   /// Puts them back: what a resumed run does until its next update() depends on them.
   void restore(std::span<const float> lows);
 
-  /// Raises what is smaller; update() has to have seen this number of Gaussians. A guard whose
-  /// first word is not 0 keeps them as they are.
+  /// Raises what is smaller and keeps to the limits; update() has to have seen this number of
+  /// Gaussians. A guard whose first word is not 0 keeps them as they are.
   void apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard);
 
  private:
   Context& context_;
   double share_;
+  ScaleLimits limits_;
   std::uint32_t views_ = 0;
   Buffer<RsFootprintView> cameras_;
   Buffer<float> lows_;

@@ -77,7 +77,7 @@ RelocationPlan plan_relocation(std::span<const float> means,
       share = {static_cast<float>(std::log(equal.opacity / (1.0 - equal.opacity))),
                static_cast<float>(equal.scale)};
     }
-    const auto role = static_cast<std::uint32_t>(shared ? DensityRole::kClone : DensityRole::kKeep);
+    const auto role = static_cast<std::uint32_t>(shared ? DensityRole::kPart : DensityRole::kKeep);
     plan.source.insert(plan.source.end(), parts[i], i);
     plan.role.insert(plan.role.end(), parts[i], role);
     out.shares.insert(out.shares.end(), parts[i], share);

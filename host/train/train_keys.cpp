@@ -309,11 +309,23 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
       "densify-signal", o.densify_signal,
       {{"auto", DensifySignal::kAuto},
        {"screen", DensifySignal::kScreen},
-       {"absolute", DensifySignal::kAbsolute}},
+       {"absolute", DensifySignal::kAbsolute},
+       {"step", DensifySignal::kStep}},
       "that gradient summed as it is (screen, 3DGS) or in absolute value per ray (absolute, AbsGS; "
-      "wants a threshold 2 to 4 times higher); auto = absolute with the budget strategy");
+      "wants a threshold 2 to 4 times higher), or in its place how far the optimiser has just "
+      "moved "
+      "the mean, over the scene extent (step, the paper's code); auto = absolute with the budget "
+      "strategy");
   t.number("densify-size", o.densify_size, 0, kHuge,
            "larger ones (times the scene extent) are split, smaller ones cloned");
+  t.choice<SizeMeasure>(
+      "densify-measure", o.densify_measure,
+      {{"longest", SizeMeasure::kLongest}, {"norm", SizeMeasure::kNorm}},
+      "what densify-size, prune-scale and prune-scale-min compare: the longest axis or the root of "
+      "the sum of the squares of all three (norm, the paper's code)");
+  t.flag("densify-inherit", o.densify_inherit,
+         "new Gaussians keep the optimiser's state of the one they come from, as in the paper's "
+         "code; else it begins at zero");
   t.number("split-factor", o.split_factor, 1, 100,
            "children of a split are smaller by this factor");
   t.number("prune-opacity", o.prune_opacity, 0, 1, "Gaussians below this opacity are removed");
@@ -339,6 +351,10 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.number("footprint", o.footprint, 0, 10,
            "least standard deviation of a Gaussian, in pixels of the view that resolves it best; 0 "
            "= none");
+  t.number("scale-min", o.scale_min, 0, kHuge,
+           "least standard deviation after every step, times the scene extent; 0 = none");
+  t.number("scale-max", o.scale_max, 0, kHuge,
+           "greatest standard deviation after every step, times the scene extent; 0 = none");
   t.number("opacity-reset-every", o.opacity_reset_every, 0, kMaxCount,
            "opacities are lowered to opacity-reset-value every so many iterations until "
            "densify-until; 0 = never");

@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kSmallPhoto = 200;         // longer side of photos that the start looks at, in pixels
 constexpr std::size_t kFewViews = 3;     // below, photos say next to nothing of depth
+constexpr double kSigmoidExtent = 20;    // then one unit is less than 0.05 extents, a usual limit
 constexpr std::size_t kMeanPhotos = 24;  // whose typical colour is the background
 
 }  // namespace
@@ -110,6 +111,13 @@ void Trainer::Impl::start() {
   if (train_views.size() < kFewViews) {
     spdlog::warn("{} training view{} of {}: depth is open, and other views will look wrong",
                  train_views.size(), train_views.size() == 1 ? "" : "s", dataset.root.string());
+  }
+  if (options.scale_activation == ScaleActivation::kSigmoid && extent > kSigmoidExtent) {
+    spdlog::warn(
+        "scale-activation = sigmoid keeps every axis below one unit of the data set, {:.2g} of the "
+        "scene's extent of {:.3g}: what is larger cannot be shown by one Gaussian; use exp, or a "
+        "data set in units of which the extent has a few",
+        1.0 / extent, extent);
   }
   if (test_views.empty())
     spdlog::info("no view is held out, so nothing is measured: --test-every 8 does");

@@ -30,6 +30,13 @@ enum class DensifySignal {
   kAuto,      ///< kAbsolute with kBudget, kScreen with kAdc
   kScreen,    ///< norm of the summed screen-space gradient (3DGS)
   kAbsolute,  ///< norm of the sum of absolute per-ray gradients (AbsGS, Ye et al. 2024)
+  kStep,      ///< the last step of the mean, over the scene extent (RaySplats' authors)
+};
+
+/// What the size of a Gaussian means to kAdc.
+enum class SizeMeasure {
+  kLongest,  ///< its greatest standard deviation
+  kNorm,     ///< the root of the sum of the three squares (RaySplats' authors)
 };
 
 /// A moment or a span of a run: a value below 1 is a share of its iterations, any other a number of
@@ -122,7 +129,7 @@ struct TrainOptions {
   LearningRate sh_lr{1e-2, 2.5e-3};
   LearningRate sh_rest_lr{5e-4, 1.25e-4};
   LearningRate exposure_lr{3e-2, 3e-3};
-  LearningRate pose_lr{5e-3, 5e-5};  ///< radians, and shares of the scene extent
+  LearningRate pose_lr{5e-3, 5e-4};  ///< radians, and shares of the scene extent
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration
   bool scale_lr_by_extent = false;
   double adam_beta1 = 0.9;
@@ -143,7 +150,9 @@ struct TrainOptions {
   double densify_grad_threshold = 4e-4;
   DensifySignal densify_signal = DensifySignal::kAuto;
   double densify_size = 0.01;  ///< times the scene extent
+  SizeMeasure densify_measure = SizeMeasure::kLongest;
   double split_factor = 1.6;
+  bool densify_inherit = false;  ///< new Gaussians keep their parent's optimiser state
   double prune_opacity = 0.005;
   double prune_scale = 0.0;        ///< times the scene extent; 0 = off
   double prune_scale_min = 0.0;    ///< times the scene extent; 0 = off
@@ -153,6 +162,8 @@ struct TrainOptions {
   double scale_reg = 0.01;         ///< weight of the mean size over the extent in the loss of kMcmc
   double mcmc_noise = 80.0;        ///< strength of the noise on faint Gaussians' means with kMcmc
   double footprint = 0.3;          ///< least standard deviation in pixels; 0 = off
+  double scale_min = 0.0;          ///< least standard deviation, times the scene extent; 0 = off
+  double scale_max = 0.0;          ///< greatest standard deviation, likewise; 0 = off
   std::int64_t opacity_reset_every = 0;
   double opacity_reset_value = 0.01;
 

@@ -81,6 +81,65 @@ TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [
   }
 }
 
+TEST_CASE("the signal step is how far the mean has moved over the extent [small] [tiny]") {
+  Context context(select_device(""));
+  const Gaussians model = model_of({0.01, 0.01, 0.01}, {0.5, 0.5, 0.5});
+  DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  TrainOptions options = rules();
+  options.densify_signal = DensifySignal::kStep;
+  options.densify_from = 20;
+  options.densify_until = 40;
+  options.densify_every = 10;
+  DensityControl control(context, options, 4.0, 1);
+  CHECK(control.measures_step(19));
+  CHECK_FALSE(control.measures_step(20));
+  CHECK_FALSE(control.measures_step(9));
+  Buffer<std::uint32_t> guard(context, 1, "guard");
+  guard.clear();
+  accumulate(context, control, gaussians, {{9, 9, 1, 9, 9, 1, 9, 9, 1}});
+  const std::vector<float> before = gaussians.means.download();
+  std::vector<float> after = before;
+  after[0] += 0.4f;
+  after[4] -= 0.3f;
+  after[5] += 0.4f;
+  after[6] = std::numeric_limits<float>::quiet_NaN();
+  control.begin_step(gaussians);
+  gaussians.means.upload(after);
+  control.end_step(gaussians, guard);
+  const std::vector<float> found = control.statistics().download();
+  CHECK(found[0] == doctest::Approx(0.1).epsilon(1e-5));
+  CHECK(found[2] == doctest::Approx(0.125).epsilon(1e-5));
+  CHECK(found[1] == 1);
+  CHECK(found[3] == 1);
+  CHECK(found[4] == 0);
+  CHECK(found[5] == 0);
+  guard.upload(std::vector<std::uint32_t>{1});
+  control.end_step(gaussians, guard);
+  for (const float value : control.statistics().download()) CHECK(value == 0);
+}
+
+TEST_CASE("sizes are the longest axis or the norm of all three [small] [tiny]") {
+  // model_of() makes axes of s, s / 2 and s / 3: the norm is 7 / 6 of the longest.
+  for (const SizeMeasure measure : {SizeMeasure::kLongest, SizeMeasure::kNorm}) {
+    const Gaussians model = model_of({0.09, 0.09, 0.9, 0.009}, {0.5, 0.5, 0.5, 0.5});
+    DensityRules rules;
+    rules.gradient = 0.5;
+    rules.split_size = 0.1;
+    rules.max_size = 1.0;
+    rules.min_size = 0.01;
+    rules.measure = measure;
+    rules.max_count = 100;
+    const std::vector<float> statistics{1, 1, 0, 1, 0, 1, 0, 1};
+    const DensityPlan plan =
+        plan_density(model.means, model.log_scales, model.opacities, statistics, rules);
+    const bool norm = measure == SizeMeasure::kNorm;
+    CHECK(plan.split == (norm ? 1 : 0));
+    CHECK(plan.cloned == (norm ? 0 : 1));
+    CHECK(plan.large == (norm ? 1 : 0));
+    CHECK(plan.small == (norm ? 0 : 1));
+  }
+}
+
 TEST_CASE("clone, split and prune follow the thresholds [small] [tiny]") {
   Context context(select_device(""));
   for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {

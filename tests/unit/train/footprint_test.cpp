@@ -153,3 +153,30 @@ TEST_CASE("a run finds the least sizes anew where density control has ended") {
     before = lows;
   }
 }
+
+TEST_CASE("scales keep to fixed limits, with a footprint and without [small] [tiny]") {
+  Context context(select_device(""));
+  const std::vector<Camera> cameras = cameras_of(CameraModel::kPinhole);
+  Buffer<std::uint32_t> guard(context, 1, "guard");
+  for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
+    Gaussians before;
+    before.resize(2);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    before.log_scales = {std::log(1e-3f), std::log(0.5f), std::log(0.05f), nan, -20, -0.1f};
+    const Footprint none(context, cameras, 0.0);
+    Footprint limited(context, cameras, 0.0, {0.01, 0.2});
+    DeviceGaussians gaussians = DeviceGaussians::upload(context, before, activation);
+    guard.upload(std::vector<std::uint32_t>{1});
+    limited.apply(gaussians, guard);
+    CHECK(gaussians.download().log_scales[1] == doctest::Approx(std::log(0.5)).epsilon(1e-5));
+    guard.clear();
+    limited.apply(gaussians, guard);
+    const std::vector<float> after = gaussians.download().log_scales;
+    const double expected[] = {0.01, 0.2, 0.05, 0, 0.01, 0.2};
+    for (std::size_t k = 0; k < 6; ++k) {
+      if (k != 3) CHECK(after[k] == doctest::Approx(std::log(expected[k])).epsilon(1e-4));
+    }
+    CHECK(std::isnan(after[3]));
+    CHECK(none.lows().size() == 0);
+  }
+}

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
@@ -11,6 +12,7 @@
 
 #include "base/rng.hpp"
 #include "raysplats/device.hpp"
+#include "train/density_control.hpp"
 
 using namespace raysplats;
 
@@ -155,5 +157,44 @@ TEST_CASE("shares replace opacity and size where they are given [small]") {
       CHECK(size_of(after[i], activation) ==
             doctest::Approx(factor * size_of(before[i], activation)).epsilon(1e-5));
     }
+  }
+}
+
+TEST_CASE("parts of a Gaussian are drawn from it, what is whole stays where it is [small]") {
+  constexpr std::size_t kMany = 4000;
+  Gaussians many;
+  many.resize(kMany);
+  for (std::size_t i = 0; i < kMany; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      many.means[3 * i + k] = static_cast<float>(k);
+      many.log_scales[3 * i + k] = static_cast<float>(std::log(0.1 * static_cast<double>(k + 1)));
+    }
+    many.quaternions[4 * i] = 1;
+    many.opacities[i] = i % 2 == 0 ? 0.0f : -9.0f;
+  }
+  TrainOptions options;
+  options.strategy = DensityStrategy::kMcmc;
+  options.max_gaussians = kMany;
+  options.densify_every = 10;
+  DeviceGaussians gaussians = DeviceGaussians::upload(context(), many, ScaleActivation::kExp);
+  DensityControl control(context(), options, kExtent, 10);
+  const DensityPlan plan = control.refine(gaussians, 10);
+  REQUIRE(gaussians.count == kMany);
+  const std::vector<float> means = gaussians.means.download();
+  std::array<double, 3> square{};
+  std::size_t parts = 0;
+  for (std::size_t i = 0; i < kMany; ++i) {
+    const bool part = plan.role[i] == static_cast<std::uint32_t>(DensityRole::kPart);
+    parts += part ? 1 : 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double moved = static_cast<double>(means[3 * i + k]) - static_cast<double>(k);
+      if (!part) CHECK(moved == 0);
+      square[k] += moved * moved;
+    }
+  }
+  CHECK(parts > kMany / 2);
+  for (std::size_t k = 0; k < 3; ++k) {
+    CHECK(std::sqrt(square[k] / static_cast<double>(parts)) ==
+          doctest::Approx(0.1 * static_cast<double>(k + 1)).epsilon(0.06));
   }
 }

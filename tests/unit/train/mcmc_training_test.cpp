@@ -54,7 +54,8 @@ TEST_CASE("the mcmc strategy learns, grows to its limit and resumes exactly") {
   const TrainSummary plain = other.run(false);
   MESSAGE("mcmc " << mcmc.evaluations.back().psnr << " dB, budget " << plain.evaluations.back().psnr
                   << " dB");
-  CHECK(mcmc.evaluations.back().psnr > plain.evaluations.back().psnr - 3);
+  // Measured: 27.1 and 28.4 dB.
+  CHECK(mcmc.evaluations.back().psnr > plain.evaluations.back().psnr - 1.75);
 
   options.checkpoint_every = 170;  // between two passes
   options.keep_checkpoints = 9;
