@@ -1,11 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <spdlog/spdlog.h>
 
+#include <cmath>
+
 #include "train/step_options.hpp"
 #include "train/train_config.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {
+namespace {
+
+// Then poses stay, so that the model settles on them; shares of the run.
+constexpr double kPoseShare = 0.8;
+
+std::int64_t pose_end(const TrainOptions& options) {
+  return std::llround(kPoseShare * static_cast<double>(options.iterations));
+}
+
+}  // namespace
 
 // One view: forward, loss, backward, statistics, Adam. Nothing is waited for, but sizes where
 // await_sizes says so and, where poses are trained, their gradients: then sizes as well, because
@@ -14,13 +26,14 @@ void Trainer::Impl::enqueue_step() {
   const std::size_t view = order.at(iteration);
   targets.prefetch(order.upcoming(kReadAhead - 1));
   const int divisor = resolution_divisor(options, iteration);
+  const bool slopes = poses && iteration < pose_end(options);
   const Camera full = poses ? poses->camera(view) : train_cameras[view];
   const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
   const std::array<float, 3> behind = step_background(options, cut_out, background, iteration);
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
   tracer.set_background(behind);
   tracer.forward(gaussians, camera, true,
-                 await_sizes || poses ? ViewSizes::kAwaited : ViewSizes::kAhead);
+                 await_sizes || slopes ? ViewSizes::kAwaited : ViewSizes::kAhead);
   const Buffer<float>& shown =
       exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
                : tracer.image();
@@ -33,12 +46,15 @@ void Trainer::Impl::enqueue_step() {
                    learning_rate(options.exposure_lr, options, iteration), guard.mark());
   }
   PoseGradient slope;
-  tracer.backward(gaussians, image_gradient, gradients, poses ? &slope : nullptr);
+  tracer.backward(gaussians, image_gradient, gradients, slopes ? &slope : nullptr);
   whole = false;
-  if (poses) poses->step(view, slope, learning_rate(options.pose_lr, options, iteration));
+  if (slopes) poses->step(view, slope, learning_rate(options.pose_lr, options, iteration));
   if (density.accumulates_at(iteration)) density.accumulate(gaussians, gradients, &guard.mark());
   if (mcmc) mcmc->press(gaussians, gradients, guard.mark());
+  const bool measured = density.measures_step(iteration);
+  if (measured) density.begin_step(gaussians);
   adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
+  if (measured) density.end_step(gaussians, guard.mark());
   if (mcmc) mcmc->disturb(gaussians, iteration, guard.mark());
   footprint.apply(gaussians, guard.mark());
   guard.close(adam.refused(), tracer.kept_capped_rays(), gaussians.count);
@@ -77,7 +93,8 @@ void Trainer::Impl::control_density() {
 // Optimiser and least sizes follow the new set of Gaussians.
 void Trainer::Impl::follow_plan(const DensityPlan& plan) {
   if (plan.changes()) {
-    const std::vector<std::uint32_t> source = plan.state_source();
+    const std::vector<std::uint32_t> source =
+        options.densify_inherit ? plan.source : plan.state_source();
     Buffer<std::uint32_t> device_source(context, source.size(), "state sources");
     device_source.upload(source);
     adam.remap(device_source, gaussians.count);
