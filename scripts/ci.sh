@@ -53,10 +53,15 @@ vendor() {
   python3 scripts/gpu_compile.py --quiet --skip-missing --targets "$1"
 }
 
+intel_cpu() {
+  ./scripts/implementations.sh --only intel,intel-gpu --build "$build" -R '^(primitives|bvh|trace|train)$' --cases "$gpu_cases"
+}
+
 browser() { ./scripts/test_browser.sh "$build/bin/raysplats"; }
 
 leg "Python" ./scripts/test_python.sh
 leg "GPU path on this OpenCL" gpu_path
+leg "Intel's OpenCL for CPUs" intel_cpu
 leg "browser" browser
 leg "AMD's compiler (gfx1030)" vendor gfx1030
 leg "NVIDIA's compiler (sm_86)" vendor sm_86

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 # Runs unit tests in the form that GPUs get (packets as work-groups, shared gradient sums, bounded launches) on
 # whatever OpenCL implementation is at hand: a small preloaded library makes every device say that it is a GPU.
-# usage: scripts/gpu_path.sh [-R REGEX] [--cases GLOBS] [--build BUILD]
+# usage: scripts/gpu_path.sh [-R REGEX] [--cases GLOBS] [--but GLOBS] [--as-it-is] [--build BUILD] [--cache DIR]
 #   -R REGEX       test programs, as ctest names them (default: ^(trace|train)$; others: primitives, bvh, light, bench)
 #   --cases GLOBS  test cases, comma-separated globs (default: all)
+#   --but GLOBS    but for these
+#   --as-it-is     devices say what they are: the same programs without the library, to compare
 #   --build BUILD  build folder with the test programs (default: build/release)
+#   --cache DIR    keeps compiled kernels (default: BUILD/gpu_path_cache)
 # Needs a C compiler and built tests (scripts/setup.sh --tests). There are no known exceptions on PoCL 3.1.
 set -euo pipefail
 called_from=$PWD
@@ -15,10 +18,13 @@ say() { printf '== %s\n' "$*"; }
 
 pattern='^(trace|train)$'
 cases='*'
+but=''
+form='as on a GPU'
 build=$PWD/build/release
+cache=
 while (($# > 0)); do
   case $1 in
-    -R | --cases | --build)
+    -R | --cases | --but | --build | --cache)
       (($# > 1)) || {
         echo "$1 needs a value" >&2
         exit 2
@@ -26,12 +32,18 @@ while (($# > 0)); do
       case $1 in
         -R) pattern=$2 ;;
         --cases) cases=$2 ;;
+        --but) but=$2 ;;
+        --cache) cache=$(cd "$called_from" && realpath -m -- "$2") ;;
         --build) build=$(cd "$called_from" && realpath -- "$2") ;;
       esac
       shift 2
       ;;
+    --as-it-is)
+      form='as the device is'
+      shift
+      ;;
     *)
-      echo "$1 is no option: scripts/gpu_path.sh [-R REGEX] [--cases GLOBS] [--build BUILD]" >&2
+      echo "$1 is no option: scripts/gpu_path.sh [-R REGEX] [--cases GLOBS] [--but GLOBS] [--as-it-is] [--build BUILD] [--cache DIR]" >&2
       exit 2
       ;;
   esac
@@ -50,15 +62,19 @@ fi
 
 work=$(mktemp -d)
 trap 'rm -rf -- "$work"' EXIT
-"${CC:-cc}" -shared -fPIC -O1 -Wall -Wextra -Werror -o "$work/say_gpu.so" tests/gpu_path/say_gpu.c -ldl
+preloaded=()
+if [[ $form == 'as on a GPU' ]]; then
+  "${CC:-cc}" -shared -fPIC -O1 -Wall -Wextra -Werror -o "$work/say_gpu.so" tests/gpu_path/say_gpu.c -ldl
+  preloaded=(env "LD_PRELOAD=$work/say_gpu.so")
+fi
 # Apart from the user's kernels and tunings, which belong to the device as it is.
-export XDG_CACHE_HOME=$build/gpu_path_cache
+export XDG_CACHE_HOME=${cache:-$build/gpu_path_cache}
 
 failed=()
 for program in "${programs[@]}"; do
   name=${program##*/test_}
-  say "$name as on a GPU"
-  LD_PRELOAD=$work/say_gpu.so "$program" --test-case="$cases" |
+  say "$name $form"
+  "${preloaded[@]}" "$program" --test-case="$cases" --test-case-exclude="$but" |
     tee "$work/$name.log" || failed+=("$name")
   if ! grep -Eq 'test cases: +[1-9]' "$work/$name.log"; then
     failed+=("$name: no test case matches $cases")
@@ -69,4 +85,4 @@ if ((${#failed[@]} > 0)); then
   printf '== Failed: %s\n' "${failed[@]}"
   exit 1
 fi
-say "Passed as on a GPU: ${programs[*]##*/test_}"
+say "Passed $form: ${programs[*]##*/test_}"

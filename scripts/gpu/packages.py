@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fetches the vendors' compilers and unpacks them into a folder; nothing is installed. Versions are pinned, so that the
-stored figures stay comparable. NVIDIA's package is under the CUDA EULA: fetch it, do not pass it on."""
+"""Fetches the vendors' compilers, and OpenCL implementations for CPUs, and unpacks them into a folder; nothing is installed.
+Versions are pinned, so that figures and test results stay comparable. NVIDIA's compiler is under the CUDA EULA, Intel's CPU
+runtime under Intel's EULA for developer tools: fetch them, do not pass them on.
+
+    packages.py NAME CACHE      # fetches one and prints the folder that holds it; 77 and a sentence where it cannot be had
+"""
 import glob
 import os
 import shutil
@@ -12,7 +16,7 @@ import zipfile
 
 LIBRARIES = "usr/lib/x86_64-linux-gnu"
 
-# Debian packages of each vendor; those of LLVM 14 only where the system has none.
+# Debian packages of each vendor's compiler (those of LLVM 14 only where the system has none) and of each implementation.
 DEBIAN = {
     "amd": ["rocm-device-libs=5.2.3-2"],
     "nvidia": ["libclc-15=1:15.0.6-4"],
@@ -24,12 +28,20 @@ DEBIAN = {
         "libllvmspirvlib14=14.0.0-5",
         "libopencl-clang14=14.0.0-4",
     ],
+    # Its other libraries are those of Mesa's drivers for pictures, and of PoCL.
+    "rusticl": ["mesa-opencl-icd=22.3.6-1+deb12u2", "libclc-15=1:15.0.6-4", "libllvmspirvlib15=15.0.0-2"],
 }
 UNLESS_PRESENT = {
     "libllvm14=1:14.0.6-12": "/" + LIBRARIES + "/libLLVM-14.so.1",
     "libclang-cpp14=1:14.0.6-12": "/" + LIBRARIES + "/libclang-cpp.so.14",
 }
-PYPI = {"nvidia": ["nvidia-cuda-nvcc-cu12==12.9.86"]}
+PYPI = {
+    "nvidia": ["nvidia-cuda-nvcc-cu12==12.9.86"],
+    # The second is not among the declared dependencies of the first, which does not load without it.
+    "intel-cpu": ["intel-opencl-rt==2026.2.0", "intel-cmplr-lib-rt==2026.2.0", "tbb==2023.2.0"],
+}
+# A folder of their own: they are taken whole, not file by file.
+APART = ("rusticl", "intel-cpu")
 CLANG = "clang-15"
 
 
@@ -80,18 +92,21 @@ def _wheel(package, root):
         for file in glob.glob(os.path.join(scratch, "*.whl")):
             zipfile.ZipFile(file).extractall(root)
         ptxas = os.path.join(root, "nvidia/cuda_nvcc/bin/ptxas")
-        os.chmod(ptxas, os.stat(ptxas).st_mode | stat.S_IXUSR)
+        if os.path.exists(ptxas):
+            os.chmod(ptxas, os.stat(ptxas).st_mode | stat.S_IXUSR)
 
     return unpack
 
 
 def fetch(vendor, cache):
-    """The folder that holds the vendor's compiler, unpacked; raises Missing."""
+    """The folder that holds the vendor's compiler or the implementation, unpacked; raises Missing."""
     if vendor in ("amd", "nvidia") and shutil.which(CLANG) is None:
         raise Missing(f"{CLANG} is not installed: apt-get install {CLANG}")
+    if vendor in APART:
+        cache = os.path.join(cache, vendor)
     root = os.path.join(cache, "root")
     os.makedirs(root, exist_ok=True)
-    packages = list(DEBIAN[vendor])
+    packages = list(DEBIAN.get(vendor, []))
     if vendor == "intel":
         packages += [package for package, path in UNLESS_PRESENT.items() if not os.path.exists(path)]
     for package in packages:
@@ -99,3 +114,17 @@ def fetch(vendor, cache):
     for package in PYPI.get(vendor, []):
         _once(cache, package, _wheel(package, root))
     return root
+
+
+def main():
+    if len(sys.argv) != 3 or sys.argv[1] not in {*DEBIAN, *PYPI}:
+        sys.exit(f"usage: packages.py {'|'.join(sorted({*DEBIAN, *PYPI}))} CACHE")
+    try:
+        print(fetch(sys.argv[1], os.path.abspath(sys.argv[2])))
+    except Missing as reason:
+        print(reason, file=sys.stderr)
+        sys.exit(77)
+
+
+if __name__ == "__main__":
+    main()
