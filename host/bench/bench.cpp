@@ -30,10 +30,19 @@ void measure(Context& context,
   const std::vector<BenchOperation> operations =
       selected(bench.operations(), keep, model.name, size);
   if (operations.empty()) return;
-  const auto samples = run_operations(context, operations, options.repeat, options.min_seconds);
+  const auto out_of_time = [&] {
+    return options.deadline && std::chrono::steady_clock::now() >= *options.deadline;
+  };
+  const auto samples =
+      run_operations(context, operations, options.repeat, options.min_seconds, out_of_time);
   for (std::size_t i = 0; i < operations.size(); ++i) {
     for (std::size_t k = 0; k < operations[i].stages.size(); ++k) {
-      report.rows.push_back(row_of(operations[i].stages[k], samples[i][k], model.name, size));
+      const BenchStage& stage = operations[i].stages[k];
+      if (samples[i][k].seconds.empty()) {
+        report.left_out.push_back(id_of(stage.name, model.name, size));
+      } else {
+        report.rows.push_back(row_of(stage, samples[i][k], model.name, size));
+      }
     }
   }
 }

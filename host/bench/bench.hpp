@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -36,6 +37,8 @@ struct BenchOptions {
   std::size_t rays = 65536;           ///< arbitrary rays, at most
   std::size_t triangles = 1'000'000;  ///< of the larger body; the smaller has a tenth
   std::uint64_t seed = 1;
+  /// Nothing more is begun after this moment; rows that were not begun are named in left_out.
+  std::optional<std::chrono::steady_clock::time_point> deadline;
   TraceOptions trace;
 };
 

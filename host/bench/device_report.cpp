@@ -104,8 +104,13 @@ DeviceReport make_device_report(Context& context,
         one.width = width;
         one.height = height;
         if (large) one.filter = kWholeRows;
+        one.deadline = std::chrono::steady_clock::now() +
+                       std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                           std::chrono::duration<double>(most_seconds - clock.seconds()));
         const Clock run(context);
         report.runs.push_back(run_bench(context, one));
+        for (const std::string& id : report.runs.back().left_out)
+          report.left_out.push_back(fmt::format("{}, {}x{}", id, width, height));
         before = run.measuring();
         size_before = size;
         add_speeds(report.runs.back(), width, height, report);

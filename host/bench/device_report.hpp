@@ -35,7 +35,8 @@ struct DeviceReport {
 
 /// Self-test, then all rows at options' resolution and views and iterations at 1600x1064, for every
 /// scene and size from the smallest on. What would by the sizes before take more than
-/// `most_seconds` in all is left out. Needs a context with keep_launches; uses no network.
+/// `most_seconds` in all is left out, and so are rows that have not begun by then. Needs a context
+/// with keep_launches; uses no network.
 DeviceReport make_device_report(Context& context,
                                 const BenchOptions& options,
                                 double most_seconds = 450.0);

@@ -76,7 +76,8 @@ bool BenchStage::takes(const LaunchTime& launch) const {
 std::vector<std::vector<StageSamples>> run_operations(Context& context,
                                                       const std::vector<BenchOperation>& operations,
                                                       int repeat,
-                                                      double min_seconds) {
+                                                      double min_seconds,
+                                                      const std::function<bool()>& out_of_time) {
   std::exception_ptr failure;
   std::vector<bool> warm(operations.size(), false);
   for (std::size_t n = 0; n < operations.size(); ++n) {
@@ -87,6 +88,10 @@ std::vector<std::vector<StageSamples>> run_operations(Context& context,
       try {
         if (failure) {
           state.SkipWithError("an earlier operation failed");
+          return;
+        }
+        if (out_of_time && out_of_time()) {
+          state.SkipWithError("out of time");
           return;
         }
         if (!warm[n]) {

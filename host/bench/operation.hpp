@@ -38,11 +38,15 @@ struct StageSamples {
 };
 
 /// Runs every operation: once to warm up, then `repeat` times as often as Google Benchmark finds
-/// necessary for `min_seconds` each. The result is parallel to operations and their stages. Needs a
-/// context with keep_launches. What an operation throws ends the run and is thrown on.
-std::vector<std::vector<StageSamples>> run_operations(Context& context,
-                                                      const std::vector<BenchOperation>& operations,
-                                                      int repeat,
-                                                      double min_seconds);
+/// necessary for `min_seconds` each. No repetition begins once `out_of_time()` says so; an
+/// operation that never began has no samples. The result is parallel to operations and their
+/// stages. Needs a context with keep_launches. What an operation throws ends the run and is thrown
+/// on.
+std::vector<std::vector<StageSamples>> run_operations(
+    Context& context,
+    const std::vector<BenchOperation>& operations,
+    int repeat,
+    double min_seconds,
+    const std::function<bool()>& out_of_time = {});
 
 }  // namespace raysplats

@@ -63,6 +63,7 @@ struct BenchReport {
   std::uint64_t peak_process_bytes = 0;
   std::uint64_t peak_device_bytes = 0;  ///< in buffers
   std::vector<BenchRow> rows;
+  std::vector<std::string> left_out;  ///< ids of rows that were not begun before the deadline
 };
 
 /// Fixed-width text, with the ceilings above and the memory below the rows.

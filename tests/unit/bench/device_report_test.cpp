@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -47,6 +48,12 @@ TEST_CASE("a device's report holds its self-test, every size that fits the time,
   CHECK(short_of_time.left_out.size() == 2);
   CHECK(short_of_time.runs.size() == 2);
   CHECK(make_device_report(context, options, 0.0).runs.empty());
+
+  options.sizes = {options.sizes[0]};
+  options.deadline = std::chrono::steady_clock::now();
+  const BenchReport late = run_bench(context, options);
+  CHECK(late.rows.empty());
+  CHECK(late.left_out.size() == 2);
 
   DeviceReport wrong = report;
   wrong.checks[3].error = std::numeric_limits<double>::quiet_NaN();
