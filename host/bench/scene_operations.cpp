@@ -52,11 +52,11 @@ BenchOperation SceneBench::Impl::build() {
           {},
           [this] { ray_tracer->update(gaussians()); },
           {{"order",
-            {"bvh/curve.cl", "bvh/lbvh.cl:order_groups", "primitives/"},
+            {"bvh/curve.cl", "bvh/order_groups.cl", "bvh/group_order.cl", "primitives/"},
             false,
             [this] { return order_work(); }},
            {"nodes",
-            {"trace/gaussian_blocks.cl", "bvh/lbvh.cl:merge_nodes"},
+            {"trace/gaussian_blocks.cl", "bvh/lbvh.cl"},
             false,
             [this] { return nodes_work(); }},
            {"build", {}, false, [this] {

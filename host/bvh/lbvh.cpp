@@ -14,10 +14,12 @@ namespace {
 
 constexpr std::string_view kCurve = "bvh/curve.cl";
 constexpr std::string_view kTree = "bvh/lbvh.cl";
+constexpr std::string_view kOrder = "bvh/order_groups.cl";
+constexpr std::string_view kGroupOrder = "bvh/group_order.cl";
 constexpr std::string_view kCost = "bvh/tree_cost.cl";
 constexpr std::size_t kGroup = 64;
 // Boxes ordered together by the surface area heuristic. Larger groups make a better tree but need
-// more private memory.
+// more private memory, or on GPUs more work-items.
 constexpr std::size_t kCpuOrderGroup = 256;
 constexpr std::size_t kOrderGroup = 64;
 constexpr std::size_t kMaxCount = std::size_t{1} << 31;
@@ -76,9 +78,9 @@ Kernel Lbvh::kernel(std::string_view program, const char* name) const {
   // Only what a program reads: every other set of definitions is compiled again.
   BuildOptions build;
   build.define("PACKET", lanes_);
-  if (program == kTree) {
+  if (program == kOrder || program == kGroupOrder) {
     build.define("GROUP", order_group());
-  } else {
+  } else if (program != kTree) {
     build.define("RS_GROUP", shape_.group_size);
   }
   return context_->kernel(std::string(program), name, build);
@@ -142,9 +144,13 @@ void Lbvh::sort_along_curve(const Buffer<RsAabb>& boxes) {
         .launch(Range::linear(count_, kGroup), scratch_, order_, high_, u32(count_));
     sort_.sort(high_, order_, count_);
   }
-  kernel(kTree, "order_groups")
-      .launch(Range::linear(ceil_div(count_, order_group()), cpu ? 1 : kGroup), boxes, order_,
-              u32(count_));
+  if (cpu) {
+    kernel(kOrder, "order_groups")
+        .launch(Range::linear(ceil_div(count_, order_group()), 1), boxes, order_, u32(count_));
+  } else {
+    kernel(kGroupOrder, "order_group")
+        .launch(Range::linear(count_, order_group()), boxes, order_, u32(count_));
+  }
 }
 
 void Lbvh::merge() {

@@ -65,7 +65,8 @@ PROGRAMS = [
     ("gaussian blocks", "trace/gaussian_blocks.cl", dict(PACKET=4, SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
     ("bounds", "bvh/gaussian_bounds.cl", dict(SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
     ("curve", "bvh/curve.cl", dict(GROUP, PACKET=4)),
-    ("tree", "bvh/lbvh.cl", dict(PACKET=4, GROUP=64)),
+    ("tree", "bvh/lbvh.cl", dict(PACKET=4)),
+    ("tree order", "bvh/group_order.cl", dict(PACKET=4, GROUP=64)),
     ("tree cost", "bvh/tree_cost.cl", dict(GROUP, PACKET=4)),
     ("sort arrays", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=0)),
     ("sort to pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=1)),
@@ -93,7 +94,7 @@ PROGRAMS = [
 ]
 
 # What GPUs never get.
-CPU_ONLY = {"trace/finalize_gradients.cl"}
+CPU_ONLY = {"bvh/order_groups.cl", "trace/finalize_gradients.cl"}
 
 
 def unlisted():

@@ -407,3 +407,35 @@ TEST_CASE("lbvh validation: a fault of each kind is found") {
     CHECK(validate_lbvh(sound, std::span<const RsAabb>(boxes).first(999)) != "");
   }
 }
+
+TEST_CASE("groups are ordered alike by one work-item and by many [small]") {
+  Context context = device_context();
+  for (const std::size_t count : {1u, 5u, 63u, 64u, 65u, 130u, 1000u}) {
+    for (const int packet : {4, 8, 16}) {
+      CAPTURE(count);
+      CAPTURE(packet);
+      Boxes boxes = random_boxes(count, 0.3, count);
+      for (std::size_t i = 7; i < count; i += 11) boxes[i] = boxes[i - 1];
+      for (std::size_t i = 3; i < count; i += 17) {
+        boxes[i].lo[0] = std::numeric_limits<float>::quiet_NaN();
+      }
+      const Buffer<RsAabb> device_boxes = uploaded(context, boxes);
+      std::vector<std::uint32_t> order(count);
+      std::iota(order.rbegin(), order.rend(), 0u);
+      BuildOptions build;
+      build.define("PACKET", packet).define("GROUP", 64);
+      std::vector<std::vector<std::uint32_t>> results;
+      for (const bool many : {false, true}) {
+        Buffer<std::uint32_t> device_order(context, count, "order");
+        device_order.upload(order);
+        Kernel kernel = context.kernel(many ? "bvh/group_order.cl" : "bvh/order_groups.cl",
+                                       many ? "order_group" : "order_groups", build);
+        kernel.launch(many ? Range::linear(count, 64) : Range::linear((count + 63) / 64, 1),
+                      device_boxes, device_order, static_cast<std::uint32_t>(count));
+        results.push_back(device_order.download());
+      }
+      CHECK(results[0] == results[1]);
+      if (count > 64) CHECK(results[0] != order);
+    }
+  }
+}
