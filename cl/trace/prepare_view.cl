@@ -102,18 +102,6 @@ gv least_peak(const ViewGaussian* g, const gv Q, const gv szz, const gv whitened
   return g->m[2] - nearer - sqrt(Q * across2);
 }
 
-// Direction in which the camera sees the mean.
-void sh_basis_of(const ViewGaussian* g, gv* basis) {
-  const gv* d = g->offset;
-  const gv inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
-  rs_sh_basis(SH_DEGREE, d[0] * inverse, d[1] * inverse, d[2] * inverse, basis);
-}
-
-void clamp_colour(const gv* sum, gv* colour) {
-  const gv most = (gv)(RS_MAX_COLOR);
-  for (int j = 0; j < 3; ++j) colour[j] = smaller(larger(sum[j], (gv)(0.0f)), most);
-}
-
 #if GROUP
 // Adds the terms of RS_STAGE floats of the SH coefficients from number `column` on.
 void add_colour(const int column,
@@ -137,27 +125,36 @@ void write_colour(const ViewGaussian* g,
                   __global const float* sh,
                   __local StagedRows* staged,
                   float* colour) {
+  const float* d = g->offset;
+  const float inverse = 1.0f / sqrt(fmax(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1e-30f));
   float basis[RS_SH_FUNCTIONS];
-  sh_basis_of(g, basis);
+  rs_sh_basis(SH_DEGREE, d[0] * inverse, d[1] * inverse, d[2] * inverse, basis);
   float sum[3] = {0.5f, 0.5f, 0.5f};
   add_colour(0, sh, basis, staged, sum);
   add_colour(RS_STAGE, sh, basis, staged, sum);
   add_colour(2 * RS_STAGE, sh, basis, staged, sum);
   add_colour(3 * RS_STAGE, sh, basis, staged, sum);
   add_colour(4 * RS_STAGE, sh, basis, staged, sum);
-  clamp_colour(sum, colour);
+  for (int j = 0; j < 3; ++j) colour[j] = fmin(fmax(sum[j], 0.0f), RS_MAX_COLOR);
 }
 #else
 void write_colour(const ViewGaussian* g, __global const float* sh, gv* colour) {
+  const gv* d = g->offset;
+  const gv inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
   gv basis[RS_SH_FUNCTIONS];
-  sh_basis_of(g, basis);
+  rs_sh_basis(SH_DEGREE, d[0] * inverse, d[1] * inverse, d[2] * inverse, basis);
   gv c[3 * RS_SH_FUNCTIONS];
   load_columns(sh, 3 * SH_COEFFICIENTS, 3 * RS_SH_FUNCTIONS, c);
-  gv sum[3] = {0.5f, 0.5f, 0.5f};
+  gv r = 0.5f, green = 0.5f, b = 0.5f;
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
-    for (int j = 0; j < 3; ++j) sum[j] += basis[k] * c[3 * k + j];
+    r += basis[k] * c[3 * k];
+    green += basis[k] * c[3 * k + 1];
+    b += basis[k] * c[3 * k + 2];
   }
-  clamp_colour(sum, colour);
+  const gv most = (gv)(RS_MAX_COLOR);
+  colour[0] = smaller(larger(r, (gv)(0.0f)), most);
+  colour[1] = smaller(larger(green, (gv)(0.0f)), most);
+  colour[2] = smaller(larger(b, (gv)(0.0f)), most);
 }
 #endif
 
