@@ -325,6 +325,7 @@ void info_model(const Options& options) {
     if (source.iteration) json["iteration"] = *source.iteration;
     if (source.trained) json["iterations"] = source.trained->iterations;
     if (source.header) json["trace"] = describe(*source.header);
+    if (!source.sky.empty()) json["sky"] = source.sky;
     if (source.origin != std::array<double, 3>{}) json["origin"] = source.origin;
     json.update(describe(summary));
     print_json(json);
@@ -342,6 +343,10 @@ void info_model(const Options& options) {
     fmt::print("traced           in {} order, quantile {:.4g}, {} radius\n",
                source.header->hit_order == HitOrder::kPeak ? "peak" : "entry",
                source.header->quantile, source.header->adaptive_radius ? "adaptive" : "whole");
+  }
+  if (!source.sky.empty()) {
+    fmt::print("sky              trained, by direction, {} coefficients a channel\n",
+               source.sky.size());
   }
   if (source.origin != std::array<double, 3>{}) {
     fmt::print("origin           {}, {}, {}: positions count from there\n", source.origin[0],

@@ -220,6 +220,26 @@ Gaussians transformed(const Gaussians& model, const glm::dmat4& map) {
   return out;
 }
 
+SkyLight transformed(const SkyLight& light, const glm::dmat4& map) {
+  if (light.empty() || map == glm::dmat4(1.0)) return light;
+  check(map);
+  const glm::dmat3 orthogonal = orthogonal_factor(glm::dmat3(map));
+  SkyLight out = light;
+  for (std::size_t degree = 1; degree * degree < light.size(); ++degree) {
+    const std::size_t first = degree * degree, size = 2 * degree + 1;
+    const std::vector<double> turn = sh_band_map(static_cast<int>(degree), orthogonal);
+    for (std::size_t k = 0; k < size; ++k) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        double sum = 0.0;
+        for (std::size_t j = 0; j < size; ++j)
+          sum += turn[k * size + j] * static_cast<double>(light[first + j][c]);
+        out[first + k][c] = static_cast<float>(sum);
+      }
+    }
+  }
+  return out;
+}
+
 Gaussians joined(std::span<const Gaussians> models) {
   Gaussians out;
   for (const Gaussians& model : models) out.sh_degree = std::max(out.sh_degree, model.sh_degree);

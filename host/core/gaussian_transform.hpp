@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "raysplats/gaussians.hpp"
+#include "raysplats/trace_options.hpp"
 
 namespace raysplats {
 
@@ -18,6 +19,9 @@ namespace raysplats {
 /// order of hits stay as they are. Throws UsageError for a map that is not finite, has another last
 /// row than 0 0 0 1, or flattens space.
 Gaussians transformed(const Gaussians& model, const glm::dmat4& map);
+
+/// A light by direction under the same map, of which only Q counts. Throws as the other.
+SkyLight transformed(const SkyLight& light, const glm::dmat4& map);
 
 /// All models one after the other, with the highest of their SH degrees.
 Gaussians joined(std::span<const Gaussians> models);

@@ -119,6 +119,7 @@ bool TraceSettings::has(const std::string& name) const {
 TraceOptions TraceSettings::over(TraceOptions base) const {
   const std::vector<OptionRow> rows = trace_rows(base);
   for (const Given& each : given_) find_row(rows, each.name)->set(each.values);
+  if (has("background")) base.sky.clear();
   return base;
 }
 

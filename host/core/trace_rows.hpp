@@ -28,6 +28,7 @@ class TraceSettings {
   /// accept.
   void set(const std::string& name, const std::vector<std::string>& values);
   bool has(const std::string& name) const;
+  /// A background that was given takes the place of a sky.
   TraceOptions over(TraceOptions base) const;
 
  private:

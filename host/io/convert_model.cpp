@@ -36,7 +36,7 @@ Conversion convert_model(const std::filesystem::path& input,
                          const std::filesystem::path& output,
                          const ModelChanges& changes,
                          const ModelEncoding& encoding,
-                         const std::optional<TraceOptions>& trace,
+                         std::optional<TraceOptions> trace,
                          bool overwrite) {
   const io::ModelFormat format = io::output_format(output);
   std::error_code error;
@@ -56,12 +56,15 @@ Conversion convert_model(const std::filesystem::path& input,
         model.size(), input.string()));
   }
   const std::array<double, 3> origin = io::model_origin(input);
+  if (trace) trace->sky = transformed(trace->sky, movement(changes));
   write_model(output, result, encoding, trace, origin);
   std::string losses = io::losses(format, result);
   if (format != io::ModelFormat::kPly && origin != std::array<double, 3>{}) {
     losses += fmt::format(", positions count from {}, {}, {}, which is not said in the file",
                           origin[0], origin[1], origin[2]);
   }
+  if (format != io::ModelFormat::kPly && trace && !trace->sky.empty())
+    losses += ", the sky behind the model is not said in the file";
   return {model.size(), result.size(), result.sh_degree, losses};
 }
 

@@ -32,14 +32,15 @@ struct Conversion {
   std::string losses;                 ///< as io::losses()
 };
 
-/// Reads `input` with the encoding, changes it and writes `output`. Throws as read_model() and
+/// Reads `input` with the encoding, changes it and writes `output`; a sky in `trace` turns with it.
+/// Throws as read_model() and
 /// write_model(), and UsageError when both are the same file, when `output` is there without
 /// `overwrite`, and when nothing is left to write.
 Conversion convert_model(const std::filesystem::path& input,
                          const std::filesystem::path& output,
                          const ModelChanges& changes,
                          const ModelEncoding& encoding,
-                         const std::optional<TraceOptions>& trace,
+                         std::optional<TraceOptions> trace,
                          bool overwrite);
 
 }  // namespace raysplats

@@ -53,6 +53,18 @@ bool parse_triple(std::string_view text, std::array<T, 3>& values) {
   return true;
 }
 
+// Coefficients as triples with spaces between them.
+bool parse_sky(std::string_view text, SkyLight& sky) {
+  constexpr std::array<std::size_t, 5> kSizes{1, 4, 9, 16, 25};  // of degree 0 to 4
+  sky.clear();
+  while (!text.empty()) {
+    const std::size_t space = std::min(text.find(' '), text.size());
+    if (!parse_triple(text.substr(0, space), sky.emplace_back())) return false;
+    text.remove_prefix(std::min(space + 1, text.size()));
+  }
+  return std::find(kSizes.begin(), kSizes.end(), sky.size()) != kSizes.end();
+}
+
 // False for a value that the option cannot have. Keys that are unknown, of a later version perhaps,
 // are left alone.
 bool set_option(std::string_view key, std::string_view value, TraceOptions& out) {
@@ -76,6 +88,7 @@ bool set_option(std::string_view key, std::string_view value, TraceOptions& out)
   }
   if (key == "max_hits") return parse(value, out.max_hits) && out.max_hits >= 1;
   if (key == "background") return parse_triple(value, out.background);
+  if (key == "sky") return parse_sky(value, out.sky);
   return true;
 }
 
@@ -117,6 +130,11 @@ std::string io::ply_option_comments(const TraceOptions& options) {
   add("min_transmittance", options.min_transmittance);
   add("max_hits", options.max_hits);
   add("background", fmt::format("{},{},{}", background[0], background[1], background[2]));
+  if (options.sky.empty()) return out;
+  std::string sky;
+  for (const auto& [r, g, b] : options.sky)
+    sky += fmt::format("{}{},{},{}", sky.empty() ? "" : " ", r, g, b);
+  add("sky", sky);
   return out;
 }
 

@@ -148,7 +148,9 @@ Environment load_environment(const SceneFile& file, const TraceOptions& trace) {
   const SceneEnvironment& from = file.environment;
   Environment out;
   const bool image = !from.image.empty();
-  out.color = from.color.value_or(image ? Rgb{1, 1, 1} : trace.background);
+  const bool sky = !image && !from.color && !trace.sky.empty();
+  if (sky) out.sky = trace.sky;
+  out.color = from.color.value_or(image || sky ? Rgb{1, 1, 1} : trace.background);
   for (float& c : out.color) c *= std::exp2(from.exposure);
   if (image) out.equirect = io::to_texture(read_image(from.image));
   const glm::dvec3 up = from.up.value_or(file.camera.up.value_or(glm::dvec3(0, -1, 0)));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "light/environment.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -9,7 +10,9 @@
 #include <numbers>
 
 #include "raysplats/error.hpp"
+#include "shared/color.h"
 #include "shared/sh.h"
+#include "trace/sky.hpp"
 
 namespace raysplats {
 namespace {
@@ -44,6 +47,13 @@ std::array<float, 9> basis(const glm::dvec3& n) {
   return out;
 }
 
+// The direction of a point of the picture, from 0 to 1 each.
+glm::dvec3 direction_of(const Frame& frame, double x, double y) {
+  const double polar = kPi * y, around = 2 * kPi * (x - 0.5);
+  return std::sin(polar) * (std::sin(around) * frame.right + std::cos(around) * frame.forward) +
+         std::cos(polar) * frame.up;
+}
+
 // Coefficients of the cosine-weighted mean over the hemisphere: those of the radiance times 1, 2/3
 // and 1/4 by band.
 std::array<double, 27> light_coefficients(const Environment& environment, const Frame& frame) {
@@ -68,12 +78,9 @@ std::array<double, 27> light_coefficients(const Environment& environment, const 
   for (int y = 0; y < image.height; ++y) {
     const double top = kPi * y / image.height, bottom = kPi * (y + 1) / image.height;
     const double solid_angle = 2 * kPi / image.width * (std::cos(top) - std::cos(bottom));
-    const double polar = 0.5 * (top + bottom);
     for (int x = 0; x < image.width; ++x) {
-      const double around = 2 * kPi * ((x + 0.5) / image.width - 0.5);
       const glm::dvec3 direction =
-          std::sin(polar) * (std::sin(around) * frame.right + std::cos(around) * frame.forward) +
-          std::cos(polar) * frame.up;
+          direction_of(frame, (x + 0.5) / image.width, (y + 0.5) / image.height);
       add(direction, {image.at(x, y, 0), image.at(x, y, 1), image.at(x, y, 2)}, solid_angle);
     }
   }
@@ -81,6 +88,38 @@ std::array<double, 27> light_coefficients(const Environment& environment, const 
 }
 
 }  // namespace
+
+bool shows_sky(const Environment& environment) {
+  return environment.equirect.pixels() == 0 && !environment.sky.empty();
+}
+
+Environment with_drawn_sky(const Environment& environment) {
+  Environment out = environment;
+  if (!shows_sky(environment)) return out;
+  check_sky(environment.sky);
+  out.rotation = 0.0f;  // which turns the picture
+  const Frame frame = frame_of(out);
+  out.rotation = environment.rotation;
+  const int degree =
+      static_cast<int>(std::lround(std::sqrt(static_cast<double>(environment.sky.size())))) - 1;
+  out.equirect = Image(2 * kSkyHeight, kSkyHeight, 3);
+  std::array<float, 25> basis{};
+  for (int y = 0; y < kSkyHeight; ++y) {
+    for (int x = 0; x < out.equirect.width; ++x) {
+      const glm::dvec3 d =
+          direction_of(frame, (x + 0.5) / out.equirect.width, (y + 0.5) / kSkyHeight);
+      rs_sh_basis(degree, static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z),
+                  basis.data());
+      for (std::size_t c = 0; c < 3; ++c) {
+        float sum = 0.5f;
+        for (std::size_t k = 0; k < environment.sky.size(); ++k)
+          sum += basis[k] * environment.sky[k][c];
+        out.equirect.at(x, y, static_cast<int>(c)) = std::clamp(sum, 0.0f, RS_MAX_COLOR);
+      }
+    }
+  }
+  return out;
+}
 
 RsEnvironment environment_record(const Environment& environment) {
   const Image& image = environment.equirect;

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "bvh/lbvh.hpp"
+#include "light/environment.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/rays.hpp"
 #include "shared/light_layout.h"
@@ -78,7 +79,9 @@ PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
   }
   std::size_t texels = 0;
   for (const Image& texture : scene.textures) texels += kFloat * texture.data.size();
-  const std::size_t environment = kFloat * scene.environment.equirect.data.size();
+  const std::size_t environment =
+      kFloat * (shows_sky(scene.environment) ? std::size_t{6} * kSkyHeight * kSkyHeight
+                                             : scene.environment.equirect.data.size());
   pictures_ = texels + environment;
   largest_ = std::max({count * sh, count * block, texels, environment});
   std::size_t triangles = 0;

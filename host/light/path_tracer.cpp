@@ -29,6 +29,7 @@ std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value);
 
 TraceOptions without_background(TraceOptions options) {
   options.background = {0, 0, 0};
+  options.sky.clear();  // the scene's environment has it
   return options;
 }
 

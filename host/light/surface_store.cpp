@@ -130,8 +130,9 @@ SurfaceStore::SurfaceStore(Context& context, const Scene& scene)
   store(context, texels, "texels", texels_);
   store(context, materials, "materials", materials_);
   store(context, lights, "lights", lights_);
-  store(context, std::vector{environment_record(scene.environment)}, "environment", environment_);
-  store(context, scene.environment.equirect.data, "environment picture", environment_picture_);
+  const Environment environment = with_drawn_sky(scene.environment);
+  store(context, std::vector{environment_record(environment)}, "environment", environment_);
+  store(context, environment.equirect.data, "environment picture", environment_picture_);
   set_meshes(scene.meshes);
 }
 

@@ -104,6 +104,11 @@ struct Tracer::Impl {
                                                            sizeof(RayBackward::Slopes)));
   }
   void require_bare_rays() const {
+    if (!options.sky.empty()) {
+      throw UsageError(
+          "Single rays do not see the sky of this Tracer, which is of cameras' views: choose a "
+          "background of one colour");
+    }
     if (mirrors) {
       throw UsageError(
           "Single rays do not see the mirrors of this Tracer: trace them with one that has none");
@@ -195,14 +200,16 @@ ViewGradients Tracer::backward(const Model& model, const Image& gradient) {
   self.image_gradient.ensure(self.context, gradient.data.size(), "image gradient");
   self.image_gradient.upload(planes_of(gradient));
   ViewGradients out;
-  if (self.mirrors) {
+  const bool known_pose = !self.mirrors && self.options.sky.empty();
+  if (!known_pose) {
     const double unknown = std::numeric_limits<double>::quiet_NaN();
     out.pose.center.fill(unknown);
     out.pose.rotation.fill(unknown);
   }
   self.views.backward(gaussians, self.image_gradient, self.gradients,
-                      self.mirrors ? nullptr : &out.pose);
+                      known_pose ? &out.pose : nullptr);
   out.parameters = downloaded(self.gradients, gaussians.sh_degree);
+  if (const Sky* sky = self.views.sky()) out.sky = sky->slopes();
   return out;
 }
 
@@ -331,11 +338,12 @@ const TraceOptions& Tracer::options() const { return impl_->options; }
 
 const Context& Tracer::context() const { return impl_->context; }
 
-void Tracer::set_background(const std::array<float, 3>& background) {
+void Tracer::set_background(const std::array<float, 3>& background, const SkyLight& sky) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
+  self.views.set_background(background, sky);
   self.options.background = background;
-  self.views.set_background(background);
+  self.options.sky = sky;
 }
 
 }  // namespace raysplats

@@ -33,7 +33,14 @@ std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value);
 
 TraceOptions ray_options(TraceOptions options) {
   options.background = {0.0f, 0.0f, 0.0f};  // MirrorPaths adds it
+  options.sky.clear();
   return options;
+}
+
+void require_no_sky() {
+  throw UsageError(
+      "Mirrors show one colour behind everything, no sky: choose a background, or leave out the "
+      "mirrors");
 }
 
 void require_no_more_than_mirrors_show(const TraceOptions& options) {
@@ -110,8 +117,16 @@ struct ViewTracer::Impl {
         packets(context_in, options_in),
         kept_capped(context_in, 2, "capped rays of a view") {
     kept_capped.clear();
+    set_background(options_in.background, options_in.sky);
   }
 
+  void set_background(const std::array<float, 3>& color, const SkyLight& light) {
+    if (!light.empty() && !mirrors.meshes.empty()) require_no_sky();
+    if (sky || !light.empty()) kept = false;
+    background = light.empty() ? color : std::array<float, 3>{};
+    sky.reset();
+    if (!light.empty()) sky.emplace(context, light);
+  }
   Rays& single_rays() {
     if (!rays) rays.emplace(context, options, mirrors);
     return *rays;
@@ -134,6 +149,7 @@ struct ViewTracer::Impl {
   Context& context;
   TraceOptions options;
   std::array<float, 3> background;  // of the next view; options have that of the last
+  std::optional<Sky> sky;           // behind it, then the background is black
   Mirrors mirrors;
   bool tree;  // rays walk it though they could be traced by tiles
   CameraTracer packets;
@@ -143,6 +159,7 @@ struct ViewTracer::Impl {
   std::function<void(double)> watch;
   // The last view.
   bool by_rays = false;
+  bool own_image = false;  // `image` is what it shows, else that of `packets`
   bool kept = false;
   std::uint64_t revision = 0;  // of its Gaussians
   Camera camera;
@@ -195,6 +212,13 @@ void ViewTracer::forward(const DeviceGaussians& gaussians,
     self.kept_capped.copy_from(self.packets.counters(), 1, RS_COUNT_CAPPED);
   }
   self.by_rays = false;
+  if (self.sky) {
+    // backward() may trace parts again, over black.
+    self.image.ensure(self.context, 4 * pixels_of(camera), "image");
+    self.image.copy_from(self.packets.image(), 4 * pixels_of(camera));
+    self.sky->show(camera, self.image);
+  }
+  self.own_image = self.sky.has_value();
   self.camera = camera;
   self.kept = keep;
   self.revision = gaussians.revision;
@@ -209,6 +233,8 @@ void ViewTracer::forward_rays(const DeviceGaussians& gaussians, const Camera& ca
   self.options.background = self.background;
   self.single_rays().tracer.follow(gaussians);
   self.forward_rays(gaussians, keep);
+  self.own_image = true;
+  if (self.sky) self.sky->show(camera, self.image);
   self.kept = keep;
   self.revision = gaussians.revision;
 }
@@ -247,7 +273,7 @@ void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep)
 }
 
 const Buffer<float>& ViewTracer::image() const {
-  return impl_->by_rays ? impl_->image : impl_->packets.image();
+  return impl_->own_image ? impl_->image : impl_->packets.image();
 }
 
 const Buffer<float>& ViewTracer::depth() const {
@@ -256,7 +282,7 @@ const Buffer<float>& ViewTracer::depth() const {
 
 Image ViewTracer::download_image() const {
   const Impl& self = *impl_;
-  if (!self.by_rays) return self.packets.download_image();
+  if (!self.own_image) return self.packets.download_image();
   return interleaved(self.image.download(), self.camera.width, self.camera.height, 4);
 }
 
@@ -281,11 +307,18 @@ void ViewTracer::backward(const DeviceGaussians& gaussians,
         "The gradient of a picture of {} numbers has {}: give one for every channel of every pixel",
         4 * pixels_of(self.camera), image_gradient.size()));
   }
+  if (self.sky && pose != nullptr) {
+    throw UsageError(
+        "The gradient of a pose is not known where there is a sky, which turns with it: choose a "
+        "background of one colour");
+  }
+  const Buffer<float>& over_black =
+      self.sky ? self.sky->backward(self.camera, image(), image_gradient) : image_gradient;
   if (self.by_rays) {
-    self.backward_rays(gaussians, image_gradient, gradients, pose);
+    self.backward_rays(gaussians, over_black, gradients, pose);
     return;
   }
-  self.packets.backward(gaussians, image_gradient, gradients, pose);
+  self.packets.backward(gaussians, over_black, gradients, pose);
 }
 
 void ViewTracer::Impl::backward_rays(const DeviceGaussians& gaussians,
@@ -344,9 +377,11 @@ void ViewTracer::set_watch(const std::function<bool(double)>& watch) {
   impl_->packets.set_watch(impl_->watch);
 }
 
-void ViewTracer::set_background(const std::array<float, 3>& background) {
-  impl_->background = background;
+void ViewTracer::set_background(const std::array<float, 3>& background, const SkyLight& sky) {
+  impl_->set_background(background, sky);
 }
+
+Sky* ViewTracer::sky() { return impl_->sky ? &*impl_->sky : nullptr; }
 
 std::uint64_t ViewTracer::capped_rays() const {
   const Impl& self = *impl_;

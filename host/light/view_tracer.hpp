@@ -15,6 +15,7 @@
 #include "raysplats/trace_options.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/device_gaussians.hpp"
+#include "trace/sky.hpp"
 
 namespace raysplats {
 
@@ -28,7 +29,7 @@ class ViewTracer {
   static std::size_t batch(std::size_t memory_budget);
 
   /// Throws UsageError for options out of range, for a negative number of bounces, and for
-  /// options.depth, options.near_depth or Traversal::kTiles with mirrors.
+  /// options.depth, options.near_depth, options.sky or Traversal::kTiles with mirrors.
   ViewTracer(Context& context, const TraceOptions& options, Mirrors mirrors = {});
   ~ViewTracer();
 
@@ -65,7 +66,7 @@ class ViewTracer {
   /// Gradients of the last forward(keep = true) view from `image_gradient` (planar dL/dR, dL/dG,
   /// dL/dB, dL/dA; 4 x height x width). Overwrites `gradients`, growing its buffers as needed. With
   /// `pose` also the gradient for the camera's pose. Throws UsageError when the Gaussians changed
-  /// since, and for the pose of a camera that looks into mirrors.
+  /// since, and for the pose of a camera that looks into mirrors or sees a sky.
   void backward(const DeviceGaussians& gaussians,
                 const Buffer<float>& image_gradient,
                 GaussianGradients& gradients,
@@ -74,8 +75,12 @@ class ViewTracer {
   /// From the next forward() on `watch` hears the share of the picture that is done, several times
   /// a second, and lets forward() end with Error(kInterrupted) by returning false.
   void set_watch(const std::function<bool(double share)>& watch);
-  /// Colour behind everything from the next forward() on.
-  void set_background(const std::array<float, 3>& background);
+  /// What is behind everything from the next forward() on: a colour, or a sky in its place. Throws
+  /// UsageError for a sky with mirrors and as Sky.
+  void set_background(const std::array<float, 3>& background, const SkyLight& sky = {});
+  /// The sky of the next view, whose coefficients may be changed, and the gradient that backward()
+  /// has found for it; null without one.
+  Sky* sky();
   /// Rays of the last view that stopped because of max_hits; blocks.
   std::uint64_t capped_rays() const;
   /// What the last view took, on every device the same; zeros where it was traced ray by ray.

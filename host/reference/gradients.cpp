@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "raysplats/error.hpp"
+#include "reference/sky.hpp"
 
 namespace raysplats::reference {
 namespace {
@@ -32,8 +33,10 @@ void backward_ray(const RayTrace& ray,
                   glm::dvec3& origin_gradient,
                   glm::dvec3& direction_gradient) {
   // Colour and alpha of everything behind the current hit, as if seen with full light.
-  glm::dvec3 suffix_color(options.background[0], options.background[1], options.background[2]);
+  glm::dvec3 suffix_color = light_behind(options, direction);
   double suffix_alpha = 0.0;
+  direction_gradient +=
+      light_behind_gradient(options, direction, ray.transmittance * color_gradient);
   for (auto hit = ray.hits.rbegin(); hit != ray.hits.rend(); ++hit) {
     const PreparedGaussian& g = prepared[hit->index];
     Sums& sum = sums[hit->index];

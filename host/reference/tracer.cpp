@@ -7,6 +7,8 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
+#include "reference/sky.hpp"
+
 namespace raysplats::reference {
 namespace {
 
@@ -128,8 +130,7 @@ RayTrace trace_ray(const Parameters& parameters,
     lower(out.margin, transmittance - stop, stop);
     out.hits.push_back(hit);
   }
-  out.color += transmittance *
-               glm::dvec3(options.background[0], options.background[1], options.background[2]);
+  out.color += transmittance * light_behind(options, direction);
   out.alpha = 1.0 - transmittance;
   if (weight_sum > 0.0) out.expected_depth = depth_sum / weight_sum;
   return out;

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "core/gaussian_transform.hpp"
 #include "io/model_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -38,9 +39,23 @@ void read_options(ModelSource& source, const std::filesystem::path& run) {
 }
 
 void read_header(ModelSource& source) {
-  if (!source.trained && io::model_format(source.file) == io::ModelFormat::kPly)
-    source.header = read_ply_options(source.file);
+  if (io::model_format(source.file) == io::ModelFormat::kPly) {
+    const std::optional<TraceOptions> said = read_ply_options(source.file);
+    if (said) source.sky = said->sky;
+    if (!source.trained) source.header = said;
+  }
   source.origin = io::model_origin(source.file);
+}
+
+// The sky of a run, which its PLY names.
+SkyLight trained_sky(const ModelSource& source) {
+  if (source.sky.empty()) {
+    spdlog::warn(
+        "the sky of the run is not in the header of {}, where the run wrote it: black is shown in "
+        "its place",
+        source.file.string());
+  }
+  return source.sky;
 }
 
 }  // namespace
@@ -105,19 +120,25 @@ TraceOptions trace_options(const ModelSource& source, bool cut_out) {
   }
   TraceOptions out = source.trained->trace;
   out.background = background_color(*source.trained, cut_out);
+  if (source.trained->background == "sky") out.sky = trained_sky(source);
   return out;
 }
 
 void find_models(SceneFile& scene) {
   std::optional<ModelSource> first;  // that tells, or else of all
+  glm::dmat4 first_transform(1.0);
   for (SceneModel& model : scene.models) {
     const ModelSource source = find_model(model.file);
     model.file = source.file;
     const bool tells = source.trained || source.header;
     const bool told = first && (first->trained || first->header);
-    if (!first || (tells && !told)) first = source;
+    if (first && (!tells || told)) continue;
+    first = source;
+    first_transform = model.transform;
   }
-  if (first) scene.trained = trace_options(*first, false);
+  if (!first) return;
+  scene.trained = trace_options(*first, false);
+  scene.trained.sky = transformed(scene.trained.sky, first_transform);
 }
 
 }  // namespace raysplats

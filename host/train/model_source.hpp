@@ -18,6 +18,7 @@ struct ModelSource {
   std::optional<TrainOptions>
       trained;  ///< of the run folder it is in; none for a PLY from elsewhere
   std::optional<TraceOptions> header;     ///< of a PLY that is in no run: what its header says
+  SkyLight sky;                           ///< that the header of a PLY names
   std::optional<std::int64_t> iteration;  ///< of RUN/point_cloud/iteration_N
   std::array<double, 3> origin{};         ///< from which its positions count (Dataset::origin)
 };

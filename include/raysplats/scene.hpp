@@ -72,9 +72,10 @@ struct Light {
 /// What rays that leave the scene see.
 struct Environment {
   Rgb color{0, 0, 0};  ///< constant, or factor of the image
-  Image equirect;      ///< 3 channels, any size; empty = constant
+  Image equirect;      ///< 3 channels, any size; empty = `sky`, or constant
   std::array<float, 3> up{0, 1, 0};
   float rotation = 0.0f;  ///< degrees about `up`
+  SkyLight sky{};         ///< in world axes, turned by `rotation`; empty = constant
 };
 
 /// Which shadows are cast; `strength` 0 switches all off, 1 is full darkness where no light comes.

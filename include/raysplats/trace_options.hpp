@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 namespace raysplats {
 
@@ -40,6 +41,11 @@ enum class GradientSum {
   kAtomic,  ///< compare-and-swap on floats: the last bits depend on the scheduling
 };
 
+/// Light from far away by direction, as spherical harmonics in world axes: R, G, B of each of the
+/// (degree + 1)^2 coefficients in the order and with the signs of cl/shared/sh.h, degree 0 to 4. A
+/// direction shows max(0, 0.5 + sum), as colours of Gaussians do.
+using SkyLight = std::vector<std::array<float, 3>>;
+
 struct TraceOptions {
   float quantile =
       11.3449f;  ///< Q: a ray meets a Gaussian when the squared whitened distance is <= Q
@@ -50,6 +56,7 @@ struct TraceOptions {
   float near_depth =
       0.0f;  ///< Gaussians whose mean is nearer along the view axis are skipped; 0 = off
   std::array<float, 3> background{0.0f, 0.0f, 0.0f};
+  SkyLight sky;  ///< behind everything in views of cameras, in place of `background`; empty: none
   Traversal traversal = Traversal::kAuto;  ///< of camera rays
   bool depth = false;  ///< camera rays also yield expected depth, median depth and hit count
   PacketForm packet_form = PacketForm::kAuto;

@@ -25,7 +25,8 @@ struct ViewGradients {
   /// dL/d(parameter), laid out as the model's: means, quaternions, log_scales, opacities (logits),
   /// sh.
   Gaussians parameters;
-  PoseGradient pose;  ///< of the camera; NaN with mirrors, behind which it is not known
+  PoseGradient pose;  ///< of the camera; NaN with mirrors and with a sky, where it is not known
+  SkyLight sky;       ///< dL/d(TraceOptions::sky); empty without one
 };
 
 /// Gradients of a loss over rays.
@@ -73,8 +74,8 @@ class Tracer {
 
   /// Rays of any origins and directions. Throws UsageError, naming the ray, for a number that is
   /// not finite (t_max may be infinite), a direction of length 0, and ends that are not
-  /// 0 <= t_min <= t_max; for a model of another context; and for options.near_depth and mirrors,
-  /// which belong to cameras.
+  /// 0 <= t_min <= t_max; for a model of another context; and for options.near_depth, options.sky
+  /// and mirrors, which belong to cameras.
   std::vector<RayResult> trace(const Model& model,
                                std::span<const Ray> rays,
                                ColorDirection direction = ColorDirection::kRay,
@@ -86,8 +87,10 @@ class Tracer {
   std::uint64_t capped_rays() const;
   const TraceOptions& options() const;
   const Context& context() const;
-  /// Colour behind everything from the next render() or trace() on.
-  void set_background(const std::array<float, 3>& background);
+  /// What is behind everything from the next render() or trace() on: a colour, or a sky in its
+  /// place. Throws UsageError for a sky with mirrors, and for one whose coefficients are not those
+  /// of a degree or not finite.
+  void set_background(const std::array<float, 3>& background, const SkyLight& sky = {});
 
   /// Of the library itself; not installed.
   struct Impl;

@@ -138,6 +138,8 @@ void bind_environment(nb::module_& module) {
           },
           nb::for_getter(nb::rv_policy::move), nb::for_setter(nb::arg("value").none()),
           "(height, width, 3), 360 degrees across; None = constant. Reading copies.")
+      .def_rw("sky", &Environment::sky,
+              "As TraceOptions.sky, seen where there is no picture, times `color`.")
       .def_rw("up", &Environment::up)
       .def_rw("rotation", &Environment::rotation, "Degrees about `up`.");
 }

@@ -3,6 +3,7 @@
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
 #include "keywords.hpp"
@@ -63,6 +64,10 @@ void bind_trace_options(nb::module_& module) {
       .def_rw("near_depth", &TraceOptions::near_depth,
               "Gaussians nearer along the viewing axis are skipped; 0 = off.")
       .def_rw("background", &TraceOptions::background, "Colour behind everything.")
+      .def_rw(
+          "sky", &TraceOptions::sky,
+          "Behind everything in pictures, in place of `background`: 1, 4, 9, 16 or 25 (r, g, b) "
+          "of spherical harmonics, world axes, plus 0.5; [] = none.")
       .def_rw("depth", &TraceOptions::depth, "Pictures have depths and numbers of hits too.")
       .def_rw("packet_width", &TraceOptions::packet_width,
               "Rays of a packet; 0 = the device's own.")

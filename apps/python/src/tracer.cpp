@@ -6,6 +6,7 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
 
 #include <array>
 #include <cstddef>
@@ -245,7 +246,8 @@ void bind_gradients(nb::module_& module) {
             return view(self, nb::cast<ViewGradients&>(self).pose.rotation.data(), {3});
           },
           "(3,), for a small turn w about the centre in camera axes and radians: rotation := "
-          "exp([w]x) rotation, the centre stays.");
+          "exp([w]x) rotation, the centre stays; NaN with mirrors and with a sky.")
+      .def_ro("sky", &ViewGradients::sky, "Of TraceOptions.sky; [] without one.");
   using Rays = nb::handle_t<RaysGradients>;
   const auto slopes = [](nb::handle self) -> std::vector<RaySlope>& {
     return nb::cast<RaysGradients&>(self).rays;
@@ -300,9 +302,11 @@ void bind_tracer(nb::module_& module) {
            "Gradients of the last rays from dL/d(color), (N, 3), and dL/d(alpha), (N,).")
       .def(
           "set_background",
-          [](HeldTracer& self, const std::array<float, 3>& color) { self->set_background(color); },
-          nb::arg("color"), nb::call_guard<nb::gil_scoped_release>(),
-          "Colour behind everything from the next call on.")
+          [](HeldTracer& self, const std::array<float, 3>& color, const SkyLight& sky) {
+            self->set_background(color, sky);
+          },
+          nb::arg("color"), nb::arg("sky") = SkyLight(), nb::call_guard<nb::gil_scoped_release>(),
+          "Colour behind everything from the next call on, or TraceOptions.sky in its place.")
       .def_prop_ro("options", [](HeldTracer& self) { return self->options(); });
 }
 

@@ -38,6 +38,9 @@ TEST_CASE("what is given of tracing goes over what was there, and nothing else d
   settings.set("background", {"1, 0.5,0"});
   settings.set("traversal", {"bvh"});
   settings.set("traversal", {"tiles"});
+  base.sky = {{0.1f, 0.2f, 0.3f}};  // a colour that is given takes its place
+  CHECK(settings.over(base).sky.empty());
+  CHECK(TraceSettings().over(base).sky == base.sky);
   CHECK(settings.has("quantile"));
   CHECK_FALSE(settings.has("max-hits"));
   const TraceOptions got = settings.over(base);

@@ -229,6 +229,17 @@ TEST_CASE("gradients equal finite differences for every SH degree") {
   }
 }
 
+TEST_CASE("gradients under a sky equal finite differences, those of the pose too") {
+  Check check = scene(20, 13, 1, ScaleActivation::kExp);
+  CounterRng rng(5, 3);
+  check.options.sky.resize(9);
+  for (auto& coefficient : check.options.sky) {
+    for (float& value : coefficient) value = static_cast<float>(0.2 * rng.normal());
+  }
+  check.run();
+  check_rays(check, ColorMode::kAlongRay);
+}
+
 TEST_CASE("bands above the active degree have no gradient") {
   Check check = scene(16, 11, 3, ScaleActivation::kExp);
   check.parameters.active_sh_degree = 1;

@@ -94,6 +94,7 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   shown.min_transmittance = 1.0f / 3.0f;
   shown.max_hits = 77;
   shown.background = {0.1f, 1.0f, 0.7f};
+  shown.sky = {{0.1f, -1.0f / 3.0f, 7e-9f}, {1, 2, 3}, {4, 5, 6}, {-7, 8, 9.5f}};
   RunFolder(run).write_model(model, shown, 12);
   const fs::path moved = folder.path / "elsewhere.ply";
   fs::copy_file(run / "point_cloud" / "iteration_12" / "point_cloud.ply", moved);
@@ -107,6 +108,7 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   CHECK(trace.min_transmittance == shown.min_transmittance);
   CHECK(trace.max_hits == shown.max_hits);
   CHECK(trace.background == shown.background);
+  CHECK(trace.sky == shown.sky);
   CHECK(read_ply(moved).size() == 1);
 
   // In a scene the first model that tells decides.
