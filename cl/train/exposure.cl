@@ -6,11 +6,11 @@
 // apply_exposure: one work-item per pixel. image, out: planar R, G, B, A; A is copied.
 // exposure_gradient: one work-item per block of BLOCK pixels. Turns gradient = dL/dx' into dL/dx in
 //   place; partials[12 block + 4 c + k] = dL/dd of the block's pixels.
-// exposure_step: one work-item per coefficient, 12 in all. Adds the partials in their order, makes
-// a
-//   step of Adam (Kingma and Ba 2015) for the photo, whose own number of steps is `step`, and takes
-//   the mean over the photos off. Does nothing where the guard's word is not 0 or the gradient is
-//   not finite.
+// exposure_sums: one work-item per coefficient, 12 in all. Adds the partials in their order, as the
+//   gradient of one view of a step: sums[12 slot + k].
+// exposure_step: likewise. Makes a step of Adam (Kingma and Ba 2015) for the photo of a slot, whose
+//   own number of steps is `step`, and takes the mean over the photos off. Does nothing where the
+//   guard's word is not 0 or the gradient is not finite.
 // Complexity: pixels + blocks + photos.
 #ifndef BLOCK
 #define BLOCK 256
@@ -61,13 +61,24 @@ __kernel void exposure_gradient(const __global float* image,
   for (int k = 0; k < 12; ++k) partials[12 * block + k] = sum[k];
 }
 
-__kernel void exposure_step(const __global float* partials,
+__kernel void exposure_sums(const __global float* partials,
+                            __global float* sums,
+                            uint blocks,
+                            uint slot) {
+  const uint k = get_global_id(0);
+  if (k >= 12) return;
+  float sum = 0.0f;
+  for (uint block = 0; block < blocks; ++block) sum += partials[12 * (size_t)block + k];
+  sums[12 * (size_t)slot + k] = sum;
+}
+
+__kernel void exposure_step(const __global float* sums,
                             const __global uint* guard,
                             __global float* deltas,
                             __global float* first,
                             __global float* second,
                             __global float* steps,
-                            uint blocks,
+                            uint slot,
                             uint views,
                             uint view,
                             float rate,
@@ -76,8 +87,7 @@ __kernel void exposure_step(const __global float* partials,
                             float epsilon) {
   const uint k = get_global_id(0);
   if (k >= 12 || guard[0] != 0) return;
-  float gradient = 0.0f;
-  for (uint block = 0; block < blocks; ++block) gradient += partials[12 * (size_t)block + k];
+  const float gradient = sums[12 * (size_t)slot + k];
   if ((as_uint(gradient) & 0x7f800000u) == 0x7f800000u) return;
   const size_t at = 12 * (size_t)view + k;
   const float step = steps[at] + 1.0f;

@@ -21,12 +21,14 @@ std::uint32_t pixels_of(int width, int height) {
 
 }  // namespace
 
-Exposure::Exposure(Context& context, std::size_t views)
+Exposure::Exposure(Context& context, std::size_t views, std::size_t slots)
     : context_(context),
       views_(views),
       apply_(context.kernel(kProgram, "apply_exposure")),
       gradient_(context.kernel(kProgram, "exposure_gradient")),
-      step_(context.kernel(kProgram, "exposure_step")) {
+      sum_(context.kernel(kProgram, "exposure_sums")),
+      step_(context.kernel(kProgram, "exposure_step")),
+      sums_(context, kNumbers * slots, "exposure gradients") {
   for (Buffer<float>* buffer : {&deltas_, &first_, &second_, &steps_}) {
     *buffer = Buffer<float>(context, kNumbers * views, "exposure");
     buffer->clear();
@@ -44,20 +46,27 @@ const Buffer<float>& Exposure::apply(const Buffer<float>& image,
   return picture_;
 }
 
-void Exposure::step(const Buffer<float>& image,
-                    Buffer<float>& gradient,
-                    std::size_t view,
-                    int width,
-                    int height,
-                    double rate,
-                    const Buffer<std::uint32_t>& guard) {
+void Exposure::backward(const Buffer<float>& image,
+                        Buffer<float>& gradient,
+                        std::size_t view,
+                        int width,
+                        int height,
+                        std::size_t slot) {
   const std::uint32_t pixels = pixels_of(width, height);
   const std::size_t blocks = (pixels + kBlock - 1) / kBlock;
   partials_.ensure(context_, kNumbers * blocks, "exposure sums");
   gradient_.launch(Range::linear(blocks, kGroup), image, deltas_, gradient, partials_, pixels,
                    static_cast<std::uint32_t>(view));
-  step_.launch(Range::linear(kNumbers, kNumbers), partials_, guard, deltas_, first_, second_,
-               steps_, static_cast<std::uint32_t>(blocks), static_cast<std::uint32_t>(views_),
+  sum_.launch(Range::linear(kNumbers, kNumbers), partials_, sums_,
+              static_cast<std::uint32_t>(blocks), static_cast<std::uint32_t>(slot));
+}
+
+void Exposure::step(std::size_t view,
+                    std::size_t slot,
+                    double rate,
+                    const Buffer<std::uint32_t>& guard) {
+  step_.launch(Range::linear(kNumbers, kNumbers), sums_, guard, deltas_, first_, second_, steps_,
+               static_cast<std::uint32_t>(slot), static_cast<std::uint32_t>(views_),
                static_cast<std::uint32_t>(view), static_cast<float>(rate), kBeta1, kBeta2,
                kEpsilon);
 }

@@ -26,22 +26,24 @@ class Exposure {
     std::vector<float> deltas, first, second, steps;
   };
 
-  Exposure(Context& context, std::size_t views);
+  /// For steps of `slots` views.
+  Exposure(Context& context, std::size_t views, std::size_t slots = 1);
 
   /// The picture as the photo of `view` shows it: planar R, G, B, A; A is copied. Valid until the
   /// next call.
   const Buffer<float>& apply(const Buffer<float>& image, std::size_t view, int width, int height);
 
   /// For the last apply() of the same picture: turns dL of its result (planar; A is left alone)
-  /// into dL of the picture in place, and makes one step of Adam (0.9, 0.999) at `rate` unless the
-  /// guard is marked. Enqueues without waiting.
-  void step(const Buffer<float>& image,
-            Buffer<float>& gradient,
-            std::size_t view,
-            int width,
-            int height,
-            double rate,
-            const Buffer<std::uint32_t>& guard);
+  /// into dL of the picture in place, and keeps dL of the photo's numbers as those of a step's view
+  /// `slot`. Enqueues without waiting, as step() does.
+  void backward(const Buffer<float>& image,
+                Buffer<float>& gradient,
+                std::size_t view,
+                int width,
+                int height,
+                std::size_t slot = 0);
+  /// One step of Adam (0.9, 0.999) at `rate` by what backward() kept, unless the guard is marked.
+  void step(std::size_t view, std::size_t slot, double rate, const Buffer<std::uint32_t>& guard);
 
   /// Blocks.
   State state() const;
@@ -51,8 +53,9 @@ class Exposure {
  private:
   Context& context_;
   std::size_t views_;
-  Kernel apply_, gradient_, step_;
+  Kernel apply_, gradient_, sum_, step_;
   Buffer<float> deltas_, first_, second_, steps_, picture_, partials_;
+  Buffer<float> sums_;  // of every slot
 };
 
 }  // namespace raysplats

@@ -25,7 +25,8 @@ Mcmc::Mcmc(Context& context, const TrainOptions& options, double extent)
 void Mcmc::press(const DeviceGaussians& gaussians,
                  GaussianGradients& gradients,
                  const Buffer<std::uint32_t>& guard) {
-  const auto count = static_cast<double>(gaussians.count);
+  // The gradients are sums over views, each of which has the regularisers in its loss.
+  const double count = static_cast<double>(gaussians.count) / options_.views_per_step;
   kernel(context_, "mcmc_press", gaussians)
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               static_cast<float>(options_.opacity_reg / count),

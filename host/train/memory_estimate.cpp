@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <string>
 
 #include "bvh/lbvh.hpp"
@@ -85,6 +86,13 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   // scales.
   const std::size_t footprint = options.footprint > 0 ? 1 : 0;
   out.gaussians = demand.gaussians * (floats * 5 + 5 + 2 + footprint) * sizeof(float);
+  // Steps of several views: sums of gradients, one for every level of their tree, and what every
+  // view says of density.
+  const auto views = static_cast<std::size_t>(options.views_per_step);
+  if (views > 1) {
+    out.gaussians +=
+        demand.gaussians * ((floats + 3) * std::bit_width(views) + 3 * views) * sizeof(float);
+  }
   // Line, gradient line and its exact sums, bounds, box, candidate keys and values with their
   // second copies.
   const bool packets = demand.ray_views < demand.views || demand.views == 0;
@@ -94,7 +102,9 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   // Image, gradient, depth and about 12 planes of the loss.
   out.images = std::min(static_cast<std::size_t>(options.image_budget) * kMiB,
                         demand.views * demand.pixels * 4) +
-               demand.pixels * (24 + (options.exposure ? 4 : 0)) * sizeof(float);
+               demand.pixels *
+                   (24 + (options.exposure ? 4 : 0) + (options.background == "sky" ? 8 : 0)) *
+                   sizeof(float);
   if (packets) {
     out.hits = std::min(options.trace.memory_budget,
                         demand.pixels * static_cast<std::size_t>(options.trace.max_hits) * 12);

@@ -14,6 +14,7 @@ namespace raysplats {
 struct RunMoment {
   std::int64_t iteration = 0;         ///< completed
   std::array<float, 3> background{};  ///< behind test views
+  SkyLight sky{};                     ///< in its place, as far as it is trained; empty without one
 };
 
 /// What a watcher asks for after a look.

@@ -17,13 +17,23 @@ constexpr std::size_t kItems = 64;
 StepGuard::StepGuard(Context& context)
     : check_(context.kernel(kProgram, "guard_loss")),
       close_(context.kernel(kProgram, "guard_close")),
-      state_(context, RS_GUARD_WORDS, "step guard") {
+      add_(context.kernel("train/gradient_tree.cl", "add_count")),
+      state_(context, RS_GUARD_WORDS, "step guard"),
+      step_capped_(context, 2, "capped rays of a step") {
   state_.clear();
 }
 
 void StepGuard::check_loss(const ImageLoss::Partials& loss, const Buffer<std::uint32_t>& overflow) {
   check_.launch(Range{{kItems, 1, 1}, {0, 0, 0}, {}}, loss.pixel, loss.ssim, loss.pixel_sums,
                 loss.ssim_sums, overflow, state_);
+}
+
+void StepGuard::count_capped(const Buffer<std::uint32_t>& capped, bool first) {
+  if (first) {
+    step_capped_.copy_from(capped, 2);
+  } else {
+    add_.launch(Range{{1, 1, 1}, {1, 1, 1}, {}}, capped, step_capped_);
+  }
 }
 
 void StepGuard::close(const Buffer<std::uint32_t>& refused,

@@ -31,8 +31,12 @@ class StepGuard {
   /// Marks the present step when the sums of its loss are not finite, or the word of `overflow` is
   /// not 0.
   void check_loss(const ImageLoss::Partials& loss, const Buffer<std::uint32_t>& overflow);
+  /// For steps of several views: adds the ViewTracer::kept_capped_rays() of one to step_capped(),
+  /// which begins anew with the first.
+  void count_capped(const Buffer<std::uint32_t>& capped, bool first);
+  const Buffer<std::uint32_t>& step_capped() const { return step_capped_; }
   /// After the update: counts. `refused` is Adam's count of refused gradients, `count` the
-  /// Gaussians, `capped` the step's ViewTracer::kept_capped_rays().
+  /// Gaussians, `capped` the rays of the step that the cap on hits stopped.
   void close(const Buffer<std::uint32_t>& refused,
              const Buffer<std::uint32_t>& capped,
              std::size_t count);
@@ -45,8 +49,8 @@ class StepGuard {
   void restore(const Counts& counts);
 
  private:
-  Kernel check_, close_;
-  Buffer<std::uint32_t> state_;
+  Kernel check_, close_, add_;
+  Buffer<std::uint32_t> state_, step_capped_;
 };
 
 }  // namespace raysplats

@@ -2,12 +2,15 @@
 #include "train/step_options.hpp"
 
 #include "train/schedule.hpp"
+#include "train/sky_adam.hpp"
 
 namespace raysplats {
 
 TraceOptions trace_options_of(const TrainOptions& options, const std::array<float, 3>& background) {
   TraceOptions trace = options.trace;
   trace.background = background;
+  trace.sky.clear();
+  if (options.background == "sky") trace.sky = even_sky(options.sky_degree, background);
   return trace;
 }
 

@@ -225,7 +225,7 @@ void validate(const TrainOptions& options) {
   }
   for (const LearningRate& rate :
        {options.position_lr, options.rotation_lr, options.scale_lr, options.opacity_lr,
-        options.sh_lr, options.sh_rest_lr, options.exposure_lr, options.pose_lr}) {
+        options.sh_lr, options.sh_rest_lr, options.exposure_lr, options.sky_lr, options.pose_lr}) {
     if ((rate.initial > 0) != (rate.final_value > 0)) {
       throw UsageError(
           "A learning rate and its final value are both 0 (the group stays as it is) or both above "
@@ -253,12 +253,22 @@ void validate(const TrainOptions& options) {
         "The option 'poses' cannot be used with 'mirrors': behind a mirror the gradient of a pose "
         "is not known");
   }
+  if (options.background == "sky" && !options.mirrors.empty()) {
+    throw UsageError(
+        "The option 'background' = sky cannot be used with 'mirrors', which show one colour "
+        "behind everything");
+  }
+  if (options.background == "sky" && options.poses) {
+    throw UsageError(
+        "The options 'background' = sky and 'poses' cannot be used together: the gradient of a "
+        "pose is not known where there is a sky");
+  }
   if (options.background != "random") background_color(options, false);
 }
 
 std::array<float, 3> background_color(const TrainOptions& options, bool cut_out) {
   const std::string& text = options.background;
-  if (text == "auto" || text == "random") {
+  if (text == "auto" || text == "random" || text == "sky") {
     const float value = cut_out ? 1.0f : 0.0f;
     return {value, value, value};
   }
@@ -270,10 +280,10 @@ std::array<float, 3> background_color(const TrainOptions& options, bool cut_out)
       std::all_of(color.begin(), color.end(), [](float c) { return c >= 0.0f && c <= 1.0f; });
   if (stream.fail() || !(stream >> std::ws).eof() || comma[0] != ',' || comma[1] != ',' ||
       !in_range) {
-    throw UsageError(
-        fmt::format("The option 'background' is auto, random or three numbers from 0 to 1 such as "
-                    "1,1,1, not '{}'",
-                    text));
+    throw UsageError(fmt::format(
+        "The option 'background' is auto, random, sky or three numbers from 0 to 1 such as "
+        "1,1,1, not '{}'",
+        text));
   }
   return color;
 }

@@ -155,7 +155,11 @@ class TrainTable : public OptionTable {
 std::vector<OptionRow> train_keys(TrainOptions& o) {
   TrainTable t;
   t.section("Run");
-  t.number("iterations", o.iterations, 0, kMaxCount, "training steps, one view each");
+  t.number("iterations", o.iterations, 0, kMaxCount,
+           "training steps, of one view each or of views-per-step");
+  t.number("views-per-step", o.views_per_step, 1, 1024,
+           "views of an iteration, whose gradients are added in an order of their own; time and "
+           "memory for gradients grow with it");
   t.number("seed", o.seed, 0, kMaxSeed,
            "seed of view order, random start and splits; a run is a function of it");
   t.flag(
@@ -207,8 +211,11 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
       });
   t.words("background", o.background,
           "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
-          "alpha, else their typical colour, which the run's configuration then names) or "
-          "\"random\" (another colour per iteration for cut-out photos, else black)");
+          "alpha, else their typical colour, which the run's configuration then names), "
+          "\"random\" (another colour per iteration for cut-out photos, else black) or \"sky\" "
+          "(trained, by direction; model files name it)");
+  t.number("sky-degree", o.sky_degree, 0, 4,
+           "degree of the spherical harmonics of a sky; 0 = one trained colour");
   t.number("image-budget", o.image_budget, 1, 1e9,
            "MiB of photos kept on the device; the others are decoded again when their turn comes");
   t.resolutions(
@@ -270,6 +277,7 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.learning_rate("sh-lr", o.sh_lr, "colour (SH band 0)");
   t.learning_rate("sh-rest-lr", o.sh_rest_lr, "the SH bands above 0");
   t.learning_rate("exposure-lr", o.exposure_lr, "the photos' affine colours");
+  t.learning_rate("sky-lr", o.sky_lr, "the sky");
   t.learning_rate("pose-lr", o.pose_lr, "the poses, in radians and shares of the scene extent");
   t.number("lr-decay", o.lr_decay, 0, 1,
            "rates fall as exp(-lr-decay * iteration) until they meet their final value; 0 = they "

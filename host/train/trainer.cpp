@@ -70,7 +70,7 @@ Trainer::Impl::Impl(Context& device,
       loss(device, options.pixel_loss, static_cast<float>(options.ssim_weight)),
       adam(device, adam_options_of(options)),
       apart(validation_views(train_views.size(), options.validate_views)),
-      density(device, options, extent, train_views.size() - apart.size()),
+      density(device, options, extent, pass_steps()),
       footprint(device,
                 train_cameras,
                 options.footprint,
@@ -80,13 +80,20 @@ Trainer::Impl::Impl(Context& device,
               views_of(dataset, train_views),
               static_cast<std::size_t>(options.image_budget) * kMiB,
               host_image_budget(options, train_cameras)),
-      order(options.seed, train_views.size(), apart, validation_end(options)) {
+      slots(static_cast<std::size_t>(options.views_per_step)),
+      sum(device) {
   options.data.origin = dataset.origin;
   follow_options();
   if (options.strategy == DensityStrategy::kMcmc) mcmc.emplace(device, options, extent);
-  if (options.exposure) exposure.emplace(device, train_views.size());
+  if (options.exposure) exposure.emplace(device, train_views.size(), slots.size());
+  forget_sky();
   if (options.poses)
     poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
+  if (options.background == "sky" && cut_out) {
+    throw UsageError(
+        "The option 'background' = sky is for photos that show one, but these are cut out: leave "
+        "it at auto, or choose 'masks' = ignore where masks cut them out");
+  }
   if (train_views.empty()) {
     const bool held_out = options.data.test_every == 1 && !test_views.empty();
     throw UsageError(fmt::format(

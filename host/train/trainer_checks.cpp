@@ -49,7 +49,7 @@ void Trainer::Impl::validate_model() {
 void Trainer::Impl::write_dump() {
   const std::filesystem::path folder = run.path() / "dump";
   write_image(folder / "picture.exr", tracer.download_image(), {}, ColorSpace::kDisplay);
-  const Camera& camera = train_cameras[order.at(iteration - 1)];
+  const Camera& camera = train_cameras[order.at(last_turn())];
   nlohmann::json rotation = nlohmann::json::array();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) rotation.push_back(camera.rotation[column][row]);

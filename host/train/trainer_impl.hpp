@@ -22,6 +22,7 @@
 #include "train/density_control.hpp"
 #include "train/exposure.hpp"
 #include "train/footprint.hpp"
+#include "train/gradient_tree.hpp"
 #include "train/image_loss.hpp"
 #include "train/initialization.hpp"
 #include "train/mcmc.hpp"
@@ -30,9 +31,10 @@
 #include "train/pose_refinement.hpp"
 #include "train/psnr_rise.hpp"
 #include "train/run_folder.hpp"
-#include "train/run_watcher.hpp"
 #include "train/run_time.hpp"
+#include "train/run_watcher.hpp"
 #include "train/schedule.hpp"
+#include "train/sky_adam.hpp"
 #include "train/step_guard.hpp"
 #include "train/stopwatch.hpp"
 #include "train/target_cache.hpp"
@@ -43,6 +45,13 @@ namespace raysplats {
 std::size_t pixels_of(const Camera& camera);
 /// Photos decoded ahead of their turn.
 constexpr std::size_t kReadAhead = 8;
+
+/// One of the views of a step, and what its gradient leaves besides.
+struct ViewSlot {
+  std::size_t view = 0;      ///< position among the training views
+  GaussianGradients screen;  ///< the statistics of steps of several views; nothing else
+  PoseGradient slope;        ///< where poses are trained
+};
 
 /// A step that is enqueued and may not be done, with what its beginning found on the host.
 struct SentStep {
@@ -66,12 +75,16 @@ struct Trainer::Impl {
   std::vector<std::size_t> first_views() const;
   const std::vector<SmallPhoto>& photos();
   void choose_background();
+  void forget_sky();
+  std::size_t pass_steps() const;
+  std::int64_t last_turn() const;
   std::size_t limit() { return most_gaussians(options.iterations); }
   std::size_t most_gaussians(std::int64_t iterations);
   std::size_t largest_photo() const;
   std::size_t ray_views() const;
 
   // trainer_step.cpp: one step, and what happens between two of them.
+  void enqueue_view(std::size_t slot);
   void enqueue_step();
   void control_density();
   void follow_plan(const DensityPlan& plan);
@@ -107,6 +120,8 @@ struct Trainer::Impl {
   // trainer_report.cpp: what a run says of itself.
   void report(Progress& progress);
   void evaluate_views(bool last);
+  void set_background();
+  TraceOptions trace_options();     // that the model looks right with
   Gaussians model_to_save() const;  // without what has left --bounds
   void save_model();
   void write_metrics(bool complete);
@@ -157,15 +172,18 @@ struct Trainer::Impl {
   DensityControl density;
   Footprint footprint;
   std::optional<Exposure> exposure;     // with the option
+  std::optional<SkyAdam> sky;           // with a background that is one; the tracer has it
   std::optional<PoseRefinement> poses;  // with the option
   std::optional<Mcmc> mcmc;             // with the strategy
   StepGuard guard;
   std::optional<ModelValidator> validator;  // once it is asked for
   TargetCache targets;
-  ViewOrder order;
+  ViewOrder order{0, 0};  // of views, of which a step takes several (follow_options())
 
   DeviceGaussians gaussians;
-  GaussianGradients gradients;
+  std::vector<ViewSlot> slots;  // views-per-step
+  StepGradients gradients;      // of the last view, then of the step
+  GradientTree sum;
   Buffer<float> image_gradient;
   std::int64_t iteration = 0;            // completed
   std::vector<SmallPhoto> small_photos;  // once they are asked for

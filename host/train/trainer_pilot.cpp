@@ -63,8 +63,9 @@ void Trainer::Impl::check_not_begun(const char* function) const {
 void Trainer::Impl::follow_options() {
   TrainOptions centred = options;
   centred.bounds = about_origin(options.bounds, dataset.origin);
-  density.follow(centred, train_views.size() - apart.size());
-  order = ViewOrder(options.seed, train_views.size(), apart, validation_end(options));
+  density.follow(centred, pass_steps());
+  order = ViewOrder(options.seed, train_views.size(), apart,
+                    validation_end(options) * options.views_per_step);
 }
 
 double Trainer::Impl::seconds_of(const Pilot& pilot,
@@ -74,11 +75,12 @@ double Trainer::Impl::seconds_of(const Pilot& pilot,
   shaped.iterations = iterations;
   const auto limit = static_cast<double>(most);
   const double first = std::min(static_cast<double>(pilot.first), kFillShare * limit);
-  const auto photos =
-      static_cast<double>(std::min(iterations, static_cast<std::int64_t>(train_views.size())));
+  const auto photos = static_cast<double>(
+      std::min(iterations * options.views_per_step, static_cast<std::int64_t>(train_views.size())));
   const HitCurve hits = expected_hits(pilot.first_hits, pilot.last_hits, pilot.opaque_share);
   return pilot.start_seconds + photos * pilot.photo_seconds +
-         pilot.per_work * run_work(shaped, mean_pixels(train_cameras), hits, first, limit);
+         pilot.per_work * run_work(shaped, options.views_per_step * mean_pixels(train_cameras),
+                                   hits, first, limit);
 }
 
 // Times steps from the start on the device: coarse ones, ones at full size, and ones with as many
@@ -89,7 +91,7 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
   double photo_seconds = 0;
   int photos = 0;
   const auto timed_step = [&] {
-    const std::size_t view = order.at(iteration);
+    const std::size_t view = order.at(iteration * options.views_per_step);
     const int divisor = resolution_divisor(options, iteration);
     const Camera camera =
         divisor > 1 ? downscaled(train_cameras[view], divisor) : train_cameras[view];
@@ -102,8 +104,11 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
     step();
     settle();
     const double seconds_of_step = timer.seconds();
-    return StepSample{static_cast<double>(pixels_of(camera)), static_cast<double>(gaussians.count),
-                      static_cast<double>(tracer.statistics().hits), seconds_of_step};
+    // Its views are taken to be like the last one.
+    const auto views = static_cast<double>(slots.size());
+    return StepSample{views * static_cast<double>(pixels_of(camera)),
+                      static_cast<double>(gaussians.count),
+                      views * static_cast<double>(tracer.statistics().hits), seconds_of_step};
   };
   // The first step of a kind compiles kernels and makes buffers: it does not count. Returns the
   // hits per pixel.
@@ -146,7 +151,8 @@ void Trainer::Impl::forget_pilot() {
   density.restore_statistics({});
   gaussians = DeviceGaussians();
   guard.restore({});
-  if (exposure) exposure.emplace(context, train_views.size());
+  if (exposure) exposure.emplace(context, train_views.size(), slots.size());
+  forget_sky();
   if (poses)
     poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
   iteration = 0;

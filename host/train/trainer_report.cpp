@@ -24,7 +24,7 @@ void Trainer::Impl::report(Progress& progress) {
   const StepGuard::Counts counts = check_guard();
   last_loss = value.total;
   const double psnr = std::min(value.psnr, kMostPsnr);
-  rise.note(order.at(iteration - 1), resolution_divisor(options, iteration - 1), psnr);
+  rise.note(order.at(last_turn()), resolution_divisor(options, iteration - 1), psnr);
   const double seconds = training.seconds();
   const double elapsed = seconds - row_seconds;
   const CameraTracer::Statistics work = tracer.statistics();
@@ -74,7 +74,7 @@ void Trainer::Impl::warn_of_no_progress() const {
 void Trainer::Impl::evaluate_views(bool last) {
   if (test_views.empty()) return;
   evaluating.start();
-  tracer.set_background(background);
+  set_background();
   // What the PLY holds: between passes of density control some may have left the box.
   std::optional<DeviceGaussians> cropped;
   if (options.bounds)
@@ -103,9 +103,19 @@ Gaussians Trainer::Impl::model_to_save() const {
   return inside(gaussians.download(), about_origin(options.bounds, dataset.origin));
 }
 
+// Behind views that are judged. A sky is with the tracer already.
+void Trainer::Impl::set_background() {
+  if (!sky) tracer.set_background(background);
+}
+
+TraceOptions Trainer::Impl::trace_options() {
+  TraceOptions out = trace_options_of(options, background);
+  if (sky) out.sky = tracer.sky()->light();
+  return out;
+}
+
 void Trainer::Impl::save_model() {
-  run.write_model(model_to_save(), trace_options_of(options, background), iteration,
-                  dataset.origin);
+  run.write_model(model_to_save(), trace_options(), iteration, dataset.origin);
   if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
   if (poses) run.write_refined_cameras(poses->cameras(), dataset.origin);
 }

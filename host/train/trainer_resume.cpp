@@ -31,6 +31,13 @@ Checkpoint Trainer::Impl::state() {
     checkpoint.sections["poses.second"] = state.second;
     checkpoint.sections["poses.steps"] = state.steps;
   }
+  if (sky) {
+    checkpoint.sections["sky"] = tracer.sky()->coefficients().download();
+    SkyAdam::State moments = sky->state();
+    checkpoint.sections["sky.first"] = std::move(moments.first);
+    checkpoint.sections["sky.second"] = std::move(moments.second);
+    checkpoint.sections["sky.steps"] = std::move(moments.steps);
+  }
   if (exposure) {
     Exposure::State colors = exposure->state();
     checkpoint.sections["exposure"] = std::move(colors.deltas);
@@ -88,7 +95,12 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   differs("undistort", before.data.undistort, options.data.undistort);
   differs("validate-views", before.validate_views, options.validate_views);
   differs("exposure", before.exposure, options.exposure);
+  differs("views-per-step", before.views_per_step, options.views_per_step);
   differs("poses", before.poses, options.poses);
+  const auto degree = [](const TrainOptions& o) {
+    return o.background == "sky" ? o.sky_degree : -1;  // -1 = no sky
+  };
+  differs("background = sky and sky-degree", degree(before), degree(options));
   const auto cuts = [](const TrainOptions& o) { return o.data.masks == MaskUse::kCutout; };
   differs("masks = cutout", cuts(before), cuts(options));
 }
@@ -149,6 +161,13 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   if (exposure) {
     exposure->restore({part("exposure"), part("exposure.first"), part("exposure.second"),
                        part("exposure.steps")});
+  }
+  if (sky) {
+    sky->restore({part("sky.first"), part("sky.second"), part("sky.steps")});
+    const std::vector<float> coefficients = part("sky");
+    if (coefficients.size() != tracer.sky()->coefficients().size())
+      throw DataError("The checkpoint lacks the sky of its run: resume from another one");
+    tracer.sky()->set(coefficients);
   }
   // What the run began with, black in those of older versions.
   if (options.background == "auto" && !checkpoint.config.empty())

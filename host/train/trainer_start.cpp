@@ -7,6 +7,7 @@
 #include "core/gaussian_selection.hpp"
 #include "core/morton_order.hpp"
 #include "train/memory_estimate.hpp"
+#include "train/step_options.hpp"
 #include "train/train_config.hpp"
 #include "train/trainer_impl.hpp"
 
@@ -34,19 +35,41 @@ std::vector<std::size_t> Trainer::Impl::first_views() const {
   return out;
 }
 
+// A sky that nothing has been learned of.
+void Trainer::Impl::forget_sky() {
+  const SkyLight light = trace_options_of(options, background).sky;
+  if (light.empty()) return;
+  tracer.set_background({}, light);
+  sky.emplace(context, 3 * light.size());
+}
+
 // What shows through where no Gaussian is. No photo says what lies there, and of all colours the
-// typical one is the least wrong. The run's configuration names it from then on.
+// typical one is the least wrong. The run's configuration names it from then on, and a sky begins
+// with it.
 void Trainer::Impl::choose_background() {
-  if (options.background != "auto" || cut_out) return;
+  if ((options.background != "auto" && !sky) || cut_out) return;
   const std::vector<std::size_t> all = first_views();
   std::vector<std::size_t> some;
   const std::size_t count = std::min(kMeanPhotos, all.size());
   for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
   const std::array<float, 3> color = typical_color(
       small_photos.empty() ? load_small_photos(dataset, some, kSmallPhoto) : small_photos);
+  if (sky) {
+    tracer.set_background({}, even_sky(options.sky_degree, color));
+    return;
+  }
   options.background = fmt::format("{:.4f},{:.4f},{:.4f}", color[0], color[1], color[2]);
   background = background_color(options, cut_out);
 }
+
+// Steps in which every view of the loss is seen once.
+std::size_t Trainer::Impl::pass_steps() const {
+  const auto together = static_cast<std::size_t>(options.views_per_step);
+  return (train_views.size() - apart.size() + together - 1) / together;
+}
+
+// The last view's number among all that steps have taken so far.
+std::int64_t Trainer::Impl::last_turn() const { return iteration * options.views_per_step - 1; }
 
 // The most Gaussians of a run of these photos.
 std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {

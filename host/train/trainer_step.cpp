@@ -19,19 +19,21 @@ std::int64_t pose_end(const TrainOptions& options) {
 
 }  // namespace
 
-// One view: forward, loss, backward, statistics, Adam. Nothing is waited for, but sizes where
-// await_sizes says so and, where poses are trained, their gradients: then sizes as well, because
-// what the host does of a step cannot be turned off by the device.
-void Trainer::Impl::enqueue_step() {
-  const std::size_t view = order.at(iteration);
+// The gradient of one view of a step: forward, loss, backward. It changes nothing that the other
+// views of the step see, so it does not matter where and in what order they are made. Nothing is
+// waited for, but sizes where await_sizes says so and, where poses are trained, their gradients:
+// then sizes as well, because what the host does of a step cannot be turned off by the device.
+void Trainer::Impl::enqueue_view(std::size_t slot) {
+  ViewSlot& out = slots[slot];
+  const std::int64_t turn = iteration * options.views_per_step + static_cast<std::int64_t>(slot);
+  const std::size_t view = out.view = order.at(turn);
   targets.prefetch(order.upcoming(kReadAhead - 1));
   const int divisor = resolution_divisor(options, iteration);
   const bool slopes = poses && iteration < pose_end(options);
   const Camera full = poses ? poses->camera(view) : train_cameras[view];
   const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
-  const std::array<float, 3> behind = step_background(options, cut_out, background, iteration);
-  gaussians.active_sh_degree = active_sh_degree(options, iteration);
-  tracer.set_background(behind);
+  const std::array<float, 3> behind = step_background(options, cut_out, background, turn);
+  if (!sky) tracer.set_background(behind);
   tracer.forward(gaussians, camera, true,
                  await_sizes || slopes ? ViewSizes::kAwaited : ViewSizes::kAhead);
   const Buffer<float>& shown =
@@ -40,25 +42,58 @@ void Trainer::Impl::enqueue_step() {
   loss.evaluate(shown, targets.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
   guard.check_loss(loss.partials(), tracer.overflow());
-  if (exposure) {
-    whole = false;
-    exposure->step(tracer.image(), image_gradient, view, camera.width, camera.height,
-                   learning_rate(options.exposure_lr, options, iteration), guard.mark());
+  if (exposure)
+    exposure->backward(tracer.image(), image_gradient, view, camera.width, camera.height, slot);
+  tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr);
+  traced_rays += pixels_of(camera);
+  if (slots.size() == 1) return;
+  // Kept for this view alone until the whole step is known to count.
+  const Buffer<float>& screen = gradients.gaussians.screen;
+  out.screen.screen.ensure(context, screen.size(), "screen gradients of a view");
+  out.screen.screen.copy_from(screen, screen.size());
+  if (sky) {
+    const Buffer<float>& slope = tracer.sky()->gradient();
+    gradients.sky.ensure(context, slope.size(), "sky gradient of a view");
+    gradients.sky.copy_from(slope, slope.size());
   }
-  PoseGradient slope;
-  tracer.backward(gaussians, image_gradient, gradients, slopes ? &slope : nullptr);
+  guard.count_capped(tracer.kept_capped_rays(), slot == 0);
+  sum.add(gradients);
+}
+
+// All views of a step and what follows of them. One view needs no sum.
+void Trainer::Impl::enqueue_step() {
+  gaussians.active_sh_degree = active_sh_degree(options, iteration);
+  sum.clear();
+  for (std::size_t slot = 0; slot < slots.size(); ++slot) enqueue_view(slot);
+  const bool several = slots.size() > 1;
+  if (several) sum.finish(gradients);
   whole = false;
-  if (slopes) poses->step(view, slope, learning_rate(options.pose_lr, options, iteration));
-  if (density.accumulates_at(iteration)) density.accumulate(gaussians, gradients, &guard.mark());
-  if (mcmc) mcmc->press(gaussians, gradients, guard.mark());
+  for (std::size_t slot = 0; slot < slots.size(); ++slot) {
+    const ViewSlot& one = slots[slot];
+    if (exposure) {
+      exposure->step(one.view, slot, learning_rate(options.exposure_lr, options, iteration),
+                     guard.mark());
+    }
+    if (poses && iteration < pose_end(options))
+      poses->step(one.view, one.slope, learning_rate(options.pose_lr, options, iteration));
+    if (density.accumulates_at(iteration)) {
+      density.accumulate(gaussians, several ? one.screen : gradients.gaussians, &guard.mark());
+    }
+  }
+  if (sky) {
+    sky->step(several ? gradients.sky : tracer.sky()->gradient(), tracer.sky()->coefficients(),
+              learning_rate(options.sky_lr, options, iteration), guard.mark());
+  }
+  GaussianGradients& slopes = gradients.gaussians;
+  if (mcmc) mcmc->press(gaussians, slopes, guard.mark());
   const bool measured = density.measures_step(iteration);
   if (measured) density.begin_step(gaussians);
-  adam.step(gaussians, gradients, adam_rates_of(options, extent, iteration), &guard.mark());
+  adam.step(gaussians, slopes, adam_rates_of(options, extent, iteration), &guard.mark());
   if (measured) density.end_step(gaussians, guard.mark());
   if (mcmc) mcmc->disturb(gaussians, iteration, guard.mark());
   footprint.apply(gaussians, guard.mark());
-  guard.close(adam.refused(), tracer.kept_capped_rays(), gaussians.count);
-  traced_rays += pixels_of(camera);
+  guard.close(adam.refused(), several ? guard.step_capped() : tracer.kept_capped_rays(),
+              gaussians.count);
   ++iteration;
   whole = true;
   stepped = true;

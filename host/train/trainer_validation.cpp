@@ -36,7 +36,7 @@ void Trainer::Impl::judge() {
     judged.views.push_back(dataset.views[train_views[i]]);
     judged.views.back().test = true;
   }
-  tracer.set_background(background);
+  set_background();
   const auto render = [this](const Camera& camera) {
     tracer.forward(gaussians, camera);
     return tracer.download_image();

@@ -70,7 +70,8 @@ Image GaussianPictures::draw(const ViewRequest& request, std::uint64_t sample, c
   const auto turn = context_.lock();
   const bool depth = request.output == Output::kDepth;
   ViewTracer& views = tracer(depth, request.near_depth);
-  views.set_background(request.background.value_or(options_.background));
+  views.set_background(request.background.value_or(options_.background),
+                       request.background ? SkyLight() : options_.sky);
   const Watched watched(views, watch);
   try {
     views.forward(gaussians_, jittered(request.camera, sample));

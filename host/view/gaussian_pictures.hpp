@@ -30,7 +30,10 @@ class GaussianPictures : public PictureSource {
   bool has_depth() const override { return mirrors_.meshes.empty(); }
 
   /// Behind everything where a page wishes nothing else.
-  void set_background(const std::array<float, 3>& background) { options_.background = background; }
+  void set_background(const std::array<float, 3>& background, const SkyLight& sky) {
+    options_.background = background;
+    options_.sky = sky;
+  }
   /// Gives the device's memory back until the next picture.
   void release();
 

@@ -91,14 +91,17 @@ inline TraceOptions peak_order() {
 struct TrainOptions {
   // Run
   std::int64_t iterations = 10000;
+  int views_per_step = 1;  ///< whose gradients are added
   std::uint64_t seed = 42;
 
   // Data
   DatasetOptions data;
   int validate_views = 0;  ///< training views kept out of the loss until 0.9 of the run
   int patience = 0;        ///< validations in a row without gain that end the run; 0 = off
-  /// "auto" (white behind cut-out photos, else the photos' typical colour), "random" or "r,g,b".
+  /// "auto" (white behind cut-out photos, else the photos' typical colour), "random", "sky" or
+  /// "r,g,b".
   std::string background = "auto";
+  int sky_degree = 2;  ///< of the light of background "sky" by direction; 0 = one trained colour
   std::int64_t image_budget = 1024;  ///< MiB
   std::vector<ResolutionStep> resolution_schedule{{4, 0.1}, {3, 0.18}, {2, 0.4}};
   std::vector<std::string> mirrors;  ///< mesh files of known mirrors
@@ -129,6 +132,7 @@ struct TrainOptions {
   LearningRate sh_lr{1e-2, 2.5e-3};
   LearningRate sh_rest_lr{5e-4, 1.25e-4};
   LearningRate exposure_lr{3e-2, 3e-3};
+  LearningRate sky_lr{1e-2, 1e-3};
   LearningRate pose_lr{5e-3, 5e-4};  ///< radians, and shares of the scene extent
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration
   bool scale_lr_by_extent = false;

@@ -103,7 +103,8 @@ TEST_CASE("exposure: pictures, gradients and steps agree with double precision [
     const std::vector<float> shown = exposure.apply(image, view, kWidth, kHeight).download();
     for (std::size_t i = 0; i < 4 * kPixels; ++i)
       REQUIRE(static_cast<double>(shown[i]) == doctest::Approx(expected[i]).epsilon(1e-5));
-    exposure.step(image, gradient, view, kWidth, kHeight, 0.05, guard);
+    exposure.backward(image, gradient, view, kWidth, kHeight);
+    exposure.step(view, 0, 0.05, guard);
     const std::vector<double> back = reference.step(picture, slope, view, 0.05);
     const std::vector<float> got = gradient.download();
     for (std::size_t i = 0; i < 4 * kPixels; ++i)
@@ -131,7 +132,8 @@ TEST_CASE("exposure: marked steps change nothing, and a state goes on where it w
   const auto step = [&](Exposure& target, std::size_t view, std::uint32_t mark) {
     guard.upload(std::vector<std::uint32_t>{mark});
     gradient.upload(slope);
-    target.step(image, gradient, view, kWidth, kHeight, 0.02, guard);
+    target.backward(image, gradient, view, kWidth, kHeight);
+    target.step(view, 0, 0.02, guard);
   };
   step(exposure, 1, 0);
   const Exposure::State before = exposure.state();
