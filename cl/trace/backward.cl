@@ -10,7 +10,8 @@
 //                     of the gradient lines: no atomics, the same sum every time.    global: groups
 //   EXACT_SUMS 1:     one long integer per component (exact_sum.h): the same sum whatever the order
 //                     of the packets, with integer atomics only.       global: packets of the band
-//   otherwise:        one copy, compare-and-swap adds.                 global: packets of the band
+//   otherwise:        one copy of shared floats (float_add.h).               global: packets of the
+//   band
 // Components of a line's gradient follow the line; slot 2 (m_z, of which order makes no gradient)
 // sums the per-ray lengths of the screen gradient instead, the densification signal of AbsGS (Ye et
 // al. 2024).

@@ -2,11 +2,12 @@
 // Sums of floats in lines of 16, one or more lines per Gaussian, to which many work-items add:
 //   PRIVATE_COPIES 1: every work-item has sums of its own: plain additions, the same every time
 //   EXACT_SUMS 1:     a long integer per float (exact_sum.h): the same bits in any order
-//   otherwise:        compare-and-swap on floats
-// O(1) per addition but for retries of the compare-and-swap.
+//   otherwise:        floats that are shared (float_add.h, FLOAT_ATOMICS)
+// O(1) per addition but for retries where floats are swapped.
 #ifndef RS_TRACE_LINE_SUM_H
 #define RS_TRACE_LINE_SUM_H
 
+#include "primitives/float_add.h"
 #include "primitives/prefetch.h"
 #include "trace/exact_sum.h"
 
@@ -32,15 +33,7 @@ void rs_add_sum(const LineSums* sums, const size_t number, const float value) {
   volatile __global uint* words = (volatile __global uint*)sums->lines;
   rs_exact_add(words + (number >> 4) * (16 * RS_EXACT_WORDS) + (number & 15), value, sums->limit);
 #else
-  if (value == 0.0f) return;
-  volatile __global uint* word = (volatile __global uint*)sums->lines + number;
-  // A plain first read would race with the others' writes; 0 is what most first writers find.
-  uint old = 0;
-  for (;;) {
-    const uint seen = atomic_cmpxchg(word, old, as_uint(as_float(old) + value));
-    if (seen == old) break;
-    old = seen;
-  }
+  rs_add_float(sums->lines + number, value);
 #endif
 }
 

@@ -81,10 +81,12 @@ void add_trace_rows(OptionTable& t, TraceOptions& o) {
       {{"auto", GradientSum::kAuto},
        {"copies", GradientSum::kCopies},
        {"exact", GradientSum::kExact},
-       {"atomic", GradientSum::kAtomic}},
+       {"atomic", GradientSum::kAtomic},
+       {"swap", GradientSum::kSwap}},
       "how the gradients of rays are added: private copies (CPUs), exact (long integers, the same "
-      "bits in any order) or atomic (floats, not deterministic); auto = copies on CPUs, else "
-      "atomic, or exact with deterministic");
+      "bits in any order), atomic (floats, not deterministic) or swap (as atomic, without the "
+      "device's own float additions); auto = copies on CPUs, else atomic, or exact with "
+      "deterministic");
   t.number("launch-budget-ms", o.launch_budget_ms, -1, 1e9,
            "a view is traced in bands of rows that take about this long each, so that watchdogs of "
            "displays do not stop them; 0 = no bound, -1 = none on CPUs and 100 elsewhere");

@@ -7,8 +7,8 @@
 
 namespace raysplats {
 
-/// Preprocessor definitions a kernel is specialised by; their sorted text is part of every cache
-/// key.
+/// Preprocessor definitions a kernel is specialised by and the language it is written in; their
+/// text is part of every cache key.
 class BuildOptions {
  public:
   template <class T>
@@ -16,16 +16,20 @@ class BuildOptions {
     values_[name] = fmt::format("{}", value);
     return *this;
   }
-  /// "-D A=1 -D B=2", sorted by name.
+  /// A later OpenCL C than 1.2, "CL3.0", where what the device has is part of that only.
+  BuildOptions& language(const std::string& version) {
+    language_ = version;
+    return *this;
+  }
+  /// "-cl-std=CL1.2 -D A=1 -D B=2", sorted by name.
   std::string text() const {
-    std::string out;
-    for (const auto& [name, value] : values_) {
-      out += fmt::format("{}-D {}={}", out.empty() ? "" : " ", name, value);
-    }
+    std::string out = "-cl-std=" + language_;
+    for (const auto& [name, value] : values_) out += fmt::format(" -D {}={}", name, value);
     return out;
   }
 
  private:
+  std::string language_ = "CL1.2";
   std::map<std::string, std::string> values_;
 };
 

@@ -22,7 +22,7 @@ namespace raysplats {
 namespace {
 
 // Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not.
-constexpr const char* kCompilerOptions = "-cl-std=CL1.2 -cl-mad-enable";
+constexpr const char* kCompilerOptions = "-cl-mad-enable";
 
 // Drivers that have the binary at hand copy some hundred kilobytes.
 constexpr std::chrono::milliseconds kSlowBinary{100};
@@ -33,8 +33,7 @@ std::string compiler_flags(const BuildOptions& build, bool check_arguments) {
   std::string flags = kCompilerOptions;
   if (check_arguments) flags += " -cl-kernel-arg-info";
   if (!spdlog::should_log(spdlog::level::debug)) flags += " -w";
-  if (!build.text().empty()) flags += " " + build.text();
-  return flags;
+  return flags + " " + build.text();
 }
 
 // Nothing when the driver has none.

@@ -63,6 +63,19 @@ std::vector<std::string> problems_of(const cl::Device& device, const DeviceInfo&
   return problems;
 }
 
+// Of cl_ext_float_atomics, which some releases of the headers lack.
+constexpr cl_device_info kFloatAtomicCapabilities = 0x4231;
+constexpr cl_bitfield kGlobalFloatAdd = 1u << 1;
+
+// Adding is one of several things that the extension may offer, in the language of OpenCL 3.0.
+bool adds_floats(const cl::Device& device, const std::string& version) {
+  cl_bitfield offered = 0;
+  return version.starts_with("OpenCL 3.") &&
+         clGetDeviceInfo(device.get(), kFloatAtomicCapabilities, sizeof offered, &offered,
+                         nullptr) == CL_SUCCESS &&
+         (offered & kGlobalFloatAdd) != 0;
+}
+
 DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
   DeviceInfo info;
   info.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
@@ -84,7 +97,7 @@ DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
   const auto has = [&](const char* name) { return extensions.find(name) != std::string::npos; };
   info.has_fp64 = has("cl_khr_fp64");
   info.has_int64_atomics = has("cl_khr_int64_base_atomics");
-  info.has_float_atomics = has("cl_ext_float_atomics");
+  info.has_float_atomics = has("cl_ext_float_atomics") && adds_floats(device, info.version);
   info.problems = problems_of(device, info);
   return info;
 }

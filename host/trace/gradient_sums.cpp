@@ -61,8 +61,11 @@ void GradientSums::prepare(const GradientSumChoice& choice, std::size_t count) {
 }
 
 BuildOptions& GradientSums::define(BuildOptions& build) const {
+  const bool native = choice_.sum == GradientSum::kAtomic;
+  if (native && context_->device().has_float_atomics) build.language("CL3.0");
   return build.define("PRIVATE_COPIES", is_private() ? 1 : 0)
-      .define("EXACT_SUMS", is_exact() ? 1 : 0);
+      .define("EXACT_SUMS", is_exact() ? 1 : 0)
+      .define("FLOAT_ATOMICS", native ? 1 : 0);
 }
 
 float GradientSums::limit(std::size_t addends) {

@@ -41,7 +41,7 @@ class GradientSums {
   /// Zeros for `count` lines and each of their copies. Throws ResourceError where they do not fit
   /// the device.
   void prepare(const GradientSumChoice& choice, std::size_t count);
-  /// Build options PRIVATE_COPIES and EXACT_SUMS.
+  /// Build options PRIVATE_COPIES, EXACT_SUMS and FLOAT_ATOMICS, and the language that takes.
   BuildOptions& define(BuildOptions& build) const;
   /// The largest absolute value that an exact sum may take in so often without leaving its range;
   /// what is larger makes it NaN.

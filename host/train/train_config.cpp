@@ -242,11 +242,12 @@ void validate(const TrainOptions& options) {
     throw UsageError(
         "The option 'patience' counts validations, but there are none: set 'validate-views'");
   }
-  if (options.trace.deterministic && options.trace.gradient_sum == GradientSum::kAtomic) {
-    throw UsageError(
-        "The options 'deterministic' and 'gradient-sum' = atomic contradict each other, because "
-        "atomic sums depend on the scheduling: use 'gradient-sum' = auto or leave 'deterministic' "
-        "off");
+  const GradientSum sum = options.trace.gradient_sum;
+  if (options.trace.deterministic && (sum == GradientSum::kAtomic || sum == GradientSum::kSwap)) {
+    throw UsageError(fmt::format(
+        "The options 'deterministic' and 'gradient-sum' = {} contradict each other, because such "
+        "sums depend on the scheduling: use 'gradient-sum' = auto or leave 'deterministic' off",
+        sum == GradientSum::kAtomic ? "atomic" : "swap"));
   }
   if (options.poses && !options.mirrors.empty()) {
     throw UsageError(

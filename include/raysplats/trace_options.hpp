@@ -38,7 +38,9 @@ enum class GradientSum {
           ///< it has to be deterministic
   kCopies,  ///< one copy per worker, added in a fixed order; exact where they do not fit
   kExact,   ///< long integers: the same bits whatever the order, and with any number of workers
-  kAtomic,  ///< compare-and-swap on floats: the last bits depend on the scheduling
+  kAtomic,  ///< shared floats: the last bits depend on the scheduling; added by the device's own
+            ///< instruction where its compiler offers one, else as kSwap
+  kSwap,    ///< shared floats, by compare-and-swap alone
 };
 
 /// Light from far away by direction, as spherical harmonics in world axes: R, G, B of each of the

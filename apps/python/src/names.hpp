@@ -32,10 +32,11 @@ inline constexpr std::array<Name<Traversal>, 3> kTraversals{
     {{"auto", Traversal::kAuto}, {"tiles", Traversal::kTiles}, {"bvh", Traversal::kBvh}}};
 inline constexpr std::array<Name<PacketForm>, 3> kPacketForms{
     {{"auto", PacketForm::kAuto}, {"vector", PacketForm::kVector}, {"group", PacketForm::kGroup}}};
-inline constexpr std::array<Name<GradientSum>, 4> kGradientSums{{{"auto", GradientSum::kAuto},
+inline constexpr std::array<Name<GradientSum>, 5> kGradientSums{{{"auto", GradientSum::kAuto},
                                                                  {"copies", GradientSum::kCopies},
                                                                  {"exact", GradientSum::kExact},
-                                                                 {"atomic", GradientSum::kAtomic}}};
+                                                                 {"atomic", GradientSum::kAtomic},
+                                                                 {"swap", GradientSum::kSwap}}};
 inline constexpr std::array<Name<ColorDirection>, 2> kColorDirections{
     {{"ray", ColorDirection::kRay}, {"from-origin", ColorDirection::kFromOrigin}}};
 inline constexpr std::array<Name<CameraModel>, 5> kCameraModels{

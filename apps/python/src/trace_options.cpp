@@ -41,7 +41,7 @@ void bind_choices(nb::class_<TraceOptions>& type) {
           [](TraceOptions& o, const std::string& name) {
             o.gradient_sum = value_of(kGradientSums, "gradient_sum", name);
           },
-          "'auto', 'copies', 'exact' or 'atomic'.");
+          "'auto', 'copies', 'exact', 'atomic' or 'swap'.");
 }
 
 }  // namespace

@@ -104,7 +104,7 @@ TEST_CASE("gradients of a few pixels equal the double reference in every way of 
   Context context = make_test_context();
   for (const Packet& packet : packets({1, 4}, {8, 32})) {
     for (const GradientSum sum :
-         {GradientSum::kCopies, GradientSum::kExact, GradientSum::kAtomic}) {
+         {GradientSum::kCopies, GradientSum::kExact, GradientSum::kAtomic, GradientSum::kSwap}) {
       CAPTURE(packet);
       CAPTURE(static_cast<int>(sum));
       TraceOptions options = packet.over({});

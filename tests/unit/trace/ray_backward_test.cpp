@@ -390,7 +390,8 @@ TEST_CASE("several batches of rays add up, and a new begin starts from zero") {
 TEST_CASE("every way of adding the gradients of rays equals the double reference") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(300, 83, 2);
-  for (const GradientSum sum : {GradientSum::kCopies, GradientSum::kExact, GradientSum::kAtomic}) {
+  for (const GradientSum sum :
+       {GradientSum::kCopies, GradientSum::kExact, GradientSum::kAtomic, GradientSum::kSwap}) {
     for (const ColorDirection direction : {ColorDirection::kRay, ColorDirection::kFromOrigin}) {
       CAPTURE(static_cast<int>(sum));
       CAPTURE(static_cast<int>(direction));
@@ -405,7 +406,7 @@ TEST_CASE("every way of adding the gradients of rays equals the double reference
 TEST_CASE("a few gradients of rays in shared sums equal the double reference [small] [tiny]") {
   Context context = make_test_context();
   TraceOptions options;
-  for (const GradientSum sum : {GradientSum::kExact, GradientSum::kAtomic}) {
+  for (const GradientSum sum : {GradientSum::kExact, GradientSum::kAtomic, GradientSum::kSwap}) {
     CAPTURE(static_cast<int>(sum));
     options.gradient_sum = sum;
     CHECK_ERRORS(compare_gradients(context, reference::random_scene(12, 84, 1), options,

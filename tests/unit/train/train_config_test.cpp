@@ -242,11 +242,13 @@ TEST_CASE("the configurations of runs of older versions are read") {
 
 TEST_CASE("a deterministic run with atomic sums is refused as a contradiction") {
   const auto path = temporary("atomic.toml");
-  const std::string both = "deterministic = true\ngradient-sum = \"atomic\"\n";
-  write_text_file(path, both);
-  CHECK(message_of(path).find("contradict") != std::string::npos);
-  write_text_file(path, "[train]\n" + both);
-  CHECK(message_of(path).find("contradict") != std::string::npos);
+  for (const char* sum : {"atomic", "swap"}) {
+    const std::string both = fmt::format("deterministic = true\ngradient-sum = \"{}\"\n", sum);
+    write_text_file(path, both);
+    CHECK(message_of(path).find("contradict") != std::string::npos);
+    write_text_file(path, "[train]\n" + both);
+    CHECK(message_of(path).find(fmt::format("= {} contradict", sum)) != std::string::npos);
+  }
   for (const char* sum : {"auto", "copies", "exact"}) {
     write_text_file(path, fmt::format("deterministic = true\ngradient-sum = \"{}\"\n", sum));
     CHECK(message_of(path) == "");
