@@ -22,11 +22,41 @@
 // Of a kernel: its groups have this size, whatever the host says.
 #define RS_GROUP_KERNEL __attribute__((reqd_work_group_size(GROUP, 1, 1)))
 
-// Rows of hits that are open at once, at most 32: local memory holds three floats per ray of each.
+// Rows of hits that are open at once, at most 32.
 #ifndef OPEN
 #define OPEN 32
 #endif
 #define RS_ALL_SLOTS ((uint)((1ul << OPEN) - 1))
+// The first of them lie in local memory, a column per work-item; the others, which few packets
+// need, in private memory: it is the local memory of a group that decides how many are resident.
+#ifndef OPEN_LOCAL
+#define OPEN_LOCAL 16
+#endif
+#define RS_OPEN_OWN (OPEN > OPEN_LOCAL ? OPEN - OPEN_LOCAL : 1)
+
+// A number that every work-item keeps per open row.
+typedef __local float (*RowColumns)[GROUP];
+
+float rs_row_get(const RowColumns columns, const float* own, const uint slot, const int lane) {
+  return OPEN <= OPEN_LOCAL || slot < OPEN_LOCAL ? columns[slot][lane] : own[slot - OPEN_LOCAL];
+}
+
+void rs_row_set(
+    const RowColumns columns, float* own, const uint slot, const int lane, const float value) {
+  if (OPEN <= OPEN_LOCAL || slot < OPEN_LOCAL) {
+    columns[slot][lane] = value;
+  } else {
+    own[slot - OPEN_LOCAL] = value;
+  }
+}
+
+// Of functions that are called in one place: what they keep for a ray stays in registers only where
+// they are inlined, which not every compiler does with large ones. (RS_CALLS: as in lbvh_node.h.)
+#ifdef RS_CALLS
+#define RS_GROUP_INLINE
+#else
+#define RS_GROUP_INLINE __attribute__((always_inline))
+#endif
 
 #define rs_group_barrier() barrier(CLK_LOCAL_MEM_FENCE)
 

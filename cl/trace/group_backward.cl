@@ -9,43 +9,63 @@
 #endif
 
 #include "trace/arguments.h"
+// Rows of less than the forward pass keeps: more of them find room in local memory.
+#define OPEN_LOCAL 24
+
 #include "trace/group.h"
 #include "trace/hit_stream.h"
 #include "trace/line_gradient.h"
 #include "trace/line_sum.h"
 
-// Parts in which the rays of a group are summed, so that all work-items have a share.
-#define RS_SUM_PARTS (GROUP > 16 ? GROUP / 16 : 1)
+// Numbers of a line that are summed at once, and parts in which the rays of a group are, so that
+// all work-items have a share.
+#define RS_SUM_NUMBERS 8
+#define RS_SUM_PARTS (GROUP > RS_SUM_NUMBERS ? GROUP / RS_SUM_NUMBERS : 1)
 #define RS_SUM_RAYS (GROUP / RS_SUM_PARTS)
 
-// As in backward.cl; what a row brings is kept per ray in the column of its work-item, what all
-// rays share by one of them.
+// What an open row brings, per ray: the transmittance in front, 0 in rays that do not blend it, and
+// the sum of T alpha (colour . gradient) over it and all hits behind it. Of two hits of a ray the
+// one with more transmittance in front is nearer, and the sum from the nearest hit behind a row on
+// is all that is behind it: no row has to be asked for its own share.
 typedef struct {
-  float alpha[OPEN][GROUP];
-  float before[OPEN][GROUP];  // transmittance in front, 0 in rays that do not blend it
-  float behind[OPEN][GROUP];
-  float part[16][GROUP + 1];  // one more column than rays: columns fall on other banks
+  float before[OPEN_LOCAL][GROUP];
+  float from_here[OPEN_LOCAL][GROUP];
+  float part[RS_SUM_NUMBERS][GROUP + 1];  // one more than rays: columns fall on other banks
   float sum[RS_SUM_PARTS][16];
   uint reference[OPEN];
   uint oldest[OPEN];  // number of the nearest row that it may change places with
 } BackwardMemory;
 
+// The same of the rows beyond OPEN_LOCAL, in private memory.
+typedef struct {
+  float before[RS_OPEN_OWN];
+  float from_here[RS_OPEN_OWN];
+} OwnRows;
+
+// The nearest hit of a ray among the rows that are closed: farther than all that are still to come.
+typedef struct {
+  float before, from_here;
+} ClosedHit;
+
 // Adds the sums of g over the group to line `line`.
-void group_add_line(__local BackwardMemory* memory,
-                    const int lane,
-                    const LineSums* sums,
-                    const uint line,
-                    const float* g) {
+RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
+                                    const int lane,
+                                    const LineSums* sums,
+                                    const uint line,
+                                    const float* g) {
 #pragma unroll
-  for (int k = 0; k < 16; ++k) memory->part[k][lane] = g[k];
-  rs_group_barrier();
-  for (int i = lane; i < 16 * RS_SUM_PARTS; i += GROUP) {
-    const int k = i % 16, first = i / 16 * RS_SUM_RAYS;
-    float sum = 0.0f;
-    for (int j = 0; j < RS_SUM_RAYS; ++j) sum += memory->part[k][first + j];
-    memory->sum[i / 16][k] = sum;
+  for (int begin = 0; begin < 16; begin += RS_SUM_NUMBERS) {
+#pragma unroll
+    for (int k = 0; k < RS_SUM_NUMBERS; ++k) memory->part[k][lane] = g[begin + k];
+    rs_group_barrier();
+    for (int i = lane; i < RS_SUM_NUMBERS * RS_SUM_PARTS; i += GROUP) {
+      const int k = i % RS_SUM_NUMBERS, first = i / RS_SUM_NUMBERS * RS_SUM_RAYS;
+      float sum = 0.0f;
+      for (int j = 0; j < RS_SUM_RAYS; ++j) sum += memory->part[k][first + j];
+      memory->sum[i / RS_SUM_NUMBERS][begin + k] = sum;
+    }
+    rs_group_barrier();
   }
-  rs_group_barrier();
   for (int k = lane; k < 16; k += GROUP) {
     float sum = memory->sum[0][k];
     for (int j = 1; j < RS_SUM_PARTS; ++j) sum += memory->sum[j][k];
@@ -53,51 +73,62 @@ void group_add_line(__local BackwardMemory* memory,
   }
 }
 
+// Of the Gaussian of line v in the packet's rays.
+float group_alpha(const Pixels* p, __global const float* v, const uint reference) {
+  const PacketMeeting m = rs_meet(v, reference & 1, 0.0f, p->X, p->Y);
+  return v[12] * rs_exp(-0.5f * m.numerator / m.direction2);
+}
+
 // The row of the slot has met all rows that it may change places with: its gradient is complete.
-// Returns its T alpha (colour . gradient), which lies behind everything still to come.
-float close_row(__local BackwardMemory* memory,
-                const int lane,
-                const uint slot,
-                const Pixels* p,
-                const float T,
-                const float T_last,
-                const float sky,
-                __global const RsLine* restrict lines,
-                const LineSums* sums) {
+RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
+                               const OwnRows* own,
+                               const int lane,
+                               const uint slot,
+                               const Pixels* p,
+                               const float T,
+                               const float T_last,
+                               const float sky,
+                               __global const RsLine* restrict lines,
+                               const LineSums* sums,
+                               ClosedHit* closed) {
   const uint reference = memory->reference[slot];
   __global const float* v = lines[reference >> 1].v;
-  const float alpha = memory->alpha[slot][lane];
-  const float before = memory->before[slot][lane];
+  const float alpha = group_alpha(p, v, reference);
+  const float before = rs_row_get(memory->before, own->before, slot, lane);
+  const float from_here = rs_row_get(memory->from_here, own->from_here, slot, lane);
+  if (before > closed->before) {
+    closed->before = before;
+    closed->from_here = from_here;
+  }
   const float projected = v[13] * p->gR + v[14] * p->gG + v[15] * p->gB + p->gA;
   // Only the last hit of a ray can be opaque, and only the background is behind that.
-  const float behind = before <= T_last
-                           ? before * sky
-                           : (memory->behind[slot][lane] + T * sky) * (1.0f / (1.0f - alpha));
+  const float behind = before <= T_last ? before * sky
+                                        : (from_here - before * alpha * projected + T * sky) *
+                                              (1.0f / (1.0f - alpha));
   const float g_alpha = before > 0.0f ? before * projected - behind : 0.0f;
   float g[16];
   line_gradient(p, reference & 1, v, g_alpha, alpha, before * alpha, g);
   group_add_line(memory, lane, sums, reference >> 1, g);
-  return before * alpha * projected;
 }
 
 // `works`: whether there is a packet at (group_x, group_y); otherwise nothing happens.
-void group_backward(__local BackwardMemory* memory,
-                    const int lane,
-                    const bool works,
-                    const RsCamera* camera,
-                    __global const float* restrict tangents,
-                    const int group_x,
-                    const int group_y,
-                    __global const RsLine* restrict lines,
-                    __global const float* restrict image_gradient,
-                    __global const float* restrict transmittances,
-                    __global const uint2* restrict stream_ends,
-                    __global const uint2* restrict pool,
-                    __global const float* restrict pool_transmittance,
-                    const float4 background,
-                    const float screen_x,
-                    const float screen_y,
-                    const LineSums* sums) {
+RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
+                                    const int lane,
+                                    const bool works,
+                                    const RsCamera* camera,
+                                    __global const float* restrict tangents,
+                                    const int group_x,
+                                    const int group_y,
+                                    __global const RsLine* restrict lines,
+                                    __global const float* restrict image_gradient,
+                                    __global const float* restrict transmittances,
+                                    __global const uint2* restrict stream_ends,
+                                    __global const uint2* restrict pool,
+                                    __global const float* restrict pool_transmittance,
+                                    const float4 background,
+                                    const float screen_x,
+                                    const float screen_y,
+                                    const LineSums* sums) {
   const int width = camera->width, height = camera->height;
   const uint2 tail =
       works ? stream_ends[rs_group_number(width, group_x, group_y)] : (uint2)(RS_NO_CHUNK, 0);
@@ -109,8 +140,9 @@ void group_backward(__local BackwardMemory* memory,
   const float T = rs_load_pixels(transmittances, width, height, px, py);
   const float T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
   const float sky = background.x * p.gR + background.y * p.gG + background.z * p.gB;
-  float behind = 0.0f;  // of closed rows: farther than all that are open or still to come
-  uint open = 0;        // slots that are taken, a bit each
+  OwnRows own;
+  ClosedHit closed = {0.0f, 0.0f};
+  uint open = 0;  // slots that are taken, a bit each
   // Rows are numbered downwards from a number that no window reaches below.
   uint number = 0x80000000u;
   uint chunk = tail.x;
@@ -124,31 +156,30 @@ void group_backward(__local BackwardMemory* memory,
       }
       open &= ~closing;
       for (; closing != 0; closing &= closing - 1)
-        behind += close_row(memory, lane, rs_lowest_bit(closing), &p, T, T_last, sky, lines, sums);
+        close_row(memory, &own, lane, rs_lowest_bit(closing), &p, T, T_last, sky, lines, sums,
+                  &closed);
       const uint2 row = pool[first + n];
       const float before = pool_transmittance[(first + n) * GROUP + lane];
       __global const float* v = lines[row.x >> 1].v;
-      const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
-      const float alpha = v[12] * rs_exp(-0.5f * m.numerator / m.direction2);
       const float projected = v[13] * p.gR + v[14] * p.gG + v[15] * p.gB + p.gA;
-      const float mine = before * alpha * projected;
-      float farther = behind;
+      const float mine = before * group_alpha(&p, v, row.x) * projected;
+      ClosedHit next = closed;  // the nearest behind this one
       for (uint rest = open; rest != 0; rest &= rest - 1) {
         const uint slot = rs_lowest_bit(rest);
-        const float other = memory->before[slot][lane];
+        const float other = rs_row_get(memory->before, own.before, slot, lane);
+        if (other <= next.before) continue;
+        const float from_there = rs_row_get(memory->from_here, own.from_here, slot, lane);
         if (other < before) {
-          __global const float* w = lines[memory->reference[slot] >> 1].v;
-          farther += other * memory->alpha[slot][lane] *
-                     (w[13] * p.gR + w[14] * p.gG + w[15] * p.gB + p.gA);
+          next.before = other;
+          next.from_here = from_there;
         } else {
-          memory->behind[slot][lane] += mine;
+          rs_row_set(memory->from_here, own.from_here, slot, lane, from_there + mine);
         }
       }
       const uint slot = rs_lowest_bit(~open & RS_ALL_SLOTS);
       open |= 1u << slot;
-      memory->alpha[slot][lane] = alpha;
-      memory->before[slot][lane] = before;
-      memory->behind[slot][lane] = farther;
+      rs_row_set(memory->before, own.before, slot, lane, before);
+      rs_row_set(memory->from_here, own.from_here, slot, lane, next.from_here + mine);
       if (lane == 0) {
         memory->reference[slot] = row.x;
         memory->oldest[slot] = number - row.y;
@@ -159,7 +190,7 @@ void group_backward(__local BackwardMemory* memory,
     used = CHUNK;
   }
   for (; open != 0; open &= open - 1)
-    close_row(memory, lane, rs_lowest_bit(open), &p, T, T_last, sky, lines, sums);
+    close_row(memory, &own, lane, rs_lowest_bit(open), &p, T, T_last, sky, lines, sums, &closed);
 }
 
 RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,

@@ -24,14 +24,14 @@ bool hit_before(const float key, const uint reference, const float other, const 
 }
 
 // The nearest hits behind (key, reference), by one work-item for itself.
-void find_behind(const GroupCandidates* c,
-                 const PacketState* p,
-                 __global const RsLine* restrict lines,
-                 __global const uint* restrict references,
-                 __global const float2* restrict limits,
-                 const float last_key,
-                 const int last_reference,
-                 PassHits* hits) {
+RS_GROUP_INLINE void find_behind(const GroupCandidates* c,
+                                 const PacketState* p,
+                                 __global const RsLine* restrict lines,
+                                 __global const uint* restrict references,
+                                 __global const float2* restrict limits,
+                                 const float last_key,
+                                 const int last_reference,
+                                 PassHits* hits) {
 #pragma unroll
   for (int i = 0; i < RS_PASS_HITS; ++i) {
     hits->key[i] = INFINITY;
@@ -67,7 +67,7 @@ void find_behind(const GroupCandidates* c,
 }
 
 // By moving the others up: an index known at compile time keeps them in registers.
-void take_first(PassHits* hits) {
+RS_GROUP_INLINE void take_first(PassHits* hits) {
 #pragma unroll
   for (int i = 0; i + 1 < RS_PASS_HITS; ++i) {
     hits->key[i] = hits->key[i + 1];
@@ -78,17 +78,17 @@ void take_first(PassHits* hits) {
 }
 
 // Traces the rays that are `alive`. Returns whether the ray lost a hit to max_hits.
-bool group_in_passes(__local GroupMemory* memory,
-                     const GroupCandidates* candidates,
-                     const int lane,
-                     bool alive,
-                     __global const RsLine* restrict lines,
-                     __global const uint* restrict references,
-                     __global const float2* restrict limits,
-                     const float min_transmittance,
-                     const int max_hits,
-                     PacketState* p,
-                     HitStream* stream) {
+RS_GROUP_INLINE bool group_in_passes(__local GroupMemory* memory,
+                                     const GroupCandidates* candidates,
+                                     const int lane,
+                                     bool alive,
+                                     __global const RsLine* restrict lines,
+                                     __global const uint* restrict references,
+                                     __global const float2* restrict limits,
+                                     const float min_transmittance,
+                                     const int max_hits,
+                                     PacketState* p,
+                                     HitStream* stream) {
   bool capped = false;
   float last_key = -1.0f;
   int last_reference = -1;

@@ -25,22 +25,34 @@
 #ifndef WAITING
 #define WAITING 64
 #endif
+
+// Per ray: the key, alpha, 0 where it misses, and the product over the nearer hits so far.
 typedef struct {
-  float key[OPEN][GROUP];
-  float alpha[OPEN][GROUP];   // 0 where a ray misses
-  float before[OPEN][GROUP];  // product over the nearer hits so far
-  float last_key[OPEN];       // farthest key of the rays that hit
+  float key[OPEN_LOCAL][GROUP];
+  float alpha[OPEN_LOCAL][GROUP];
+  float before[OPEN_LOCAL][GROUP];
+  float last_key[OPEN];  // farthest key of the rays that hit
   uint reference[OPEN];
   uint settled[OPEN];  // rows settled when it was opened
   uint stream_row[OPEN];
 } OpenRows;
 
-// Rows that wait, nearest first; ordering them anew writes the other side.
+// The same of the rows beyond OPEN_LOCAL, in private memory.
 typedef struct {
-  float first_key[2][WAITING];
-  float last_key[2][WAITING];
-  uint candidate[2][WAITING];
+  float key[RS_OPEN_OWN];
+  float alpha[RS_OPEN_OWN];
+  float before[RS_OPEN_OWN];
+} OwnRows;
+
+// Rows that wait, nearest first.
+typedef struct {
+  float first_key[WAITING];
+  float last_key[WAITING];
+  uint candidate[WAITING];
 } WaitingRows;
+
+// Of them, those that one work-item puts in order.
+#define RS_WAITING_EACH ((WAITING + GROUP - 1) / GROUP)
 
 typedef struct {
   OpenRows open;
@@ -64,7 +76,7 @@ typedef struct {
 } GroupCandidates;
 
 // Reads on until there is a batch, or the list ends. A box per work-item.
-void group_fetch(__local GroupMemory* memory, GroupCandidates* c, const int lane) {
+RS_GROUP_INLINE void group_fetch(__local GroupMemory* memory, GroupCandidates* c, const int lane) {
   while (c->queued - c->taken < RS_GROUP_BATCH && c->read < c->end) {
     const uint k = c->read + lane;
     bool meets = false;
@@ -82,11 +94,10 @@ void group_fetch(__local GroupMemory* memory, GroupCandidates* c, const int lane
 }
 
 float group_waiting_key(const __local GroupMemory* memory,
-                        const int side,
                         const int begin,
                         const int waiting,
                         const int i) {
-  return i < waiting ? memory->waiting.first_key[side][begin + i]
+  return i < waiting ? memory->waiting.first_key[begin + i]
                      : as_float(memory->found_first[i - waiting]);
 }
 
@@ -99,8 +110,9 @@ void group_stream_set(const HitStream* stream,
 }
 
 // Blends an open row whose place is known; `settled` is the product over such rows.
-void group_settle(const __local OpenRows* rows,
-                  const int slot,
+void group_settle(__local OpenRows* rows,
+                  const OwnRows* own,
+                  const uint slot,
                   const int lane,
                   __global const RsLine* restrict lines,
                   const float min_transmittance,
@@ -108,8 +120,8 @@ void group_settle(const __local OpenRows* rows,
                   float* settled,
                   const HitStream* stream) {
   const uint reference = rows->reference[slot];
-  const float alpha = rows->alpha[slot][lane];
-  const float before = rows->before[slot][lane];
+  const float alpha = rs_row_get(rows->alpha, own->alpha, slot, lane);
+  const float before = rs_row_get(rows->before, own->before, slot, lane);
   const int mine = RS_MASK(alpha > 0.0f) & RS_MASK(before >= min_transmittance);
   packet_blend(p, lines[reference >> 1].v, reference & 1, mine, before, alpha);
   *settled -= *settled * alpha;
@@ -132,18 +144,19 @@ void group_push_rows(__local OpenRows* rows, uint closing, uint settled, HitStre
 // Traces the rays that are `traced`. False when they need more rows at once than there is room for,
 // or a ray has more than max_hits hits: fewer rays need less room, and group_passes.h has no such
 // limits. Work-item 0 alone pushes rows into its stream; all set them.
-bool group_in_rows(__local GroupMemory* memory,
-                   GroupCandidates* candidates,
-                   const int lane,
-                   const bool traced,
-                   __global const RsLine* restrict lines,
-                   __global const uint* restrict references,
-                   __global const float2* restrict limits,
-                   const float min_transmittance,
-                   const int max_hits,
-                   PacketState* p,
-                   HitStream* stream) {
+RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
+                                   GroupCandidates* candidates,
+                                   const int lane,
+                                   const bool traced,
+                                   __global const RsLine* restrict lines,
+                                   __global const uint* restrict references,
+                                   __global const float2* restrict limits,
+                                   const float min_transmittance,
+                                   const int max_hits,
+                                   PacketState* p,
+                                   HitStream* stream) {
   __local OpenRows* rows = &memory->open;
+  OwnRows own;
   float settled = 1.0f;
   uint settled_rows = 0;
   uint open = 0;    // slots that are taken, a bit each
@@ -151,7 +164,7 @@ bool group_in_rows(__local GroupMemory* memory,
   int alive = traced ? p->valid : 0;
   candidates->read = candidates->begin;
   candidates->queued = candidates->taken = 0;
-  int side = 0, begin = 0, waiting = 0;
+  int begin = 0, waiting = 0;
   bool fits = true;
   bool goes_on = true;
   while (goes_on && fits) {
@@ -188,35 +201,46 @@ bool group_in_rows(__local GroupMemory* memory,
     const int total = waiting + batch;
     int found = 0, ready = 0;
     for (int i = 0; i < total; ++i) {
-      const float key = group_waiting_key(memory, side, begin, waiting, i);
+      const float key = group_waiting_key(memory, begin, waiting, i);
       found += key < INFINITY;
       ready += key < INFINITY && key <= bound;
     }
     if (memory->alive == 0) ready = 0;
-    for (int i = lane; i < total; i += GROUP) {
-      const float key = group_waiting_key(memory, side, begin, waiting, i);
+    __local WaitingRows* w = &memory->waiting;
+    float moved_first[RS_WAITING_EACH], moved_last[RS_WAITING_EACH];
+    uint moved_candidate[RS_WAITING_EACH];
+    int moved_to[RS_WAITING_EACH];
+#pragma unroll
+    for (int n = 0; n < RS_WAITING_EACH; ++n) {
+      const int i = lane + n * GROUP;
+      const float key = i < total ? group_waiting_key(memory, begin, waiting, i) : INFINITY;
+      moved_first[n] = key;
       if (!(key < INFINITY)) continue;
       int place = 0;
       for (int j = 0; j < total; ++j) {
-        const float other = group_waiting_key(memory, side, begin, waiting, j);
+        const float other = group_waiting_key(memory, begin, waiting, j);
         place += other < key || (other == key && j < i);
       }
       const bool old = i < waiting;
-      __local WaitingRows* w = &memory->waiting;
-      w->first_key[1 - side][place] = key;
-      w->last_key[1 - side][place] =
-          old ? w->last_key[side][begin + i] : as_float(memory->found_last[i - waiting]);
-      w->candidate[1 - side][place] =
-          old ? w->candidate[side][begin + i]
-              : memory->queue[(candidates->taken + i - waiting) % RS_GROUP_QUEUE];
+      moved_to[n] = place;
+      moved_last[n] = old ? w->last_key[begin + i] : as_float(memory->found_last[i - waiting]);
+      moved_candidate[n] = old ? w->candidate[begin + i]
+                               : memory->queue[(candidates->taken + i - waiting) % RS_GROUP_QUEUE];
     }
     rs_group_barrier();
-    side = 1 - side;
+#pragma unroll
+    for (int n = 0; n < RS_WAITING_EACH; ++n) {
+      if (!(moved_first[n] < INFINITY)) continue;
+      w->first_key[moved_to[n]] = moved_first[n];
+      w->last_key[moved_to[n]] = moved_last[n];
+      w->candidate[moved_to[n]] = moved_candidate[n];
+    }
+    rs_group_barrier();
     candidates->taken += batch;
 
     for (int r = 0; r < ready && fits; ++r) {
-      const float first_key = memory->waiting.first_key[side][r];
-      const uint k = memory->waiting.candidate[side][r];
+      const float first_key = w->first_key[r];
+      const uint k = w->candidate[r];
       const uint reference = references[k];
       const PacketHit hit = packet_hit(p, lines, reference, limits[k].y, alive);
       // Compared as integers (keys are not negative), less one where an equal key of a Gaussian
@@ -225,42 +249,43 @@ bool group_in_rows(__local GroupMemory* memory,
       uint closing = 0;
       float before = 1.0f;
       for (uint rest = open; rest != 0; rest &= rest - 1) {
-        const int other = (int)rs_lowest_bit(rest);
+        const uint other = rs_lowest_bit(rest);
         if (rows->last_key[other] < first_key) {
           closing |= 1u << other;
           continue;
         }
-        const bool nearer =
-            order - (reference < rows->reference[other] ? 1 : 0) < as_int(rows->key[other][lane]);
-        const float other_before = rows->before[other][lane];
+        const bool nearer = order - (reference < rows->reference[other] ? 1 : 0) <
+                            as_int(rs_row_get(rows->key, own.key, other, lane));
         if (nearer) {
-          rows->before[other][lane] = other_before - other_before * hit.alpha;
+          const float other_before = rs_row_get(rows->before, own.before, other, lane);
+          rs_row_set(rows->before, own.before, other, lane,
+                     other_before - other_before * hit.alpha);
         } else {
-          before -= before * rows->alpha[other][lane];
+          before -= before * rs_row_get(rows->alpha, own.alpha, other, lane);
         }
       }
       const uint free = ~(open | closed) & RS_ALL_SLOTS;
       fits = free != 0;
-      const int slot = fits ? (int)rs_lowest_bit(free) : 0;
+      const uint slot = fits ? rs_lowest_bit(free) : 0;
       const uint settling = (uint)popcount(closing);
       if (lane == 0 && fits) {
 #if KEEP_HITS
         group_push_rows(rows, closing, settled_rows, stream);
 #endif
-        rows->last_key[slot] = memory->waiting.last_key[side][r];
+        rows->last_key[slot] = w->last_key[r];
         rows->reference[slot] = reference;
         rows->settled[slot] = settled_rows + settling;
       }
       rs_group_barrier();
       for (uint rest = fits ? closing : 0; rest != 0; rest &= rest - 1)
-        group_settle(rows, (int)rs_lowest_bit(rest), lane, lines, min_transmittance, p, &settled,
+        group_settle(rows, &own, rs_lowest_bit(rest), lane, lines, min_transmittance, p, &settled,
                      stream);
       settled_rows += settling;
       open = (open & ~closing) | 1u << slot;
       closed = closing;
-      rows->key[slot][lane] = as_float(order);
-      rows->alpha[slot][lane] = hit.alpha;
-      rows->before[slot][lane] = before * settled;
+      rs_row_set(rows->key, own.key, slot, lane, as_float(order));
+      rs_row_set(rows->alpha, own.alpha, slot, lane, hit.alpha);
+      rs_row_set(rows->before, own.before, slot, lane, before * settled);
     }
     begin = ready;
     waiting = found - ready;
@@ -271,7 +296,7 @@ bool group_in_rows(__local GroupMemory* memory,
 #endif
   rs_group_barrier();
   for (uint rest = fits ? open : 0; rest != 0; rest &= rest - 1)
-    group_settle(rows, (int)rs_lowest_bit(rest), lane, lines, min_transmittance, p, &settled,
+    group_settle(rows, &own, rs_lowest_bit(rest), lane, lines, min_transmittance, p, &settled,
                  stream);
   return rs_group_bits(memory->words, lane, !fits || (traced && p->hits > max_hits)) == 0;
 }

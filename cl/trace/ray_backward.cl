@@ -18,7 +18,7 @@
 // Launch: `items` work-items; each takes every items-th chunk of `chunk` rays in the order given.
 //   PRIVATE_COPIES 1: work-item i adds to copy i of `sums`: no atomics, the same sum every time
 //   EXACT_SUMS 1:     one copy of long integers (exact_sum.h): the same sum in any order
-//   otherwise:        one copy, compare-and-swap adds
+//   otherwise:        one copy of shared floats (float_add.h)
 #include "trace/line_sum.h"
 #include "trace/ray_color.h"
 #include "trace/ray_sums.h"
@@ -95,6 +95,14 @@ RS_INLINE void add_hit(const RayScene* scene,
   sum.sbcd = (float3)(0.0f);
   float own_basis[RS_RAY_FUNCTIONS];
   const float* basis = basis_of_ray;
+#if KEPT
+  // ray_color.h: nothing is kept of the basis along the ray.
+  if (!scene->color_from_origin) {
+    const float3 n = ray->d * rsqrt(fmax(dot(ray->d, ray->d), 1e-38f));
+    rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, own_basis);
+  }
+  basis = own_basis;
+#endif
   if (scene->color_from_origin) {
     const float inverse = rsqrt(fmax(dot(offset, offset), 1e-30f));
     const float3 n = -inverse * offset;
@@ -125,6 +133,9 @@ RS_INLINE void add_hit(const RayScene* scene,
   }
 #endif
   const size_t first = (size_t)index * RS_RAY_SUMS + RS_RAY_SH;
+#if KEPT
+#pragma unroll 1
+#endif
   for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) {
     rs_add_sum(&state->sums, first + k, basis[k] * by_color.x);
     rs_add_sum(&state->sums, first + RS_RAY_FUNCTIONS + k, basis[k] * by_color.y);

@@ -51,6 +51,56 @@ RS_INLINE RayScene ray_scene(RS_TREE_ARGUMENTS,
   return scene;
 }
 
+#if KEPT
+
+// On GPUs the values of the functions are computed anew at every hit, which costs less than to keep
+// them during the walk, and are as many as the degree has, which is known when this is compiled.
+// Loops over them are not unrolled: all coefficients at once would fill the registers.
+#ifndef SH_DEGREE
+#define SH_DEGREE 0
+#endif
+#define RS_COLOR_FUNCTIONS ((SH_DEGREE + 1) * (SH_DEGREE + 1))
+
+RS_INLINE void basis_along_ray(const RayScene* scene, const RayData* ray, float* basis) {
+  (void)scene;
+  (void)ray;
+  (void)basis;
+}
+
+// Of hit k from the nearest.
+RS_INLINE float4 hit_color(const RayScene* scene,
+                           const RayData* ray,
+                           const float* ray_basis,
+                           const Pending* pending,
+                           const int k) {
+  __global const fv* blocks = scene->tree.blocks;
+  (void)ray_basis;
+#if SH_DEGREE == 0
+  (void)ray;
+  return pending_color(blocks, pending, k);
+#else
+  const uint slot = pending_slot(pending, k);
+  float3 v = ray->d;
+  if (scene->color_from_origin) {
+    __global const float* mean =
+        (__global const float*)(blocks + slot / PACKET * RS_BLOCK_VECTORS) + 6 * PACKET +
+        slot % PACKET;
+    v = (float3)(mean[0], mean[PACKET], mean[2 * PACKET]) - ray->o;
+  }
+  const float3 n = v * rsqrt(fmax(dot(v, v), 1e-38f));
+  float basis[RS_COLOR_FUNCTIONS];
+  rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, basis);
+  __global const float* c =
+      scene->sh + (size_t)pending_index(blocks, pending, k) * 3 * scene->sh_coefficients;
+  float3 color = (float3)(0.5f);
+#pragma unroll 1
+  for (int j = 0; j < RS_COLOR_FUNCTIONS; ++j) color += basis[j] * vload3(j, c);
+  return (float4)(fmin(fmax(color, (float3)(0.0f)), (float3)(RS_MAX_COLOR)), 0.0f);
+#endif
+}
+
+#else
+
 // The basis along the ray, for colours that do not come from its origin.
 RS_INLINE void basis_along_ray(const RayScene* scene, const RayData* ray, float* basis) {
   if (scene->active_degree == 0 || scene->color_from_origin) return;
@@ -97,5 +147,7 @@ void prefetch_color(const RayScene* scene, uint index) {
   for (int k = 0; k < active; k += 16) RS_PREFETCH_READ(c + k);
   (void)c;
 }
+
+#endif
 
 #endif

@@ -50,13 +50,14 @@ BuildOptions tree_walk_build(const DeviceInfo& device, int lanes) {
 BuildOptions ray_walk_build(const DeviceInfo& device,
                             const TraceOptions& options,
                             const RayNear& near,
-                            int lanes) {
+                            int lanes,
+                            int sh_degree) {
   BuildOptions build = tree_walk_build(device, lanes);
   build.define("NEAR_PLANE", near.kind)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
       .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
   if (keeps_trail(device, lanes)) {
-    build.define("KEPT", kKept).define("GROUP", kGroup);
+    build.define("KEPT", kKept).define("GROUP", kGroup).define("SH_DEGREE", sh_degree);
   } else {
     build.define("PENDING", kPending);
   }

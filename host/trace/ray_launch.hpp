@@ -35,11 +35,13 @@ struct RayNear {
 /// Build options of a kernel that walks rays through an Lbvh (cl/bvh/tree_walk.h).
 BuildOptions tree_walk_build(const DeviceInfo& device, int lanes);
 
-/// Build options of a kernel that walks rays through Gaussians (cl/trace/ray_walk.h).
+/// Build options of a kernel that walks rays through Gaussians (cl/trace/ray_walk.h), whose colours
+/// have `sh_degree`.
 BuildOptions ray_walk_build(const DeviceInfo& device,
                             const TraceOptions& options,
                             const RayNear& near,
-                            int lanes);
+                            int lanes,
+                            int sh_degree);
 
 /// What all rays of a launch share. `color_from_origin` as in RsRayWalk.
 RsRayWalk ray_walk(const TraceOptions& options,

@@ -118,7 +118,8 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   const Lbvh& tree = self.tree.tree();
   const bool ordered = self.order.compute(tree, rays, count);
   const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
-  BuildOptions build = ray_walk_build(self.context.device(), options, self.near, tree.lanes());
+  BuildOptions build = ray_walk_build(self.context.device(), options, self.near, tree.lanes(),
+                                      gaussians.active_sh_degree);
   build.define("LEADING", color_mode == kFlagPerRay ? 1 : 0);
   launch_in_bands(
       self.context, self.budget, self.context.kernel("trace/rays.cl", "trace_rays", build),

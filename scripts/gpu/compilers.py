@@ -8,6 +8,7 @@ import re
 import struct
 import subprocess
 
+import machine_code
 from packages import CLANG, LIBRARIES
 
 AMD_LIBRARIES = "/amdgcn/bitcode"
@@ -24,6 +25,12 @@ def _run(command, env=None):
     return done.stdout + done.stderr
 
 
+def _clang(name, root, command):
+    """Runs the unpacked clang of a vendor, whose libraries are not where the loader looks."""
+    libraries = f"{root}/{LIBRARIES}"
+    return _run([f"{root}/{CLANG[name]}", "-x", "cl", *command], dict(os.environ, LD_LIBRARY_PATH=libraries))
+
+
 def _number(pattern, text):
     found = re.search(pattern, text)
     return int(found[1]) if found else 0
@@ -38,14 +45,16 @@ def prepare_amd(root, target):
     source = f"{library}.cl"
     with open(source, "w", encoding="utf-8") as file:
         file.write(f'__attribute__((visibility("protected"))) const __constant int __oclc_ISA_version = {number};\n')
-    _run([CLANG, "-x", "cl", "-cl-std=CL2.0", "--target=amdgcn-amd-amdhsa", "-nogpulib", "-emit-llvm", "-c", "-o", library, source])
+    _clang("amd", root, ["-cl-std=CL2.0", "--target=amdgcn-amd-amdhsa", "-nogpulib", "-emit-llvm", "-c", "-o", library, source])
 
 
 def amd(root, target, flags, source, stem):
     assembly = stem + ".s"
     libraries = f"{root}/{LIBRARIES}{AMD_LIBRARIES}"
-    _run([CLANG, "-x", "cl", *flags, "--target=amdgcn-amd-amdhsa", f"-mcpu={target}", f"--rocm-device-lib-path={libraries}",
-          "-O3", "-S", "-w", "-o", assembly, source])
+    # Clang 22 is newer than these libraries: their code object is 5, and it no longer links the switch for denormals.
+    older = ["-mcode-object-version=5", "-Xclang", "-mlink-builtin-bitcode", "-Xclang", f"{libraries}/oclc_daz_opt_off.bc"]
+    _clang("amd", root, [*flags, "--target=amdgcn-amd-amdhsa", f"-mcpu={target}", f"--rocm-device-lib-path={libraries}", *older,
+                         "-O3", "-S", "-w", "-o", assembly, source])
     with open(assembly, encoding="utf-8") as file:
         text = file.read()
     # No linker runs: what is called by name and defined nowhere would be missing at load.
@@ -54,31 +63,14 @@ def amd(root, target, flags, source, stem):
     if missing:
         raise CompileError("Unresolved symbols: " + ", ".join(sorted(missing)))
     metadata = text[text.index(".amdgpu_metadata"):]
+    counts = machine_code.amd(text)
     kernels = {}
     for block in re.split(r"\n  - (?=\.)", metadata)[1:]:
         figure = lambda key: _number(rf"\n    \.{key}:\s+(\d+)", block)
         name = re.search(r"\n    \.name:\s+(\w+)", block)[1]
-        kernels[name] = dict(registers=figure("vgpr_count"), spills=figure("vgpr_spill_count") + figure("sgpr_spill_count"),
+        kernels[name] = dict(registers=figure("vgpr_count"), spills=figure("vgpr_spill_count"), moved=figure("sgpr_spill_count"),
                              private=figure("private_segment_fixed_size"), local=figure("group_segment_fixed_size"),
-                             width=figure("wavefront_size"))
-    return kernels
-
-
-def nvidia(root, target, flags, source, stem):
-    # PTX is forward compatible and clang 15 knows nothing newer than sm_86.
-    processor = min(target, "sm_86", key=lambda name: int(name[3:]))
-    clang = ["-mlink-builtin-bitcode", f"{root}/usr/lib/clc/nvptx64--nvidiacl.bc", "-target-cpu", processor, "-target-feature", "+ptx71"]
-    # NVIDIA's default precision of division and square root in OpenCL C.
-    precise = ["-mllvm", "-nvptx-prec-divf32=1", "-mllvm", "-nvptx-prec-sqrtf32=0"]
-    _run([CLANG, "-x", "cl", *flags, "--target=nvptx64--nvidiacl", *(word for option in clang for word in ("-Xclang", option)), *precise,
-          "-O3", "-S", "-w", "-o", stem + ".ptx", source])
-    text = _run([f"{root}/nvidia/cuda_nvcc/bin/ptxas", "-v", f"-arch={target}", stem + ".ptx", "-o", stem + ".cubin"])
-    kernels = {}
-    for block in text.split("Compiling entry function '")[1:]:
-        stack = _number(r"(\d+) bytes stack frame", block)
-        kernels[block.split("'")[0]] = dict(registers=_number(r"Used (\d+) registers", block), spills=_number(r"(\d+) bytes spill stores", block),
-                                            private=max(stack, _number(r"(\d+) bytes cumulative stack", block)),
-                                            local=_number(r"(\d+) bytes smem", block), width=32)
+                             width=figure("wavefront_size"), **counts[name])
     return kernels
 
 
@@ -91,6 +83,26 @@ def _elf_sections(path):
     sections = [struct.unpack_from("<IIQQQQ", data, table + i * size) for i in range(count)]
     text = lambda at: data[at:data.index(b"\0", at)].decode()
     return {text(sections[strings][4] + name): data[begin:begin + length] for name, _, _, _, begin, length in sections}
+
+
+def nvidia(root, target, flags, source, stem):
+    # libclc calls NVIDIA's own library of device functions.
+    built_in = [f"{root}/usr/lib/clc/nvptx64--nvidiacl.bc", f"{root}/nvidia/cuda_nvcc/nvvm/libdevice/libdevice.10.bc"]
+    clang = [word for library in built_in for word in ("-mlink-builtin-bitcode", library)] + ["-target-cpu", target, "-target-feature", "+ptx78"]
+    # What its front end defines, and its default precision of division and square root in OpenCL C.
+    driver = ["-D__NV_CL_C_VERSION=120", "-mllvm", "-nvptx-prec-divf32=1", "-mllvm", "-nvptx-prec-sqrtf32=0"]
+    _clang("nvidia", root, [*flags, "--target=nvptx64--nvidiacl", *(word for option in clang for word in ("-Xclang", option)), *driver,
+                            "-O3", "-S", "-w", "-o", stem + ".ptx", source])
+    text = _run([f"{root}/nvidia/cuda_nvcc/bin/ptxas", "-v", f"-arch={target}", stem + ".ptx", "-o", stem + ".cubin"])
+    counts = machine_code.nvidia(_elf_sections(stem + ".cubin"))
+    kernels = {}
+    for block in text.split("Compiling entry function '")[1:]:
+        name = block.split("'")[0]
+        stack = _number(r"(\d+) bytes stack frame", block)
+        kernels[name] = dict(registers=_number(r"Used (\d+) registers", block), spills=_number(r"(\d+) bytes spill stores", block), moved=0,
+                             private=max(stack, _number(r"(\d+) bytes cumulative stack", block)),
+                             local=_number(r"(\d+) bytes smem", block), width=32, **counts[name])
+    return kernels
 
 
 def _undefined_symbols(sections):
@@ -107,13 +119,15 @@ def intel(root, target, flags, source, stem):
     folder = stem + ".igc"
     os.makedirs(folder, exist_ok=True)
     binary = folder + "/out.bin"
-    for old in (binary, folder + "/out"):
-        if os.path.exists(old):
-            os.remove(old)
+    for old in os.listdir(folder):
+        os.remove(os.path.join(folder, old))
     env = dict(os.environ, LD_LIBRARY_PATH=f"{root}/{LIBRARIES}")
     text = _run([f"{root}/usr/bin/ocloc", "compile", "-file", source, "-device", target, "-out_dir", folder, "-output", "out",
                  "-output_no_suffix", "-options", " ".join(flags), "-internal_options", "-cl-intel-allow-zebin"], env)
-    sections = _elf_sections(binary if os.path.exists(binary) else folder + "/out")
+    binary = binary if os.path.exists(binary) else folder + "/out"
+    _run([f"{root}/usr/bin/ocloc", "disasm", "-file", binary, "-device", target, "-dump", folder], env)
+    counts = machine_code.intel(folder)
+    sections = _elf_sections(binary)
     missing = _undefined_symbols(sections)
     if missing:
         raise CompileError("Unresolved symbols: " + ", ".join(sorted(missing)))
@@ -130,8 +144,10 @@ def intel(root, target, flags, source, stem):
         buffers = re.findall(r"usage:\s+(\w+)\n\s+size:\s+(\d+)", block)
         private = sum(int(size) for usage, size in buffers if usage == "private_space")
         private = private or sum(int(size) // max(width, 1) for usage, size in buffers if usage == "single_space")
-        kernels[name] = dict(registers=_number(r"\bgrf_count:\s+(\d+)", block), spills=int(spilled.get(name, 0)), private=private,
-                             local=_number(r"\bslm_size:\s+(\d+)", block), width=width)
+        if name not in counts:
+            raise CompileError(f"The disassembler left no listing of {name}")
+        kernels[name] = dict(registers=_number(r"\bgrf_count:\s+(\d+)", block), spills=int(spilled.get(name, 0)), moved=0, private=private,
+                             local=_number(r"\bslm_size:\s+(\d+)", block), width=width, **counts[name])
     return kernels
 
 

@@ -16,10 +16,16 @@ import zipfile
 
 LIBRARIES = "usr/lib/x86_64-linux-gnu"
 
+
+def _llvm(major, version):
+    """Debian's packages of one clang, unpacked without what it takes to compile for this machine."""
+    return [f"{name}={version}" for name in (f"clang-{major}", f"libclang-cpp{major}", f"libllvm{major}", f"libclang-common-{major}-dev")]
+
+
 # Debian packages of each vendor's compiler (those of LLVM 14 only where the system has none) and of each implementation.
 DEBIAN = {
-    "amd": ["rocm-device-libs=5.2.3-2"],
-    "nvidia": ["libclc-15=1:15.0.6-4"],
+    "amd": [*_llvm(22, "1:22.1.8-1~deb12u1"), "rocm-device-libs=5.2.3-2"],
+    "nvidia": [*_llvm(19, "1:19.1.7-3~deb12u1"), "libclc-19=1:19.1.7-3~deb12u1"],
     "intel": [
         "intel-opencl-icd=22.43.24595.41-1",
         "libigc1=1.0.12504.6-1+deb12u1",
@@ -42,7 +48,7 @@ PYPI = {
 }
 # A folder of their own: they are taken whole, not file by file.
 APART = ("rusticl", "intel-cpu")
-CLANG = "clang-15"
+CLANG = {"amd": "usr/lib/llvm-22/bin/clang", "nvidia": "usr/lib/llvm-19/bin/clang"}
 
 
 class Missing(Exception):
@@ -100,8 +106,6 @@ def _wheel(package, root):
 
 def fetch(vendor, cache):
     """The folder that holds the vendor's compiler or the implementation, unpacked; raises Missing."""
-    if vendor in ("amd", "nvidia") and shutil.which(CLANG) is None:
-        raise Missing(f"{CLANG} is not installed: apt-get install {CLANG}")
     if vendor in APART:
         cache = os.path.join(cache, vendor)
     root = os.path.join(cache, "root")
@@ -113,6 +117,9 @@ def fetch(vendor, cache):
         _once(cache, package, _debian(package, root))
     for package in PYPI.get(vendor, []):
         _once(cache, package, _wheel(package, root))
+    disassembler = f"{root}/{LIBRARIES}/libiga64.so"
+    if vendor == "intel" and not os.path.lexists(disassembler):
+        os.symlink("libiga64.so.1", disassembler)  # the name by which ocloc opens it
     return root
 
 

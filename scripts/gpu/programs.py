@@ -5,7 +5,7 @@ import os
 
 KERNELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "cl")
 # Context::Impl::program (host/device/context.cpp).
-COMPILER = ["-cl-std=CL1.2", "-cl-mad-enable"]
+COMPILER = ["-cl-mad-enable"]
 
 # packet_shape.cpp and camera_tracer.cpp: a packet per work-group, or one ray per work-item, in tiles of 16.
 CAMERA = dict(PACKET=1, TILE=16, CHUNK=16, LENS=0)
@@ -16,9 +16,13 @@ FORWARD = dict(CAMERA, BLOCK=1, PENDING=48, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HIT
 VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, NEAR_DISTANCE=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1, GROUP=64)
 LISTS = dict(TILE=16, PEAK_ORDER=1, LENS=0, VECTOR=1, GROUP=64)
 FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, ANGULAR=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1, GROUP=64)
+# gradient_sums.cpp.
+ATOMIC = dict(PRIVATE_COPIES=0, EXACT_SUMS=0, FLOAT_ATOMICS=1)
+SWAP = dict(ATOMIC, FLOAT_ATOMICS=0)
+EXACT = dict(SWAP, EXACT_SUMS=1)
 # ray_launch.cpp, ray_backward.cpp.
-WALK = dict(PACKET=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1)
-RAY_BACKWARD = dict(WALK, SH_DEGREE=3, RAY_SLOPES=0, PRIVATE_COPIES=0)
+WALK = dict(PACKET=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
+RAY_BACKWARD = dict(WALK, RAY_SLOPES=0)
 RAY_GRADIENTS = dict(SIGMOID_SCALE=0, VECTOR=1, GROUP=64)
 # image_loss.cpp: groups, or what devices get whose groups are smaller.
 LOSS = dict(VECTOR=1, TILE=16, ROWS=1, PIXEL_L2=0)
@@ -32,17 +36,18 @@ PROGRAMS = [
     ("group forward render", "trace/group_forward.cl", GROUP_FORWARD),
     ("group forward depth", "trace/group_forward.cl", dict(GROUP_FORWARD, PEAK_ORDER=0, WITH_DEPTH=1)),
     ("group forward around", "trace/group_forward.cl", dict(GROUP_FORWARD, LENS=2, KEEP_HITS=1)),
-    ("group backward atomic", "trace/group_backward.cl", dict(GROUP_CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=0)),
-    ("group backward atomic 64", "trace/group_backward.cl", dict(GROUP_CAMERA, GROUP=64, PRIVATE_COPIES=0, EXACT_SUMS=0)),
-    ("group backward exact", "trace/group_backward.cl", dict(GROUP_CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=1)),
+    ("group backward atomic", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC)),
+    ("group backward atomic 64", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC, GROUP=64)),
+    ("group backward swap", "trace/group_backward.cl", dict(GROUP_CAMERA, **SWAP)),
+    ("group backward exact", "trace/group_backward.cl", dict(GROUP_CAMERA, **EXACT)),
     ("forward train", "trace/forward.cl", dict(FORWARD, KEEP_HITS=1)),
     ("forward render", "trace/forward.cl", FORWARD),
     ("forward entry", "trace/forward.cl", dict(FORWARD, PEAK_ORDER=0)),
     ("forward depth", "trace/forward.cl", dict(FORWARD, WITH_DEPTH=1)),
     ("forward lens", "trace/forward.cl", dict(FORWARD, LENS=1, KEEP_HITS=1)),
     ("forward around", "trace/forward.cl", dict(FORWARD, LENS=2, KEEP_HITS=1)),
-    ("backward atomic", "trace/backward.cl", dict(CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=0)),
-    ("backward exact", "trace/backward.cl", dict(CAMERA, PRIVATE_COPIES=0, EXACT_SUMS=1)),
+    ("backward atomic", "trace/backward.cl", dict(CAMERA, **ATOMIC)),
+    ("backward exact", "trace/backward.cl", dict(CAMERA, **EXACT)),
     ("prepare sh3", "trace/prepare_view.cl", VIEW),
     ("prepare sh0", "trace/prepare_view.cl", dict(VIEW, SH_DEGREE=0, SH_COEFFICIENTS=1)),
     ("finalize group sh3", "trace/group_finalize.cl", FINALIZE),
@@ -58,9 +63,10 @@ PROGRAMS = [
     ("rays entry", "trace/rays.cl", dict(WALK, PEAK_ORDER=0, ADAPTIVE_RADIUS=0)),
     ("rays leading", "trace/rays.cl", dict(WALK, LEADING=1)),
     ("ray order", "trace/ray_order.cl", dict(PACKET=4)),
-    ("ray backward atomic", "trace/ray_backward.cl", dict(RAY_BACKWARD, EXACT_SUMS=0)),
-    ("ray backward exact", "trace/ray_backward.cl", dict(RAY_BACKWARD, EXACT_SUMS=1)),
-    ("ray slopes", "trace/ray_backward.cl", dict(RAY_BACKWARD, RAY_SLOPES=1, EXACT_SUMS=0)),
+    ("ray backward atomic", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC)),
+    ("ray backward swap", "trace/ray_backward.cl", dict(RAY_BACKWARD, **SWAP)),
+    ("ray backward exact", "trace/ray_backward.cl", dict(RAY_BACKWARD, **EXACT)),
+    ("ray slopes", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC, RAY_SLOPES=1)),
     ("ray records", "trace/ray_gradients.cl", RAY_GRADIENTS),
     ("ray gradients", "trace/ray_gradients.cl", dict(RAY_GRADIENTS, SH_DEGREE=3, SH_COEFFICIENTS=16)),
     ("gaussian blocks", "trace/gaussian_blocks.cl", dict(PACKET=4, SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
@@ -111,8 +117,11 @@ def unlisted():
     return sorted(found - listed)
 
 
-def flags(definitions):
-    return COMPILER + [f"-D{name}={value}" for name, value in sorted(definitions.items())]
+def flags(definitions, vendor):
+    """As the host builds them; native float additions take a later language where they come by cl_ext_float_atomics, which is
+    on Intel's devices."""
+    standard = "CL3.0" if vendor == "intel" and definitions.get("FLOAT_ATOMICS") else "CL1.2"
+    return [f"-cl-std={standard}", *COMPILER, *(f"-D{name}={value}" for name, value in sorted(definitions.items()))]
 
 
 def resolve(path, seen=None):
