@@ -50,11 +50,11 @@ def faults(key, now, before):
     out = []
     margins = dict(registers=(1.1, 8), private=(1.1, 64), local=(1.1, 64), spills=(1.25, 0), moved=(1.25, 8), swaps=(1.25, 0), barriers=(1.25, 0))
     for figure, (factor, more) in margins.items():
-        if now[figure] > before[figure] * factor + more:
+        if now[figure] > before.get(figure, now[figure]) * factor + more:
             out.append(f"{key}: {figure} {now[figure]}, the baseline has {before[figure]}")
     if now["width"] < before["width"]:
         out.append(f"{key}: width {now['width']}, the baseline has {before['width']}")
-    if before["adds"] > 0 and now["adds"] == 0:
+    if before.get("adds", 0) > 0 and now["adds"] == 0:
         out.append(f"{key}: no native additions, the baseline has {before['adds']}")
     return out
 
