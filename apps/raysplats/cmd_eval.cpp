@@ -17,6 +17,7 @@
 #include "raysplats/io.hpp"
 #include "raysplats/model.hpp"
 #include "raysplats/tracer.hpp"
+#include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/model_source.hpp"
 
@@ -50,35 +51,40 @@ void run(const Options& options, const GlobalOptions& global) {
   check_not_data(options.output, dataset);
   check_leftovers(options.output, evaluated_names(dataset, split), FrameFormat::kPng,
                   options.overwrite);
-  std::unique_ptr<Lpips> lpips;
-  if (!options.lpips.empty()) lpips = std::make_unique<Lpips>(options.lpips);
-
   const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
-  const std::unique_ptr<Context> context = open_context(options.device);
-  const Model on_device(*context, model);
-  Tracer tracer(*context, trace, mirrors_of(source));
   make_output_directory(options.output);
-  spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(), views);
+  share_work(options.device, global, [&](Communicator& ranks, Context& context) {
+    const Model on_device(context, model);
+    Tracer tracer(context, trace, mirrors_of(source));
+    std::unique_ptr<Lpips> lpips;
+    if (!options.lpips.empty()) lpips = std::make_unique<Lpips>(options.lpips);
+    spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(), views);
 
-  FrameProgress progress("evaluating", views, global.quiet);
-  std::uint64_t rays = 0;
-  std::uint64_t capped = 0;
-  const auto render = [&](const Camera& camera) {
-    Image image = tracer.render(on_device, camera, false,
-                                [&](double share) { return progress.within(share); });
-    rays += image.pixels();
-    capped += tracer.capped_rays();
-    return image;
-  };
-  EvaluationOptions evaluation;
-  evaluation.lpips = lpips.get();
-  evaluation.done = [&](std::size_t done) { return progress.done(done); };
-  const EvaluationReport report =
-      evaluate(render, dataset, split, trace.background, options.output, evaluation);
-  progress.finish(report.images.size(), "views: the means in " + options.output + " are of those");
-  warn_of_capped_rays(capped, rays, trace);
-  fmt::print("{}", report.table());
-  if (options.device.profile) fmt::print("{}", context->profile_table());
+    FrameProgress progress("evaluating", views, ranks, global.quiet);
+    std::uint64_t rays = 0;
+    std::uint64_t capped = 0;
+    const auto render = [&](const Camera& camera) {
+      Image image = tracer.render(on_device, camera, false,
+                                  [&](double share) { return progress.within(share); });
+      rays += image.pixels();
+      capped += tracer.capped_rays();
+      return image;
+    };
+    EvaluationOptions evaluation;
+    evaluation.lpips = lpips.get();
+    evaluation.done = [&](std::size_t done) { return progress.done(done); };
+    evaluation.ranks = &ranks;
+    const EvaluationReport report =
+        evaluate(render, dataset, split, trace.background, options.output, evaluation);
+    capped = sum_over(ranks, capped);
+    rays = sum_over(ranks, rays);
+    progress.finish(report.images.size(),
+                    "views: the means in " + options.output + " are of those");
+    if (!ranks.leads()) return;
+    warn_of_capped_rays(capped, rays, trace);
+    fmt::print("{}", report.table());
+    if (options.device.profile) fmt::print("{}", context.profile_table());
+  });
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "raysplats/io.hpp"
 #include "render_flags.hpp"
 #include "render_output.hpp"
+#include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/model_source.hpp"
 
@@ -188,26 +189,34 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
 
   TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   trace.depth = options.depth;
-  const std::unique_ptr<Context> context = open_context(options.device);
-  const Model on_device(*context, model);
-  Tracer tracer(*context, trace, mirrors_of(source));
-  output.begin();
-  spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(), cameras.size());
+  share_work(options.device, global, [&](Communicator& ranks, Context& context) {
+    const Model on_device(context, model);
+    Tracer tracer(context, trace, mirrors_of(source));
+    const FrameOptions share = share_of(ranks, output.options());
+    output.begin();
+    spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(),
+                 cameras.size());
 
-  FrameProgress progress("rendering", cameras.size(), global.quiet);
-  const FrameReport report = write_frames(
-      tracer, on_device, cameras, options.output, output.options(),
-      [&](std::size_t done) { return progress.done(done); },
-      [&](double share) { return progress.within(share); });
-  progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
-  output.finish();
-  warn_of_capped_rays(report.capped_rays, report.rays, trace);
-  const std::string speed =
-      fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,
-                  1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
-  fmt::print("{} frames in {} ({})\n", report.frames, output.name(),
-             with_compiling(speed, context->build_seconds()));
-  if (options.device.profile) fmt::print("{}", context->profile_table());
+    FrameProgress progress("rendering", cameras.size(), ranks, global.quiet);
+    FrameReport report = write_frames(
+        tracer, on_device, cameras, options.output, share,
+        [&](std::size_t done) { return progress.done(done); },
+        [&](double share) { return progress.within(share); });
+    report.frames = sum_over(ranks, report.frames);
+    report.rays = sum_over(ranks, report.rays);
+    report.capped_rays = sum_over(ranks, report.capped_rays);
+    report.trace_seconds = most_of(ranks, report.trace_seconds);
+    progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
+    if (!ranks.leads()) return;
+    output.finish();
+    warn_of_capped_rays(report.capped_rays, report.rays, trace);
+    const std::string speed =
+        fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,
+                    1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
+    fmt::print("{} frames in {} ({})\n", report.frames, output.name(),
+               with_compiling(speed, context.build_seconds()));
+    if (options.device.profile) fmt::print("{}", context.profile_table());
+  });
 }
 
 }  // namespace

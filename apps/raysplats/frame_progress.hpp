@@ -10,18 +10,23 @@
 
 #include "base/interrupt.hpp"
 #include "base/progress.hpp"
+#include "comm/communicator.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
 
-/// Draws how far frames are and lets signals end them: what write_frames(),
-/// write_scene_frames() and evaluate() tell.
+/// Draws how far a rank is with its share of the frames and lets signals end them: what
+/// write_frames(), write_scene_frames() and evaluate() tell.
 class FrameProgress {
  public:
   /// `work`: what the bar is called.
-  FrameProgress(const std::string& work, std::size_t frames, bool quiet)
+  FrameProgress(const std::string& work, std::size_t frames, const Communicator& ranks, bool quiet)
       : total_(frames),
-        progress_(work, static_cast<std::int64_t>(frames), 0, quiet ? nullptr : stderr) {}
+        progress_(
+            work,
+            (static_cast<std::int64_t>(frames) + ranks.size() - 1 - ranks.rank()) / ranks.size(),
+            0,
+            quiet || !ranks.leads() ? nullptr : stderr) {}
 
   /// A frame is done. False = stop.
   bool done(std::size_t frames) {
@@ -35,8 +40,8 @@ class FrameProgress {
                      fmt::format("{:.0f} % of this frame", 100.0 * share));
     return !interrupt_.requested();
   }
-  /// Throws Error (kInterrupted) when a signal has ended it after `frames`; `rest` ends the
-  /// sentence: "frames: what is in DIR is whole".
+  /// Throws Error (kInterrupted) when a signal has ended it after `frames` of all ranks; `rest`
+  /// ends the sentence: "frames: what is in DIR is whole".
   void finish(std::size_t frames, const std::string& rest) {
     progress_.finish();
     if (!interrupt_.requested()) return;

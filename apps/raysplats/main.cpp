@@ -19,13 +19,15 @@
 #include "help.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
+#include "shared_work.hpp"
 
 namespace {
 
+// The processes of the work are known outside of run(), which may end by an exception.
+raysplats::cli::GlobalOptions global;
+
 int fail(raysplats::ErrorCode code, const std::string& message) {
-  // What cannot be said is no reason to end otherwise than with the code.
-  std::fputs(fmt::format("raysplats: {}\n", message).c_str(), stderr);
-  return static_cast<int>(code);
+  return raysplats::cli::fail_together(global.processes, raysplats::Error(code, message));
 }
 
 std::string no_memory() {
@@ -58,7 +60,6 @@ int run(int argc, char** argv) {
   app.formatter(std::make_shared<HelpFormatter>());
   app.require_subcommand(1);
   app.fallthrough();
-  GlobalOptions global;
   add_global_options(app, global);
   const std::vector<Command> commands{add_devices_command(app),
                                       add_generate_command(app),
@@ -87,9 +88,12 @@ int run(int argc, char** argv) {
     }
     return fail(raysplats::ErrorCode::kUsage, explain(error, app));
   }
-  start_logging(global);
   for (const Command& command : commands) {
-    if (command.app->parsed()) command.run();
+    if (!command.app->parsed()) continue;
+    global.processes = join_processes(command.app->get_name());
+    if (!global.processes.leads()) global.quiet = true;
+    start_logging(global);
+    command.run();
   }
   raysplats::finish_standard_output();
   return 0;
@@ -106,7 +110,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const raysplats::Error& error) {
-    return fail(error.code(), error.what());
+    return raysplats::cli::fail_together(global.processes, error);
   } catch (const std::bad_alloc&) {
     return fail(raysplats::ErrorCode::kMemory, no_memory());
   } catch (const std::system_error& error) {

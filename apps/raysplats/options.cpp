@@ -64,8 +64,25 @@ void add_global_options(CLI::App& app, GlobalOptions& options) {
   app.add_flag("-q,--quiet", options.quiet, "Show errors only: no log lines, no progress");
 }
 
+namespace {
+
+thread_local bool silent_thread = false;
+
+class LogSink : public spdlog::sinks::stderr_color_sink_mt {
+ public:
+  void log(const spdlog::details::log_msg& message) override {
+    if (!silent_thread || message.level >= spdlog::level::err)
+      spdlog::sinks::stderr_color_sink_mt::log(message);
+  }
+};
+
+}  // namespace
+
+LogSilence::LogSilence(bool silent) : before_(std::exchange(silent_thread, silent)) {}
+LogSilence::~LogSilence() { silent_thread = before_; }
+
 void start_logging(const GlobalOptions& options) {
-  auto logger = spdlog::stderr_color_mt("raysplats");
+  auto logger = std::make_shared<spdlog::logger>("raysplats", std::make_shared<LogSink>());
   logger->set_pattern("[%H:%M:%S] %^%l%$: %v");
   logger->set_level(options.quiet ? spdlog::level::err
                                   : spdlog::level::from_str(options.log_level));
@@ -74,7 +91,8 @@ void start_logging(const GlobalOptions& options) {
 
 void add_device_flags(CLI::App& app, DeviceFlags& flags) {
   app.add_option("--device", flags.device,
-                 "Index or part of the name of a device ('raysplats devices' lists them)")
+                 "Index or part of the name of a device ('raysplats devices' lists them); train, "
+                 "render and eval share their work among several, as in 0,1")
       ->type_name("DEVICE");
   app.add_flag("--profile", flags.profile, "Print the device time per kernel");
   app.add_flag("--no-kernel-cache", flags.no_kernel_cache, "Compile every kernel again");
@@ -84,7 +102,7 @@ namespace {
 
 // Shows the compiling of kernels, whose number nobody knows before: a bar without an end.
 std::function<void(std::size_t, const std::string&)> show_compiling() {
-  if (!spdlog::should_log(spdlog::level::info)) return {};
+  if (silent_thread || !spdlog::should_log(spdlog::level::info)) return {};
   const auto bar = std::make_shared<Progress>("compiling kernels", Progress::kUnknown);
   return [bar](std::size_t number, const std::string& program) {
     if (program.empty()) {
@@ -99,11 +117,14 @@ std::function<void(std::size_t, const std::string&)> show_compiling() {
 }  // namespace
 
 std::unique_ptr<Context> open_context(const DeviceFlags& flags) {
+  return open_context(flags, select_device(flags.device));
+}
+
+std::unique_ptr<Context> open_context(const DeviceFlags& flags, const DeviceInfo& device) {
   ContextOptions options;
   options.compiling = show_compiling();
   options.profile = flags.profile;
   options.kernel_cache = !flags.no_kernel_cache;
-  const DeviceInfo device = select_device(flags.device);
   spdlog::info("device {}: {} ({})", device.index, device.name, device.platform);
   return std::make_unique<Context>(device, options);
 }

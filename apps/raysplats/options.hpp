@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "comm/communicator.hpp"
 #include "core/trace_rows.hpp"
 #include "device/context.hpp"
 #include "raysplats/dataset.hpp"
@@ -24,10 +25,23 @@ namespace raysplats::cli {
 struct GlobalOptions {
   std::string log_level = "info";
   bool quiet = false;
+  /// The processes that mpirun has started, of which this is one; alone as a rule.
+  mutable Communicator processes = {};
 };
 void add_global_options(CLI::App& app, GlobalOptions& options);
 /// Log lines go to standard error, so that results on standard output can be piped.
 void start_logging(const GlobalOptions& options);
+/// While one with `silent` lives, its thread logs errors only: another thread says the same.
+class LogSilence {
+ public:
+  explicit LogSilence(bool silent);
+  ~LogSilence();
+  LogSilence(const LogSilence&) = delete;
+  LogSilence& operator=(const LogSilence&) = delete;
+
+ private:
+  bool before_;
+};
 
 /// A command of the program; `run` is called after everything has been parsed.
 struct Command {
@@ -56,7 +70,9 @@ struct DeviceFlags {
   bool no_kernel_cache = false;
 };
 void add_device_flags(CLI::App& app, DeviceFlags& flags);
+/// On the device that the flags name, or on this one.
 std::unique_ptr<Context> open_context(const DeviceFlags& flags);
+std::unique_ptr<Context> open_context(const DeviceFlags& flags, const DeviceInfo& device);
 
 /// Tracing options as given: what is not given stays as the model's run or the defaults have it.
 void add_trace_flags(CLI::App& app, TraceSettings& settings);

@@ -15,6 +15,7 @@
 #include "raysplats/path_tracer.hpp"
 #include "render_flags.hpp"
 #include "render_output.hpp"
+#include "shared_work.hpp"
 #include "train/model_source.hpp"
 
 namespace raysplats::cli {
@@ -160,6 +161,16 @@ void print_summary(const SceneReport& report, const std::string& output, double 
   fmt::print("{} frames in {} ({})\n", report.frames, output, with_compiling(speed, compiling));
 }
 
+// All ranks: the report of all.
+void add_up(Communicator& ranks, SceneReport& report) {
+  report.frames = sum_over(ranks, report.frames);
+  report.trace_seconds = most_of(ranks, report.trace_seconds);
+  PathTracer::Statistics& rays = report.rays;
+  for (std::uint64_t* count : {&rays.camera_rays, &rays.continued_rays, &rays.shadow_rays,
+                               &rays.capped_rays, &rays.ended_by_bounces})
+    *count = sum_over(ranks, *count);
+}
+
 }  // namespace
 
 bool is_scene_file(const std::string& model) {
@@ -184,29 +195,32 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
     check_not_data(flags.output, file.camera.file);
   RenderOutput output(flags, loaded.cameras, last - first, fps, false);
 
-  const std::unique_ptr<Context> context = open_context(flags.device);
-  PathTracer tracer(*context, loaded.scene);
-  output.begin();
-  spdlog::info("{}: {} Gaussians, {} meshes, {} lights, {} frames", flags.model,
-               loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
-               loaded.scene.lights.size(), last - first);
+  share_work(flags.device, global,
+             [&, first = first, last = last](Communicator& ranks, Context& context) {
+               PathTracer tracer(context, loaded.scene);
+               spdlog::info("{}: {} Gaussians, {} meshes, {} lights, {} frames", flags.model,
+                            loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
+                            loaded.scene.lights.size(), last - first);
 
-  FrameProgress progress("rendering", last - first, global.quiet);
-  const SceneReport report = write_scene_frames(
-      tracer, loaded, first, last, flags.output, output.options(),
-      [&](std::size_t done) { return progress.done(done); },
-      [&](double share) { return progress.within(share); });
-  progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
-  output.finish();
-  const PathTracer::Statistics& rays = report.rays;
-  warn_of_capped_rays(rays.capped_rays, rays.camera_rays + rays.continued_rays + rays.shadow_rays,
-                      loaded.scene.trace);
-  if (rays.ended_by_bounces > 0) {
-    spdlog::info("{} paths ended after --max-bounces {}", rays.ended_by_bounces,
-                 loaded.scene.render.max_bounces);
-  }
-  print_summary(report, output.name(), context->build_seconds());
-  if (flags.device.profile) fmt::print("{}", context->profile_table());
+               FrameProgress progress("rendering", last - first, ranks, global.quiet);
+               SceneReport report = write_scene_frames(
+                   tracer, loaded, first, last, flags.output, share,
+                   [&](std::size_t done) { return progress.done(done); },
+                   [&](double share) { return progress.within(share); });
+               add_up(ranks, report);
+               progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
+               if (!ranks.leads()) return;
+               const PathTracer::Statistics& rays = report.rays;
+               warn_of_capped_rays(rays.capped_rays,
+                                   rays.camera_rays + rays.continued_rays + rays.shadow_rays,
+                                   loaded.scene.trace);
+               if (rays.ended_by_bounces > 0) {
+                 spdlog::info("{} paths ended after --max-bounces {}", rays.ended_by_bounces,
+                              loaded.scene.render.max_bounces);
+               }
+               print_summary(report, output.name(), context.build_seconds());
+               if (flags.device.profile) fmt::print("{}", context.profile_table());
+             });
 }
 
 }  // namespace raysplats::cli

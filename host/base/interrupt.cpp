@@ -14,6 +14,7 @@ namespace {
 // A signal handler can reach nothing but a variable of static storage. It runs in any thread, the
 // driver's own among them.
 std::atomic<bool> interrupted{false};
+std::atomic<int> guards{0};
 std::atomic<bool> announced{false};  // whether somebody sees what the handler says
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler must not take locks");
 
@@ -36,7 +37,8 @@ extern "C" void mark_interrupt(int signal) {
 
 }  // namespace
 
-InterruptGuard::InterruptGuard() {
+InterruptGuard::InterruptGuard() : outer_(guards++ == 0) {
+  if (!outer_) return;
   interrupted = false;
   announced = ::isatty(STDERR_FILENO) == 1;
   struct sigaction action {};
@@ -48,6 +50,8 @@ InterruptGuard::InterruptGuard() {
 }
 
 InterruptGuard::~InterruptGuard() {
+  --guards;
+  if (!outer_) return;
   sigaction(SIGINT, &previous_int_, nullptr);
   sigaction(SIGTERM, &previous_term_, nullptr);
 }

@@ -6,7 +6,8 @@
 namespace raysplats {
 
 /// While one lives, SIGINT and SIGTERM only set a mark that long work polls, and say so at once on
-/// a terminal; a second signal ends the process as usual. At most one at a time.
+/// a terminal; a second signal ends the process as usual. One that is made while another lives, in
+/// this thread or others, shares its mark and must not outlive it.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -18,6 +19,7 @@ class InterruptGuard {
   bool requested() const;
 
  private:
+  bool outer_ = false;  // the first of those that live
   struct sigaction previous_int_ {};
   struct sigaction previous_term_ {};
 };

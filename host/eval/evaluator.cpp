@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.hpp"
+#include "comm/communicator.hpp"
 #include "eval/error_map.hpp"
 #include "eval/frame_writer.hpp"
 #include "eval/metrics.hpp"
@@ -54,6 +55,53 @@ Comparison compare(const Image& traced,
   }
   out.valid = weights / static_cast<double>(rgba.pixels());
   return out;
+}
+
+// What ranks tell each other of a view.
+struct MeasuredView {
+  std::size_t index;  // among those that are evaluated
+  bool compared, has_all, has_lpips;
+  double psnr, psnr_corrected, psnr_all, ssim, lpips;
+};
+
+MeasuredView measure(std::size_t index, const Comparison& pair, Lpips* lpips) {
+  MeasuredView out{};
+  out.index = index;
+  out.compared = pair.valid > 0;
+  if (!out.compared) return out;
+  // Masked pixels are equal; they must not count as well reconstructed ones.
+  out.psnr = std::min(psnr(pair.render, pair.photo) + 10.0 * std::log10(pair.valid), kMostPsnr);
+  out.psnr_corrected = std::min(corrected_psnr(pair.whole, pair.photo, pair.mask), kMostPsnr);
+  out.has_all = pair.valid < 1.0;
+  if (out.has_all) out.psnr_all = std::min(psnr(pair.whole, pair.photo), kMostPsnr);
+  out.ssim = ssim(pair.render, pair.photo);
+  out.has_lpips = lpips != nullptr;
+  if (out.has_lpips) out.lpips = lpips->distance(pair.render, pair.photo);
+  return out;
+}
+
+EvaluationMetrics metrics_of(const MeasuredView& view) {
+  EvaluationMetrics out;
+  out.psnr = view.psnr;
+  out.ssim = view.ssim;
+  out.psnr_corrected = view.psnr_corrected;
+  if (view.has_all) out.psnr_all = view.psnr_all;
+  if (view.has_lpips) out.lpips = view.lpips;
+  return out;
+}
+
+// In the order of the views.
+std::vector<MeasuredView> of_all_ranks(Communicator& ranks, const std::vector<MeasuredView>& own) {
+  const std::string mine(reinterpret_cast<const char*>(own.data()),
+                         own.size() * sizeof(MeasuredView));
+  std::vector<MeasuredView> all;
+  for (const std::string& theirs : ranks.gather(mine)) {
+    const std::size_t before = all.size();
+    all.resize(before + theirs.size() / sizeof(MeasuredView));
+    std::copy(theirs.begin(), theirs.end(), reinterpret_cast<char*>(all.data() + before));
+  }
+  std::ranges::sort(all, {}, &MeasuredView::index);
+  return all;
 }
 
 nlohmann::json to_json(const EvaluationMetrics& metrics) {
@@ -148,9 +196,13 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
           fmt::format("The folder {} cannot be created: {}", output.string(), error.message()));
   }
 
-  EvaluationReport report;
+  Communicator alone;
+  Communicator& ranks = options.ranks != nullptr ? *options.ranks : alone;
+  std::vector<MeasuredView> measured;
   bool stopped = false;
-  for (std::size_t i = 0; i < views.size(); ++i) {
+  const auto step = static_cast<std::size_t>(ranks.size());
+  for (std::size_t i = static_cast<std::size_t>(ranks.rank()); i < views.size() && !stopped;
+       i += step) {
     const ViewPicture picture = load_view_picture(dataset.views[views[i]]);
     const Image& rgba = picture.rgba;
     const Image traced = render(dataset.views[views[i]].camera);
@@ -162,29 +214,24 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
           traced.width, traced.height, traced.channels, rgba.width, rgba.height));
     }
     const Comparison pair = compare(traced, picture, dataset.alpha_is_background, background);
-    EvaluationMetrics metrics;
-    const std::string& view_name = dataset.views[views[i]].camera.name;
-    metrics.name = view_name.empty() ? names[i] : view_name;
-    if (!(pair.valid > 0)) {
+    measured.push_back(measure(i, pair, options.lpips));
+    if (pair.valid > 0 && !output.empty() && i < options.max_pictures.value_or(views.size()))
+      write_image(output / (names[i] + ".png"), side_by_side(pair.photo, pair.render));
+    stopped = options.done && !options.done(measured.size());
+  }
+  stopped = ranks.any(stopped);
+
+  EvaluationReport report;
+  for (const MeasuredView& view : of_all_ranks(ranks, measured)) {
+    EvaluationMetrics metrics = metrics_of(view);
+    const std::string& view_name = dataset.views[views[view.index]].camera.name;
+    metrics.name = view_name.empty() ? names[view.index] : view_name;
+    if (view.compared) {
+      report.images.push_back(metrics);
+    } else if (ranks.leads()) {
       spdlog::warn("nothing of {} can be compared: its mask or its lens leaves no pixel",
                    metrics.name);
-      stopped = options.done && !options.done(i + 1);
-      if (stopped) break;
-      continue;
     }
-    // Masked pixels are equal; they must not count as well reconstructed ones.
-    metrics.psnr =
-        std::min(psnr(pair.render, pair.photo) + 10.0 * std::log10(pair.valid), kMostPsnr);
-    metrics.psnr_corrected = std::min(corrected_psnr(pair.whole, pair.photo, pair.mask), kMostPsnr);
-    if (pair.valid < 1.0) metrics.psnr_all = std::min(psnr(pair.whole, pair.photo), kMostPsnr);
-    metrics.ssim = ssim(pair.render, pair.photo);
-    if (options.lpips != nullptr) metrics.lpips = options.lpips->distance(pair.render, pair.photo);
-    report.images.push_back(metrics);
-    if (!output.empty() && i < options.max_pictures.value_or(views.size())) {
-      write_image(output / (names[i] + ".png"), side_by_side(pair.photo, pair.render));
-    }
-    stopped = options.done && !options.done(i + 1);
-    if (stopped) break;
   }
   if (report.images.empty() && stopped) return report;
   if (report.images.empty()) {
@@ -193,7 +240,7 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
                     dataset.root.string()));
   }
   report.mean = mean_of(report.images);
-  if (!output.empty()) write_text_file(output / "metrics.json", report.json());
+  if (!output.empty() && ranks.leads()) write_text_file(output / "metrics.json", report.json());
   return report;
 }
 

@@ -219,7 +219,7 @@ FrameReport write_frames(Tracer& tracer,
   }
   const std::vector<std::string> names = frame_names(cameras);
   FrameReport report;
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
+  for (std::size_t i = options.offset; i < cameras.size(); i += options.stride) {
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
     const Image samples = exposed(tracer, model, cameras, i, options, within);

@@ -38,6 +38,8 @@ struct FrameOptions {
   int shutter_samples = 1;     ///< moments of a frame that are averaged (motion blur)
   double shutter = 0.5;        ///< share of the time to the next frame that they are taken in
   bool closed = false;         ///< the frame after the last one is the first
+  /// Only every stride-th frame from this one on: what is left to a rank that shares the frames.
+  std::size_t offset = 0, stride = 1;
 };
 
 struct FrameReport {

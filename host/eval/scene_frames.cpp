@@ -28,7 +28,7 @@ SceneReport write_scene_frames(PathTracer& tracer,
                                const std::function<bool(double)>& within) {
   const std::vector<std::string> names = frame_names(scene.cameras);
   SceneReport report;
-  for (std::size_t i = first; i < last; ++i) {
+  for (std::size_t i = first + options.offset; i < last; i += options.stride) {
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
     if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<int>(i)));

@@ -15,6 +15,8 @@
 
 namespace raysplats {
 
+class Communicator;
+
 /// Measures of one view, or their means over views.
 struct EvaluationMetrics {
   std::string name;
@@ -44,6 +46,9 @@ struct EvaluationOptions {
   Lpips* lpips = nullptr;                   ///< not owned
   std::function<bool(std::size_t)> done =
       {};  ///< hears the number of finished views, returns false to stop early
+  /// Of the library itself; its type is not installed. With it every rank calls evaluate() and
+  /// compares its share of the views; all get the whole report.
+  Communicator* ranks = nullptr;
 };
 
 /// The names of the pictures that evaluate() writes of all views of a split, without extension.

@@ -12,9 +12,13 @@ if(RAYSPLATS_IMAGES_STATIC)
 else()
   install(TARGETS raysplats_images LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime)
 endif()
+if(RAYSPLATS_HAVE_MPI)
+  install(TARGETS raysplats_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endif()
 install(
   TARGETS raysplats
           raysplats_base
+          raysplats_comm
           raysplats_core
           raysplats_device
           raysplats_primitives

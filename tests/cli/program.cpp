@@ -23,7 +23,8 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
                                const Surroundings& surroundings) {
   const std::string out = surroundings.out_file.empty() ? folder_ / "out" : surroundings.out_file;
   const std::string err = surroundings.err_file.empty() ? folder_ / "err" : surroundings.err_file;
-  std::vector<std::string> words{RAYSPLATS_PROGRAM};
+  std::vector<std::string> words = surroundings.launcher;
+  words.emplace_back(RAYSPLATS_PROGRAM);
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());

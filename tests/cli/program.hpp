@@ -29,6 +29,7 @@ struct Surroundings {
   bool closed_out = false;                 ///< as by >&-
   bool closed_err = false;
   std::string folder = {};  ///< to run in; the test's own when empty
+  std::vector<std::string> launcher = {};  ///< what starts the program, such as mpirun -n 2
 };
 
 /// Runs `raysplats` with `arguments` and waits for it.

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "comm/communicator.hpp"
+#include "eval/frame_writer.hpp"
+#include "options.hpp"
+
+namespace raysplats::cli {
+
+/// Whether several processes, or several devices, share the work of a command.
+bool is_shared(const std::string& command);
+
+/// Joins the processes that mpirun has started for `command`. Throws UsageError for a command that
+/// is none of those, and what launched_transport() throws.
+Communicator join_processes(const std::string& command);
+
+/// Runs `work` for every rank of a shared command: for this process with the device of its place on
+/// the machine, or for every device of --device in a thread each. Only the rank that leads prints
+/// and logs.
+void share_work(const DeviceFlags& flags,
+                const GlobalOptions& global,
+                const std::function<void(Communicator&, Context&)>& work);
+
+/// The same options for the frames of a rank. Throws UsageError for a video that several ranks
+/// would write.
+FrameOptions share_of(const Communicator& ranks, FrameOptions options);
+
+/// All ranks: the sum and the largest of a number of each.
+std::uint64_t sum_over(Communicator& ranks, std::uint64_t mine);
+double most_of(Communicator& ranks, double mine);
+
+/// Ends this process and the others of its work with one sentence, said by one of them; returns the
+/// exit status where it is alone.
+int fail_together(Communicator& processes, const Error& error);
+
+}  // namespace raysplats::cli

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "comm/transport.hpp"
+
+namespace raysplats {
+
+/// A rank's view of the ranks that work on one thing together: processes under MPI, threads with a
+/// device each, or one rank alone. What is said of all ranks they have to call in the same order.
+class Communicator {
+ public:
+  /// What this rank has sent, received and waited for since the start.
+  struct Traffic {
+    std::uint64_t sent = 0;  ///< bytes
+    std::uint64_t received = 0;
+    std::uint64_t messages = 0;  ///< sent
+    double seconds = 0;          ///< within exchange()
+  };
+
+  /// One rank alone.
+  Communicator() = default;
+  explicit Communicator(std::shared_ptr<Transport> transport);
+
+  int rank() const { return transport_ ? transport_->rank() : 0; }
+  int size() const { return transport_ ? transport_->size() : 1; }
+  int local_rank() const { return transport_ ? transport_->local_rank() : 0; }
+  /// Whether this rank writes files and speaks for all.
+  bool leads() const { return rank() == 0; }
+
+  /// As Transport, and counted.
+  void exchange(std::span<const Outgoing> out, std::span<const Incoming> in);
+  [[noreturn]] void abort(ErrorCode code);
+
+  /// All ranks: the bytes of `root` become those of all.
+  void broadcast(std::span<std::byte> bytes, int root = 0);
+  /// All ranks: what each has, in the order of the ranks. Sizes may differ.
+  std::vector<std::string> gather(const std::string& mine);
+  /// All ranks: whether any of them says so.
+  bool any(bool mine);
+  /// All ranks: the least of their numbers.
+  std::uint64_t least(std::uint64_t mine);
+  /// All ranks: waits until all are here.
+  void barrier() { any(false); }
+
+  const Traffic& traffic() const { return traffic_; }
+
+ private:
+  std::shared_ptr<Transport> transport_;  // none = alone
+  Traffic traffic_;
+};
+
+/// The share of a rank in `count` things of a row: [first, last).
+struct RankShare {
+  std::size_t first = 0, last = 0;
+
+  std::size_t size() const { return last - first; }
+  bool holds(std::size_t i) const { return i >= first && i < last; }
+  static RankShare of(std::size_t count, int rank, int ranks);
+};
+
+}  // namespace raysplats
