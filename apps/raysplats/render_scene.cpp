@@ -198,6 +198,8 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   share_work(flags.device, global,
              [&, first = first, last = last](Communicator& ranks, Context& context) {
                PathTracer tracer(context, loaded.scene);
+               const FrameOptions share = share_of(ranks, output.options());
+               output.begin();
                spdlog::info("{}: {} Gaussians, {} meshes, {} lights, {} frames", flags.model,
                             loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
                             loaded.scene.lights.size(), last - first);
@@ -210,6 +212,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
                add_up(ranks, report);
                progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
                if (!ranks.leads()) return;
+               output.finish();
                const PathTracer::Statistics& rays = report.rays;
                warn_of_capped_rays(rays.capped_rays,
                                    rays.camera_rays + rays.continued_rays + rays.shadow_rays,

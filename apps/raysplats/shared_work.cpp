@@ -41,7 +41,7 @@ std::vector<T> of_all(Communicator& ranks, T mine) {
 }  // namespace
 
 bool is_shared(const std::string& command) {
-  return command == "train" || command == "render" || command == "eval";
+  return command == "render" || command == "eval";
 }
 
 Communicator join_processes(const std::string& command) {
