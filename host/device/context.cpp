@@ -54,7 +54,6 @@ cl::Program compile(Context::Impl& context,
     if (context.options.compiling) context.options.compiling(context.compiled, what);
   };
   ++context.compiled;
-  context.keeping.postpone();
   tell(path);
   try {
     context.faults.check(Fault::kBuild);
@@ -255,16 +254,7 @@ cl::Program Context::Impl::make_program(const std::string& path, const BuildOpti
 void Context::Impl::keep(const ProgramCache& cache,
                          const std::string& key,
                          const cl::Program& program) {
-  if (cache.gives_slowly(info)) {
-    keeping.add([cache, key, program] {
-      try {
-        store_binary(cache, key, program);
-      } catch (const cl::Error& error) {
-        spdlog::debug("a compiled program is not kept: {}", cl_error_name(error.err()));
-      }
-    });
-    return;
-  }
+  if (cache.gives_slowly(info)) return;
   const auto begin = std::chrono::steady_clock::now();
   store_binary(cache, key, program);
   if (std::chrono::steady_clock::now() - begin > kSlowBinary) cache.note_gives_slowly(info);

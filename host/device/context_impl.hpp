@@ -2,7 +2,6 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -10,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "base/idle_work.hpp"
 #include "device/canaries.hpp"
 #include "device/cl.hpp"
 #include "device/context.hpp"
@@ -70,12 +68,11 @@ struct Context::Impl {
 
   std::recursive_mutex mutex;
   std::uint64_t revisions = 0;
-  IdleWork keeping{std::chrono::seconds(10)};  // stores programs that keep() left; ends first
 
   cl::Program& program(const std::string& path, const BuildOptions& build);
   cl::Program make_program(const std::string& path, const BuildOptions& build);
-  /// Puts a program that the compiler has made into the cache, or sees to that once nothing is
-  /// compiled any more, where the driver takes long to give it.
+  /// Puts a program that the compiler has made into the cache, unless the driver is known to take
+  /// long to give it: what compiles again to do so keeps what it compiled by itself (PoCL does).
   void keep(const ProgramCache& cache, const std::string& key, const cl::Program& program);
   /// Keeps host memory until the command that uses it is over.
   void keep_until(const cl::Event& event, std::shared_ptr<const void> memory);

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <thread>
@@ -148,28 +147,15 @@ TEST_CASE("program cache: a context fills it, uses it and repairs it") {
   }
 }
 
-TEST_CASE("program cache: what a slow driver makes is stored when nothing is compiled any more") {
+TEST_CASE("program cache: what a slow driver makes is not stored") {
   const TemporaryDirectory folder;
-  ProgramCache(folder.path().string()).note_gives_slowly(select_device(""));
-  CHECK(ProgramCache(folder.path().string()).gives_slowly(select_device("")));
+  const ProgramCache cache(folder.path().string());
+  cache.note_gives_slowly(select_device(""));
+  CHECK(cache.gives_slowly(select_device("")));
   CHECK(probe(folder.path()) > 1);
-  CHECK(entries(folder.path()).empty());  // the context was gone before
-  ContextOptions options;
-  options.cache_directory = folder.path().string();
-  Context context(select_device(""), options);
-  context.kernel("primitives/layout_probe.cl", "layout_probe");
-  const auto begin = std::chrono::steady_clock::now();
-  const auto stored = [&] {
-    const std::vector<fs::path> found = entries(folder.path());
-    return !found.empty() && found[0].extension() == ".bin";
-  };
-  while (!stored() && std::chrono::steady_clock::now() - begin < std::chrono::seconds(60)) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  CHECK(std::chrono::steady_clock::now() - begin > std::chrono::seconds(5));
-  CHECK(entries(folder.path()).size() == 1);
-  CHECK(clear_program_cache(folder.path()) == 1);
-  CHECK_FALSE(ProgramCache(folder.path().string()).gives_slowly(select_device("")));
+  CHECK(entries(folder.path()).empty());
+  CHECK(clear_program_cache(folder.path()) == 0);
+  CHECK_FALSE(cache.gives_slowly(select_device("")));
 }
 
 TEST_CASE("program cache: a sound entry with a binary the driver refuses is replaced") {
