@@ -5,14 +5,15 @@
 // tiles_y x 3 of groups; a work-item per pixel. The window is separable: what it slides over lies
 // in local memory with a border of RADIUS, zero beyond the image; a pass along the rows, then one
 // along the columns. Neighbouring work-items touch neighbouring addresses, in local memory as well.
-//   image     planes R, G, B       target   packed pixels, and with composite 2 a plane of weights
+//   image     planes R, G, B       photo    as train/photo.h says
 //   composite 0: m is the photo's alpha; 1: the photo is blended over the background and m is 1; 2:
-//             the same, and m is the plane of words 0 to 255 behind the photo's pixels
+//             the same, and m is the photo's plane of weights
 //   slopes    per channel planes E, F, G as large as the image
 // Per pixel and channel 2.6 pixels of image and photo are fetched, and as many of each plane of
 // slopes: 26^2 for 16^2.
 #define VECTOR 1
 #include "train/loss_pixel.h"
+#include "train/photo.h"
 #include "train/ssim.h"
 #include "train/ssim_window.h"
 
@@ -34,7 +35,8 @@
 
 typedef struct {
   const __global float* image;  // of the channel
-  const __global uint* target;
+  const __global uint* photo;
+  int planes;  // of the photo
   int pixels;
   int channel;
   int composite;
@@ -42,7 +44,8 @@ typedef struct {
 } Comparison;
 
 Comparison comparison_of(const __global float* image,
-                         const __global uint* target,
+                         const __global uint* photo,
+                         int planes,
                          int pixels,
                          int channel,
                          int composite,
@@ -50,7 +53,8 @@ Comparison comparison_of(const __global float* image,
                          float green,
                          float blue) {
   const Comparison out = {image + channel * pixels,
-                          target,
+                          photo,
+                          planes,
                           pixels,
                           channel,
                           composite,
@@ -63,12 +67,13 @@ typedef struct {
 } Sample;
 
 Sample sample_at(const Comparison* of, int pixel) {
-  const uint word = of->target[pixel];
-  const float alpha = rs_photo_byte(word, 24);
-  Sample s = {of->image[pixel], rs_photo_byte(word, 8 * of->channel), alpha};
+  const float alpha = rs_photo_channel(of->photo, of->planes, of->pixels, pixel, 1, 3);
+  const float y = rs_photo_channel(of->photo, of->planes, of->pixels, pixel, 1, of->channel);
+  Sample s = {of->image[pixel], y, alpha};
   if (of->composite != 0) {
     s.y = s.y * alpha + of->background * (1.0f - alpha);
-    s.mask = of->composite == 2 ? rs_photo_byte(of->target[of->pixels + pixel], 0) : 1.0f;
+    s.mask =
+        of->composite == 2 ? rs_photo_weight(of->photo, of->planes, of->pixels, pixel, 1) : 1.0f;
   }
   return s;
 }
@@ -92,12 +97,13 @@ float4 group_sum(float4 value, int lane, __local float4* scratch) {
 // sum m (clamp(x) - y)^2, sum m, 0}, ssim_partials the sum of SSIM.
 __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_slopes(
     const __global float* image,
-    const __global uint* target,
+    const __global uint* photo,
     __global float* slopes,
     __global float4* pixel_partials,
     __global float* ssim_partials,
     int width,
     int height,
+    int planes,
     int composite,
     float red,
     float green,
@@ -107,7 +113,8 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_slopes(
   const int lane = get_local_id(1) * SIDE + get_local_id(0);
   const int channel = get_group_id(2);
   const int pixels = width * height;
-  const Comparison of = comparison_of(image, target, pixels, channel, composite, red, green, blue);
+  const Comparison of =
+      comparison_of(image, photo, planes, pixels, channel, composite, red, green, blue);
 
   const int left = (int)get_group_id(0) * SIDE - RADIUS;
   const int top = (int)get_group_id(1) * SIDE - RADIUS;
@@ -175,11 +182,12 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_slopes(
 // zeroed.
 __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradient(
     const __global float* image,
-    const __global uint* target,
+    const __global uint* photo,
     const __global float* slopes,
     __global float* gradient,
     int width,
     int height,
+    int planes,
     int composite,
     float red,
     float green,
@@ -191,8 +199,8 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradien
   const int column = get_global_id(0);
   const int row = get_global_id(1);
 #if SSIM_GRADIENT
-  __local float planes[3][SPAN * SPAN];  // E, F, G
-  __local float rows[3][SPAN * SIDE];    // their windows along the rows
+  __local float tile[3][SPAN * SPAN];  // E, F, G
+  __local float rows[3][SPAN * SIDE];  // their windows along the rows
   const int lane = get_local_id(1) * SIDE + get_local_id(0);
   const int left = (int)get_group_id(0) * SIDE - RADIUS;
   const int top = (int)get_group_id(1) * SIDE - RADIUS;
@@ -201,17 +209,18 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradien
     const int x = left + i % SPAN;
     const int y = top + i / SPAN;
     const bool inside = x >= 0 && x < width && y >= 0 && y < height;
-    for (int k = 0; k < 3; ++k) planes[k][i] = inside ? in[k * pixels + y * width + x] : 0.0f;
+    for (int k = 0; k < 3; ++k) tile[k][i] = inside ? in[k * pixels + y * width + x] : 0.0f;
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   for (int i = lane; i < SPAN * SIDE; i += ITEMS) {
     const int first = i / SIDE * SPAN + i % SIDE + RADIUS;
-    for (int k = 0; k < 3; ++k) rows[k][i] = RS_WINDOW(planes[k] + first, 1);
+    for (int k = 0; k < 3; ++k) rows[k][i] = RS_WINDOW(tile[k] + first, 1);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
 #endif
   if (column >= width || row >= height) return;
-  const Comparison of = comparison_of(image, target, pixels, channel, composite, red, green, blue);
+  const Comparison of =
+      comparison_of(image, photo, planes, pixels, channel, composite, red, green, blue);
   const int pixel = row * width + column;
   const Sample s = sample_at(&of, pixel);
   const float v = s.mask * (s.x - s.y);

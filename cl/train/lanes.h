@@ -14,24 +14,28 @@ typedef int lane_mask;
 typedef uint lane_words;
 #define RS_LANE_IDS (0)
 #define rs_to_float(words) convert_float(words)
+#define rs_as_float(words) as_float(words)
 #elif VECTOR == 4
 typedef float4 lanes;
 typedef int4 lane_mask;
 typedef uint4 lane_words;
 #define RS_LANE_IDS ((int4)(0, 1, 2, 3))
 #define rs_to_float(words) convert_float4(words)
+#define rs_as_float(words) as_float4(words)
 #elif VECTOR == 8
 typedef float8 lanes;
 typedef int8 lane_mask;
 typedef uint8 lane_words;
 #define RS_LANE_IDS ((int8)(0, 1, 2, 3, 4, 5, 6, 7))
 #define rs_to_float(words) convert_float8(words)
+#define rs_as_float(words) as_float8(words)
 #elif VECTOR == 16
 typedef float16 lanes;
 typedef int16 lane_mask;
 typedef uint16 lane_words;
 #define RS_LANE_IDS ((int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 #define rs_to_float(words) convert_float16(words)
+#define rs_as_float(words) as_float16(words)
 #else
 #error "VECTOR is 1, 4, 8 or 16"
 #endif

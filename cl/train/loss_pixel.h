@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the loss takes from a pixel by itself: values of a packed photo and the sums of the pixel
-// term. With the mask m the images compared are y and x' = y + m (x - y).
+// What the loss takes from a pixel by itself: the sums of the pixel term. With the mask m the
+// images compared are y and x' = y + m (x - y).
 #ifndef RS_TRAIN_LOSS_PIXEL_H
 #define RS_TRAIN_LOSS_PIXEL_H
 
@@ -9,9 +9,6 @@
 #ifndef PIXEL_L2
 #define PIXEL_L2 0
 #endif
-
-// Byte `shift` / 8 of words as a number of [0, 1].
-#define rs_photo_byte(words, shift) (rs_to_float(((words) >> (shift)) & 255u) * (1.0f / 255.0f))
 
 typedef struct {
   lanes pixel, square, weight;  // sums of m rho(x - y), m (clamp(x) - y)^2, m

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns a rendered image x and a packed photo y into the planes u = x' + y and v = x' - y that SSIM
+// Turns a rendered image x and a photo y into the planes u = x' + y and v = x' - y that SSIM
 // and its gradient read, and sums the pixel term. x' = y + m (x - y) with the mask m: where m = 0
 // both images are equal.
 //
@@ -7,10 +7,11 @@
 // size.
 //   pair      3 planes u (R, G, B), then 3 planes v, padded as in train/ssim_window.h, borders zero
 //   composite 0: m is the photo's alpha; 1: the photo is blended over the background and m is 1; 2:
-//             the same, and m is the plane of words 0 to 255 behind the photo's pixels
+//             the same, and m is the photo's plane of weights
 //   partials  per tile {sum m rho(x - y), sum m (clamp(x) - y)^2, 3 sum m, 0} over R, G, B
 // Complexity: one pass over the pixels.
 #include "train/loss_pixel.h"
+#include "train/photo.h"
 #include "train/ssim_window.h"
 
 void store_pair(
@@ -21,13 +22,14 @@ void store_pair(
 }
 
 __kernel void prepare_pair(const __global float* image,
-                           const __global uint* target,
+                           const __global uint* photo,
                            __global float* pair,
                            __global float4* partials,
                            int width,
                            int height,
                            int stride,
                            int plane,
+                           int planes,
                            int composite,
                            float red,
                            float green,
@@ -46,48 +48,31 @@ __kernel void prepare_pair(const __global float* image,
   for (int row = top; row < bottom; ++row) {
     for (int column = first; column < last; column += VECTOR) {
       const int in = row * width + column;
-      lane_words words;
+      const int count = min(last - column, VECTOR);
       lanes x[3];
       lanes valid = (lanes)(1.0f);
-      if (column + VECTOR <= last) {
-        words = rs_load_words(target + in);
+      if (count == VECTOR) {
         for (int c = 0; c < 3; ++c) x[c] = rs_load(image + c * pixels + in);
       } else {
         // The last columns: lanes beyond the image are x = y = m = 0.
-        uint word_tail[VECTOR];
         float tail[4][VECTOR];
         for (int i = 0; i < VECTOR; ++i) {
-          const bool inside = column + i < last;
-          word_tail[i] = inside ? target[in + i] : 0;
-          for (int c = 0; c < 3; ++c) tail[c][i] = inside ? image[c * pixels + in + i] : 0.0f;
-          tail[3][i] = inside ? 1.0f : 0.0f;
+          for (int c = 0; c < 3; ++c) tail[c][i] = i < count ? image[c * pixels + in + i] : 0.0f;
+          tail[3][i] = i < count ? 1.0f : 0.0f;
         }
-        words = rs_load_private_words(word_tail);
         for (int c = 0; c < 3; ++c) x[c] = rs_load_private(tail[c]);
         valid = rs_load_private(tail[3]);
       }
       lanes y[3];
-      y[0] = rs_photo_byte(words, 0);
-      y[1] = rs_photo_byte(words, 8);
-      y[2] = rs_photo_byte(words, 16);
-      const lanes alpha = rs_photo_byte(words, 24);
+      for (int c = 0; c < 3; ++c) y[c] = rs_photo_channel(photo, planes, pixels, in, count, c);
+      const lanes alpha = rs_photo_channel(photo, planes, pixels, in, count, 3);
       lanes mask = alpha;
       if (composite) {
         const lanes rest = valid - alpha;
         y[0] = y[0] * alpha + red * rest;
         y[1] = y[1] * alpha + green * rest;
         y[2] = y[2] * alpha + blue * rest;
-        mask = valid;
-        if (composite == 2) {
-          if (column + VECTOR <= last) {
-            mask = rs_to_float(rs_load_words(target + pixels + in)) * (1.0f / 255.0f);
-          } else {
-            uint tail[VECTOR];
-            for (int i = 0; i < VECTOR; ++i)
-              tail[i] = column + i < last ? target[pixels + in + i] : 0;
-            mask = rs_to_float(rs_load_private_words(tail)) * (1.0f / 255.0f);
-          }
-        }
+        mask = composite == 2 ? rs_photo_weight(photo, planes, pixels, in, count) : valid;
       }
       __global float* out = pair + RS_PADDED(row, stride) + column;
       for (int c = 0; c < 3; ++c) {

@@ -8,6 +8,7 @@
 // Complexity: 2 x 11 multiply-adds per moment and pixel: a column pass into private memory, then a
 // row pass.
 #include "train/loss_pixel.h"
+#include "train/photo.h"
 #include "train/ssim.h"
 #include "train/ssim_window.h"
 
@@ -88,15 +89,16 @@ __kernel void ssim_slopes(const __global float* pair,
 }
 
 // gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B; the A plane is
-// zeroed. `masked`: 0, m = 1; 1, the photo's alpha; 2, the words behind the photo's pixels.
+// zeroed. `masked`: 0, m = 1; 1, the photo's alpha; 2, its plane of weights.
 __kernel void loss_gradient(const __global float* pair,
                             const __global float* slopes,
-                            const __global uint* target,
+                            const __global uint* photo,
                             __global float* gradient,
                             int width,
                             int height,
                             int stride,
                             int plane,
+                            int planes,
                             int masked,
                             float pixel_scale,
                             float ssim_scale) {
@@ -128,17 +130,8 @@ __kernel void loss_gradient(const __global float* pair,
       const int pixel = row * width + column;
       const bool whole = column + VECTOR <= last;
       lanes mask = (lanes)(1.0f);
-      if (masked) {
-        const __global uint* weights = masked == 2 ? target + pixels + pixel : target + pixel;
-        const uint shift = masked == 2 ? 0 : 24;
-        if (whole) {
-          mask = rs_to_float(rs_load_words(weights) >> shift) * (1.0f / 255.0f);
-        } else {
-          uint tail[VECTOR];
-          for (int k = 0; k < VECTOR; ++k) tail[k] = column + k < last ? weights[k] : 0;
-          mask = rs_to_float(rs_load_private_words(tail) >> shift) * (1.0f / 255.0f);
-        }
-      }
+      if (masked == 1) mask = rs_photo_channel(photo, planes, pixels, pixel, last - column, 3);
+      if (masked == 2) mask = rs_photo_weight(photo, planes, pixels, pixel, last - column);
       lanes result = rs_pixel_slope(v, mask, pixel_scale);
 #if SSIM_GRADIENT
       const lanes u = rs_load(center);

@@ -55,7 +55,7 @@ void add_step(Context& context,
   target.upload(photo);
   ImageLoss loss(context, PixelLoss::kL1, 0.2f);
   Buffer<float> slopes;
-  loss.evaluate(tracer.image(), target, false, {0, 0, 0}, width, height, slopes);
+  loss.evaluate(tracer.image(), {target}, false, {0, 0, 0}, width, height, slopes);
   out.push_back({way + "gradient of the image", slopes.download()});
   GaussianGradients gradients;
   tracer.backward(gaussians, slopes, gradients);

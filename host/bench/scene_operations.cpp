@@ -109,7 +109,7 @@ BenchOperation SceneBench::Impl::backward() {
   return {[this] {
             make_loss();
             forward_with_hits();
-            image_loss->evaluate(picture, photo, false, {0, 0, 0}, model.camera.width,
+            image_loss->evaluate(picture, {photo}, false, {0, 0, 0}, model.camera.width,
                                  model.camera.height, image_gradient);
           },
           {},
@@ -138,7 +138,7 @@ BenchOperation SceneBench::Impl::loss() {
   return {[this] { make_loss(); },
           {},
           [this] {
-            image_loss->evaluate(picture, photo, false, {0, 0, 0}, model.camera.width,
+            image_loss->evaluate(picture, {photo}, false, {0, 0, 0}, model.camera.width,
                                  model.camera.height, image_gradient);
             image_loss->value();
           },
@@ -198,7 +198,7 @@ BenchOperation SceneBench::Impl::iteration() {
             DeviceGaussians& g = gaussians();
             rays.update(g);
             rays.forward(g, model.camera, true, ViewSizes::kAhead);
-            image_loss->evaluate(rays.image(), photo, false, {0, 0, 0}, model.camera.width,
+            image_loss->evaluate(rays.image(), {photo}, false, {0, 0, 0}, model.camera.width,
                                  model.camera.height, image_gradient);
             rays.backward(g, image_gradient, gradients);
             density->accumulate(g, gradients);
@@ -219,7 +219,7 @@ BenchOperation SceneBench::Impl::iteration_by_bvh() {
             ViewTracer& rays = view_tracer();
             DeviceGaussians& g = gaussians();
             rays.forward(g, model.camera, true);
-            image_loss->evaluate(rays.image(), photo, false, {0, 0, 0}, model.camera.width,
+            image_loss->evaluate(rays.image(), {photo}, false, {0, 0, 0}, model.camera.width,
                                  model.camera.height, image_gradient);
             rays.backward(g, image_gradient, gradients);
             density->accumulate(g, gradients);

@@ -74,10 +74,8 @@ class Buffer {
     if (!source.empty()) raw_.write(source.data(), source.size_bytes(), offset * sizeof(T));
   }
   /// The same, to the first elements, without waiting for the device.
-  void upload_later(std::vector<T> source) {
-    if (source.empty()) return;
-    const auto kept = std::make_shared<const std::vector<T>>(std::move(source));
-    raw_.write_later({kept, kept->data()}, kept->size() * sizeof(T));
+  void upload_later(const std::shared_ptr<const std::vector<T>>& source) {
+    if (!source->empty()) raw_.write_later({source, source->data()}, source->size() * sizeof(T));
   }
   void download(std::span<T> target, std::size_t offset = 0) const {
     if (!target.empty()) raw_.read(target.data(), target.size_bytes(), offset * sizeof(T));

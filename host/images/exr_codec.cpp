@@ -117,19 +117,22 @@ class ExrDecoder : public ImageDecoder {
 
   int width() const override { return window_.max.x - window_.min.x + 1; }
   int height() const override { return window_.max.y - window_.min.y + 1; }
-  Image decode() override try {
+  int sample_bytes() const override { return sizeof(float); }
+  RawImage decode() override try {
     const std::vector<std::string> names = chosen_channels(file_.header().channels());
     if (names.empty()) fail_to_read(path_, "it has no channels");
-    Image image(width(), height(), static_cast<int>(names.size()));
+    RawImage image{width(), height(), static_cast<int>(names.size()), {}};
+    std::vector<float> numbers(image.count());
     const std::size_t pixel = names.size() * sizeof(float);
     const std::size_t row = pixel * static_cast<std::size_t>(image.width);
     Imf::FrameBuffer buffer;
     for (std::size_t c = 0; c < names.size(); ++c) {
       buffer.insert(names[c],
-                    Imf::Slice::Make(Imf::FLOAT, image.data.data() + c, window_, pixel, row));
+                    Imf::Slice::Make(Imf::FLOAT, numbers.data() + c, window_, pixel, row));
     }
     file_.setFrameBuffer(buffer);
     file_.readPixels(window_.min.y, window_.max.y);
+    image.numbers = std::move(numbers);
     return image;
   } catch (const Error&) {
     throw;

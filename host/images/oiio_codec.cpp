@@ -65,16 +65,34 @@ class OiioDecoder : public ImageDecoder {
 
   int width() const override { return input_->spec().width; }
   int height() const override { return input_->spec().height; }
-  Image decode() override {
-    Image image(width(), height(), std::min(input_->spec().nchannels, 4));
-    if (!input_->read_image(0, 0, 0, image.channels, OIIO::TypeFloat, image.data.data())) {
-      throw DataError(
-          fmt::format("The image {} cannot be decoded: {}", name_, reason(input_->geterror())));
+  int sample_bytes() const override {
+    const unsigned char type = input_->spec().format.basetype;
+    return type == OIIO::TypeDesc::UINT8 ? 1 : type == OIIO::TypeDesc::UINT16 ? 2 : 4;
+  }
+  RawImage decode() override {
+    switch (sample_bytes()) {
+      case 1:
+        return decode_as<std::uint8_t>(OIIO::TypeUInt8);
+      case 2:
+        return decode_as<std::uint16_t>(OIIO::TypeUInt16);
+      default:
+        return decode_as<float>(OIIO::TypeFloat);
     }
-    return image;
   }
 
  private:
+  template <class T>
+  RawImage decode_as(const OIIO::TypeDesc& type) {
+    RawImage image{width(), height(), std::min(input_->spec().nchannels, 4), {}};
+    std::vector<T> numbers(image.count());
+    if (!input_->read_image(0, 0, 0, image.channels, type, numbers.data())) {
+      throw DataError(
+          fmt::format("The image {} cannot be decoded: {}", name_, reason(input_->geterror())));
+    }
+    image.numbers = std::move(numbers);
+    return image;
+  }
+
   std::string name_;
   std::unique_ptr<OIIO::Filesystem::IOMemReader> memory_;  // outlives the input
   std::unique_ptr<OIIO::ImageInput> input_;

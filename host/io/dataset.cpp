@@ -75,6 +75,7 @@ void set_cameras(
   view.source_camera.cy *= scale_y;
   require_believable(view.source_camera,
                      fmt::format("The camera of the image {}", view.image_path.string()));
+  view.sample_bytes = photo.sample_bytes;
   view.camera = downscaled(view.source_camera, factor);
   if (undistort && view.camera.model == CameraModel::kOpenCv) {
     view.camera.model = CameraModel::kPinhole;

@@ -6,11 +6,33 @@
 
 #include <cstdlib>
 #include <string_view>
+#include <utility>
 
 #include "base/memory_limit.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
+
+Image to_image(RawImage raw) {
+  Image image;
+  image.width = raw.width;
+  image.height = raw.height;
+  image.channels = raw.channels;
+  if (auto* floats = std::get_if<std::vector<float>>(&raw.numbers)) {
+    image.data = std::move(*floats);
+    return image;
+  }
+  const auto convert = [&image](const auto& numbers, float most) {
+    image.data.reserve(numbers.size());
+    for (const auto number : numbers) image.data.push_back(static_cast<float>(number) / most);
+  };
+  if (const auto* shorts = std::get_if<std::vector<std::uint16_t>>(&raw.numbers)) {
+    convert(*shorts, 65535.0f);
+  } else {
+    convert(std::get<std::vector<std::uint8_t>>(raw.numbers), 255.0f);
+  }
+  return image;
+}
 
 #ifdef RAYSPLATS_IMAGES_STATIC
 

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "raysplats/error.hpp"
@@ -13,14 +15,36 @@
 
 namespace raysplats::io {
 
+/// A picture as its file has it: row by row, 8 bits a number (of 255), 16 bits (of 65535) or
+/// floats.
+struct RawImage {
+  using Numbers =
+      std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>>;
+
+  int width = 0;
+  int height = 0;
+  int channels = 0;  ///< at most 4; alpha is straight
+  Numbers numbers;   ///< height x width x channels
+
+  std::size_t count() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+           static_cast<std::size_t>(channels);
+  }
+};
+
+/// As read_image() gives it; takes the floats of one that has them.
+Image to_image(RawImage raw);
+
 /// An opened picture.
 class ImageDecoder {
  public:
   virtual ~ImageDecoder() = default;
   virtual int width() const = 0;
   virtual int height() const = 0;
-  /// Straight alpha as in the file, at most 4 channels. Throws DataError.
-  virtual Image decode() = 0;
+  /// Bytes of a number that decode() gives: 1, 2 or 4.
+  virtual int sample_bytes() const = 0;
+  /// Throws DataError.
+  virtual RawImage decode() = 0;
 };
 
 /// A network that compares pictures; see Lpips.

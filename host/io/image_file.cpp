@@ -198,7 +198,9 @@ ImageSize image_size(const std::filesystem::path& path) {
     return *size;
   }
   const auto input = image_codec().open(format, path.string(), {});
-  return {input->width(), input->height()};
+  // These have 8 bits by definition, whatever the codec makes of them.
+  const bool bytes = format == "webp" || format == "bmp";
+  return {input->width(), input->height(), bytes ? 1 : input->sample_bytes()};
 }
 
 Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
@@ -210,13 +212,17 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
   if (format == "png" ? !has_whole_png_chunks(text, false) : !is_whole_jpeg(bytes)) {
     fail_damaged(name);
   }
-  return image_codec().open(std::string(format), name, bytes)->decode();
+  return to_image(image_codec().open(std::string(format), name, bytes)->decode());
+}
+
+RawImage read_raw_image(const std::filesystem::path& path) {
+  return image_codec().open(checked_format(path, true), path.string(), {})->decode();
 }
 
 }  // namespace io
 
 Image read_image(const std::filesystem::path& path) {
-  return io::image_codec().open(checked_format(path, true), path.string(), {})->decode();
+  return io::to_image(io::read_raw_image(path));
 }
 
 void write_image(const std::filesystem::path& path,

@@ -7,18 +7,23 @@
 #include <span>
 #include <string>
 
+#include "io/image_codec.hpp"
 #include "raysplats/image.hpp"
 
 namespace raysplats::io {
 
-/// Size of an image file without its pixels.
+/// What the header of an image file says.
 struct ImageSize {
   int width = 0;
   int height = 0;
+  int sample_bytes = 1;  ///< of a number: 1, 2 or 4 (floats)
 };
 
 /// Reads the header of an image that read_image() accepts. Throws DataError as read_image() does.
 ImageSize image_size(const std::filesystem::path& path);
+
+/// read_image() without a conversion of its numbers.
+RawImage read_raw_image(const std::filesystem::path& path);
 
 /// read_image() of a PNG or JPEG file in memory; `name` stands for its path in errors.
 Image decode_image(std::span<const std::byte> bytes, const std::string& name);

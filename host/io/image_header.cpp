@@ -20,18 +20,22 @@ std::optional<unsigned> big_endian(std::istream& stream, int count) {
   return value;
 }
 
-std::optional<ImageSize> size_of(std::optional<unsigned> width, std::optional<unsigned> height) {
+std::optional<ImageSize> size_of(std::optional<unsigned> width,
+                                 std::optional<unsigned> height,
+                                 int sample_bytes) {
   constexpr unsigned kMost = 0x7fffffffu;
   if (!width || !height || *width < 1 || *height < 1 || *width > kMost || *height > kMost)
     return std::nullopt;
-  return ImageSize{static_cast<int>(*width), static_cast<int>(*height)};
+  return ImageSize{static_cast<int>(*width), static_cast<int>(*height), sample_bytes};
 }
 
-// The first chunk is IHDR, which begins with both (PNG specification, section 11.2.2).
+// The first chunk is IHDR, which begins with both and the bits of a number (PNG specification,
+// section 11.2.2).
 std::optional<ImageSize> png_size(std::istream& stream) {
   stream.seekg(16);
   const auto width = big_endian(stream, 4);
-  return size_of(width, big_endian(stream, 4));
+  const auto height = big_endian(stream, 4);
+  return size_of(width, height, stream.get() == 16 ? 2 : 1);
 }
 
 // The segment that begins the frame has both (ITU-T T.81, B.2.2); a height of 0 comes later.
@@ -53,7 +57,7 @@ std::optional<ImageSize> jpeg_size(std::istream& stream) {
     }
     stream.get();  // bits per sample
     const auto height = big_endian(stream, 2);
-    return size_of(big_endian(stream, 2), height);
+    return size_of(big_endian(stream, 2), height, 1);
   }
 }
 

@@ -15,7 +15,6 @@
 #include "core/camera_check.hpp"
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
-#include "io/resample.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 

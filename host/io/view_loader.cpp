@@ -9,37 +9,6 @@
 
 namespace raysplats::io {
 
-namespace {
-
-std::uint32_t byte_of(float value) {
-  // Written so that NaN becomes 0.
-  const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;
-  return static_cast<std::uint32_t>(clamped * 255.0f + 0.5f);
-}
-
-}  // namespace
-
-PackedImage pack(const ViewPicture& picture) {
-  PackedImage out = pack(picture.rgba);
-  out.weights.reserve(picture.weight.data.size());
-  for (const float weight : picture.weight.data)
-    out.weights.push_back(static_cast<std::uint8_t>(byte_of(weight)));
-  return out;
-}
-
-PackedImage pack(const Image& rgba) {
-  PackedImage out{rgba.width, rgba.height, {}, {}};
-  out.pixels.resize(rgba.pixels());
-  for (std::size_t i = 0; i < rgba.pixels(); ++i) {
-    std::uint32_t word = 0;
-    for (std::size_t c = 0; c < 4; ++c) {
-      word |= byte_of(rgba.data[4 * i + c]) << (8 * c);
-    }
-    out.pixels[i] = word;
-  }
-  return out;
-}
-
 ViewLoader::ViewLoader(std::vector<View> views, std::size_t budget_bytes, unsigned threads)
     : views_(std::move(views)), budget_(budget_bytes), entries_(views_.size()) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
@@ -51,12 +20,6 @@ ViewLoader::ViewLoader(std::vector<View> views, std::size_t budget_bytes, unsign
 
 ViewLoader::~ViewLoader() {
   for (std::jthread& worker : workers_) worker.request_stop();
-}
-
-std::size_t ViewLoader::view_bytes(std::size_t index) const {
-  const Camera& camera = views_[index].camera;
-  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height) *
-         (sizeof(std::uint32_t) + (views_[index].mask_apart ? 1 : 0));
 }
 
 void ViewLoader::prefetch(std::span<const std::size_t> indices) {
@@ -75,7 +38,7 @@ void ViewLoader::prefetch(std::span<const std::size_t> indices) {
     std::size_t bytes = 0;
     for (const std::size_t index : indices) {
       if (index >= views_.size() || entries_[index].wanted) continue;
-      bytes += view_bytes(index);
+      bytes += photo_bytes(views_[index]);
       if (bytes > budget_) break;
       Entry& entry = entries_[index];
       entry.wanted = true;
@@ -88,7 +51,7 @@ void ViewLoader::prefetch(std::span<const std::size_t> indices) {
   work_available_.notify_all();
 }
 
-std::shared_ptr<const PackedImage> ViewLoader::get(std::size_t index) {
+std::shared_ptr<const Photo> ViewLoader::get(std::size_t index) {
   std::unique_lock lock(mutex_);
   if (index >= views_.size()) {
     throw UsageError(
@@ -96,7 +59,7 @@ std::shared_ptr<const PackedImage> ViewLoader::get(std::size_t index) {
   }
   Entry& entry = entries_[index];
   ++entry.waiting;
-  std::shared_ptr<const PackedImage> image;
+  std::shared_ptr<const Photo> image;
   std::exception_ptr error;
   while (true) {
     if (entry.state == State::kReady) {
@@ -132,6 +95,16 @@ std::shared_ptr<const PackedImage> ViewLoader::get(std::size_t index) {
   return image;
 }
 
+void ViewLoader::forget(std::size_t index) {
+  const std::lock_guard lock(mutex_);
+  if (index >= views_.size()) return;
+  Entry& entry = entries_[index];
+  if (entry.state != State::kReady || entry.waiting > 0) return;
+  cached_bytes_ -= entry.image->bytes();
+  entry.image = nullptr;
+  entry.state = State::kIdle;
+}
+
 std::size_t ViewLoader::cached_bytes() const {
   const std::lock_guard lock(mutex_);
   return cached_bytes_;
@@ -153,7 +126,7 @@ void ViewLoader::make_room(std::size_t bytes) {
   }
 }
 
-void ViewLoader::store(std::size_t index, std::shared_ptr<const PackedImage> image) {
+void ViewLoader::store(std::size_t index, std::shared_ptr<const Photo> image) {
   Entry& entry = entries_[index];
   make_room(image->bytes());
   cached_bytes_ += image->bytes();
@@ -170,10 +143,10 @@ void ViewLoader::work(const std::stop_token& stop) {
     queue_.pop_front();
     entries_[index].state = State::kLoading;
     lock.unlock();
-    std::shared_ptr<const PackedImage> image;
+    std::shared_ptr<const Photo> image;
     std::exception_ptr error;
     try {
-      image = std::make_shared<const PackedImage>(pack(load_view_picture(views_[index])));
+      image = std::make_shared<const Photo>(load_photo(views_[index]));
     } catch (...) {
       error = std::current_exception();
     }

@@ -13,25 +13,10 @@
 #include <thread>
 #include <vector>
 
+#include "io/photo.hpp"
 #include "raysplats/dataset.hpp"
 
 namespace raysplats::io {
-
-/// A view's picture, 8 bits a channel and straight alpha: r | g << 8 | b << 16 | a << 24, row by
-/// row.
-struct PackedImage {
-  int width = 0;
-  int height = 0;
-  std::vector<std::uint32_t> pixels;
-  /// How much each pixel counts, 0 to 255; empty where ViewPicture::weight is.
-  std::vector<std::uint8_t> weights;
-
-  std::size_t bytes() const { return pixels.size() * sizeof(std::uint32_t) + weights.size(); }
-};
-
-/// Rounds an RGBA image to 8 bits a channel, clamped to [0, 1].
-PackedImage pack(const Image& rgba);
-PackedImage pack(const ViewPicture& picture);
 
 /// Loads the pictures of a data set in worker threads and keeps those used last within a byte
 /// budget. All members may be called from several threads.
@@ -50,9 +35,12 @@ class ViewLoader {
   void prefetch(std::span<const std::size_t> indices);
 
   /// The picture of a view; waits when it is not there yet. A picture larger than the budget is
-  /// returned too, but not kept. Throws the DataError of load_view_image(), and again on the next
+  /// returned too, but not kept. Throws the DataError of load_view_picture(), and again on the next
   /// call if it still fails.
-  std::shared_ptr<const PackedImage> get(std::size_t index);
+  std::shared_ptr<const Photo> get(std::size_t index);
+
+  /// Keeps this picture no longer: its bytes lie elsewhere.
+  void forget(std::size_t index);
 
   /// Bytes of the pictures kept now: within the budget but for those that get() is about to return.
   std::size_t cached_bytes() const;
@@ -64,14 +52,13 @@ class ViewLoader {
     bool wanted = false;      ///< prefetched and not yet used: evicted last
     std::size_t waiting = 0;  ///< callers of get() that wait for it
     std::uint64_t last_use = 0;
-    std::shared_ptr<const PackedImage> image;
+    std::shared_ptr<const Photo> image;
     std::exception_ptr error;
   };
 
   void work(const std::stop_token& stop);
-  void store(std::size_t index, std::shared_ptr<const PackedImage> image);
+  void store(std::size_t index, std::shared_ptr<const Photo> image);
   void make_room(std::size_t bytes);
-  std::size_t view_bytes(std::size_t index) const;
 
   const std::vector<View> views_;
   const std::size_t budget_;

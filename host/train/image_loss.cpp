@@ -112,24 +112,24 @@ struct ImageLoss::Impl {
   }
 
   void evaluate_tiles(const Buffer<float>& image,
-                      const Buffer<std::uint32_t>& target,
+                      const DevicePhoto& photo,
                       int composite,
                       std::array<float, 3> background,
                       std::array<float, 2> scales,
                       Buffer<float>& gradient) {
     Range range{{tiles_x(), tiles_y(), 1}, {0, 0, 0}};
     if (serial) range.local = {1, 1, 1};
-    prepare.launch(range, image, target, pair, pixel_partials, width, height, stride, plane,
-                   composite, background[0], background[1], background[2]);
+    prepare.launch(range, image, photo.words, pair, pixel_partials, width, height, stride, plane,
+                   photo.planes, composite, background[0], background[1], background[2]);
     range.global[2] = 3;
     slopes_kernel.launch(range, pair, slopes, ssim_partials, width, height, stride, plane);
     const int masked = composite == 0 ? 1 : (composite == 1 ? 0 : 2);
-    gradient_kernel.launch(range, pair, slopes, target, gradient, width, height, stride, plane,
-                           masked, scales[0], scales[1]);
+    gradient_kernel.launch(range, pair, slopes, photo.words, gradient, width, height, stride, plane,
+                           photo.planes, masked, scales[0], scales[1]);
   }
 
   void evaluate_groups(const Buffer<float>& image,
-                       const Buffer<std::uint32_t>& target,
+                       const DevicePhoto& photo,
                        int composite,
                        std::array<float, 3> background,
                        std::array<float, 2> scales,
@@ -137,10 +137,12 @@ struct ImageLoss::Impl {
     Range range = Range::plane(static_cast<std::size_t>(width), static_cast<std::size_t>(height),
                                kSide, kSide);
     range.global[2] = 3;
-    slopes_kernel.launch(range, image, target, slopes, pixel_partials, ssim_partials, width, height,
-                         composite, background[0], background[1], background[2]);
-    gradient_kernel.launch(range, image, target, slopes, gradient, width, height, composite,
-                           background[0], background[1], background[2], scales[0], scales[1]);
+    slopes_kernel.launch(range, image, photo.words, slopes, pixel_partials, ssim_partials, width,
+                         height, photo.planes, composite, background[0], background[1],
+                         background[2]);
+    gradient_kernel.launch(range, image, photo.words, slopes, gradient, width, height, photo.planes,
+                           composite, background[0], background[1], background[2], scales[0],
+                           scales[1]);
   }
 };
 
@@ -149,30 +151,31 @@ ImageLoss::ImageLoss(Context& context, PixelLoss pixel_loss, float ssim_weight, 
 ImageLoss::~ImageLoss() = default;
 
 void ImageLoss::evaluate(const Buffer<float>& image,
-                         const Buffer<std::uint32_t>& target,
+                         const DevicePhoto& photo,
                          bool alpha_is_background,
                          std::array<float, 3> background,
                          int width,
                          int height,
                          Buffer<float>& gradient) {
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  if (width <= 0 || height <= 0 || image.size() < 4 * pixels || target.size() < pixels) {
+  if (width <= 0 || height <= 0 || image.size() < 4 * pixels ||
+      photo.words.size() < photo.words_of(pixels)) {
     throw UsageError(
-        fmt::format("The loss of a {}x{} image was given buffers of {} floats and {} pixels", width,
-                    height, image.size(), target.size()));
+        fmt::format("The loss of a {}x{} image was given buffers of {} floats and {} words", width,
+                    height, image.size(), photo.words.size()));
   }
   Impl& s = *impl_;
   s.resize(width, height);
   gradient.ensure(s.context, 4 * pixels, "image gradient");
 
-  const bool weighted = alpha_is_background && target.size() >= 2 * pixels;
+  const bool weighted = alpha_is_background && photo.weighted;
   const int composite = alpha_is_background ? (weighted ? 2 : 1) : 0;
   const float share = 1.0f / (3.0f * static_cast<float>(pixels));
   const std::array<float, 2> scales{(1.0f - s.ssim_weight) * share, -s.ssim_weight * share};
   if (s.grouped) {
-    s.evaluate_groups(image, target, composite, background, scales, gradient);
+    s.evaluate_groups(image, photo, composite, background, scales, gradient);
   } else {
-    s.evaluate_tiles(image, target, composite, background, scales, gradient);
+    s.evaluate_tiles(image, photo, composite, background, scales, gradient);
   }
 }
 

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <memory>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "raysplats/train_options.hpp"
+#include "train/device_photo.hpp"
 
 namespace raysplats {
 
@@ -17,7 +17,7 @@ namespace raysplats {
 /// pixel = sum over pixels and R, G, B of m * rho(x - y), divided by 3 * width * height, where rho
 /// is |.| (kL1) or the square (kL2). SSIM is the mean over all 3 * width * height window positions
 /// (11 x 11 Gaussian, sigma 1.5, C1 = 0.01^2, C2 = 0.03^2, zeros beyond the borders; Wang et al.
-/// 2004) of x' = y + m (x - y) and y. With an alpha that is a mask, m = a / 255: both means are
+/// 2004) of x' = y + m (x - y) and y. With an alpha a that is a mask, m = a: both means are
 /// still taken over *all* pixels, so masking takes a pixel's share out of the loss and leaves the
 /// weight of the others as it was; a masked pixel (m = 0) is equal in both images and contributes
 /// neither value nor gradient. With alpha_is_background y = rgb * a + background * (1 - a) and m =
@@ -51,11 +51,10 @@ class ImageLoss {
   ~ImageLoss();
 
   /// Enqueues loss and gradient. `image`: planar R, G, B, A (A is not read), 4 x height x width.
-  /// `target`: packed r | g << 8 | b << 16 | a << 24, height x width; with alpha_is_background a
-  /// plane of weights, words 0 to 255, may follow (TargetCache). `gradient` is grown as needed
-  /// and overwritten: planar dL/dR, dL/dG, dL/dB and zeros for A. Nothing is waited for.
+  /// `photo`: of the same size; its weights count with alpha_is_background. `gradient` is grown as
+  /// needed and overwritten: planar dL/dR, dL/dG, dL/dB and zeros for A. Nothing is waited for.
   void evaluate(const Buffer<float>& image,
-                const Buffer<std::uint32_t>& target,
+                const DevicePhoto& photo,
                 bool alpha_is_background,
                 std::array<float, 3> background,
                 int width,

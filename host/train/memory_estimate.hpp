@@ -12,11 +12,12 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;  ///< bytes in the unit of bu
 
 /// What a training run wants to hold.
 struct MemoryDemand {
-  std::size_t gaussians = 0;  ///< most that it may reach
-  std::size_t pixels = 0;     ///< of the largest view
-  std::size_t views = 0;      ///< photos to train on
-  std::size_t ray_views = 0;  ///< of these, traced ray by ray (ViewTracer::by_rays())
-  std::size_t triangles = 0;  ///< of mirrors
+  std::size_t gaussians = 0;    ///< most that it may reach
+  std::size_t pixels = 0;       ///< of the largest view
+  std::size_t views = 0;        ///< photos to train on
+  std::size_t ray_views = 0;    ///< of these, traced ray by ray (ViewTracer::by_rays())
+  std::size_t triangles = 0;    ///< of mirrors
+  std::size_t photo_words = 1;  ///< of 32 bits, of a pixel of a photo (io::Photo)
 };
 
 /// Device memory that a training run will need, in bytes.

@@ -15,24 +15,38 @@ namespace {
 constexpr std::size_t kColorBins = 32;  // per channel
 constexpr double kSharedColor = 0.2;    // share of the pixels that makes a colour the ground's
 
-double channel(std::uint32_t pixel, int index) {
-  return static_cast<double>(pixel >> (8 * index) & 255u) / 255.0;
+// The pixel that contains an image point.
+struct Pixel {
+  int x, y;
+};
+Pixel pixel_at(const io::Photo& picture, const glm::dvec2& point) {
+  return {static_cast<int>(std::clamp<double>(point.x, 0, picture.width - 1)),
+          static_cast<int>(std::clamp<double>(point.y, 0, picture.height - 1))};
+}
+
+// One of kColorBins steps along a channel.
+std::size_t bin_of(float value) {
+  return std::min(kColorBins - 1, static_cast<std::size_t>(value * kColorBins));
+}
+
+template <class Take>
+void for_each_pixel(const io::Photo& picture, const Take& take) {
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < picture.width; ++x) take(picture.at(x, y));
+  }
 }
 
 }  // namespace
 
 glm::dvec4 SmallPhoto::at(const glm::dvec2& point) const {
-  const auto x = static_cast<std::size_t>(std::clamp<double>(point.x, 0, picture->width - 1));
-  const auto y = static_cast<std::size_t>(std::clamp<double>(point.y, 0, picture->height - 1));
-  const std::uint32_t pixel = picture->pixels[y * static_cast<std::size_t>(picture->width) + x];
-  return {channel(pixel, 0), channel(pixel, 1), channel(pixel, 2), channel(pixel, 3)};
+  const Pixel pixel = pixel_at(*picture, point);
+  const std::array<float, 4> rgba = picture->at(pixel.x, pixel.y);
+  return {rgba[0], rgba[1], rgba[2], rgba[3]};
 }
 
 bool SmallPhoto::known(const glm::dvec2& point) const {
-  if (picture->weights.empty()) return true;
-  const auto x = static_cast<std::size_t>(std::clamp<double>(point.x, 0, picture->width - 1));
-  const auto y = static_cast<std::size_t>(std::clamp<double>(point.y, 0, picture->height - 1));
-  return picture->weights[y * static_cast<std::size_t>(picture->width) + x] >= 128;
+  const Pixel pixel = pixel_at(*picture, point);
+  return picture->weight(pixel.x, pixel.y) >= 0.5f;
 }
 
 std::optional<glm::dvec2> SmallPhoto::sees(const glm::dvec3& world) const {
@@ -68,11 +82,12 @@ std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
 double opaque_share(std::span<const SmallPhoto> photos) {
   double sum = 0;
   for (const SmallPhoto& photo : photos) {
-    const auto& pixels = photo.picture->pixels;
-    const auto opaque = std::count_if(pixels.begin(), pixels.end(),
-                                      [](std::uint32_t pixel) { return pixel >> 24 >= 128; });
-    sum +=
-        static_cast<double>(opaque) / static_cast<double>(std::max<std::size_t>(pixels.size(), 1));
+    std::size_t opaque = 0;
+    for_each_pixel(*photo.picture, [&opaque](const std::array<float, 4>& rgba) {
+      opaque += rgba[3] >= 0.5f ? 1 : 0;
+    });
+    const std::size_t pixels = std::max<std::size_t>(photo.picture->pixels(), 1);
+    sum += static_cast<double>(opaque) / static_cast<double>(pixels);
   }
   return photos.empty() ? 1.0 : sum / static_cast<double>(photos.size());
 }
@@ -81,21 +96,20 @@ std::array<float, 3> typical_color(std::span<const SmallPhoto> photos) {
   struct Sum {
     std::array<double, 3> color{};
     double weight = 0;
-    void add(std::uint32_t pixel) {
-      const double share = channel(pixel, 3);
-      for (int c = 0; c < 3; ++c) color[static_cast<std::size_t>(c)] += share * channel(pixel, c);
+    void add(const std::array<float, 4>& rgba) {
+      const auto share = static_cast<double>(rgba[3]);
+      for (std::size_t c = 0; c < 3; ++c) color[c] += share * static_cast<double>(rgba[c]);
       weight += share;
     }
   };
   Sum all;
   std::vector<Sum> bins(kColorBins * kColorBins * kColorBins);
   for (const SmallPhoto& photo : photos) {
-    for (const std::uint32_t pixel : photo.picture->pixels) {
-      all.add(pixel);
-      const std::size_t bin = ((pixel >> 3 & 31u) * kColorBins + (pixel >> 11 & 31u)) * kColorBins +
-                              (pixel >> 19 & 31u);
-      bins[bin].add(pixel);
-    }
+    for_each_pixel(*photo.picture, [&](const std::array<float, 4>& rgba) {
+      all.add(rgba);
+      bins[(bin_of(rgba[0]) * kColorBins + bin_of(rgba[1])) * kColorBins + bin_of(rgba[2])].add(
+          rgba);
+    });
   }
   const auto most = std::max_element(
       bins.begin(), bins.end(), [](const Sum& a, const Sum& b) { return a.weight < b.weight; });

@@ -16,7 +16,7 @@ namespace raysplats {
 /// A reduced photo and the camera that would have taken it.
 struct SmallPhoto {
   Camera camera;
-  std::shared_ptr<const io::PackedImage> picture;
+  std::shared_ptr<const io::Photo> picture;
 
   /// Colour and alpha in [0, 1] of the pixel that contains the image point; the point has to lie
   /// inside the picture.

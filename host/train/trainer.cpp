@@ -31,16 +31,6 @@ std::vector<View> views_of(const Dataset& dataset, const std::vector<std::size_t
   return views;
 }
 
-// Host memory for decoded photos: enough to read ahead, or all within the budget when a later
-// resolution needs them again.
-std::size_t host_image_budget(const TrainOptions& options, const std::vector<Camera>& cameras) {
-  if (!options.resolution_schedule.empty())
-    return static_cast<std::size_t>(options.image_budget) * kMiB;
-  std::size_t largest = 0;
-  for (const Camera& camera : cameras) largest = std::max(largest, 4 * pixels_of(camera));
-  return kReadAhead * largest;
-}
-
 }  // namespace
 
 std::size_t pixels_of(const Camera& camera) {
@@ -76,10 +66,10 @@ Trainer::Impl::Impl(Context& device,
                 options.footprint,
                 {options.scale_min * extent, options.scale_max * extent}),
       guard(device),
-      targets(device,
-              views_of(dataset, train_views),
-              static_cast<std::size_t>(options.image_budget) * kMiB,
-              host_image_budget(options, train_cameras)),
+      photo_cache(device,
+                  views_of(dataset, train_views),
+                  static_cast<std::size_t>(options.image_budget) * kMiB,
+                  kReadAhead),
       slots(static_cast<std::size_t>(options.views_per_step)),
       sum(device) {
   options.data.origin = dataset.origin;

@@ -27,6 +27,7 @@
 #include "train/initialization.hpp"
 #include "train/mcmc.hpp"
 #include "train/model_validator.hpp"
+#include "train/photo_cache.hpp"
 #include "train/photo_set.hpp"
 #include "train/pose_refinement.hpp"
 #include "train/psnr_rise.hpp"
@@ -37,7 +38,6 @@
 #include "train/sky_adam.hpp"
 #include "train/step_guard.hpp"
 #include "train/stopwatch.hpp"
-#include "train/target_cache.hpp"
 
 namespace raysplats {
 
@@ -81,6 +81,7 @@ struct Trainer::Impl {
   std::size_t limit() { return most_gaussians(options.iterations); }
   std::size_t most_gaussians(std::int64_t iterations);
   std::size_t largest_photo() const;
+  std::size_t photo_words() const;
   std::size_t ray_views() const;
 
   // trainer_step.cpp: one step, and what happens between two of them.
@@ -177,7 +178,7 @@ struct Trainer::Impl {
   std::optional<Mcmc> mcmc;             // with the strategy
   StepGuard guard;
   std::optional<ModelValidator> validator;  // once it is asked for
-  TargetCache targets;
+  PhotoCache photo_cache;
   ViewOrder order{0, 0};  // of views, of which a step takes several (follow_options())
 
   DeviceGaussians gaussians;

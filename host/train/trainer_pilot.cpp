@@ -96,7 +96,7 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
     const Camera camera =
         divisor > 1 ? downscaled(train_cameras[view], divisor) : train_cameras[view];
     const Timer photo(context);
-    targets.get(view, camera.width, camera.height);
+    photo_cache.get(view, camera.width, camera.height);
     context.finish();
     photo_seconds += photo.seconds();
     ++photos;

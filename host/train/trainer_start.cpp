@@ -78,8 +78,12 @@ std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {
   for (const Camera& camera : train_cameras) pixels += static_cast<double>(pixels_of(camera));
   pixels /= static_cast<double>(train_cameras.size());
   if (cut_out) pixels *= opaque_share(photos());
-  const MemoryDemand demand{fitted_limit(pixels, iterations), largest_photo(), train_views.size(),
-                            ray_views(), tracer.triangles()};
+  const MemoryDemand demand{fitted_limit(pixels, iterations),
+                            largest_photo(),
+                            train_views.size(),
+                            ray_views(),
+                            tracer.triangles(),
+                            photo_words()};
   return std::max<std::size_t>(1, gaussians_that_fit(options, demand, context.device()));
 }
 
@@ -87,6 +91,17 @@ std::size_t Trainer::Impl::largest_photo() const {
   std::size_t pixels = 0;
   for (const Camera& camera : train_cameras) pixels = std::max(pixels, pixels_of(camera));
   return pixels;
+}
+
+// Of the photos with the most precise numbers.
+std::size_t Trainer::Impl::photo_words() const {
+  std::size_t words = 1;
+  for (const std::size_t i : train_views) {
+    const View& view = dataset.views[i];
+    words =
+        std::max(words, static_cast<std::size_t>(view.sample_bytes + (view.mask_apart ? 1 : 0)));
+  }
+  return words;
 }
 
 std::size_t Trainer::Impl::ray_views() const {
@@ -147,7 +162,7 @@ void Trainer::Impl::start() {
   const bool grows = density.accumulates_at(iteration);
   check_memory(options,
                {grows ? std::max(gaussians.count, most) : gaussians.count, largest_photo(),
-                train_views.size(), ray_views(), tracer.triangles()},
+                train_views.size(), ray_views(), tracer.triangles(), photo_words()},
                context.device());
   if (const std::size_t by_rays = ray_views(); by_rays > 0) {
     spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),

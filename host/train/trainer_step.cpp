@@ -27,7 +27,7 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
   ViewSlot& out = slots[slot];
   const std::int64_t turn = iteration * options.views_per_step + static_cast<std::int64_t>(slot);
   const std::size_t view = out.view = order.at(turn);
-  targets.prefetch(order.upcoming(kReadAhead - 1));
+  photo_cache.prefetch(order.upcoming(kReadAhead - 1));
   const int divisor = resolution_divisor(options, iteration);
   const bool slopes = poses && iteration < pose_end(options);
   const Camera full = poses ? poses->camera(view) : train_cameras[view];
@@ -39,7 +39,7 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
   const Buffer<float>& shown =
       exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
                : tracer.image();
-  loss.evaluate(shown, targets.get(view, camera.width, camera.height), cut_out, behind,
+  loss.evaluate(shown, photo_cache.get(view, camera.width, camera.height), cut_out, behind,
                 camera.width, camera.height, image_gradient);
   guard.check_loss(loss.partials(), tracer.overflow());
   if (exposure)

@@ -30,6 +30,7 @@ struct View {
   std::filesystem::path mask_path;   ///< optional mask (black = ignore); empty when there is none
   bool mask_apart = false;  ///< alpha is coverage, and what the mask ignores is a plane of its own
   Camera source_camera;     ///< of the photo on disk, with its lens
+  int sample_bytes = 1;     ///< of a number in the photo on disk: 1, 2 or 4 (floats)
   bool test = false;
 };
 
@@ -76,7 +77,7 @@ Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& op
 /// The photo of a view as RGBA float at camera.width x camera.height: undistorted where
 /// view.camera is a pinhole and the photo's lens is none, resampled (area average). A is the mask
 /// or coverage: 1 where the photo is valid, 0 beyond the limit of a lens; RGB is straight (not
-/// premultiplied).
+/// premultiplied). Numbers of float files count within [0, 1].
 Image load_view_image(const View& view);
 
 /// A photo, and how much each of its pixels counts: a mask that is black everywhere is refused.

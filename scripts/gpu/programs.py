@@ -83,6 +83,7 @@ PROGRAMS = [
     ("loss group", "train/group_loss.cl", dict(PIXEL_L2=0, SSIM_GRADIENT=1)),
     ("loss prepare", "train/loss_prepare.cl", LOSS),
     ("loss ssim", "train/loss_ssim.cl", dict(LOSS, SSIM_GRADIENT=1)),
+    ("photo reduce", "train/photo_reduce.cl", {}),
     ("loss reduce", "train/loss_reduce.cl", {}),
     ("adam sh3", "train/adam.cl", dict(VECTOR=1, BLOCK=256, GROUP=64, WIDTH=48, SPAN=1)),
     ("adam means", "train/adam.cl", dict(VECTOR=1, BLOCK=256, GROUP=64, WIDTH=3, SPAN=1)),

@@ -44,7 +44,10 @@ class PythonDecoder : public io::ImageDecoder {
   explicit PythonDecoder(Image image) : image_(std::move(image)) {}
   int width() const override { return image_.width; }
   int height() const override { return image_.height; }
-  Image decode() override { return std::move(image_); }
+  int sample_bytes() const override { return sizeof(float); }
+  io::RawImage decode() override {
+    return {image_.width, image_.height, image_.channels, std::move(image_.data)};
+  }
 
  private:
   Image image_;

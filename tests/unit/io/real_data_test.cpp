@@ -65,7 +65,7 @@ void check_dataset(const fs::path& root, const Expected& expected) {
   io::ViewLoader loader(dataset.views, std::size_t{1} << 30);
   loader.prefetch(dataset.indices(Split::kAll));
   for (std::size_t i = 0; i < dataset.views.size(); ++i) {
-    CHECK(loader.get(i)->pixels.size() ==
+    CHECK(loader.get(i)->words.size() ==
           static_cast<std::size_t>(expected.width) * static_cast<std::size_t>(expected.height));
   }
   std::printf(

@@ -3,7 +3,6 @@
 
 #include <doctest/doctest.h>
 
-#include <cmath>
 #include <string>
 #include <thread>
 #include <vector>
@@ -37,15 +36,6 @@ std::vector<View> make_views(const Scratch& scratch, std::size_t count) {
 
 }  // namespace
 
-TEST_CASE("pixels are packed as r, g, b, a from the low byte, clamped and rounded") {
-  Image image(2, 1, 4);
-  image.data = {1.0f, 0.5f, 0.0f, 2.0f, 10.4f / 255, 10.6f / 255, -3.0f, std::nanf("")};
-  const io::PackedImage packed = io::pack(image);
-  CHECK(packed.width == 2);
-  CHECK(packed.height == 1);
-  CHECK(packed.pixels == std::vector<std::uint32_t>{0xff0080ffu, 0x00000b0au});
-}
-
 TEST_CASE("views come back right in any order, prefetched or not, within the budget") {
   const Scratch scratch;
   const auto views = make_views(scratch, 12);
@@ -59,8 +49,8 @@ TEST_CASE("views come back right in any order, prefetched or not, within the bud
       if (step % 3 != 0) loader.prefetch(order);
       const std::size_t index = order[rng.below(3)] % 12;
       const auto image = loader.get(index);
-      CHECK(image->pixels.size() == kSide * kSide);
-      CHECK(image->pixels[7] == (0xff000000u | static_cast<std::uint32_t>(index)));
+      CHECK(image->words.size() == kSide * kSide);
+      CHECK(image->words[7] == (0xff000000u | static_cast<std::uint32_t>(index)));
       CHECK(loader.cached_bytes() <= 5 * kBytes + 10);
     }
   }
@@ -72,8 +62,8 @@ TEST_CASE("what was used last stays: deleted files show what is kept") {
   io::ViewLoader loader(views, 2 * kBytes, 1);
   for (const std::size_t index : {0u, 1u, 0u, 2u}) loader.get(index);
   for (const View& view : views) fs::remove(view.image_path);
-  CHECK(loader.get(0)->pixels[0] == 0xff000000u);
-  CHECK(loader.get(2)->pixels[0] == 0xff000002u);
+  CHECK(loader.get(0)->words[0] == 0xff000000u);
+  CHECK(loader.get(2)->words[0] == 0xff000002u);
   CHECK(contains(data_error([&] { loader.get(1); }), "1.png"));
 }
 
@@ -83,9 +73,26 @@ TEST_CASE("a picture above the budget is returned and not kept, and outlives its
   io::ViewLoader loader(views, 10, 2);
   const auto first = loader.get(0);
   const auto second = loader.get(1);
-  CHECK(first->pixels[0] == 0xff000000u);
-  CHECK(second->pixels[0] == 0xff000001u);
+  CHECK(first->words[0] == 0xff000000u);
+  CHECK(second->words[0] == 0xff000001u);
   CHECK(loader.cached_bytes() == 0);
+}
+
+TEST_CASE("what is forgotten is read again") {
+  const Scratch scratch;
+  const auto views = make_views(scratch, 2);
+  io::ViewLoader loader(views, 10 * kBytes, 1);
+  const auto first = loader.get(0);
+  loader.forget(1);  // never read
+  loader.forget(7);  // none
+  CHECK(loader.cached_bytes() == kBytes);
+  loader.forget(0);
+  CHECK(loader.cached_bytes() == 0);
+  CHECK(first->words[0] == 0xff000000u);
+  CHECK(loader.get(0)->words == first->words);
+  fs::remove(views[0].image_path);
+  loader.forget(0);
+  CHECK(contains(data_error([&] { loader.get(0); }), "0.png"));
 }
 
 TEST_CASE("errors of the workers surface in get, and a repaired file is read again") {
@@ -95,11 +102,11 @@ TEST_CASE("errors of the workers surface in get, and a repaired file is read aga
   write_bytes(views[1].image_path, "");
   io::ViewLoader loader(views, 100 * kBytes);
   loader.prefetch(std::vector<std::size_t>{0, 1, 2});
-  CHECK(loader.get(2)->pixels[0] == 0xff000002u);
+  CHECK(loader.get(2)->words[0] == 0xff000002u);
   CHECK(contains(data_error([&] { loader.get(1); }), "empty"));
   CHECK(contains(data_error([&] { loader.get(1); }), "empty"));
   write_bytes(views[1].image_path, whole);
-  CHECK(loader.get(1)->pixels[0] == 0xff000001u);
+  CHECK(loader.get(1)->words[0] == 0xff000001u);
   CHECK_THROWS_AS(loader.get(3), UsageError);
 }
 
@@ -117,7 +124,7 @@ TEST_CASE("several callers may ask at once, and a loader with queued work can be
           for (int i = 0; i < 50; ++i) {
             const std::size_t index = rng.below(8);
             if (i % 10 == 0) loader.prefetch(std::vector<std::size_t>{index, (index + 1) % 8});
-            if (loader.get(index)->pixels[3] != (0xff000000u | static_cast<std::uint32_t>(index)))
+            if (loader.get(index)->words[3] != (0xff000000u | static_cast<std::uint32_t>(index)))
               ++wrong[t];
           }
         });

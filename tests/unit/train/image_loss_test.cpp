@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -31,6 +32,8 @@ struct Scene {
   std::vector<std::uint32_t> target;  // packed
   bool alpha_is_background = false;
   std::array<float, 3> background{0, 0, 0};
+  int planes = 1;
+  bool weighted = false;
 
   std::size_t pixels() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -68,16 +71,48 @@ Scene make_scene(int width, int height, std::uint64_t seed, bool random_alpha) {
   return s;
 }
 
+// A number of the photo, by the layout of cl/train/photo.h.
+double photo_channel(const Scene& s, std::size_t pixel, std::size_t c) {
+  if (s.planes == 1) return (s.target[pixel] >> (8 * c) & 255u) / 255.0;
+  if (s.planes == 2)
+    return (s.target[c / 2 * s.pixels() + pixel] >> (16 * (c % 2)) & 65535u) / 65535.0;
+  return static_cast<double>(std::bit_cast<float>(s.target[c * s.pixels() + pixel]));
+}
+
 double photo_value(const Scene& s, std::size_t pixel, std::size_t c) {
-  const double value = ((s.target[pixel] >> (8 * c)) & 255u) / 255.0;
-  const double alpha = (s.target[pixel] >> 24) / 255.0;
+  const double value = photo_channel(s, pixel, c);
+  const double alpha = photo_channel(s, pixel, 3);
   return s.alpha_is_background ? value * alpha + static_cast<double>(s.background[c]) * (1 - alpha)
                                : value;
 }
 
 double photo_weight(const Scene& s, std::size_t pixel) {
-  if (s.target.size() > s.pixels()) return s.target[s.pixels() + pixel] / 255.0;
-  return s.alpha_is_background ? 1.0 : (s.target[pixel] >> 24) / 255.0;
+  if (s.weighted) {
+    const std::uint32_t word = s.target[static_cast<std::size_t>(s.planes) * s.pixels() + pixel];
+    return s.planes == 4 ? static_cast<double>(std::bit_cast<float>(word)) : word / 255.0;
+  }
+  return s.alpha_is_background ? 1.0 : photo_channel(s, pixel, 3);
+}
+
+// The photo with more precise numbers: what no 8 bits can hold is added to its colours.
+Scene with_planes(const Scene& s, int planes) {
+  Scene out = s;
+  out.planes = planes;
+  out.target.assign(s.pixels() * static_cast<std::size_t>(planes), 0);
+  CounterRng rng(29, static_cast<std::uint64_t>(planes));
+  for (std::size_t i = 0; i < s.pixels(); ++i) {
+    for (std::size_t c = 0; c < 4; ++c) {
+      const double fine = c < 3 ? (rng.uniform() - 0.5) / 300.0 : 0.0;
+      const double value = std::clamp(photo_channel(s, i, c) + fine, 0.0, 1.0);
+      if (planes == 2) {
+        out.target[c / 2 * s.pixels() + i] |= static_cast<std::uint32_t>(std::lround(value * 65535))
+                                              << (16 * (c % 2));
+      } else {
+        out.target[c * s.pixels() + i] = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+      }
+    }
+  }
+  return out;
 }
 
 // What a work-item takes: a vector's pixels of whole tiles, or one pixel of a group.
@@ -133,7 +168,8 @@ Result run(const Scene& s, ImageLoss& loss) {
   image.upload(s.image);
   target.upload(s.target);
   gradient.upload(std::vector<float>(s.image.size() + 64, 7.0f));
-  loss.evaluate(image, target, s.alpha_is_background, s.background, s.width, s.height, gradient);
+  loss.evaluate(image, {target, s.planes, s.weighted}, s.alpha_is_background, s.background, s.width,
+                s.height, gradient);
   Result result{loss.value(), std::vector<float>(s.image.size() + 64)};
   gradient.download(std::span<float>(result.gradient));
   for (std::size_t i = s.image.size(); i < result.gradient.size(); ++i)
@@ -239,11 +275,44 @@ TEST_CASE("image loss: a plane of weights ignores pixels of cut-out photos [smal
       s.background = {1.0f, 0.5f, 0.25f};
       for (std::size_t i = 0; i < s.pixels(); ++i)
         s.target.push_back(i % 5 == 0 ? 0U : i % 5 == 1 ? 97U : 255U);
+      s.weighted = true;
       const Result result = run(s, pixel_loss, 0.2f, form);
       check_value(s, pixel_loss, 0.2f, result.value);
       check_gradient(s, pixel_loss, 0.2f, result.gradient);
       for (std::size_t i = 0; i < s.pixels(); i += 5) {
         for (std::size_t c = 0; c < 3; ++c) CHECK(result.gradient[c * s.pixels() + i] == 0.0f);
+      }
+    }
+  }
+}
+
+TEST_CASE("image loss: photos of 16 bits and of floats keep their precision [small]") {
+  for (const auto& [planes, form] :
+       {std::pair{2, 0}, {4, 0}, {2, ImageLoss::kGroups}, {4, ImageLoss::kGroups}}) {
+    for (const bool alpha_is_background : {false, true}) {
+      for (const bool weighted : {false, true}) {
+        CAPTURE(planes);
+        CAPTURE(alpha_is_background);
+        CAPTURE(weighted);
+        Scene coarse = make_scene(37, 14, 9, true);
+        coarse.alpha_is_background = alpha_is_background;
+        coarse.background = {1.0f, 0.5f, 0.25f};
+        Scene s = with_planes(coarse, planes);
+        s.weighted = weighted;
+        for (std::size_t i = 0; weighted && i < s.pixels(); ++i) {
+          const std::uint32_t word = i % 3 == 0 ? 0U : i % 3 == 1 ? 97U : 255U;
+          const float share = static_cast<float>(word) / 255.0f;
+          s.target.push_back(planes == 4 ? std::bit_cast<std::uint32_t>(share) : word);
+        }
+        if (weighted && !alpha_is_background) continue;  // weights are of cut-out photos
+        const Result result = run(s, PixelLoss::kL2, 0.2f, form);
+        check_value(s, PixelLoss::kL2, 0.2f, result.value);
+        check_gradient(s, PixelLoss::kL2, 0.2f, result.gradient);
+        const double rounded =
+            reference_loss(coarse, std::vector<double>(s.image.begin(), s.image.end()),
+                           PixelLoss::kL2, 0.2)
+                .pixel;
+        if (!weighted) CHECK(std::abs(result.value.pixel - rounded) > 3e-6 * rounded);
       }
     }
   }
@@ -336,7 +405,7 @@ TEST_CASE("image loss: equal images have no loss, and bad arguments are refused"
   CHECK_THROWS_AS(loss.value(), UsageError);
   Buffer<float> image(context(), 16, "image"), gradient;
   Buffer<std::uint32_t> target(context(), 4, "target");
-  CHECK_THROWS_AS(loss.evaluate(image, target, false, {0, 0, 0}, 3, 3, gradient), UsageError);
+  CHECK_THROWS_AS(loss.evaluate(image, {target}, false, {0, 0, 0}, 3, 3, gradient), UsageError);
 }
 
 }  // namespace raysplats

@@ -20,7 +20,7 @@ namespace {
 // The photo that `color` of each pixel's ray makes.
 template <class Color>
 SmallPhoto photo_of(const Camera& camera, const Color& color) {
-  auto picture = std::make_shared<io::PackedImage>();
+  auto picture = std::make_shared<io::Photo>();
   picture->width = camera.width;
   picture->height = camera.height;
   for (int y = 0; y < camera.height; ++y) {
@@ -30,7 +30,7 @@ SmallPhoto photo_of(const Camera& camera, const Color& color) {
       std::uint32_t pixel = 0;
       for (int k = 0; k < 4; ++k)
         pixel |= static_cast<std::uint32_t>(std::lround(255 * std::clamp(c[k], 0.0, 1.0))) << 8 * k;
-      picture->pixels.push_back(pixel);
+      picture->words.push_back(pixel);
     }
   }
   return {camera, picture};

@@ -44,7 +44,7 @@ struct Fixture {
     std::vector<float> pixels(4 * kPixels, 0.5f);
     pixels[777] = value;
     image.upload(pixels);
-    loss.evaluate(image, photo, false, {0, 0, 0}, kSide, kSide, gradient);
+    loss.evaluate(image, {photo}, false, {0, 0, 0}, kSide, kSide, gradient);
     guard.check_loss(loss.partials(), overflow);
     marked = guard.mark().read(0) != 0;
     refused_so_far += refusals;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/resample.hpp"
+#include "io/photo_rows.hpp"
 
 #include <doctest/doctest.h>
 
@@ -15,6 +15,32 @@
 using namespace raysplats;
 
 namespace {
+
+/// A picture of floats as a file has it.
+io::RawImage raw(const Image& image) {
+  return {image.width, image.height, image.channels, image.data};
+}
+
+Image collected(io::PhotoRows& rows) {
+  Image out(rows.width(), rows.height(), 4);
+  for (int y = 0; y < out.height; ++y) rows.row(y, &out.at(0, y, 0));
+  return out;
+}
+
+Image reduced(const Image& image, int width, int height) {
+  const io::RawImage source = raw(image);
+  return collected(*io::reduced_rows(io::decoded_rows(source, nullptr), width, height));
+}
+
+Image undistorted(const Image& image, const Camera& camera) {
+  const io::RawImage source = raw(image);
+  return collected(*io::undistorted_rows(io::decoded_rows(source, nullptr), camera));
+}
+
+Image seen(const Image& image, const Camera& camera) {
+  const io::RawImage source = raw(image);
+  return collected(*io::seen_rows(io::decoded_rows(source, nullptr), camera));
+}
 
 /// Average of premultiplied colour and of alpha over a target pixel, straight, by overlap areas in
 /// double.
@@ -64,7 +90,7 @@ TEST_CASE("area resampling equals the overlap-weighted average for whole and fra
   for (std::size_t i = 0; i < image.pixels(); i += 3) image.data[4 * i + 3] = 0.0f;
   for (const auto& [width, height] :
        {std::pair{23, 17}, {11, 8}, {8, 6}, {5, 17}, {1, 1}, {22, 16}}) {
-    const Image out = io::area_resample(image, width, height);
+    const Image out = reduced(image, width, height);
     double worst = 0;
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
@@ -80,10 +106,39 @@ TEST_CASE("area resampling equals the overlap-weighted average for whole and fra
   }
 }
 
+TEST_CASE("reduction of 8 and 16 bits works on unrounded sums") {
+  CounterRng rng(6, 6);
+  for (const int width : {31, 40}) {
+    Image image(width, 26, 4);
+    io::RawImage bytes{width, 26, 4, std::vector<std::uint8_t>(image.data.size())};
+    io::RawImage shorts{width, 26, 4, std::vector<std::uint16_t>(image.data.size())};
+    for (std::size_t i = 0; i < image.data.size(); ++i) {
+      const auto byte = static_cast<std::uint8_t>(rng.below(256));
+      std::get<std::vector<std::uint8_t>>(bytes.numbers)[i] = byte;
+      std::get<std::vector<std::uint16_t>>(shorts.numbers)[i] =
+          static_cast<std::uint16_t>(257u * byte);
+      image.data[i] = static_cast<float>(byte) / 255.0f;
+    }
+    for (const io::RawImage* source : {&bytes, &shorts}) {
+      const Image out = collected(*io::reduced_rows(io::decoded_rows(*source, nullptr), 9, 5));
+      double worst = 0;
+      for (int y = 0; y < 5; ++y) {
+        for (int x = 0; x < 9; ++x) {
+          double expected[4];
+          box_reference(image, 9, 5, x, y, expected);
+          for (int c = 0; c < 4; ++c)
+            worst = std::max(worst, std::abs(static_cast<double>(out.at(x, y, c)) - expected[c]));
+        }
+      }
+      CHECK(worst < 2e-6);
+    }
+  }
+}
+
 TEST_CASE("transparent pixels do not bleed into the average") {
   Image image(2, 1, 4);
   image.data = {1.0f, 0.5f, 0.25f, 1.0f, 0.0f, 0.0f, 0.0f, 0.0f};
-  const Image out = io::area_resample(image, 1, 1);
+  const Image out = reduced(image, 1, 1);
   CHECK(out.data == std::vector<float>{1.0f, 0.5f, 0.25f, 0.5f});
 }
 
@@ -114,7 +169,7 @@ TEST_CASE("undistortion recovers an analytic pattern seen through a lens") {
       }
     }
     camera.distortion = d;
-    const Image out = io::undistort(photo, camera);
+    const Image out = undistorted(photo, camera);
     double worst = 0;
     double worst_unchanged = 0;
     std::size_t inside = 0;
@@ -156,7 +211,7 @@ TEST_CASE("rays beyond the angle where the lens folds over are masked") {
   // r (1 - r^2 / 3) grows up to r = 1 and comes back into the photo beyond.
   camera.model = CameraModel::kOpenCv;
   camera.distortion = {-1.0 / 3.0, 0, 0, 0, 0};
-  const Image out = io::undistort(Image(100, 100, 4, 1.0f), camera);
+  const Image out = undistorted(Image(100, 100, 4, 1.0f), camera);
   std::size_t wrong = 0;
   for (int y = 0; y < 100; ++y) {
     for (int x = 0; x < 100; ++x) {
@@ -177,24 +232,21 @@ TEST_CASE("pixels that a lens does not see are masked in photos that keep their 
   camera.model = CameraModel::kFisheye;
   for (const double k4 : {0.0, -0.001}) {
     camera.distortion.k4 = k4;
-    Image photo(100, 100, 4, 0.75f);
-    io::mask_unseen(photo, camera);
+    const Image photo = seen(Image(100, 100, 4, 0.75f), camera);
     std::size_t wrong = 0, masked = 0;
     for (int y = 0; y < 100; ++y) {
       for (int x = 0; x < 100; ++x) {
-        const bool seen = camera_ray(camera, x + 0.5, y + 0.5).valid;
-        masked += seen ? 0 : 1;
-        wrong += photo.at(x, y, 3) == (seen ? 0.75f : 0.0f) && photo.at(x, y, 0) == 0.75f ? 0 : 1;
+        const bool valid = camera_ray(camera, x + 0.5, y + 0.5).valid;
+        masked += valid ? 0 : 1;
+        wrong += photo.at(x, y, 3) == (valid ? 0.75f : 0.0f) && photo.at(x, y, 0) == 0.75f ? 0 : 1;
       }
     }
     CHECK(wrong == 0);
     CHECK(masked > 1000);
   }
   camera.model = CameraModel::kPinhole;
-  Image photo(100, 100, 4, 0.75f);
-  const std::vector<float> before = photo.data;
-  io::mask_unseen(photo, camera);
-  CHECK(photo.data == before);
+  const Image photo(100, 100, 4, 0.75f);
+  CHECK(seen(photo, camera).data == photo.data);
 }
 
 TEST_CASE("compositing blends by alpha and repeats grey") {

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/photo_rows.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/vec2.hpp>
+#include <type_traits>
+#include <utility>
+
+#include "core/camera_model.hpp"
+
+namespace raysplats::io {
+namespace {
+
+constexpr std::size_t kChannels = 4;
+
+// A number of a file in [0, 1]; written so that NaN becomes 0.
+float to_unit(std::uint8_t value) { return static_cast<float>(value) / 255.0f; }
+float to_unit(std::uint16_t value) { return static_cast<float>(value) / 65535.0f; }
+float to_unit(float value) { return value > 0.0f ? std::min(value, 1.0f) : 0.0f; }
+
+template <class T>
+class DecodedRows : public PhotoPixels {
+ public:
+  DecodedRows(const RawImage& image, const std::vector<T>& numbers, const MaskPlane* mask)
+      : PhotoPixels(image.width, image.height),
+        numbers_(numbers),
+        channels_(static_cast<std::size_t>(image.channels)),
+        mask_(mask) {}
+
+  void pixel(int x, int y, float* rgba) override {
+    const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width()) +
+                              static_cast<std::size_t>(x);
+    const T* number = numbers_.data() + index * channels_;
+    const bool grey = channels_ < 3;
+    for (std::size_t c = 0; c < 3; ++c) rgba[c] = to_unit(number[grey ? 0 : c]);
+    const bool covered = channels_ == 2 || channels_ == 4;
+    rgba[3] = covered ? to_unit(number[channels_ - 1]) : 1.0f;
+    if (mask_ != nullptr) rgba[3] *= mask_->at(x, y, width(), height());
+  }
+  void row(int y, float* rgba) override {
+    for (int x = 0; x < width(); ++x, rgba += kChannels) pixel(x, y, rgba);
+  }
+
+ private:
+  const std::vector<T>& numbers_;
+  std::size_t channels_;
+  const MaskPlane* mask_;
+};
+
+class MaskRows : public PhotoPixels {
+ public:
+  MaskRows(const MaskPlane& mask, int width, int height)
+      : PhotoPixels(width, height), mask_(mask) {}
+  void pixel(int x, int y, float* rgba) override {
+    std::fill(rgba, rgba + 3, 1.0f);
+    rgba[3] = mask_.at(x, y, width(), height());
+  }
+  void row(int y, float* rgba) override {
+    for (int x = 0; x < width(); ++x, rgba += kChannels) pixel(x, y, rgba);
+  }
+
+ private:
+  const MaskPlane& mask_;
+};
+
+// Writes a sum of alpha-weighted colours as straight colour and alpha.
+void store_straight(const std::array<float, kChannels>& sum, float* out) {
+  for (std::size_t c = 0; c < 3; ++c) out[c] = sum[3] > 0 ? sum[c] / sum[3] : 0.0f;
+  out[3] = sum[3] > 0 ? std::min(sum[3], 1.0f) : 0.0f;
+}
+
+class UndistortedRows : public PhotoRows {
+ public:
+  UndistortedRows(std::unique_ptr<PhotoPixels> source, const Camera& camera)
+      : PhotoRows(source->width(), source->height()),
+        source_(std::move(source)),
+        camera_(camera),
+        limit_(lens_limit(CameraModel::kOpenCv, camera.distortion)) {}
+
+  void row(int y, float* rgba) override {
+    for (int x = 0; x < width(); ++x, rgba += kChannels) {
+      const glm::dvec2 p((x + 0.5 - camera_.cx) / camera_.fx, (y + 0.5 - camera_.cy) / camera_.fy);
+      const glm::dvec2 seen = distort(camera_.distortion, p);
+      const double u = seen.x * camera_.fx + camera_.cx;
+      const double v = seen.y * camera_.fy + camera_.cy;
+      const bool inside = p.x * p.x + p.y * p.y <= limit_ * limit_ && u >= 0 && u <= width() &&
+                          v >= 0 && v <= height();
+      if (inside) {
+        interpolate(u, v, rgba);
+      } else {
+        std::fill(rgba, rgba + kChannels, 0.0f);
+      }
+    }
+  }
+
+ private:
+  void interpolate(double u, double v, float* rgba) {
+    // Between the outermost pixel centres and the border the border pixel goes on.
+    const double px = std::clamp(u - 0.5, 0.0, width() - 1.0);
+    const double py = std::clamp(v - 0.5, 0.0, height() - 1.0);
+    const int x0 = std::min(static_cast<int>(px), std::max(width() - 2, 0));
+    const int y0 = std::min(static_cast<int>(py), std::max(height() - 2, 0));
+    const int x1 = std::min(x0 + 1, width() - 1);
+    const int y1 = std::min(y0 + 1, height() - 1);
+    const auto wx = static_cast<float>(px - x0);
+    const auto wy = static_cast<float>(py - y0);
+    std::array<float, kChannels> sum{};
+    const auto add = [&](int x, int y, float weight) {
+      std::array<float, kChannels> tap{};
+      source_->pixel(x, y, tap.data());
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * tap[3] * tap[c];
+      sum[3] += weight * tap[3];
+    };
+    add(x0, y0, (1 - wx) * (1 - wy));
+    add(x1, y0, wx * (1 - wy));
+    add(x0, y1, (1 - wx) * wy);
+    add(x1, y1, wx * wy);
+    store_straight(sum, rgba);
+  }
+
+  std::unique_ptr<PhotoPixels> source_;
+  Camera camera_;
+  double limit_;
+};
+
+class SeenRows : public PhotoRows {
+ public:
+  SeenRows(std::unique_ptr<PhotoRows> source, const Camera& camera)
+      : PhotoRows(source->width(), source->height()),
+        source_(std::move(source)),
+        camera_(camera),
+        limit_(radial_image(
+            camera.model, camera.distortion, lens_limit(camera.model, camera.distortion))) {}
+
+  void row(int y, float* rgba) override {
+    source_->row(y, rgba);
+    const double v = (y + 0.5 - camera_.cy) / camera_.fy;
+    for (int x = 0; x < width(); ++x) {
+      const double u = (x + 0.5 - camera_.cx) / camera_.fx;
+      if (u * u + v * v > limit_ * limit_) rgba[kChannels * static_cast<std::size_t>(x) + 3] = 0.0f;
+    }
+  }
+
+ private:
+  std::unique_ptr<PhotoRows> source_;
+  Camera camera_;
+  double limit_;
+};
+
+// Source pixels [first, first + weights.size()) of one target pixel along an axis; the weights sum
+// to 1.
+struct Span {
+  int first = 0;
+  std::vector<float> weights;
+};
+
+// Parts of 1 / target of a source pixel are whole numbers, so nothing depends on rounding.
+std::vector<Span> area_spans(int source, int target) {
+  std::vector<Span> spans(static_cast<std::size_t>(target));
+  for (std::int64_t i = 0; i < target; ++i) {
+    const std::int64_t begin = i * source, end = begin + source;
+    Span& span = spans[static_cast<std::size_t>(i)];
+    span.first = static_cast<int>(begin / target);
+    for (std::int64_t p = span.first; p * target < end; ++p) {
+      const std::int64_t overlap = std::min(end, (p + 1) * target) - std::max(begin, p * target);
+      span.weights.push_back(static_cast<float>(static_cast<double>(overlap) / source));
+    }
+  }
+  return spans;
+}
+
+class ReducedRows : public PhotoRows {
+ public:
+  ReducedRows(std::unique_ptr<PhotoRows> source, int width, int height)
+      : PhotoRows(width, height),
+        source_(std::move(source)),
+        columns_(area_spans(source_->width(), width)),
+        rows_(area_spans(source_->height(), height)),
+        pixels_(kChannels * static_cast<std::size_t>(source_->width())),
+        sums_(static_cast<std::size_t>(source_->width())) {}
+
+  // Rows are averaged first, so that one row of sums is all the memory there is.
+  void row(int y, float* rgba) override {
+    std::fill(sums_.begin(), sums_.end(), std::array<float, kChannels>{});
+    const Span& span = rows_[static_cast<std::size_t>(y)];
+    for (std::size_t k = 0; k < span.weights.size(); ++k) {
+      source_->row(span.first + static_cast<int>(k), pixels_.data());
+      const float* pixel = pixels_.data();
+      for (std::array<float, kChannels>& sum : sums_) {
+        const float weight = span.weights[k] * pixel[3];
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * pixel[c];
+        sum[3] += weight;
+        pixel += kChannels;
+      }
+    }
+    for (const Span& column : columns_) {
+      std::array<float, kChannels> sum{};
+      for (std::size_t k = 0; k < column.weights.size(); ++k) {
+        const auto& part = sums_[static_cast<std::size_t>(column.first) + k];
+        for (std::size_t c = 0; c < kChannels; ++c) sum[c] += column.weights[k] * part[c];
+      }
+      store_straight(sum, rgba);
+      rgba += kChannels;
+    }
+  }
+
+ private:
+  std::unique_ptr<PhotoRows> source_;
+  std::vector<Span> columns_, rows_;
+  std::vector<float> pixels_;
+  std::vector<std::array<float, kChannels>> sums_;
+};
+
+}  // namespace
+
+float MaskPlane::at(int x, int y, int photo_width, int photo_height) const {
+  const auto mask_x = static_cast<std::size_t>(static_cast<long>(x) * width / photo_width);
+  const auto mask_y = static_cast<std::size_t>(static_cast<long>(y) * height / photo_height);
+  return values[mask_y * static_cast<std::size_t>(width) + mask_x];
+}
+
+MaskPlane mask_plane(const RawImage& mask) {
+  MaskPlane out{mask.width, mask.height, {}};
+  const auto channels = static_cast<std::size_t>(mask.channels);
+  std::visit(
+      [&](const auto& numbers) {
+        out.values.reserve(numbers.size() / channels);
+        for (std::size_t i = 0; i < numbers.size(); i += channels)
+          out.values.push_back(to_unit(numbers[i]));
+      },
+      mask.numbers);
+  return out;
+}
+
+std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image, const MaskPlane* mask) {
+  return std::visit(
+      [&](const auto& numbers) -> std::unique_ptr<PhotoPixels> {
+        using T = typename std::decay_t<decltype(numbers)>::value_type;
+        return std::make_unique<DecodedRows<T>>(image, numbers, mask);
+      },
+      image.numbers);
+}
+
+std::unique_ptr<PhotoPixels> mask_rows(const MaskPlane& mask, int width, int height) {
+  return std::make_unique<MaskRows>(mask, width, height);
+}
+
+std::unique_ptr<PhotoRows> undistorted_rows(std::unique_ptr<PhotoPixels> source,
+                                            const Camera& camera) {
+  return std::make_unique<UndistortedRows>(std::move(source), camera);
+}
+
+std::unique_ptr<PhotoRows> seen_rows(std::unique_ptr<PhotoRows> source, const Camera& camera) {
+  if (camera.model != CameraModel::kOpenCv && camera.model != CameraModel::kFisheye) return source;
+  return std::make_unique<SeenRows>(std::move(source), camera);
+}
+
+std::unique_ptr<PhotoRows> reduced_rows(std::unique_ptr<PhotoRows> source, int width, int height) {
+  if (width == source->width() && height == source->height()) return source;
+  return std::make_unique<ReducedRows>(std::move(source), width, height);
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "io/image_codec.hpp"
+#include "raysplats/camera.hpp"
+
+namespace raysplats::io {
+
+/// A picture that is made row by row: RGBA in [0, 1] with straight alpha. What changes a photo on
+/// its way from the file is made of one another, so that nothing in between is rounded or kept.
+class PhotoRows {
+ public:
+  PhotoRows(int width, int height) : width_(width), height_(height) {}
+  virtual ~PhotoRows() = default;
+  PhotoRows(const PhotoRows&) = delete;
+  PhotoRows& operator=(const PhotoRows&) = delete;
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  /// Writes row y, 4 x width().
+  virtual void row(int y, float* rgba) = 0;
+
+ private:
+  int width_;
+  int height_;
+};
+
+/// One that can be asked for any pixel.
+class PhotoPixels : public PhotoRows {
+ public:
+  using PhotoRows::PhotoRows;
+  virtual void pixel(int x, int y, float* rgba) = 0;
+};
+
+/// One number per pixel of a photo, of any size: pixels are taken by the nearest.
+struct MaskPlane {
+  int width = 0;
+  int height = 0;
+  std::vector<float> values;
+
+  float at(int x, int y, int photo_width, int photo_height) const;
+};
+
+/// The first channel of a mask, in [0, 1].
+MaskPlane mask_plane(const RawImage& mask);
+
+/// The photo of a file, grey or colour, with or without alpha, which `mask` (may be null)
+/// multiplies. Refers to both.
+std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image, const MaskPlane* mask);
+/// White whose alpha is the mask, at the size of a photo.
+std::unique_ptr<PhotoPixels> mask_rows(const MaskPlane& mask, int width, int height);
+
+/// The picture that a pinhole camera with the intrinsics and size of this kOpenCv camera would have
+/// taken (bilinear, colours weighted by alpha). Pixels whose ray leaves the photo, or lies beyond
+/// lens_limit(), get alpha 0.
+std::unique_ptr<PhotoRows> undistorted_rows(std::unique_ptr<PhotoPixels> source,
+                                            const Camera& camera);
+/// Alpha 0 where the camera's lens (kOpenCv or kFisheye) sees nothing: beyond the image of
+/// lens_limit().
+std::unique_ptr<PhotoRows> seen_rows(std::unique_ptr<PhotoRows> source, const Camera& camera);
+/// Average over the area of each target pixel, colours weighted by alpha; pixels without any
+/// coverage are 0. O(pixels of both pictures).
+std::unique_ptr<PhotoRows> reduced_rows(std::unique_ptr<PhotoRows> source, int width, int height);
+
+}  // namespace raysplats::io

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/view_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "io/image_file.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats::io {
+namespace {
+
+MaskPlane load_mask(const View& view) {
+  MaskPlane mask = mask_plane(read_raw_image(view.mask_path));
+  const bool dark =
+      std::none_of(mask.values.begin(), mask.values.end(), [](float value) { return value > 0; });
+  if (dark) {
+    throw DataError(fmt::format(
+        "The mask {} is black everywhere and leaves nothing of its photo {}: remove the "
+        "photo from the data set, or the mask",
+        view.mask_path.string(), view.image_path.string()));
+  }
+  return mask;
+}
+
+}  // namespace
+
+ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
+  if (raw_.width != view.source_camera.width || raw_.height != view.source_camera.height) {
+    throw DataError(
+        fmt::format("The image {} has {} x {} pixels now, but {} x {} when the data set was opened",
+                    view.image_path.string(), raw_.width, raw_.height, view.source_camera.width,
+                    view.source_camera.height));
+  }
+  const bool masked = !view.mask_path.empty();
+  if (masked) {
+    mask_ = load_mask(view);
+    unchanged_ = false;
+  }
+  rows_ = fitted(decoded_rows(raw_, masked ? &mask_ : nullptr), view);
+  if (masked && view.mask_apart) {
+    weights_ = fitted(mask_rows(mask_, raw_.width, raw_.height), view);
+  }
+}
+
+// Takes the lens out of a picture and gives it the view's size.
+std::unique_ptr<PhotoRows> ViewRows::fitted(std::unique_ptr<PhotoPixels> source, const View& view) {
+  const PhotoRows* before = source.get();
+  std::unique_ptr<PhotoRows> out;
+  if (view.source_camera.model == CameraModel::kOpenCv &&
+      view.camera.model == CameraModel::kPinhole) {
+    out = undistorted_rows(std::move(source), view.source_camera);
+  } else {
+    out = seen_rows(std::move(source), view.source_camera);
+  }
+  out = reduced_rows(std::move(out), view.camera.width, view.camera.height);
+  unchanged_ = unchanged_ && out.get() == before;
+  return out;
+}
+
+void ViewRows::read(const std::function<void(const float*, const float*)>& take) {
+  const auto width = static_cast<std::size_t>(rows_->width());
+  std::vector<float> rgba(4 * width), weight_rgba(weights_ ? 4 * width : 0);
+  std::vector<float> weights(weights_ ? width : 0);
+  for (int y = 0; y < rows_->height(); ++y) {
+    rows_->row(y, rgba.data());
+    if (!weights_) {
+      take(rgba.data(), nullptr);
+      continue;
+    }
+    weights_->row(y, weight_rgba.data());
+    for (std::size_t x = 0; x < width; ++x) {
+      // Where nothing is known the coverage is none, so that colours come from known pixels; where
+      // something is, it is the coverage of that.
+      const float share = weight_rgba[4 * x + 3];
+      float& alpha = rgba[4 * x + 3];
+      alpha = share > 0 ? std::min(alpha / share, 1.0f) : 0.0f;
+      weights[x] = share;
+    }
+    take(rgba.data(), weights.data());
+  }
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/photo_cache.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+namespace raysplats {
+namespace {
+
+constexpr int kFloatPlanes = 4;
+constexpr std::size_t kGroup = 64;
+
+std::size_t largest_photo(const std::vector<View>& views) {
+  std::size_t bytes = 0;
+  for (const View& view : views) bytes = std::max(bytes, io::photo_bytes(view));
+  return bytes;
+}
+
+}  // namespace
+
+PhotoCache::PhotoCache(Context& context,
+                       std::vector<View> views,
+                       std::size_t budget,
+                       std::size_t ahead)
+    : context_(context),
+      budget_(budget),
+      entries_(views.size()),
+      reduce_(context.kernel("train/photo_reduce.cl", "reduce_photo")),
+      loader_(views, ahead * largest_photo(views)) {}
+
+const PhotoCache::Entry& PhotoCache::full_size(std::size_t view) {
+  Entry& entry = entries_[view];
+  if (entry.width > 0) return entry;
+  const std::shared_ptr<const io::Photo> photo = loader_.get(view);
+  const bool stays = cached_ + photo->bytes() <= budget_;
+  Entry& target = stays ? entry : passing_;
+  target.words.ensure(context_, photo->words.size(), "photo");
+  target.words.upload_later({photo, &photo->words});
+  target.width = photo->width;
+  target.height = photo->height;
+  target.planes = photo->planes;
+  target.weighted = photo->weighted;
+  if (stays) {
+    cached_ += photo->bytes();
+    loader_.forget(view);
+  }
+  return target;
+}
+
+DevicePhoto PhotoCache::get(std::size_t view, int width, int height) {
+  const Entry& entry = full_size(view);
+  const DevicePhoto whole{entry.words, entry.planes, entry.weighted};
+  if (entry.width == width && entry.height == height) return whole;
+  const DevicePhoto small{reduced_, kFloatPlanes, entry.weighted};
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  reduced_.ensure(context_, small.words_of(pixels), "reduced photo");
+  reduce_.launch(Range::linear(pixels, kGroup), entry.words, reduced_, entry.planes,
+                 entry.weighted ? 1 : 0, entry.width, entry.height, width, height);
+  return small;
+}
+
+void PhotoCache::prefetch(std::span<const std::size_t> views) {
+  std::vector<std::size_t> missing;
+  for (const std::size_t view : views) {
+    if (entries_[view].width == 0) missing.push_back(view);
+  }
+  if (!missing.empty()) loader_.prefetch(missing);
+}
+
+}  // namespace raysplats
