@@ -38,7 +38,7 @@ void run(const Options& options, const GlobalOptions& global) {
   const ModelSource source = find_model(options.model);
   const Gaussians model = in_morton_order(read_model(source.file));
   const Dataset dataset =
-      load_dataset(options.data.data, options.data.over(dataset_options(source)));
+      load_dataset(options.data.data, options.data.settings.over(dataset_options(source)));
   const Split split = options.data.chosen_split();
   const std::size_t views = dataset.indices(split).size();
   if (views == 0) throw no_views(options.data);

@@ -156,7 +156,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   const Gaussians model = in_morton_order(read_model(source.file));
   Dataset dataset;
   if (!options.data.data.empty()) {
-    dataset = load_dataset(options.data.data, options.data.over(dataset_options(source)));
+    dataset = load_dataset(options.data.data, options.data.settings.over(dataset_options(source)));
   }
 
   std::vector<Camera> cameras;
@@ -176,7 +176,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
       cameras = read_cameras(options.cameras);
     }
     for (Camera& camera : cameras) {
-      camera = downscaled(camera, options.data.downscale.value_or(1.0));
+      camera = downscaled(camera, options.data.settings.over({}).downscale);
       io::move_origin(camera, {source.origin[0], source.origin[1], source.origin[2]});
     }
   } else {

@@ -96,7 +96,7 @@ void view_model(const Options& options) {
   const Gaussians gaussians = in_morton_order(read_model(source.file));
   Dataset dataset;
   if (!options.data.data.empty())
-    dataset = load_dataset(options.data.data, options.data.over(dataset_options(source)));
+    dataset = load_dataset(options.data.data, options.data.settings.over(dataset_options(source)));
   const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
   const std::vector<Camera> cameras = cameras_of(options, dataset, source);
   view::ViewState state = view::first_look(scene_extent(gaussians), cameras, up_of(options));

@@ -131,12 +131,14 @@ std::unique_ptr<Context> open_context(const DeviceFlags& flags, const DeviceInfo
 
 namespace {
 
-CLI::Option* add_trace_row(CLI::App& app,
-                           TraceSettings& settings,
-                           const std::string& name,
-                           const std::string& names = {}) {
-  TraceOptions defaults;
-  const std::vector<OptionRow> rows = trace_rows(defaults);
+// An option by its row of the table, kept for what it goes over.
+template <class Options, std::vector<OptionRow> (*rows_of)(Options&)>
+CLI::Option* add_setting(CLI::App& app,
+                         GivenOptions<Options, rows_of>& settings,
+                         const std::string& name,
+                         const std::string& names = {}) {
+  Options defaults;
+  const std::vector<OptionRow> rows = rows_of(defaults);
   return add_row(
       app, *find_row(rows, name),
       [&settings, name](const std::vector<std::string>& values) { settings.set(name, values); },
@@ -146,16 +148,16 @@ CLI::Option* add_trace_row(CLI::App& app,
 }  // namespace
 
 void add_trace_flags(CLI::App& app, TraceSettings& settings) {
-  add_trace_row(app, settings, "quantile", "--q");
+  add_setting(app, settings, "quantile", "--q");
   for (const char* name : {"min-transmittance", "max-hits", "hit-order", "adaptive-radius", "near"})
-    add_trace_row(app, settings, name);
-  add_trace_row(app, settings, "background")->type_name("R,G,B");
+    add_setting(app, settings, name);
+  add_setting(app, settings, "background")->type_name("R,G,B");
   for (const char* name : {"packet-shape", "packet-width", "memory-budget", "launch-budget-ms"})
-    add_trace_row(app, settings, name);
+    add_setting(app, settings, name);
 }
 
 void add_traversal_flag(CLI::App& app, TraceSettings& settings) {
-  add_trace_row(app, settings, "traversal");
+  add_setting(app, settings, "traversal");
 }
 
 std::string with_compiling(const std::string& text, double seconds) {
@@ -169,41 +171,18 @@ void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOp
                capped, rays, options.max_hits);
 }
 
-DatasetOptions DataFlags::over(DatasetOptions base) const {
-  if (downscale) base.downscale = *downscale;
-  if (test_every) base.test_every = *test_every;
-  if (undistort) base.undistort = *undistort;
-  if (masks) base.masks = *masks == "cutout" ? MaskUse::kCutout : MaskUse::kIgnore;
-  return base;
-}
-
 CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags) {
   const std::string group = "Data set";
-  CLI::Option* data = app.add_option("-d,--data", flags.data,
-                                     "COLMAP, nerfstudio or Blender data set whose cameras to use");
+  CLI::Option* data =
+      app.add_option("-d,--data", flags.data,
+                     "COLMAP, nerfstudio or Blender data set whose cameras to use; what is not "
+                     "said of it is as in the run of the model, else the default");
   data->group(group)->type_name("DATASET");
   app.add_option("--split", flags.split, "test (default), train or all")
       ->group(group)
       ->check(one_of({"test", "train", "all"}));
-  app.add_option("--downscale", flags.downscale,
-                 "Divide the image sizes by this (1, or as the run was trained)")
-      ->group(group)
-      ->transform(between(0.01, 1e4));
-  app.add_option(
-         "--test-every", flags.test_every,
-         "Every n-th view is a test view where the data set has no split (8, or as the run)")
-      ->group(group)
-      ->transform(whole_between(0, 1e9));
-  app.add_flag_function(
-         "--undistort,!--no-undistort",
-         [&flags](std::int64_t count) { flags.undistort = count > 0; },
-         "Make photos with OpenCV distortion pinhole pictures (default, or as the run); no: keep "
-         "their own pixels and lenses")
-      ->group(group);
-  app.add_option("--masks", flags.masks,
-                 "What is black in masks: ignore (default, or as the run) or cutout (background)")
-      ->group(group)
-      ->check(one_of({"ignore", "cutout"}));
+  for (const char* name : {"downscale", "test-every", "undistort", "masks"})
+    add_setting(app, flags.settings, name)->group(group);
   return data;
 }
 
@@ -214,18 +193,18 @@ Split DataFlags::chosen_split() const {
 }
 
 void DataFlags::check_used(bool orbit) const {
-  if (data.empty() && (split || test_every || undistort || masks)) {
+  const bool chosen = split || settings.has("test-every");
+  if (data.empty() && (chosen || settings.has("undistort") || settings.has("masks"))) {
     throw UsageError(
         "--split, --test-every, --undistort and --masks are about the views of a data set: add "
-        "--data "
-        "DATASET");
+        "--data DATASET");
   }
-  if (orbit && (split || test_every)) {
+  if (orbit && chosen) {
     throw UsageError(
         "--split and --test-every choose views, but an orbit goes around all of them: leave them "
         "out");
   }
-  if (orbit && data.empty() && downscale) {
+  if (orbit && data.empty() && settings.has("downscale")) {
     throw UsageError(
         "--downscale divides the sizes of photos, and this orbit has none: give --width and "
         "--height");

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "comm/communicator.hpp"
+#include "core/data_rows.hpp"
 #include "core/trace_rows.hpp"
 #include "device/context.hpp"
 #include "raysplats/dataset.hpp"
@@ -90,12 +91,8 @@ void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOp
 struct DataFlags {
   std::string data;
   std::optional<std::string> split;  ///< "test" when not given
-  std::optional<double> downscale;
-  std::optional<int> test_every;
-  std::optional<bool> undistort;
-  std::optional<std::string> masks;
+  DataSettings settings;
 
-  DatasetOptions over(DatasetOptions base) const;
   Split chosen_split() const;
   /// Throws UsageError for options that choose among views where no data set gives any, or where
   /// an orbit goes around all of them.

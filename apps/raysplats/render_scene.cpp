@@ -107,7 +107,7 @@ void override_camera(const RenderFlags& flags, SceneFile& scene, std::optional<d
     }
     camera.file = flags.data.data;
     camera.split = flags.data.chosen_split();
-    camera.data_options = flags.data.over({});
+    camera.data_options = flags.data.settings.over({});
   } else if (!flags.path.empty()) {
     CameraPathFile path = read_path(flags);
     camera = {};
@@ -123,7 +123,7 @@ void override_camera(const RenderFlags& flags, SceneFile& scene, std::optional<d
     camera.file = flags.cameras;
   }
   if (data || camera.source == Source::kFile) camera.place = scene.path.string();
-  if (!data) scene.downscale = flags.data.downscale.value_or(1.0);
+  if (!data) scene.downscale = flags.data.settings.over({}).downscale;
 }
 
 /// "START:END" as a range within `count` frames.

@@ -8,7 +8,6 @@
 #include "shared/sh.h"
 
 #define RS_PI 3.14159265358979f
-#define RS_TRIANGLE_FLOATS 24  // of its vertices
 
 float3 load3(const float* p) { return (float3)(p[0], p[1], p[2]); }
 

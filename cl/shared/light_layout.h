@@ -14,6 +14,9 @@ typedef struct {
 } RsSurfaceHit;
 RS_STATIC_ASSERT_SIZE(RsSurfaceHit, 16);
 
+// Numbers of a triangle's vertices: position, normal and texture coordinates of three corners.
+#define RS_TRIANGLE_FLOATS 24
+
 #define RS_DIFFUSE 0
 #define RS_MIRROR 1
 #define RS_GLASS 2

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstdint>
+#include <utility>
 
 #include "raysplats/error.hpp"
 
@@ -104,25 +104,10 @@ std::vector<OptionRow> trace_rows(TraceOptions& options) {
   return table.take();
 }
 
-void TraceSettings::set(const std::string& name, const std::vector<std::string>& values) {
-  TraceOptions scratch;
-  const std::vector<OptionRow> rows = trace_rows(scratch);
-  const OptionRow* row = find_row(rows, name);
-  if (row == nullptr) throw UsageError(fmt::format("There is no option '{}' of tracing", name));
-  row->set(values);
-  given_.push_back({name, values});
-}
-
-bool TraceSettings::has(const std::string& name) const {
-  return std::any_of(given_.begin(), given_.end(),
-                     [&](const Given& each) { return each.name == name; });
-}
-
 TraceOptions TraceSettings::over(TraceOptions base) const {
-  const std::vector<OptionRow> rows = trace_rows(base);
-  for (const Given& each : given_) find_row(rows, each.name)->set(each.values);
-  if (has("background")) base.sky.clear();
-  return base;
+  TraceOptions out = GivenOptions::over(std::move(base));
+  if (has("background")) out.sky.clear();
+  return out;
 }
 
 }  // namespace raysplats

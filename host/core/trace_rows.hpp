@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/given_options.hpp"
 #include "core/option_table.hpp"
 #include "raysplats/trace_options.hpp"
 
@@ -21,25 +22,14 @@ std::string packet_shape_name(PacketForm form);
 /// Throws UsageError for a width that packets of that form cannot have.
 void check_packet_width(const TraceOptions& options);
 
+/// All of these rows, bound to `options`.
+std::vector<OptionRow> trace_rows(TraceOptions& options);
+
 /// Options of tracing that a user gave, to go over others.
-class TraceSettings {
+class TraceSettings : public GivenOptions<TraceOptions, trace_rows> {
  public:
-  /// Throws UsageError for a name that is none of the rows above, and for values that it does not
-  /// accept.
-  void set(const std::string& name, const std::vector<std::string>& values);
-  bool has(const std::string& name) const;
   /// A background that was given takes the place of a sky.
   TraceOptions over(TraceOptions base) const;
-
- private:
-  struct Given {
-    std::string name;
-    std::vector<std::string> values;
-  };
-  std::vector<Given> given_;
 };
-
-/// The rows that TraceSettings know, bound to `options`.
-std::vector<OptionRow> trace_rows(TraceOptions& options);
 
 }  // namespace raysplats

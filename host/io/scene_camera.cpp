@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "core/camera_model.hpp"
+#include "core/data_rows.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -72,8 +73,20 @@ void read_orbit(io::TomlTable table, SceneCamera& camera) {
   table.finish();
 }
 
+// A key of [camera] that is an option of data sets.
+void read_data_row(io::TomlTable& table, const char* key, SceneCamera& camera) {
+  const std::optional<std::vector<std::string>> values = table.values(key);
+  if (!values) return;
+  const std::vector<OptionRow> rows = data_rows(camera.data_options);
+  try {
+    find_row(rows, key)->set(*values);
+  } catch (const UsageError& error) {
+    table.fail(key, fmt::format("{} ([camera])", error.what()));
+  }
+}
+
 void read_views(io::TomlTable& table, SceneCamera& camera) {
-  table.number("downscale", camera.data_options.downscale, 0.01, 1e4);
+  read_data_row(table, "downscale", camera);
   const auto views = table.numbers("views", 0);
   if (!views) return;
   for (const double view : *views) {
@@ -222,12 +235,12 @@ SceneCamera read_scene_camera(io::TomlTable& table) {
     read_views(table, camera);
     table.choice<Split>("split", camera.split,
                         {{"test", Split::kTest}, {"train", Split::kTrain}, {"all", Split::kAll}});
-    table.number("test-every", camera.data_options.test_every, 0, 1e9);
-    table.flag("undistort", camera.data_options.undistort);
+    read_data_row(table, "test-every", camera);
+    read_data_row(table, "undistort", camera);
   } else {
     if (data) {
       camera.file = *data;
-      table.number("downscale", camera.data_options.downscale, 0.01, 1e4);
+      read_data_row(table, "downscale", camera);
     }
     camera.up = table.direction("up");
     for (auto [key, side] :

@@ -10,6 +10,7 @@
 
 #include "light/environment.hpp"
 #include "raysplats/error.hpp"
+#include "shared/light_layout.h"
 
 namespace raysplats {
 namespace {
@@ -141,7 +142,7 @@ void SurfaceStore::set_meshes(const std::vector<Mesh>& meshes) {
   std::vector<float> vertices;
   std::vector<std::uint32_t> of;
   std::vector<float> shadows;
-  vertices.reserve(24 * triangles_.size());
+  vertices.reserve(RS_TRIANGLE_FLOATS * triangles_.size());
   lit_ = false;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     const Mesh& mesh = meshes[m];

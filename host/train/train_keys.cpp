@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/number_text.hpp"
+#include "core/data_rows.hpp"
 #include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
 
@@ -168,9 +169,7 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
       "do, others add gradients in long integers for it");
 
   t.section("Data");
-  t.number("downscale", o.data.downscale, 1, 1024, "photos are reduced by this factor");
-  t.number("test-every", o.data.test_every, 0, 1e9,
-           "every n-th view is held out when the data set has no split of its own; 0 = none");
+  add_data_rows(t, o.data);
   t.number(
       "validate-views", o.validate_views, 0, 1e6,
       "training views that are kept out of the loss until 0.9 of the run, to judge it by every "
@@ -178,37 +177,6 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.number("patience", o.patience, 0, 10,
            "end the run when so many validations in a row were no better than the best one; 0 = "
            "never");
-  t.flag("undistort", o.data.undistort,
-         "turn photos through lenses with OpenCV distortion into pinhole pictures; false = their "
-         "own pixels and rays");
-  t.choice<MaskUse>("masks", o.data.masks,
-                    {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
-                    "what is black in the photos' masks: ignore (it counts neither in the loss nor "
-                    "in metrics) or cutout (background, as transparent pixels are)");
-  t.add(
-      "origin",
-      "\"x,y,z\" in the data set's coordinates, from which the model's positions count; \"auto\" = "
-      "0, but near the cameras where the scene lies so far from 0 that single precision would blur "
-      "it (surveyed captures), which the run's configuration then names",
-      [&o](const Values& values) {
-        if (values.size() == 1 && values.front() == "auto") {
-          o.data.origin.reset();
-          return;
-        }
-        const std::vector<std::string> parts = option_items("origin", values);
-        std::array<double, 3> origin{};
-        for (std::size_t k = 0; k < parts.size() && k < origin.size(); ++k)
-          origin[k] = option_number<double>("origin", parts[k], -kHuge, kHuge);
-        if (parts.size() != origin.size()) {
-          throw UsageError(fmt::format("The option 'origin' is auto or three numbers, not '{}'",
-                                       fmt::join(values, " ")));
-        }
-        o.data.origin = origin;
-      },
-      [&o] {
-        if (!o.data.origin) return std::string("\"auto\"");
-        return fmt::format("[{}]", fmt::join(*o.data.origin, ", "));
-      });
   t.words("background", o.background,
           "colour behind the Gaussians: \"r,g,b\", \"auto\" (white where photos are cut out by "
           "alpha, else their typical colour, which the run's configuration then names), "

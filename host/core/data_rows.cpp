@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/data_rows.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+
+#include "base/number_text.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+void add_origin_row(OptionTable& table, DatasetOptions& options) {
+  table.add(
+      "origin",
+      "\"x,y,z\" in the data set's coordinates, from which the model's positions count; \"auto\" = "
+      "0, but near the cameras where the scene lies so far from 0 that single precision would blur "
+      "it (surveyed captures), which the run's configuration then names",
+      [&options](const OptionTable::Values& values) {
+        if (values.size() == 1 && values.front() == "auto") {
+          options.origin.reset();
+          return;
+        }
+        const std::vector<std::string> parts = option_items("origin", values);
+        std::array<double, 3> origin{};
+        for (std::size_t k = 0; k < parts.size() && k < origin.size(); ++k)
+          origin[k] = option_number<double>("origin", parts[k], -kNoBound, kNoBound);
+        if (parts.size() != origin.size()) {
+          throw UsageError(fmt::format("The option 'origin' is auto or three numbers, not '{}'",
+                                       fmt::join(values, " ")));
+        }
+        options.origin = origin;
+      },
+      [&options] {
+        if (!options.origin) return std::string("\"auto\"");
+        return fmt::format("[{}]", fmt::join(*options.origin, ", "));
+      });
+}
+
+}  // namespace
+
+void add_data_rows(OptionTable& table, DatasetOptions& options) {
+  table.number("downscale", options.downscale, 1, 1024, "image sizes are divided by this");
+  table.number("test-every", options.test_every, 0, 1e9,
+               "every n-th view is held out when the data set has no split of its own; 0 = none");
+  table.flag("undistort", options.undistort,
+             "turn photos through lenses with OpenCV distortion into pinhole pictures; false = "
+             "their own pixels and rays");
+  table.choice<MaskUse>(
+      "masks", options.masks, {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
+      "what is black in the photos' masks: ignore (it counts neither in the loss nor in metrics) "
+      "or cutout (background, as transparent pixels are)");
+  add_origin_row(table, options);
+}
+
+std::vector<OptionRow> data_rows(DatasetOptions& options) {
+  OptionTable table;
+  add_data_rows(table, options);
+  return table.take();
+}
+
+}  // namespace raysplats

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "core/given_options.hpp"
+#include "core/option_table.hpp"
+#include "raysplats/dataset.hpp"
+
+namespace raysplats {
+
+/// How a data set is read: the same on every command line, in [camera] of scene files and in
+/// training configurations.
+void add_data_rows(OptionTable& table, DatasetOptions& options);
+
+/// These rows, bound to `options`.
+std::vector<OptionRow> data_rows(DatasetOptions& options);
+
+using DataSettings = GivenOptions<DatasetOptions, data_rows>;
+
+}  // namespace raysplats
