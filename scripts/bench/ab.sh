@@ -7,14 +7,18 @@ usage() {
   cat <<'END'
 usage: scripts/bench/ab.sh OLD NEW [OPTIONS] [-- BENCH-OPTIONS]
 Runs every row of `raysplats bench` that both programs have with the one and the other in turns, and prints per row
-the medians, the ratio NEW/OLD (median over the rounds of the ratio within a round), its spread (least to largest) and
-what that says at a noise of 5 %: "faster", "slower" or "same". A row is slower or faster only when the ratios of at
-least three quarters of the rounds lie beyond the noise on the same side. Exit status 3 when any row is slower.
+the medians, the ratio NEW/OLD (median over the rounds of the ratio within a round), its spread (least to largest), the
+noise and what that says: "faster", "slower" or "same". A row is slower or faster only when the ratios of at least three
+quarters of the rounds lie beyond the noise on the same side (of five ratios that differ by chance alone, four lie on one
+side in three rows of eight: it is the noise that keeps these from being called). With --noise own every round runs
+OLD a second time, and a row's noise is the larger of 5 % and the median distance of that ratio OLD/OLD from 1: a machine
+that other programs share then says "same" more often, instead of calling differences that are its own. A row that one
+of the programs cannot run is named and left out. Exit status 3 when any row is slower, 1 when one was left out.
 
   OLD, NEW         two raysplats programs
   --rounds N       rounds per row, at least 5 (5)
   --filter REGEX   rows, as of bench --filter (.)
-  --noise SHARE    what counts as the same (0.05)
+  --noise SHARE    what counts as the same (0.05), or own
   --old-row NAME, --new-row NAME
                    compare one row with another one, for rows that changed their name
   --csv FILE       every single time as well
@@ -65,6 +69,10 @@ if [[ -n $old_row && -z $new_row ]] || [[ -z $old_row && -n $new_row ]]; then
   echo "ab.sh: --old-row and --new-row go together" >&2
   exit 2
 fi
+if ! [[ $noise == own || $noise =~ ^0?\.[0-9]+$ ]]; then
+  echo "ab.sh: --noise is $noise: give a share below 1, such as 0.05, or own" >&2
+  exit 2
+fi
 for program in "$old" "$new"; do
   if [[ ! -x $program ]]; then
     echo "ab.sh: $program is no program: build it first" >&2
@@ -92,8 +100,8 @@ fi
 run() { # program, row id, what to call it, bench options
   local result=$work/result.json
   if ! "${prefix[@]}" "$1" bench --filter "^$2\$" --json "$result" "${@:4}" >"$work/log" 2>&1; then
-    cat "$work/log" >&2
-    exit 1
+    printf 'ab.sh: %s fails in %s: %s\n' "$2" "$1" "$(tail -n 1 "$work/log")" >&2
+    return 1
   fi
   python3 - "$result" "$2" "$3" >>"$work/times.csv" <<'END'
 import json, sys
@@ -103,32 +111,45 @@ print(sys.argv[3], 1e3 * row["seconds"]["median"], sep=",")
 END
 }
 
+# One round of a row. Who goes first changes: what a program leaves in caches and in the clock helps neither.
+compare() { # round, old row, new row, bench options
+  local round=$1 old_id=$2 new_id=$3
+  shift 3
+  if ((round % 2)); then
+    run "$old" "$old_id" "$new_id,$round,old" "$@" && run "$new" "$new_id" "$new_id,$round,new" "$@"
+  else
+    run "$new" "$new_id" "$new_id,$round,new" "$@" && run "$old" "$old_id" "$new_id,$round,old" "$@"
+  fi || return 1
+  [[ $noise != own ]] || run "$old" "$old_id" "$new_id,$round,again" "$@"
+}
+
 echo "row,round,program,ms" >"$work/times.csv"
+left_out=0
 while read -r old_id new_id; do
   for ((round = 1; round <= rounds; ++round)); do
-    # Who goes first changes: what a program leaves in caches and in the clock helps neither.
-    if ((round % 2)); then
-      run "$old" "$old_id" "$new_id,$round,old" "$@"
-      run "$new" "$new_id" "$new_id,$round,new" "$@"
-    else
-      run "$new" "$new_id" "$new_id,$round,new" "$@"
-      run "$old" "$old_id" "$new_id,$round,old" "$@"
+    if ! compare "$round" "$old_id" "$new_id" "$@" </dev/null; then
+      left_out=1
+      grep -v "^$new_id," "$work/times.csv" >"$work/kept.csv" && mv "$work/kept.csv" "$work/times.csv"
+      break
     fi
   done
 done <"$work/rows"
 if [[ -n $csv ]]; then cp "$work/times.csv" "$csv"; fi
 
-python3 - "$work/times.csv" "$noise" <<'END'
+python3 - "$work/times.csv" "$noise" "$left_out" <<'END'
 import csv, statistics, sys
-noise = float(sys.argv[2])
 times = {}
 for line in csv.DictReader(open(sys.argv[1])):
     times.setdefault(line["row"], {}).setdefault(line["round"], {})[line["program"]] = float(line["ms"])
 slower = False
-print(f"{'row':36} {'old ms':>10} {'new ms':>10} {'new/old':>8}  spread")
+print(f"{'row':36} {'old ms':>10} {'new ms':>10} {'new/old':>8}  spread          noise")
 for row, rounds in times.items():
     ratios = sorted(r["new"] / r["old"] for r in rounds.values())
     ratio = statistics.median(ratios)
+    noise = 0.05 if sys.argv[2] == "own" else float(sys.argv[2])
+    own = [abs(r["again"] / r["old"] - 1) for r in rounds.values() if "again" in r]
+    if own:
+        noise = max(noise, statistics.median(own))
     enough = 0.75 * len(ratios)
     verdict = "same"
     if ratio > 1 and sum(r > 1 + noise for r in ratios) >= enough:
@@ -137,6 +158,6 @@ for row, rounds in times.items():
         verdict = "faster"
     print(f"{row:36} {statistics.median(r['old'] for r in rounds.values()):10.3f}"
           f" {statistics.median(r['new'] for r in rounds.values()):10.3f} {ratio:8.3f}"
-          f"  {ratios[0]:.3f} to {ratios[-1]:.3f}  {verdict}")
-sys.exit(3 if slower else 0)
+          f"  {ratios[0]:.3f} to {ratios[-1]:.3f}  {noise:.3f}  {verdict}")
+sys.exit(3 if slower else int(sys.argv[3]))
 END

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ratios between our programs and their peers from the measurements of peers.sh.
 
-usage: peer_table.py table PEERS.CSV RATIOS.CSV    prints the table and writes it
+usage: peer_table.py table PEERS.CSV RATIOS.CSV [PART]    prints the table and writes it; counts are of 1 / PART
        peer_table.py rows BENCH.JSON               rows of PEERS.CSV from `raysplats bench --json`
 """
 
@@ -69,9 +69,9 @@ def scaled(published: float, measured: dict[str, float], reference: float) -> di
     return {r: published * ms / reference for r, ms in measured.items()}
 
 
-def lines_of(times: dict[Key, dict[str, float]]) -> list[Line]:
+def lines_of(times: dict[Key, dict[str, float]], part: int) -> list[Line]:
     def of(work: str, program: str, gaussians: int) -> dict[str, float]:
-        return times.get((work, program, gaussians), {})
+        return times.get((work, program, gaussians // part), {})
 
     packets, single = "embree-packets-k64", "embree-single-k64"
 
@@ -91,8 +91,16 @@ def lines_of(times: dict[Key, dict[str, float]]) -> list[Line]:
              of("rays", "ours", 100_000), of("rays", single, 100_000), 1.0, True),
         Line("arbitrary rays, 1 M: Embree single K=64 / ours",
              of("rays", "ours", 1_000_000), of("rays", single, 1_000_000), 1.0, True),
+        Line("LBVH build, 100 k: ours / Embree Morton",
+             of("build", "ours", 100_000), of("build", "embree-morton", 100_000), 0.7, False),
         Line("LBVH build, 1 M: ours / Embree Morton",
              of("build", "ours", 1_000_000), of("build", "embree-morton", 1_000_000), 0.7, False),
+        Line("LBVH build, 1 M: ours / Embree SAH",
+             of("build", "ours", 1_000_000), of("build", "embree-sah", 1_000_000), 0.7, False),
+        Line("LBVH refit, 100 k: ours / Embree refit",
+             of("refit", "ours", 100_000), of("refit", "embree-refit", 100_000), 0.7, False),
+        Line("LBVH refit, 1 M: ours / Embree refit",
+             of("refit", "ours", 1_000_000), of("refit", "embree-refit", 1_000_000), 0.7, False),
         Line("LBVH refit, 1 M: ours / tinybvh (scaled)",
              of("refit", "ours", 1_000_000),
              scaled(TINYBVH_REFIT_MS, of("build", "embree-morton", 1_000_000), EMBREE_MORTON_MS), 0.7, False),
@@ -103,12 +111,12 @@ def lines_of(times: dict[Key, dict[str, float]]) -> list[Line]:
     ]
 
 
-def table(rows: Path, output: Path) -> None:
+def table(rows: Path, output: Path, part: int) -> None:
     times = read_times(rows)
     header = ["comparison", "ours_ms", "peer_ms", "ratio", "ratio_min", "ratio_max", "target", "met"]
     written = [header]
     print(f"{'comparison':54} {'ours ms':>9} {'peer ms':>9} {'ratio':>6} {'range':>12} {'target':>8}")
-    for line in lines_of(times):
+    for line in lines_of(times, part):
         ratios = line.ratios()
         if not ratios:
             print(f"{line.title:54} not measured")
@@ -124,7 +132,7 @@ def table(rows: Path, output: Path) -> None:
     calibrations = (("camera", "embree-single-k64", 100_000, EMBREE_SINGLE_MS),
                     ("build", "embree-morton", 1_000_000, EMBREE_MORTON_MS))
     for work, program, gaussians, reference in calibrations:
-        measured = times.get((work, program, gaussians))
+        measured = times.get((work, program, gaussians // part))
         if measured:
             print(f"this machine against the published one, {work} by {program}: "
                   f"{median(measured.values()) / reference:.2f} times the time")
@@ -147,8 +155,8 @@ def rows_of_bench(path: Path) -> None:
 
 def main() -> None:
     arguments = sys.argv[1:]
-    if len(arguments) == 3 and arguments[0] == "table":
-        table(Path(arguments[1]), Path(arguments[2]))
+    if len(arguments) in (3, 4) and arguments[0] == "table":
+        table(Path(arguments[1]), Path(arguments[2]), int(arguments[3]) if len(arguments) == 4 else 1)
     elif len(arguments) == 2 and arguments[0] == "rows":
         rows_of_bench(Path(arguments[1]))
     else:

@@ -17,6 +17,8 @@ Writes OUT/peers.csv (every measurement) and OUT/ratios.csv (the table).
   --device DEV   OpenCL device of ours
   --fox DIR      COLMAP folder of the undistorted fox: also time training iterations
   --prefix CMD   put before every measured program, for example "taskset -c 0-3"
+  --only LIST    kinds of work: build, refit, camera, rays, train (all)
+  --quick        a hundredth of the Gaussians, to try the script
   --help
 
 OpenSplat and tinybvh are not run: their published figures are scaled to this machine by what Embree takes
@@ -30,11 +32,14 @@ rounds=3
 repeat=2
 device=()
 fox=
+only=build,refit,camera,rays,train
+part=1 # of the Gaussians
 prefix=()
 while (($# > 0)); do
   case $1 in
     --help) usage && exit 0 ;;
-    --out | --build | --rounds | --repeat | --device | --fox | --prefix)
+    --quick) part=100 && shift ;;
+    --out | --build | --rounds | --repeat | --device | --fox | --prefix | --only)
       (($# > 1)) || { echo "peers.sh: $1 needs a value" >&2 && exit 2; }
       case $1 in
         --out) out=$2 ;;
@@ -43,6 +48,7 @@ while (($# > 0)); do
         --repeat) repeat=$2 ;;
         --device) device=(--device "$2") ;;
         --fox) fox=$2 ;;
+        --only) only=$2 ;;
         --prefix) read -ra prefix <<<"$2" ;;
       esac
       shift 2
@@ -79,10 +85,22 @@ trap 'rm -rf "$scratch"' EXIT
 header=work,program,scene,gaussians,units,median_ms,min_ms,million_units_per_s,hits_per_ray,traces_per_ray
 echo "round,$header,mean_color,max_difference,mean_difference" >"$rows"
 
-# measure ARGUMENTS...: embree_peer's rows, marked with the round.
+# wanted LIST: those of the kinds of work that were asked for.
+wanted() {
+  local kept=
+  for work in ${1//,/ }; do
+    [[ ,$only, != *,$work,* ]] || kept+=${kept:+,}$work
+  done
+  echo "$kept"
+}
+
+# measure GAUSSIANS WORK ARGUMENTS...: embree_peer's rows, marked with the round.
 measure() {
-  "${prefix[@]}" "$build/bin/embree_peer" --no-header --repeat "$repeat" "${device[@]}" "$@" |
-    sed "s/^/$round,/" >>"$rows"
+  local work
+  work=$(wanted "$2")
+  [[ -n $work ]] || return 0
+  "${prefix[@]}" "$build/bin/embree_peer" --no-header --repeat "$repeat" --count "$(($1 / part))" --work "$work" \
+    "${device[@]}" "${@:3}" | sed "s/^/$round,/" >>"$rows"
 }
 
 # measure_ours ARGUMENTS...: the same for our side alone, through raysplats bench.
@@ -107,14 +125,15 @@ measure_fox() {
 for ((round = 1; round <= rounds; ++round)); do
   say "Round $round of $rounds"
   if [[ $embree == ON ]]; then
-    measure --count 100000 --work camera
-    measure --count 10000 --work camera --programs embree-packets-k64
-    measure --count 1000000 --work build,refit,camera --programs embree-packets-k64
-    measure --count 100000 --work rays --size 400 --programs embree-single-k64
-    measure --count 1000000 --work rays --size 200 --programs embree-single-k64
+    measure 100000 build,refit,camera
+    measure 10000 camera --programs embree-packets-k64
+    measure 1000000 build,refit,camera --programs embree-packets-k64
+    measure 100000 rays --size 400 --programs embree-single-k64
+    measure 1000000 rays --size 200 --programs embree-single-k64
   else
-    measure_ours --sizes 10k,100k,1M --filter '^(view|build|refit|rays)/'
+    measure_ours --sizes "$((10000 / part)),$((100000 / part)),$((1000000 / part))" \
+      --filter '^(view|build|refit|rays)/'
   fi
-  [[ -z $fox ]] || measure_fox
+  [[ -z $fox || -z $(wanted train) ]] || measure_fox
 done
-python3 "$root/scripts/bench/peer_table.py" table "$rows" "$out/ratios.csv"
+python3 "$root/scripts/bench/peer_table.py" table "$rows" "$out/ratios.csv" "$part"

@@ -109,6 +109,7 @@ const std::vector<std::pair<std::string, std::string>> kNotRun{
     {"raysplats eval model.ply --data garden --downscale 4 -o eval --lpips",
      "needs a network that the user supplies"},
     {"ctest --preset", "runs this test"},
+    {"scripts/figures.sh", "measures for minutes; the test 'figures' compares its parts with docs"},
     {"scripts/reliability/fuzz.sh", "needs a build by clang and 20 minutes"},
     {"build/release/bin/fuzz_seeds", "writes into the source tree"},
     {"cmake --preset asan-ubsan", "another build"},
