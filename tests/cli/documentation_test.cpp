@@ -117,6 +117,7 @@ const std::vector<std::pair<std::string, std::string>> kNotRun{
     {"$raysplats prepare ", "needs COLMAP; tests/cli/prepare_test.cpp"},
     {"raysplats view ", "runs until it is ended; tests/view"},
     {"$raysplats view ", "runs until it is ended; tests/view"},
+    {"mpirun ", "needs MPI; tests/ranks"},
     {"RUSTICL_ENABLE=", "needs another OpenCL platform"},
     {"pip install ", "downloads; scripts/test_python.sh does the same"},
     {"./scripts/test_python.sh", "builds the wheel; run by scripts/ci.sh"},
