@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "comm/communicator.hpp"
-#include "core/data_rows.hpp"
 #include "core/trace_rows.hpp"
 #include "device/context.hpp"
+#include "io/data_rows.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trace_options.hpp"

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "core/camera_model.hpp"
-#include "core/data_rows.hpp"
+#include "io/data_rows.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "base/number_text.hpp"
-#include "core/data_rows.hpp"
 #include "core/trace_rows.hpp"
+#include "io/data_rows.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/data_rows.hpp"
+#include "io/data_rows.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
