@@ -24,9 +24,6 @@ namespace {
 // Fused multiply-add is wanted everywhere; reordering and ignoring NaN are not.
 constexpr const char* kCompilerOptions = "-cl-mad-enable";
 
-// Drivers that have the binary at hand copy some hundred kilobytes.
-constexpr std::chrono::milliseconds kSlowBinary{100};
-
 // Compilers print warnings, or how many there were, to the terminal behind our back: they are for
 // those who ask for them.
 std::string compiler_flags(const BuildOptions& build, bool check_arguments) {
@@ -134,7 +131,7 @@ Context::Context(const DeviceInfo& device, const ContextOptions& options)
   impl_->check_arguments = arguments_are_checked();
   try {
     impl_->context = cl::Context(impl_->device);
-    // GPUs always need it, because LaunchTimer bounds their launches; elsewhere it costs nothing.
+    // GPUs always need it, because LaunchTimer bounds their launches by it.
     impl_->queue = cl::CommandQueue(impl_->context, impl_->device, cl::QueueProperties::Profiling);
   } catch (const cl::Error& error) {
     throw_cl_error(error, fmt::format("Opening the OpenCL device {}", device.name));
@@ -243,21 +240,12 @@ cl::Program Context::Impl::make_program(const std::string& path, const BuildOpti
     program = cached();
     if (!program) {
       program = compile(*this, path, source, flags);
-      keep(cache, cache_key, *program);
+      store_binary(cache, cache_key, *program);
       return *program;
     }
   }
   faults.check(Fault::kBuild);
   return *program;
-}
-
-void Context::Impl::keep(const ProgramCache& cache,
-                         const std::string& key,
-                         const cl::Program& program) {
-  if (cache.gives_slowly(info)) return;
-  const auto begin = std::chrono::steady_clock::now();
-  store_binary(cache, key, program);
-  if (std::chrono::steady_clock::now() - begin > kSlowBinary) cache.note_gives_slowly(info);
 }
 
 void Context::Impl::timed(const std::string& path,

@@ -14,7 +14,6 @@
 #include "device/context.hpp"
 #include "device/fault_injection.hpp"
 #include "device/profiler.hpp"
-#include "device/program_cache.hpp"
 
 namespace raysplats {
 
@@ -71,9 +70,6 @@ struct Context::Impl {
 
   cl::Program& program(const std::string& path, const BuildOptions& build);
   cl::Program make_program(const std::string& path, const BuildOptions& build);
-  /// Puts a program that the compiler has made into the cache, unless the driver is known to take
-  /// long to give it: what compiles again to do so keeps what it compiled by itself (PoCL does).
-  void keep(const ProgramCache& cache, const std::string& key, const cl::Program& program);
   /// Keeps host memory until the command that uses it is over.
   void keep_until(const cl::Event& event, std::shared_ptr<const void> memory);
   /// What an enqueue call takes for its event: null unless launches are timed.

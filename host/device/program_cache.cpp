@@ -18,7 +18,6 @@ namespace raysplats {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'R', 'S', 'K', 'E', 'R', 'N', '0', '1'};
-constexpr const char* kSlowMark = ".slow";
 
 struct Header {
   std::array<char, 8> magic;
@@ -124,28 +123,13 @@ void ProgramCache::remove(const std::string& key) const {
   if (!directory_.empty()) std::filesystem::remove(file(key), error);
 }
 
-std::filesystem::path ProgramCache::slow_mark(const DeviceInfo& device) const {
-  return directory_ / (key("", "", device) + kSlowMark);
-}
-
-bool ProgramCache::gives_slowly(const DeviceInfo& device) const {
-  std::error_code error;
-  return !directory_.empty() && std::filesystem::exists(slow_mark(device), error);
-}
-
-void ProgramCache::note_gives_slowly(const DeviceInfo& device) const {
-  if (!directory_.empty()) std::ofstream(slow_mark(device)).flush();
-}
-
 std::size_t clear_program_cache(const std::filesystem::path& directory) {
   std::error_code error;
-  std::vector<std::filesystem::path> programs, marks;
+  std::vector<std::filesystem::path> programs;
   for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
        entry.increment(error)) {
     if (entry->path().extension() == ".bin") programs.push_back(entry->path());
-    if (entry->path().extension() == kSlowMark) marks.push_back(entry->path());
   }
-  for (const std::filesystem::path& path : marks) std::filesystem::remove(path, error);
   std::size_t removed = 0;
   for (const std::filesystem::path& path : programs) {
     if (std::filesystem::remove(path, error)) ++removed;

@@ -27,10 +27,6 @@ class ProgramCache {
   std::optional<std::vector<unsigned char>> load(const std::string& key) const;
   void store(const std::string& key, const std::vector<unsigned char>& binary) const;
   void remove(const std::string& key) const;
-  /// Whether the device's driver is known to take long to give the binary of a program it has just
-  /// made, as PoCL does, which compiles every kernel of it a second time.
-  bool gives_slowly(const DeviceInfo& device) const;
-  void note_gives_slowly(const DeviceInfo& device) const;
   const std::filesystem::path& directory() const { return directory_; }
 
   /// Keeps other processes and threads from compiling for this cache; gone with its process.
@@ -50,7 +46,6 @@ class ProgramCache {
 
  private:
   std::filesystem::path file(const std::string& key) const { return directory_ / (key + ".bin"); }
-  std::filesystem::path slow_mark(const DeviceInfo& device) const;
   std::filesystem::path directory_;  // empty = off
 };
 

@@ -102,7 +102,7 @@ TEST_CASE("prepare goes on after the last finished step") {
   const Stage stage;
   const Outcome failed = stage.run({stage.path("photos"), "-o", stage.path("data")}, "mapper");
   CHECK(failed.code == 1);
-  CHECK(has(failed.err, "colmap failed with exit code 7: "));
+  CHECK(has(failed.err, "colmap ended with exit code 7: "));
   CHECK(has(failed.err, "the disk is on fire"));
   CHECK(has(failed.err, "prepare.log"));
   CHECK(!fs::exists(stage.path("data/sparse")));

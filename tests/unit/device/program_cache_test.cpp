@@ -33,20 +33,10 @@ std::string read_all(const fs::path& path) {
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-// All but the mark of a slow driver.
 std::vector<fs::path> entries(const fs::path& directory) {
   std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(directory)) {
-    if (entry.path().extension() != ".slow") found.push_back(entry.path());
-  }
+  for (const auto& entry : fs::directory_iterator(directory)) found.push_back(entry.path());
   return found;
-}
-
-// So that the next program is stored at once.
-void forget_slow(const fs::path& directory) {
-  for (const auto& entry : fs::directory_iterator(directory)) {
-    if (entry.path().extension() == ".slow") fs::remove(entry.path());
-  }
 }
 
 // Runs a kernel that needs no arguments but a buffer in a context with this cache; the words it
@@ -140,22 +130,10 @@ TEST_CASE("program cache: a context fills it, uses it and repairs it") {
        {good.substr(0, good.size() / 2), good.substr(0, 100) + std::string(good.size() - 100, 'x'),
         std::string()}) {
     folder.write(file.filename().string(), bad);
-    forget_slow(folder.path());
     CHECK(probe(folder.path()) == expected);
     CHECK(read_all(file).size() > 100);
     CHECK(read_all(file) != bad);
   }
-}
-
-TEST_CASE("program cache: what a slow driver makes is not stored") {
-  const TemporaryDirectory folder;
-  const ProgramCache cache(folder.path().string());
-  cache.note_gives_slowly(select_device(""));
-  CHECK(cache.gives_slowly(select_device("")));
-  CHECK(probe(folder.path()) > 1);
-  CHECK(entries(folder.path()).empty());
-  CHECK(clear_program_cache(folder.path()) == 0);
-  CHECK_FALSE(cache.gives_slowly(select_device("")));
 }
 
 TEST_CASE("program cache: a sound entry with a binary the driver refuses is replaced") {
@@ -164,7 +142,6 @@ TEST_CASE("program cache: a sound entry with a binary the driver refuses is repl
   const fs::path file = entries(folder.path()).at(0);
   const ProgramCache cache(folder.path().string());
   cache.store(file.stem().string(), pattern(5000, 3));
-  forget_slow(folder.path());
   CHECK(probe(folder.path()) == expected);
   CHECK(cache.load(file.stem().string()) != pattern(5000, 3));
 }
