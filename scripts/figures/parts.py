@@ -180,11 +180,11 @@ def captures(run):
     run.call(ROOT / "scripts/quality.sh", run.data, "-o", run.folder, "--raysplats", run.raysplats, *options)
     result = json.loads((run.folder / "result.json").read_text())["scenes"]
     lines = [[name, f"{row['psnr']:.2f}", f"{row['ssim']:.4f}", f"{row['gap']:.2f}", f"{row['gaussians']:.0f}",
-              f"{row['seconds']:.1f}"] for name, row in result.items()]
+              f"{row['hits']:.0f}"] for name, row in result.items()]
     return (f"`scripts/quality.sh DATA -o OUT {shown(*options)}`: default settings, sizes and lengths as "
             "`scripts/quality/scenes.toml` says under `screen`.\n\n"
             + table(["capture", "held-out PSNR, dB", "SSIM", "training views above it, dB", "Gaussians",
-                     "training, s"], lines))
+                     "hits a step"], lines))
 
 
 def peers(run):
@@ -230,7 +230,7 @@ def limits(run):
     lines = [[f"`{row['axis']}`", row["value"], f"{float(row['psnr']):.2f}", f"{float(row['ssim']):.4f}",
               number(float(row["train_seconds"]))] for row in rows]
     return (f"`scripts/ablation.sh DATA/colmap/fox_undistorted OUT {shown(*options, *values)} -- {shown(*train)}`.\n\n"
-            + table(["option", "value", "held-out PSNR, dB", "SSIM", "training, s"], lines))
+            + table(["option", "value", "held-out PSNR, dB", "SSIM", "hits a step"], lines))
 
 
 def plain(run, script, *options):
