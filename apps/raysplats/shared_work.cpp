@@ -40,9 +40,7 @@ std::vector<T> of_all(Communicator& ranks, T mine) {
 
 }  // namespace
 
-bool is_shared(const std::string& command) {
-  return command == "render" || command == "eval";
-}
+bool is_shared(const std::string& command) { return command == "render" || command == "eval"; }
 
 Communicator join_processes(const std::string& command) {
   const Launch launch = find_launch();

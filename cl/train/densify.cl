@@ -119,8 +119,9 @@ float half_opacity(float logit) {
 
 // Gaussian i of the new set comes from source[i] of the old one in the role role[i]. The two
 // children of a split are drawn from the parent's own distribution and are smaller by split_factor;
-// the two halves lie side by side along the parent's longest axis. Parts are drawn from the parent's
-// distribution, because equal ones in one place would have equal gradients and stay together.
+// the two halves lie side by side along the parent's longest axis. Parts are drawn from the
+// parent's distribution, because equal ones in one place would have equal gradients and stay
+// together.
 kernel void gather_gaussians(uint count,
                              uint key_low,
                              uint key_high,

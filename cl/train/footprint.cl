@@ -50,11 +50,8 @@ __kernel void footprint_floor(uint count,
 }
 
 // Keeps all scale parameters within two limits. A guard word that is not 0 turns it off.
-__kernel void limit_scales(uint count,
-                           float low,
-                           float high,
-                           __global const uint* guard,
-                           __global float* scales) {
+__kernel void limit_scales(
+    uint count, float low, float high, __global const uint* guard, __global float* scales) {
   const size_t i = get_global_id(0);
   if (i >= count || guard[0] != 0) return;
   const float3 scale = vload3(i, scales);

@@ -11,9 +11,9 @@
 #include <string_view>
 
 #include "base/atomic_file.hpp"
+#include "base/program.hpp"
 #include "io/colmap_model.hpp"
 #include "prepare/frames.hpp"
-#include "base/program.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {

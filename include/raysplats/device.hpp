@@ -42,7 +42,7 @@ struct DeviceInfo {
   std::uint32_t float_vector_width = 1;  ///< native float lanes
   bool has_fp64 = false;
   bool has_int64_atomics = false;
-  bool has_float_atomics = false;  ///< additions in global memory, by cl_ext_float_atomics
+  bool has_float_atomics = false;      ///< additions in global memory, by cl_ext_float_atomics
   std::optional<DeviceTuning> tuning;  ///< of Context::device(): what `raysplats tune` found
   std::vector<std::string> problems;   ///< why the device cannot be used; empty when it can
 

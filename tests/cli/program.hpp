@@ -28,7 +28,7 @@ struct Surroundings {
   bool terminal = false;                   ///< standard error is one, 80 columns wide
   bool closed_out = false;                 ///< as by >&-
   bool closed_err = false;
-  std::string folder = {};  ///< to run in; the test's own when empty
+  std::string folder = {};                 ///< to run in; the test's own when empty
   std::vector<std::string> launcher = {};  ///< what starts the program, such as mpirun -n 2
 };
 
