@@ -237,7 +237,7 @@ def plain(run, script, *options):
     """A script of scripts/reliability whose output is a table as it stands."""
     text = run.call(ROOT / "scripts/reliability" / script, "--raysplats", run.raysplats, *options)
     command = f"scripts/reliability/{script} {shown(*options)}".rstrip()
-    return f"`{command}`:\n\n```\n{text.rstrip()}\n```\n"
+    return f"`{command}`:\n\n```text\n{text.rstrip()}\n```\n"
 
 
 def spread(run):
