@@ -98,6 +98,7 @@ void check_mask(const View& view) {
 
 void mark_every(std::vector<View>& views, int test_every) {
   if (test_every <= 0) return;
+  if (views.size() == 1 && test_every > 1) return;  // a photo alone is trained on
   const auto step = static_cast<std::size_t>(test_every);
   for (std::size_t i = 0; i < views.size(); i += step) views[i].test = true;
 }

@@ -344,8 +344,17 @@ Gaussians initial_model(const Dataset& dataset,
     return inside(gaussians_from_points(points, options.sh_degree, options.init_opacity, cameras),
                   bounds);
   };
-  if (has_points && (options.init == "auto" || options.init == "colmap"))
-    return subset(start(reliable_points(dataset.points)), share(kStartShare));
+  if (has_points && (options.init == "auto" || options.init == "colmap")) {
+    const Gaussians model = start(reliable_points(dataset.points));
+    const std::size_t most = share(kStartShare);
+    if (model.size() > most) {
+      spdlog::info(
+          "the start takes {} of {} sparse points, so that at most {} Gaussians have room to grow "
+          "(--max-gaussians)",
+          most, model.size(), limit);
+    }
+    return subset(model, most);
+  }
 
   const std::size_t count = options.init_count > 0
                                 ? std::min(limit, static_cast<std::size_t>(options.init_count))

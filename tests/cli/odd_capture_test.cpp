@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// Captures that lack what training expects: each is said in one sentence, and only what cannot be
+// trained on ends the run.
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "program.hpp"
+#include "raysplats/io.hpp"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Words = std::vector<std::string>;
+
+constexpr int kSize = 16;
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// Four photos for training and one that is held out.
+void make_data(const std::string& path) {
+  const Outcome outcome = raysplats_program({"generate", path, "--size", std::to_string(kSize),
+                                             "--train-views", "4", "--test-views", "1", "-q"});
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+}
+
+nlohmann::json training_file(const std::string& data) {
+  return nlohmann::json::parse(read_file(data + "/transforms_train.json"));
+}
+
+/// Keeps the first photos for training alone; without `test` none is held out by the files.
+void keep_photos(const std::string& data, std::size_t count, bool test) {
+  nlohmann::json json = training_file(data);
+  nlohmann::json& frames = json["frames"];
+  frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(count), frames.end());
+  write_file(data + "/transforms_train.json", json.dump());
+  if (!test) fs::remove(data + "/transforms_test.json");
+}
+
+/// Gives the second photo a mask of one value.
+void add_mask(const std::string& data, int width, int height, float value) {
+  raysplats::Image mask(width, height, 3);
+  for (float& number : mask.data) number = value;
+  raysplats::write_image(data + "/mask.png", mask);
+  nlohmann::json json = training_file(data);
+  json["frames"][1]["mask_path"] = "mask.png";
+  write_file(data + "/transforms_train.json", json.dump());
+}
+
+Outcome train(const std::string& data, const std::string& run, const Words& more = {}) {
+  Words words{"train", data,          "-o", run, "-n", "4", "--resolution-schedule",
+              "[]",    "--sh-degree", "0"};
+  words.insert(words.end(), more.begin(), more.end());
+  return raysplats_program(words);
+}
+
+/// The run ends well and says `remark` once.
+void check_trains(const Outcome& outcome, const std::string& remark) {
+  INFO(outcome.err);
+  CHECK(outcome.code == 0);
+  const std::size_t at = outcome.err.find(remark);
+  REQUIRE(at != std::string::npos);
+  CHECK(outcome.err.find(remark, at + 1) == std::string::npos);
+}
+
+/// The run ends with one sentence that has `part`.
+void check_refused(const Outcome& outcome, int code, const std::string& part) {
+  INFO(outcome.err);
+  CHECK(outcome.code == code);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.err, part));
+}
+
+}  // namespace
+
+TEST_CASE("masks that cannot belong to their photo are refused with their name") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  make_data(data);
+  add_mask(data, kSize, kSize, 0.0f);
+  check_refused(train(data, folder / "black", {"-q"}), 3, "mask.png is black everywhere");
+  add_mask(data, kSize, kSize / 2, 1.0f);
+  check_refused(train(data, folder / "shape", {"-q"}), 3, "mask.png has 16 x 8 pixels");
+  // The same shape in another size is the photo's all the same.
+  add_mask(data, 2 * kSize, 2 * kSize, 1.0f);
+  check_trains(train(data, folder / "size"), "1 of 5 photos have a mask");
+}
+
+TEST_CASE("one or two photos are trained on, with a warning of what they leave open") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  make_data(data);
+  keep_photos(data, 2, true);
+  check_trains(train(data, folder / "two"), "warning: 2 training views of " + data);
+  keep_photos(data, 1, false);
+  const Outcome one = train(data, folder / "one");
+  check_trains(one, "warning: 1 training view of " + data);
+  check_trains(one, "no view is held out, so nothing is measured");
+  keep_photos(data, 0, false);
+  check_refused(train(data, folder / "none", {"-q"}), 3, "has no views");
+}
+
+TEST_CASE("a run without test views says that nothing is measured") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  make_data(data);
+  keep_photos(data, 4, false);
+  const Outcome outcome = train(data, folder / "run", {"--test-every", "0"});
+  check_trains(outcome, "no view is held out, so nothing is measured");
+  CHECK_FALSE(contains(outcome.out, "PSNR"));
+  check_refused(train(data, folder / "all", {"-q", "--test-every", "1"}), 2,
+                "--test-every 1 holds all of them out");
+}
+
+TEST_CASE("a cap below the start takes a part of it, and never what was asked for by number") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  make_data(data);
+  check_refused(train(data, folder / "count", {"-q", "--init-count", "50", "--max-gaussians", "8"}),
+                2, "'init-count' = 50 Gaussians is above 'max-gaussians' = 8");
+  write_file(folder / "model.ply", ply_file(20));
+  const Words from_model{"--init", folder / "model.ply", "--max-gaussians", "8"};
+  const Outcome outcome = train(data, folder / "model", from_model);
+  check_trains(outcome, "has 20 Gaussians, but this run may have 8");
+  CHECK(contains(outcome.out, ": 8 Gaussians in "));
+}
