@@ -31,7 +31,8 @@
 #endif
 
 // statistics: 2 N, {sum of the signal, number of views that saw the Gaussian}; signal 0 = screen, 1
-// = absolute. A signal that is not finite is left out; a guard word that is not 0 turns all off.
+// = absolute. screen: 3 N, of one view or a sum over views; the third number tells how many saw it.
+// A signal that is not finite is left out; a guard word that is not 0 turns all off.
 kernel void accumulate_screen(uint count,
                               uint signal,
                               global const float* screen,
@@ -39,10 +40,10 @@ kernel void accumulate_screen(uint count,
                               global float* statistics) {
   const uint i = get_global_id(0);
   if (i >= count || guard[0] != 0) return;
-  const float visible = screen[3 * i + 2];
-  if (visible > 0.0f && isfinite(screen[3 * i + signal])) {
+  const float views = screen[3 * i + 2];
+  if (views > 0.0f && isfinite(screen[3 * i + signal])) {
     statistics[2 * i] += screen[3 * i + signal];
-    statistics[2 * i + 1] += 1.0f;
+    statistics[2 * i + 1] += views;
   }
 }
 

@@ -26,8 +26,8 @@ class DensityControl {
   /// The count that max-gaussians = 0 stands for.
   void set_limit(std::size_t limit) { limit_ = limit; }
 
-  /// Adds the statistics of one view; enqueues without waiting. A `guard` whose first word is not 0
-  /// keeps them as they are.
+  /// Adds the statistics of one view, or of several whose gradients are added; enqueues without
+  /// waiting. A `guard` whose first word is not 0 keeps them as they are.
   void accumulate(const DeviceGaussians& gaussians,
                   const GaussianGradients& gradients,
                   const Buffer<std::uint32_t>* guard = nullptr);

@@ -12,45 +12,38 @@ constexpr std::size_t kGroup = 64;
 
 }  // namespace
 
-// later = earlier + later.
-void GradientTree::join(const StepGradients& earlier, StepGradients& later) {
+// left += right, whose buffers are spare then.
+void GradientTree::join(StepGradients& left, StepGradients& right) {
   Kernel add = context_.kernel("train/gradient_tree.cl", "add_numbers");
   const auto join_numbers = [&add](const Buffer<float>& first, const Buffer<float>& second) {
-    add.launch(Range::linear(second.size(), kGroup), first, second, second,
+    add.launch(Range::linear(second.size(), kGroup), first, second, first,
                static_cast<std::uint64_t>(second.size()));
   };
   for_each_group([&](ParameterGroup, const Buffer<float>& first,
                      const Buffer<float>& second) { join_numbers(first, second); },
-                 earlier.gaussians, later.gaussians);
-  join_numbers(earlier.gaussians.screen, later.gaussians.screen);
-  if (later.sky.size() > 0) join_numbers(earlier.sky, later.sky);
+                 left.gaussians, right.gaussians);
+  join_numbers(left.gaussians.screen, right.gaussians.screen);
+  if (right.sky.size() > 0) join_numbers(left.sky, right.sky);
+  spare_.push_back(std::move(right));
 }
 
 void GradientTree::clear() {
-  for (Level& level : levels_) level.full = false;
+  for (Part& part : sum_.take()) spare_.push_back(std::move(part.second));
 }
 
-void GradientTree::add(StepGradients& slot) {
-  std::size_t level = 0;
-  for (; level < levels_.size() && levels_[level].full; ++level) {
-    join(levels_[level].gradients, slot);
-    levels_[level].full = false;
-  }
-  if (level == levels_.size()) levels_.emplace_back();
-  std::swap(levels_[level].gradients, slot);
-  levels_[level].full = true;
+void GradientTree::add(std::size_t slot, StepGradients& gradients) {
+  sum_.push({slot, 0}, std::exchange(gradients, {}),
+            [this](StepGradients& left, StepGradients& right) { join(left, right); });
+  if (spare_.empty()) return;
+  gradients = std::move(spare_.back());
+  spare_.pop_back();
 }
 
 void GradientTree::finish(StepGradients& sum) {
-  bool any = false;
-  for (Level& level : levels_) {
-    if (!level.full) continue;
-    if (any) join(level.gradients, sum);
-    if (!any) std::swap(level.gradients, sum);
-    any = true;
-    level.full = false;
-  }
-  if (!any) throw UsageError("There are no gradients to add: give those of one view or more");
+  sum_.finish([this](StepGradients& left, StepGradients& right) { join(left, right); });
+  if (sum_.parts().empty())
+    throw UsageError("There are no gradients to add: give those of one view or more");
+  spare_.push_back(std::exchange(sum, std::move(sum_.take().front().second)));
 }
 
 }  // namespace raysplats

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
+#include "comm/pairwise.hpp"
 #include "device/context.hpp"
 #include "trace/device_gaussians.hpp"
 
@@ -17,32 +17,33 @@ struct StepGradients {
   Buffer<float> sky;  ///< empty without one
 };
 
-/// Sum of the gradients of a step's views in a fixed tree over their slots: neighbours first, then
-/// neighbouring sums, ((0 + 1) + (2 + 3)) + ((4 + 5) + 6) for seven. So the sum is a function of
-/// the slots alone, whoever finds their gradients and when; what is kept at once is a set for every
-/// level. GaussianGradients::screen is added too: its last number tells how many views met a
-/// Gaussian then.
+/// Sum of the gradients of a step's views in the tree of PairwiseNode over their slots: neighbours
+/// first, then neighbouring sums, ((0 + 1) + (2 + 3)) + ((4 + 5) + 6) for seven. So the sum is a
+/// function of the slots alone, whoever finds their gradients and when; what is kept at once is a
+/// set for every level. GaussianGradients::screen is added too: what density control counts, and
+/// how many views met a Gaussian.
 class GradientTree {
  public:
+  using Part = PairwiseSum<StepGradients>::Part;
+
   explicit GradientTree(Context& context) : context_(context) {}
 
   /// Forgets what was added: a step that broke off.
   void clear();
-  /// Takes the gradients of the next slot, and leaves buffers of an earlier one in their place.
-  /// Enqueues without waiting.
-  void add(StepGradients& slot);
-  /// Moves the sum of all slots since the last finish() to `sum`. Throws UsageError without any.
+  /// Takes the gradients of a slot, which follows the last one since finish() or clear(), and
+  /// leaves buffers of an earlier one in their place. Enqueues without waiting.
+  void add(std::size_t slot, StepGradients& gradients);
+  /// The sums of the slots so far, those of pairwise_nodes().
+  const std::vector<Part>& parts() const { return sum_.parts(); }
+  /// Moves the sum of all slots to `sum`. Throws UsageError without any.
   void finish(StepGradients& sum);
 
  private:
-  struct Level {
-    StepGradients gradients;
-    bool full = false;
-  };
-  void join(const StepGradients& earlier, StepGradients& later);
+  void join(StepGradients& left, StepGradients& right);
 
   Context& context_;
-  std::vector<Level> levels_;
+  PairwiseSum<StepGradients> sum_;
+  std::vector<StepGradients> spare_;  // buffers of sets that have been added
 };
 
 }  // namespace raysplats

@@ -86,13 +86,9 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   // scales.
   const std::size_t footprint = options.footprint > 0 ? 1 : 0;
   out.gaussians = demand.gaussians * (floats * 5 + 5 + 2 + footprint) * sizeof(float);
-  // Steps of several views: sums of gradients, one for every level of their tree, and what every
-  // view says of density.
+  // Steps of several views: sums of gradients, one for every level of their tree.
   const auto views = static_cast<std::size_t>(options.views_per_step);
-  if (views > 1) {
-    out.gaussians +=
-        demand.gaussians * ((floats + 3) * std::bit_width(views) + 3 * views) * sizeof(float);
-  }
+  out.gaussians += demand.gaussians * (floats + 3) * std::bit_width(views - 1) * sizeof(float);
   // Line, gradient line and its exact sums, bounds, box, candidate keys and values with their
   // second copies.
   const bool packets = demand.ray_views < demand.views || demand.views == 0;

@@ -48,9 +48,8 @@ constexpr std::size_t kReadAhead = 8;
 
 /// One of the views of a step, and what its gradient leaves besides.
 struct ViewSlot {
-  std::size_t view = 0;      ///< position among the training views
-  GaussianGradients screen;  ///< the statistics of steps of several views; nothing else
-  PoseGradient slope;        ///< where poses are trained
+  std::size_t view = 0;  ///< position among the training views
+  PoseGradient slope;    ///< where poses are trained
 };
 
 /// A step that is enqueued and may not be done, with what its beginning found on the host.

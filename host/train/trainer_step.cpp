@@ -47,17 +47,13 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
   tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr);
   traced_rays += pixels_of(camera);
   if (slots.size() == 1) return;
-  // Kept for this view alone until the whole step is known to count.
-  const Buffer<float>& screen = gradients.gaussians.screen;
-  out.screen.screen.ensure(context, screen.size(), "screen gradients of a view");
-  out.screen.screen.copy_from(screen, screen.size());
   if (sky) {
     const Buffer<float>& slope = tracer.sky()->gradient();
     gradients.sky.ensure(context, slope.size(), "sky gradient of a view");
     gradients.sky.copy_from(slope, slope.size());
   }
   guard.count_capped(tracer.kept_capped_rays(), slot == 0);
-  sum.add(gradients);
+  sum.add(slot, gradients);
 }
 
 // All views of a step and what follows of them. One view needs no sum.
@@ -76,10 +72,9 @@ void Trainer::Impl::enqueue_step() {
     }
     if (poses && iteration < pose_end(options))
       poses->step(one.view, one.slope, learning_rate(options.pose_lr, options, iteration));
-    if (density.accumulates_at(iteration)) {
-      density.accumulate(gaussians, several ? one.screen : gradients.gaussians, &guard.mark());
-    }
   }
+  if (density.accumulates_at(iteration))
+    density.accumulate(gaussians, gradients.gaussians, &guard.mark());
   if (sky) {
     sky->step(several ? gradients.sky : tracer.sky()->gradient(), tracer.sky()->coefficients(),
               learning_rate(options.sky_lr, options, iteration), guard.mark());

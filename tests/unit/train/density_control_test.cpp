@@ -78,6 +78,9 @@ TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [
     accumulate(context, control, gaussians, {{4, 40, 1, 5, 50, 0, 6, 60, 0}});
     const float f = signal == DensifySignal::kScreen ? 1.0f : 10.0f;
     CHECK(control.statistics().download() == std::vector<float>{5 * f, 2, 0, 0, 3 * f, 1});
+    // The sum over a step's four views.
+    accumulate(context, control, gaussians, {{7, 70, 4, 8, 80, 1, 0, 0, 0}});
+    CHECK(control.statistics().download() == std::vector<float>{12 * f, 6, 8 * f, 1, 3 * f, 1});
   }
 }
 

@@ -93,7 +93,7 @@ TEST_CASE("gradients of a step's views are added in a fixed tree, bit for bit [s
     CAPTURE(views);
     for (std::size_t slot = 0; slot < views; ++slot) {
       fill(context, slot, sum);
-      tree.add(sum);
+      tree.add(slot, sum);
     }
     tree.finish(sum);
     const auto check = [&](std::uint64_t part, const Buffer<float>& got) {
