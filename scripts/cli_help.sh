@@ -11,7 +11,7 @@ trap 'rm -f "$new"' EXIT
 awk '/^## All options$/ { exit } { print }' "$page" >"$new"
 {
   printf '## All options\n\nWhat `-h` prints (`scripts/cli_help.sh` writes this section).\n'
-  for command in devices generate prepare train render eval trace info convert view report bench "bench compare" tune completion manual; do
+  for command in devices doctor generate prepare train render eval trace info convert view report bench "bench compare" tune completion manual; do
     # shellcheck disable=SC2086  # two words are two arguments
     help=$("$raysplats" $command -h)
     printf '\n```text\n%s\n```\n' "$(sed 's/ *$//' <<<"$help")"

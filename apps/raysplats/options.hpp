@@ -50,6 +50,7 @@ struct Command {
   std::function<void()> run;
 };
 Command add_devices_command(CLI::App& app);
+Command add_doctor_command(CLI::App& app);
 Command add_generate_command(CLI::App& app);
 Command add_prepare_command(CLI::App& app, const GlobalOptions& global);
 Command add_train_command(CLI::App& app, const GlobalOptions& global);

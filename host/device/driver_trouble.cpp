@@ -25,28 +25,6 @@ std::string variable(const char* name) {
   return value != nullptr ? value : "";
 }
 
-// A driver is a line, the name of its library, in a file NAME.icd of the loader's folder.
-struct Driver {
-  fs::path file;
-  std::string library;
-};
-
-std::vector<Driver> registered_drivers(const fs::path& folder) {
-  std::vector<Driver> drivers;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    if (entry->path().extension() != ".icd") continue;
-    Driver driver{entry->path(), ""};
-    std::ifstream stream(driver.file);
-    std::getline(stream, driver.library);
-    drivers.push_back(std::move(driver));
-  }
-  std::sort(drivers.begin(), drivers.end(),
-            [](const Driver& a, const Driver& b) { return a.file < b.file; });
-  return drivers;
-}
-
 // Nothing when the library loads.
 std::string load_error(const std::string& library) {
   void* handle = ::dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -54,6 +32,34 @@ std::string load_error(const std::string& library) {
   ::dlclose(handle);
   return "";
 }
+
+}  // namespace
+
+DriverFolder driver_folder() {
+  for (const char* name : {"OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH"}) {
+    if (const std::string chosen = variable(name); !chosen.empty()) return {chosen, name};
+  }
+  return {"/etc/OpenCL/vendors", ""};
+}
+
+std::vector<RegisteredDriver> registered_drivers(const std::filesystem::path& folder) {
+  std::vector<RegisteredDriver> drivers;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() != ".icd") continue;
+    RegisteredDriver driver{entry->path(), "", ""};
+    std::ifstream stream(driver.file);
+    std::getline(stream, driver.library);
+    driver.error = load_error(driver.library);
+    drivers.push_back(std::move(driver));
+  }
+  std::sort(drivers.begin(), drivers.end(),
+            [](const RegisteredDriver& a, const RegisteredDriver& b) { return a.file < b.file; });
+  return drivers;
+}
+
+namespace {
 
 // The folder that PoCL keeps compiled kernels in, and the variable that names it.
 struct PoclCache {
@@ -101,26 +107,21 @@ std::vector<std::string> platform_names() {
 }
 
 std::string why_no_platforms() {
-  std::string chosen;
-  for (const char* name : {"OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH"}) {
-    if (chosen.empty() && !variable(name).empty()) chosen = name;
-  }
-  const fs::path folder = chosen.empty() ? "/etc/OpenCL/vendors" : variable(chosen.c_str());
-  const std::vector<Driver> drivers = registered_drivers(folder);
-  for (const Driver& driver : drivers) {
-    const std::string error = load_error(driver.library);
-    if (error.empty()) continue;
+  const DriverFolder folder = driver_folder();
+  const std::vector<RegisteredDriver> drivers = registered_drivers(folder.path);
+  for (const RegisteredDriver& driver : drivers) {
+    if (driver.error.empty()) continue;
     const std::string remark = memory_limit_remark();
     return fmt::format("The OpenCL driver of {} cannot be loaded ({}){}: {}", driver.file.string(),
-                       error, remark,
+                       driver.error, remark,
                        remark.empty() ? "install it anew" : "allow it more, or install it anew");
   }
-  if (drivers.empty() && !chosen.empty()) {
+  if (drivers.empty() && !folder.variable.empty()) {
     return fmt::format(
         "No OpenCL platform is registered in {}, which {} names: unset it, or install "
         "pocl-opencl-icd "
         "to run on the CPU",
-        folder.string(), chosen);
+        folder.path.string(), folder.variable);
   }
   if (!drivers.empty()) {
     return fmt::format("The OpenCL driver of {} offers no platform here: install another driver",

@@ -1,9 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
+#include <vector>
 
 namespace raysplats {
+
+/// Where the OpenCL loader looks for drivers, and the environment variable that says so (empty: the
+/// loader's own folder).
+struct DriverFolder {
+  std::filesystem::path path;
+  std::string variable;
+};
+DriverFolder driver_folder();
+
+/// A driver is a line, the name of its library, in a file NAME.icd of the loader's folder.
+struct RegisteredDriver {
+  std::filesystem::path file;
+  std::string library;
+  std::string error;  ///< why the library cannot be loaded; empty when it can
+};
+/// All drivers of a folder by the names of their files; none where it cannot be read.
+std::vector<RegisteredDriver> registered_drivers(const std::filesystem::path& folder);
 
 /// Why the OpenCL loader finds no device, as one sentence with what to do: no driver is registered,
 /// a driver's library cannot be loaded, or a driver has no place for its cache.

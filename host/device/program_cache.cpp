@@ -123,15 +123,41 @@ void ProgramCache::remove(const std::string& key) const {
   if (!directory_.empty()) std::filesystem::remove(file(key), error);
 }
 
-std::size_t clear_program_cache(const std::filesystem::path& directory) {
+namespace {
+
+std::vector<std::filesystem::path> programs_in(const std::filesystem::path& directory) {
   std::error_code error;
   std::vector<std::filesystem::path> programs;
   for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
        entry.increment(error)) {
     if (entry->path().extension() == ".bin") programs.push_back(entry->path());
   }
+  return programs;
+}
+
+}  // namespace
+
+ProgramCacheState program_cache_state(const std::filesystem::path& directory) {
+  if (directory.empty()) return {0, 0, "neither XDG_CACHE_HOME nor HOME names a folder for it"};
+  ProgramCacheState state;
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (!error && ::access(directory.c_str(), W_OK | X_OK) != 0)
+    error = std::error_code(errno, std::generic_category());
+  if (error) state.trouble = fmt::format("it cannot be written ({})", error.message());
+  for (const std::filesystem::path& path : programs_in(directory)) {
+    const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+    if (error) continue;  // removed meanwhile
+    ++state.programs;
+    state.bytes += bytes;
+  }
+  return state;
+}
+
+std::size_t clear_program_cache(const std::filesystem::path& directory) {
   std::size_t removed = 0;
-  for (const std::filesystem::path& path : programs) {
+  std::error_code error;
+  for (const std::filesystem::path& path : programs_in(directory)) {
     if (std::filesystem::remove(path, error)) ++removed;
   }
   return removed;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -51,6 +52,15 @@ class ProgramCache {
 
 /// The directory used when none is named.
 std::filesystem::path default_cache_directory();
+
+/// What lies in a folder of compiled programs.
+struct ProgramCacheState {
+  std::size_t programs = 0;
+  std::uintmax_t bytes = 0;
+  std::string trouble;  ///< why nothing can be kept there; empty when it can
+};
+/// Makes the folder where it is missing, as the cache does.
+ProgramCacheState program_cache_state(const std::filesystem::path& directory);
 
 /// Removes every compiled program from `directory` and returns how many there were. Programs that
 /// other processes store meanwhile may stay.

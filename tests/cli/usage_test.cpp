@@ -30,7 +30,7 @@ TEST_CASE("help and version") {
   const Outcome help = raysplats_program({"--help"});
   CHECK(help.code == 0);
   for (const char* command : {"devices", "generate", "train", "render", "eval", "info", "convert",
-                              "view", "bench", "tune"}) {
+                              "view", "bench", "tune", "doctor"}) {
     CHECK(contains(help.out, command));
     const Outcome own = raysplats_program({command, "-h"});
     CHECK(own.code == 0);

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "program.hpp"
+
+namespace {
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("doctor tests every device and says that it works") {
+  const Outcome text = raysplats_program({"doctor", "-q"});
+  INFO(text.err);
+  CHECK(text.code == 0);
+  CHECK(contains(text.out, ".icd: "));
+  CHECK(contains(text.out, "14 of 14 quantities"));
+  CHECK(contains(text.out, "verdict        works\n"));
+  const Outcome json = raysplats_program({"doctor", "--json", "-q"});
+  CHECK(json.code == 0);
+  CHECK(nlohmann::json::parse(json.out).at("works") == true);
+}
+
+TEST_CASE("doctor without any driver says what to install, exit code 4") {
+  const TemporaryFolder folder;
+  const Outcome outcome =
+      raysplats_program({"doctor"}, {{{"OCL_ICD_VENDORS", folder.path().string()}}});
+  CHECK(outcome.code == 4);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.out, "(by OCL_ICD_VENDORS)\n  none\n"));
+  CHECK(contains(outcome.out, "advice           No OpenCL platform"));
+  CHECK(contains(outcome.out, "pocl-opencl-icd"));
+}
+
+TEST_CASE("doctor names a driver that cannot be loaded") {
+  const TemporaryFolder folder;
+  write_file(folder / "none.icd", "libnone_of_that_name.so\n");
+  const Outcome outcome =
+      raysplats_program({"doctor"}, {{{"OCL_ICD_VENDORS", folder.path().string()}}});
+  CHECK(outcome.code == 4);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.out, "none.icd: libnone_of_that_name.so, "));
+  CHECK(contains(outcome.out, "install it anew"));
+}
+
+TEST_CASE("doctor has no use for a device that is too small") {
+  if (!contains(raysplats_program({"devices"}).out, "Portable Computing Language")) return;
+  const Outcome outcome = raysplats_program({"doctor"}, {{{"POCL_MAX_WORK_GROUP_SIZE", "16"}}});
+  CHECK(outcome.code == 4);
+  CHECK(contains(outcome.out, "not usable: its work-groups hold 16"));
+  CHECK(contains(outcome.out, "advice           No device is usable"));
+}
