@@ -23,10 +23,9 @@
 
 namespace {
 
-// The processes of the work are known outside of run(), which may end by an exception.
-raysplats::cli::GlobalOptions global;
+using raysplats::cli::GlobalOptions;
 
-int fail(raysplats::ErrorCode code, const std::string& message) {
+int fail(GlobalOptions& global, raysplats::ErrorCode code, const std::string& message) {
   return raysplats::cli::fail_together(global.processes, raysplats::Error(code, message));
 }
 
@@ -38,22 +37,24 @@ std::string no_memory() {
 }
 
 // Drivers and libraries have threads of their own, out of reach of main(); some of them meet the
-// end of memory.
+// end of memory. Other processes of the work are ended by mpirun.
 [[noreturn]] void end_of_process() {
-  int code = static_cast<int>(raysplats::ErrorCode::kRuntime);
+  auto code = raysplats::ErrorCode::kRuntime;
+  std::string message;
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
-    fail(raysplats::ErrorCode::kRuntime,
-         fmt::format("A library ended the program{}", raysplats::memory_limit_remark()));
+    message = fmt::format("A library ended the program{}", raysplats::memory_limit_remark());
   } catch (const std::bad_alloc&) {
-    code = fail(raysplats::ErrorCode::kMemory, no_memory());
+    code = raysplats::ErrorCode::kMemory;
+    message = no_memory();
   } catch (const std::exception& error) {
-    fail(raysplats::ErrorCode::kRuntime, error.what());
+    message = error.what();
   }
-  std::_Exit(code);
+  std::fputs(fmt::format("raysplats: {}\n", message).c_str(), stderr);
+  std::_Exit(static_cast<int>(code));
 }
 
-int run(int argc, char** argv) {
+int run(int argc, char** argv, GlobalOptions& global) {
   using namespace raysplats::cli;
   CLI::App app{"Trains and renders 3D Gaussians by ray tracing on any OpenCL device", "raysplats"};
   app.set_version_flag("--version", "raysplats " RAYSPLATS_VERSION);
@@ -80,7 +81,7 @@ int run(int argc, char** argv) {
       raysplats::finish_standard_output();
       return 0;
     }
-    return fail(raysplats::ErrorCode::kUsage, explain(error, app));
+    return fail(global, raysplats::ErrorCode::kUsage, explain(error, app));
   }
   for (const Command& command : commands) {
     if (!command.app->parsed()) continue;
@@ -101,18 +102,20 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::set_terminate(end_of_process);
   raysplats::open_standard_streams();
+  // Known here, because run() may end by an exception.
+  GlobalOptions global;
   try {
-    return run(argc, argv);
+    return run(argc, argv, global);
   } catch (const raysplats::Error& error) {
     return raysplats::cli::fail_together(global.processes, error);
   } catch (const std::bad_alloc&) {
-    return fail(raysplats::ErrorCode::kMemory, no_memory());
+    return fail(global, raysplats::ErrorCode::kMemory, no_memory());
   } catch (const std::system_error& error) {
     // fmt throws it for what does not fit into the buffer of standard output.
-    if (std::ferror(stdout) == 0) return fail(raysplats::ErrorCode::kRuntime, error.what());
-    return fail(raysplats::ErrorCode::kData,
+    if (std::ferror(stdout) == 0) return fail(global, raysplats::ErrorCode::kRuntime, error.what());
+    return fail(global, raysplats::ErrorCode::kData,
                 fmt::format("Standard output cannot be written: {}", error.code().message()));
   } catch (const std::exception& error) {
-    return fail(raysplats::ErrorCode::kRuntime, error.what());
+    return fail(global, raysplats::ErrorCode::kRuntime, error.what());
   }
 }
