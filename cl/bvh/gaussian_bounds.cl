@@ -3,13 +3,10 @@
 // S S R^T (Byrski et al. 2025, eq. 2), grown by what float rounding can lose. Launch: work-items of
 // `chunk` consecutive Gaussians each; O(1) per Gaussian. Scalars without branches, so that
 // compilers make vectors of a long loop (one work-item per Gaussian suits GPUs).
+#include "shared/activation.h"
 #include "shared/alpha.h"
 #include "shared/layout.h"
 
-// S = sigmoid(s) instead of exp(s).
-#ifndef SIGMOID_SCALE
-#define SIGMOID_SCALE 0
-#endif
 // Q shrinks to where opacity * response reaches 1/255; Gaussians below that are empty.
 #ifndef ADAPTIVE_RADIUS
 #define ADAPTIVE_RADIUS 0
@@ -19,14 +16,6 @@
 // the last place).
 #define RS_GROWTH 1.00001f
 #define RS_CENTER_SLACK 2.4e-7f
-
-inline float activated_scale(float parameter) {
-#if SIGMOID_SCALE
-  return 1.0f / (1.0f + exp(-parameter));
-#else
-  return exp(parameter);
-#endif
-}
 
 inline float larger(float a, float b) { return a > b ? a : b; }
 
@@ -57,9 +46,9 @@ __kernel void gaussian_bounds(__global const float* restrict means,
     qy *= shrink;
     qz *= shrink;
     __global const float* parameter = scales + 3 * (size_t)i;
-    const float sx = activated_scale(parameter[0]);
-    const float sy = activated_scale(parameter[1]);
-    const float sz = activated_scale(parameter[2]);
+    const float sx = rs_scale_of(parameter[0]);
+    const float sy = rs_scale_of(parameter[1]);
+    const float sz = rs_scale_of(parameter[2]);
     const float longest = larger(sx, larger(sy, sz));
     const float inverse = longest > 0.0f ? longest : 1.0f;
     const float rx = sx / inverse;
@@ -80,7 +69,7 @@ __kernel void gaussian_bounds(__global const float* restrict means,
     int good = finite(opacities[i]) & finite(sx) & finite(sy) & finite(sz);
 #if ADAPTIVE_RADIUS
     // The limits give way by what rounding does to a logarithm near zero.
-    const float alpha = 1.0f / (1.0f + exp(-opacities[i]));
+    const float alpha = rs_sigmoid(opacities[i]);
     good = good & (alpha >= RS_MIN_ALPHA * 0.99999f);
     const float reach = 2.0f * larger(log(255.0f * alpha), 0.0f) + 1e-5f;
     squared_radius = reach < quantile ? reach : quantile;

@@ -6,32 +6,12 @@
 #include "shared/alpha.h"
 #include "trace/gaussian_lanes.h"
 
-#ifndef SIGMOID_SCALE
-#define SIGMOID_SCALE 0  // 1: S = sigmoid(s) (the paper), 0: S = exp(s)
-#endif
+#define RS_ACTIVATED gv
+#include "shared/activation.h"
+
 #ifndef ADAPTIVE_RADIUS
 #define ADAPTIVE_RADIUS 0
 #endif
-
-gv sigmoid(gv x) { return 1.0f / (1.0f + exp(-x)); }
-
-gv activated_scale(gv s) {
-#if SIGMOID_SCALE
-  return sigmoid(s);
-#else
-  return exp(s);
-#endif
-}
-
-// dS/ds divided by S.
-gv scale_log_derivative(gv scale) {
-#if SIGMOID_SCALE
-  return 1.0f - scale;
-#else
-  (void)scale;
-  return (gv)(1.0f);
-#endif
-}
 
 // Q of a Gaussian; negative when no ray can meet it.
 gv effective_quantile(float quantile, gv opacity) {

@@ -78,11 +78,11 @@ __kernel void fill_blocks(const uint count,
       float check = norm;
       for (int k = 0; k < 3; ++k) {
         // Thinner than this, 1 / scale^2 leaves float's range.
-        scale[k] = fmax(activated_scale(scales[3 * (size_t)index + k]), 1e-12f);
+        scale[k] = fmax(rs_scale_of(scales[3 * (size_t)index + k]), 1e-12f);
         check += scale[k];
       }
       const float3 mean = vload3(index, means);
-      const float opacity = sigmoid(opacities[index]);
+      const float opacity = rs_sigmoid(opacities[index]);
       const float Q = effective_quantile(quantile, opacity);
       check += opacity + fabs(mean.x) + fabs(mean.y) + fabs(mean.z);
       // An empty box stands for parameters with a NaN or an infinity as well.

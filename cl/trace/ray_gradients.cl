@@ -32,7 +32,7 @@ void load_ray_gaussian(const size_t i,
   gv longest = 0;
   load_columns3(scales + 3 * i, g->raw_scale);
   for (int k = 0; k < 3; ++k) {
-    g->raw_scale[k] = activated_scale(g->raw_scale[k]);
+    g->raw_scale[k] = rs_scale_of(g->raw_scale[k]);
     longest = larger(g->raw_scale[k], longest);
   }
   const gv floor_scale = larger(longest * 1e-7f, (gv)(1e-12f));
@@ -153,7 +153,7 @@ __kernel void finish_ray_gradients(const uint begin,
   for (int k = 0; k < 3; ++k) {
     const gv diagonal = k == 0 ? v[3] : k == 1 ? v[6] : v[8];
     const gi moves = touched & (g.raw_scale[k] >= g.scale[k]);
-    const gv value = -2.0f * diagonal * scale_log_derivative(g.scale[k]);
+    const gv value = -2.0f * diagonal * rs_scale_log_slope(g.scale[k]);
     gs[k] = moves ? value : zero;
     const gv mixed = k == 0 ? v[7] : k == 1 ? v[5] : v[4];
     const gv a = g.scale[(k + 1) % 3], b = g.scale[(k + 2) % 3];
@@ -168,6 +168,6 @@ __kernel void finish_ray_gradients(const uint begin,
   gq[3] = g.q[0] * turn[2] + g.q[1] * turn[1] - g.q[2] * turn[0];
   for (int j = 0; j < 4; ++j) gq[j] = touched ? 2.0f * gq[j] / g.q_norm : zero;
   store_columns4(gq, g_quaternions + 4 * i);
-  const gv opacity = sigmoid(load_column(opacities + i, 1));
+  const gv opacity = rs_sigmoid(load_column(opacities + i, 1));
   store_column(touched ? v[9] * (1.0f - opacity) : zero, g_opacities + i, 1);
 }

@@ -72,12 +72,12 @@ gi load_view_gaussian(const size_t i,
   gv sum = distance + g->q_norm;
   load_columns3(scales + 3 * i, g->raw_scale);
   for (int k = 0; k < 3; ++k) {
-    g->raw_scale[k] = activated_scale(g->raw_scale[k]);
+    g->raw_scale[k] = rs_scale_of(g->raw_scale[k]);
     g->scale[k] = larger(g->raw_scale[k], floor_scale);
     g->w[k] = 1.0f / g->scale[k];
     sum += g->raw_scale[k];
   }
-  g->opacity = sigmoid(load_column(opacities + i, 1));
+  g->opacity = rs_sigmoid(load_column(opacities + i, 1));
   return (fabs(sum + g->opacity) <= FLT_MAX) & (g->q_norm > 0.0f);
 }
 

@@ -192,7 +192,7 @@ void parameter_gradient(const ViewGaussian* g,
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     const gi moves = touched & (g->raw_scale[k] >= g->scale[k]);
-    const gv value = -view->w[k] * g->w[k] * scale_log_derivative(g->scale[k]);
+    const gv value = -view->w[k] * g->w[k] * rs_scale_log_slope(g->scale[k]);
     out->scale[k] = moves ? value : zero;
   }
   out->opacity = touched ? opacity * g->opacity * (1.0f - g->opacity) : zero;

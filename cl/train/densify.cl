@@ -4,13 +4,11 @@
 // reset. Launch: one work-item per Gaussian (of the new set for gather_gaussians), any group size,
 // ids checked. Complexity: O(N) memory traffic; no work-item reads what another one writes.
 
+#include "shared/activation.h"
 #include "shared/layout.h"
 
 #ifndef SH_COEFFICIENTS
 #define SH_COEFFICIENTS 16
-#endif
-#ifndef SIGMOID_SCALE
-#define SIGMOID_SCALE 0
 #endif
 
 // What becomes of a Gaussian in the new set; host/train/density_plan.hpp names the same values.
@@ -95,21 +93,13 @@ float3 rotate(float4 q, float3 v) {
   return v + q.x * t + cross(q.yzw, t);
 }
 
-// Standard deviation of a trained scale parameter, and the way back.
-float scale_value(float parameter) {
-#if SIGMOID_SCALE
-  return 1.0f / (1.0f + exp(-parameter));
-#else
-  return exp(parameter);
-#endif
+float3 scales_of(const float3 p) {
+  return (float3)(rs_scale_of(p.x), rs_scale_of(p.y), rs_scale_of(p.z));
 }
 
-float scale_parameter(float value) {
-#if SIGMOID_SCALE
-  return log(value / (1.0f - value));
-#else
-  return log(value);
-#endif
+float3 parameters_of_scales(const float3 s) {
+  return (float3)(rs_parameter_of_scale(s.x), rs_parameter_of_scale(s.y),
+                  rs_parameter_of_scale(s.z));
 }
 
 // The parameter of an opacity of HALF_OPACITY times that of `logit`.
@@ -148,10 +138,10 @@ kernel void gather_gaussians(uint count,
   float3 scale = vload3(from, scales);
   float opacity = opacities[from];
   if (role[i] == ROLE_PART) {
-    const float3 s = (float3)(scale_value(scale.x), scale_value(scale.y), scale_value(scale.z));
+    const float3 s = scales_of(scale);
     mean += rotate(quaternion, s * child_offset(key_low, key_high, (uint)from, i));
   } else if (role[i] >= ROLE_FIRST_HALF) {
-    float3 s = (float3)(scale_value(scale.x), scale_value(scale.y), scale_value(scale.z));
+    float3 s = scales_of(scale);
     const float longest = fmax(s.x, fmax(s.y, s.z));
     const float3 axis = s.x == longest   ? (float3)(1.0f, 0.0f, 0.0f)
                         : s.y == longest ? (float3)(0.0f, 1.0f, 0.0f)
@@ -159,15 +149,13 @@ kernel void gather_gaussians(uint count,
     const float side = role[i] == ROLE_FIRST_HALF ? HALF_OFFSET : -HALF_OFFSET;
     mean += rotate(quaternion, side * longest * axis);
     s *= HALF_OTHERS + (HALF_LONGEST - HALF_OTHERS) * axis;
-    scale = (float3)(scale_parameter(s.x), scale_parameter(s.y), scale_parameter(s.z));
+    scale = parameters_of_scales(s);
     opacity = half_opacity(opacity);
   } else if (role[i] >= ROLE_FIRST_CHILD) {
-    const float3 s = (float3)(scale_value(scale.x), scale_value(scale.y), scale_value(scale.z));
+    const float3 s = scales_of(scale);
     mean += rotate(quaternion,
                    s * child_offset(key_low, key_high, (uint)from, role[i] - ROLE_FIRST_CHILD));
-    const float3 smaller = s / split_factor;
-    scale = (float3)(scale_parameter(smaller.x), scale_parameter(smaller.y),
-                     scale_parameter(smaller.z));
+    scale = parameters_of_scales(s / split_factor);
   }
   vstore3(mean, to, new_means);
   vstore4(quaternion, to, new_quaternions);
@@ -188,7 +176,7 @@ kernel void limit_opacity(uint count, float limit, global float* opacities) {
 kernel void fade_opacity(uint count, float amount, float lowest, global float* opacities) {
   const uint i = get_global_id(0);
   if (i >= count) return;
-  const float opacity = 1.0f / (1.0f + exp(-opacities[i]));
+  const float opacity = rs_sigmoid(opacities[i]);
   const float faded = fmax(opacity - amount, fmin(opacity, lowest));
   if (faded < opacity) opacities[i] = log(faded / (1.0f - faded));
 }

@@ -6,11 +6,8 @@
 //
 // Launch: one work-item per Gaussian, any group size.
 // Complexity of footprint_floor: O(N views) arithmetic, one read and one write per Gaussian.
+#include "shared/activation.h"
 #include "shared/layout.h"
-
-#ifndef SIGMOID_SCALE
-#define SIGMOID_SCALE 0
-#endif
 
 // lows[i] becomes the least scale parameter of Gaussian i: that of `share` pixels. A Gaussian that
 // no view sees has none.
@@ -41,11 +38,7 @@ __kernel void footprint_floor(uint count,
   }
   const float size = share * least;
   float low = -INFINITY;
-#if SIGMOID_SCALE
-  if (size > 0.0f && size < 1.0f) low = log(size / (1.0f - size));
-#else
-  if (size > 0.0f && size < INFINITY) low = log(size);
-#endif
+  if (size > 0.0f && size < RS_LARGEST_SCALE) low = rs_parameter_of_scale(size);
   lows[i] = low;
 }
 

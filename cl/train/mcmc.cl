@@ -5,32 +5,16 @@
 //
 // Launch: one work-item per Gaussian, any group size. A guard word that is not 0 turns mcmc_press
 // and mcmc_noise off. Complexity: O(N); no work-item reads what another one writes.
+#include "shared/activation.h"
 #include "shared/random.h"
-
-#ifndef SIGMOID_SCALE
-#define SIGMOID_SCALE 0
-#endif
 
 // Noise that moves nothing to speak of is not drawn: opacities above 0.074.
 #define LEAST_GATE 1e-3f
 
-float mcmc_scale(float parameter) {
-#if SIGMOID_SCALE
-  return 1.0f / (1.0f + exp(-parameter));
-#else
-  return exp(parameter);
-#endif
-}
-
 // d scale / d parameter.
-float3 mcmc_scale_slope(float3 parameter) {
-  const float3 s =
-      (float3)(mcmc_scale(parameter.x), mcmc_scale(parameter.y), mcmc_scale(parameter.z));
-#if SIGMOID_SCALE
-  return s * (1.0f - s);
-#else
-  return s;
-#endif
+float mcmc_scale_slope(float parameter) {
+  const float scale = rs_scale_of(parameter);
+  return scale * rs_scale_log_slope(scale);
 }
 
 // Adds the gradients of opacity_weight * (sum of opacities) + scale_weight * (sum of standard
@@ -45,9 +29,11 @@ __kernel void mcmc_press(uint count,
                          __global float* scale_gradient) {
   const size_t i = get_global_id(0);
   if (i >= count || guard[0] != 0) return;
-  const float opacity = 1.0f / (1.0f + exp(-opacities[i]));
+  const float opacity = rs_sigmoid(opacities[i]);
   opacity_gradient[i] += opacity_weight * opacity * (1.0f - opacity);
-  const float3 slope = mcmc_scale_slope(vload3(i, scales));
+  const float3 scale = vload3(i, scales);
+  const float3 slope =
+      (float3)(mcmc_scale_slope(scale.x), mcmc_scale_slope(scale.y), mcmc_scale_slope(scale.z));
   vstore3(vload3(i, scale_gradient) + scale_weight * slope, i, scale_gradient);
 }
 
@@ -65,7 +51,7 @@ __kernel void mcmc_noise(uint count,
                          __global float* means) {
   const size_t i = get_global_id(0);
   if (i >= count || guard[0] != 0) return;
-  const float opacity = 1.0f / (1.0f + exp(-opacities[i]));
+  const float opacity = rs_sigmoid(opacities[i]);
   const float gate = 1.0f / (1.0f + exp(100.0f * (opacity - 0.005f)));
   if (!(gate > LEAST_GATE)) return;
   const RsRandom4 u = rs_random4(key_low, key_high, (uint)i, 0, 0);
@@ -82,7 +68,7 @@ __kernel void mcmc_noise(uint count,
   float3 v = normal - q.x * t + cross(axis, t);
   const float3 parameter = vload3(i, scales);
   const float3 s =
-      (float3)(mcmc_scale(parameter.x), mcmc_scale(parameter.y), mcmc_scale(parameter.z));
+      (float3)(rs_scale_of(parameter.x), rs_scale_of(parameter.y), rs_scale_of(parameter.z));
   v *= s * s;
   const float3 back = 2.0f * cross(axis, v);
   v += q.x * back + cross(axis, back);
@@ -100,8 +86,8 @@ __kernel void mcmc_share(uint count,
   opacities[i] = shares[i].x;
   const float3 parameter = vload3(i, scales);
 #if SIGMOID_SCALE
-  const float3 s = shares[i].y * (float3)(mcmc_scale(parameter.x), mcmc_scale(parameter.y),
-                                          mcmc_scale(parameter.z));
+  const float3 s = shares[i].y * (float3)(rs_scale_of(parameter.x), rs_scale_of(parameter.y),
+                                          rs_scale_of(parameter.z));
   vstore3(log(s / (1.0f - s)), i, scales);
 #else
   vstore3(parameter + log(shares[i].y), i, scales);
