@@ -12,7 +12,7 @@ packages=(
   ocl-icd-opencl-dev opencl-headers opencl-clhpp-headers pocl-opencl-icd
   libglm-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libcli11-dev libxxhash-dev doctest-dev
   libbenchmark-dev libtinyobjloader-dev libtinygltf-dev libtomlplusplus-dev
-  zlib1g-dev libzstd-dev libopenimageio-dev openimageio-tools libopenexr-dev libopencv-dnn-dev
+  zlib1g-dev libzstd-dev libwebp-dev libopenimageio-dev openimageio-tools libopenexr-dev libopencv-dnn-dev
   libboost1.81-dev
 )
 

@@ -62,12 +62,13 @@ Command add_convert_command(CLI::App& app) {
   ModelChanges& changes = options->changes;
   command
       ->add_option("MODEL", options->input,
-                   "PLY, compressed PLY, .splat, SPZ or glTF with Gaussians, or a run folder")
+                   "PLY, compressed PLY, .splat, SPZ, SOG or glTF with Gaussians, or a run folder")
       ->required()
       ->type_name("");
   command
-      ->add_option("-o,--output", options->output,
-                   "What to write, by its ending: .ply, .compressed.ply, .splat, .spz or .glb")
+      ->add_option(
+          "-o,--output", options->output,
+          "What to write, by its ending: .ply, .compressed.ply, .splat, .spz, .sog or .glb")
       ->required()
       ->type_name("FILE");
   command->add_option("--sh-degree", changes.sh_degree, "Keep or fill up this many SH degrees")

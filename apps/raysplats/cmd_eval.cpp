@@ -94,7 +94,7 @@ Command add_eval_command(CLI::App& app, const GlobalOptions& global) {
   auto options = std::make_shared<Options>();
   command
       ->add_option("MODEL", options->model,
-                   "Model (PLY, .splat, SPZ, glTF), or the folder of a training run")
+                   "Model (PLY, .splat, SPZ, SOG, glTF), or the folder of a training run")
       ->required()
       ->type_name("");
   command->add_option("-o,--output", options->output, "Folder for metrics.json and pictures")

@@ -428,7 +428,7 @@ Command add_info_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   command
       ->add_option("PATH", options->path,
-                   "Model (PLY, .splat, SPZ, glTF), mesh, scene file, data set or run folder")
+                   "Model (PLY, .splat, SPZ, SOG, glTF), mesh, scene file, data set or run folder")
       ->required()
       ->type_name("");
   command->add_flag("--json", options->json, "Print JSON");

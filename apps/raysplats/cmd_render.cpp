@@ -226,9 +226,9 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       "render", "Render a model or a scene file from a data set's cameras, a file's or an orbit");
   auto options = std::make_shared<RenderFlags>();
   command
-      ->add_option(
-          "MODEL", options->model,
-          "Model (PLY, .splat, SPZ, glTF), the folder of a training run, or a scene file (.toml)")
+      ->add_option("MODEL", options->model,
+                   "Model (PLY, .splat, SPZ, SOG, glTF), the folder of a training run, or a scene "
+                   "file (.toml)")
       ->required()
       ->type_name("");
   command->add_option("-o,--output", options->output, "Folder for the frames")->type_name("DIR");

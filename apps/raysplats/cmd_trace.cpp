@@ -54,7 +54,7 @@ Command add_trace_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   command
       ->add_option("MODEL", options->model,
-                   "Model (PLY, .splat, SPZ, glTF), or the folder of a training run")
+                   "Model (PLY, .splat, SPZ, SOG, glTF), or the folder of a training run")
       ->required()
       ->type_name("");
   command

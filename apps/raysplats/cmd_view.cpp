@@ -127,9 +127,9 @@ Command add_view_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("view", "Show a model or a scene file in a browser, live");
   auto options = std::make_shared<Options>();
   command
-      ->add_option(
-          "MODEL", options->model,
-          "Model (PLY, .splat, SPZ, glTF), the folder of a training run, or a scene file (.toml)")
+      ->add_option("MODEL", options->model,
+                   "Model (PLY, .splat, SPZ, SOG, glTF), the folder of a training run, or a scene "
+                   "file (.toml)")
       ->required()
       ->type_name("");
   add_data_flags(*command, options->data);

@@ -15,7 +15,11 @@ constexpr int kMaxDepth = 32;
 }  // namespace
 
 nlohmann::json read_json_object(const std::filesystem::path& path) {
-  const auto bytes = read_file(path, kMaxBytes);
+  return parse_json_object(read_file(path, kMaxBytes), path);
+}
+
+nlohmann::json parse_json_object(std::span<const std::byte> bytes,
+                                 const std::filesystem::path& path) {
   const auto* begin = reinterpret_cast<const char*>(bytes.data());
   const auto check_depth = [&](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
     if (depth > kMaxDepth) {

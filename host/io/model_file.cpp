@@ -16,6 +16,7 @@
 #include "core/gaussian_transform.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/model_formats.hpp"
+#include "io/sog_file.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
@@ -53,10 +54,12 @@ ModelFormat model_format(const std::filesystem::path& path) {
   if (start.starts_with("ply")) return ModelFormat::kPly;
   if (start.starts_with("\x1f\x8b") || start == "NGSP") return ModelFormat::kSpz;
   if (start == "glTF") return ModelFormat::kGltf;
+  if (start == "PK\x03\x04") return ModelFormat::kSog;
   const std::string extension = lower_extension(path);
   if (extension == ".splat") return ModelFormat::kSplat;
   if (extension == ".spz") return ModelFormat::kSpz;
   if (extension == ".glb" || extension == ".gltf") return ModelFormat::kGltf;
+  if (extension == ".sog" || path.filename() == "meta.json") return ModelFormat::kSog;
   // Files that are missing, too, are best explained by the reader.
   const bool readable = !start.empty() && extension != ".ply";
   return readable ? ModelFormat::kUnknown : ModelFormat::kPly;
@@ -74,11 +77,13 @@ ModelFormat output_format(const std::filesystem::path& path) {
   }
   if (extension == ".splat") return ModelFormat::kSplat;
   if (extension == ".spz") return ModelFormat::kSpz;
+  if (extension == ".sog") return ModelFormat::kSog;
   if (extension == ".glb") return ModelFormat::kGltf;
-  throw UsageError(fmt::format(
-      "{} does not say what to write: give a name that ends in .ply, .compressed.ply, .splat, .spz "
-      "or .glb",
-      path.string()));
+  throw UsageError(
+      fmt::format("{} does not say what to write: give a name that ends in .ply, .compressed.ply, "
+                  ".splat, .spz, "
+                  ".sog or .glb",
+                  path.string()));
 }
 
 std::string losses(ModelFormat format, const Gaussians& model) {
@@ -105,6 +110,14 @@ std::string losses(ModelFormat format, const Gaussians& model) {
           beyond ? ", and some scales are beyond what SPZ knows (4.5e-5 to 380) and are clamped"
                  : "");
     }
+    case ModelFormat::kSog:
+      return fmt::format(
+          "positions are kept to 1/65536 of their range, rotations to 1/360, scales, colours and "
+          "opacities to 8 bits{}{}",
+          model.sh_degree > 0 ? ", SH to an entry of a palette that all share" : "",
+          model.sh_degree > kSogMostDegree
+              ? fmt::format(", SH above degree {} is left out", kSogMostDegree)
+              : "");
     case ModelFormat::kGltf:
       return model.sh_degree > kSplattingMaxDegree
                  ? fmt::format("SH above degree {} is left out", kSplattingMaxDegree)
@@ -123,6 +136,8 @@ Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& enc
       return io::read_splat(path);
     case io::ModelFormat::kGltf:
       return io::read_gltf_gaussians(path);
+    case io::ModelFormat::kSog:
+      return io::read_sog(path);
     case io::ModelFormat::kSpz: {
       Gaussians model = io::read_spz(path);
       return encoding.spz_axes == SpzAxes::kRub ? transformed(model, io::rub_turn()) : model;
@@ -134,7 +149,7 @@ Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& enc
       break;
   }
   throw DataError(fmt::format(
-      "{} is no model that is known: those are PLY, .splat, SPZ and glTF with Gaussians",
+      "{} is no model that is known: those are PLY, .splat, SPZ, SOG and glTF with Gaussians",
       path.string()));
 }
 
@@ -152,6 +167,8 @@ void write_model(const std::filesystem::path& path,
       return io::write_splat(path, model);
     case io::ModelFormat::kGltf:
       return io::write_glb(path, model);
+    case io::ModelFormat::kSog:
+      return io::write_sog(path, model);
     case io::ModelFormat::kUnknown:
       break;
     case io::ModelFormat::kSpz:

@@ -11,7 +11,7 @@
 namespace raysplats::io {
 
 /// A compressed PLY is read as kPly, which its first bytes say.
-enum class ModelFormat { kPly, kCompressedPly, kSplat, kSpz, kGltf, kUnknown };
+enum class ModelFormat { kPly, kCompressedPly, kSplat, kSpz, kSog, kGltf, kUnknown };
 
 /// What a file is, by its first bytes, else by its extension.
 ModelFormat model_format(const std::filesystem::path& path);

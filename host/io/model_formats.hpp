@@ -41,4 +41,11 @@ Gaussians read_compressed_ply(const std::filesystem::path& path);
 /// Along the Morton curve, so that chunks are small. SH above degree 3 is left out.
 void write_compressed_ply(const std::filesystem::path& path, const Gaussians& model);
 
+/// PlayCanvas' SOG, version 2: a zip archive of meta.json and lossless WebP textures, or the
+/// meta.json of an unpacked one.
+Gaussians read_sog(const std::filesystem::path& path);
+/// A zip archive, along the Morton curve. SH above degree 3 is left out; what is above degree 0 is
+/// shared by a palette of at most 65536 entries. Throws DataError for more than 268 million.
+void write_sog(const std::filesystem::path& path, const Gaussians& model);
+
 }  // namespace raysplats::io

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # raysplats_bundle: what fmt, spdlog, xxHash, tinyobjloader, tinygltf and toml++ define in shared libraries, built from
-# their headers instead, so that a wheel needs none of them, and the archive of zstd. The library's own sources are
+# their headers instead, so that a wheel needs none of them, and the archives of zstd and WebP. The library's own sources are
 # compiled exactly as without.
 
 set(raysplats_bundled fmt::fmt spdlog::spdlog PkgConfig::XXHASH tinyobjloader::tinyobjloader TinyGLTF::TinyGLTF
@@ -25,13 +25,14 @@ endforeach()
 # tinygltf is given its files by callbacks and decodes no pictures.
 target_compile_definitions(raysplats_bundle PUBLIC TINYGLTF_NO_STB_IMAGE TINYGLTF_NO_STB_IMAGE_WRITE)
 find_library(RAYSPLATS_ZSTD_ARCHIVE libzstd.a REQUIRED)
-mark_as_advanced(RAYSPLATS_ZSTD_ARCHIVE)
-target_link_libraries(raysplats_bundle PUBLIC ${RAYSPLATS_ZSTD_ARCHIVE})
+find_library(RAYSPLATS_WEBP_ARCHIVE libwebp.a REQUIRED)
+mark_as_advanced(RAYSPLATS_ZSTD_ARCHIVE RAYSPLATS_WEBP_ARCHIVE)
+target_link_libraries(raysplats_bundle PUBLIC ${RAYSPLATS_ZSTD_ARCHIVE} ${RAYSPLATS_WEBP_ARCHIVE})
 
 # Replaces the names of the bundled libraries in a list of targets.
 function(raysplats_bundle list)
   set(targets ${${list}})
-  list(REMOVE_ITEM targets ${raysplats_bundled} PkgConfig::ZSTD)
+  list(REMOVE_ITEM targets ${raysplats_bundled} PkgConfig::ZSTD PkgConfig::WEBP)
   if(NOT "${targets}" STREQUAL "${${list}}")
     list(APPEND targets raysplats_bundle)
   endif()

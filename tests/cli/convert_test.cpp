@@ -29,7 +29,7 @@ TEST_CASE("convert writes every format, which every command reads again") {
     words.insert(words.begin(), "convert");
     return raysplats_program(words);
   };
-  for (const char* name : {"a.spz", "a.splat", "a.glb", "a.ply"}) {
+  for (const char* name : {"a.spz", "a.splat", "a.glb", "a.sog", "a.ply"}) {
     const Outcome outcome = convert({folder / "balls.ply", "-o", folder / name});
     INFO(outcome.err);
     REQUIRE(outcome.code == 0);

@@ -8,11 +8,13 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "bench/report.hpp"
+#include "io/zip_archive.hpp"
 #include "raysplats/io.hpp"
 #include "train/checkpoint.hpp"
 #include "train/train_config.hpp"
@@ -283,6 +285,23 @@ void make_models(const fs::path& root) {
   add("three.spz", 1, ".spz", 3);
   add("two.splat", 2, ".splat", 3);
   add("two.glb", 3, ".glb", 3);
+  add("two.sog", 6, ".sog", 3);
+  // The files of a SOG, as the target packs them.
+  const fs::path sog = fs::path(temporary).replace_extension(".sog");
+  write_model(sog, small_model(1, 2));
+  std::ifstream stream(sog, std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+  const io::ZipArchive archive(std::as_bytes(std::span(bytes)), sog);
+  Bytes packed;
+  for (const char* name : {"meta.json", "means_l.webp", "means_u.webp", "scales.webp", "quats.webp",
+                           "sh0.webp", "shN_centroids.webp", "shN_labels.webp"}) {
+    const std::vector<std::byte> file = archive.read(name);
+    packed.add(static_cast<std::uint16_t>(file.size()));
+    packed.add_text({reinterpret_cast<const char*>(file.data()), file.size()});
+  }
+  corpus.add("packed_sog", packed.take(5));
+  stream.close();
+  fs::remove(sog);
   // What is compressed in SPZ of each older version.
   for (std::uint32_t version = 1; version <= 3; ++version) {
     Bytes bytes;

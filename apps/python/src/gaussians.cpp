@@ -130,7 +130,7 @@ void bind_gaussians(nb::module_& module) {
           },
           nb::arg("path"), nb::kw_only(), nb::arg("spz_axes") = "ply",
           nb::call_guard<nb::gil_scoped_release>(),
-          "Reads a 3DGS PLY, compressed PLY, .splat, SPZ or glTF (docs/formats.md).")
+          "Reads a 3DGS PLY, compressed PLY, .splat, SPZ, SOG or glTF (docs/formats.md).")
       .def(
           "save",
           [](const Gaussians& self, const std::filesystem::path& path,

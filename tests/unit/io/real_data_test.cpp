@@ -216,13 +216,27 @@ TEST_CASE("foreign models of every format hold what their programs say") {
   const Gaussians splat = read_model(formats / "minimal.splat");
   CHECK(splat.size() == 4);
   CHECK(splat.log_scales[0] == doctest::Approx(std::log(0.1)));
-  const Gaussians packed = read_model(formats / "pc_test.compressed.ply");
-  REQUIRE(packed.size() == 64);
-  CHECK(packed.sh_degree == 3);
   const auto check = [](const std::vector<float>& values, const std::vector<double>& expected) {
     for (std::size_t i = 0; i < expected.size(); ++i)
       CHECK(static_cast<double>(values[i]) == doctest::Approx(expected[i]).epsilon(1e-5));
   };
+  const Gaussians sog = read_model(formats / "playbot_sog/meta.json");
+  REQUIRE(sog.size() == 1873);
+  CHECK(sog.sh_degree == 2);
+  check(sog.means, {-1.0038020, -0.0209996, -1.0018792});
+  check(sog.quaternions, {0.635010, 0.169151, 0.296708, 0.692904});
+  check(sog.log_scales, {-7.584230, -4.582156, -4.253626});
+  check(sog.sh, {-1.257241, -1.301147, -1.257241, -0.108984, -0.108984, -0.101719});
+  CHECK(1.0 / (1.0 + std::exp(-sog.opacities[0])) == doctest::Approx(0.996078).epsilon(1e-5));
+  double sums[3] = {};
+  for (std::size_t i = 0; i < sog.means.size(); ++i)
+    sums[i % 3] += static_cast<double>(sog.means[i]) / 1873.0;
+  CHECK(sums[0] == doctest::Approx(3.659e-5).epsilon(1e-3));
+  CHECK(sums[1] == doctest::Approx(-0.204976).epsilon(1e-5));
+  CHECK(sums[2] == doctest::Approx(-0.0021404).epsilon(1e-4));
+  const Gaussians packed = read_model(formats / "pc_test.compressed.ply");
+  REQUIRE(packed.size() == 64);
+  CHECK(packed.sh_degree == 3);
   check(packed.means, {-1.09285614, -0.81247817, 0.34936113});
   check(packed.log_scales, {-2.446086, -14.426013, -5.735317});
   check(packed.quaternions, {0.9346983, -0.1693462, -0.2702627, 0.1569044});

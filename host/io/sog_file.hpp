@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+/// What reader and writer of SOG share. Its layout: PlayCanvas, splat-transform, version 2.
+namespace raysplats::io {
+
+constexpr int kSogVersion = 2;
+constexpr int kSogMostDegree = 3;
+constexpr std::size_t kSogLevels = 256;         // of a codebook
+constexpr std::size_t kSogMostEntries = 65536;  // of the palette of harmonics
+constexpr std::size_t kSogEntriesPerRow = 64;   // of its texture
+constexpr int kSogRotation = 252;               // alpha of a rotation whose w is the largest
+
+}  // namespace raysplats::io
