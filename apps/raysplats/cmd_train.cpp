@@ -10,6 +10,7 @@
 #include "options.hpp"
 #include "raysplats/trainer.hpp"
 #include "report/run_report.hpp"
+#include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/quality_preset.hpp"
 #include "train/train_config.hpp"
@@ -70,10 +71,10 @@ Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device
 
 /// Sets the length of a run by --time, and says beforehand how long it will take. Returns its
 /// iterations.
-std::int64_t announce(Trainer& trainer, const Options& options, const GlobalOptions& global) {
+std::int64_t announce(Trainer& trainer, const Options& options, bool quiet) {
   constexpr double kMeasureSeconds = 3;
   const bool fits = !options.time.empty();
-  if (!fits && (global.quiet || !options.resume.empty())) return options.train.iterations;
+  if (!fits && (quiet || !options.resume.empty())) return options.train.iterations;
   const RunEstimate estimate = fits ? trainer.fit_time(parse_duration("--time", options.time))
                                     : trainer.estimate(kMeasureSeconds);
   spdlog::info("{} iterations, up to {} Gaussians: about {} of training", estimate.iterations,
@@ -105,38 +106,55 @@ std::unique_ptr<view::RunView> show(Context& context,
   return shown;
 }
 
-void run(CLI::App& command, Options& options, const GlobalOptions& global) {
-  check_choices(command, options);
-  if (!options.time.empty()) parse_duration("--time", options.time);  // before anything is loaded
-  keep_run_options(command, options);
-  const std::unique_ptr<Context> context = open_context(options.device);
-  Dataset dataset = load(command, options, context->device());
-  check_not_data(options.output, dataset);
-  std::vector<Camera> cameras;
-  for (const std::size_t index : dataset.indices(Split::kTrain))
-    cameras.push_back(dataset.views[index].camera);
-  const std::array<double, 3> origin = dataset.origin;
-  Trainer trainer(*context, std::move(dataset), options.train, options.output, options.overwrite);
-  if (!options.resume.empty()) trainer.resume(options.resume);
-  options.train.iterations = announce(trainer, options, global);
-  std::unique_ptr<view::RunView> shown;
-  if (options.view) shown = show(*context, trainer, options, cameras, origin);
-  const TrainSummary summary = trainer.run(!global.quiet);
-
+void print_results(const TrainSummary& summary, const std::string& folder) {
   fmt::print("{} iterations in {}: {} Gaussians in {}\n", summary.iterations,
              with_compiling(format_duration(summary.training_seconds) + " of training",
                             summary.kernel_build_seconds),
-             summary.gaussians, options.output);
+             summary.gaussians, folder);
   if (!summary.evaluations.empty()) {
     const EvaluationRow& last = summary.evaluations.back();
     fmt::print("PSNR {:.2f} dB, SSIM {:.4f} on {} held-out views\n", last.psnr, last.ssim,
                last.views);
   }
-  const std::filesystem::path report = std::filesystem::path(options.output) / "report.html";
-  write_run_report(options.output, report);
+  const std::filesystem::path report = std::filesystem::path(folder) / "report.html";
+  write_run_report(folder, report);
   fmt::print("Report: {}\n", report.string());
+}
+
+/// As one of the ranks that share the run.
+void train(
+    const CLI::App& command, Options options, bool quiet, Communicator& ranks, Context& context) {
+  Dataset dataset = load(command, options, context.device());
+  check_not_data(options.output, dataset);
+  std::vector<Camera> cameras;
+  for (const std::size_t index : dataset.indices(Split::kTrain))
+    cameras.push_back(dataset.views[index].camera);
+  const std::array<double, 3> origin = dataset.origin;
+  Trainer trainer(context, std::move(dataset), options.train, options.output, options.overwrite,
+                  &ranks);
+  if (!options.resume.empty()) trainer.resume(options.resume);
+  options.train.iterations = announce(trainer, options, ranks.said_by(0, quiet));
+  std::unique_ptr<view::RunView> shown;
+  if (options.view && ranks.leads()) shown = show(context, trainer, options, cameras, origin);
+  const std::int64_t begun = trainer.iteration();
+  const Communicator::Traffic before = ranks.traffic();
+  const TrainSummary summary = trainer.run(!quiet && ranks.leads());
+  if (!ranks.leads()) return;
+
+  print_results(summary, options.output);
   if (shown) shown->finish(fmt::format("The run has ended: raysplats view {}", options.output));
-  if (options.device.profile) fmt::print("{}", context->profile_table());
+  if (!options.device.profile) return;
+  fmt::print("{}{}", context.profile_table(),
+             traffic_of(ranks, before, summary.iterations - begun, "step"));
+}
+
+void run(CLI::App& command, Options& options, const GlobalOptions& global) {
+  check_choices(command, options);
+  if (!options.time.empty()) parse_duration("--time", options.time);  // before anything is loaded
+  keep_run_options(command, options);
+  share_work(options.device, global, [&](Communicator& ranks, Context& context) {
+    train(command, options, global.quiet, ranks, context);
+  });
 }
 
 }  // namespace

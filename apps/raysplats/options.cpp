@@ -91,8 +91,8 @@ void start_logging(const GlobalOptions& options) {
 
 void add_device_flags(CLI::App& app, DeviceFlags& flags) {
   app.add_option("--device", flags.device,
-                 "Index or part of the name of a device ('raysplats devices' lists them); render "
-                 "and eval share their work among several, as in 0,1")
+                 "Index or part of the name of a device ('raysplats devices' lists them); train, "
+                 "render and eval share their work among several, as in 0,1")
       ->type_name("DEVICE");
   app.add_flag("--profile", flags.profile, "Print the device time per kernel");
   app.add_flag("--no-kernel-cache", flags.no_kernel_cache, "Compile every kernel again");

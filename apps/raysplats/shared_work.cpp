@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -25,22 +25,11 @@ namespace {
 constexpr auto kLeadersTurn = std::chrono::seconds(5);
 constexpr auto kSpeakersTurn = std::chrono::seconds(10);
 
-template <class T>
-std::vector<T> of_all(Communicator& ranks, T mine) {
-  std::string bytes(sizeof(mine), '\0');
-  std::memcpy(bytes.data(), &mine, sizeof(mine));
-  std::vector<T> all;
-  for (const std::string& theirs : ranks.gather(bytes)) {
-    T value{};
-    std::memcpy(&value, theirs.data(), sizeof(value));
-    all.push_back(value);
-  }
-  return all;
-}
-
 }  // namespace
 
-bool is_shared(const std::string& command) { return command == "render" || command == "eval"; }
+bool is_shared(const std::string& command) {
+  return command == "render" || command == "eval" || command == "train";
+}
 
 Communicator join_processes(const std::string& command) {
   const Launch launch = find_launch();
@@ -74,7 +63,8 @@ void share_work(const DeviceFlags& flags,
     const LogSilence silence(!contexts.empty());
     contexts.push_back(open_context(flags, device));
   }
-  const InterruptGuard interrupt;
+  std::optional<InterruptGuard> interrupt;  // that those of the threads do not outlive
+  if (devices.size() > 1) interrupt.emplace();
   run_thread_ranks(static_cast<int>(devices.size()), [&](Communicator& ranks) {
     const LogSilence silence(!ranks.leads());
     work(ranks, *contexts[static_cast<std::size_t>(ranks.rank())]);
@@ -93,11 +83,27 @@ FrameOptions share_of(const Communicator& ranks, FrameOptions options) {
 }
 
 std::uint64_t sum_over(Communicator& ranks, std::uint64_t mine) {
-  const std::vector<std::uint64_t> all = of_all(ranks, mine);
+  const std::vector<std::uint64_t> all = ranks.all(mine);
   return std::accumulate(all.begin(), all.end(), std::uint64_t{0});
 }
 
-double most_of(Communicator& ranks, double mine) { return std::ranges::max(of_all(ranks, mine)); }
+double most_of(Communicator& ranks, double mine) { return std::ranges::max(ranks.all(mine)); }
+
+std::string traffic_of(const Communicator& ranks,
+                       const Communicator::Traffic& before,
+                       std::int64_t things,
+                       const std::string& name) {
+  if (ranks.size() == 1 || things < 1) return "";
+  const Communicator::Traffic& now = ranks.traffic();
+  const auto each = static_cast<double>(things);
+  return fmt::format(
+      "rank {} of {}, for each {}: {:.0f} bytes out, {:.0f} bytes in, {:.1f} messages out, {:.3f} "
+      "ms among ranks\n",
+      ranks.rank(), ranks.size(), name, static_cast<double>(now.sent - before.sent) / each,
+      static_cast<double>(now.received - before.received) / each,
+      static_cast<double>(now.messages - before.messages) / each,
+      1e3 * (now.seconds - before.seconds) / each);
+}
 
 int fail_together(Communicator& processes, const Error& error) {
   // Processes that have not joined yet all fail alike.

@@ -33,6 +33,13 @@ FrameOptions share_of(const Communicator& ranks, FrameOptions options);
 std::uint64_t sum_over(Communicator& ranks, std::uint64_t mine);
 double most_of(Communicator& ranks, double mine);
 
+/// For --profile: what this rank has sent, received and waited for since `before`, for each of
+/// `things`, such as "step". Empty for one rank.
+std::string traffic_of(const Communicator& ranks,
+                       const Communicator::Traffic& before,
+                       std::int64_t things,
+                       const std::string& name);
+
 /// Ends this process and the others of its work with one sentence, said by one of them; returns the
 /// exit status where it is alone.
 int fail_together(Communicator& processes, const Error& error);

@@ -95,15 +95,22 @@ bool Communicator::any(bool mine) {
   return known != std::byte{0};
 }
 
-std::uint64_t Communicator::least(std::uint64_t mine) {
-  std::string bytes(sizeof(mine), '\0');
-  std::memcpy(bytes.data(), &mine, sizeof(mine));
-  for (const std::string& theirs : gather(bytes)) {
-    std::uint64_t value = 0;
-    std::memcpy(&value, theirs.data(), sizeof(value));
-    mine = std::min(mine, value);
+std::uint64_t Communicator::least(std::uint64_t mine) { return std::ranges::min(all(mine)); }
+
+void Communicator::share(std::span<std::byte> row) {
+  const int self = rank();
+  const std::size_t size_of_piece = row.size() / static_cast<std::size_t>(size());
+  const auto piece = [&](int r) {
+    return row.subspan(static_cast<std::size_t>(r) * size_of_piece, size_of_piece);
+  };
+  std::vector<Outgoing> out;
+  std::vector<Incoming> in;
+  for (int other = 0; other < size(); ++other) {
+    if (other == self) continue;
+    out.push_back({other, piece(self)});
+    in.push_back({other, piece(other)});
   }
-  return mine;
+  exchange(out, in);
 }
 
 RankShare RankShare::of(std::size_t count, int rank, int ranks) {

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "comm/transport.hpp"
@@ -42,6 +44,22 @@ class Communicator {
   void broadcast(std::span<std::byte> bytes, int root = 0);
   /// All ranks: what each has, in the order of the ranks. Sizes may differ.
   std::vector<std::string> gather(const std::string& mine);
+  /// All ranks: the values of all, in the order of the ranks.
+  template <class T>
+  std::vector<T> all(const T& mine) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    std::vector<T> values(static_cast<std::size_t>(size()));
+    values[static_cast<std::size_t>(rank())] = mine;
+    share(std::as_writable_bytes(std::span(values)));
+    return values;
+  }
+  /// All ranks: the value of `root`.
+  template <class T>
+  T said_by(int root, T mine) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    broadcast(std::as_writable_bytes(std::span(&mine, 1)), root);
+    return mine;
+  }
   /// All ranks: whether any of them says so.
   bool any(bool mine);
   /// All ranks: the least of their numbers.
@@ -52,6 +70,9 @@ class Communicator {
   const Traffic& traffic() const { return traffic_; }
 
  private:
+  // A row of equal pieces, one a rank: each gives its own to all others.
+  void share(std::span<std::byte> row);
+
   std::shared_ptr<Transport> transport_;  // none = alone
   Traffic traffic_;
 };

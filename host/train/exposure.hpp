@@ -42,6 +42,8 @@ class Exposure {
                 int width,
                 int height,
                 std::size_t slot = 0);
+  /// What backward() has kept: kNumbers a slot.
+  Buffer<float>& gradients() { return sums_; }
   /// One step of Adam (0.9, 0.999) at `rate` by what backward() kept, unless the guard is marked.
   void step(std::size_t view, std::size_t slot, double rate, const Buffer<std::uint32_t>& guard);
 

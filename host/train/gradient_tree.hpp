@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "comm/communicator.hpp"
 #include "comm/pairwise.hpp"
 #include "device/context.hpp"
 #include "trace/device_gaussians.hpp"
@@ -24,8 +25,6 @@ struct StepGradients {
 /// how many views met a Gaussian.
 class GradientTree {
  public:
-  using Part = PairwiseSum<StepGradients>::Part;
-
   explicit GradientTree(Context& context) : context_(context) {}
 
   /// Forgets what was added: a step that broke off.
@@ -33,10 +32,11 @@ class GradientTree {
   /// Takes the gradients of a slot, which follows the last one since finish() or clear(), and
   /// leaves buffers of an earlier one in their place. Enqueues without waiting.
   void add(std::size_t slot, StepGradients& gradients);
-  /// The sums of the slots so far, those of pairwise_nodes().
-  const std::vector<Part>& parts() const { return sum_.parts(); }
   /// Moves the sum of all slots to `sum`. Throws UsageError without any.
   void finish(StepGradients& sum);
+  /// All ranks: the same for `slots` slots, of which each rank has added those of its RankShare.
+  /// With several ranks the sums go through the host, and are waited for.
+  void finish(StepGradients& sum, Communicator& ranks, std::size_t slots);
 
  private:
   void join(StepGradients& left, StepGradients& right);
@@ -44,6 +44,9 @@ class GradientTree {
   Context& context_;
   PairwiseSum<StepGradients> sum_;
   std::vector<StepGradients> spare_;  // buffers of sets that have been added
+  // On the host, with several ranks: the numbers of every part, and their sum.
+  std::vector<std::vector<float>> rows_;
+  std::vector<float> total_;
 };
 
 }  // namespace raysplats

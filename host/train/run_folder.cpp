@@ -114,8 +114,9 @@ void remove_if_empty(const std::filesystem::path& folder) {
 
 }  // namespace
 
-RunFolder::RunFolder(std::filesystem::path path) : path_(std::move(path)) {
-  make_output_directory(path_);
+RunFolder::RunFolder(std::filesystem::path path, bool writes)
+    : path_(std::move(path)), writes_(writes) {
+  if (writes_) make_output_directory(path_);
 }
 
 FileLock RunFolder::lock() const {
@@ -130,10 +131,12 @@ std::filesystem::path RunFolder::evaluation_folder(std::int64_t iteration) const
 }
 
 void RunFolder::write_config(const TrainOptions& options) const {
+  if (!writes_) return;
   write_text_file(path_ / "config.toml", to_toml(options));
 }
 
 void RunFolder::write_cameras(std::span<const Camera> cameras) const {
+  if (!writes_) return;
   nlohmann::json list = nlohmann::json::array();
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Camera& camera = cameras[i];
@@ -158,6 +161,7 @@ void RunFolder::write_cameras(std::span<const Camera> cameras) const {
 
 void RunFolder::write_exposures(std::span<const Camera> cameras,
                                 std::span<const float> deltas) const {
+  if (!writes_) return;
   nlohmann::json json = nlohmann::json::object();
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     nlohmann::json rows = nlohmann::json::array();
@@ -174,6 +178,7 @@ void RunFolder::write_exposures(std::span<const Camera> cameras,
 
 void RunFolder::write_refined_cameras(std::vector<Camera> cameras,
                                       const std::array<double, 3>& origin) const {
+  if (!writes_) return;
   for (Camera& camera : cameras)
     io::move_origin(camera, -glm::dvec3(origin[0], origin[1], origin[2]));
   raysplats::write_cameras(path_ / "cameras_refined.json", cameras);
@@ -183,6 +188,7 @@ void RunFolder::write_model(const Gaussians& model,
                             const TraceOptions& trace,
                             std::int64_t iteration,
                             const std::array<double, 3>& origin) const {
+  if (!writes_) return;
   write_ply(model_file(path_, iteration), model, trace, origin);
 }
 
@@ -192,6 +198,7 @@ bool RunFolder::has_model(std::int64_t iteration) const {
 }
 
 void RunFolder::remove_model(std::int64_t iteration) const {
+  if (!writes_) return;
   if (!has_model(iteration)) return;
   const std::filesystem::path file = model_file(path_, iteration);
   remove_file(file);
@@ -199,6 +206,7 @@ void RunFolder::remove_model(std::int64_t iteration) const {
 }
 
 void RunFolder::remove_after(std::int64_t iteration) const {
+  if (!writes_) return;
   for (const auto& [number, file] : numbered(path_ / "checkpoints", "step_", ".rsck")) {
     if (number > iteration) remove_file(file);
   }
@@ -248,10 +256,11 @@ void RunFolder::begin_metrics(std::int64_t iteration) {
       // Reports of an earlier run that cannot be read are no reason not to train.
     }
   }
-  write_text_file(path_ / "metrics.csv", csv);
+  if (writes_) write_text_file(path_ / "metrics.csv", csv);
 }
 
 void RunFolder::append(const TrainRow& row) {
+  if (!writes_) return;
   std::ofstream stream(path_ / "metrics.csv", std::ios::app);
   stream << fmt::format("{},{:.3f},{:.7g},{:.4f},{},{:.3f},{},{}\n", row.iteration, row.seconds,
                         row.loss, row.psnr, row.gaussians, row.iterations_per_second,
@@ -266,6 +275,7 @@ void RunFolder::append(const TrainRow& row) {
 void RunFolder::record(const EvaluationRow& row) { evaluations_.push_back(row); }
 
 void RunFolder::write_metrics(const nlohmann::json& summary) const {
+  if (!writes_) return;
   nlohmann::json json = summary;
   json["evaluations"] = nlohmann::json::array();
   for (const EvaluationRow& row : evaluations_) json["evaluations"].push_back(to_json(row));

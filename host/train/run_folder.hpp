@@ -36,8 +36,9 @@ struct TrainRow {
 /// file stays, the lock on it does not).
 class RunFolder {
  public:
-  /// Makes the folder. Throws DataError when it cannot be written to.
-  explicit RunFolder(std::filesystem::path path);
+  /// Makes the folder. Throws DataError when it cannot be written to. One of several ranks that
+  /// share a run `writes`; the others know the same, and leave the folder alone.
+  explicit RunFolder(std::filesystem::path path, bool writes = true);
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path evaluation_folder(std::int64_t iteration) const;
@@ -83,6 +84,7 @@ class RunFolder {
 
  private:
   std::filesystem::path path_;
+  bool writes_;
   std::vector<EvaluationRow> evaluations_, validations_;
 };
 

@@ -43,6 +43,13 @@ void StepGuard::close(const Buffer<std::uint32_t>& refused,
                 kLimit, state_);
 }
 
+void StepGuard::set_mark(std::uint32_t word) { state_.upload({&word, 1}); }
+
+void StepGuard::set_step_capped(std::uint64_t rays) {
+  step_capped_.upload(std::array<std::uint32_t, 2>{static_cast<std::uint32_t>(rays),
+                                                   static_cast<std::uint32_t>(rays >> 32)});
+}
+
 StepGuard::Counts StepGuard::counts() const {
   const std::vector<std::uint32_t> words = state_.download();
   return {words[1], words[2], words[3] != 0, std::uint64_t{words[6]} << 32 | words[5]};

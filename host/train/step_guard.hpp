@@ -43,6 +43,11 @@ class StepGuard {
 
   /// Not 0 in its first word: the kernels of this step change nothing.
   const Buffer<std::uint32_t>& mark() const { return state_; }
+  /// The word, which ranks that share a step agree on; blocks. With a bit of RS_GUARD_REPEATED
+  /// close() counts nothing.
+  std::uint32_t marked() const { return state_.read(0); }
+  void set_mark(std::uint32_t word);
+  void set_step_capped(std::uint64_t rays);
   /// Blocks.
   Counts counts() const;
   /// Goes on counting from a checkpoint.

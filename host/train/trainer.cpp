@@ -41,11 +41,13 @@ Trainer::Impl::Impl(Context& device,
                     Dataset data,
                     const TrainOptions& train_options,
                     std::filesystem::path run_path,
-                    bool replace)
+                    bool replace,
+                    Communicator* others)
     : context(device),
+      ranks(others != nullptr ? *others : alone),
       dataset(std::move(data)),
       options((validate(train_options), train_options)),
-      run(std::move(run_path)),
+      run(std::move(run_path), ranks.leads()),
       overwrite(replace),
       train_views(dataset.indices(Split::kTrain)),
       test_views(dataset.indices(Split::kTest)),
@@ -71,7 +73,14 @@ Trainer::Impl::Impl(Context& device,
                   static_cast<std::size_t>(options.image_budget) * kMiB,
                   kReadAhead),
       slots(static_cast<std::size_t>(options.views_per_step)),
+      share(RankShare::of(slots.size(), ranks.rank(), ranks.size())),
       sum(device) {
+  if (slots.size() < static_cast<std::size_t>(ranks.size())) {
+    throw UsageError(fmt::format(
+        "The {} ranks (processes, or devices of --device) of a run share the views of a step, and "
+        "'views-per-step' = {} leaves some without one: give at least as many views as ranks",
+        ranks.size(), slots.size()));
+  }
   options.data.origin = dataset.origin;
   follow_options();
   if (options.strategy == DensityStrategy::kMcmc) mcmc.emplace(device, options, extent);
@@ -102,9 +111,10 @@ Trainer::Trainer(Context& context,
                  Dataset dataset,
                  const TrainOptions& options,
                  std::filesystem::path run_folder,
-                 bool overwrite)
+                 bool overwrite,
+                 Communicator* ranks)
     : impl_(std::make_unique<Impl>(
-          context, std::move(dataset), options, std::move(run_folder), overwrite)) {}
+          context, std::move(dataset), options, std::move(run_folder), overwrite, ranks)) {}
 Trainer::~Trainer() = default;
 
 void Trainer::resume(const std::filesystem::path& source) {
@@ -163,8 +173,8 @@ TrainLoss Trainer::loss() {
   Impl& self = *impl_;
   const auto turn = self.context.lock();
   if (!self.stepped) throw UsageError("There is no loss before the first step");
-  const ImageLoss::Value value = self.loss.value();
-  return {value.total, value.psnr};
+  const LastView last = self.last_view();
+  return {last.loss.total, last.loss.psnr};
 }
 
 Gaussians Trainer::model() const {

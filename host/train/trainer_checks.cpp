@@ -15,7 +15,8 @@ namespace raysplats {
 StepGuard::Counts Trainer::Impl::check_guard() {
   const StepGuard::Counts counts = guard.counts();
   if (counts.stopped) {
-    write_dump();
+    if (ranks.leads()) write_dump();
+    ranks.barrier();
     throw Error(
         ErrorCode::kRuntime,
         fmt::format("The loss or the gradients were not finite in {} steps in a row by iteration "
@@ -49,7 +50,7 @@ void Trainer::Impl::validate_model() {
 void Trainer::Impl::write_dump() {
   const std::filesystem::path folder = run.path() / "dump";
   write_image(folder / "picture.exr", tracer.download_image(), {}, ColorSpace::kDisplay);
-  const Camera& camera = train_cameras[order.at(last_turn())];
+  const Camera& camera = train_cameras[slots[share.last - 1].view];  // of the picture
   nlohmann::json rotation = nlohmann::json::array();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) rotation.push_back(camera.rotation[column][row]);

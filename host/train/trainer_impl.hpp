@@ -13,6 +13,7 @@
 
 #include "base/file_lock.hpp"
 #include "base/progress.hpp"
+#include "comm/communicator.hpp"
 #include "device/read_back.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
@@ -52,6 +53,12 @@ struct ViewSlot {
   PoseGradient slope;    ///< where poses are trained
 };
 
+/// What the last view of a step says of itself.
+struct LastView {
+  ImageLoss::Value loss;
+  CameraTracer::Statistics work;
+};
+
 /// A step that is enqueued and may not be done, with what its beginning found on the host.
 struct SentStep {
   std::int64_t iteration;
@@ -66,7 +73,8 @@ struct Trainer::Impl {
        Dataset data,
        const TrainOptions& train_options,
        std::filesystem::path run_path,
-       bool replace);
+       bool replace,
+       Communicator* others);
 
   // trainer_start.cpp: from a data set to the first step.
   void start();
@@ -76,6 +84,7 @@ struct Trainer::Impl {
   void choose_background();
   void forget_sky();
   std::size_t pass_steps() const;
+  std::int64_t turn_of(std::size_t slot) const;
   std::int64_t last_turn() const;
   std::size_t limit() { return most_gaussians(options.iterations); }
   std::size_t most_gaussians(std::int64_t iterations);
@@ -85,9 +94,17 @@ struct Trainer::Impl {
 
   // trainer_step.cpp: one step, and what happens between two of them.
   void enqueue_view(std::size_t slot);
+  void enqueue_views();
   void enqueue_step();
   void control_density();
   void follow_plan(const DensityPlan& plan);
+
+  // trainer_ranks.cpp: what ranks that share the run tell each other.
+  void read_ahead(std::int64_t turn);
+  bool join_views();
+  void share_slots();
+  void check_alike();
+  LastView last_view();
 
   // trainer_pilot.cpp: how long a run will take.
   struct Pilot;
@@ -131,6 +148,7 @@ struct Trainer::Impl {
 
   // trainer_resume.cpp: checkpoints.
   void resume(const std::filesystem::path& source);
+  void take_up(const std::filesystem::path& source);
   void check_data_options(const Checkpoint& checkpoint) const;
   Checkpoint state();
   void save_checkpoint();
@@ -152,6 +170,8 @@ struct Trainer::Impl {
   void show(const std::function<bool()>& interrupted);
 
   Context& context;
+  Communicator alone;
+  Communicator& ranks;
   Dataset dataset;
   TrainOptions options;
   RunFolder run;
@@ -182,6 +202,7 @@ struct Trainer::Impl {
 
   DeviceGaussians gaussians;
   std::vector<ViewSlot> slots;  // views-per-step
+  RankShare share;              // of the slots, that this rank traces
   StepGradients gradients;      // of the last view, then of the step
   GradientTree sum;
   Buffer<float> image_gradient;
@@ -208,6 +229,8 @@ struct Trainer::Impl {
   RunWatcher* watcher = nullptr;
   std::atomic<bool> stop_asked = false;
   std::atomic<bool> save_asked = false;
+  bool stop_wished = false;        // before a step, by this rank; with several ranks
+  bool stop_agreed = false;        // after it: by any of them
   std::atomic<bool> busy = false;  // in run() or step()
   bool stepped = false;            // since this object was made
   bool prepared = false;           // for steps of the caller's own
@@ -230,7 +253,8 @@ struct Trainer::Impl {
   };
   // Keeps other runs out of the folder while it lives.
   struct FolderUse {
-    explicit FolderUse(Impl& impl_in) : impl(impl_in), own(!impl.folder_lock) {
+    explicit FolderUse(Impl& impl_in)
+        : impl(impl_in), own(impl.ranks.leads() && !impl.folder_lock) {
       if (own) impl.folder_lock.emplace(impl.run.lock());
     }
     ~FolderUse() {

@@ -14,6 +14,8 @@ namespace {
 // The same error with a remark at its end.
 [[noreturn]] void throw_with(const Error& error, const std::string& remark) {
   const std::string message = fmt::format("{}; {}", error.what(), remark);
+  if (const auto* const lost = dynamic_cast<const RankLost*>(&error))
+    throw RankLost(message, lost->rank);
   switch (error.code()) {
     case ErrorCode::kUsage:
       throw UsageError(message);
@@ -57,6 +59,7 @@ void Trainer::Impl::run_iterations(std::int64_t until,
   bool stop = false;
   while (iteration < until && !stop) {
     const auto turn = context.lock();
+    if (ranks.size() > 1) stop_wished = interrupted() || stop_asked;
     step();
     const bool last = iteration == options.iterations;
     if (last || every(options.log_every, iteration)) report(progress);
@@ -70,8 +73,8 @@ void Trainer::Impl::run_iterations(std::int64_t until,
         throw;
       }
     }
-    // Asked once: a signal that comes later is seen after the next step.
-    stop = interrupted() || stop_asked;
+    // Asked once: a signal that comes later is seen after the next step. Ranks end together.
+    stop = ranks.size() > 1 ? stop_agreed : interrupted() || stop_asked;
     bool ends = false;
     if (scheduled && validates_at(options, iteration)) {
       pause([this] { judge(); });
@@ -116,7 +119,7 @@ void Trainer::Impl::show(const std::function<bool()>& interrupted) {
 
 // A run that is resumed where it ends: its results may not be in this folder.
 void Trainer::Impl::finish_resumed() {
-  if (run.has_model(iteration)) return;
+  if (ranks.said_by(0, run.has_model(iteration))) return;
   save_model();
   evaluate_views(true);
   save_checkpoint();
@@ -164,6 +167,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     start();
   }
   advance(options.iterations, true, show_progress, [&] { return interrupt.requested(); });
+  ranks.barrier();  // what rank 0 writes is written
   settle_validation();
   write_metrics(ended || iteration == options.iterations);
   if (const std::uint64_t capped = guard.counts().capped_rays; capped > 0)
@@ -208,7 +212,7 @@ bool Trainer::Impl::train_some(std::int64_t count) {
 void Trainer::Impl::prepare() {
   if (prepared) return;
   const auto turn = context.lock();
-  if (!folder_lock) folder_lock.emplace(run.lock());
+  if (!folder_lock && ranks.leads()) folder_lock.emplace(run.lock());
   start();
   prepared = true;
 }

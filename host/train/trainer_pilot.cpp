@@ -91,7 +91,7 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
   double photo_seconds = 0;
   int photos = 0;
   const auto timed_step = [&] {
-    const std::size_t view = order.at(iteration * options.views_per_step);
+    const std::size_t view = order.at(turn_of(share.first));
     const int divisor = resolution_divisor(options, iteration);
     const Camera camera =
         divisor > 1 ? downscaled(train_cameras[view], divisor) : train_cameras[view];
@@ -115,13 +115,14 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
   const auto stage = [&](double until) {
     timed_step();
     const std::size_t begin = samples.size();
-    for (int i = 0; i < kLeastSteps || clock.seconds() < until * seconds; ++i)
+    // The first rank's clock counts for all.
+    for (int i = 0; i < kLeastSteps || ranks.said_by(0, clock.seconds() < until * seconds); ++i)
       samples.push_back(timed_step());
     double hits = 0, pixels = 0;
     for (std::size_t i = begin; i < samples.size(); ++i)
       hits += samples[i].hits, pixels += samples[i].pixels;
-    pilot.per_work = seconds_per_work(samples);
-    return hits / pixels;
+    pilot.per_work = ranks.said_by(0, seconds_per_work(samples));
+    return ranks.said_by(0, hits / pixels);
   };
   iteration = 0;
   pilot.first_hits = pilot.last_hits = stage(kCoarseShare);
@@ -142,7 +143,7 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
   for (const StepSample& s : samples)
     spdlog::debug("a step of {} rays, {} Gaussians and {} hits took {:.2f} ms", s.pixels,
                   s.gaussians, s.hits, 1e3 * s.seconds);
-  pilot.photo_seconds = photo_seconds / photos;
+  pilot.photo_seconds = ranks.said_by(0, photo_seconds / photos);
 }
 
 // Everything as it was before the first step.
@@ -161,7 +162,7 @@ void Trainer::Impl::forget_pilot() {
 }
 
 Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<double> run_time) {
-  if (!continues && !overwrite) check_no_run(run.path());
+  if (!continues && !overwrite && ranks.leads()) check_no_run(run.path());
   const Timer clock(context);
   Pilot pilot;
   const std::size_t most = limit();
@@ -169,14 +170,14 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   first_model = initial_model(
       dataset, train_cameras, [this]() -> const auto& { return photos(); }, most, options);
   std::optional<Gaussians> made = first_model;
-  pilot.start_seconds = clock.seconds();
+  pilot.start_seconds = ranks.said_by(0, clock.seconds());
   upload_start(most);
   pilot.first = gaussians.count;
   if (cut_out) pilot.opaque_share = opaque_share(photos());
   time_steps(std::max(seconds - clock.seconds(), 0.0), run_time, pilot);
   forget_pilot();
   first_model = std::move(made);
-  pilot.seconds = clock.seconds();
+  pilot.seconds = ranks.said_by(0, clock.seconds());
   return pilot;
 }
 

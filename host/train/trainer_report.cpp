@@ -20,14 +20,13 @@ constexpr double kManyCapped = 1e-3;  // share of rays at which the cap on hits 
 // Waits for the device and reports the step just done.
 void Trainer::Impl::report(Progress& progress) {
   settle();
-  const ImageLoss::Value value = loss.value();
+  const auto [value, work] = last_view();
   const StepGuard::Counts counts = check_guard();
   last_loss = value.total;
   const double psnr = std::min(value.psnr, kMostPsnr);
   rise.note(order.at(last_turn()), resolution_divisor(options, iteration - 1), psnr);
   const double seconds = training.seconds();
   const double elapsed = seconds - row_seconds;
-  const CameraTracer::Statistics work = tracer.statistics();
   const TrainRow row{
       iteration,       seconds,
       value.total,     psnr,
@@ -85,6 +84,7 @@ void Trainer::Impl::evaluate_views(bool last) {
     return tracer.download_image();
   };
   EvaluationOptions choice;
+  choice.ranks = &ranks;
   choice.max_views = last ? 0 : static_cast<std::size_t>(options.eval_views);
   choice.max_pictures = static_cast<std::size_t>(options.eval_renders);
   const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
@@ -115,12 +115,14 @@ TraceOptions Trainer::Impl::trace_options() {
 }
 
 void Trainer::Impl::save_model() {
+  if (!ranks.leads()) return;
   run.write_model(model_to_save(), trace_options(), iteration, dataset.origin);
   if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
   if (poses) run.write_refined_cameras(poses->cameras(), dataset.origin);
 }
 
 void Trainer::Impl::write_metrics(bool complete) {
+  if (!ranks.leads()) return;
   const StepGuard::Counts counts = guard.counts();
   run.write_metrics({{"complete", complete},
                      {"iteration", iteration},

@@ -49,6 +49,7 @@ Checkpoint Trainer::Impl::state() {
 }
 
 void Trainer::Impl::save_checkpoint() {
+  if (!ranks.leads()) return;
   write_checkpoint(checkpoint_path(run.path(), iteration), state());
   saved = iteration;
   remove_old_checkpoints(run.path(), options.keep_checkpoints, iteration);
@@ -58,6 +59,10 @@ void Trainer::Impl::save_checkpoint() {
 // can do then.
 std::string Trainer::Impl::rescue() {
   const auto turn = context.lock();
+  if (!ranks.leads()) {
+    return fmt::format("what rank 0 has saved is in {}: continue with --resume {}",
+                       run.path().string(), run.path().string());
+  }
   if (whole) {
     try {
       abandon();
@@ -105,7 +110,20 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   differs("masks = cutout", cuts(before), cuts(options));
 }
 
+// All ranks read the same state, before one of them writes into the folder again.
 void Trainer::Impl::resume(const std::filesystem::path& source) {
+  take_up(source);
+  const std::vector<std::int64_t> all = ranks.all(started ? iteration : -1);
+  for (std::size_t rank = 1; rank < all.size(); ++rank) {
+    if (all[rank] == all[0]) continue;
+    throw DataError(fmt::format(
+        "Rank 0 finds iteration {} in {} and rank {} iteration {}: put the run where all ranks see "
+        "the same folder",
+        all[0], source.string(), rank, all[rank]));
+  }
+}
+
+void Trainer::Impl::take_up(const std::filesystem::path& source) {
   const bool own = source == "latest";
   const std::filesystem::path place = own ? run.path() : source;
   if (own && list_checkpoints(place).empty()) {

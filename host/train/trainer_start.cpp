@@ -68,6 +68,11 @@ std::size_t Trainer::Impl::pass_steps() const {
   return (train_views.size() - apart.size() + together - 1) / together;
 }
 
+// The number of the view of a slot of the next step among all that steps take.
+std::int64_t Trainer::Impl::turn_of(std::size_t slot) const {
+  return iteration * options.views_per_step + static_cast<std::int64_t>(slot);
+}
+
 // The last view's number among all that steps have taken so far.
 std::int64_t Trainer::Impl::last_turn() const { return iteration * options.views_per_step - 1; }
 
@@ -84,7 +89,8 @@ std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {
                             ray_views(),
                             tracer.triangles(),
                             photo_words()};
-  return std::max<std::size_t>(1, gaussians_that_fit(options, demand, context.device()));
+  return std::max<std::size_t>(1,
+                               ranks.least(gaussians_that_fit(options, demand, context.device())));
 }
 
 std::size_t Trainer::Impl::largest_photo() const {
@@ -131,7 +137,7 @@ void Trainer::Impl::upload_start(std::size_t most) {
 
 // Makes the first model, unless resume() has brought one.
 void Trainer::Impl::start() {
-  if (!continues && !overwrite) check_no_run(run.path());
+  if (!continues && !overwrite && ranks.leads()) check_no_run(run.path());
   const std::size_t most = limit();
   density.set_limit(most);
   if (started) {
@@ -171,6 +177,7 @@ void Trainer::Impl::start() {
                      ? "traversal is bvh"
                      : "as tuned for the device, or their cameras have no tiles");
   }
+  check_alike();
   run.write_config(options);
   run.write_cameras(train_cameras);
   // From here on what is in the folder is of this run.

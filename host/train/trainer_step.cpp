@@ -25,9 +25,9 @@ std::int64_t pose_end(const TrainOptions& options) {
 // then sizes as well, because what the host does of a step cannot be turned off by the device.
 void Trainer::Impl::enqueue_view(std::size_t slot) {
   ViewSlot& out = slots[slot];
-  const std::int64_t turn = iteration * options.views_per_step + static_cast<std::int64_t>(slot);
-  const std::size_t view = out.view = order.at(turn);
-  photo_cache.prefetch(order.upcoming(kReadAhead - 1));
+  const std::int64_t turn = turn_of(slot);
+  const std::size_t view = out.view;
+  read_ahead(turn);
   const int divisor = resolution_divisor(options, iteration);
   const bool slopes = poses && iteration < pose_end(options);
   const Camera full = poses ? poses->camera(view) : train_cameras[view];
@@ -45,27 +45,38 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
   if (exposure)
     exposure->backward(tracer.image(), image_gradient, view, camera.width, camera.height, slot);
   tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr);
-  traced_rays += pixels_of(camera);
   if (slots.size() == 1) return;
   if (sky) {
     const Buffer<float>& slope = tracer.sky()->gradient();
     gradients.sky.ensure(context, slope.size(), "sky gradient of a view");
     gradients.sky.copy_from(slope, slope.size());
   }
-  guard.count_capped(tracer.kept_capped_rays(), slot == 0);
+  guard.count_capped(tracer.kept_capped_rays(), slot == share.first);
   sum.add(slot, gradients);
 }
 
-// All views of a step and what follows of them. One view needs no sum.
+// The views of a step, those of this rank with their gradients.
+void Trainer::Impl::enqueue_views() {
+  sum.clear();
+  for (std::size_t slot = 0; slot < slots.size(); ++slot) {
+    slots[slot].view = order.at(turn_of(slot));
+    if (share.holds(slot)) enqueue_view(slot);
+  }
+}
+
+// All views of a step and what follows of them.
 void Trainer::Impl::enqueue_step() {
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
-  sum.clear();
-  for (std::size_t slot = 0; slot < slots.size(); ++slot) enqueue_view(slot);
+  do {
+    enqueue_views();
+  } while (!join_views());
+  const int divisor = resolution_divisor(options, iteration);
   const bool several = slots.size() > 1;
-  if (several) sum.finish(gradients);
   whole = false;
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     const ViewSlot& one = slots[slot];
+    const Camera& full = train_cameras[one.view];
+    traced_rays += pixels_of(divisor > 1 ? downscaled(full, divisor) : full);
     if (exposure) {
       exposure->step(one.view, slot, learning_rate(options.exposure_lr, options, iteration),
                      guard.mark());
@@ -108,6 +119,7 @@ void Trainer::Impl::control_density() {
   check_guard();
   whole = false;
   if (refines) {
+    check_alike();
     const DensityPlan plan = density.refine(gaussians, iteration);
     follow_plan(plan);
     spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",

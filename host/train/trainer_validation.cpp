@@ -41,8 +41,10 @@ void Trainer::Impl::judge() {
     tracer.forward(gaussians, camera);
     return tracer.download_image();
   };
+  EvaluationOptions choice;
+  choice.ranks = &ranks;
   const EvaluationReport report =
-      raysplats::evaluate(render, judged, Split::kTest, background, {}, {});
+      raysplats::evaluate(render, judged, Split::kTest, background, {}, choice);
   // Nothing told the exposure of photos that were not trained on.
   const double psnr = exposure ? report.mean.psnr_corrected : report.mean.psnr;
   const std::vector<EvaluationRow>& rows = run.validations();

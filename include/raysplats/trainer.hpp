@@ -16,6 +16,7 @@
 
 namespace raysplats {
 
+class Communicator;
 struct DeviceGaussians;
 class RunWatcher;
 
@@ -75,11 +76,18 @@ class Trainer {
   /// little memory, DataError when the run folder cannot be written to. With `overwrite` the run
   /// takes the place of one that is in the folder, whose files are removed when training starts;
   /// without, a folder that holds another run is refused then.
+  ///
+  /// `ranks`, which outlives the trainer, is of the library itself; its type is not installed. With
+  /// it every rank makes a trainer of its own with the same arguments, and calls what trains,
+  /// measures or saves like all others. Each traces its share of the views of a step; all hold the
+  /// same model, that of a run alone, and the rank that leads writes. Throws UsageError for fewer
+  /// views a step than ranks, RankLost when one has ended.
   Trainer(Context& context,
           Dataset dataset,
           const TrainOptions& options,
           std::filesystem::path run_folder,
-          bool overwrite = false);
+          bool overwrite = false,
+          Communicator* ranks = nullptr);
   ~Trainer();
 
   /// Continues from the newest valid checkpoint of a run folder, or from a checkpoint file, instead

@@ -107,6 +107,10 @@ TEST_CASE("what ranks say reaches all, whoever says it") {
         CHECK_FALSE(self.any(false));
       }
       CHECK(self.least(static_cast<std::uint64_t>(10 + (self.rank() + 1) % ranks)) == 10);
+      const std::vector<double> halves = self.all(0.5 * self.rank());
+      REQUIRE(halves.size() == static_cast<std::size_t>(ranks));
+      for (int r = 0; r < ranks; ++r) CHECK(halves[static_cast<std::size_t>(r)] == 0.5 * r);
+      CHECK(self.said_by(ranks - 1, self.rank()) == ranks - 1);
       const std::vector<std::string> all = self.gather(std::string(self.rank() * 3, 'a'));
       REQUIRE(all.size() == static_cast<std::size_t>(ranks));
       for (std::size_t i = 0; i < all.size(); ++i) CHECK(all[i] == std::string(i * 3, 'a'));
