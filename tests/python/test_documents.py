@@ -3,6 +3,7 @@
 
 import pathlib
 import re
+import webbrowser
 
 import numpy as np
 import pytest
@@ -26,6 +27,9 @@ def given():
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_blocks(document, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # Nobody looks, and nobody ends it.
+    monkeypatch.setattr(webbrowser, "open", lambda url: True)
+    monkeypatch.setattr(rs.Viewer, "wait", lambda viewer: None)
     as_gaussians(random_arrays()).save("model.ply", rs.TraceOptions(hit_order="peak"))
     names = given()
     for block in re.findall(r"```python\n(.*?)```", document.read_text(), re.DOTALL):

@@ -17,7 +17,8 @@ def test_stubs_know_every_name_and_no_type_of_cpp():
     known = {node.name for node in ast.parse(text).body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
     # Exceptions are attributes.
     known |= {name for name in rs.__all__ if isinstance(getattr(rs, name), type) and issubclass(getattr(rs, name), Exception)}
-    assert set(rs.__all__) <= known
+    # And Viewer is of Python.
+    assert set(rs.__all__) - {"Viewer"} <= known
 
 
 def test_everything_says_what_it_is(context):

@@ -12,41 +12,14 @@ import tempfile
 import urllib.parse
 
 
-class Viewer:
-    """Runs `raysplats view` on a small model until the end of a with block, or `command` with
-    `arguments`."""
+class Address:
+    """What a viewer listens on."""
 
-    def __init__(self, program, arguments=(), command="view"):
-        self.folder = tempfile.TemporaryDirectory(prefix="raysplats_view_")
-        model = os.path.join(self.folder.name, "model.ply")
-        write_model(model)
-        self.process = subprocess.Popen(
-            [program, command, *(arguments or [model]), "--port", "0", "-q"],
-            stdout=subprocess.PIPE, text=True)
-        line = self.process.stdout.readline()
-        found = re.search(r"http://\S+", line)
-        if not found:
-            raise RuntimeError(f"no address in {line!r}")
-        self.url = found.group()
+    def __init__(self, url):
+        self.url = url
         self.address = urllib.parse.urlsplit(self.url)
         self.token = self.address.query.removeprefix("token=")
         self.host = self.address.netloc
-        self.model = arguments[0] if arguments else model
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.stop()
-        self.folder.cleanup()
-
-    def stop(self):
-        """Ends it as Ctrl-C does; its exit code."""
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-        code = self.process.wait(timeout=30)
-        self.process.stdout.close()
-        return code
 
     def connect(self):
         return socket.create_connection((self.address.hostname, self.address.port), timeout=60)
@@ -71,6 +44,40 @@ class Viewer:
 
     def cookie(self):
         return f"raysplats-{self.address.port}={self.token}"
+
+
+class Viewer(Address):
+    """Runs `raysplats view` on a small model until the end of a with block, or `command` with
+    `arguments`."""
+
+    def __init__(self, program, arguments=(), command="view"):
+        self.folder = tempfile.TemporaryDirectory(prefix="raysplats_view_")
+        model = os.path.join(self.folder.name, "model.ply")
+        write_model(model)
+        self.process = subprocess.Popen(
+            [program, command, *(arguments or [model]), "--port", "0", "-q"],
+            stdout=subprocess.PIPE, text=True)
+        line = self.process.stdout.readline()
+        found = re.search(r"http://\S+", line)
+        if not found:
+            raise RuntimeError(f"no address in {line!r}")
+        super().__init__(found.group())
+        self.model = arguments[0] if arguments else model
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+        self.folder.cleanup()
+
+    def stop(self):
+        """Ends it as Ctrl-C does; its exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        code = self.process.wait(timeout=30)
+        self.process.stdout.close()
+        return code
 
 
 class Channel:

@@ -4,6 +4,7 @@
 from . import _images
 from ._raysplats import *  # noqa: F403
 from ._raysplats import __version__, set_image_functions
+from ._viewer import Viewer
 
 __all__ = [name for name in dir() if not name.startswith("_")]
 

@@ -19,5 +19,6 @@ void bind_metrics(nanobind::module_& module);
 void bind_trainer(nanobind::module_& module);
 void bind_scenes(nanobind::module_& module);
 void bind_path_tracer(nanobind::module_& module);
+void bind_viewer(nanobind::module_& module);
 
 }  // namespace raysplats::python

@@ -46,4 +46,5 @@ NB_MODULE(_raysplats, module) {
   bind_metrics(module);
   bind_trainer(module);
   bind_path_tracer(module);
+  bind_viewer(module);
 }

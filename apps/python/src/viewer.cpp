@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bindings.hpp"
+#include "context.hpp"
+#include "raysplats/camera.hpp"
+#include "raysplats/trace_options.hpp"
+#include "signals.hpp"
+#include "view/model_viewer.hpp"
+
+namespace raysplats::python {
+namespace {
+
+namespace nb = nanobind;
+
+using HeldViewer = Held<view::ModelViewer>;
+
+void make(HeldViewer* self,
+          HeldContext& context,
+          HeldModel& model,
+          const TraceOptions& options,
+          const std::vector<Camera>& cameras,
+          const std::string& name,
+          const std::string& host,
+          std::uint16_t port,
+          int max_size) {
+  view::ViewerOptions viewer;
+  viewer.server.host = host;
+  viewer.server.port = port;
+  viewer.max_side = max_size;
+  new (self) HeldViewer(*context, *model, options, cameras, name, viewer);
+}
+
+// Until it is closed, or a signal says otherwise.
+void wait(HeldViewer& self) {
+  const view::ModelViewer& viewer = *self;
+  const nb::gil_scoped_release release;
+  while (viewer.serves()) {
+    heed_signals(0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+}  // namespace
+
+void bind_viewer(nb::module_& module) {
+  using Guard = nb::call_guard<nb::gil_scoped_release>;
+  nb::class_<HeldViewer>(module, "_ModelViewer", "What raysplats.Viewer is made of.")
+      .def("__init__", &make, nb::arg("context"), nb::arg("model"), nb::arg("options"),
+           nb::arg("cameras"), nb::arg("name"), nb::arg("host"), nb::arg("port"),
+           nb::arg("max_size"), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
+      .def_prop_ro("url", [](HeldViewer& self) { return self->url(); })
+      .def("wait", &wait)
+      .def(
+          "close", [](HeldViewer& self) { self->close(); }, Guard());
+}
+
+}  // namespace raysplats::python
