@@ -1,20 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 // An affine colour of each photo: x'[c] = x[c] + sum_k d[c][k] x[k] + d[c][3], with 12 numbers d a
 // photo whose mean over all photos is zero (Kerbl et al. 2024 have such a matrix, without the
-// mean).
+// mean, and train it).
 //
 // apply_exposure: one work-item per pixel. image, out: planar R, G, B, A; A is copied.
-// exposure_gradient: one work-item per block of BLOCK pixels. Turns gradient = dL/dx' into dL/dx in
-//   place; partials[12 block + 4 c + k] = dL/dd of the block's pixels.
-// exposure_sums: one work-item per coefficient, 12 in all. Adds the partials in their order, as the
-//   gradient of one view of a step: sums[12 slot + k].
-// exposure_step: likewise. Makes a step of Adam (Kingma and Ba 2015) for the photo of a slot, whose
-//   own number of steps is `step`, and takes the mean over the photos off. Does nothing where the
-//   guard's word is not 0 or the gradient is not finite.
+// exposure_backward: one work-item per pixel. Turns gradient = dL/dx' into dL/dx in place.
+// exposure_moments: one work-item per block of BLOCK pixels. With z = (x, 1), the photo's colour y
+//   and its weight m (`composite` as in train/loss_prepare.cl), partials[24 block + j] are the sums
+//   of m z[a] z[b] (10 for a <= b, row by row) and of m z[a] (y[c] - x[c]) (4 for each c), then two
+//   zeros.
+// exposure_sums: one work-item per sum, 24 in all. Adds the partials in their order, as those of
+// one
+//   view of a step: sums[24 slot + j].
+// exposure_solve: one work-item. The rows d[c] of the photo of a slot become what minimises
+//   sum m (d[c] z - (y[c] - x[c]))^2 / sum m + damping |d[c] - before|^2 (a step of the proximal
+//   point method, Rockafellar 1976), by Cholesky's factors of a 4 x 4 matrix whose eigenvalues are
+//   at least `damping`; then the mean over the photos is taken off. Does nothing where the guard's
+//   word is not 0, nothing of the photo counts, or a sum is not finite.
 // Complexity: pixels + blocks + photos.
+#define VECTOR 1
+#include "train/photo.h"
+
 #ifndef BLOCK
 #define BLOCK 256
 #endif
+#define SUMS 24
 
 __kernel void apply_exposure(const __global float* image,
                              const __global float* deltas,
@@ -33,72 +43,111 @@ __kernel void apply_exposure(const __global float* image,
   out[3 * (size_t)pixels + i] = image[3 * (size_t)pixels + i];
 }
 
-__kernel void exposure_gradient(const __global float* image,
-                                const __global float* deltas,
+__kernel void exposure_backward(const __global float* deltas,
                                 __global float* gradient,
-                                __global float* partials,
                                 uint pixels,
                                 uint view) {
-  const size_t block = get_global_id(0);
-  const size_t begin = block * BLOCK;
-  if (begin >= pixels) return;
-  const size_t end = min(begin + BLOCK, (size_t)pixels);
+  const size_t i = get_global_id(0);
+  if (i >= pixels) return;
   const size_t plane = pixels;
-  float d[12], sum[12];
-  for (int k = 0; k < 12; ++k) {
-    d[k] = deltas[12 * (size_t)view + k];
-    sum[k] = 0.0f;
-  }
-  for (size_t i = begin; i < end; ++i) {
-    const float x[4] = {image[i], image[plane + i], image[2 * plane + i], 1.0f};
-    const float g[3] = {gradient[i], gradient[plane + i], gradient[2 * plane + i]};
-    for (int c = 0; c < 3; ++c) {
-      for (int k = 0; k < 4; ++k) sum[4 * c + k] += g[c] * x[k];
+  const __global float* d = deltas + 12 * (size_t)view;
+  const float g[3] = {gradient[i], gradient[plane + i], gradient[2 * plane + i]};
+  for (int k = 0; k < 3; ++k)
+    gradient[k * plane + i] = g[k] + d[k] * g[0] + d[4 + k] * g[1] + d[8 + k] * g[2];
+}
+
+__kernel void exposure_moments(const __global float* image,
+                               const __global uint* photo,
+                               __global float* partials,
+                               int pixels,
+                               int planes,
+                               int composite,
+                               float red,
+                               float green,
+                               float blue) {
+  const int block = get_global_id(0);
+  const int begin = block * BLOCK;
+  if (begin >= pixels) return;
+  const int end = min(begin + BLOCK, pixels);
+  const float behind[3] = {red, green, blue};
+  float sum[SUMS];
+  for (int j = 0; j < SUMS; ++j) sum[j] = 0.0f;
+  for (int i = begin; i < end; ++i) {
+    const float alpha = rs_photo_channel(photo, planes, pixels, i, 1, 3);
+    const float share = composite ? alpha : 1.0f;
+    const float weight =
+        composite == 0 ? alpha
+                       : (composite == 1 ? 1.0f : rs_photo_weight(photo, planes, pixels, i, 1));
+    const float z[4] = {image[i], image[(size_t)pixels + i], image[2 * (size_t)pixels + i], 1.0f};
+    int j = 0;
+    for (int a = 0; a < 4; ++a) {
+      for (int b = a; b < 4; ++b) sum[j++] += weight * z[a] * z[b];
     }
-    for (int k = 0; k < 3; ++k)
-      gradient[k * plane + i] = g[k] + d[k] * g[0] + d[4 + k] * g[1] + d[8 + k] * g[2];
+    for (int c = 0; c < 3; ++c) {
+      const float y =
+          rs_photo_channel(photo, planes, pixels, i, 1, c) * share + behind[c] * (1.0f - share);
+      for (int a = 0; a < 4; ++a) sum[j++] += weight * z[a] * (y - z[c]);
+    }
   }
-  for (int k = 0; k < 12; ++k) partials[12 * block + k] = sum[k];
+  for (int j = 0; j < SUMS; ++j) partials[SUMS * (size_t)block + j] = sum[j];
 }
 
 __kernel void exposure_sums(const __global float* partials,
                             __global float* sums,
                             uint blocks,
                             uint slot) {
-  const uint k = get_global_id(0);
-  if (k >= 12) return;
+  const uint j = get_global_id(0);
+  if (j >= SUMS) return;
   float sum = 0.0f;
-  for (uint block = 0; block < blocks; ++block) sum += partials[12 * (size_t)block + k];
-  sums[12 * (size_t)slot + k] = sum;
+  for (uint block = 0; block < blocks; ++block) sum += partials[SUMS * (size_t)block + j];
+  sums[SUMS * (size_t)slot + j] = sum;
 }
 
-__kernel void exposure_step(const __global float* sums,
-                            const __global uint* guard,
-                            __global float* deltas,
-                            __global float* first,
-                            __global float* second,
-                            __global float* steps,
-                            uint slot,
-                            uint views,
-                            uint view,
-                            float rate,
-                            float beta1,
-                            float beta2,
-                            float epsilon) {
-  const uint k = get_global_id(0);
-  if (k >= 12 || guard[0] != 0) return;
-  const float gradient = sums[12 * (size_t)slot + k];
-  if ((as_uint(gradient) & 0x7f800000u) == 0x7f800000u) return;
-  const size_t at = 12 * (size_t)view + k;
-  const float step = steps[at] + 1.0f;
-  steps[at] = step;
-  first[at] = beta1 * first[at] + (1.0f - beta1) * gradient;
-  second[at] = beta2 * second[at] + (1.0f - beta2) * gradient * gradient;
-  const float mean = first[at] / (1.0f - pow(beta1, step));
-  const float square = second[at] / (1.0f - pow(beta2, step));
-  deltas[at] -= rate * mean / (sqrt(square) + epsilon);
-  float sum = 0.0f;
-  for (uint v = 0; v < views; ++v) sum += deltas[12 * (size_t)v + k];
-  const float off = sum / views;
-  for (uint v = 0; v < views; ++v) deltas[12 * (size_t)v + k] -= off;
+__kernel void exposure_solve(const __global float* sums,
+                             const __global uint* guard,
+                             __global float* deltas,
+                             uint slot,
+                             uint views,
+                             uint view,
+                             float damping) {
+  if (get_global_id(0) != 0 || guard[0] != 0) return;
+  const __global float* s = sums + SUMS * (size_t)slot;
+  for (int j = 0; j < SUMS; ++j) {
+    if ((as_uint(s[j]) & 0x7f800000u) == 0x7f800000u) return;
+  }
+  const float all = s[9];  // the sum of the weights
+  if (!(all > 0.0f)) return;
+  float L[4][4];  // the lower factor; its diagonal inverted
+  int j = 0;
+  for (int a = 0; a < 4; ++a) {
+    for (int b = a; b < 4; ++b) L[b][a] = s[j++] / all + (a == b ? damping : 0.0f);
+  }
+  for (int a = 0; a < 4; ++a) {
+    for (int b = 0; b < a; ++b) {
+      for (int k = 0; k < b; ++k) L[a][b] -= L[a][k] * L[b][k];
+      L[a][b] *= L[b][b];
+      L[a][a] -= L[a][b] * L[a][b];
+    }
+    L[a][a] = 1.0f / sqrt(fmax(L[a][a], 0.5f * damping));  // rounding may take a little off
+  }
+  __global float* d = deltas + 12 * (size_t)view;
+  for (int c = 0; c < 3; ++c) {
+    float x[4];
+    for (int a = 0; a < 4; ++a) {
+      x[a] = s[10 + 4 * c + a] / all + damping * d[4 * c + a];
+      for (int b = 0; b < a; ++b) x[a] -= L[a][b] * x[b];
+      x[a] *= L[a][a];
+    }
+    for (int a = 3; a >= 0; --a) {
+      for (int b = a + 1; b < 4; ++b) x[a] -= L[b][a] * x[b];
+      x[a] *= L[a][a];
+    }
+    for (int a = 0; a < 4; ++a) d[4 * c + a] = x[a];
+  }
+  for (int k = 0; k < 12; ++k) {
+    float sum = 0.0f;
+    for (uint v = 0; v < views; ++v) sum += deltas[12 * (size_t)v + k];
+    const float off = sum / views;
+    for (uint v = 0; v < views; ++v) deltas[12 * (size_t)v + k] -= off;
+  }
 }

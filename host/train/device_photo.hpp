@@ -17,6 +17,11 @@ struct DevicePhoto {
   std::size_t words_of(std::size_t pixels) const {
     return pixels * (static_cast<std::size_t>(planes) + (weighted ? 1 : 0));
   }
+  /// How kernels take its colours and weights: `composite` of cl/train/loss_prepare.cl.
+  int composite(bool alpha_is_background) const {
+    if (!alpha_is_background) return 0;
+    return weighted ? 2 : 1;
+  }
 };
 
 }  // namespace raysplats

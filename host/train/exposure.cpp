@@ -11,12 +11,9 @@ namespace {
 constexpr const char* kProgram = "train/exposure.cl";
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kBlock = 256;  // as in cl/train/exposure.cl
-constexpr float kBeta1 = 0.9f;
-constexpr float kBeta2 = 0.999f;
-constexpr float kEpsilon = 1e-15f;
 
-std::uint32_t pixels_of(int width, int height) {
-  return static_cast<std::uint32_t>(width) * static_cast<std::uint32_t>(height);
+std::size_t pixels_of(int width, int height) {
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
 
 }  // namespace
@@ -25,70 +22,67 @@ Exposure::Exposure(Context& context, std::size_t views, std::size_t slots)
     : context_(context),
       views_(views),
       apply_(context.kernel(kProgram, "apply_exposure")),
-      gradient_(context.kernel(kProgram, "exposure_gradient")),
+      backward_(context.kernel(kProgram, "exposure_backward")),
+      moments_(context.kernel(kProgram, "exposure_moments")),
       sum_(context.kernel(kProgram, "exposure_sums")),
-      step_(context.kernel(kProgram, "exposure_step")),
-      sums_(context, kNumbers * slots, "exposure gradients") {
-  for (Buffer<float>* buffer : {&deltas_, &first_, &second_, &steps_}) {
-    *buffer = Buffer<float>(context, kNumbers * views, "exposure");
-    buffer->clear();
-  }
+      solve_(context.kernel(kProgram, "exposure_solve")),
+      deltas_(context, kNumbers * views, "exposure"),
+      sums_(context, kSums * slots, "exposure sums of a step") {
+  deltas_.clear();
 }
 
 const Buffer<float>& Exposure::apply(const Buffer<float>& image,
                                      std::size_t view,
                                      int width,
                                      int height) {
-  const std::uint32_t pixels = pixels_of(width, height);
-  picture_.ensure(context_, 4 * static_cast<std::size_t>(pixels), "exposed picture");
-  apply_.launch(Range::linear(pixels, kGroup), image, deltas_, picture_, pixels,
-                static_cast<std::uint32_t>(view));
+  const std::size_t pixels = pixels_of(width, height);
+  picture_.ensure(context_, 4 * pixels, "exposed picture");
+  apply_.launch(Range::linear(pixels, kGroup), image, deltas_, picture_,
+                static_cast<std::uint32_t>(pixels), static_cast<std::uint32_t>(view));
   return picture_;
 }
 
-void Exposure::backward(const Buffer<float>& image,
-                        Buffer<float>& gradient,
-                        std::size_t view,
-                        int width,
-                        int height,
-                        std::size_t slot) {
-  const std::uint32_t pixels = pixels_of(width, height);
+void Exposure::backward(Buffer<float>& gradient, std::size_t view, int width, int height) {
+  const std::size_t pixels = pixels_of(width, height);
+  backward_.launch(Range::linear(pixels, kGroup), deltas_, gradient,
+                   static_cast<std::uint32_t>(pixels), static_cast<std::uint32_t>(view));
+}
+
+void Exposure::observe(const Buffer<float>& image,
+                       const DevicePhoto& photo,
+                       bool alpha_is_background,
+                       std::array<float, 3> background,
+                       int width,
+                       int height,
+                       std::size_t slot) {
+  const std::size_t pixels = pixels_of(width, height);
   const std::size_t blocks = (pixels + kBlock - 1) / kBlock;
-  partials_.ensure(context_, kNumbers * blocks, "exposure sums");
-  gradient_.launch(Range::linear(blocks, kGroup), image, deltas_, gradient, partials_, pixels,
-                   static_cast<std::uint32_t>(view));
-  sum_.launch(Range::linear(kNumbers, kNumbers), partials_, sums_,
-              static_cast<std::uint32_t>(blocks), static_cast<std::uint32_t>(slot));
+  partials_.ensure(context_, kSums * blocks, "exposure sums");
+  moments_.launch(Range::linear(blocks, kGroup), image, photo.words, partials_,
+                  static_cast<std::int32_t>(pixels), photo.planes,
+                  photo.composite(alpha_is_background), background[0], background[1],
+                  background[2]);
+  sum_.launch(Range::linear(kSums, kSums), partials_, sums_, static_cast<std::uint32_t>(blocks),
+              static_cast<std::uint32_t>(slot));
 }
 
 void Exposure::step(std::size_t view,
                     std::size_t slot,
-                    double rate,
+                    double damping,
                     const Buffer<std::uint32_t>& guard) {
-  step_.launch(Range::linear(kNumbers, kNumbers), sums_, guard, deltas_, first_, second_, steps_,
-               static_cast<std::uint32_t>(slot), static_cast<std::uint32_t>(views_),
-               static_cast<std::uint32_t>(view), static_cast<float>(rate), kBeta1, kBeta2,
-               kEpsilon);
+  solve_.launch(Range::linear(1, 1), sums_, guard, deltas_, static_cast<std::uint32_t>(slot),
+                static_cast<std::uint32_t>(views_), static_cast<std::uint32_t>(view),
+                static_cast<float>(damping));
 }
 
-Exposure::State Exposure::state() const {
-  return {deltas_.download(), first_.download(), second_.download(), steps_.download()};
-}
-
-void Exposure::restore(const State& state) {
-  for (const std::vector<float>* part :
-       {&state.deltas, &state.first, &state.second, &state.steps}) {
-    if (part->size() == kNumbers * views_) continue;
+void Exposure::restore(const std::vector<float>& deltas) {
+  if (deltas.size() != kNumbers * views_) {
     throw DataError(
         fmt::format("The exposures to go on with are {} numbers, but {} photos have {}: resume "
-                    "with the data of "
-                    "the run",
-                    part->size(), views_, kNumbers * views_));
+                    "with the data of the run",
+                    deltas.size(), views_, kNumbers * views_));
   }
-  deltas_.upload(state.deltas);
-  first_.upload(state.first);
-  second_.upload(state.second);
-  steps_.upload(state.steps);
+  deltas_.upload(deltas);
 }
 
 }  // namespace raysplats

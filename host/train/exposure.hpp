@@ -4,27 +4,25 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
+#include "train/device_photo.hpp"
 
 namespace raysplats {
 
-/// An affine colour per photo (3 x 4: a matrix and an offset), trained beside the model, so that
+/// An affine colour per photo (3 x 4: a matrix and an offset), found beside the model, so that
 /// exposure and white balance that change from photo to photo need no Gaussians. What is kept is
 /// the difference from the identity, row by row; its mean over all photos is zero after every step,
-/// so the model's own colours are those of the average photo. Sums are taken in a fixed order:
-/// equal inputs give equal bits.
+/// so the model's own colours are those of the average photo. A step is the least squares fit of
+/// the picture to its photo, held back by a damping: few visits of a photo suffice, and what its
+/// colours do not tell stays as it is. Sums are taken in a fixed order: equal inputs give equal
+/// bits.
 class Exposure {
  public:
   static constexpr std::size_t kNumbers = 12;
-
-  /// The whole state: 12 numbers a photo each.
-  struct State {
-    std::vector<float> deltas, first, second, steps;
-  };
+  static constexpr std::size_t kSums = 24;  ///< that say what a picture and its photo tell
 
   /// For steps of `slots` views.
   Exposure(Context& context, std::size_t views, std::size_t slots = 1);
@@ -33,30 +31,34 @@ class Exposure {
   /// next call.
   const Buffer<float>& apply(const Buffer<float>& image, std::size_t view, int width, int height);
 
-  /// For the last apply() of the same picture: turns dL of its result (planar; A is left alone)
-  /// into dL of the picture in place, and keeps dL of the photo's numbers as those of a step's view
-  /// `slot`. Enqueues without waiting, as step() does.
-  void backward(const Buffer<float>& image,
-                Buffer<float>& gradient,
-                std::size_t view,
-                int width,
-                int height,
-                std::size_t slot = 0);
-  /// What backward() has kept: kNumbers a slot.
-  Buffer<float>& gradients() { return sums_; }
-  /// One step of Adam (0.9, 0.999) at `rate` by what backward() kept, unless the guard is marked.
-  void step(std::size_t view, std::size_t slot, double rate, const Buffer<std::uint32_t>& guard);
+  /// Turns dL of the result of apply() (planar; A is left alone) into dL of the picture in place.
+  /// Enqueues without waiting, as observe() and step() do.
+  void backward(Buffer<float>& gradient, std::size_t view, int width, int height);
+  /// Keeps what the picture (not the result of apply()) and its photo say of the photo's numbers as
+  /// those of a step's view `slot`; the other arguments as in ImageLoss::evaluate().
+  void observe(const Buffer<float>& image,
+               const DevicePhoto& photo,
+               bool alpha_is_background,
+               std::array<float, 3> background,
+               int width,
+               int height,
+               std::size_t slot = 0);
+  /// What observe() has kept: kSums a slot.
+  Buffer<float>& sums() { return sums_; }
+  /// Fits the photo's numbers to what observe() kept, unless the guard is marked: they minimise the
+  /// mean squared error of the colours + damping x their squared distance from where they were.
+  void step(std::size_t view, std::size_t slot, double damping, const Buffer<std::uint32_t>& guard);
 
-  /// Blocks.
-  State state() const;
-  /// Throws DataError when it is not of as many photos.
-  void restore(const State& state);
+  /// The differences of all photos, 12 numbers each. Blocks.
+  std::vector<float> deltas() const { return deltas_.download(); }
+  /// Throws DataError when they are not of as many photos.
+  void restore(const std::vector<float>& deltas);
 
  private:
   Context& context_;
   std::size_t views_;
-  Kernel apply_, gradient_, sum_, step_;
-  Buffer<float> deltas_, first_, second_, steps_, picture_, partials_;
+  Kernel apply_, backward_, moments_, sum_, solve_;
+  Buffer<float> deltas_, picture_, partials_;
   Buffer<float> sums_;  // of every slot
 };
 

@@ -168,8 +168,7 @@ void ImageLoss::evaluate(const Buffer<float>& image,
   s.resize(width, height);
   gradient.ensure(s.context, 4 * pixels, "image gradient");
 
-  const bool weighted = alpha_is_background && photo.weighted;
-  const int composite = alpha_is_background ? (weighted ? 2 : 1) : 0;
+  const int composite = photo.composite(alpha_is_background);
   const float share = 1.0f / (3.0f * static_cast<float>(pixels));
   const std::array<float, 2> scales{(1.0f - s.ssim_weight) * share, -s.ssim_weight * share};
   if (s.grouped) {

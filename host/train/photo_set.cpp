@@ -30,17 +30,34 @@ std::size_t bin_of(float value) {
 }
 
 template <class Take>
-void for_each_pixel(const io::Photo& picture, const Take& take) {
-  for (int y = 0; y < picture.height; ++y) {
-    for (int x = 0; x < picture.width; ++x) take(picture.at(x, y));
+void for_each_pixel(const SmallPhoto& photo, const Take& take) {
+  for (int y = 0; y < photo.picture->height; ++y) {
+    for (int x = 0; x < photo.picture->width; ++x) take(photo.color(x, y));
   }
 }
 
+// Colours weighted by their alpha.
+struct ColorSum {
+  std::array<double, 3> color{};
+  double weight = 0;
+  void add(const std::array<float, 4>& rgba) {
+    const auto share = static_cast<double>(rgba[3]);
+    for (std::size_t c = 0; c < 3; ++c) color[c] += share * static_cast<double>(rgba[c]);
+    weight += share;
+  }
+};
+
 }  // namespace
+
+std::array<float, 4> SmallPhoto::color(int x, int y) const {
+  std::array<float, 4> rgba = picture->at(x, y);
+  for (std::size_t c = 0; c < 3; ++c) rgba[c] *= gain[c];
+  return rgba;
+}
 
 glm::dvec4 SmallPhoto::at(const glm::dvec2& point) const {
   const Pixel pixel = pixel_at(*picture, point);
-  const std::array<float, 4> rgba = picture->at(pixel.x, pixel.y);
+  const std::array<float, 4> rgba = color(pixel.x, pixel.y);
   return {rgba[0], rgba[1], rgba[2], rgba[3]};
 }
 
@@ -79,13 +96,32 @@ std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
   return out;
 }
 
+void balance(std::span<SmallPhoto> photos) {
+  constexpr double kDark = 1e-3;  // a mean that says nothing of a gain
+  std::vector<ColorSum> sums(photos.size());
+  std::array<double, 3> all{};
+  std::size_t counted = 0;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    for_each_pixel(photos[i], [&](const std::array<float, 4>& rgba) { sums[i].add(rgba); });
+    if (sums[i].weight == 0) continue;
+    ++counted;
+    for (std::size_t c = 0; c < 3; ++c) all[c] += sums[i].color[c] / sums[i].weight;
+  }
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    for (std::size_t c = 0; c < 3 && sums[i].weight > 0; ++c) {
+      const double mean = sums[i].color[c] / sums[i].weight;
+      if (mean < kDark) continue;
+      photos[i].gain[c] *= static_cast<float>(all[c] / static_cast<double>(counted) / mean);
+    }
+  }
+}
+
 double opaque_share(std::span<const SmallPhoto> photos) {
   double sum = 0;
   for (const SmallPhoto& photo : photos) {
     std::size_t opaque = 0;
-    for_each_pixel(*photo.picture, [&opaque](const std::array<float, 4>& rgba) {
-      opaque += rgba[3] >= 0.5f ? 1 : 0;
-    });
+    for_each_pixel(
+        photo, [&opaque](const std::array<float, 4>& rgba) { opaque += rgba[3] >= 0.5f ? 1 : 0; });
     const std::size_t pixels = std::max<std::size_t>(photo.picture->pixels(), 1);
     sum += static_cast<double>(opaque) / static_cast<double>(pixels);
   }
@@ -93,27 +129,19 @@ double opaque_share(std::span<const SmallPhoto> photos) {
 }
 
 std::array<float, 3> typical_color(std::span<const SmallPhoto> photos) {
-  struct Sum {
-    std::array<double, 3> color{};
-    double weight = 0;
-    void add(const std::array<float, 4>& rgba) {
-      const auto share = static_cast<double>(rgba[3]);
-      for (std::size_t c = 0; c < 3; ++c) color[c] += share * static_cast<double>(rgba[c]);
-      weight += share;
-    }
-  };
-  Sum all;
-  std::vector<Sum> bins(kColorBins * kColorBins * kColorBins);
+  ColorSum all;
+  std::vector<ColorSum> bins(kColorBins * kColorBins * kColorBins);
   for (const SmallPhoto& photo : photos) {
-    for_each_pixel(*photo.picture, [&](const std::array<float, 4>& rgba) {
+    for_each_pixel(photo, [&](const std::array<float, 4>& rgba) {
       all.add(rgba);
       bins[(bin_of(rgba[0]) * kColorBins + bin_of(rgba[1])) * kColorBins + bin_of(rgba[2])].add(
           rgba);
     });
   }
-  const auto most = std::max_element(
-      bins.begin(), bins.end(), [](const Sum& a, const Sum& b) { return a.weight < b.weight; });
-  const Sum& chosen = most->weight >= kSharedColor * all.weight ? *most : all;
+  const auto most =
+      std::max_element(bins.begin(), bins.end(),
+                       [](const ColorSum& a, const ColorSum& b) { return a.weight < b.weight; });
+  const ColorSum& chosen = most->weight >= kSharedColor * all.weight ? *most : all;
   std::array<float, 3> out{};
   if (chosen.weight == 0) return out;
   for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<float>(chosen.color[c] / chosen.weight);

@@ -17,8 +17,11 @@ namespace raysplats {
 struct SmallPhoto {
   Camera camera;
   std::shared_ptr<const io::Photo> picture;
+  std::array<float, 3> gain{1.0f, 1.0f, 1.0f};  ///< of its colours, in all that is read of it
 
-  /// Colour and alpha in [0, 1] of the pixel that contains the image point; the point has to lie
+  /// Colour and alpha of a pixel.
+  std::array<float, 4> color(int x, int y) const;
+  /// Colour and alpha of the pixel that contains the image point; the point has to lie
   /// inside the picture.
   glm::dvec4 at(const glm::dvec2& point) const;
   /// Whether the pixel that contains the image point counts: at least half of it is not masked out.
@@ -32,6 +35,11 @@ struct SmallPhoto {
 std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
                                           std::span<const std::size_t> views,
                                           int longest);
+
+/// Chooses the gains of photos whose exposure or white balance changes, so that all have the same
+/// mean colour, the mean of theirs: a first guess, right where they show much of the same. A photo
+/// of which nothing counts keeps its own.
+void balance(std::span<SmallPhoto> photos);
 
 /// Mean share of the pixels that show something: alpha at least one half.
 double opaque_share(std::span<const SmallPhoto> photos);

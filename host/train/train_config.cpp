@@ -27,13 +27,17 @@ constexpr std::size_t kCommentWidth = 110;
 // The first line of what to_toml() writes.
 constexpr std::string_view kRunMark = "# ---- Run ----\n";
 
-// A file that a run wrote, in the dialect of older versions: strings without escapes and seeds
-// beyond the integers of TOML.
+// A file that a run wrote, in the dialect of older versions: strings without escapes, seeds beyond
+// the integers of TOML, and rates of exposures, which are fitted now.
 std::string modern(std::string text) {
   std::string out;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size() - 1) + 1;
     const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    if (line.starts_with("exposure-lr")) {
+      begin = end;
+      continue;
+    }
     constexpr std::string_view kSeed = "seed = ";
     constexpr std::size_t kMostDigits = 18;
     if (line.starts_with(kSeed)) {
@@ -225,7 +229,7 @@ void validate(const TrainOptions& options) {
   }
   for (const LearningRate& rate :
        {options.position_lr, options.rotation_lr, options.scale_lr, options.opacity_lr,
-        options.sh_lr, options.sh_rest_lr, options.exposure_lr, options.sky_lr, options.pose_lr}) {
+        options.sh_lr, options.sh_rest_lr, options.sky_lr, options.pose_lr}) {
     if ((rate.initial > 0) != (rate.final_value > 0)) {
       throw UsageError(
           "A learning rate and its final value are both 0 (the group stays as it is) or both above "

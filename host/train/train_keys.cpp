@@ -228,9 +228,12 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
            "lambda in (1 - lambda) pixel term + lambda (1 - SSIM)");
 
   t.flag("exposure", o.exposure,
-         "train an affine colour (3 x 4) for each training photo too, for captures whose exposure "
+         "find an affine colour (3 x 4) for each training photo too, for captures whose exposure "
          "or white balance changes; their mean stays the identity, which other views are shown "
          "with");
+  t.number("exposure-damping", o.exposure_damping, 1e-6, 1e3,
+           "how strongly an affine colour stays where it is when its photo is fitted anew: the "
+           "weight of the square of its change beside the mean squared error of the colours");
 
   t.flag("poses", o.poses,
          "train the poses of the training photos too, for captures whose poses are not exact; what "
@@ -244,7 +247,6 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.learning_rate("opacity-lr", o.opacity_lr, "the opacity parameters");
   t.learning_rate("sh-lr", o.sh_lr, "colour (SH band 0)");
   t.learning_rate("sh-rest-lr", o.sh_rest_lr, "the SH bands above 0");
-  t.learning_rate("exposure-lr", o.exposure_lr, "the photos' affine colours");
   t.learning_rate("sky-lr", o.sky_lr, "the sky");
   t.learning_rate("pose-lr", o.pose_lr, "the poses, in radians and shares of the scene extent");
   t.number("lr-decay", o.lr_decay, 0, 1,

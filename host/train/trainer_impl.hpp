@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -81,6 +82,7 @@ struct Trainer::Impl {
   void upload_start(std::size_t most);
   std::vector<std::size_t> first_views() const;
   const std::vector<SmallPhoto>& photos();
+  std::vector<SmallPhoto> reduced_photos(std::span<const std::size_t> views) const;
   void choose_background();
   void forget_sky();
   std::size_t pass_steps() const;

@@ -27,7 +27,7 @@ struct StepWord {
 // And of one of them, where photos have exposures or poses.
 struct SlotWord {
   PoseGradient slope;
-  std::array<float, Exposure::kNumbers> exposure{};
+  std::array<float, Exposure::kSums> exposure{};
 };
 
 }  // namespace
@@ -74,12 +74,12 @@ bool Trainer::Impl::join_views() {
 // What a photo alone says of its exposure and its pose.
 void Trainer::Impl::share_slots() {
   if (!exposure && !poses) return;
-  std::vector<float> colors(Exposure::kNumbers * slots.size());
-  if (exposure) exposure->gradients().download(colors);
+  std::vector<float> colors(Exposure::kSums * slots.size());
+  if (exposure) exposure->sums().download(colors);
   std::string mine;
   for (std::size_t slot = share.first; slot < share.last; ++slot) {
     SlotWord word{slots[slot].slope, {}};
-    std::copy_n(&colors[Exposure::kNumbers * slot], Exposure::kNumbers, word.exposure.begin());
+    std::copy_n(&colors[Exposure::kSums * slot], Exposure::kSums, word.exposure.begin());
     mine.append(reinterpret_cast<const char*>(&word), sizeof(word));
   }
   std::string all;
@@ -88,9 +88,9 @@ void Trainer::Impl::share_slots() {
     SlotWord word;
     std::memcpy(&word, &all.at(slot * sizeof(word)), sizeof(word));
     slots[slot].slope = word.slope;
-    std::copy(word.exposure.begin(), word.exposure.end(), &colors[Exposure::kNumbers * slot]);
+    std::copy(word.exposure.begin(), word.exposure.end(), &colors[Exposure::kSums * slot]);
   }
-  if (exposure) exposure->gradients().upload(colors);
+  if (exposure) exposure->sums().upload(colors);
 }
 
 // Ranks whose data, options or models are not the same would drift apart without a word.

@@ -117,7 +117,7 @@ TraceOptions Trainer::Impl::trace_options() {
 void Trainer::Impl::save_model() {
   if (!ranks.leads()) return;
   run.write_model(model_to_save(), trace_options(), iteration, dataset.origin);
-  if (exposure) run.write_exposures(train_cameras, exposure->state().deltas);
+  if (exposure) run.write_exposures(train_cameras, exposure->deltas());
   if (poses) run.write_refined_cameras(poses->cameras(), dataset.origin);
 }
 

@@ -38,13 +38,7 @@ Checkpoint Trainer::Impl::state() {
     checkpoint.sections["sky.second"] = std::move(moments.second);
     checkpoint.sections["sky.steps"] = std::move(moments.steps);
   }
-  if (exposure) {
-    Exposure::State colors = exposure->state();
-    checkpoint.sections["exposure"] = std::move(colors.deltas);
-    checkpoint.sections["exposure.first"] = std::move(colors.first);
-    checkpoint.sections["exposure.second"] = std::move(colors.second);
-    checkpoint.sections["exposure.steps"] = std::move(colors.steps);
-  }
+  if (exposure) checkpoint.sections["exposure"] = exposure->deltas();
   return checkpoint;
 }
 
@@ -176,10 +170,7 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
   };
   if (poses)
     poses->restore({part("poses"), part("poses.first"), part("poses.second"), part("poses.steps")});
-  if (exposure) {
-    exposure->restore({part("exposure"), part("exposure.first"), part("exposure.second"),
-                       part("exposure.steps")});
-  }
+  if (exposure) exposure->restore(part("exposure"));
   if (sky) {
     sky->restore({part("sky.first"), part("sky.second"), part("sky.steps")});
     const std::vector<float> coefficients = part("sky");

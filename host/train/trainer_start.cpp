@@ -22,8 +22,14 @@ constexpr std::size_t kMeanPhotos = 24;  // whose typical colour is the backgrou
 }  // namespace
 
 const std::vector<SmallPhoto>& Trainer::Impl::photos() {
-  if (small_photos.empty()) small_photos = load_small_photos(dataset, first_views(), kSmallPhoto);
+  if (small_photos.empty()) small_photos = reduced_photos(first_views());
   return small_photos;
+}
+
+std::vector<SmallPhoto> Trainer::Impl::reduced_photos(std::span<const std::size_t> views) const {
+  std::vector<SmallPhoto> out = load_small_photos(dataset, views, kSmallPhoto);
+  if (exposure) balance(out);
+  return out;
 }
 
 // Those that a run may look at from its beginning.
@@ -52,8 +58,8 @@ void Trainer::Impl::choose_background() {
   std::vector<std::size_t> some;
   const std::size_t count = std::min(kMeanPhotos, all.size());
   for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
-  const std::array<float, 3> color = typical_color(
-      small_photos.empty() ? load_small_photos(dataset, some, kSmallPhoto) : small_photos);
+  const std::array<float, 3> color =
+      typical_color(small_photos.empty() ? reduced_photos(some) : small_photos);
   if (sky) {
     tracer.set_background({}, even_sky(options.sky_degree, color));
     return;

@@ -39,11 +39,13 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
   const Buffer<float>& shown =
       exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
                : tracer.image();
-  loss.evaluate(shown, photo_cache.get(view, camera.width, camera.height), cut_out, behind,
-                camera.width, camera.height, image_gradient);
+  const DevicePhoto photo = photo_cache.get(view, camera.width, camera.height);
+  loss.evaluate(shown, photo, cut_out, behind, camera.width, camera.height, image_gradient);
   guard.check_loss(loss.partials(), tracer.overflow());
-  if (exposure)
-    exposure->backward(tracer.image(), image_gradient, view, camera.width, camera.height, slot);
+  if (exposure) {
+    exposure->observe(tracer.image(), photo, cut_out, behind, camera.width, camera.height, slot);
+    exposure->backward(image_gradient, view, camera.width, camera.height);
+  }
   tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr);
   if (slots.size() == 1) return;
   if (sky) {
@@ -77,10 +79,7 @@ void Trainer::Impl::enqueue_step() {
     const ViewSlot& one = slots[slot];
     const Camera& full = train_cameras[one.view];
     traced_rays += pixels_of(divisor > 1 ? downscaled(full, divisor) : full);
-    if (exposure) {
-      exposure->step(one.view, slot, learning_rate(options.exposure_lr, options, iteration),
-                     guard.mark());
-    }
+    if (exposure) exposure->step(one.view, slot, options.exposure_damping, guard.mark());
     if (poses && iteration < pose_end(options))
       poses->step(one.view, one.slope, learning_rate(options.pose_lr, options, iteration));
   }

@@ -121,8 +121,9 @@ struct TrainOptions {
   // Loss
   PixelLoss pixel_loss = PixelLoss::kL1;
   double ssim_weight = 0.2;
-  bool exposure = false;  ///< an affine colour per training photo is trained too
-  bool poses = false;     ///< the poses of the training photos are trained too
+  bool exposure = false;           ///< an affine colour per training photo is trained too
+  double exposure_damping = 0.02;  ///< of its change at a visit of the photo
+  bool poses = false;              ///< the poses of the training photos are trained too
 
   // Optimiser
   LearningRate position_lr{5e-4, 5e-6};  ///< times the scene extent
@@ -131,7 +132,6 @@ struct TrainOptions {
   LearningRate opacity_lr{1e-1, 3e-2};
   LearningRate sh_lr{1e-2, 2.5e-3};
   LearningRate sh_rest_lr{5e-4, 1.25e-4};
-  LearningRate exposure_lr{3e-2, 3e-3};
   LearningRate sky_lr{1e-2, 1e-3};
   LearningRate pose_lr{5e-3, 5e-4};  ///< radians, and shares of the scene extent
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration

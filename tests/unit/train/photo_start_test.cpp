@@ -111,6 +111,42 @@ TEST_CASE("sweeping finds a textured wall and its colours") {
   CHECK(near > points.size() * 6 / 10);
 }
 
+TEST_CASE("photos of other exposures agree once they are balanced") {
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 9; ++i) {
+    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
+    const double gain = 0.4 + 1.2 * (i * 4 % 9) / 8.0;
+    const auto exposed = [gain](const CameraRay& ray) {
+      return wall(ray) * glm::dvec4(0.6 * gain, 0.6 * gain, 0.6 * gain, 1);
+    };
+    photos.push_back(
+        photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90), exposed));
+  }
+  const auto on_the_wall = [&photos] {
+    const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5);
+    std::size_t near = 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      near += std::abs(points.positions[3 * i] - 4.0f) > 0.5f ? 0 : 1;
+    return near;
+  };
+  const std::size_t before = on_the_wall();
+  const auto plain = typical_color(photos);
+  balance(photos);
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    const double gain = 0.4 + 1.2 * static_cast<double>(i * 4 % 9) / 8.0;
+    CHECK(static_cast<double>(photos[i].gain[1]) * gain == doctest::Approx(1.0).epsilon(0.05));
+  }
+  const std::size_t after = on_the_wall();
+  MESSAGE(before << " points on the wall, " << after << " once balanced");
+  CHECK(after > 240);
+  CHECK(after > before + 50);
+  for (std::size_t c = 0; c < 3; ++c)
+    CHECK(typical_color(photos)[c] == doctest::Approx(plain[c]).epsilon(0.01));
+  const auto gain = photos[3].gain;
+  balance(photos);  // they are
+  CHECK(photos[3].gain[0] == doctest::Approx(gain[0]).epsilon(1e-4));
+}
+
 TEST_CASE("photos without a common view give no sure points and do not fail") {
   std::vector<SmallPhoto> one{photo_of(look_at({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 40, 30, 40), wall)};
   const PointCloud points = swept_points(one, {0.4, 2.0, 20.0}, 100, 0.25, 1);

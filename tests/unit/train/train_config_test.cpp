@@ -224,7 +224,8 @@ TEST_CASE("the configurations of runs of older versions are read") {
   const auto path = temporary("old.toml");
   write_text_file(path,
                   "# ---- Run ----\n# training steps\niterations = 7\nseed = "
-                  "18446744073709551615\n# \"colmap\" \\ or\ninit = \"C:\\points\\new.ply\"\n");
+                  "18446744073709551615\n# \"colmap\" \\ or\ninit = \"C:\\points\\new.ply\"\n"
+                  "exposure-lr = 0.03\nexposure-lr-final = 0.003\n");
   TrainOptions options;
   read_train_config(path, options);
   CHECK(options.iterations == 7);
