@@ -188,7 +188,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   RenderOutput output(options, cameras, cameras.size(), fps, closed);
 
   TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
-  trace.depth = options.depth;
+  trace.depth = options.depth || options.hits;
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
     const Model on_device(context, model);
     Tracer tracer(context, trace, mirrors_of(source));
@@ -364,6 +364,12 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->transform(whole_between(1, 16));
   command->add_flag("--depth", options->depth,
                     "Also expected depth: channel Z of an EXR, or NAME_depth.png");
+  command->add_flag("--normals", options->normals,
+                    "Also normals: channels N.X, N.Y, N.Z of an EXR in world axes, or "
+                    "NAME_normals.png in the camera's (right red, up green, near blue)");
+  command->add_flag("--hits", options->hits,
+                    "Also the number of blended Gaussians: channel hits of an EXR, or "
+                    "NAME_hits.png (white: the most of the frame)");
   add_trace_flags(*command, options->trace);
   add_traversal_flag(*command, options->trace);
   add_device_flags(*command, options->device);

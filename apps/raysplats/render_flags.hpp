@@ -33,6 +33,8 @@ struct RenderFlags {
   std::string exr;  ///< "linear", "display" or "" = not given
   int supersample = 1;
   bool depth = false;
+  bool normals = false;
+  bool hits = false;
   std::optional<int> width;
   std::optional<int> height;
   std::optional<double> fov;

@@ -26,11 +26,15 @@ FrameOptions RenderFlags::frame_options() const {
   out.linear_exr = exr != "display";
   out.supersample = supersample;
   out.depth = depth;
+  out.normals = normals;
+  out.hits = hits;
   out.files = !output.empty();
   if (output.empty() && video.empty())
     throw UsageError("There is nowhere to put the frames: give -o DIR, --video FILE or both");
-  if (output.empty() && depth)
-    throw UsageError("--depth is for the files of frames: add -o DIR to --video");
+  if (output.empty() && (depth || normals || hits)) {
+    throw UsageError(
+        "--depth, --normals and --hits are for the files of frames: add -o DIR to --video");
+  }
   if (fps && path.empty() && video.empty())
     throw UsageError("--fps is for --path and --video: files of frames have no time");
   if (shutter && !shutter_samples)

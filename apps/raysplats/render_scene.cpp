@@ -25,9 +25,10 @@ using Source = SceneCamera::Source;
 
 void check(const RenderFlags& flags) {
   flags.frame_options();
-  if (flags.depth) {
+  if (flags.depth || flags.normals || flags.hits) {
     throw UsageError(
-        "--depth is for models alone: a scene with mirrors and glass has no single depth");
+        "--depth, --normals and --hits are for models alone: a scene with mirrors and glass has no "
+        "single depth");
   }
   if (flags.supersample != 1) {
     throw UsageError("--supersample is for models alone: scene files take --samples");

@@ -25,6 +25,7 @@ float linear_from_display(float value) {
 }
 
 constexpr int kMaxSupersample = 16;
+constexpr float kLeastNormal = 1e-5f;
 
 /// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
 std::string joined(const std::filesystem::path& name) {
@@ -171,9 +172,49 @@ Image depth_preview(const Image& depth, const Image& rgba) {
   return out;
 }
 
+Image hits_of(const Image& depth) {
+  Image out(depth.width, depth.height, 1);
+  for (std::size_t i = 0; i < out.pixels(); ++i) out.data[i] = depth.data[3 * i + 2];
+  return out;
+}
+
+Image unit_normals(Image sums) {
+  for (std::size_t i = 0; i < sums.pixels(); ++i) {
+    float* n = &sums.data[3 * i];
+    const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    // Less is what rounding leaves of nothing.
+    const float scale = length > kLeastNormal ? 1.0f / length : 0.0f;
+    for (std::size_t c = 0; c < 3; ++c) n[c] *= scale;
+  }
+  return sums;
+}
+
+Image normals_preview(const Image& normals, const Image& rgba, const Camera& camera) {
+  Image out(normals.width, normals.height, 3);
+  for (std::size_t i = 0; i < normals.pixels(); ++i) {
+    if (rgba.data[4 * i + 3] < 0.5f) continue;
+    const float* n = &normals.data[3 * i];
+    const glm::dvec3 seen = camera.rotation * glm::dvec3(n[0], n[1], n[2]);
+    // The camera's y points down and its z away.
+    const double axes[] = {seen.x, -seen.y, -seen.z};
+    for (std::size_t c = 0; c < 3; ++c)
+      out.data[3 * i + c] = static_cast<float>(0.5 + 0.5 * axes[c]);
+  }
+  return out;
+}
+
+Image hits_preview(const Image& hits) {
+  Image out = hits;
+  float most = 1.0f;
+  for (const float count : hits.data) most = std::max(most, count);
+  for (float& count : out.data) count /= most;
+  return out;
+}
+
 void write_frame(const std::filesystem::path& stem,
                  const Image& rgba,
-                 const Image& depth,
+                 const Camera& camera,
+                 const FrameLayers& layers,
                  const FrameOptions& options) {
   if (options.video) options.video->add(rgba);
   if (!options.files) return;
@@ -184,21 +225,37 @@ void write_frame(const std::filesystem::path& stem,
     return path;
   };
   if (options.format == FrameFormat::kExr) {
-    const std::size_t count = options.depth ? 5 : 4;
+    std::vector<std::string> names;
+    std::vector<const Image*> more;
+    const auto add = [&](bool wanted, const Image& layer, const std::vector<std::string>& of) {
+      if (!wanted) return;
+      more.push_back(&layer);
+      names.insert(names.end(), of.begin(), of.end());
+    };
+    add(options.depth, layers.depth, {"Z"});
+    add(options.normals, layers.normals, {"N.X", "N.Y", "N.Z"});
+    add(options.hits, layers.hits, {"hits"});
+    const std::size_t count = 4 + names.size();
     Image channels = with_channels(rgba, static_cast<int>(count));
     for (std::size_t i = 0; i < channels.pixels(); ++i) {
-      if (options.depth) channels.data[5 * i + 4] = depth.data[i];
-      for (std::size_t c = 0; c < 3 && options.linear_exr; ++c) {
-        channels.data[count * i + c] = linear_from_display(channels.data[count * i + c]);
+      float* pixel = &channels.data[count * i];
+      for (std::size_t c = 0; c < 3 && options.linear_exr; ++c)
+        pixel[c] = linear_from_display(pixel[c]);
+      pixel += 4;
+      for (const Image* layer : more) {
+        const auto width = static_cast<std::size_t>(layer->channels);
+        pixel = std::copy_n(&layer->data[width * i], width, pixel);
       }
     }
-    write_image(file("", file_extension(options.format)), channels,
-                options.depth ? std::vector<std::string>{"Z"} : std::vector<std::string>{},
+    write_image(file("", file_extension(options.format)), channels, names,
                 options.linear_exr ? ColorSpace::kLinear : ColorSpace::kDisplay);
     return;
   }
   write_image(file("", file_extension(options.format)), with_channels(rgba, 3));
-  if (options.depth) write_image(file("_depth", ".png"), depth_preview(depth, rgba));
+  if (options.depth) write_image(file("_depth", ".png"), depth_preview(layers.depth, rgba));
+  if (options.normals)
+    write_image(file("_normals", ".png"), normals_preview(layers.normals, rgba, camera));
+  if (options.hits) write_image(file("_hits", ".png"), hits_preview(layers.hits));
 }
 
 FrameReport write_frames(Tracer& tracer,
@@ -224,14 +281,24 @@ FrameReport write_frames(Tracer& tracer,
     const auto start = std::chrono::steady_clock::now();
     const Image samples = exposed(tracer, model, cameras, i, options, within);
     if (samples.data.empty()) break;
-    Image depth;
-    if (options.depth) depth = average_depth(tracer.depth(), samples, options.supersample);
+    FrameLayers layers;
+    if (options.depth) layers.depth = average_depth(tracer.depth(), samples, options.supersample);
+    if (options.hits) layers.hits = box_average(hits_of(tracer.depth()), options.supersample);
     report.trace_seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
         (tracer.context().build_seconds() - built);
     report.capped_rays += tracer.capped_rays();
     report.rays += samples.pixels() * static_cast<std::uint64_t>(options.shutter_samples);
-    write_frame(folder / names[i], box_average(samples, options.supersample), depth, options);
+    if (options.normals) {
+      const double last = options.shutter * (options.shutter_samples - 1) / options.shutter_samples;
+      const Image sums = tracer.normals(
+          model, downscaled(later(cameras, i, last, options.closed), 1.0 / options.supersample),
+          within);
+      if (sums.data.empty()) break;
+      layers.normals = unit_normals(box_average(sums, options.supersample));
+    }
+    write_frame(folder / names[i], box_average(samples, options.supersample), cameras[i], layers,
+                options);
     ++report.frames;
     if (done && !done(report.frames)) break;
   }

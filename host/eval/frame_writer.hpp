@@ -31,6 +31,9 @@ struct FrameOptions {
   int supersample = 1;  ///< rays per pixel side; the samples are box-averaged
   bool depth =
       false;  ///< EXR: channel Z; PNG and JPG: a file NAME_depth.png, near white, far black
+  bool normals = false;  ///< EXR: channels N.X, N.Y and N.Z, of length 1 or 0, in world axes; PNG
+                         ///< and JPG: a file NAME_normals.png (normals_preview())
+  bool hits = false;     ///< EXR: channel hits; PNG and JPG: a file NAME_hits.png (hits_preview())
   bool linear_exr = true;  ///< EXR: proportional to light, as other programs expect; false = the
                            ///< values as trained, which PNG and JPG hold
   bool files = true;       ///< one for every frame, as above
@@ -61,18 +64,40 @@ Image box_average(const Image& image, int factor);
 /// alpha (channel 3 of `rgba`) is below one half are 0 and do not count.
 Image depth_preview(const Image& depth, const Image& rgba);
 
+/// The third channel of Tracer::depth(): numbers of hits.
+Image hits_of(const Image& depth);
+
+/// Tracer::normals() made as long as 1, where they have a direction.
+Image unit_normals(Image sums);
+
+/// Normals in world axes (3 channels) in the colours of the camera's axes: red to the right, green
+/// up, blue towards the camera, 0.5 in the middle. Pixels whose alpha is below one half are 0.
+Image normals_preview(const Image& normals, const Image& rgba, const Camera& camera);
+
+/// Number of hits (1 channel) as grey in [0, 1]: as many as the pixel with the most 1, none 0.
+Image hits_preview(const Image& hits);
+
+/// What a frame has beside its colours, at its size; empty pictures where options do not ask.
+struct FrameLayers {
+  Image depth;    ///< expected, 1 channel
+  Image normals;  ///< 3 channels, world axes, of length 1 or 0
+  Image hits;     ///< blended Gaussians, 1 channel; means where several rays make a pixel
+};
+
 /// Gives a frame to options.video, and where options.files says so writes it: `stem` with the
-/// format's extension, RGB of `rgba` for 8-bit formats. `depth` is used where options.depth is set.
-/// Throws DataError when a file fails.
+/// format's extension, RGB of `rgba` for 8-bit formats, and the layers that options ask for.
+/// `camera` is the frame's. Throws DataError when a file fails.
 void write_frame(const std::filesystem::path& stem,
                  const Image& rgba,
-                 const Image& depth,
+                 const Camera& camera,
+                 const FrameLayers& layers,
                  const FrameOptions& options);
 
 /// Traces every camera and writes its files to `folder`, which exists where there are files. `done`
 /// hears the number of finished frames and returns false to stop early; so does `within` with the
 /// share of the frame that is being traced, which is not written then. The tracer was made with the
-/// option depth when options.depth is set. Throws UsageError for a supersampling factor
+/// option depth when options.depth or options.hits is set; layers are those of the shutter's last
+/// moment. Throws UsageError for a supersampling factor
 /// outside 1..16 and shutters out of range, DataError when a file fails.
 FrameReport write_frames(Tracer& tracer,
                          const Model& model,

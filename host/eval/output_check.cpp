@@ -56,7 +56,7 @@ void check_leftovers(const std::filesystem::path& output,
   std::set<std::string> own;
   for (const std::string& name : names) {
     own.insert(name + extension);
-    own.insert(name + "_depth.png");
+    for (const char* layer : {"_depth.png", "_normals.png", "_hits.png"}) own.insert(name + layer);
   }
   std::set<std::string> others;
   std::error_code error;

@@ -38,7 +38,7 @@ SceneReport write_scene_frames(PathTracer& tracer,
         (tracer.context().build_seconds() - built);
     add(report.rays, tracer.statistics());
     if (rgba.pixels() == 0) break;
-    write_frame(folder / names[i], rgba, {}, options);
+    write_frame(folder / names[i], rgba, {}, {}, options);
     ++report.frames;
     if (done && !done(report.frames)) break;
   }

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "core/planes.hpp"
 #include "device/foreign_opencl.hpp"
+#include "light/normal_pictures.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/opencl.hpp"
@@ -128,6 +130,7 @@ struct Tracer::Impl {
   ViewTracer views;
   RayTracer tracer;
   RayBackward sums;
+  std::optional<NormalPictures> normals;  // once they are wanted
   // The last picture.
   int width = 0;
   int height = 0;
@@ -179,6 +182,26 @@ Image Tracer::depth() const {
   const auto lock = self.context.lock();
   if (self.width == 0) throw UsageError("There is no picture yet: call Tracer::render() first");
   return self.views.download_depth();
+}
+
+Image Tracer::normals(const Model& model,
+                      const Camera& camera,
+                      const std::function<bool(double)>& within) {
+  Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  if (self.mirrors)
+    throw UsageError("A picture with mirrors has no single normal: leave out the mirrors");
+  if (!self.normals) self.normals.emplace(self.context, self.options);
+  bool stopped = false;
+  try {
+    return self.normals->draw(gaussians_of(model, self.context), camera, [&](double share) {
+      stopped = within && !within(share);
+      return !stopped;
+    });
+  } catch (const Error&) {
+    if (!stopped) throw;
+    return {};
+  }
 }
 
 ViewGradients Tracer::backward(const Model& model, const Image& gradient) {

@@ -48,6 +48,7 @@ std::uint64_t GaussianPictures::samples() const { return kSamples; }
 void GaussianPictures::release() {
   color_.reset();
   depth_.reset();
+  normals_.reset();
 }
 
 ViewTracer& GaussianPictures::tracer(bool depth, const std::optional<float>& near_depth) {
@@ -66,20 +67,36 @@ ViewTracer& GaussianPictures::tracer(bool depth, const std::optional<float>& nea
   return *tracer;
 }
 
+Image GaussianPictures::normals_of(const Camera& camera, const Watch& watch) {
+  if (!normals_) {
+    TraceOptions options = options_;
+    options.near_depth = near_;
+    normals_ = std::make_unique<NormalPictures>(context_, options);
+  }
+  return normals_->draw(gaussians_, camera, watch);
+}
+
 Image GaussianPictures::draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) {
   const auto turn = context_.lock();
-  const bool depth = request.output == Output::kDepth;
+  const bool depth = request.output == Output::kDepth || request.output == Output::kHits;
+  const bool normals = request.output == Output::kNormals;
+  if (normals && !has_depth()) throw UsageError("A scene with mirrors has no single normal");
   ViewTracer& views = tracer(depth, request.near_depth);
   views.set_background(request.background.value_or(options_.background),
                        request.background ? SkyLight() : options_.sky);
   const Watched watched(views, watch);
+  const Camera camera = jittered(request.camera, sample);
+  Image sums;
   try {
-    views.forward(gaussians_, jittered(request.camera, sample));
+    views.forward(gaussians_, camera);
+    if (normals) sums = normals_of(camera, watch);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kInterrupted) throw;
     return {};
   }
   const Image rgba = views.download_image();
+  if (normals) return normals_picture(sums, rgba, camera);
+  if (request.output == Output::kHits) return hits_picture(views.download_depth());
   if (depth) return depth_picture(views.download_depth(), rgba);
   return request.output == Output::kAlpha ? alpha_picture(rgba) : rgba;
 }

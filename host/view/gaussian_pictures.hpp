@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "light/normal_pictures.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/context.hpp"
 #include "raysplats/mirrors.hpp"
@@ -40,6 +41,8 @@ class GaussianPictures : public PictureSource {
  private:
   ViewTracer& tracer(bool depth, const std::optional<float>& near_depth);
 
+  Image normals_of(const Camera& camera, const Watch& watch);
+
   Context& context_;
   const DeviceGaussians& gaussians_;
   TraceOptions options_;
@@ -47,6 +50,7 @@ class GaussianPictures : public PictureSource {
   float near_;  // of the tracers
   std::unique_ptr<ViewTracer> color_;
   std::unique_ptr<ViewTracer> depth_;
+  std::unique_ptr<NormalPictures> normals_;
 };
 
 }  // namespace raysplats::view

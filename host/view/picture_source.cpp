@@ -18,7 +18,7 @@ class ScenePictures : public PictureSource {
       : tracer_(context, scene), seed_(scene.render.seed) {}
 
   Image draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) override {
-    if (request.output == Output::kDepth)
+    if (request.output != Output::kColor && request.output != Output::kAlpha)
       throw UsageError("A scene with surfaces has no single depth");
     tracer_.set_sampling(1, seed_ + sample);
     const Image rgba = tracer_.render(jittered(request.camera, sample), watch);

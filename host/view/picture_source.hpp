@@ -33,7 +33,7 @@ class PictureSource {
   virtual std::optional<glm::dvec3> point(const ViewRequest& request) = 0;
   /// How many samples of a still view are worth it.
   virtual std::uint64_t samples() const = 0;
-  /// Whether there are depths.
+  /// Whether there are depths, normals and numbers of hits.
   virtual bool has_depth() const = 0;
 };
 

@@ -19,6 +19,17 @@ double halton(std::uint64_t index, std::uint64_t base) {
   return value;
 }
 
+/// RGBA of one or three channels.
+Image opaque(const Image& picture) {
+  Image out(picture.width, picture.height, 4, 1.0f);
+  const auto channels = static_cast<std::size_t>(picture.channels);
+  for (std::size_t i = 0; i < picture.pixels(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c)
+      out.data[4 * i + c] = picture.data[channels * i + std::min(c, channels - 1)];
+  }
+  return out;
+}
+
 }  // namespace
 
 Camera jittered(Camera camera, std::uint64_t sample) {
@@ -41,10 +52,13 @@ Image depth_picture(const Image& depth, const Image& rgba) {
   Image expected(depth.width, depth.height, 1);
   for (std::size_t i = 0; i < expected.pixels(); ++i)
     expected.data[i] = depth.data[i * static_cast<std::size_t>(depth.channels)];
-  const Image grey = depth_preview(expected, rgba);
-  Image out(rgba.width, rgba.height, 4, 1.0f);
-  for (std::size_t i = 0; i < grey.pixels(); ++i) std::fill_n(&out.data[4 * i], 3, grey.data[i]);
-  return out;
+  return opaque(depth_preview(expected, rgba));
 }
+
+Image normals_picture(const Image& sums, const Image& rgba, const Camera& camera) {
+  return opaque(normals_preview(unit_normals(sums), rgba, camera));
+}
+
+Image hits_picture(const Image& depth) { return opaque(hits_preview(hits_of(depth))); }
 
 }  // namespace raysplats::view

@@ -18,4 +18,9 @@ Image alpha_picture(const Image& rgba);
 /// nearest and farthest.
 Image depth_picture(const Image& depth, const Image& rgba);
 
+/// Sums of normals (3 channels, world axes) in the colours of normals_preview(), opaque.
+Image normals_picture(const Image& sums, const Image& rgba, const Camera& camera);
+/// Number of hits, the third channel of a depth, as grey: the most of the picture white; opaque.
+Image hits_picture(const Image& depth);
+
 }  // namespace raysplats::view

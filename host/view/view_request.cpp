@@ -101,6 +101,10 @@ ViewRequest view_of(const Json& json, int max_side) {
     const std::string output = text(json, "output");
     if (output == "depth") {
       request.output = Output::kDepth;
+    } else if (output == "normals") {
+      request.output = Output::kNormals;
+    } else if (output == "hits") {
+      request.output = Output::kHits;
     } else if (output == "alpha") {
       request.output = Output::kAlpha;
     } else if (output != "color") {

@@ -11,7 +11,7 @@
 
 namespace raysplats::view {
 
-enum class Output { kColor, kDepth, kAlpha };
+enum class Output { kColor, kDepth, kAlpha, kNormals, kHits };
 
 /// A picture that the page wants to see.
 struct ViewRequest {

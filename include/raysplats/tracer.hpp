@@ -67,6 +67,14 @@ class Tracer {
   /// pixel. Depth is along the viewing axis for kPinhole, kOpenCv and kOrthographic, along the ray
   /// for other models; 0 where nothing is. Throws UsageError without options.depth.
   Image depth() const;
+  /// Where the surfaces that a camera sees point to: 3 channels, the mean of the hits' normals
+  /// weighted by what they show, times alpha, in world axes. The normal of a Gaussian is its
+  /// shortest axis, turned to the side of the camera's centre (kOrthographic: against its
+  /// direction). Traced anew, beside the last picture, which stays; `within` as in render(). Throws
+  /// as render(), and UsageError with mirrors.
+  Image normals(const Model& model,
+                const Camera& camera,
+                const std::function<bool(double share)>& within = {});
   /// Gradients of the last picture from dL/d(R, G, B, A), of its size with 4 channels. Throws
   /// UsageError when that was not rendered differentiable, when the model has changed since or is
   /// another one, and for a gradient of another size or with a number that is not finite.

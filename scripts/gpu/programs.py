@@ -59,6 +59,7 @@ PROGRAMS = [
     ("exact lines", "trace/exact_lines.cl", {}),
     ("camera rays", "trace/camera_rays.cl", dict(CAMERA_MODEL=1)),
     ("sky", "trace/sky.cl", dict(CAMERA_MODEL=1, SKY_DEGREE=2)),
+    ("normals", "trace/normals.cl", {}),
     ("rays", "trace/rays.cl", WALK),
     ("rays entry", "trace/rays.cl", dict(WALK, PEAK_ORDER=0, ADAPTIVE_RADIUS=0)),
     ("rays leading", "trace/rays.cl", dict(WALK, LEADING=1)),

@@ -102,6 +102,9 @@ def test_views(context):
     tracer = rs.Tracer(context, rs.TraceOptions(quantile=QUANTILE, depth=True))
     picture = tracer.render(model, camera, differentiable=True)
     assert np.abs(picture.rgba - seen()).max() < 2e-5
+    normals = tracer.normals(model, camera)
+    assert normals.shape == (*picture.alpha.shape, 3) and np.abs(normals).max() > 0.1
+    assert (np.linalg.norm(normals, axis=2) <= picture.alpha + 1e-5).all()
     assert picture.hits.max() >= 2 and 1.5 < picture.expected_depth.max() < 4
     found = tracer.backward(model, weights)
     for name in reference.NAMES:

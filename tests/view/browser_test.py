@@ -171,6 +171,15 @@ class ViewTest(PageCase):
         Select(self.page.find_element(By.ID, "output")).select_by_value("depth")
         third = self.rest(second["id"])
         self.assertEqual(third["last"]["samples"], 1)
+        for output in ("normals", "hits"):
+            Select(self.page.find_element(By.ID, "output")).select_by_value(output)
+            third = self.rest(third["id"])
+            self.assertEqual(third["errors"], [])
+            levels = self.page.execute_script(
+                "const p = document.getElementById('picture');"
+                "return new Set(p.getContext('2d').getImageData(0, 0, p.width, p.height).data).size;")
+            self.assertGreater(levels, 20, output)
+            self.screenshot(output)
         Select(self.page.find_element(By.ID, "output")).select_by_value("color")
         fourth = self.rest(third["id"])
         stage = self.page.find_element(By.ID, "picture")

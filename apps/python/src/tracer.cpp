@@ -13,12 +13,14 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "context.hpp"
+#include "images.hpp"
 #include "names.hpp"
 #include "raysplats/error.hpp"
 #include "signals.hpp"
@@ -128,6 +130,17 @@ TracedRays trace(HeldTracer& self,
   const Model& gaussians = *model;
   const nb::gil_scoped_release release;
   return {tracer.trace(gaussians, rays, direction, differentiable)};
+}
+
+FloatView normals(HeldTracer& self, HeldModel& model, const Camera& camera) {
+  Tracer& tracer = *self;
+  const Model& gaussians = *model;
+  Image out;
+  {
+    const nb::gil_scoped_release release;
+    out = tracer.normals(gaussians, camera, &heed_signals);
+  }
+  return array_of(std::move(out));
 }
 
 RaysGradients backward_rays(HeldTracer& self,
@@ -292,6 +305,8 @@ void bind_tracer(nb::module_& module) {
            "The picture at the camera's size; differentiable keeps what backward() needs.")
       .def("backward", &backward, nb::arg("model"), nb::arg("gradient"),
            "Gradients of the last picture from dL/d(R, G, B, A), shaped as Picture.rgba.")
+      .def("normals", &normals, nb::arg("model"), nb::arg("camera"),
+           "(height, width, 3): mean normal of what the camera sees times alpha, in world axes.")
       .def("trace", &trace, nb::arg("model"), nb::arg("origins"), nb::arg("directions"),
            nb::kw_only(), nb::arg("t_min") = 0.0f, nb::arg("t_max") = kInfinity,
            nb::arg("color_direction") = "ray", nb::arg("differentiable") = false,

@@ -264,7 +264,7 @@ async function start() {
   $('near').disabled = !state.has_near;
   $('near').value = state.has_near ? Math.sqrt(Math.min(state.near / state.radius, 1)) : 0;
   for (const option of $('output').options) {
-    if (option.value === 'depth') option.disabled = !state.has_depth;
+    if (['depth', 'normals', 'hits'].includes(option.value)) option.disabled = !state.has_depth;
   }
   cameras.fill(state.cameras, state.center);
   link = new Connection(wanted, {

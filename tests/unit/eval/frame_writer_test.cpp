@@ -182,3 +182,55 @@ TEST_CASE("frames hold what the tracer saw") {
   options.supersample = 0;
   CHECK_THROWS_AS(write_frames(tracer, model, cameras, folder.path, options), UsageError);
 }
+
+TEST_CASE("normals and numbers of hits have colours of their own") {
+  // Seen from the front, from above and from the right, by a camera that looks along z, y down.
+  Image normals(4, 1, 3);
+  normals.data = {0, 0, -1, 0, -1, 0, 1, 0, 0, 1, 0, 0};
+  Image rgba(4, 1, 4, 1.0f);
+  rgba.at(3, 0, 3) = 0.4f;
+  const Image colors = normals_preview(normals, rgba, Camera{});
+  CHECK(colors.data == std::vector<float>{0.5f, 0.5f, 1, 0.5f, 1, 0.5f, 1, 0.5f, 0.5f, 0, 0, 0});
+  Image hits(3, 1, 1);
+  hits.data = {0, 2, 8};
+  CHECK(hits_preview(hits).data == std::vector<float>{0, 0.25f, 1});
+  CHECK(hits_preview(Image(2, 1, 1)).data == std::vector<float>{0, 0});
+  Image sums(2, 1, 3);
+  sums.data = {0, 0.3f, 0.4f, 0, 0, 0};
+  CHECK(unit_normals(sums).data == std::vector<float>{0, 0.6f, 0.8f, 0, 0, 0});
+}
+
+TEST_CASE("frames hold normals and numbers of hits where they are asked for") {
+  const TemporaryFolder folder;
+  Context context(select_device(""));
+  TraceOptions trace;
+  trace.depth = true;
+  Tracer tracer(context, trace);
+  Gaussians balls = red_balls();
+  // A disc that faces the camera, thinnest along z.
+  balls.log_scales[2] = std::log(0.01f);
+  const Model model(context, balls);
+  Camera camera = look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, 33, 21, 30.0);
+  camera.name = "ball.png";
+  FrameOptions options;
+  options.format = FrameFormat::kExr;
+  options.normals = options.hits = true;
+  options.supersample = 2;
+  write_frames(tracer, model, std::vector<Camera>{camera}, folder.path, options);
+  const std::size_t middle = 10 * 33 + 16;
+  const std::vector<float> z = exr_channel(folder.path / "ball.exr", "N.Z");
+  CHECK(z[middle] == doctest::Approx(-1.0f).epsilon(0.001));
+  CHECK(z[0] == 0.0f);
+  CHECK(exr_channel(folder.path / "ball.exr", "N.X")[middle] == doctest::Approx(0.0f));
+  CHECK(exr_channel(folder.path / "ball.exr", "hits")[middle] == 1.0f);
+  CHECK(exr_channel(folder.path / "ball.exr", "hits")[0] == 0.0f);
+  options.format = FrameFormat::kPng;
+  write_frames(tracer, model, std::vector<Camera>{camera}, folder.path, options);
+  const Image normals = read_image(folder.path / "ball_normals.png");
+  CHECK(normals.at(16, 10, 2) == doctest::Approx(1.0f).epsilon(0.01));
+  CHECK(normals.at(16, 10, 0) == doctest::Approx(0.5f).epsilon(0.01));
+  // At the edge rays meet the further ball as well.
+  CHECK(read_image(folder.path / "ball_hits.png").at(16, 10, 0) ==
+        doctest::Approx(0.5).epsilon(0.01));
+  CHECK_FALSE(fs::exists(folder.path / "ball_depth.png"));
+}

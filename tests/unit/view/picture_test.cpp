@@ -85,6 +85,18 @@ TEST_CASE("depths become grey between the nearest and the farthest") {
   CHECK(grey.at(2, 0, 2) == 0.0f);
 }
 
+TEST_CASE("normals and numbers of hits become opaque pictures") {
+  Image sums(1, 1, 3);
+  sums.data = {0, 0, -0.5f};
+  const Image colors = normals_picture(sums, Image(1, 1, 4, 1.0f), Camera{});
+  CHECK(colors.data == std::vector<float>{0.5f, 0.5f, 1, 1});
+  Image depth(2, 1, 3);
+  depth.at(0, 0, 2) = 3.0f;
+  depth.at(1, 0, 2) = 6.0f;
+  const Image hits = hits_picture(depth);
+  CHECK(hits.data == std::vector<float>{0.5f, 0.5f, 0.5f, 1, 1, 1, 1, 1});
+}
+
 TEST_CASE("the library holds the page, and nothing else is served") {
   REQUIRE(page_file("/").has_value());
   CHECK(page_file("/")->content.find("<!doctype html>") == 0);

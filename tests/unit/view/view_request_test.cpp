@@ -71,6 +71,14 @@ TEST_CASE("a view message becomes a camera") {
   CHECK(*other.near_depth == 0.5f);
   CHECK((*other.background)[1] == 0.5f);
   CHECK(other.output == Output::kDepth);
+  const std::pair<const char*, Output> outputs[] = {{"color", Output::kColor},
+                                                    {"alpha", Output::kAlpha},
+                                                    {"normals", Output::kNormals},
+                                                    {"hits", Output::kHits}};
+  for (const auto& [name, output] : outputs) {
+    turned["output"] = name;
+    CHECK(view_of(turned).output == output);
+  }
 }
 
 TEST_CASE("picks and commands are understood") {
