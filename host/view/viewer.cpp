@@ -107,6 +107,7 @@ struct Viewer::Impl {
           if (client.wanted->moving) last_motion = Clock::now();
         } else if (std::holds_alternative<Leave>(message)) {
           client.wanted.reset();
+          client.wish = ++wishes;  // what is drawn of the last one comes too late
         } else if (auto* pick = std::get_if<PickRequest>(&message)) {
           if (picks.size() < kMostWaiting) picks.emplace_back(id, std::move(*pick));
         } else if (commands.size() < kMostWaiting) {
@@ -194,8 +195,11 @@ void Viewer::Impl::draw(PictureSource& source,
   std::uint64_t wish = 0;
   std::uint64_t sample = 0;
   {
+    // It may have gone since it was chosen.
     const std::lock_guard<std::mutex> guard(mutex);
-    Client& client = clients.at(id);
+    const auto found = clients.find(id);
+    if (found == clients.end() || !found->second.wanted) return;
+    Client& client = found->second;
     request = *client.wanted;
     if (request.moving) {
       pace = client.pace;
@@ -215,9 +219,8 @@ void Viewer::Impl::draw(PictureSource& source,
     const std::lock_guard<std::mutex> guard(mutex);
     return std::none_of(clients.begin(), clients.end(), [&](const auto& each) {
       const Client& client = each.second;
-      if (!client.wanted) return false;
       if (each.first == id) return client.wish != wish;
-      return client.wanted->moving && client.drawn == 0;
+      return client.wanted && client.wanted->moving && client.drawn == 0;
     });
   };
   const auto start = Clock::now();
