@@ -115,6 +115,14 @@ Matrix matrix_of(const std::filesystem::path& path, const Json& json, const char
   return matrix;
 }
 
+/// nerfstudio's seconds are those of the way to a keyframe, from the last to the first where the
+/// path is closed.
+void count_from_start(std::vector<Keyframe>& keys) {
+  const double first = keys.front().seconds;
+  for (std::size_t i = 0; i + 1 < keys.size(); ++i) keys[i].seconds = keys[i + 1].seconds;
+  keys.back().seconds = first;
+}
+
 /// A pose of OpenGL axes (right, up, back).
 void set_pose(const std::filesystem::path& path, const Matrix& matrix, Keyframe& key) {
   glm::dmat3 axes;
@@ -180,6 +188,7 @@ Stored read_json(const std::filesystem::path& path) {
                       : (frames ? 1.0 : transition);
     out.path.keys.push_back(key);
   }
+  count_from_start(out.path.keys);
   return out;
 }
 

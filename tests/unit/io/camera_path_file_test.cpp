@@ -118,6 +118,29 @@ TEST_CASE("frames of a camera path are taken as they are, unless other moments a
   CHECK(read.cameras[0].fx == 40);
 }
 
+TEST_CASE("seconds of nerfstudio's keyframes are those of the way to them") {
+  const Folder folder;
+  json file = key_file(matrix_at(0), matrix_at(4));
+  file.erase("seconds");
+  file["keyframes"].push_back({{"matrix", matrix_at(8)}, {"fov", 60}});
+  file["keyframes"][1]["override_transition_enabled"] = true;
+  file["keyframes"][1]["override_transition_sec"] = 3;
+  file["default_transition_sec"] = 1;
+  CameraPathFile read = read_camera_path(folder.write("open.json", file.dump()), {});
+  // 3 s to the second and 1 s to the third; the 40 frames lie 4/39 s apart.
+  REQUIRE(read.cameras.size() == 40);
+  CHECK(read.cameras[29].center().x < 4);
+  CHECK(read.cameras[30].center().x > 4);
+  // 2 s from the third back to the first.
+  file["is_cycle"] = true;
+  file["keyframes"][0]["override_transition_enabled"] = true;
+  file["keyframes"][0]["override_transition_sec"] = 2;
+  read = read_camera_path(folder.write("closed.json", file.dump()), {});
+  REQUIRE(read.cameras.size() == 60);
+  CHECK(read.cameras[30].center().x == doctest::Approx(4));
+  CHECK(read.cameras[40].center().x == doctest::Approx(8));
+}
+
 TEST_CASE("nerfstudio's transform is undone") {
   const Folder folder;
   const auto path = folder.write("path.json", key_file(matrix_at(0), matrix_at(4)).dump());
