@@ -58,8 +58,8 @@ void Trainer::Impl::choose_background() {
   std::vector<std::size_t> some;
   const std::size_t count = std::min(kMeanPhotos, all.size());
   for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
-  const std::array<float, 3> color =
-      typical_color(small_photos.empty() ? reduced_photos(some) : small_photos);
+  // Not those that a start has looked at: the colour is not to depend on what came before.
+  const std::array<float, 3> color = typical_color(reduced_photos(some));
   if (sky) {
     tracer.set_background({}, even_sky(options.sky_degree, color));
     return;

@@ -54,6 +54,33 @@ TEST_CASE("an estimate leaves no trace in the run, whatever its strategy and opt
   }
 }
 
+TEST_CASE("an estimate looks at the photos that the run's background comes from") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data";
+  // More photos than the background is the mean of, all of which the start looks at.
+  make_photos(data, 16, 40, 1, SyntheticScene::kOutdoor);
+  TrainOptions options = short_training(2);
+  options.init = "photos";
+  options.trace.deterministic = true;
+  const auto background = [&](const std::string& name) {
+    TrainOptions used;
+    read_train_config(folder.path() / name / "config.toml", used);
+    return used.background;
+  };
+  for (const std::string name : {"auto", "sky", "exposure"}) {
+    CAPTURE(name);
+    options.background = name == "sky" ? "sky" : "auto";
+    options.exposure = name == "exposure";
+    Trainer plain(context(), load_dataset(data), options, folder.path() / ("plain " + name));
+    plain.run(false);
+    Trainer judged(context(), load_dataset(data), options, folder.path() / ("judged " + name));
+    judged.estimate(0.1);
+    judged.run(false);
+    CHECK(background("plain " + name) == background("judged " + name));
+    check_equal(plain.model(), judged.model());
+  }
+}
+
 TEST_CASE("a run by time names its length, and a replay of its configuration gives its bytes") {
   const TemporaryDirectory folder;
   const fs::path data = folder.path() / "data", run = folder.path() / "run";
