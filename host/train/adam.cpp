@@ -59,6 +59,7 @@ void Adam::initialize(std::size_t count, int sh_degree) {
   first_.ensure(context_, count, sh_degree, "Adam first moments");
   second_.ensure(context_, count, sh_degree, "Adam second moments");
   for (const ParameterGroup group : kParameterGroups) reset(group);
+  skipped_.clear();
   initialized_ = true;
   count_ = count;
   sh_degree_ = sh_degree;

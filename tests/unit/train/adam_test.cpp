@@ -206,6 +206,9 @@ TEST_CASE("adam: a Gaussian with a non-finite gradient is skipped and counted [s
     }
     CHECK(adam.skipped() == expected);
     f.check(adam, 1e-5);
+    // Steps of a trial are not those of the run that follows it.
+    adam.initialize(count, 2);
+    CHECK(adam.skipped() == 0);
   }
 }
 
