@@ -47,9 +47,9 @@ Image with_channels(const Image& image, int channels) {
   return out;
 }
 
-/// Expected depth at the size of the frame. Samples that met nothing carry no depth, so blocks
-/// average by alpha.
-Image average_depth(const Image& depth, const Image& rgba, int factor) {
+/// Expected depth times alpha, and alpha: samples that met nothing carry no depth, so blocks and
+/// moments average by alpha.
+Image weighted_depth(const Image& depth, const Image& rgba) {
   Image weighted(depth.width, depth.height, 2);
   for (std::size_t i = 0; i < depth.pixels(); ++i) {
     const float alpha = rgba.data[4 * i + 3];
@@ -57,6 +57,11 @@ Image average_depth(const Image& depth, const Image& rgba, int factor) {
     weighted.data[2 * i] = alpha * z;
     weighted.data[2 * i + 1] = alpha;
   }
+  return weighted;
+}
+
+/// Expected depth at the size of the frame, from weighted_depth().
+Image average_depth(const Image& weighted, int factor) {
   const Image mean = box_average(weighted, factor);
   Image out(mean.width, mean.height, 1);
   for (std::size_t i = 0; i < mean.pixels(); ++i) {
@@ -75,31 +80,49 @@ Camera later(std::span<const Camera> cameras, std::size_t frame, double share, b
   return between(cameras[frame - 1], now, 1.0 + share);
 }
 
-/// A frame at its number of rays per pixel, as the mean of the moments at which the shutter is
-/// open; empty when `within` stopped it.
-Image exposed(Tracer& tracer,
-              const Model& model,
-              std::span<const Camera> cameras,
-              std::size_t frame,
-              const FrameOptions& options,
-              const std::function<bool(double)>& within) {
+/// A frame at its number of rays per pixel, means of the moments at which the shutter is open.
+struct Exposed {
+  Image rgba;   ///< empty when it was stopped
+  Image depth;  ///< weighted_depth(), where options ask
+  Image hits;   ///< where options ask
+  std::uint64_t capped_rays = 0;
+};
+
+void add(Image& sum, Image image) {
+  if (sum.data.empty()) {
+    sum = std::move(image);
+    return;
+  }
+  for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += image.data[i];
+}
+
+Exposed exposed(Tracer& tracer,
+                const Model& model,
+                std::span<const Camera> cameras,
+                std::size_t frame,
+                const FrameOptions& options,
+                const std::function<bool(double)>& within) {
   const int moments = options.shutter_samples;
-  Image sum;
+  Exposed out;
   for (int k = 0; k < moments; ++k) {
     const Camera camera = later(cameras, frame, options.shutter * k / moments, options.closed);
-    const Image moment =
+    Image moment =
         tracer.render(model, downscaled(camera, 1.0 / options.supersample), false,
                       [&](double share) { return !within || within((k + share) / moments); });
     if (moment.data.empty()) return {};
-    if (k == 0) {
-      sum = moment;
-    } else {
-      for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += moment.data[i];
+    if (options.depth || options.hits) {
+      const Image depth = tracer.depth();
+      if (options.depth) add(out.depth, weighted_depth(depth, moment));
+      if (options.hits) add(out.hits, hits_of(depth));
     }
+    add(out.rgba, std::move(moment));
+    out.capped_rays += tracer.capped_rays();
   }
   const float scale = 1.0f / static_cast<float>(moments);
-  for (float& value : sum.data) value *= scale;
-  return sum;
+  for (Image* image : {&out.rgba, &out.depth, &out.hits}) {
+    for (float& value : image->data) value *= scale;
+  }
+  return out;
 }
 
 }  // namespace
@@ -279,16 +302,16 @@ FrameReport write_frames(Tracer& tracer,
   for (std::size_t i = options.offset; i < cameras.size(); i += options.stride) {
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
-    const Image samples = exposed(tracer, model, cameras, i, options, within);
-    if (samples.data.empty()) break;
+    const Exposed samples = exposed(tracer, model, cameras, i, options, within);
+    if (samples.rgba.data.empty()) break;
     FrameLayers layers;
-    if (options.depth) layers.depth = average_depth(tracer.depth(), samples, options.supersample);
-    if (options.hits) layers.hits = box_average(hits_of(tracer.depth()), options.supersample);
+    if (options.depth) layers.depth = average_depth(samples.depth, options.supersample);
+    if (options.hits) layers.hits = box_average(samples.hits, options.supersample);
     report.trace_seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
         (tracer.context().build_seconds() - built);
-    report.capped_rays += tracer.capped_rays();
-    report.rays += samples.pixels() * static_cast<std::uint64_t>(options.shutter_samples);
+    report.capped_rays += samples.capped_rays;
+    report.rays += samples.rgba.pixels() * static_cast<std::uint64_t>(options.shutter_samples);
     if (options.normals) {
       const double last = options.shutter * (options.shutter_samples - 1) / options.shutter_samples;
       const Image sums = tracer.normals(
@@ -297,8 +320,8 @@ FrameReport write_frames(Tracer& tracer,
       if (sums.data.empty()) break;
       layers.normals = unit_normals(box_average(sums, options.supersample));
     }
-    write_frame(folder / names[i], box_average(samples, options.supersample), cameras[i], layers,
-                options);
+    write_frame(folder / names[i], box_average(samples.rgba, options.supersample), cameras[i],
+                layers, options);
     ++report.frames;
     if (done && !done(report.frames)) break;
   }

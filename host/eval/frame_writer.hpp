@@ -96,9 +96,9 @@ void write_frame(const std::filesystem::path& stem,
 /// Traces every camera and writes its files to `folder`, which exists where there are files. `done`
 /// hears the number of finished frames and returns false to stop early; so does `within` with the
 /// share of the frame that is being traced, which is not written then. The tracer was made with the
-/// option depth when options.depth or options.hits is set; layers are those of the shutter's last
-/// moment. Throws UsageError for a supersampling factor
-/// outside 1..16 and shutters out of range, DataError when a file fails.
+/// option depth when options.depth or options.hits is set; depth and hits are means over the
+/// moments of the shutter, depth by alpha, and normals are those of the last one. Throws UsageError
+/// for a supersampling factor outside 1..16 and shutters out of range, DataError when a file fails.
 FrameReport write_frames(Tracer& tracer,
                          const Model& model,
                          std::span<const Camera> cameras,

@@ -85,6 +85,41 @@ TEST_CASE("the depth preview is white near, black far and where nothing is") {
   CHECK(depth_preview(depth, rgba).data == std::vector<float>{1.0f, 0.0f, 0.5f, 0.0f});
 }
 
+TEST_CASE("depth, hits and capped rays of a blurred frame are those of all its moments") {
+  const TemporaryFolder folder;
+  Context context(select_device(""));
+  TraceOptions trace;
+  trace.depth = true;
+  trace.max_hits = 1;
+  Tracer tracer(context, trace);
+  Gaussians balls = red_balls();
+  balls.means = {0, 0, 0, 0, 0, 4};
+  balls.opacities = {0.0f, 8.0f};
+  const Model model(context, balls);
+  // It looks at the balls, then away.
+  std::vector<Camera> cameras{look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, 17, 11, 15.0),
+                              look_at({0, 0, -4}, {0, 0, -8}, {0, -1, 0}, 17, 11, 15.0)};
+  FrameOptions options;
+  options.format = FrameFormat::kExr;
+  options.depth = options.hits = true;
+  options.shutter = 1.0;
+  const FrameReport sharp = write_frames(tracer, model, cameras, folder.path, options);
+  const fs::path first = folder.path / "frame_0000.exr";
+  const std::vector<float> z = exr_channel(first, "Z"), hits = exr_channel(first, "hits");
+  REQUIRE(z[5 * 17 + 8] > 3.0f);
+  REQUIRE(sharp.capped_rays > 0);
+  cameras.push_back(cameras.back());
+  // Moments at 0 and half of the way, where nothing is seen any more.
+  options.shutter_samples = 2;
+  const FrameReport blurred = write_frames(tracer, model, cameras, folder.path, options);
+  const std::vector<float> mean = exr_channel(first, "Z"), half = exr_channel(first, "hits");
+  for (std::size_t i = 0; i < z.size(); ++i) {
+    CHECK(mean[i] == doctest::Approx(z[i]).epsilon(1e-5));
+    CHECK(half[i] == doctest::Approx(0.5f * hits[i]));
+  }
+  CHECK(blurred.capped_rays == sharp.capped_rays);
+}
+
 TEST_CASE("frames hold what the tracer saw") {
   const TemporaryFolder folder;
   Context context(select_device(""));
