@@ -47,7 +47,8 @@ std::vector<Camera> cameras_of(const Options& options,
       io::move_origin(camera, {source.origin[0], source.origin[1], source.origin[2]});
     return cameras;
   }
-  for (const View& each : dataset.views) cameras.push_back(each.camera);
+  const Split split = options.data.split ? options.data.chosen_split() : Split::kAll;
+  for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
   return cameras;
 }
 
@@ -110,10 +111,21 @@ void view_model(const Options& options) {
   serve(options, *pictures, std::move(state));
 }
 
+void check(const Options& options) {
+  options.data.check_used(false);
+  if (options.data.data.empty() && options.data.settings.has("downscale"))
+    throw UsageError("--downscale divides the sizes of photos: add --data DATASET");
+}
+
 void run(const Options& options) {
+  check(options);
   if (is_scene_file(options.model)) {
     if (!options.data.data.empty() || !options.cameras.empty()) {
       throw UsageError("--data and --cameras are for models: a scene file has its own [camera]");
+    }
+    if (options.trace.has("near")) {
+      throw UsageError(
+          "--near is for models: rays that leave a mirror have no camera that could be near");
     }
     view_scene(options);
   } else {

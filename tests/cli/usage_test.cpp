@@ -78,6 +78,9 @@ TEST_CASE("a wrong command line is one sentence, exit code 2") {
   check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--shutter", "0.5"}, 2,
                 "--shutter-samples");
   check_refused({"render", "m.ply", "--orbit", "3", "--video", "x.mp4", "--depth"}, 2, "-o");
+  check_refused({"view", "m.ply", "--split", "train"}, 2, "--data DATASET");
+  check_refused({"view", "m.ply", "--downscale", "2"}, 2, "--data DATASET");
+  check_refused({"view", "scene.toml", "--near", "1"}, 2, "--near is for models");
   check_refused({"render", "m.ply", "-o", "x"}, 2, "no cameras");
   check_refused({"render", "m.ply", "-o", "x", "--data", "d", "--cameras", "c"}, 2, "--cameras");
   check_refused({"render", "m.ply", "-o", "x", "--data", "d", "--fov", "30"}, 2, "--orbit");

@@ -4,12 +4,14 @@
 usage: protocol_test.py PROGRAM"""
 import json
 import os
+import subprocess
 import sys
+import tempfile
 import time
 import unittest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from program import Channel, Viewer, view  # noqa: E402
+from program import Channel, Viewer, view, write_model  # noqa: E402
 
 PROGRAM = ""
 LAST, PNG = 1, 2
@@ -173,6 +175,19 @@ class ViewerTest(unittest.TestCase):
         self.last_picture(channels[1], 9)
         for each in channels:
             each.socket.close()
+
+
+class CamerasTest(unittest.TestCase):
+    def test_the_list_has_the_views_that_are_asked_for(self):
+        with tempfile.TemporaryDirectory(prefix="raysplats_views_") as folder:
+            model, photos = os.path.join(folder, "model.ply"), os.path.join(folder, "photos")
+            write_model(model)
+            subprocess.run([PROGRAM, "generate", photos, "--size", "16", "--train-views", "3", "--test-views", "2"],
+                           check=True, stdout=subprocess.DEVNULL)
+            for more, count in (([], 5), (["--split", "test"], 2), (["--split", "train"], 3)):
+                with Viewer(PROGRAM, [model, "--data", photos, *more]) as viewer:
+                    state = json.loads(viewer.ask("/api/state", Cookie=viewer.cookie())[2])
+                    self.assertEqual(len(state["cameras"]), count, more)
 
 
 class ScenesTest(unittest.TestCase):
