@@ -106,6 +106,7 @@ void read_keys(const toml::table& table,
           "the table [{}{}] is unknown: keys stand at the top of the file or below [train]", prefix,
           written.str()));
     }
+    if (key == keys.end() && take_retired_key(name)) continue;
     if (key == keys.end()) {
       fail(fmt::format("unknown key '{}{}': did you mean '{}'?", prefix, written.str(),
                        nearest_name(name, names_of(keys))));
@@ -164,6 +165,12 @@ void add_train_options(CLI::App& app, TrainOptions& options) {
     const char* names = key.name == "iterations" ? "-n" : key.name == "mirrors" ? "--mirror" : "";
     CLI::Option* option = add_row(app, key, key.set, names);
     option->default_str(shell_text(key.text()))->group(key.section);
+  }
+  for (const RetiredKey& key : retired_train_keys()) {
+    app.add_option_function<std::vector<std::string>>(
+           "--" + key.name, [name = key.name](const auto&) { take_retired_key(name); })
+        ->expected(1)
+        ->group("");
   }
   app.add_option("--config", "configuration file (TOML); options on the command line go before it")
       ->expected(1)

@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "base/number_text.hpp"
@@ -359,6 +361,20 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
            "iterations between checkpoints; 0 = only the last");
   t.number("keep-checkpoints", o.keep_checkpoints, 1, 1e9, "checkpoints kept in the run folder");
   return t.take();
+}
+
+const std::vector<RetiredKey>& retired_train_keys() {
+  static const std::string fitted = "the affine colours of photos are fitted, see exposure-damping";
+  static const std::vector<RetiredKey> keys{{"exposure-lr", fitted}, {"exposure-lr-final", fitted}};
+  return keys;
+}
+
+bool take_retired_key(const std::string& name) {
+  const std::vector<RetiredKey>& keys = retired_train_keys();
+  const auto key = std::ranges::find(keys, name, &RetiredKey::name);
+  if (key == keys.end()) return false;
+  spdlog::warn("'{}' has no effect any more: {}", key->name, key->instead);
+  return true;
 }
 
 }  // namespace raysplats

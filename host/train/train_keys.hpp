@@ -13,4 +13,12 @@ namespace raysplats {
 /// `options`, which has to outlive them.
 std::vector<OptionRow> train_keys(TrainOptions& options);
 
+/// A key of earlier versions that nothing reads any more, and what there is instead.
+struct RetiredKey {
+  std::string name, instead;
+};
+const std::vector<RetiredKey>& retired_train_keys();
+/// Whether it is one of them: commands and files of earlier versions go on working, with a warning.
+bool take_retired_key(const std::string& name);
+
 }  // namespace raysplats

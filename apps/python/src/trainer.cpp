@@ -50,6 +50,7 @@ void set_option(TrainOptions& options, std::string key, nb::handle value) {
     if (known.name == key) return known.set(words(value));
     names.push_back(known.name);
   }
+  if (take_retired_key(key)) return;
   throw UsageError(
       fmt::format("unknown option '{}': did you mean '{}'?", key, nearest_name(key, names)));
 }

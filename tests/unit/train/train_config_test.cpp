@@ -107,6 +107,22 @@ TEST_CASE("an unknown key is refused with the nearest one") {
   CHECK(message_of(temporary("missing.toml")).find("cannot be read") != std::string::npos);
 }
 
+TEST_CASE("keys of earlier versions are taken, and their options") {
+  const auto path = temporary("retired.toml");
+  write_text_file(path, "exposure-lr = 0.01\nseed = 7\n");
+  TrainOptions read;
+  read_train_config(path, read);
+  CHECK(read.seed == 7);
+  CHECK(to_toml(read).find("exposure-lr") == std::string::npos);
+  std::filesystem::remove(path);
+  CLI::App app;
+  TrainOptions options;
+  add_train_options(app, options);
+  app.parse("--exposure-lr-final 0.001 --seed 8");
+  CHECK(options.seed == 8);
+  CHECK(app.help().find("exposure-lr") == std::string::npos);
+}
+
 TEST_CASE("values out of range and of the wrong kind are refused by name") {
   const auto path = temporary("range.toml");
   for (const std::string line : {"iterations = -1",
