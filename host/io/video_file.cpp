@@ -10,6 +10,7 @@
 
 #include "base/atomic_file.hpp"
 #include "base/program.hpp"
+#include "io/gif_moments.hpp"
 #include "io/image_codec.hpp"
 #include "io/video_frame.hpp"
 #include "raysplats/error.hpp"
@@ -18,7 +19,6 @@ namespace raysplats {
 namespace {
 
 constexpr double kMostFps = 1000.0;
-constexpr double kMostGifFps = 100.0;  // its clock's
 
 /// What ffmpeg does with the frames. Both formats keep colours at half the resolution, for which
 /// sizes have to be even: the last row and column go.
@@ -39,7 +39,8 @@ std::vector<std::string> arguments_of(const std::string& extension,
     add({"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "30", "-row-mt", "1"});
   }
   add({"-pix_fmt", "yuv420p", "-color_primaries", "bt709", "-color_trc", "bt709", "-colorspace",
-       "bt709", target.string()});
+       // A name that begins at the root is neither an option nor an address to ffmpeg.
+       "bt709", std::filesystem::absolute(target).string()});
   return words;
 }
 
@@ -87,10 +88,12 @@ class Gif : public VideoFile {
       encoder_ = io::image_codec().open_gif(file_.temporary(), frame.width, frame.height, fps_);
     }
     encoder_->add(frame);
+    ++frames_;
   }
   void finish() override {
     if (!encoder_) throw UsageError(fmt::format("The video {} has no frames", path_.string()));
     encoder_->finish();
+    io::set_gif_moments(file_.temporary(), path_, frames_, fps_);
     file_.commit();
   }
 
@@ -99,6 +102,7 @@ class Gif : public VideoFile {
   AtomicFile file_;
   double fps_;
   FrameSize size_;
+  std::size_t frames_ = 0;
   std::unique_ptr<io::MovieEncoder> encoder_;
 };
 
@@ -113,7 +117,7 @@ std::unique_ptr<VideoFile> open_video(const std::filesystem::path& path,
         fmt::format("The video {} has no name that says its format: use .mp4, .webm, .gif or .apng",
                     path.string()));
   }
-  const double most = gif ? kMostGifFps : kMostFps;
+  const double most = gif ? io::kMostGifFps : kMostFps;
   if (!(options.fps > 0.0 && options.fps <= most)) {
     throw UsageError(fmt::format("{} frames a second are out of range for {}: use up to {}",
                                  options.fps, path.string(), most));

@@ -41,6 +41,16 @@ std::uint32_t big_endian(const std::string& bytes, std::size_t at) {
   return value;
 }
 
+/// How long the pictures of a GIF stay, in 1/100 s.
+std::vector<int> lengths_of(const std::string& gif) {
+  std::vector<int> lengths;
+  const std::string control("\x21\xf9\x04", 3);
+  for (std::size_t at = gif.find(control); at != std::string::npos; at = gif.find(control, at + 1))
+    lengths.push_back(static_cast<std::uint8_t>(gif[at + 4]) |
+                      static_cast<std::uint8_t>(gif[at + 5]) << 8);
+  return lengths;
+}
+
 }  // namespace
 
 TEST_CASE("ffmpeg gets every frame as bytes, and the file appears when it is done") {
@@ -119,11 +129,41 @@ TEST_CASE("GIF and APNG need no program and hold every frame") {
   CHECK(gif.starts_with("GIF89a"));
   CHECK(gif.find("NETSCAPE2.0") != std::string::npos);
   CHECK(static_cast<std::uint8_t>(gif.back()) == 0x3b);
-  std::size_t pictures = 0;
-  const std::string control("\x21\xf9\x04", 3);
-  for (std::size_t at = gif.find(control); at != std::string::npos; at = gif.find(control, at + 1))
-    ++pictures;
-  CHECK(pictures == 4);
+  CHECK(lengths_of(gif) == std::vector<int>{4, 4, 4, 4});
+}
+
+TEST_CASE("a GIF lasts as long as its frames, and is whole or not there") {
+  const TemporaryFolder folder;
+  const auto lengths = [&](const std::string& frames, const std::string& fps) {
+    REQUIRE(raysplats_program(orbit(folder, frames) +
+                              Words{"--video", folder / "a.gif", "--fps", fps, "--overwrite"})
+                .code == 0);
+    return lengths_of(read_file(folder / "a.gif"));
+  };
+  CHECK(lengths("6", "30") == std::vector<int>{3, 4, 3, 3, 4, 3});
+  CHECK(lengths("4", "40") == std::vector<int>{3, 2, 3, 2});
+  CHECK(raysplats_program(orbit(folder, "2") + Words{"--video", folder / "b.gif", "--fps", "60"})
+            .code == 2);
+  // The encoder does not notice a full disk.
+  Surroundings around;
+  around.file_size_limit = 4096;
+  const Outcome outcome =
+      raysplats_program(orbit(folder, "60") + Words{"--video", folder / "full.gif"}, around);
+  CHECK(outcome.code == 3);
+  CHECK(outcome.err.find("full disk") != std::string::npos);
+  CHECK(!fs::exists(folder / "full.gif"));
+}
+
+TEST_CASE("names of videos are no options and no addresses to ffmpeg") {
+  const TemporaryFolder folder;
+  Surroundings around =
+      with_ffmpeg(folder, "echo \"$word\" > '" + (folder / "word") + "'; cat > \"$word\"\n");
+  around.folder = folder.path();
+  for (const std::string video : {"a:b/out.webm", "-x/out.webm"}) {
+    REQUIRE(raysplats_program(orbit(folder, "2") + Words{"--video=" + video}, around).code == 0);
+    CHECK(read_file(folder / "word").starts_with("/"));
+    CHECK(fs::exists(folder / video));
+  }
 }
 
 TEST_CASE("motion blur is the mean of the moments, and one moment is the frame itself") {
