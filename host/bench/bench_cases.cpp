@@ -11,6 +11,7 @@
 #include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
+#include "trace/memory_shares.hpp"
 
 namespace raysplats {
 namespace {
@@ -51,7 +52,8 @@ std::map<std::string, std::string> option_texts(const Context& context,
           {"max-hits", std::to_string(options.trace.max_hits)},
           {"adaptive-radius", options.trace.adaptive_radius ? "on" : "off"},
           {"tuning", tuning_text(context.device())},
-          {"memory-budget", fmt::format("{} MiB", options.trace.memory_budget >> 20)}};
+          {"memory-budget",
+           fmt::format("{} MiB", MemoryShares(options.trace, context.device()).all() >> 20)}};
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
   const std::size_t paths = has_glass(scene) ? kPathsThroughGlass : 1;
   pixel_ = kPixelBytes + paths * (kPathBytes + (scene.lights.empty() ? 0 : kShadowBytes));
   pixel_largest_ = 2 * paths * sizeof(RsPath);
-  const std::size_t room = std::min(MemoryShares(scene.trace.memory_budget).paths() / pixel_,
+  const std::size_t room = std::min(MemoryShares(scene.trace, device).paths() / pixel_,
                                     device.max_allocation / pixel_largest_);
   batch_ = std::clamp<std::size_t>(room, kLeastBatch,
                                    device.type == DeviceType::kCpu ? kMaxCpuBatch : kMaxBatch);
@@ -74,7 +74,7 @@ PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
   gaussians_ = count * (11 * kFloat + sh + sizeof(RsAabb) + block + Lbvh::bytes_per_box(lanes_));
   if (scene.render.samples == 1) {
     packets_ = count * (sizeof(RsLine) + sizeof(RsViewBounds) + sizeof(RsAabb) + 4) +
-               MemoryShares(scene.trace.memory_budget).tile_lists();
+               MemoryShares(scene.trace, device).tile_lists();
     packet_pixel_ = kPacketPixelBytes;
   }
   std::size_t texels = 0;

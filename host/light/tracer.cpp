@@ -15,6 +15,7 @@
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/opencl.hpp"
+#include "trace/memory_shares.hpp"
 #include "trace/model_impl.hpp"
 #include "trace/ray_backward.hpp"
 #include "trace/ray_tracer.hpp"
@@ -101,9 +102,10 @@ struct Tracer::Impl {
         sums(context_in, tracer) {}
 
   std::size_t batch() const {
-    return std::max(kLeastBatch, std::min<std::size_t>(options.memory_budget / 4 / kRayBytes,
-                                                       context.device().max_allocation /
-                                                           sizeof(RayBackward::Slopes)));
+    return std::max(
+        kLeastBatch,
+        std::min<std::size_t>(MemoryShares(options, context.device()).ray_batch() / kRayBytes,
+                              context.device().max_allocation / sizeof(RayBackward::Slopes)));
   }
   void require_bare_rays() const {
     if (!options.sky.empty()) {

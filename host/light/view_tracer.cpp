@@ -132,7 +132,7 @@ struct ViewTracer::Impl {
     return *rays;
   }
   std::size_t batch() const {
-    const std::size_t most = ViewTracer::batch(options.memory_budget);
+    const std::size_t most = ViewTracer::batch(options, context.device());
     return watch ? std::min(most, kWatchedBatch) : most;
   }
   Kernel kernel(const char* name) { return context.kernel("light/mirror_paths.cl", name); }
@@ -167,8 +167,8 @@ struct ViewTracer::Impl {
   Buffer<float> depth;
 };
 
-std::size_t ViewTracer::batch(std::size_t memory_budget) {
-  return std::max(kLeastBatch, MemoryShares(memory_budget).ray_batch() / kPathBytes);
+std::size_t ViewTracer::batch(const TraceOptions& options, const DeviceInfo& device) {
+  return std::max(kLeastBatch, MemoryShares(options, device).ray_batch() / kPathBytes);
 }
 
 ViewTracer::ViewTracer(Context& context, const TraceOptions& options, Mirrors mirrors)

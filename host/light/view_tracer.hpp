@@ -26,7 +26,7 @@ namespace raysplats {
 class ViewTracer {
  public:
   /// Rays of camera pixels that are traced at once where they are traced one by one.
-  static std::size_t batch(std::size_t memory_budget);
+  static std::size_t batch(const TraceOptions& options, const DeviceInfo& device);
 
   /// Throws UsageError for options out of range, for a negative number of bounces, and for
   /// options.depth, options.near_depth, options.sky or Traversal::kTiles with mirrors.

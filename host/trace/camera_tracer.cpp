@@ -126,7 +126,7 @@ struct CameraTracer::Impl {
         std::numeric_limits<std::uint32_t>::max() / kChunkEntries);
   }
   std::size_t pool_limit() const {
-    return std::min(MemoryShares(options.memory_budget).hit_streams() / chunk_bytes(),
+    return std::min(MemoryShares(options, context.device()).hit_streams() / chunk_bytes(),
                     largest_pool());
   }
 
@@ -264,7 +264,7 @@ void CameraTracer::Impl::trace_ahead(const DeviceGaussians& gaussians) {
   FaultInjection& faults = context.faults();
   room = faults.strikes(Fault::kHits) ? 0 : static_cast<std::uint32_t>(view_room());
   const std::size_t budget =
-      faults.strikes(Fault::kLists) ? 0 : MemoryShares(options.memory_budget).tile_lists();
+      faults.strikes(Fault::kLists) ? 0 : MemoryShares(options, context.device()).tile_lists();
   for (const int number : faces()) {
     set_face(gaussians, number);
     lists.build_ahead(boxes, camera, whole(), budget, counters, overflow);
@@ -309,7 +309,7 @@ void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
 void CameraTracer::Impl::trace_window(const DeviceGaussians& gaussians,
                                       const TileWindow& window,
                                       bool keep) {
-  if (!lists.build(boxes, camera, window, MemoryShares(options.memory_budget).tile_lists(),
+  if (!lists.build(boxes, camera, window, MemoryShares(options, context.device()).tile_lists(),
                    counters)) {
     if (keep) traced_whole = false;
     for (const TileWindow& half : window.halves()) trace_window(gaussians, half, keep);
@@ -533,10 +533,10 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
 // Gradients of the lines of one face.
 void CameraTracer::Impl::backward_face(const DeviceGaussians& gaussians,
                                        const Buffer<float>& image_gradient) {
-  sums.prepare(
-      GradientSumChoice::of(options, context.device(), gaussians.count,
-                            MemoryShares(options.memory_budget).packet_gradients(), kCopiesPerUnit),
-      gaussians.count);
+  sums.prepare(GradientSumChoice::of(options, context.device(), gaussians.count,
+                                     MemoryShares(options, context.device()).packet_gradients(),
+                                     kCopiesPerUnit),
+               gaussians.count);
   if (hits_complete) {
     launch_backward(image_gradient, 0, lists.tile_rows());
     return;

@@ -67,7 +67,7 @@ GradientSumChoice RayBackward::sum_choice(const TraceOptions& options,
                                           std::size_t gaussians,
                                           int degree) {
   return GradientSumChoice::of(options, device, gaussians * sum_lines(degree),
-                               MemoryShares(options.memory_budget).ray_gradients(), 1);
+                               MemoryShares(options, device).ray_gradients(), 1);
 }
 
 void RayBackward::begin(const DeviceGaussians& gaussians,

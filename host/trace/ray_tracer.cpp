@@ -145,9 +145,9 @@ std::vector<RayResult> RayTracer::trace(const DeviceGaussians& gaussians,
                                         ColorDirection color_direction) {
   Impl& self = *impl_;
   const std::size_t batch = std::max<std::size_t>(
-      kGroup,
-      std::min<std::size_t>(MemoryShares(self.options.memory_budget).host_rays() / kRayBytes,
-                            self.context.device().max_allocation / sizeof(Ray)));
+      kGroup, std::min<std::size_t>(
+                  MemoryShares(self.options, self.context.device()).host_rays() / kRayBytes,
+                  self.context.device().max_allocation / sizeof(Ray)));
   std::vector<RayResult> out(rays.size());
   for (std::size_t begin = 0; begin < rays.size(); begin += batch) {
     const std::size_t count = std::min(batch, rays.size() - begin);

@@ -29,7 +29,7 @@ namespace {
 bool may_sum_exactly(const TrainOptions& options, std::size_t gaussians, const DeviceInfo& device) {
   const TraceOptions trace = options.trace;
   return GradientSumChoice::of(trace, device, gaussians,
-                               MemoryShares(trace.memory_budget).packet_gradients(), 1)
+                               MemoryShares(trace, device).packet_gradients(), 1)
              .sum == GradientSum::kExact;
 }
 
@@ -56,7 +56,7 @@ RayShare rays_per_gaussian(const TrainOptions& options,
 
 // Rays of one launch, with results, gradients and the order in which they are traced, forward and
 // backward; with mirrors those that are reflected as well. Few meet more than one.
-std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels) {
+std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels, const DeviceInfo& device) {
   constexpr std::size_t segment =
       sizeof(Ray) + sizeof(RayResult) + 2 * sizeof(RayBackward::Gradient);
   constexpr std::size_t order = 2 * RayOrder::kBytesPerRay;
@@ -64,7 +64,7 @@ std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels) {
       options.mirrors.empty() ? 0 : sizeof(RsSurfaceHit) + sizeof(std::uint32_t);
   const bool reflects = mirrors > 0 && options.mirror_bounces > 0;
   const std::size_t reflected = reflects ? segment + mirrors + sizeof(RsPath) : 0;
-  const std::size_t rays = std::min(pixels, ViewTracer::batch(options.trace.memory_budget));
+  const std::size_t rays = std::min(pixels, ViewTracer::batch(options.trace, device));
   return rays * (segment + order + mirrors + reflected);
 }
 
@@ -105,13 +105,13 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
           (photo + (25 + (options.exposure ? 4 : 0) + (options.background == "sky" ? 8 : 0)) *
                        sizeof(float));
   if (packets) {
-    out.hits = std::min(options.trace.memory_budget,
+    out.hits = std::min(MemoryShares(options.trace, device).all(),
                         demand.pixels * static_cast<std::size_t>(options.trace.max_hits) * 12);
   }
   std::size_t largest = std::max({sh * sizeof(float), sizeof(RsLine), packets ? exact : 0});
   if (demand.ray_views > 0) {
     const RayShare share = rays_per_gaussian(options, demand.gaussians, device);
-    out.rays = demand.gaussians * share.bytes + ray_bytes(options, demand.pixels) +
+    out.rays = demand.gaussians * share.bytes + ray_bytes(options, demand.pixels, device) +
                mesh_bytes(demand.triangles, ray_lanes(device, 0));
     largest = std::max(largest, share.largest);
   }

@@ -67,7 +67,8 @@ struct TraceOptions {
   GradientSum gradient_sum = GradientSum::kAuto;
   bool deterministic = false;      ///< kAuto gives the same bits every time; on CPUs it always does
   double launch_budget_ms = -1.0;  ///< time of one launch; 0 = unbounded, -1 = the device's default
-  std::size_t memory_budget = std::size_t{1} << 30;  ///< bytes for hit lists and private gradients
+  std::size_t memory_budget = 0;   ///< bytes for hit lists and private gradients; 0 = 1 GiB on
+                                   ///< CPUs, elsewhere a quarter of the memory, 1 to 4 GiB
 };
 
 }  // namespace raysplats

@@ -103,7 +103,7 @@ TEST_CASE("ranges are the same on the command line, in [trace] and in configurat
       {"--quantile", "q", "101", "from 0.01 to 100"},
       {"--min-transmittance", "min-transmittance", "0.6", "from 0 to 0.5"},
       {"--max-hits", "max-hits", "0", "from 1 to 1000000"},
-      {"--memory-budget", "memory-budget", "0", "from 1 to 1000000000"},
+      {"--memory-budget", "memory-budget", "-1", "from 0 to 1000000000"},
       {"--background", "background", "2", "from 0 to 1"}};
   for (const auto& [option, key, value, range] : cases) {
     INFO(option);

@@ -75,7 +75,7 @@ void bind_trace_options(nb::module_& module) {
       .def_rw("launch_budget_ms", &TraceOptions::launch_budget_ms,
               "Time of one launch; 0 = unbounded, -1 = the device's default.")
       .def_rw("memory_budget", &TraceOptions::memory_budget,
-              "Bytes for hit lists and private gradients.");
+              "Bytes for hit lists and private gradients; 0 = the device's default.");
   bind_choices(type);
 }
 

@@ -65,7 +65,7 @@ TEST_CASE("options of tracing refuse in one sentence what they do not accept") {
   CHECK(refusal("adaptive-radius", {"1"}).find("true or false") != std::string::npos);
   CHECK(refusal("background", {"1,1"}).find("three numbers") != std::string::npos);
   CHECK(refusal("background", {"1,1,1.5"}).find("three numbers") != std::string::npos);
-  CHECK(refusal("memory-budget", {"0"}).find("from 1 to") != std::string::npos);
+  CHECK(refusal("memory-budget", {"-1"}).find("from 0 to") != std::string::npos);
   CHECK(refusal("min-transmitance", {"0"}).find("no option") != std::string::npos);
   // A sensible wish: never stop early.
   CHECK(refusal("min-transmittance", {"0"}).empty());

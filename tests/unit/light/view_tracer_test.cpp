@@ -178,7 +178,7 @@ TEST_CASE("rays that stop at the cap on hits are told of the last view and the l
   TraceOptions options;
   options.max_hits = 3;
   options.memory_budget = 1 << 16;  // several batches of rays, which backward() traces again
-  REQUIRE(ViewTracer::batch(options.memory_budget) < 90 * 80);
+  REQUIRE(ViewTracer::batch(options, context.device()) < 90 * 80);
   ViewTracer tracer(context, options);
   tracer.forward(gaussians, camera);
   const std::uint64_t by_rays = tracer.capped_rays();
