@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // finalize_group: what finalize_gradients does, with a Gaussian per work-item of GPUs. All rows but
 // those of mean, quaternion and scales (40 bytes side by side) go through local memory
-// (staged_rows.h); the colour comes first, so that its SH coefficients need no registers later.
+// (staged_rows.h). What is done comes one after the other, so that little is in registers at once:
+// the colour's share of the mean, the SH coefficients, then the rest with the line's gradient read
+// again; what the rest needs last waits in local memory meanwhile.
 // Launch: groups of GROUP work-items for the Gaussians from number `begin` to `end`.
 #define VECTOR 1
 #ifndef GROUP
@@ -62,7 +64,8 @@ void add_along(const int column,
 
 // Stores RS_STAGE floats of the gradient of the SH coefficients from number `column` on.
 void store_sh_gradient(const int column,
-                       const ColourGradient* colour,
+                       const float* basis,
+                       const float* slope,
                        const int touched,
                        __local StagedRows* staged,
                        __global float* g_sh) {
@@ -73,10 +76,37 @@ void store_sh_gradient(const int column,
   for (int t = 0; t < RS_STAGE; ++t) {
     const int k = column + t;
     const bool moves = touched && k < 3 * RS_SH_FUNCTIONS;
-    if (t < count)
-      staged->rows[lane][t] = moves ? colour->basis[k / 3] * colour->slope[k % 3] : 0.0f;
+    if (t < count) staged->rows[lane][t] = moves ? basis[k / 3] * slope[k % 3] : 0.0f;
   }
   stage_store(staged, 0, count, g_sh, 3 * SH_COEFFICIENTS, column, ACCUMULATE);
+}
+
+// What parameter_gradient() needs of a Gaussian and line_gradient() does not, in the work-item's
+// own row meanwhile. The barrier is for the compiler: behind it these numbers may have changed.
+void park(__local float* row, const ViewGaussian* g, const float opacity_slope, const float* mean) {
+  for (int j = 0; j < 3; ++j) {
+    row[j] = mean[j];
+    row[3 + j] = g->raw_scale[j];
+    row[6 + j] = g->scale[j];
+  }
+  for (int j = 0; j < 4; ++j) row[9 + j] = g->q[j];
+  row[13] = g->q_norm;
+  row[14] = g->opacity;
+  row[15] = opacity_slope;
+  barrier(CLK_LOCAL_MEM_FENCE);
+}
+
+float unpark(const __local float* row, ViewGaussian* g, float* mean) {
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (int j = 0; j < 3; ++j) {
+    mean[j] = row[j];
+    g->raw_scale[j] = row[3 + j];
+    g->scale[j] = row[6 + j];
+  }
+  for (int j = 0; j < 4; ++j) g->q[j] = row[9 + j];
+  g->q_norm = row[13];
+  g->opacity = row[14];
+  return row[15];
 }
 
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
@@ -104,28 +134,24 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   for (int k = 0; k < 16; ++k) row[k] = 0.0f;
   stage_copies(line_gradients + 16 * first, (size_t)finalize.gaussians * 16, finalize.copies,
                &staged);
-  float v[16];
   float sum = 0.0f;
-  for (int k = 0; k < 16; ++k) {
-    v[k] = row[k];
-    sum += fabs(v[k]);
-  }
+  for (int k = 0; k < 16; ++k) sum += fabs(row[k]);
   const gi touched = sum != 0.0f;
   // Who is not touched reads what a neighbour reads, and stores zeros or nothing.
   const size_t i = touched ? first + lane : first;
   const uint stored = ACCUMULATE ? touched : exists;
 
-  float offset[3];
-  load_offset(i, means, &camera, offset);
-  float line[16];
-  for (int k = 13; k < 16; ++k) line[k] = lines[i].v[k];
   ColourGradient colour;
-  colour_gradient(offset, line, v, touched, &colour);
+  load_offset(i, means, &camera, colour.n);
+  colour_direction(&colour);
+  for (int j = 0; j < 3; ++j)
+    colour.slope[j] = touched && lines[i].v[13 + j] > 0.0f ? row[13 + j] : 0.0f;
   ParameterGradient out;
   for (int j = 0; j < 3; ++j) out.mean[j] = 0.0f;
 #if SH_DEGREE > 0
   float along[RS_SH_FUNCTIONS];
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) along[k] = 0.0f;
+  barrier(CLK_LOCAL_MEM_FENCE);
   staged.present[lane] = touched;
   __global const float* coefficients = sh + first * 3 * SH_COEFFICIENTS;
   add_along(0, coefficients, colour.slope, &staged, along);
@@ -135,19 +161,21 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   add_along(4 * RS_STAGE, coefficients, colour.slope, &staged, along);
   direction_gradient(&colour, along, out.mean);
 #endif
+  rs_sh_basis(SH_DEGREE, colour.n[0], colour.n[1], colour.n[2], colour.basis);
+  barrier(CLK_LOCAL_MEM_FENCE);
   staged.present[lane] = stored;
   __global float* slopes = g_sh + first * 3 * SH_COEFFICIENTS;
-  store_sh_gradient(0, &colour, touched, &staged, slopes);
-  store_sh_gradient(RS_STAGE, &colour, touched, &staged, slopes);
-  store_sh_gradient(2 * RS_STAGE, &colour, touched, &staged, slopes);
-  store_sh_gradient(3 * RS_STAGE, &colour, touched, &staged, slopes);
-  store_sh_gradient(4 * RS_STAGE, &colour, touched, &staged, slopes);
+  store_sh_gradient(0, colour.basis, colour.slope, touched, &staged, slopes);
+  store_sh_gradient(RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
+  store_sh_gradient(2 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
+  store_sh_gradient(3 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
+  store_sh_gradient(4 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
 
+  stage_fetch(line_gradients + 16 * first, 16, 0, 16, &staged);
+  float v[16];
+  for (int k = 0; k < 13; ++k) v[k] = row[k];
   ViewGaussian g;
   load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
-  ViewGradient view;
-  line_gradient(&g, v, touched, kind, &view);
-  parameter_gradient(&g, &view, v[12], touched, &camera, &out);
   float seen[3];
   screen_statistics(&g, v, touched, kind, finalize.screen_x, finalize.screen_y, seen);
 #if ACCUMULATE
@@ -155,10 +183,17 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   seen[1] += screen[3 * i + 1];
   seen[2] = larger(seen[2], screen[3 * i + 2]);
 #endif
+  for (int j = 0; j < 3; ++j) row[j] = seen[j];
+  stage_store(&staged, 0, 3, screen + 3 * first, 3, 0, 0);
+
+  ViewGradient view;
+  park(row, &g, v[12], out.mean);
+  line_gradient(&g, v, touched, kind, &view);
+  const float opacity_slope = unpark(row, &g, out.mean);
+  parameter_gradient(&g, &view, opacity_slope, touched, &camera, &out);
   for (int j = 0; j < 3; ++j) {
     row[j] = out.mean[j];
     row[7 + j] = out.scale[j];
-    row[11 + j] = seen[j];
   }
   for (int j = 0; j < 4; ++j) row[3 + j] = out.quaternion[j];
   row[10] = out.opacity;
@@ -166,7 +201,6 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   stage_store(&staged, 3, 4, g_quaternions + 4 * first, 4, 0, ACCUMULATE);
   stage_store(&staged, 7, 3, g_scales + 3 * first, 3, 0, ACCUMULATE);
   stage_store(&staged, 10, 1, g_opacities + first, 1, 0, ACCUMULATE);
-  stage_store(&staged, 11, 3, screen + 3 * first, 3, 0, 0);
 #if POSE
   float moves[6];
   pose_gradient(&g, &view, out.mean, touched, moves);

@@ -131,14 +131,22 @@ typedef struct {
   gv slope[3];  // of R, G, B before they are clamped
 } ColourGradient;
 
+// From out->n = m - c.
+void colour_direction(ColourGradient* out) {
+  gv* d = out->n;
+  out->inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
+#pragma unroll
+  for (int j = 0; j < 3; ++j) d[j] = d[j] * out->inverse;
+}
+
 void colour_gradient(
     const gv* offset, const gv* line, const gv* v, const gi touched, ColourGradient* out) {
   const gv zero = (gv)(0.0f);
-  const gv* d = offset;
-  out->inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
+#pragma unroll
+  for (int j = 0; j < 3; ++j) out->n[j] = offset[j];
+  colour_direction(out);
 #pragma unroll
   for (int j = 0; j < 3; ++j) {
-    out->n[j] = d[j] * out->inverse;
     out->slope[j] = (touched & (line[13 + j] > 0.0f)) ? v[13 + j] : zero;
   }
   rs_sh_basis(SH_DEGREE, out->n[0], out->n[1], out->n[2], out->basis);
