@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view/run_history.hpp"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace raysplats::view {
@@ -17,7 +18,9 @@ Json row_json(const TrainRow& row) {
 
 }  // namespace
 
+// What is not finite has no number in JSON, and no place on a curve.
 void RunHistory::add(const TrainRow& row) {
+  if (!std::isfinite(row.loss) || !std::isfinite(row.psnr)) return;
   const Guard guard(mutex_);
   newest_ = row;
   if (seen_++ % stride_ != 0) return;
@@ -30,6 +33,7 @@ void RunHistory::add(const TrainRow& row) {
 }
 
 void RunHistory::add(const EvaluationRow& row) {
+  if (!std::isfinite(row.psnr)) return;
   const Guard guard(mutex_);
   tests_.push_back(row);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "view/run_history.hpp"
@@ -76,6 +77,20 @@ TEST_CASE("what a page is told of a run does not grow with it, and ends with the
   CHECK(json["paused"] == true);
   CHECK(json["share"] == 0.25);
   CHECK(json["ended"].get<std::string>().starts_with("over"));
+}
+
+TEST_CASE("what is not finite is no row of a run's curves") {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  RunHistory history(100);
+  history.add(TrainRow{10, 0.1, 0.5, 11.0, 1000, 100.0});
+  history.add(TrainRow{20, 0.2, kNan, 11.0, 1000, 100.0});
+  history.add(TrainRow{30, 0.3, 0.5, kNan, 1000, 100.0});
+  EvaluationRow test;
+  test.psnr = kNan;
+  history.add(test);
+  const nlohmann::json json = nlohmann::json::parse(history.json());
+  CHECK(json["rows"] == nlohmann::json{{10, 0.1, 0.5, 11.0, 1000}});
+  CHECK(json["tests"].empty());
 }
 
 TEST_CASE("before there is a model the page looks at what the cameras look at") {
