@@ -260,6 +260,10 @@ void validate(const TrainOptions& options) {
         "sums depend on the scheduling: use 'gradient-sum' = auto or leave 'deterministic' off",
         sum == GradientSum::kAtomic ? "atomic" : "swap"));
   }
+  if (options.scale_max > 0 && options.scale_min > options.scale_max) {
+    throw UsageError(fmt::format("The option 'scale-min' = {} is above 'scale-max' = {}",
+                                 options.scale_min, options.scale_max));
+  }
   if (options.poses && !options.mirrors.empty()) {
     throw UsageError(
         "The option 'poses' cannot be used with 'mirrors': behind a mirror the gradient of a pose "

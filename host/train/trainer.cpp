@@ -88,6 +88,12 @@ Trainer::Impl::Impl(Context& device,
   forget_sky();
   if (options.poses)
     poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
+  if (options.scale_activation == ScaleActivation::kSigmoid && options.scale_min * extent >= 1) {
+    throw UsageError(
+        fmt::format("The option 'scale-min' = {} is {:.3g} units of this data set, and with "
+                    "'scale-activation' = sigmoid no axis is as long as one: lower it, or use exp",
+                    options.scale_min, options.scale_min * extent));
+  }
   if (options.background == "sky" && cut_out) {
     throw UsageError(
         "The option 'background' = sky is for photos that show one, but these are cut out: leave "

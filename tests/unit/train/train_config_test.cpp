@@ -257,6 +257,15 @@ TEST_CASE("the configurations of runs of older versions are read") {
   std::filesystem::remove(path);
 }
 
+TEST_CASE("limits of scales that nothing can keep are refused") {
+  const auto path = temporary("scales.toml");
+  write_text_file(path, "scale-min = 0.2\nscale-max = 0.1\n");
+  CHECK(message_of(path).find("above 'scale-max'") != std::string::npos);
+  write_text_file(path, "scale-min = 0.2\nscale-max = 0\n");
+  CHECK(message_of(path) == "");
+  std::filesystem::remove(path);
+}
+
 TEST_CASE("a deterministic run with atomic sums is refused as a contradiction") {
   const auto path = temporary("atomic.toml");
   for (const char* sum : {"atomic", "swap"}) {

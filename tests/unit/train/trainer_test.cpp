@@ -298,6 +298,16 @@ TEST_CASE("a loss that is not finite stops the run and names the iteration") {
   CHECK(message.find("iteration 1") != std::string::npos);
 }
 
+TEST_CASE("a least scale that a sigmoid does not reach is refused") {
+  Scene scene;
+  TrainOptions options = small_options();
+  options.scale_activation = ScaleActivation::kSigmoid;
+  options.scale_min = 10.0;
+  CHECK_THROWS_AS(Trainer(scene.context, scene.dataset, options, scene.folder / "run"), UsageError);
+  options.scale_min = 1e-3;
+  CHECK_NOTHROW(Trainer(scene.context, scene.dataset, options, scene.folder / "run"));
+}
+
 TEST_CASE("a device with too little memory is refused with the figures") {
   Scene scene;
   TrainOptions options = small_options();
