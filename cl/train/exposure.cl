@@ -10,8 +10,7 @@
 //   of m z[a] z[b] (10 for a <= b, row by row) and of m z[a] (y[c] - x[c]) (4 for each c), then two
 //   zeros.
 // exposure_sums: one work-item per sum, 24 in all. Adds the partials in their order, as those of
-// one
-//   view of a step: sums[24 slot + j].
+//   one view of a step: sums[24 slot + j].
 // exposure_solve: one work-item. The rows d[c] of the photo of a slot become what minimises
 //   sum m (d[c] z - (y[c] - x[c]))^2 / sum m + damping |d[c] - before|^2 (a step of the proximal
 //   point method, Rockafellar 1976), by Cholesky's factors of a 4 x 4 matrix whose eigenvalues are
