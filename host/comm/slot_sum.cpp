@@ -27,7 +27,8 @@ std::vector<PairwiseNode> pairwise_nodes(std::size_t first, std::size_t last) {
 void sum_slots(Communicator& ranks,
                std::size_t slots,
                std::span<const std::span<const float>> parts,
-               std::span<float> total) {
+               std::span<float> total,
+               std::vector<float>& room) {
   const int self = ranks.rank(), count = ranks.size();
   const auto piece = [&](int rank) { return RankShare::of(total.size(), rank, count); };
   const auto nodes_of = [&](int rank) {
@@ -38,12 +39,11 @@ void sum_slots(Communicator& ranks,
 
   // Rows of this rank's piece, those of rank 0 first.
   std::vector<std::pair<PairwiseNode, std::span<float>>> rows;
-  std::vector<float> room;
   std::vector<Outgoing> out;
   std::vector<Incoming> in;
   std::size_t needed = 0;
   for (int rank = 0; rank < count; ++rank) needed += nodes_of(rank).size() * own.size();
-  room.resize(needed);
+  if (room.size() < needed) room.resize(needed);
   for (int rank = 0, row = 0; rank < count; ++rank) {
     for (std::size_t k = 0; const PairwiseNode& node : nodes_of(rank)) {
       const std::span<float> here(room.data() + static_cast<std::size_t>(row++) * own.size(),

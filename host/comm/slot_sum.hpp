@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "comm/communicator.hpp"
 
@@ -15,10 +16,12 @@ namespace raysplats {
 ///
 /// Every rank adds the numbers of an equal part of the row, of which it hears from all others, and
 /// sends its sums to all: with N numbers and one node a rank, 2 N (R - 1) / R numbers out and as
-/// many in. Needs room for (R - 1) / R rows a node of the other ranks.
+/// many in. `room` holds what comes, an R-th of a row for each node, and is best kept for the next
+/// call.
 void sum_slots(Communicator& ranks,
                std::size_t slots,
                std::span<const std::span<const float>> parts,
-               std::span<float> total);
+               std::span<float> total,
+               std::vector<float>& room);
 
 }  // namespace raysplats

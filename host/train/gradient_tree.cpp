@@ -75,7 +75,7 @@ void GradientTree::finish(StepGradients& sum, Communicator& ranks, std::size_t s
   finish(sum);  // for its buffers
   const std::vector<std::span<const float>> views(rows_.begin(), rows_.end());
   total_.resize(rows_.front().size());
-  sum_slots(ranks, slots, views, total_);
+  sum_slots(ranks, slots, views, total_, room_);
   std::size_t at = 0;
   for_each_buffer(sum, [&](Buffer<float>& b) {
     b.upload(std::span<const float>(total_).subspan(at, b.size()));

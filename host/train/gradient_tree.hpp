@@ -46,7 +46,7 @@ class GradientTree {
   std::vector<StepGradients> spare_;  // buffers of sets that have been added
   // On the host, with several ranks: the numbers of every part, and their sum.
   std::vector<std::vector<float>> rows_;
-  std::vector<float> total_;
+  std::vector<float> total_, room_;
 };
 
 }  // namespace raysplats

@@ -59,8 +59,8 @@ std::vector<float> sum_among(int ranks, std::size_t slots, std::size_t n) {
                                         RankShare::of(slots, self.rank(), self.size()).last)
                              .size());
     const std::vector<std::span<const float>> parts(rows.begin(), rows.end());
-    std::vector<float> total(n, -1.0f);
-    sum_slots(self, slots, parts, total);
+    std::vector<float> total(n, -1.0f), room;
+    sum_slots(self, slots, parts, total, room);
     totals[static_cast<std::size_t>(self.rank())] = total;
   });
   for (const std::vector<float>& total : totals) CHECK(total == totals.front());
@@ -133,8 +133,8 @@ TEST_CASE("traffic counts what goes out and comes in") {
   run_thread_ranks(2, [&](Communicator& self) {
     const auto rows = own_rows(2, self, kNumbers);
     const std::vector<std::span<const float>> parts(rows.begin(), rows.end());
-    std::vector<float> total(kNumbers);
-    sum_slots(self, 2, parts, total);
+    std::vector<float> total(kNumbers), room;
+    sum_slots(self, 2, parts, total, room);
     // Half a row to be added, and half a row of sums.
     CHECK(self.traffic().sent == kNumbers * sizeof(float));
     CHECK(self.traffic().received == kNumbers * sizeof(float));
