@@ -13,7 +13,8 @@ else()
   install(TARGETS raysplats_images LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime)
 endif()
 if(RAYSPLATS_HAVE_MPI)
-  install(TARGETS raysplats_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS raysplats_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT mpi)
+  install(FILES scripts/cmake/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/raysplats-mpi COMPONENT mpi)
 endif()
 install(
   TARGETS raysplats

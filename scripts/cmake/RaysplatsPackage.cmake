@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# cpack: Debian packages of the program and of the library's headers, and one archive that runs from anywhere.
+# cpack: Debian packages of the program, of what MPI needs and of the library's headers, and one archive that runs from anywhere.
 set(RAYSPLATS_MAINTAINER "RaySplats-CL contributors <raysplats@example.org>" CACHE STRING
                                                                              "Name and address in Debian packages")
 set(CPACK_PACKAGE_NAME raysplats)
@@ -10,6 +10,9 @@ set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
 set(CPACK_GENERATOR DEB TGZ)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL runtime dev)
+if(RAYSPLATS_HAVE_MPI)
+  list(APPEND CPACK_COMPONENTS_ALL mpi)
+endif()
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
                                                 WORLD_EXECUTE)
@@ -22,7 +25,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME raysplats)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "pocl-opencl-icd | opencl-icd")
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "ffmpeg, colmap")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "raysplats-mpi, ffmpeg, colmap")
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
     "Photos go in, a standard 3D Gaussian Splatting model comes out, on GPUs of every vendor and on CPUs.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME raysplats-dev)
@@ -31,4 +34,10 @@ set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
     "raysplats (= ${PROJECT_VERSION}), ocl-icd-opencl-dev, opencl-clhpp-headers, libglm-dev, libfmt-dev, libspdlog-dev, \
 nlohmann-json3-dev, libxxhash-dev, libtinyobjloader-dev, libtinygltf-dev, libtomlplusplus-dev, zlib1g-dev, libzstd-dev, libwebp-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers, static libraries and the CMake package of RaySplats-CL.")
+# Of its own, because who has one computer needs no MPI.
+set(CPACK_DEBIAN_MPI_PACKAGE_NAME raysplats-mpi)
+set(CPACK_DEBIAN_MPI_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_MPI_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_MPI_PACKAGE_DEPENDS "raysplats (= ${PROJECT_VERSION})")
+set(CPACK_COMPONENT_MPI_DESCRIPTION "What lets the processes of mpirun share the work of RaySplats-CL.")
 include(CPack)

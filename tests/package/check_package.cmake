@@ -25,6 +25,20 @@ if(strays)
   message(FATAL_ERROR "Files of the tests were installed: ${strays}")
 endif()
 
+# Packages are made of components: together they have all that is installed.
+include(${BUILD}/CPackConfig.cmake)
+file(REMOVE_RECURSE ${WORK}/parts)
+foreach(component IN LISTS CPACK_COMPONENTS_ALL)
+  run("install ${component}" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/parts --config ${CONFIG}
+      --component ${component})
+endforeach()
+file(GLOB_RECURSE installed RELATIVE ${prefix} ${prefix}/*)
+file(GLOB_RECURSE packed RELATIVE ${WORK}/parts ${WORK}/parts/*)
+list(REMOVE_ITEM installed ${packed})
+if(installed)
+  message(FATAL_ERROR "No package has ${installed}")
+endif()
+
 set(flags "")
 if(SANITIZE)
   set(flags -fsanitize=${SANITIZE})
