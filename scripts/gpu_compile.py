@@ -87,7 +87,7 @@ def compile_all(targets, roots, chosen, jobs):
                 return job, None, str(error)
             return job, kernels, "" if kernels else "no kernel in what the compiler wrote"
 
-        for (target, (name, _, _)), kernels, error in pool.map(compile_one, [(t, p) for t in targets for p in chosen]):
+        for (target, (name, _, _)), kernels, error in pool.map(compile_one, [(t, p) for t in targets for p in chosen if programs.offered(p[2], compilers.vendor(t))]):
             if error:
                 failures.append(f"{target} {name} does not compile: {error[:800]}")
             for kernel, figures in (kernels or {}).items():

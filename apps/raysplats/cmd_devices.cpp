@@ -31,6 +31,7 @@ void print(const DeviceInfo& device) {
   fmt::print("    fp64            {}\n", yes(device.has_fp64));
   fmt::print("    float atomics   {}\n", yes(device.has_float_atomics));
   fmt::print("    int64 atomics   {}\n", yes(device.has_int64_atomics));
+  fmt::print("    subgroups       {}\n", yes(device.has_subgroups));
   fmt::print("    tuning          {}\n", device.tuning ? describe(*device.tuning) : "none");
   if (device.usable()) {
     fmt::print("    usable          yes\n");

@@ -431,8 +431,11 @@ std::pair<int, int> parse_resolution(const std::string& text) {
 std::string describe(const DeviceTuning& tuning) {
   const std::string group = tuning.group == 0 ? "whole tiles" : std::to_string(tuning.group);
   return fmt::format("packet width {}{}, tiles of {}, pending {}, groups of {}{}",
-                     tuning.packet_width, tuning.grouped ? " as work-groups" : "", tuning.tile,
-                     tuning.pending, group, tuning.bvh ? ", bvh" : "");
+                     tuning.packet_width,
+                     tuning.subgroups ? " as subgroups"
+                     : tuning.grouped ? " as work-groups"
+                                      : "",
+                     tuning.tile, tuning.pending, group, tuning.bvh ? ", bvh" : "");
 }
 
 std::string readable_bytes(std::uint64_t bytes) {

@@ -5,6 +5,9 @@
 // are all it takes; where a group is no larger than a hardware thread, compilers drop most of both.
 // No barrier depends on a condition but that of a loop, and no way leaves a loop between two:
 // implementations that make loops over work-items double what follows a conditional barrier.
+//   SUBGROUP 1: the group is a single subgroup, whose functions (cl_khr_subgroups) take the place
+//               of barriers and local atomics. The host asks the compiled kernel whether it is.
+//   SUBGROUP 2: the same, demanded of compilers that choose the size themselves.
 #ifndef RS_TRACE_GROUP_H
 #define RS_TRACE_GROUP_H
 
@@ -19,8 +22,25 @@
 #endif
 #define RS_GROUP_WIDTH (GROUP >= 32 ? 8 : 4)
 #define RS_GROUP_HEIGHT (GROUP / RS_GROUP_WIDTH)
+#ifndef SUBGROUP
+#define SUBGROUP 0
+#endif
+#if SUBGROUP
+#ifdef cl_khr_subgroups
+#pragma OPENCL EXTENSION cl_khr_subgroups : enable
+#endif
+#ifdef cl_khr_subgroup_ballot
+#pragma OPENCL EXTENSION cl_khr_subgroup_ballot : enable
+#endif
+#endif
 // Of a kernel: its groups have this size, whatever the host says.
+#if SUBGROUP == 2 && defined(cl_intel_required_subgroup_size) && GROUP <= 32
+#define RS_GROUP_KERNEL                              \
+  __attribute__((reqd_work_group_size(GROUP, 1, 1))) \
+  __attribute__((intel_reqd_sub_group_size(GROUP)))
+#else
 #define RS_GROUP_KERNEL __attribute__((reqd_work_group_size(GROUP, 1, 1)))
+#endif
 
 // Rows of hits that are open at once, at most 32.
 #ifndef OPEN
@@ -58,16 +78,36 @@ void rs_row_set(
 #define RS_GROUP_INLINE __attribute__((always_inline))
 #endif
 
+#if SUBGROUP
+#define rs_group_barrier() sub_group_barrier(CLK_LOCAL_MEM_FENCE)
+#define rs_group_lane() ((int)get_sub_group_local_id())
+#else
 #define rs_group_barrier() barrier(CLK_LOCAL_MEM_FENCE)
+#define rs_group_lane() ((int)get_local_id(0))
+#endif
 
-// One bit per work-item whose flag is set, work-item 0 lowest. `words`: two words of local memory.
+// One bit per work-item whose flag is set, work-item 0 lowest. `words`: two words of local memory,
+// which subgroups leave alone.
 ulong rs_group_bits(__local uint* words, const int lane, const bool flag) {
+#if SUBGROUP && defined(cl_khr_subgroup_ballot)
+  (void)words;
+  (void)lane;
+  const uint4 bits = sub_group_ballot(flag);
+  return (ulong)bits.y << 32 | bits.x;
+#elif SUBGROUP && GROUP <= 32
+  (void)words;
+  return sub_group_reduce_add(flag ? 1u << lane : 0u);
+#elif SUBGROUP
+  (void)words;
+  return sub_group_reduce_add(flag ? 1ul << lane : 0ul);
+#else
   rs_group_barrier();
   if (lane < 2) words[lane] = 0;
   rs_group_barrier();
   if (flag) atomic_or(words + (lane >> 5), 1u << (lane & 31));
   rs_group_barrier();
   return (ulong)words[1] << 32 | words[0];
+#endif
 }
 
 uint rs_lowest_of(const ulong bits) { return 63 - (uint)clz(bits & -bits); }

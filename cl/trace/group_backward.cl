@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // trace_backward_group: what trace_backward does, with a packet per work-group (group.h) and the
 // streams that trace_forward_group kept. The 16 components of a line's gradient are summed over the
-// rays through local memory; one work-item adds one of them to the sums.
+// rays through local memory, or by the subgroup; one work-item adds one of them to the sums.
 //   PRIVATE_COPIES 1: work-group g of `copies` takes every copies-th tile and adds to its own copy.
 //   otherwise:        a work-group per packet of the band.
 #ifndef TILE
@@ -22,6 +22,8 @@
 #define RS_SUM_NUMBERS 8
 #define RS_SUM_PARTS (GROUP > RS_SUM_NUMBERS ? GROUP / RS_SUM_NUMBERS : 1)
 #define RS_SUM_RAYS (GROUP / RS_SUM_PARTS)
+// Numbers that a work-item of a subgroup adds.
+#define RS_SUM_EACH ((16 + GROUP - 1) / GROUP)
 
 // What an open row brings, per ray: the transmittance in front, 0 in rays that do not blend it, and
 // the sum of T alpha (colour . gradient) over it and all hits behind it. Of two hits of a ray the
@@ -30,8 +32,10 @@
 typedef struct {
   float before[OPEN_LOCAL][GROUP];
   float from_here[OPEN_LOCAL][GROUP];
+#if !SUBGROUP
   float part[RS_SUM_NUMBERS][GROUP + 1];  // one more than rays: columns fall on other banks
   float sum[RS_SUM_PARTS][16];
+#endif
   uint reference[OPEN];
   uint oldest[OPEN];  // number of the nearest row that it may change places with
 } BackwardMemory;
@@ -53,6 +57,20 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
                                     const LineSums* sums,
                                     const uint line,
                                     const float* g) {
+#if SUBGROUP
+  (void)memory;
+  float mine[RS_SUM_EACH];
+#pragma unroll
+  for (int k = 0; k < 16; ++k) {
+    const float sum = sub_group_reduce_add(g[k]);
+    if (lane == k % GROUP) mine[k / GROUP] = sum;
+  }
+#pragma unroll
+  for (int i = 0; i < RS_SUM_EACH; ++i) {
+    const int k = lane + i * GROUP;
+    if (k < 16) rs_add_sum(sums, (size_t)line * 16 + k, mine[i]);
+  }
+#else
 #pragma unroll
   for (int begin = 0; begin < 16; begin += RS_SUM_NUMBERS) {
 #pragma unroll
@@ -71,6 +89,7 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
     for (int j = 1; j < RS_SUM_PARTS; ++j) sum += memory->sum[j][k];
     rs_add_sum(sums, (size_t)line * 16 + k, sum);
   }
+#endif
 }
 
 // Of the Gaussian of line v in the packet's rays.
@@ -205,7 +224,7 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
   const uint tiles_x = backward.tiles_x, tile_row = backward.tile_row;
   const float4 background =
       (float4)(backward.background[0], backward.background[1], backward.background[2], 0.0f);
-  const int lane = get_local_id(0);
+  const int lane = rs_group_lane();
   LineSums sums;
   sums.lines = gradients;
   sums.limit = backward.limit;

@@ -25,6 +25,14 @@ void outermost_rays(__local GroupMemory* memory,
                     const int lane,
                     const PacketRays* rays,
                     GroupCandidates* c) {
+#if SUBGROUP
+  (void)memory;
+  (void)lane;
+  c->x0 = sub_group_reduce_min(rays->valid ? rays->X : INFINITY);
+  c->x1 = sub_group_reduce_max(rays->valid ? rays->X : -INFINITY);
+  c->y0 = sub_group_reduce_min(rays->valid ? rays->Y : INFINITY);
+  c->y1 = sub_group_reduce_max(rays->valid ? rays->Y : -INFINITY);
+#else
   __local float* X = memory->open.key[0];
   __local float* Y = memory->open.alpha[0];
   X[lane] = rays->valid ? rays->X : INFINITY;
@@ -40,6 +48,7 @@ void outermost_rays(__local GroupMemory* memory,
     c->y1 = fmax(c->y1, Y[i]);
   }
   rs_group_barrier();
+#endif
 }
 #endif
 
@@ -58,7 +67,7 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   const int max_hits = forward.max_hits;
   const float4 background =
       (float4)(forward.background[0], forward.background[1], forward.background[2], 0.0f);
-  const int lane = get_local_id(0);
+  const int lane = rs_group_lane();
   const int window_x = (int)(get_global_id(0) / GROUP) * RS_GROUP_WIDTH;
   const int window_y = (int)get_global_id(1) * RS_GROUP_HEIGHT;
   const int group_x = window_x + forward.window[0] * TILE;
@@ -136,14 +145,20 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
 #else
   (void)stream_ends;
 #endif
+#if SUBGROUP
+  const uint hits = sub_group_reduce_add((uint)p.hits);
+  const uint capped_rays = sub_group_reduce_add(capped ? 1u : 0u);
+#else
   rs_group_barrier();
   if (lane < 2) memory.words[lane] = 0;
   rs_group_barrier();
   atomic_add(memory.words, (uint)p.hits);
   if (capped) atomic_inc(memory.words + 1);
   rs_group_barrier();
+  const uint hits = memory.words[0], capped_rays = memory.words[1];
+#endif
   if (lane == 0) {
-    rs_count(counters + 2, memory.words[0]);
-    if (memory.words[1] != 0) atomic_add(counters + 1, memory.words[1]);
+    rs_count(counters + 2, hits);
+    if (capped_rays != 0) atomic_add(counters + 1, capped_rays);
   }
 }

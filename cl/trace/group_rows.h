@@ -172,23 +172,40 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
     const int queued = (int)(candidates->queued - candidates->taken);
     const int batch = min(min(queued, RS_GROUP_BATCH), WAITING - waiting);
     fits = batch > 0 || queued == 0;
+#if SUBGROUP
+    rs_group_barrier();
+#else
     if (lane < RS_GROUP_BATCH) {
       memory->found_first[lane] = as_uint(INFINITY);
       memory->found_last[lane] = 0;
     }
     if (lane == 0) memory->alive = 0;
     rs_group_barrier();
+#endif
     for (int j = 0; j < batch; ++j) {
       const uint k = memory->queue[(candidates->taken + j) % RS_GROUP_QUEUE];
       const PacketHit hit = packet_hit(p, lines, references[k], limits[k].y, alive);
+      // Keys are not negative: their bits are in order.
+      const uint key = as_uint(hit.key) & 0x7fffffff;
+#if SUBGROUP
+      const uint nearest = sub_group_reduce_min(hit.hit ? key : as_uint(INFINITY));
+      const uint farthest = sub_group_reduce_max(hit.hit ? key : 0u);
+      if (lane == 0) {
+        memory->found_first[j] = nearest;
+        memory->found_last[j] = farthest;
+      }
+#else
       if (hit.hit) {
-        // Keys are not negative: their bits are in order.
-        const uint key = as_uint(hit.key) & 0x7fffffff;
         atomic_min(&memory->found_first[j], key);
         atomic_max(&memory->found_last[j], key);
       }
+#endif
     }
+#if SUBGROUP
+    const bool some_alive = sub_group_any(alive != 0);
+#else
     if (alive) atomic_or(&memory->alive, 1u);
+#endif
     float bound = INFINITY;
     if (queued > batch) {
       bound = limits[memory->queue[(candidates->taken + batch) % RS_GROUP_QUEUE]].x;
@@ -196,7 +213,10 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
       bound = limits[candidates->read].x;
     }
     rs_group_barrier();
-    goes_on = memory->alive != 0 && bound < INFINITY;
+#if !SUBGROUP
+    const bool some_alive = memory->alive != 0;
+#endif
+    goes_on = some_alive && bound < INFINITY;
     // Every row to the place that its nearest key has among all; what no ray hits has none.
     const int total = waiting + batch;
     int found = 0, ready = 0;
@@ -205,7 +225,7 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
       found += key < INFINITY;
       ready += key < INFINITY && key <= bound;
     }
-    if (memory->alive == 0) ready = 0;
+    if (!some_alive) ready = 0;
     __local WaitingRows* w = &memory->waiting;
     float moved_first[RS_WAITING_EACH], moved_last[RS_WAITING_EACH];
     uint moved_candidate[RS_WAITING_EACH];

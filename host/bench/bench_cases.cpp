@@ -9,6 +9,7 @@
 #include <regex>
 
 #include "core/trace_rows.hpp"
+#include "device/tuning.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
 #include "trace/memory_shares.hpp"
@@ -29,8 +30,8 @@ std::string tuning_text(const DeviceInfo& device) {
   if (!device.tuning) return "none";
   const DeviceTuning& tuning = *device.tuning;
   return fmt::format("packet shape {}, width {}, tile {}, pending {}, group {}{}",
-                     tuning.grouped ? "group" : "vector", tuning.packet_width, tuning.tile,
-                     tuning.pending, tuning.group, tuning.bvh ? ", bvh" : "");
+                     packet_shape_of(tuning), tuning.packet_width, tuning.tile, tuning.pending,
+                     tuning.group, tuning.bvh ? ", bvh" : "");
 }
 
 std::map<std::string, std::string> option_texts(const Context& context,

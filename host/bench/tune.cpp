@@ -33,7 +33,6 @@ class Course {
                                            bench_scene(options.scene, options.size, options.seed),
                                            ScaleActivation::kExp)) {
     options_.packet_width = 0;
-    options_.packet_form = PacketForm::kAuto;
     options_.traversal = Traversal::kAuto;  // the tuning's
     const std::size_t pixels =
         static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
@@ -48,6 +47,8 @@ class Course {
 
   std::unique_ptr<ViewTracer> tracer(const DeviceTuning& tuning) {
     context_.set_tuning(tuning);
+    // Named, so that a form that does not run is not another one in silence.
+    options_.packet_form = tuned_form(tuning);
     auto out = std::make_unique<ViewTracer>(context_, options_);
     run(*out);  // compiles and allocates
     return out;
@@ -130,7 +131,8 @@ DeviceTuning tuning_of(const DeviceInfo& device, const TraceOptions& options) {
   DeviceInfo plain = device;
   plain.tuning.reset();
   const PacketShape shape = packet_shape(plain, options);
-  return {shape.grouped, shape.lanes, shape.tile, shape.pending, shape.group, false};
+  return {shape.grouped, shape.lanes, shape.tile,     shape.pending,
+          shape.group,   false,       shape.subgroups};
 }
 
 }  // namespace
@@ -159,9 +161,12 @@ std::vector<DeviceTuning> tune_candidates(const std::string& axis,
   } else if (axis == "packet-shape") {
     // A CPU runs the work-items of a group one after the other, and compiles them long.
     if (device.type == DeviceType::kCpu) return out;
-    TraceOptions other;
-    other.packet_form = current.grouped ? PacketForm::kVector : PacketForm::kGroup;
-    out.push_back(tuning_of(device, other));
+    for (const PacketForm form : {PacketForm::kVector, PacketForm::kGroup, PacketForm::kSubgroup}) {
+      if (form == PacketForm::kSubgroup && !device.has_subgroups) continue;
+      TraceOptions other;
+      other.packet_form = form;
+      if (form != tuned_form(current)) out.push_back(tuning_of(device, other));
+    }
   } else if (axis == "packet-width" && current.grouped) {
     for (const int width : kGroupWidths) {
       if (static_cast<std::size_t>(width) <= device.max_work_group_size)

@@ -15,7 +15,10 @@ constexpr std::size_t kMiBShift = 20;
 
 const std::vector<std::pair<std::string, PacketForm>>& packet_shapes() {
   static const std::vector<std::pair<std::string, PacketForm>> shapes{
-      {"auto", PacketForm::kAuto}, {"vector", PacketForm::kVector}, {"group", PacketForm::kGroup}};
+      {"auto", PacketForm::kAuto},
+      {"vector", PacketForm::kVector},
+      {"group", PacketForm::kGroup},
+      {"subgroup", PacketForm::kSubgroup}};
   return shapes;
 }
 
@@ -31,12 +34,14 @@ std::string packet_shape_name(PacketForm form) {
 void check_packet_width(const TraceOptions& options) {
   const int width = options.packet_width;
   if (width == 0) return;
-  const int low = options.packet_form == PacketForm::kGroup ? 8 : 1;
+  const int low =
+      options.packet_form == PacketForm::kGroup || options.packet_form == PacketForm::kSubgroup ? 8
+                                                                                                : 1;
   const int high = options.packet_form == PacketForm::kVector ? 16 : 64;
   if ((width & (width - 1)) == 0 && width >= low && width <= high) return;
   throw UsageError(
       fmt::format("The option 'packet-width' is 0, 1, 2, 4, 8 or 16 with 'packet-shape' vector, "
-                  "0, 8, 16, 32 or 64 with group, not {}",
+                  "0, 8, 16, 32 or 64 with group and subgroup, not {}",
                   width));
 }
 
@@ -64,8 +69,9 @@ void add_trace_rows(OptionTable& t, TraceOptions& o) {
   t.choice<PacketForm>(
       "packet-shape", o.packet_form, packet_shapes(),
       "what a packet of camera rays is: vector (the lanes of one work-item), group (the work-items "
-      "of a work-group) or auto (as 'raysplats tune' found, else vectors on CPUs and groups "
-      "elsewhere)");
+      "of a work-group), subgroup (those of a work-group that is one subgroup) or auto (as "
+      "'raysplats tune' found, else vectors on CPUs, and elsewhere subgroups where the compiler "
+      "makes them that large, or groups)");
   t.number("packet-width", o.packet_width, 0, 64,
            "rays of a packet: 1, 2, 4, 8 or 16, in a group also 32 or 64; 0 = fit to the device");
   t.add(

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "device/device_json.hpp"
 
+#include "device/tuning.hpp"
+
 namespace raysplats {
 
 const char* device_type_name(DeviceType type) {
@@ -20,7 +22,7 @@ const char* device_type_name(DeviceType type) {
 nlohmann::ordered_json device_json(const DeviceInfo& device) {
   nlohmann::ordered_json tuning;
   if (device.tuning) {
-    tuning = {{"packet_shape", device.tuning->grouped ? "group" : "vector"},
+    tuning = {{"packet_shape", packet_shape_of(*device.tuning)},
               {"packet_width", device.tuning->packet_width},
               {"tile", device.tuning->tile},
               {"pending", device.tuning->pending},
@@ -44,6 +46,7 @@ nlohmann::ordered_json device_json(const DeviceInfo& device) {
           {"fp64", device.has_fp64},
           {"float_atomics", device.has_float_atomics},
           {"int64_atomics", device.has_int64_atomics},
+          {"subgroups", device.has_subgroups},
           {"tuning", tuning},
           {"usable", device.usable()},
           {"problems", device.problems}};

@@ -16,6 +16,21 @@ std::size_t Kernel::max_work_group_size() const {
   return impl_->kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(impl_->context->device);
 }
 
+std::size_t Kernel::subgroups(std::size_t items) const {
+  if (!impl_->context->info.has_subgroups) return 0;
+  // Devices of OpenCL 2.0 know it as an extension alone, others need not have that.
+  const cl::Device& device = impl_->context->device;
+  void* found = clGetExtensionFunctionAddressForPlatform(device.getInfo<CL_DEVICE_PLATFORM>(),
+                                                         "clGetKernelSubGroupInfoKHR");
+  const auto ask = found != nullptr ? reinterpret_cast<decltype(&clGetKernelSubGroupInfo)>(found)
+                                    : &clGetKernelSubGroupInfo;
+  std::size_t number = 0;
+  const cl_int status =
+      ask(impl_->kernel.get(), device.get(), CL_KERNEL_SUB_GROUP_COUNT_FOR_NDRANGE, sizeof items,
+          &items, sizeof number, &number, nullptr);
+  return status == CL_SUCCESS ? number : 0;
+}
+
 std::size_t Kernel::argument_count() const { return impl_->argument_count; }
 
 void Kernel::begin(std::size_t argument_count) {

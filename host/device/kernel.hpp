@@ -93,6 +93,9 @@ class Kernel {
   const std::string& name() const;
   std::size_t max_work_group_size() const;
   std::size_t argument_count() const;
+  /// In a work-group of `items` in a row, once the compiler has chosen their size; 0 where the
+  /// device does not tell.
+  std::size_t subgroups(std::size_t items) const;
 
   struct Impl;
   explicit Kernel(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -76,6 +76,16 @@ bool adds_floats(const cl::Device& device, const std::string& version) {
          (offered & kGlobalFloatAdd) != 0;
 }
 
+// An extension, part of OpenCL 2.1 and 2.2, and optional again in 3.0.
+bool has_subgroups(const cl::Device& device, const std::string& version, bool extension) {
+  if (!version.starts_with("OpenCL 3."))
+    return extension || version.starts_with("OpenCL 2.1") || version.starts_with("OpenCL 2.2");
+  cl_uint most = 0;
+  return clGetDeviceInfo(device.get(), CL_DEVICE_MAX_NUM_SUB_GROUPS, sizeof most, &most, nullptr) ==
+             CL_SUCCESS &&
+         most > 0;
+}
+
 DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
   DeviceInfo info;
   info.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
@@ -98,6 +108,7 @@ DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
   info.has_fp64 = has("cl_khr_fp64");
   info.has_int64_atomics = has("cl_khr_int64_base_atomics");
   info.has_float_atomics = has("cl_ext_float_atomics") && adds_floats(device, info.version);
+  info.has_subgroups = has_subgroups(device, info.version, has("cl_khr_subgroups"));
   info.problems = problems_of(device, info);
   return info;
 }

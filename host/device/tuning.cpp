@@ -54,7 +54,10 @@ Entry entry_from(const nlohmann::json& json) {
   entry.driver = json.at("driver").get<std::string>();
   entry.version = json.at("raysplats").get<std::string>();
   // Files of older versions know vectors alone.
-  entry.tuning.grouped = json.value("packet_shape", std::string("vector")) == "group";
+  const std::string shape = json.value("packet_shape", std::string("vector"));
+  entry.tuning.grouped = shape != "vector";
+  entry.tuning.subgroups = shape == "subgroup";
+  if (shape != packet_shape_of(entry.tuning)) throw DataError("'packet_shape' is none");
   entry.tuning.packet_width = whole_number(json, "packet_width");
   entry.tuning.tile = whole_number(json, "tile");
   entry.tuning.pending = whole_number(json, "pending");
@@ -98,7 +101,7 @@ void write_entries(const std::filesystem::path& path, const std::vector<Entry>& 
                        {"platform", entry.platform},
                        {"driver", entry.driver},
                        {"raysplats", entry.version},
-                       {"packet_shape", entry.tuning.grouped ? "group" : "vector"},
+                       {"packet_shape", packet_shape_of(entry.tuning)},
                        {"packet_width", entry.tuning.packet_width},
                        {"tile", entry.tuning.tile},
                        {"pending", entry.tuning.pending},
@@ -112,11 +115,17 @@ void write_entries(const std::filesystem::path& path, const std::vector<Entry>& 
 
 }  // namespace
 
+const char* packet_shape_of(const DeviceTuning& tuning) {
+  if (!tuning.grouped) return "vector";
+  return tuning.subgroups ? "subgroup" : "group";
+}
+
 bool is_valid(const DeviceTuning& tuning) {
   const auto is_one_of = [&](const auto& widths) {
     return std::find(widths.begin(), widths.end(), tuning.packet_width) != widths.end();
   };
-  return (tuning.grouped ? is_one_of(kGroupWidths) : is_one_of(kWidths)) &&
+  return (tuning.grouped || !tuning.subgroups) &&
+         (tuning.grouped ? is_one_of(kGroupWidths) : is_one_of(kWidths)) &&
          std::find(kTiles.begin(), kTiles.end(), tuning.tile) != kTiles.end() &&
          tuning.pending >= 1 && tuning.pending <= kMaxPending && tuning.group >= 0;
 }

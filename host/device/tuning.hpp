@@ -42,6 +42,9 @@ class TuningStore {
 
 /// Whether tracing can be built like that: a packet width of 1, 2, 4, 8 or 16, a tile of 8, 16, 32
 /// or 64 pixels, 1 to 1024 pending entries, and a group of 0 (the whole tile) or more.
+/// "vector", "group" or "subgroup".
+const char* packet_shape_of(const DeviceTuning& tuning);
+
 bool is_valid(const DeviceTuning& tuning);
 
 }  // namespace raysplats

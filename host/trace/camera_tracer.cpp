@@ -101,6 +101,7 @@ struct CameraTracer::Impl {
   void grow_pool(std::size_t chunks, std::size_t least = 1);
   Kernel& forward_kernel(bool keep);
   BuildOptions packet_build() const;
+  Kernel group_kernel(const char* file, const char* name, const BuildOptions& build);
   // Work-items of a packet.
   std::size_t lane_items() const {
     return packet.grouped ? static_cast<std::size_t>(packet.lanes) : 1;
@@ -328,6 +329,28 @@ BuildOptions CameraTracer::Impl::packet_build() const {
   return build;
 }
 
+// With subgroups, where the packet has them. Only the compiled kernel tells how large they are; a
+// kernel whose work-groups are several of them is built again without.
+Kernel CameraTracer::Impl::group_kernel(const char* file,
+                                        const char* name,
+                                        const BuildOptions& build) {
+  if (!packet.subgroups) return context.kernel(file, name, build);
+  BuildOptions one = build;
+  one.define("SUBGROUP", packet.sized ? 2 : 1)
+      .language(context.device().version.starts_with("OpenCL 3.") ? "CL3.0" : "CL2.0");
+  Kernel kernel = context.kernel(file, name, one);
+  const std::size_t number = kernel.subgroups(lane_items());
+  if (number == 1) return kernel;
+  if (options.packet_form == PacketForm::kSubgroup) {
+    throw DeviceError(fmt::format(
+        "{} makes {} subgroups of a packet of {} rays in kernel {}, which has to be one: choose "
+        "another --packet-width, or --packet-shape group",
+        context.device().name, number, packet.lanes, name));
+  }
+  packet.subgroups = false;
+  return context.kernel(file, name, build);
+}
+
 Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
   const int variant =
       (options.depth ? 1 : 0) | (options.hit_order == HitOrder::kPeak ? 2 : 0) | lens_kind << 2;
@@ -342,7 +365,7 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
     build.define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
         .define("WITH_DEPTH", options.depth ? 1 : 0)
         .define("KEEP_HITS", keep ? 1 : 0);
-    kernel = packet.grouped ? context.kernel("trace/group_forward.cl", "trace_forward_group", build)
+    kernel = packet.grouped ? group_kernel("trace/group_forward.cl", "trace_forward_group", build)
                             : context.kernel("trace/forward.cl", "trace_forward", build);
   }
   return kernel;
@@ -429,7 +452,7 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   BuildOptions build = packet_build();
   sums.define(build);
   Kernel kernel = packet.grouped
-                      ? context.kernel("trace/group_backward.cl", "trace_backward_group", build)
+                      ? group_kernel("trace/group_backward.cl", "trace_backward_group", build)
                       : context.kernel("trace/backward.cl", "trace_backward", build);
   RsBackward pass{};
   pass.gaussians = static_cast<std::uint32_t>(count);

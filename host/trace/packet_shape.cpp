@@ -26,13 +26,16 @@ bool takes_groups(const DeviceInfo& device, int lanes) {
 }
 
 PacketForm default_form(const DeviceInfo& device, int lanes) {
-  if (lanes > 16) return PacketForm::kGroup;
-  if (lanes > 0 || device.type == DeviceType::kCpu) return PacketForm::kVector;
-  return takes_groups(device, kGroupLanes) ? PacketForm::kGroup : PacketForm::kVector;
+  const bool cpu = device.type == DeviceType::kCpu;
+  const PacketForm group =
+      device.has_subgroups && !cpu ? PacketForm::kSubgroup : PacketForm::kGroup;
+  if (lanes > 16) return group;
+  if (lanes > 0 || cpu) return PacketForm::kVector;
+  return takes_groups(device, kGroupLanes) ? group : PacketForm::kVector;
 }
 
 int default_lanes(const DeviceInfo& device, PacketForm form) {
-  if (form == PacketForm::kGroup) return kGroupLanes;
+  if (form != PacketForm::kVector) return kGroupLanes;
   int lanes = 1;
   while (device.type == DeviceType::kCpu && lanes < 16 &&
          static_cast<std::uint32_t>(2 * lanes) <= device.float_vector_width)
@@ -42,20 +45,35 @@ int default_lanes(const DeviceInfo& device, PacketForm form) {
 
 }  // namespace
 
+PacketForm tuned_form(const DeviceTuning& tuning) {
+  if (!tuning.grouped) return PacketForm::kVector;
+  return tuning.subgroups ? PacketForm::kSubgroup : PacketForm::kGroup;
+}
+
 PacketShape packet_shape(const DeviceInfo& device, const TraceOptions& options) {
   PacketForm form = options.packet_form;
   int lanes = options.packet_width;
   const auto& tuning = device.tuning;
-  if (tuning && lanes == 0 &&
-      (form == PacketForm::kAuto || (form == PacketForm::kGroup) == tuning->grouped)) {
-    form = tuning->grouped ? PacketForm::kGroup : PacketForm::kVector;
+  if (form == PacketForm::kSubgroup && !device.has_subgroups) {
+    throw DeviceError(
+        fmt::format("{} has no subgroups (cl_khr_subgroups): choose --packet-shape group, vector "
+                    "or auto",
+                    device.name));
+  }
+  bool sized = form == PacketForm::kSubgroup;
+  if (tuning && lanes == 0 && (form == PacketForm::kAuto || form == tuned_form(*tuning)) &&
+      (device.has_subgroups || !tuning->subgroups)) {
+    form = tuned_form(*tuning);
     lanes = tuning->packet_width;
+    sized = tuning->subgroups;
   }
   if (form == PacketForm::kAuto) form = default_form(device, lanes);
   if (lanes == 0) lanes = default_lanes(device, form);
 
   PacketShape shape;
-  shape.grouped = form == PacketForm::kGroup;
+  shape.grouped = form != PacketForm::kVector;
+  shape.subgroups = form == PacketForm::kSubgroup;
+  shape.sized = shape.subgroups && sized;
   shape.lanes = lanes;
   // Single rays are for devices that run many work-items at once: they have no room for queues.
   shape.block = lanes > 1 && !shape.grouped ? 2 : 1;
@@ -103,7 +121,7 @@ PacketShape packet_shape(const DeviceInfo& device, const TraceOptions& options) 
   const bool cpu = device.type == DeviceType::kCpu;
   shape.tile = cpu ? 32 : 16;
   shape.pending = cpu ? 96 : 48;
-  if (tuning && tuning->grouped == shape.grouped && tuning->packet_width == lanes) {
+  if (tuning && tuned_form(*tuning) == form && tuning->packet_width == lanes) {
     shape.tile = tuning->tile;
     shape.pending = tuning->pending;
     shape.group = tuning->group;

@@ -12,7 +12,9 @@ namespace raysplats {
 /// Block of camera rays that one work-item or one work-group traces, and the square tile whose
 /// packets share a candidate list.
 struct PacketShape {
-  bool grouped = false;  ///< a lane is a work-item (cl/trace/group.h), not a lane of a vector
+  bool grouped = false;    ///< a lane is a work-item (cl/trace/group.h), not a lane of a vector
+  bool subgroups = false;  ///< and each work-group is one subgroup, if the compiler says so
+  bool sized = false;      ///< which is demanded of a compiler that can choose the size
   int lanes = 1;
   int width = 1;     ///< pixels
   int height = 1;    ///< pixels
@@ -23,10 +25,12 @@ struct PacketShape {
 };
 
 /// Lanes and form as the options say; what they leave open is the device's tuning, or without one
-/// vectors as wide as the device's own on CPUs and elsewhere groups of 32,
-/// or single rays where local memory is short. The rest follows the tuning when that has
-/// the same form and width. Throws UsageError for other widths.
+/// vectors as wide as the device's own on CPUs and elsewhere subgroups, or groups, of 32, or single
+/// rays where local memory is short. The rest follows the tuning when that has the same form and
+/// width. Throws UsageError for other widths, DeviceError for what the device does not have.
 PacketShape packet_shape(const DeviceInfo& device, const TraceOptions& options);
+
+PacketForm tuned_form(const DeviceTuning& tuning);
 
 /// Work-group of packets: those of a tile, halved until at most `limit` work-items are left.
 std::array<std::size_t, 2> packet_group(const PacketShape& packet, std::size_t limit);

@@ -13,12 +13,13 @@ enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
 
 /// How camera rays are traced on a device: the choices that change the speed and nothing else.
 struct DeviceTuning {
-  bool grouped = false;  ///< packets are work-groups, not vectors
-  int packet_width = 1;  ///< rays of a packet: 1, 2, 4, 8 or 16, in groups 8, 16, 32 or 64
-  int tile = 16;         ///< pixels along a side of the tiles that share a candidate list
-  int pending = 48;      ///< entries of a ray's sorted list
-  int group = 0;         ///< most work-items of a work-group; 0 = all packets of a tile
-  bool bvh = false;      ///< camera rays walk the hierarchy one by one instead
+  bool grouped = false;    ///< packets are work-groups, not vectors
+  int packet_width = 1;    ///< rays of a packet: 1, 2, 4, 8 or 16, in groups 8, 16, 32 or 64
+  int tile = 16;           ///< pixels along a side of the tiles that share a candidate list
+  int pending = 48;        ///< entries of a ray's sorted list
+  int group = 0;           ///< most work-items of a work-group; 0 = all packets of a tile
+  bool bvh = false;        ///< camera rays walk the hierarchy one by one instead
+  bool subgroups = false;  ///< of work-groups: each is one subgroup
 
   bool operator==(const DeviceTuning&) const = default;
 };
@@ -42,7 +43,8 @@ struct DeviceInfo {
   std::uint32_t float_vector_width = 1;  ///< native float lanes
   bool has_fp64 = false;
   bool has_int64_atomics = false;
-  bool has_float_atomics = false;      ///< additions in global memory, by cl_ext_float_atomics
+  bool has_float_atomics = false;  ///< additions in global memory, by cl_ext_float_atomics
+  bool has_subgroups = false;      ///< cl_khr_subgroups, or what became of it in OpenCL 2.1 and 3.0
   std::optional<DeviceTuning> tuning;  ///< of Context::device(): what `raysplats tune` found
   std::vector<std::string> problems;   ///< why the device cannot be used; empty when it can
 

@@ -24,9 +24,11 @@ enum class Traversal {
 
 /// What a packet of camera rays is made of.
 enum class PacketForm {
-  kAuto,    ///< the device's own: vectors on CPUs, groups elsewhere; widths 32 and 64 are groups
-  kVector,  ///< the lanes of a vector in one work-item
-  kGroup,   ///< the work-items of a work-group, which share rows of hits in local memory
+  kAuto,      ///< the device's own: vectors on CPUs, elsewhere subgroups where its compiler makes
+              ///< one of a packet, or groups; widths 32 and 64 are never vectors
+  kVector,    ///< the lanes of a vector in one work-item
+  kGroup,     ///< the work-items of a work-group, which share rows of hits in local memory
+  kSubgroup,  ///< the same, with what they share going through functions of one subgroup
 };
 
 /// Function from the trained scale parameter to the standard deviation.

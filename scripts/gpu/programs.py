@@ -7,7 +7,8 @@ KERNELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "
 # Context::Impl::program (host/device/context.cpp).
 COMPILER = ["-cl-mad-enable"]
 
-# packet_shape.cpp and camera_tracer.cpp: a packet per work-group, or one ray per work-item, in tiles of 16.
+# packet_shape.cpp and camera_tracer.cpp: a packet per work-group, or one ray per work-item, in tiles of 16. SUBGROUP 1 is what
+# a device with subgroups is tried with, 2 what it is asked for by name.
 CAMERA = dict(PACKET=1, TILE=16, CHUNK=16, LENS=0)
 GROUP_CAMERA = dict(CAMERA, GROUP=32)
 GROUP_FORWARD = dict(GROUP_CAMERA, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
@@ -40,6 +41,14 @@ PROGRAMS = [
     ("group backward atomic 64", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC, GROUP=64)),
     ("group backward swap", "trace/group_backward.cl", dict(GROUP_CAMERA, **SWAP)),
     ("group backward exact", "trace/group_backward.cl", dict(GROUP_CAMERA, **EXACT)),
+    ("subgroup forward train", "trace/group_forward.cl", dict(GROUP_FORWARD, KEEP_HITS=1, SUBGROUP=1)),
+    ("subgroup forward train 16", "trace/group_forward.cl", dict(GROUP_FORWARD, KEEP_HITS=1, SUBGROUP=2, GROUP=16)),
+    ("subgroup forward train 64", "trace/group_forward.cl", dict(GROUP_FORWARD, KEEP_HITS=1, SUBGROUP=1, GROUP=64)),
+    ("subgroup forward around", "trace/group_forward.cl", dict(GROUP_FORWARD, LENS=2, KEEP_HITS=1, SUBGROUP=1)),
+    ("subgroup backward atomic", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC, SUBGROUP=1)),
+    ("subgroup backward atomic 16", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC, SUBGROUP=2, GROUP=16)),
+    ("subgroup backward atomic 64", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC, SUBGROUP=1, GROUP=64)),
+    ("subgroup backward exact", "trace/group_backward.cl", dict(GROUP_CAMERA, **EXACT, SUBGROUP=1)),
     ("forward train", "trace/forward.cl", dict(FORWARD, KEEP_HITS=1)),
     ("forward render", "trace/forward.cl", FORWARD),
     ("forward entry", "trace/forward.cl", dict(FORWARD, PEAK_ORDER=0)),
@@ -119,10 +128,19 @@ def unlisted():
     return sorted(found - listed)
 
 
+def offered(definitions, vendor):
+    """Whether the vendor's OpenCL has what the program asks for: NVIDIA's has no subgroups."""
+    return not (definitions.get("SUBGROUP") and vendor == "nvidia")
+
+
 def flags(definitions, vendor):
     """As the host builds them; native float additions take a later language where they come by cl_ext_float_atomics, which is
-    on Intel's devices."""
-    standard = "CL3.0" if vendor == "intel" and definitions.get("FLOAT_ATOMICS") else "CL1.2"
+    on Intel's devices, and subgroups take the latest of the device."""
+    standard = "CL1.2"
+    if vendor == "intel" and (definitions.get("FLOAT_ATOMICS") or definitions.get("SUBGROUP")):
+        standard = "CL3.0"
+    elif definitions.get("SUBGROUP"):
+        standard = "CL2.0"
     return [f"-cl-std={standard}", *COMPILER, *(f"-D{name}={value}" for name, value in sorted(definitions.items()))]
 
 

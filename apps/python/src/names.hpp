@@ -30,8 +30,11 @@ inline constexpr std::array<Name<HitOrder>, 2> kHitOrders{
     {{"entry", HitOrder::kEntry}, {"peak", HitOrder::kPeak}}};
 inline constexpr std::array<Name<Traversal>, 3> kTraversals{
     {{"auto", Traversal::kAuto}, {"tiles", Traversal::kTiles}, {"bvh", Traversal::kBvh}}};
-inline constexpr std::array<Name<PacketForm>, 3> kPacketForms{
-    {{"auto", PacketForm::kAuto}, {"vector", PacketForm::kVector}, {"group", PacketForm::kGroup}}};
+inline constexpr std::array<Name<PacketForm>, 4> kPacketForms{
+    {{"auto", PacketForm::kAuto},
+     {"vector", PacketForm::kVector},
+     {"group", PacketForm::kGroup},
+     {"subgroup", PacketForm::kSubgroup}}};
 inline constexpr std::array<Name<GradientSum>, 5> kGradientSums{{{"auto", GradientSum::kAuto},
                                                                  {"copies", GradientSum::kCopies},
                                                                  {"exact", GradientSum::kExact},

@@ -57,6 +57,17 @@ TEST_CASE("tune: GPUs try groups and vectors, each in its own widths") {
       CHECK(c.grouped == form.grouped);
     }
   }
+  device.has_subgroups = true;
+  const DeviceTuning subgroup = default_tuning(device);
+  CHECK(subgroup.subgroups);
+  const std::vector<DeviceTuning> three = tune_candidates("packet-shape", subgroup, device);
+  REQUIRE(three.size() == 3);
+  CHECK(std::count(three.begin(), three.end(), start) == 1);
+  CHECK(std::count(three.begin(), three.end(), forms[1]) == 1);
+  for (const DeviceTuning& c : tune_candidates("packet-width", subgroup, device)) {
+    CHECK(is_valid(c));
+    CHECK(c.subgroups);
+  }
   CHECK(tune_candidates("pending", start, device).size() == 1);
   CHECK(tune_candidates("pending", forms[1], device).size() > 1);
 }

@@ -105,14 +105,15 @@ TEST_CASE("packets have widths that their form allows") {
     }
     return true;
   };
-  for (const PacketForm form : {PacketForm::kAuto, PacketForm::kVector, PacketForm::kGroup}) {
+  for (const PacketForm form : {PacketForm::kAuto, PacketForm::kVector, PacketForm::kGroup,
+                                PacketForm::kSubgroup}) {
     CAPTURE(packet_shape_name(form));
     CHECK(accepts(form, 0));
     CHECK(accepts(form, 8));
     CHECK(accepts(form, 16));
     CHECK_FALSE(accepts(form, 3));
     CHECK_FALSE(accepts(form, 128));
-    CHECK(accepts(form, 4) == (form != PacketForm::kGroup));
+    CHECK(accepts(form, 4) == (form == PacketForm::kAuto || form == PacketForm::kVector));
     CHECK(accepts(form, 32) == (form != PacketForm::kVector));
   }
 }

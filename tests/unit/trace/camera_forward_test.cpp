@@ -355,6 +355,35 @@ TEST_CASE("tiles of a row whose lists are too long are traced apart") {
   }
 }
 
+TEST_CASE("packets that are no subgroup are refused where subgroups are asked for [small]") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(20, 18, 0);
+  const Camera camera = reference::cube_camera(9, 7);
+  TraceOptions options;
+  options.packet_form = PacketForm::kSubgroup;
+  // 64 work-items are one subgroup on few devices.
+  for (const int width : {8, 64}) {
+    CAPTURE(width);
+    options.packet_width = width;
+    std::string refusal;
+    try {
+      check_against_reference(context, model, options, camera);
+    } catch (const DeviceError& error) {
+      refusal = error.what();
+    }
+    if (!context.device().has_subgroups) {
+      CHECK(refusal.find("has no subgroups") != std::string::npos);
+    } else if (!refusal.empty()) {
+      CHECK(width == 64);
+      CHECK(refusal.find("subgroups of a packet of 64 rays") != std::string::npos);
+    }
+  }
+  // Without being asked for they are groups there.
+  options.packet_form = PacketForm::kAuto;
+  options.packet_width = 64;
+  check_against_reference(context, model, options, camera);
+}
+
 TEST_CASE("lists that 32 bits cannot count are refused before anything is written") {
   Context context = make_test_context();
   // Every Gaussian meets every tile of one pixel: 65800 x 65280 = 2^32 + 456704.

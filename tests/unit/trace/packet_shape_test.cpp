@@ -96,6 +96,54 @@ TEST_CASE("packet shape: groups on GPUs, and where they are asked for") {
   CHECK(packet_shape(device, width_of(0, PacketForm::kVector)).tile == 32);
 }
 
+TEST_CASE("packet shape: subgroups where the device has them") {
+  DeviceInfo gpu = gpu_of(32768);
+  CHECK_FALSE(packet_shape(gpu, width_of(0)).subgroups);
+  CHECK_THROWS_AS(packet_shape(gpu, width_of(0, PacketForm::kSubgroup)), DeviceError);
+  gpu.has_subgroups = true;
+  const PacketShape shape = packet_shape(gpu, width_of(0));
+  CHECK(shape.grouped);
+  CHECK(shape.subgroups);
+  CHECK_FALSE(shape.sized);  // as the compiler likes
+  CHECK(shape.lanes == 32);
+  const PacketShape asked = packet_shape(gpu, width_of(16, PacketForm::kSubgroup));
+  CHECK(asked.grouped);
+  CHECK(asked.subgroups);
+  CHECK(asked.sized);
+  CHECK(asked.lanes == 16);
+  CHECK_FALSE(packet_shape(gpu, width_of(0, PacketForm::kGroup)).subgroups);
+  CHECK_FALSE(packet_shape(gpu, width_of(0, PacketForm::kVector)).grouped);
+  CHECK_THROWS_AS(packet_shape(gpu, width_of(4, PacketForm::kSubgroup)), UsageError);
+  // CPUs take them only where they are asked for.
+  DeviceInfo device = cpu(16);
+  device.local_memory = 65536;
+  device.max_work_group_size = 4096;
+  device.has_subgroups = true;
+  CHECK_FALSE(packet_shape(device, width_of(0)).grouped);
+  CHECK_FALSE(packet_shape(device, width_of(64)).subgroups);
+  CHECK(packet_shape(device, width_of(0, PacketForm::kSubgroup)).subgroups);
+}
+
+TEST_CASE("packet shape: a tuning with subgroups and one without are two forms") {
+  DeviceInfo gpu = gpu_of(65536);
+  gpu.has_subgroups = true;
+  gpu.tuning = DeviceTuning{true, 16, 32, 48, 0, false, true};
+  const PacketShape tuned = packet_shape(gpu, width_of(0));
+  CHECK(tuned.subgroups);
+  CHECK(tuned.sized);
+  CHECK(tuned.lanes == 16);
+  CHECK(tuned.tile == 32);
+  CHECK(tuned_form(*gpu.tuning) == PacketForm::kSubgroup);
+  const PacketShape group = packet_shape(gpu, width_of(0, PacketForm::kGroup));
+  CHECK_FALSE(group.subgroups);
+  CHECK(group.lanes == 32);
+  CHECK(group.tile == 16);
+  gpu.tuning->subgroups = false;
+  CHECK_FALSE(packet_shape(gpu, width_of(0)).subgroups);
+  CHECK(packet_shape(gpu, width_of(0)).lanes == 16);
+  CHECK(packet_shape(gpu, width_of(0, PacketForm::kSubgroup)).lanes == 32);
+}
+
 TEST_CASE("packet group: within the limits of the kernel and the tuning") {
   PacketShape shape = packet_shape(cpu(16), width_of(16));
   shape.tile = 32;

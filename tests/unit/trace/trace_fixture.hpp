@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/rng.hpp"
+#include "core/trace_rows.hpp"
 #include "device/context.hpp"
 #include "raysplats/device.hpp"
 #include "reference/gradients.hpp"
@@ -21,10 +22,12 @@
 namespace raysplats {
 
 /// The device the tests run on: RAYSPLATS_DEVICE, or the default.
-inline Context make_test_context() {
+inline DeviceInfo test_device() {
   const char* selector = std::getenv("RAYSPLATS_DEVICE");
-  return Context(select_device(selector == nullptr ? "" : selector));
+  return select_device(selector == nullptr ? "" : selector);
 }
+
+inline Context make_test_context() { return Context(test_device()); }
 
 /// What a packet of rays may be.
 struct Packet {
@@ -39,15 +42,19 @@ struct Packet {
 };
 
 inline std::ostream& operator<<(std::ostream& out, const Packet& packet) {
-  return out << (packet.form == PacketForm::kGroup ? "group of " : "vector of ") << packet.lanes;
+  return out << packet_shape_name(packet.form) << " of " << packet.lanes;
 }
 
-/// Every form of packet in the widths named.
+/// Every form of packet in the widths named; subgroups where the device has any, up to 32 wide.
 inline std::vector<Packet> packets(const std::vector<int>& vectors = {1, 2, 4, 8, 16},
                                    const std::vector<int>& groups = {8, 16, 32, 64}) {
   std::vector<Packet> out;
   for (const int lanes : vectors) out.push_back({PacketForm::kVector, lanes});
   for (const int lanes : groups) out.push_back({PacketForm::kGroup, lanes});
+  static const bool has_subgroups = test_device().has_subgroups;
+  for (const int lanes : groups) {
+    if (has_subgroups && lanes <= 32) out.push_back({PacketForm::kSubgroup, lanes});
+  }
   return out;
 }
 
