@@ -54,10 +54,13 @@ struct Pipe {
 };
 
 /// The child, with both of its streams in `output`, reading `input`, or nothing where that is -1.
+/// With `apart` the terminal's Ctrl-C is for this process alone, which ends the child when it has
+/// to.
 pid_t start(const std::filesystem::path& program,
             const std::vector<std::string>& arguments,
             int input,
-            int output) {
+            int output,
+            bool apart) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   if (input < 0) {
@@ -72,9 +75,16 @@ pid_t start(const std::filesystem::path& program,
   std::vector<char*> pointers;
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  if (apart) {
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    posix_spawnattr_setpgroup(&attributes, 0);
+  }
   pid_t child = -1;
   const int error =
-      ::posix_spawn(&child, program.c_str(), &actions, nullptr, pointers.data(), environ);
+      ::posix_spawn(&child, program.c_str(), &actions, &attributes, pointers.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0)
     throw failure(fmt::format("{} cannot be started: {}", program.string(), std::strerror(error)));
@@ -148,7 +158,7 @@ void run_program(const std::filesystem::path& program,
   std::ofstream file(log, std::ios::app | std::ios::binary);
   file << fmt::format("\n$ {} {}\n", program.string(), fmt::join(arguments, " "));
   Pipe pipe;
-  const pid_t child = start(program, arguments, -1, pipe.ends[1]);
+  const pid_t child = start(program, arguments, -1, pipe.ends[1], false);
   pipe.close_writing();
   Lines lines(line);
   bool stopped = false;
@@ -192,7 +202,7 @@ ProgramInput::ProgramInput(const std::filesystem::path& program,
         fmt::format("A channel to {} cannot be made: {}", program.string(), std::strerror(errno)));
   input_ = ends[1];
   try {
-    child_ = start(program, arguments, ends[0], said_);
+    child_ = start(program, arguments, ends[0], said_, true);
   } catch (...) {
     ::close(ends[0]);
     ::close(input_);
@@ -215,7 +225,10 @@ void ProgramInput::write(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t count = ::send(input_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail(wait_for(std::exchange(child_, -1)));
+    if (count < 0) {
+      ::close(std::exchange(input_, -1));  // it may wait for more
+      fail(wait_for(std::exchange(child_, -1)));
+    }
     bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
 }

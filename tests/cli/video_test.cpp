@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Frames of `render` as videos, by a stand-in for ffmpeg and by the formats that need no program.
 #include <doctest/doctest.h>
+#include <signal.h>
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "program.hpp"
@@ -71,6 +74,28 @@ TEST_CASE("ffmpeg gets every frame as bytes, and the file appears when it is don
   // A video that is there stays.
   CHECK(raysplats_program(command, around).code == 2);
   CHECK(raysplats_program(command + Words{"--overwrite"}, around).code == 0);
+}
+
+TEST_CASE("Ctrl-C ends a video as it ends files, also while ffmpeg takes its time") {
+  const TemporaryFolder folder;
+  Surroundings around = with_ffmpeg(folder, "trap 'exit 255' INT\n: > '" + (folder / "begun") +
+                                                "'\nsleep 2 & wait\ncat > \"$word\"\n");
+  around.launcher = {"/usr/bin/setsid"};  // a group of processes, as a terminal makes one
+  const std::string model = folder / "balls.ply";
+  write_file(model, ply_file(3));
+  // More bytes than wait in a channel.
+  RunningProgram program({"render", model, "--orbit", "9", "--width", "400", "--height", "400",
+                          "-q", "--video", folder / "out.mp4"},
+                         around);
+  for (int i = 0; i < 600 && !fs::exists(folder / "begun"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  REQUIRE(fs::exists(folder / "begun"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  REQUIRE(::kill(-program.process(), SIGINT) == 0);
+  const Outcome outcome = program.wait();
+  INFO(outcome.err);
+  CHECK(outcome.code == 130);
+  CHECK(!fs::exists(folder / "out.mp4"));
 }
 
 TEST_CASE("what ffmpeg says when it fails is told, and no file is left") {
