@@ -14,6 +14,7 @@
 #include "train/mirror_meshes.hpp"
 #include "train/quality_preset.hpp"
 #include "train/train_config.hpp"
+#include "view/photos.hpp"
 #include "view/run_view.hpp"
 #include "view/view_state.hpp"
 #include "viewer_flags.hpp"
@@ -86,18 +87,22 @@ std::int64_t announce(Trainer& trainer, const Options& options, bool quiet) {
 std::unique_ptr<view::RunView> show(Context& context,
                                     Trainer& trainer,
                                     const Options& options,
-                                    const std::vector<Camera>& cameras,
+                                    const std::vector<View>& views,
                                     const std::array<double, 3>& origin) {
   const Mirrors mirrors = load_mirrors(options.train.mirrors, options.train.mirror_bounces, origin);
+  std::vector<Camera> cameras;
+  for (const View& each : views) cameras.push_back(each.camera);
   view::ViewState state = view::first_look(view::extent_before(cameras), cameras, std::nullopt);
   state.name = std::filesystem::path(options.output).filename().string();
   state.about = fmt::format("in training on {} photos of {}", cameras.size(),
                             std::filesystem::path(options.data).filename().string());
   state.has_near = state.has_depth = mirrors.meshes.empty();
   state.near_depth = options.train.trace.near_depth;
-  state.trains = true;
+  state.trains = state.has_order = state.has_photos = true;
   view::ViewerOptions viewer = options.viewer;
   viewer.state = view::state_json(state);
+  const auto photos = std::make_shared<view::Photos>(views, options.train.trace.background);
+  viewer.photo = [photos](std::size_t number) { return photos->jpeg(number); };
   auto shown = std::make_unique<view::RunView>(context, trainer.gaussians(), options.train.trace,
                                                mirrors, options.train.iterations, viewer);
   trainer.set_watcher(shown.get());
@@ -126,16 +131,18 @@ void train(
     const CLI::App& command, Options options, bool quiet, Communicator& ranks, Context& context) {
   Dataset dataset = load(command, options, context.device());
   check_not_data(options.output, dataset);
-  std::vector<Camera> cameras;
-  for (const std::size_t index : dataset.indices(Split::kTrain))
-    cameras.push_back(dataset.views[index].camera);
+  std::vector<View> views;
+  if (options.view && ranks.leads()) {
+    for (const std::size_t index : dataset.indices(Split::kTrain))
+      views.push_back(dataset.views[index]);
+  }
   const std::array<double, 3> origin = dataset.origin;
   Trainer trainer(context, std::move(dataset), options.train, options.output, options.overwrite,
                   &ranks);
   if (!options.resume.empty()) trainer.resume(options.resume);
   options.train.iterations = announce(trainer, options, ranks.said_by(0, quiet));
   std::unique_ptr<view::RunView> shown;
-  if (options.view && ranks.leads()) shown = show(context, trainer, options, cameras, origin);
+  if (options.view && ranks.leads()) shown = show(context, trainer, options, views, origin);
   const std::int64_t begun = trainer.iteration();
   const Communicator::Traffic before = ranks.traffic();
   const TrainSummary summary = trainer.run(!quiet && ranks.leads());

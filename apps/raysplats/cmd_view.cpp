@@ -20,6 +20,7 @@
 #include "render_flags.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/model_source.hpp"
+#include "view/photos.hpp"
 #include "view/view_state.hpp"
 #include "view/viewer.hpp"
 #include "viewer_flags.hpp"
@@ -37,8 +38,16 @@ struct Options {
   DeviceFlags device;
 };
 
+/// The views whose cameras the page lists, in its order.
+std::vector<View> views_of(const Options& options, const Dataset& dataset) {
+  const Split split = options.data.split ? options.data.chosen_split() : Split::kAll;
+  std::vector<View> views;
+  for (const std::size_t i : dataset.indices(split)) views.push_back(dataset.views[i]);
+  return views;
+}
+
 std::vector<Camera> cameras_of(const Options& options,
-                               const Dataset& dataset,
+                               const std::vector<View>& views,
                                const ModelSource& source) {
   std::vector<Camera> cameras;
   if (!options.cameras.empty()) {
@@ -47,8 +56,7 @@ std::vector<Camera> cameras_of(const Options& options,
       io::move_origin(camera, {source.origin[0], source.origin[1], source.origin[2]});
     return cameras;
   }
-  const Split split = options.data.split ? options.data.chosen_split() : Split::kAll;
-  for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
+  for (const View& each : views) cameras.push_back(each.camera);
   return cameras;
 }
 
@@ -59,12 +67,18 @@ std::optional<glm::dvec3> up_of(const Options& options) {
 }
 
 /// Draws for the pages until a signal comes.
-void serve(const Options& options, view::PictureSource& pictures, view::ViewState state) {
+void serve(const Options& options,
+           view::PictureSource& pictures,
+           view::ViewState state,
+           view::Photos* photos = nullptr) {
   state.name = std::filesystem::path(options.model).filename().string();
   if (state.name.empty()) state.name = options.model;
   state.has_depth = pictures.has_depth();
   view::ViewerOptions viewer_options = options.viewer;
+  state.has_photos = photos != nullptr;
   viewer_options.state = view::state_json(state);
+  if (photos != nullptr)
+    viewer_options.photo = [photos](std::size_t number) { return photos->jpeg(number); };
   const InterruptGuard interrupt;
   view::Viewer viewer(viewer_options);
   fmt::print("Open {} in a browser; Ctrl-C ends it\n", viewer.url());
@@ -99,7 +113,8 @@ void view_model(const Options& options) {
   if (!options.data.data.empty())
     dataset = load_dataset(options.data.data, options.data.settings.over(dataset_options(source)));
   const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
-  const std::vector<Camera> cameras = cameras_of(options, dataset, source);
+  const std::vector<View> views = views_of(options, dataset);
+  const std::vector<Camera> cameras = cameras_of(options, views, source);
   view::ViewState state = view::first_look(scene_extent(gaussians), cameras, up_of(options));
   state.about = fmt::format("{} Gaussians, SH degree {}", gaussians.size(), gaussians.sh_degree);
   const Mirrors mirrors = mirrors_of(source);
@@ -108,7 +123,9 @@ void view_model(const Options& options) {
   const auto pictures = view::model_pictures(*context, model, trace, mirrors);
   state.has_near = mirrors.meshes.empty();
   state.near_depth = trace.near_depth;
-  serve(options, *pictures, std::move(state));
+  state.has_order = true;
+  view::Photos photos(views, trace.background);
+  serve(options, *pictures, std::move(state), options.cameras.empty() ? &photos : nullptr);
 }
 
 void check(const Options& options) {

@@ -41,7 +41,8 @@ GaussianPictures::GaussianPictures(Context& context,
       gaussians_(gaussians),
       options_(options),
       mirrors_(std::move(mirrors)),
-      near_(options.near_depth) {}
+      near_(options.near_depth),
+      order_(options.hit_order) {}
 
 std::uint64_t GaussianPictures::samples() const { return kSamples; }
 
@@ -51,16 +52,19 @@ void GaussianPictures::release() {
   normals_.reset();
 }
 
-ViewTracer& GaussianPictures::tracer(bool depth, const std::optional<float>& near_depth) {
+ViewTracer& GaussianPictures::tracer(bool depth, const ViewRequest& request) {
   if (depth && !has_depth()) throw UsageError("A scene with mirrors has no single depth");
   // With mirrors there is no camera that could be near.
-  const float wanted = has_depth() ? near_depth.value_or(options_.near_depth) : near_;
-  if (wanted != near_) release();
+  const float wanted = has_depth() ? request.near_depth.value_or(options_.near_depth) : near_;
+  const HitOrder order = request.hit_order.value_or(options_.hit_order);
+  if (wanted != near_ || order != order_) release();
   near_ = wanted;
+  order_ = order;
   std::unique_ptr<ViewTracer>& tracer = depth ? depth_ : color_;
   if (!tracer) {
     TraceOptions options = options_;
     options.near_depth = near_;
+    options.hit_order = order_;
     options.depth = depth;
     tracer = std::make_unique<ViewTracer>(context_, options, mirrors_);
   }
@@ -71,6 +75,7 @@ Image GaussianPictures::normals_of(const Camera& camera, const Watch& watch) {
   if (!normals_) {
     TraceOptions options = options_;
     options.near_depth = near_;
+    options.hit_order = order_;
     normals_ = std::make_unique<NormalPictures>(context_, options);
   }
   return normals_->draw(gaussians_, camera, watch);
@@ -81,7 +86,7 @@ Image GaussianPictures::draw(const ViewRequest& request, std::uint64_t sample, c
   const bool depth = request.output == Output::kDepth || request.output == Output::kHits;
   const bool normals = request.output == Output::kNormals;
   if (normals && !has_depth()) throw UsageError("A scene with mirrors has no single normal");
-  ViewTracer& views = tracer(depth, request.near_depth);
+  ViewTracer& views = tracer(depth, request);
   views.set_background(request.background.value_or(options_.background),
                        request.background ? SkyLight() : options_.sky);
   const Watched watched(views, watch);
@@ -104,7 +109,7 @@ Image GaussianPictures::draw(const ViewRequest& request, std::uint64_t sample, c
 std::optional<glm::dvec3> GaussianPictures::point(const ViewRequest& request) {
   if (!has_depth()) return std::nullopt;
   const auto turn = context_.lock();
-  ViewTracer& views = tracer(true, request.near_depth);
+  ViewTracer& views = tracer(true, request);
   views.forward(gaussians_, request.camera);
   const int x = request.camera.width / 2;
   const int y = request.camera.height / 2;

@@ -39,7 +39,7 @@ class GaussianPictures : public PictureSource {
   void release();
 
  private:
-  ViewTracer& tracer(bool depth, const std::optional<float>& near_depth);
+  ViewTracer& tracer(bool depth, const ViewRequest& request);
 
   Image normals_of(const Camera& camera, const Watch& watch);
 
@@ -48,6 +48,7 @@ class GaussianPictures : public PictureSource {
   TraceOptions options_;
   Mirrors mirrors_;
   float near_;  // of the tracers
+  HitOrder order_;
   std::unique_ptr<ViewTracer> color_;
   std::unique_ptr<ViewTracer> depth_;
   std::unique_ptr<NormalPictures> normals_;

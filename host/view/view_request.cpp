@@ -113,6 +113,11 @@ ViewRequest view_of(const Json& json, int max_side) {
   }
   if (json.contains("near"))
     request.near_depth = static_cast<float>(number(json["near"], "near", 0.0, kFarthest));
+  if (json.contains("order")) {
+    const std::string order = text(json, "order");
+    if (order != "entry" && order != "peak") refuse("asks for an unknown 'order'");
+    request.hit_order = order == "peak" ? HitOrder::kPeak : HitOrder::kEntry;
+  }
   if (json.contains("background")) {
     const std::array<double, 3> color = numbers<3>(json, "background", 0.0, 1.0);
     request.background = {static_cast<float>(color[0]), static_cast<float>(color[1]),

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "raysplats/camera.hpp"
+#include "raysplats/trace_options.hpp"
 
 namespace raysplats::view {
 
@@ -21,6 +22,7 @@ struct ViewRequest {
   bool moving = false;  ///< more are to follow: speed before size
   bool png = false;     ///< without losses, to be kept
   std::optional<float> near_depth;
+  std::optional<HitOrder> hit_order;  ///< else the model's
   std::optional<std::array<float, 3>> background;
 };
 

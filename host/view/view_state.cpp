@@ -40,11 +40,24 @@ double vertical_fov(const Camera& camera) {
   return std::clamp(degrees, kLeastFov, kMostFov);
 }
 
-Json camera_json(const Camera& camera) {
-  return {{"name", camera.name},
-          {"c2w", pose_json(camera)},
-          {"fov", vertical_fov(camera)},
-          {"aspect", static_cast<double>(camera.width) / std::max(camera.height, 1)}};
+/// `photo`: whether its photo lies over what the page's pinhole sees from there; `shift` is how far
+/// its middle is off that of the picture, in heights of the photo.
+Json camera_json(const Camera& camera, bool photos) {
+  const double height = std::max(camera.height, 1);
+  const bool flat = photos && camera.model == CameraModel::kPinhole && !camera.distortion.any() &&
+                    camera.fx > 0.0;
+  Json json{{"name", camera.name},
+            {"c2w", pose_json(camera)},
+            {"fov", vertical_fov(camera)},
+            {"aspect", static_cast<double>(camera.width) / height},
+            {"photo", flat}};
+  if (!flat) return json;
+  // Pixels that are no squares are drawn as what they see.
+  const double stretch = camera.fy / camera.fx;
+  json["aspect"] = stretch * static_cast<double>(camera.width) / height;
+  json["shift"] = {stretch * (0.5 * camera.width - camera.cx) / height,
+                   (0.5 * camera.height - camera.cy) / height};
+  return json;
 }
 
 }  // namespace
@@ -81,18 +94,20 @@ SceneExtent extent_before(std::span<const Camera> cameras) {
 
 std::string state_json(const ViewState& state) {
   Json cameras = Json::array();
-  for (const Camera& camera : state.cameras) cameras.push_back(camera_json(camera));
+  for (const Camera& camera : state.cameras)
+    cameras.push_back(camera_json(camera, state.has_photos));
   const Json json{{"version", RAYSPLATS_VERSION},
                   {"name", state.name},
                   {"about", state.about},
                   {"center", vector_json(state.extent.center)},
                   {"radius", state.extent.radius},
                   {"up", vector_json(state.up)},
-                  {"start", camera_json(state.start)},
+                  {"start", camera_json(state.start, false)},
                   {"cameras", cameras},
                   {"near", state.near_depth},
                   {"has_near", state.has_near},
                   {"has_depth", state.has_depth},
+                  {"has_order", state.has_order},
                   {"trains", state.trains}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

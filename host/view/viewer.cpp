@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -26,6 +27,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr std::string_view kPhotoPath = "/api/photo/";
 constexpr int kMovingQuality = 60;
 constexpr int kStillQuality = 85;
 constexpr int kLastQuality = 94;
@@ -79,8 +81,23 @@ struct Viewer::Impl {
   HttpReply get(std::string_view path) const {
     if (path == "/api/state") return {200, "application/json", options.state};
     if (path == "/api/run" && options.run) return {200, "application/json", options.run()};
+    if (path.starts_with(kPhotoPath) && options.photo) return photo(path.substr(kPhotoPath.size()));
     if (const std::optional<PageFile> file = page_file(path))
       return {200, file->type, file->content};
+    return {404, "text/plain", "Not found\n"};
+  }
+
+  HttpReply photo(std::string_view number) const {
+    std::size_t index = 0;
+    const char* end = number.data() + number.size();
+    const auto [read, error] = std::from_chars(number.data(), end, index);
+    if (error != std::errc() || read != end) return {404, "text/plain", "Not found\n"};
+    try {
+      if (const std::optional<std::string> jpeg = options.photo(index))
+        return {200, "image/jpeg", *jpeg};
+    } catch (const Error& problem) {
+      return {500, "text/plain; charset=utf-8", problem.what() + std::string("\n")};
+    }
     return {404, "text/plain", "Not found\n"};
   }
 

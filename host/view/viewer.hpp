@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "view/picture_source.hpp"
@@ -18,6 +19,9 @@ struct ViewerOptions {
   std::string state;                   ///< JSON of /api/state, for the page to start with
   /// JSON of /api/run, asked for from another thread than that of work(); none: there is no run.
   std::function<std::string()> run;
+  /// The JPEG of /api/photo/N, asked for from that thread too; nothing for a number that there is
+  /// not. None: there are no photos.
+  std::function<std::optional<std::string>(std::size_t number)> photo;
 };
 
 /// Shows a PictureSource to the pages that are open: takes what they want to see, the newest wish

@@ -316,7 +316,7 @@ void make_view(const fs::path& root) {
   const Corpus corpus(root, "view");
   const std::string seen = R"("id":1,"fov":50,"size":[64,48],"c2w":[1,0,0,0,0,1,0,0,0,0,1,-6])";
   corpus.add("view.json", R"({"type":"view",)" + seen +
-                              R"(,"moving":true,"near":0.5,"background":[0,0.5,1],)"
+                              R"(,"moving":true,"near":0.5,"background":[0,0.5,1],"order":"peak",)"
                               R"("output":"depth"})");
   corpus.add("pick.json", R"({"type":"pick",)" + seen + R"(,"px":[0.5,0.25]})");
   corpus.add("pause.json", R"({"type":"pause"})");

@@ -3,8 +3,10 @@
 
 import { Rig } from './camera.js';
 import { Connection } from './connection.js';
+import { Crop } from './crop.js';
 import { Keyframes } from './keyframes.js';
 import { TrainingCameras } from './cameras.js';
+import { Photo } from './photo.js';
 import { Pointers } from './pointers.js';
 import { Run } from './run.js';
 
@@ -42,6 +44,7 @@ function wanted() {
   const color = $('background').value;
   const view = { c2w: rig.pose, fov: rig.fov, size: size(), output: $('output').value };
   if (nearChosen) view.near = nearDepth();
+  if ($('order').value) view.order = $('order').value;
   if ($('own-background').checked) {
     view.background = [1, 3, 5].map((i) => parseInt(color.slice(i, i + 2), 16) / 255);
   }
@@ -66,7 +69,26 @@ function drawOverlay() {
   overlay.height = Math.round(overlay.clientHeight * density);
   const context = overlay.getContext('2d');
   context.scale(density, density);
-  cameras.draw(context, rig, overlay.clientWidth, overlay.clientHeight);
+  $('photo-section').hidden = !photo.at(rig.pose);
+  for (const layer of [crop, cameras]) layer.draw(context, rig, overlay.clientWidth, overlay.clientHeight);
+  photo.draw(context, picture, rig, overlay.clientWidth, overlay.clientHeight);
+}
+
+// Choosing the camera that is there already brings its photo back.
+function goTo(camera) {
+  go(camera.c2w, camera.fov);
+  photo.choose(camera, state.cameras.indexOf(camera)).catch(() => {});
+}
+
+function setUp() {
+  const chosen = $('up').value;
+  if (chosen === 'start') rig.up = [...state.up];
+  else if (chosen === 'view') rig.up = rig.axes[1].map((x) => -x);
+  else rig.up = chosen.split(',').map(Number);
+  $('up-text').textContent = chosen === 'start' ? ''
+    : `--up ${rig.up.map((x) => Number(x.toPrecision(4))).join(',')}`;
+  if (chosen !== 'view') rig.level();
+  changed();
 }
 
 async function show(header, blob) {
@@ -82,6 +104,7 @@ async function show(header, blob) {
   bitmap.close();
   seen.id = header.id;
   seen.pictures += 1;
+  if (photo.at(rig.pose)) drawOverlay();
   seen.last = header;
   const now = performance.now();
   frames = frames.filter((time) => now - time < 1000);
@@ -130,7 +153,7 @@ function go(pose, fov) {
 
 function click(x, y) {
   const found = cameras.at(rig, x, y, overlay.clientWidth, overlay.clientHeight);
-  if (found) go(found.c2w, found.fov);
+  if (found) goTo(found);
 }
 
 function pick(x, y) {
@@ -193,7 +216,9 @@ function keyDown(event) {
   }
 }
 
-const cameras = new TrainingCameras($('cameras'), (camera) => go(camera.c2w, camera.fov));
+const cameras = new TrainingCameras($('cameras'), goTo);
+const photo = new Photo(drawOverlay);
+const crop = new Crop($('crop-sliders'), $('crop-text'), drawOverlay);
 const keyframes = new Keyframes({
   list: $('keyframes'),
   settings: () => ({
@@ -216,6 +241,21 @@ function wire() {
   $('fov').addEventListener('input', () => { rig.fov = Number($('fov').value); changed(); });
   $('near').addEventListener('input', () => { nearChosen = true; });
   $('output').addEventListener('change', changed);
+  $('order').addEventListener('change', changed);
+  $('up').addEventListener('change', setUp);
+  $('split').addEventListener('input', () => {
+    photo.split = Number($('split').value) / 100;
+    drawOverlay();
+  });
+  $('difference').addEventListener('change', () => {
+    photo.difference = $('difference').checked;
+    drawOverlay();
+  });
+  $('show-crop').addEventListener('change', () => {
+    crop.shown = $('show-crop').checked;
+    $('crop-sliders').hidden = !crop.shown;
+    drawOverlay();
+  });
   for (const id of ['near', 'own-background', 'background']) {
     $(id).addEventListener('input', changed);
   }
@@ -266,7 +306,9 @@ async function start() {
   for (const option of $('output').options) {
     if (['depth', 'normals', 'hits'].includes(option.value)) option.disabled = !state.has_depth;
   }
+  $('order').disabled = !state.has_order;
   cameras.fill(state.cameras, state.center);
+  crop.begin(state.center, state.radius);
   link = new Connection(wanted, {
     picture: show,
     text: heard,
@@ -284,6 +326,7 @@ async function start() {
     seen.run = run;
   }
   seen.rig = rig;
+  seen.photo = photo;
   wire();
   changed();
 }

@@ -105,9 +105,9 @@ TEST_CASE("the library holds the page, and nothing else is served") {
   for (const char* path : {"", "/..", "/../app.js", "//app.js", "/etc/passwd", "/app.js/", "/x.js"})
     CHECK(!page_file(path).has_value());
   // No script, style or picture from elsewhere.
-  for (const char* path :
-       {"/", "/app.js", "/style.css", "/connection.js", "/cameras.js", "/keyframes.js", "/path.js",
-        "/pointers.js", "/vectors.js", "/camera.js", "/run.js", "/curves.js"}) {
+  for (const char* path : {"/", "/app.js", "/style.css", "/connection.js", "/cameras.js",
+                           "/keyframes.js", "/path.js", "/pointers.js", "/vectors.js", "/camera.js",
+                           "/run.js", "/curves.js", "/photo.js", "/crop.js"}) {
     INFO(path);
     REQUIRE(page_file(path).has_value());
     CHECK(page_file(path)->content.find("https:") == std::string::npos);
@@ -122,12 +122,30 @@ TEST_CASE("the page learns what it starts with") {
   const std::vector<Camera> cameras{state.start};
   state.cameras = cameras;
   state.has_near = true;
+  state.has_photos = true;
   const nlohmann::json json = nlohmann::json::parse(state_json(state));
   CHECK(json["start"]["fov"] == doctest::Approx(90));
   CHECK(json["start"]["aspect"] == 2);
   CHECK(json["start"]["c2w"].size() == 12);
   CHECK(json["start"]["c2w"][11] == doctest::Approx(-4));
   CHECK(json["cameras"].size() == 1);
+  CHECK(json["cameras"][0]["photo"] == true);
+  CHECK(json["cameras"][0]["shift"] == nlohmann::json{0.0, 0.0});
+  // A lens whose middle is off, with pixels twice as high as wide.
+  Camera odd = state.start;
+  odd.cx = 90;
+  odd.cy = 52;
+  odd.fx = 100;
+  const std::vector<Camera> others{odd};
+  state.cameras = others;
+  const nlohmann::json off = nlohmann::json::parse(state_json(state))["cameras"][0];
+  CHECK(off["aspect"] == doctest::Approx(1));
+  CHECK(off["shift"][0] == doctest::Approx(0.05));
+  CHECK(off["shift"][1] == doctest::Approx(-0.02));
+  odd.model = CameraModel::kFisheye;
+  const std::vector<Camera> fisheyes{odd};
+  state.cameras = fisheyes;
+  CHECK(nlohmann::json::parse(state_json(state))["cameras"][0]["photo"] == false);
   CHECK(json["up"] == nlohmann::json{0, -1, 0});
   CHECK(json["has_near"] == true);
 }

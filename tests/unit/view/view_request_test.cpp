@@ -71,6 +71,11 @@ TEST_CASE("a view message becomes a camera") {
   CHECK(*other.near_depth == 0.5f);
   CHECK((*other.background)[1] == 0.5f);
   CHECK(other.output == Output::kDepth);
+  CHECK(!other.hit_order);
+  turned["order"] = "peak";
+  CHECK(view_of(turned).hit_order == HitOrder::kPeak);
+  turned["order"] = "entry";
+  CHECK(view_of(turned).hit_order == HitOrder::kEntry);
   const std::pair<const char*, Output> outputs[] = {{"color", Output::kColor},
                                                     {"alpha", Output::kAlpha},
                                                     {"normals", Output::kNormals},
@@ -121,6 +126,8 @@ TEST_CASE("messages that are not understood are refused in one sentence") {
         std::string::npos);
   CHECK(refusal(with("c2w", {1, 0, 0, 1e30, 0, 1, 0, 0, 0, 0, 1, 0})).find("c2w") !=
         std::string::npos);
+  CHECK(refusal(with("order", "far")).find("order") != std::string::npos);
+  CHECK(refusal(with("order", 1)).find("order") != std::string::npos);
   CHECK(refusal(with("near", -1)).find("near") != std::string::npos);
   CHECK(refusal(with("background", {0, 0, 2})).find("background") != std::string::npos);
   CHECK(refusal(with("output", "source code")).find("output") != std::string::npos);
