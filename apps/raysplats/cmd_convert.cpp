@@ -17,7 +17,9 @@ namespace {
 struct Options {
   std::string input;
   std::string output;
+  std::optional<std::string> up;
   std::optional<std::string> rotate;
+  std::string max_gaussians;
   std::optional<std::string> translate;
   std::optional<std::string> crop_min;
   std::optional<std::string> crop_max;
@@ -34,6 +36,9 @@ glm::dvec3 vector_of(const std::string& text) {
 
 void run(Options& options) {
   ModelChanges& changes = options.changes;
+  if (options.up) changes.up = vector_of(*options.up);
+  if (!options.max_gaussians.empty())
+    changes.max_gaussians = parse_count("--max-gaussians", options.max_gaussians);
   if (options.rotate) changes.rotate_degrees = vector_of(*options.rotate);
   if (options.translate) changes.translate = vector_of(*options.translate);
   if (options.crop_min || options.crop_max) {
@@ -75,6 +80,15 @@ Command add_convert_command(CLI::App& app) {
       ->transform(whole_between(0, 4));
   command->add_option("--min-opacity", changes.min_opacity, "Leave out Gaussians that are fainter")
       ->check(between(0.0, 1.0));
+  command
+      ->add_option("--max-gaussians", options->max_gaussians,
+                   "Keep the N (such as 500k) that contribute most: opacity times largest section")
+      ->type_name("N");
+  command
+      ->add_option("--up", options->up,
+                   "Turn the model so that this direction is up, before everything else")
+      ->check(triple())
+      ->type_name("X,Y,Z");
   command->add_option("--scale", changes.scale, "Make the model this much larger")
       ->check(above(0.0))
       ->capture_default_str();

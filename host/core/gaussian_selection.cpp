@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace raysplats {
 namespace {
@@ -52,6 +53,26 @@ Gaussians with_opacity(const Gaussians& model, double least) {
   return kept(model, [&](std::uint32_t i) {
     return 1.0 / (1.0 + std::exp(-static_cast<double>(model.opacities[i]))) >= least;
   });
+}
+
+Gaussians most_contributing(const Gaussians& model, std::size_t most) {
+  if (model.size() <= most) return model;
+  std::vector<double> weights(model.size());
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const float* s = &model.log_scales[3 * i];
+    // Of the two longer axes; logarithms, which do not overflow.
+    const double area = static_cast<double>(s[0]) + static_cast<double>(s[1]) +
+                        static_cast<double>(s[2]) -
+                        static_cast<double>(std::min({s[0], s[1], s[2]}));
+    weights[i] = area - std::log1p(std::exp(-static_cast<double>(model.opacities[i])));
+  }
+  std::vector<std::uint32_t> order(model.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return weights[a] > weights[b]; });
+  order.resize(most);
+  std::sort(order.begin(), order.end());
+  return gathered(model, order);
 }
 
 }  // namespace raysplats

@@ -16,13 +16,16 @@ namespace raysplats {
 /// whose origin (read_ply_origin()) stays.
 struct ModelChanges {
   std::optional<double> min_opacity;
+  std::optional<glm::dvec3> up;  ///< this direction becomes up, the -y of model files
   double scale = 1.0;
   glm::dvec3 rotate_degrees{0.0};  ///< about the axes x, then y, then z
   glm::dvec3 translate{0.0};
-  std::optional<CropBox> crop;  ///< in the coordinates of the result
+  std::optional<CropBox> crop;               ///< in the coordinates of the result
+  std::optional<std::size_t> max_gaussians;  ///< those that most_contributing() keeps
   std::optional<int> sh_degree;
 };
 
+/// Throws UsageError for an `up` of length 0.
 Gaussians changed(const Gaussians& model, const ModelChanges& changes);
 
 /// What a conversion did.

@@ -61,6 +61,49 @@ TEST_CASE("conversion moves, crops and thins in the stated order") {
   CHECK(changed(model, {}).sh == model.sh);
 }
 
+TEST_CASE("conversion turns what is up to -y, harmonics as well") {
+  Gaussians model = trained_like(2, 1);
+  model.means = {0, 0, 2, 1, 0, 0};
+  ModelChanges changes;
+  changes.up = glm::dvec3(0, 0, 5);
+  const Gaussians out = changed(model, changes);
+  CHECK(farthest(out.means, {0, -2, 0, 1, 0, 0}) < 1e-6);
+  // Degree 1 is -y, z, -x of the direction: z goes to -y, which is stored with its sign turned.
+  for (std::size_t c = 0; c < 3; ++c) {
+    CHECK(out.sh[3 + c] == doctest::Approx(model.sh[6 + c]));
+    CHECK(out.sh[9 + c] == doctest::Approx(model.sh[9 + c]));
+  }
+  changes.up = glm::dvec3(0, -3, 0);
+  CHECK(changed(model, changes).means == model.means);
+  changes.up = glm::dvec3(0, 3, 0);
+  CHECK(farthest(changed(model, changes).means, {0, 0, -2, 1, 0, 0}) < 1e-6);
+  changes.up = glm::dvec3(0.3, -0.4, 0.5);
+  Gaussians pointer = trained_like(1, 0);
+  pointer.means = {0.3f, -0.4f, 0.5f};
+  const double length = std::sqrt(0.5);
+  CHECK(farthest(changed(pointer, changes).means, {0, static_cast<float>(-length), 0}) < 1e-6);
+  changes.up = glm::dvec3(0.0);
+  CHECK(contains(usage_error([&] { changed(model, changes); }), "--up"));
+}
+
+TEST_CASE("conversion keeps those that contribute most, in their order") {
+  Gaussians model = trained_like(4, 0);
+  model.opacities = {0, 5, 0, -20};
+  // Discs whose thickness has no part in it.
+  model.log_scales = {-1, -1, -9, -1, -9, -1, -2, -3, -2, 3, 3, 3};
+  for (std::size_t i = 0; i < 4; ++i) model.means[3 * i] = static_cast<float>(i);
+  ModelChanges changes;
+  changes.max_gaussians = 2;
+  const Gaussians two = changed(model, changes);
+  REQUIRE(two.size() == 2);
+  CHECK(two.means[0] == 0.0f);
+  CHECK(two.means[3] == 1.0f);
+  changes.max_gaussians = 3;
+  CHECK(changed(model, changes).means[6] == 2.0f);
+  changes.max_gaussians = 9;
+  CHECK(changed(model, changes).means == model.means);
+}
+
 TEST_CASE("conversion refuses what would be lost") {
   const Scratch scratch;
   write_model(scratch / "a.ply", trained_like(3, 0));
