@@ -18,6 +18,21 @@ constexpr double kTop = 30.0;
 constexpr double kBottom = 36.0;
 constexpr std::size_t kColumns = 400;  ///< of a curve; each keeps its extremes
 
+constexpr const char* kStyle = R"(
+:root{color-scheme:light dark;--text:#1d1d1b;--line:#d5d5d0;--warn:#9c3a1a;--c0:#1d5fa8;--c1:#c2561b;--c2:#2c7d3c;--c3:#8a3fa0;--c4:#8a6d14;--c5:#b02358}
+@media (prefers-color-scheme:dark){:root{--text:#e6e6e3;--line:#3c3e42;--warn:#f0906a;--c0:#7db4ee;--c1:#f0a15e;--c2:#7fd08f;--c3:#cf93e6;--c4:#d9bd5c;--c5:#f288ab}body{background:#1c1d1f}}
+body{max-width:1000px;margin:24px auto;padding:0 16px;color:var(--text);font:15px/1.5 system-ui,sans-serif}
+h1{font-size:22px}h2{font-size:17px;margin-top:28px;border-top:1px solid var(--line);padding-top:10px}
+.warn{color:var(--warn)}.charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(380px,1fr));gap:12px}
+svg{width:100%;height:auto}svg text{fill:currentColor;font-size:11px}svg .title{font-size:13px;font-weight:600}
+svg line{stroke:var(--line)}polyline{fill:none;stroke-width:1.6}
+polyline.c0{stroke:var(--c0)}circle.c0,svg text.c0{fill:var(--c0)}th.c0{color:var(--c0)}polyline.c1{stroke:var(--c1)}circle.c1,svg text.c1{fill:var(--c1)}th.c1{color:var(--c1)}
+polyline.c2{stroke:var(--c2)}circle.c2,svg text.c2{fill:var(--c2)}th.c2{color:var(--c2)}polyline.c3{stroke:var(--c3)}circle.c3,svg text.c3{fill:var(--c3)}th.c3{color:var(--c3)}
+polyline.c4{stroke:var(--c4)}circle.c4,svg text.c4{fill:var(--c4)}th.c4{color:var(--c4)}polyline.c5{stroke:var(--c5)}circle.c5,svg text.c5{fill:var(--c5)}th.c5{color:var(--c5)}
+table{border-collapse:collapse}td,th{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid var(--line)}
+figure{margin:14px 0}img{max-width:100%;height:auto}pre{white-space:pre-wrap;overflow-wrap:anywhere}
+)";
+
 using Points = std::vector<std::pair<double, double>>;
 
 /// Bytes of the character that starts here, 0 when it is no UTF-8.
@@ -190,19 +205,30 @@ std::string chart(std::string_view title, std::string_view x_label, std::span<co
     std::string places;
     for (const auto& [px, py] : drawn[i])
       places += fmt::format("{:.1f},{:.1f} ", place_x(px), place_y(py));
-    out += fmt::format("<polyline class=\"c{}\" points=\"{}\"/>", i, places);
+    out += fmt::format("<polyline class=\"c{}\" points=\"{}\"/>", i % kColors, places);
     if (drawn[i].size() <= 30) {
       for (const auto& [px, py] : drawn[i])
-        out += fmt::format("<circle class=\"c{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.5\"/>", i,
-                           place_x(px), place_y(py));
+        out += fmt::format("<circle class=\"c{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.5\"/>",
+                           i % kColors, place_x(px), place_y(py));
     }
     if (drawn.size() > 1) {
-      out +=
-          fmt::format("<text class=\"c{}\" x=\"{}\" y=\"{}\">{}</text>", i,
-                      kLeft + 110.0 * static_cast<double>(i), kHeight - 5, escaped(curves[i].name));
+      out += fmt::format("<text class=\"c{}\" x=\"{}\" y=\"{}\">{}</text>", i % kColors,
+                         kLeft + std::min(110.0, 300.0 / static_cast<double>(drawn.size())) *
+                                     static_cast<double>(i),
+                         kHeight - 5, escaped(curves[i].name));
     }
   }
   return out + "</svg>\n";
+}
+
+std::string page(std::string_view title, std::string_view body) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\n<meta "
+      "http-equiv=\"Content-Security-Policy\" content=\"default-src &#39;none&#39;; img-src data:; "
+      "style-src &#39;unsafe-inline&#39;\"/>\n<meta name=\"viewport\" "
+      "content=\"width=device-width\"/><title>{0}</title>\n<style>{1}</style></head>\n<body><h1>{0}"
+      "</h1>\n{2}<p>RaySplats-CL {3}</p>\n</body></html>\n",
+      escaped(title), kStyle, body, RAYSPLATS_VERSION);
 }
 
 }  // namespace raysplats::report

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -21,6 +22,13 @@ struct Curve {
   std::string name;
   std::vector<std::pair<double, double>> points;  ///< by rising x; others than finite are left out
 };
+
+/// A whole page: well-formed XML, no scripts, nothing from elsewhere, light and dark. `title` is
+/// escaped here, `body` has been.
+std::string page(std::string_view title, std::string_view body);
+
+/// Colours of curves and of headings, in classes c0, c1, ...; further ones begin again.
+constexpr std::size_t kColors = 6;
 
 /// Curves as an SVG with axes, a grid and a legend, named for readers that do not see it. Curves of
 /// many points keep the least and greatest of each column. Empty without points.

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace raysplats {
 
@@ -14,5 +15,10 @@ std::string run_report(const std::filesystem::path& run);
 
 /// Writes run_report() atomically.
 void write_run_report(const std::filesystem::path& run, const std::filesystem::path& file);
+
+/// A page about 2 to 12 runs side by side: figures, curves, the views in which they differ most,
+/// the settings in which they differ. Throws DataError as run_report(), UsageError for another
+/// number.
+std::string runs_report(const std::vector<std::filesystem::path>& runs);
 
 }  // namespace raysplats

@@ -54,7 +54,9 @@ std::string fault(const std::string& text) {
 /// A run with two evaluations, the second below the first, of views with an awkward name.
 class Run {
  public:
-  Run() : path_(fs::temp_directory_path() / ("raysplats_report_" + std::to_string(::getpid()))) {
+  explicit Run(const std::string& name = "")
+      : path_(fs::temp_directory_path() /
+              ("raysplats_report_" + std::to_string(::getpid()) + name)) {
     const fs::path eval = path_ / "eval/iteration_200";
     fs::create_directories(eval);
     write("metrics.csv",
@@ -120,6 +122,42 @@ TEST_CASE("a report of a run that is under way or damaged says so") {
   CHECK_THROWS_AS(run_report(run.path()), DataError);
   fs::remove(run.path() / "metrics.json");
   CHECK_THROWS_AS(run_report(run.path()), DataError);
+}
+
+TEST_CASE("several runs stand side by side, with what differs between them") {
+  const Run first("_<one>"), second("_two"), third("_three");
+  second.write("metrics.json",
+               R"({"complete":true,"iteration":300,"gaussians":999,"device":"other","evaluations":[
+          {"iteration":200,"training_seconds":9,"psnr":23.5,"ssim":0.7,"views":2}]})");
+  second.write("config.toml", "iterations = 300\nname = \"<script>\"\nseed = 7\n");
+  second.write("eval/iteration_200/metrics.json",
+               R"({"images":[{"name":"a<b>&.png","psnr":11,"ssim":0.5},
+                 {"name":"good.png","psnr":36,"ssim":0.9},{"name":"own.png","psnr":20}]})");
+  const std::string page = runs_report({first.path(), second.path()});
+  CHECK(fault(page) == "");
+  CHECK(has(page, "_&lt;one&gt;</th>"));
+  CHECK(has(page, "<td>20.25</td><td><b>23.50</b></td>"));
+  CHECK(has(page, "<td><b>0.7500</b></td><td>0.7000</td>"));
+  CHECK(has(page, "<td>140</td><td>999</td>"));
+  // The view in which they differ by 6 dB comes before that in which they differ by one.
+  const std::size_t good = page.find("A: good.png, 30.00 dB"), bad = page.find("A: a&lt;b");
+  CHECK(good != std::string::npos);
+  CHECK(bad != std::string::npos);
+  CHECK(good < bad);
+  CHECK(has(page, "B: good.png, 36.00 dB"));
+  CHECK(!has(page, "own.png"));
+  CHECK(has(page, "<tr><th>seed</th><td></td><td>7</td></tr>"));
+  CHECK(has(page, "<tr><th>iterations</th><td>200</td><td>300</td></tr>"));
+  CHECK(!has(page, "<th>name</th>"));
+  CHECK(!has(page, "<script"));
+  // A run without held-out views, and settings that are the same.
+  third.write("metrics.json", R"({"iteration":7})");
+  const std::string bare = runs_report({first.path(), third.path()});
+  CHECK(fault(bare) == "");
+  CHECK(has(bare, "no held-out view in common"));
+  CHECK(has(bare, "All settings are the same"));
+  CHECK_THROWS_AS(runs_report({first.path()}), UsageError);
+  CHECK_THROWS_AS(runs_report({first.path(), first.path() / "none"}), DataError);
 }
 
 TEST_CASE("text, bytes and curves as HTML has them") {

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report/run_files.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+
+#include "base/number_text.hpp"
+#include "io/image_codec.hpp"
+#include "io/json_file.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+namespace raysplats::report {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr std::uint64_t kMostText = std::uint64_t{64} << 20;
+constexpr int kPictureQuality = 85;
+
+}  // namespace
+
+nlohmann::json metrics_of(const fs::path& run) {
+  std::error_code error;
+  if (!fs::is_regular_file(run / "metrics.json", error)) {
+    throw DataError(fmt::format("{} is no training run: it holds no metrics.json", run.string()));
+  }
+  return io::read_json_object(run / "metrics.json");
+}
+
+std::string run_name(const fs::path& run) {
+  return fs::absolute(run).lexically_normal().filename().string();
+}
+
+std::string text_of(const fs::path& path) {
+  std::error_code error;
+  if (fs::file_size(path, error) > kMostText && !error)
+    throw DataError(fmt::format("{} is too large for a file of a run", path.string()));
+  std::ifstream stream(path, std::ios::binary);
+  return std::string(std::istreambuf_iterator<char>(stream), {});
+}
+
+double number(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_number() ? found->get<double>() : 0.0;
+}
+
+std::vector<Json> objects(const Json& json, const char* key) {
+  std::vector<Json> out;
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_array()) return out;
+  std::copy_if(found->begin(), found->end(), std::back_inserter(out),
+               [](const Json& each) { return each.is_object(); });
+  return out;
+}
+
+std::map<std::string, std::vector<double>> columns_of(const fs::path& path) {
+  std::istringstream stream(text_of(path));
+  const auto cells = [](const std::string& line) {
+    std::vector<std::string> out;
+    std::istringstream parts(line);
+    for (std::string part; std::getline(parts, part, ',');) out.push_back(part);
+    return out;
+  };
+  std::string line;
+  std::getline(stream, line);
+  const std::vector<std::string> names = cells(line);
+  std::map<std::string, std::vector<double>> out;
+  while (std::getline(stream, line)) {
+    const std::vector<std::string> values = cells(line);
+    std::vector<double> numbers;
+    for (const std::string& value : values) {
+      if (const std::optional<double> parsed = parse_real(value)) numbers.push_back(*parsed);
+    }
+    if (numbers.size() != names.size()) continue;
+    for (std::size_t i = 0; i < names.size(); ++i) out[names[i]].push_back(numbers[i]);
+  }
+  return out;
+}
+
+Curve curve(const std::string& name,
+            std::map<std::string, std::vector<double>>& columns,
+            const std::string& x,
+            const std::string& y) {
+  Curve out{name, {}};
+  const std::vector<double>& from = columns[x];
+  const std::vector<double>& to = columns[y];
+  for (std::size_t i = 0; i < std::min(from.size(), to.size()); ++i)
+    out.points.emplace_back(from[i], to[i]);
+  return out;
+}
+
+Curve evaluated(const std::string& name,
+                const std::vector<Json>& evaluations,
+                const char* x,
+                const char* y) {
+  Curve out{name, {}};
+  for (const Json& each : evaluations) out.points.emplace_back(number(each, x), number(each, y));
+  return out;
+}
+
+std::map<std::string, std::string> settings(const std::string& toml) {
+  std::map<std::string, std::string> out;
+  std::istringstream stream(toml);
+  for (std::string line; std::getline(stream, line);) {
+    const std::size_t equals = line.find(" = ");
+    if (!line.starts_with("#") && equals != std::string::npos)
+      out[line.substr(0, equals)] = line.substr(equals + 3);
+  }
+  return out;
+}
+
+fs::path pictures_of(const fs::path& run, const std::vector<Json>& evaluations) {
+  if (evaluations.empty()) return {};
+  return run / "eval" / fmt::format("iteration_{:.0f}", number(evaluations.back(), "iteration"));
+}
+
+std::vector<Json> views_of(const fs::path& run, const std::vector<Json>& evaluations) {
+  const fs::path file = pictures_of(run, evaluations) / "metrics.json";
+  std::error_code error;
+  if (evaluations.empty() || !fs::is_regular_file(file, error)) return {};
+  return objects(io::read_json_object(file), "images");
+}
+
+std::string picture(const fs::path& folder, const Json& view, const std::string& what) {
+  const std::string name = view.value("name", "");
+  const fs::path file = folder / fs::path(name).stem().concat(".png");
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return "";
+  io::ImageEncoding encoding;
+  encoding.format = "jpeg";
+  encoding.quality = kPictureQuality;
+  const std::vector<unsigned char> bytes =
+      io::image_codec().encode("picture.jpg", read_image(file), encoding);
+  return fmt::format(
+      "<figure><img alt=\"{0}\" src=\"{1}\"/><figcaption>{2}: {0}, {3:.2f} dB (photo, render, "
+      "error)</figcaption></figure>\n",
+      escaped(name), data_url("image/jpeg", bytes), escaped(what), number(view, "psnr"));
+}
+
+}  // namespace raysplats::report

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "raysplats/error.hpp"
+#include "report/html.hpp"
+#include "report/run_files.hpp"
+#include "report/run_report.hpp"
+
+namespace raysplats {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using namespace report;
+
+constexpr std::size_t kMostRuns = 12;
+/// Views that are shown, so that the page stays small.
+constexpr std::size_t kShownViews = 2;
+
+struct Run {
+  fs::path folder;
+  std::string name;
+  std::string letter;  ///< what stands for it in curves
+  Json metrics;
+  std::vector<Json> evaluations;
+  std::vector<Json> views;  ///< of the last evaluation
+};
+
+std::vector<Run> read_runs(const std::vector<fs::path>& folders) {
+  std::vector<Run> runs;
+  for (const fs::path& folder : folders) {
+    Run run;
+    run.folder = folder;
+    run.name = run_name(folder);
+    run.letter = std::string(1, static_cast<char>('A' + runs.size()));
+    run.metrics = metrics_of(folder);
+    run.evaluations = objects(run.metrics, "evaluations");
+    run.views = views_of(folder, run.evaluations);
+    runs.push_back(std::move(run));
+  }
+  return runs;
+}
+
+/// A row of a table with a cell for each run; the greatest of finite numbers stands out.
+std::string numbers_row(const std::string& what,
+                        const std::vector<Run>& runs,
+                        const char* format,
+                        const std::function<double(const Run&)>& value,
+                        bool greatest_wins = false) {
+  std::vector<double> numbers;
+  for (const Run& run : runs) numbers.push_back(value(run));
+  const double most = *std::max_element(numbers.begin(), numbers.end());
+  std::string out = fmt::format("<tr><th>{}</th>", escaped(what));
+  for (const double number : numbers) {
+    const std::string text = std::isnan(number) ? "" : fmt::format(fmt::runtime(format), number);
+    out += greatest_wins && number == most ? fmt::format("<td><b>{}</b></td>", text)
+                                           : fmt::format("<td>{}</td>", text);
+  }
+  return out + "</tr>\n";
+}
+
+std::string heads(const std::vector<Run>& runs) {
+  std::string out = "<tr><th></th>";
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    out += fmt::format("<th class=\"c{}\">{}: {}</th>", i % kColors, runs[i].letter,
+                       escaped(runs[i].name));
+  }
+  return out + "</tr>\n";
+}
+
+double last_of(const Run& run, const char* key) {
+  return run.evaluations.empty() ? std::nan("") : number(run.evaluations.back(), key);
+}
+
+std::string figures(const std::vector<Run>& runs) {
+  const auto metric = [](const char* key, double scale = 1.0) {
+    return [key, scale](const Run& run) { return scale * number(run.metrics, key); };
+  };
+  std::string out = "<table>\n" + heads(runs);
+  out += numbers_row(
+      "PSNR of held-out views, dB", runs, "{:.2f}",
+      [](const Run& run) { return last_of(run, "psnr"); }, true);
+  out += numbers_row(
+      "SSIM", runs, "{:.4f}", [](const Run& run) { return last_of(run, "ssim"); }, true);
+  out += numbers_row("Gaussians", runs, "{:.0f}", metric("gaussians"));
+  out += numbers_row("Iterations", runs, "{:.0f}", metric("iteration"));
+  out += numbers_row("Training, s", runs, "{:.0f}", metric("training_seconds"));
+  out += numbers_row("Device memory at most, MiB", runs, "{:.0f}",
+                     metric("peak_device_bytes", 1.0 / 1048576.0));
+  out += "<tr><th>Device</th>";
+  for (const Run& run : runs)
+    out += fmt::format("<td>{}</td>", escaped(run.metrics.value("device", "")));
+  return out + "</tr>\n</table>\n";
+}
+
+std::string charts(const std::vector<Run>& runs) {
+  const auto of_evaluations = [&](const char* title, const char* label, const char* x,
+                                  const char* y) {
+    std::vector<Curve> curves;
+    for (const Run& run : runs) curves.push_back(evaluated(run.letter, run.evaluations, x, y));
+    return chart(title, label, curves);
+  };
+  std::vector<std::map<std::string, std::vector<double>>> columns;
+  for (const Run& run : runs) columns.push_back(columns_of(run.folder / "metrics.csv"));
+  const auto of_columns = [&](const char* title, const char* x, const char* label, const char* y) {
+    std::vector<Curve> curves;
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      curves.push_back(curve(runs[i].letter, columns[i], x, y));
+    return chart(title, label, curves);
+  };
+  return "<div class=\"charts\">\n" +
+         of_evaluations("PSNR of held-out views, dB", "iterations", "iteration", "psnr") +
+         of_evaluations("PSNR of held-out views, dB", "seconds of training", "training_seconds",
+                        "psnr") +
+         of_columns("PSNR of the view just trained, dB", "seconds", "seconds of training", "psnr") +
+         of_columns("Loss", "iteration", "iterations", "loss") +
+         of_columns("Gaussians", "iteration", "iterations", "gaussians") +
+         of_columns("Iterations a second", "iteration", "iterations", "it_per_s") + "</div>\n";
+}
+
+const Json* view_named(const Run& run, const std::string& name) {
+  const auto found = std::find_if(run.views.begin(), run.views.end(),
+                                  [&](const Json& view) { return view.value("name", "") == name; });
+  return found == run.views.end() ? nullptr : &*found;
+}
+
+/// The views that all runs have, those in which they differ most first.
+std::string held_out(const std::vector<Run>& runs) {
+  struct Common {
+    std::string name;
+    double spread = 0;
+  };
+  std::vector<Common> common;
+  for (const Json& view : runs.front().views) {
+    Common entry{view.value("name", ""), 0};
+    double least = number(view, "psnr"), most = least;
+    bool everywhere = true;
+    for (const Run& run : runs) {
+      const Json* other = view_named(run, entry.name);
+      everywhere = everywhere && other != nullptr;
+      if (other == nullptr) break;
+      least = std::min(least, number(*other, "psnr"));
+      most = std::max(most, number(*other, "psnr"));
+    }
+    entry.spread = most - least;
+    if (everywhere) common.push_back(entry);
+  }
+  if (common.empty()) return "<p>The runs have no held-out view in common.</p>\n";
+  std::stable_sort(common.begin(), common.end(),
+                   [](const Common& a, const Common& b) { return a.spread > b.spread; });
+  std::string out;
+  for (std::size_t i = 0; i < std::min(kShownViews, common.size()); ++i) {
+    for (const Run& run : runs) {
+      out += picture(pictures_of(run.folder, run.evaluations), *view_named(run, common[i].name),
+                     run.letter);
+    }
+  }
+  out += "<details><summary>All views</summary><table>\n" + heads(runs);
+  for (const Common& entry : common) {
+    out += numbers_row(
+        entry.name, runs, "{:.2f}",
+        [&](const Run& run) { return number(*view_named(run, entry.name), "psnr"); }, true);
+  }
+  return out + "</table></details>\n";
+}
+
+std::string differences(const std::vector<Run>& runs) {
+  std::vector<std::map<std::string, std::string>> all;
+  std::set<std::string> keys;
+  for (const Run& run : runs) {
+    all.push_back(settings(text_of(run.folder / "config.toml")));
+    for (const auto& [key, value] : all.back()) keys.insert(key);
+  }
+  std::string rows;
+  for (const std::string& key : keys) {
+    std::vector<std::string> values;
+    for (const auto& of_run : all) {
+      const auto found = of_run.find(key);
+      values.push_back(found == of_run.end() ? "" : found->second);
+    }
+    if (std::all_of(values.begin(), values.end(),
+                    [&](const std::string& value) { return value == values.front(); }))
+      continue;
+    rows += fmt::format("<tr><th>{}</th>", escaped(key));
+    for (const std::string& value : values) rows += fmt::format("<td>{}</td>", escaped(value));
+    rows += "</tr>\n";
+  }
+  if (rows.empty()) return "<p>All settings are the same.</p>\n";
+  return "<table>\n" + heads(runs) + rows + "</table>\n";
+}
+
+}  // namespace
+
+std::string runs_report(const std::vector<fs::path>& folders) {
+  if (folders.size() < 2 || folders.size() > kMostRuns) {
+    throw UsageError(
+        fmt::format("{} runs do not go side by side: give 2 to {}", folders.size(), kMostRuns));
+  }
+  const std::vector<Run> runs = read_runs(folders);
+  std::string title;
+  for (const Run& run : runs) title += (title.empty() ? "" : ", ") + run.name;
+  return page(title, figures(runs) + "<h2>Curves</h2>\n" + charts(runs) +
+                         "<h2>Held-out views that differ most</h2>\n" + held_out(runs) +
+                         "<h2>Settings that differ</h2>\n" + differences(runs));
+}
+
+}  // namespace raysplats
