@@ -312,6 +312,29 @@ void make_models(const fs::path& root) {
   }
 }
 
+void make_paths(const fs::path& root) {
+  const Corpus corpus(root, "camera_path");
+  corpus.add("keys.toml", std::string(1, '\0') +
+                              "fps = 12\nclosed = true\nwidth = 8\nheight = 6\n[[key]]\n"
+                              "eye = [0, -1, -4]\ntarget = [0, 0, 0]\nseconds = 1\n[[key]]\n"
+                              "eye = [3, -1, 2]\ntarget = [0, 0, 0]\nup = [0, -1, 0]\nfov = 35\n");
+  const auto path = [](int x) {
+    return fmt::format(
+        R"({{"camera_to_world":[1,0,0,{0},0,1,0,0,0,0,1,4,0,0,0,1],"fov":50,"aspect":1.5}})", x);
+  };
+  const std::string head =
+      R"({"camera_type":"perspective","render_width":8,"render_height":6,"fps":4,"seconds":1,)";
+  const std::string frames = head + R"("camera_path":[)" + path(0) + "," + path(1) + "]}";
+  corpus.add("frames.json", "\1" + frames);
+  corpus.add("keyframes.json",
+             "\2" + head +
+                 R"("is_cycle":true,"keyframes":[{"matrix":"[1,0,0,0,0,1,0,0,0,0,1,0,0,0,4,1]",)"
+                 R"("fov":50,"aspect":1.5},{"matrix":[1,0,0,2,0,1,0,0,0,0,1,4,0,0,0,1],"fov":60,)"
+                 R"("aspect":1.5}]})");
+  corpus.add("scaled.json", "\3" + frames.substr(0, frames.size() - 1) +
+                                R"(,"transform":[[1,0,0,0],[0,1,0,0],[0,0,1,0]],"scale":0.5})");
+}
+
 void make_view(const fs::path& root) {
   const Corpus corpus(root, "view");
   const std::string seen = R"("id":1,"fov":50,"size":[64,48],"c2w":[1,0,0,0,0,1,0,0,0,0,1,-6])";
@@ -389,6 +412,7 @@ int main(int argc, char** argv) {
   make_checkpoints(root);
   make_meshes(root);
   make_models(root);
+  make_paths(root);
   make_view(root);
   make_scenes(root);
   return 0;
