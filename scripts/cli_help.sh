@@ -10,10 +10,10 @@ new=$(mktemp)
 trap 'rm -f "$new"' EXIT
 awk '/^## All options$/ { exit } { print }' "$page" >"$new"
 {
-  printf '## All options\n\nWhat `-h` prints (`scripts/cli_help.sh` writes this section).\n'
+  printf '## All options\n\nWhat `--help-all` prints (`scripts/cli_help.sh` writes this section).\n'
   for command in devices doctor generate prepare train render eval trace info convert view report bench "bench compare" tune completion manual; do
     # shellcheck disable=SC2086  # two words are two arguments
-    help=$("$raysplats" $command -h)
+    help=$("$raysplats" $command --help-all)
     printf '\n```text\n%s\n```\n' "$(sed 's/ *$//' <<<"$help")"
   done
 } >>"$new"

@@ -59,6 +59,8 @@ int run(int argc, char** argv, GlobalOptions& global) {
   CLI::App app{"Trains and renders 3D Gaussians by ray tracing on any OpenCL device", "raysplats"};
   app.set_version_flag("--version", "raysplats " RAYSPLATS_VERSION);
   app.formatter(std::make_shared<HelpFormatter>());
+  app.set_help_flag("-h,--help", "Print this help message and exit");
+  app.set_help_all_flag("--help-all", "Print help with every option and exit");
   app.require_subcommand(1);
   app.fallthrough();
   add_global_options(app, global);

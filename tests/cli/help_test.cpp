@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -21,9 +22,10 @@ std::string trimmed(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("docs/cli.md lists what -h lists") {
+TEST_CASE("docs/cli.md lists what --help-all lists") {
   const std::string page = read_file(std::string(RAYSPLATS_SOURCE_DIR) + "/docs/cli.md");
   for (const std::vector<std::string>& command : {std::vector<std::string>{"devices"},
+                                                  {"doctor"},
                                                   {"generate"},
                                                   {"prepare"},
                                                   {"train"},
@@ -40,7 +42,7 @@ TEST_CASE("docs/cli.md lists what -h lists") {
                                                   {"completion"},
                                                   {"manual"}}) {
     std::vector<std::string> words = command;
-    words.emplace_back("-h");
+    words.emplace_back("--help-all");
     const Outcome help = raysplats_program(words);
     REQUIRE(help.code == 0);
     INFO(command.back() << ": scripts/cli_help.sh writes this section");
@@ -48,8 +50,30 @@ TEST_CASE("docs/cli.md lists what -h lists") {
   }
 }
 
-TEST_CASE("-h shows defaults that can be pasted") {
-  const Outcome help = raysplats_program({"train", "-h"});
+TEST_CASE("-h shows what most people need and says how much more there is") {
+  const auto lines = [](const std::string& text) {
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  const Outcome brief = raysplats_program({"train", "-h"});
+  const Outcome whole = raysplats_program({"train", "--help-all"});
+  CHECK(brief.code == 0);
+  CHECK(whole.code == 0);
+  CHECK(lines(brief.out) * 2 < lines(whole.out));
+  CHECK(brief.out.find(" more options: raysplats train --help-all\n") != std::string::npos);
+  CHECK(whole.out.find("more options") == std::string::npos);
+  for (const char* option : {"--iterations", "--quality", "--max-gaussians", "--device"})
+    CHECK(brief.out.find(option) != std::string::npos);
+  CHECK(brief.out.find("--adam-beta1") == std::string::npos);
+  CHECK(whole.out.find("--adam-beta1") != std::string::npos);
+  // Nothing is left out of a short list, and commands do not take each other's place.
+  CHECK(raysplats_program({"report", "-h"}).out.find("more options") == std::string::npos);
+  CHECK(raysplats_program({"render", "-h"}).out.find("raysplats render --help-all") !=
+        std::string::npos);
+  CHECK(raysplats_program({"--help-all"}).out.find("--adam-beta1") != std::string::npos);
+}
+
+TEST_CASE("--help-all shows defaults that can be pasted") {
+  const Outcome help = raysplats_program({"train", "--help-all"});
   CHECK(help.out.find("--adaptive-radius,--no-adaptive-radius [default: true]") !=
         std::string::npos);
   CHECK(help.out.find("{false}") == std::string::npos);

@@ -42,7 +42,7 @@ TEST_CASE("help and version") {
 }
 
 TEST_CASE("help of train lists the configuration keys and hides foreign names") {
-  const Outcome help = raysplats_program({"train", "-h"});
+  const Outcome help = raysplats_program({"train", "--help-all"});
   for (const char* key :
        {"--iterations", "--ssim-weight", "--densify-grad-threshold", "--config", "--resume"}) {
     CHECK(contains(help.out, key));
