@@ -105,7 +105,7 @@ _raysplats() {{
   if [[ $current == -* || -z $command ]]; then
     COMPREPLY=($(compgen -W "$words" -- "$current"))
   else
-    COMPREPLY=($(compgen -f -- "$current"))
+    mapfile -t COMPREPLY < <(compgen -f -- "$current")
   fi
 }}
 complete -o filenames -F _raysplats raysplats

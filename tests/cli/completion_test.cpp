@@ -42,6 +42,8 @@ TEST_CASE("bash completes commands, options, words of options and files") {
   REQUIRE(outcome.code == 0);
   write_file(folder / "raysplats.bash", outcome.out);
   write_file(folder / "garden.ply", "");
+  write_file(folder / "my *.ply", "");
+  CHECK(offered(folder, {"raysplats", "info", "my"}) == Words{"my *.ply"});
   CHECK(offered(folder, {"raysplats", "tr"}) == Words{"train", "trace"});
   CHECK(offered(folder, {"raysplats", "train", "--val"}) ==
         Words{"--validate-every", "--validate-views"});
