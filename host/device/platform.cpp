@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cstdlib>
 #include <string_view>
 
 #include "device/cl.hpp"
@@ -113,6 +114,38 @@ DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
   return info;
 }
 
+// The parts of a device that RAYSPLATS_CPU_PARTS asks for, else itself.
+std::vector<cl::Device> parts_of(const cl::Device& device) {
+  const char* text = std::getenv("RAYSPLATS_CPU_PARTS");
+  if (text == nullptr || type_of(device.getInfo<CL_DEVICE_TYPE>()) != DeviceType::kCpu)
+    return {device};
+  const std::string_view value(text);
+  const cl_uint units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+  cl_uint parts = 0;
+  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), parts);
+  if (error != std::errc() || end != value.data() + value.size() || parts < 1 || parts > units) {
+    throw UsageError(
+        fmt::format("RAYSPLATS_CPU_PARTS = '{}' cannot be: {} has {} compute units, give a number "
+                    "from 1 to that",
+                    value, trimmed(device.getInfo<CL_DEVICE_NAME>()), units));
+  }
+  if (parts == 1) return {device};
+  const cl_device_partition_property equally[] = {
+      CL_DEVICE_PARTITION_EQUALLY, static_cast<cl_device_partition_property>(units / parts), 0};
+  std::vector<cl::Device> found;
+  cl::Device whole = device;
+  try {
+    whole.createSubDevices(equally, &found);
+  } catch (const cl::Error& failure) {
+    throw UsageError(fmt::format(
+        "RAYSPLATS_CPU_PARTS = {}: the driver of {} does not divide it "
+        "({} {}); leave the variable out",
+        parts, trimmed(device.getInfo<CL_DEVICE_NAME>()), failure.what(), failure.err()));
+  }
+  found.resize(parts);  // the last cores where the division leaves some
+  return found;
+}
+
 }  // namespace
 
 std::vector<PlatformDevice> platform_devices() {
@@ -132,9 +165,11 @@ std::vector<PlatformDevice> platform_devices() {
       continue;  // a platform without devices is an error too
     }
     for (const cl::Device& device : devices) {
-      DeviceInfo info = query(platform, device);
-      info.index = found.size();
-      found.push_back({std::move(info), device});
+      for (const cl::Device& part : parts_of(device)) {
+        DeviceInfo info = query(platform, part);
+        info.index = found.size();
+        found.push_back({std::move(info), part});
+      }
     }
   }
   return found;

@@ -133,6 +133,31 @@ TEST_CASE("what photos have of their own is shared too") {
   }
 }
 
+TEST_CASE("the parts of a processor train as one of them does") {
+  const TemporaryFolder folder;
+  const Surroundings halves{.environment = {{"RAYSPLATS_CPU_PARTS", "2"}}};
+  const Outcome devices = raysplats_program({"devices"}, halves);
+  if (devices.code != 0 && has(devices.err, "compute units, give a number")) {
+    MESSAGE("one core alone cannot be divided");
+    return;
+  }
+  INFO(devices.err);
+  REQUIRE(devices.code == 0);
+  const auto train = [&](const std::string& name, const std::string& list) {
+    const Outcome outcome =
+        raysplats_program(shared_training(folder / name) + Words{"--device", list}, halves);
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    return folder / name;
+  };
+  const std::string one = train("one", "1");
+  CHECK(same_run(train("two", "0,1"), one));
+  const Outcome no =
+      raysplats_program({"devices"}, {.environment = {{"RAYSPLATS_CPU_PARTS", "0"}}});
+  CHECK(no.code == 2);
+  CHECK(one_sentence(no));
+}
+
 TEST_CASE("ranks without a view are refused") {
   const TemporaryFolder folder;
   const Outcome outcome =
