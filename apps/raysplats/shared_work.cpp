@@ -71,11 +71,15 @@ void share_work(const DeviceFlags& flags,
   });
 }
 
-FrameOptions share_of(const Communicator& ranks, FrameOptions options) {
+FrameOptions share_of(Communicator& ranks, FrameOptions options, std::size_t frames, bool bands) {
   if (ranks.size() > 1 && options.video != nullptr) {
     throw UsageError(
         "--video is written by one rank, frame after frame: leave out mpirun and the list of "
         "--device, or write the frames alone");
+  }
+  if (bands && frames < static_cast<std::size_t>(ranks.size())) {
+    options.bands = &ranks;
+    return options;
   }
   options.offset = static_cast<std::size_t>(ranks.rank());
   options.stride = static_cast<std::size_t>(ranks.size());

@@ -4,12 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <set>
+#include <span>
 
+#include "comm/communicator.hpp"
 #include "core/camera_path.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -96,11 +99,31 @@ void add(Image& sum, Image image) {
   for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += image.data[i];
 }
 
+// Brings the rows that each rank has drawn to the one that leads.
+void collect(Communicator& ranks, const std::array<int, 2>& rows, Image& image) {
+  if (ranks.size() == 1) return;
+  const auto of_rows = [&image](const std::array<int, 2>& r) {
+    const auto row =
+        static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.channels);
+    return std::as_writable_bytes(std::span(image.data)
+                                      .subspan(row * static_cast<std::size_t>(r[0]),
+                                               row * static_cast<std::size_t>(r[1] - r[0])));
+  };
+  const std::vector<std::array<int, 2>> all = ranks.all(rows);
+  std::vector<Outgoing> out;
+  std::vector<Incoming> in;
+  if (!ranks.leads()) out.push_back({0, of_rows(rows)});
+  for (int rank = 1; ranks.leads() && rank < ranks.size(); ++rank)
+    in.push_back({rank, of_rows(all[static_cast<std::size_t>(rank)])});
+  ranks.exchange(out, in);
+}
+
 Exposed exposed(Tracer& tracer,
                 const Model& model,
                 std::span<const Camera> cameras,
                 std::size_t frame,
                 const FrameOptions& options,
+                Communicator& ranks,
                 const std::function<bool(double)>& within) {
   const int moments = options.shutter_samples;
   Exposed out;
@@ -109,9 +132,11 @@ Exposed exposed(Tracer& tracer,
     Image moment =
         tracer.render(model, downscaled(camera, 1.0 / options.supersample), false,
                       [&](double share) { return !within || within((k + share) / moments); });
-    if (moment.data.empty()) return {};
+    if (ranks.any(moment.data.empty())) return {};
+    collect(ranks, tracer.rows(), moment);
     if (options.depth || options.hits) {
-      const Image depth = tracer.depth();
+      Image depth = tracer.depth();
+      collect(ranks, tracer.rows(), depth);
       if (options.depth) add(out.depth, weighted_depth(depth, moment));
       if (options.hits) add(out.hits, hits_of(depth));
     }
@@ -299,10 +324,13 @@ FrameReport write_frames(Tracer& tracer,
   }
   const std::vector<std::string> names = frame_names(cameras);
   FrameReport report;
+  Communicator alone;
+  Communicator& ranks = options.bands != nullptr ? *options.bands : alone;
+  tracer.set_share(static_cast<std::size_t>(ranks.rank()), static_cast<std::size_t>(ranks.size()));
   for (std::size_t i = options.offset; i < cameras.size(); i += options.stride) {
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
-    const Exposed samples = exposed(tracer, model, cameras, i, options, within);
+    const Exposed samples = exposed(tracer, model, cameras, i, options, ranks, within);
     if (samples.rgba.data.empty()) break;
     FrameLayers layers;
     if (options.depth) layers.depth = average_depth(samples.depth, options.supersample);
@@ -311,20 +339,29 @@ FrameReport write_frames(Tracer& tracer,
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
         (tracer.context().build_seconds() - built);
     report.capped_rays += samples.capped_rays;
+    // What follows is left to the one that leads.
+    if (!ranks.leads()) {
+      if (ranks.any(done && !done(report.frames))) break;
+      continue;
+    }
     report.rays += samples.rgba.pixels() * static_cast<std::uint64_t>(options.shutter_samples);
     if (options.normals) {
       const double last = options.shutter * (options.shutter_samples - 1) / options.shutter_samples;
       const Image sums = tracer.normals(
           model, downscaled(later(cameras, i, last, options.closed), 1.0 / options.supersample),
           within);
-      if (sums.data.empty()) break;
+      if (sums.data.empty()) {
+        ranks.any(true);
+        break;
+      }
       layers.normals = unit_normals(box_average(sums, options.supersample));
     }
     write_frame(folder / names[i], box_average(samples.rgba, options.supersample), cameras[i],
                 layers, options);
     ++report.frames;
-    if (done && !done(report.frames)) break;
+    if (ranks.any(done && !done(report.frames))) break;
   }
+  tracer.set_share(0, 1);
   return report;
 }
 

@@ -179,6 +179,13 @@ Image Tracer::render(const Model& model,
   return self.views.download_image();
 }
 
+void Tracer::set_share(std::size_t part, std::size_t parts) {
+  const auto lock = impl_->context.lock();
+  impl_->views.set_share(part, parts);
+}
+
+std::array<int, 2> Tracer::rows() const { return impl_->views.rows(); }
+
 Image Tracer::depth() const {
   const Impl& self = *impl_;
   const auto lock = self.context.lock();

@@ -136,6 +136,13 @@ struct ViewTracer::Impl {
     return watch ? std::min(most, kWatchedBatch) : most;
   }
   Kernel kernel(const char* name) { return context.kernel("light/mirror_paths.cl", name); }
+  // Of a picture that is traced ray by ray.
+  std::array<int, 2> ray_rows() const {
+    const auto row = [this](std::size_t p) {
+      return static_cast<int>(static_cast<std::size_t>(camera.height) * p / parts);
+    };
+    return {row(part), row(part + 1)};
+  }
   void trace_batch(const DeviceGaussians& gaussians,
                    std::size_t first,
                    std::size_t count,
@@ -157,6 +164,7 @@ struct ViewTracer::Impl {
   Buffer<std::uint32_t> kept_capped;  // rays that stopped because of max_hits, two words
   std::optional<Rays> rays;           // once a view needs it
   std::function<void(double)> watch;
+  std::size_t part = 0, parts = 1;  // of pictures
   // The last view.
   bool by_rays = false;
   bool own_image = false;  // `image` is what it shows, else that of `packets`
@@ -254,8 +262,12 @@ void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep)
   const std::size_t pixels = pixels_of(camera);
   image.ensure(context, 4 * pixels, "image");
   if (options.depth) depth.ensure(context, 3 * pixels, "depth");
-  for (std::size_t first = 0; first < pixels; first += batch()) {
-    const std::size_t count = std::min(batch(), pixels - first);
+  const auto [top, bottom] = keep ? std::array<int, 2>{0, camera.height} : ray_rows();
+  const auto row = static_cast<std::size_t>(camera.width);
+  const std::size_t begin = row * static_cast<std::size_t>(top);
+  const std::size_t end = row * static_cast<std::size_t>(bottom);
+  for (std::size_t first = begin; first < end; first += batch()) {
+    const std::size_t count = std::min(batch(), end - first);
     trace_batch(gaussians, first, count, rays->capped);
     kernel("store_picture")
         .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), paths.seen(),
@@ -267,9 +279,19 @@ void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep)
     }
     if (!watch) continue;
     context.finish();
-    watch(static_cast<double>(first + count) / static_cast<double>(pixels));
+    watch(static_cast<double>(first + count - begin) / static_cast<double>(end - begin));
   }
   if (keep) kept_capped.copy_from(rays->capped, 2);
+}
+
+void ViewTracer::set_share(std::size_t part, std::size_t parts) {
+  impl_->part = part;
+  impl_->parts = parts;
+  impl_->packets.set_share(part, parts);
+}
+
+std::array<int, 2> ViewTracer::rows() const {
+  return impl_->by_rays ? impl_->ray_rows() : impl_->packets.rows();
 }
 
 const Buffer<float>& ViewTracer::image() const {

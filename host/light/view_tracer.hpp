@@ -45,6 +45,9 @@ class ViewTracer {
                const Camera& camera,
                bool keep = false,
                ViewSizes sizes = ViewSizes::kAwaited);
+  /// CameraTracer::set_share() and rows(), of views that are traced ray by ray too, without `keep`.
+  void set_share(std::size_t part, std::size_t parts);
+  std::array<int, 2> rows() const;
   /// Of views that were traced with ViewSizes::kAhead, as CameraTracer says; those that are traced
   /// ray by ray wait for their sizes and always fit.
   const Buffer<std::uint32_t>& overflow() const;

@@ -65,6 +65,15 @@ struct CameraTracer::Impl {
   bool can_trace_ahead() const;
   void trace_ahead(const DeviceGaussians& gaussians);
   TileWindow whole() const { return tile_window(0, lists.tile_rows()); }
+  // The rows of tiles of set_share().
+  TileWindow share() const {
+    const std::size_t first = tile_rows() * part / parts;
+    return tile_window(static_cast<std::uint32_t>(first),
+                       static_cast<std::uint32_t>(tile_rows() * (part + 1) / parts - first));
+  }
+  std::size_t tile_rows() const {
+    return static_cast<std::size_t>((camera.height + packet.tile - 1) / packet.tile);
+  }
   TileWindow tile_window(std::uint32_t row, std::uint32_t rows) const {
     return {0, static_cast<std::int32_t>(row), static_cast<std::int32_t>(lists.tiles_x()),
             static_cast<std::int32_t>(rows)};
@@ -165,8 +174,9 @@ struct CameraTracer::Impl {
   bool traced_whole = false;  // the last view that was waited for fits the memory budget
   Statistics saved;
   bool statistics_saved = false;
-  bool hits_kept = false;      // the last forward() was asked to keep hits
-  bool hits_complete = false;  // and all of them fit
+  std::size_t part = 0, parts = 1;  // set_share()
+  bool hits_kept = false;           // the last forward() was asked to keep hits
+  bool hits_complete = false;       // and all of them fit
   GradientSums sums;
   Buffer<float> pose;
   GaussianGradients pose_scratch;
@@ -200,6 +210,21 @@ void CameraTracer::update(const DeviceGaussians& gaussians) {
   if (self.count != gaussians.count) self.traced_whole = self.pool.size() > 0;
   self.count = gaussians.count;
   self.revision = gaussians.revision;
+}
+
+void CameraTracer::set_share(std::size_t part, std::size_t parts) {
+  impl_->part = part;
+  impl_->parts = parts;
+}
+
+std::array<int, 2> CameraTracer::rows() const {
+  const Impl& self = *impl_;
+  if (self.hits_kept) return {0, self.camera.height};
+  const TileWindow window = self.share();
+  const auto pixel_row = [&](std::int32_t row) {
+    return std::min(row * self.packet.tile, static_cast<int>(self.camera.height));
+  };
+  return {pixel_row(window.row), pixel_row(window.row + window.rows)};
 }
 
 const Buffer<std::uint32_t>& CameraTracer::overflow() const { return impl_->overflow; }
@@ -294,7 +319,8 @@ void CameraTracer::Impl::trace_faces(const DeviceGaussians& gaussians, bool keep
   room = static_cast<std::uint32_t>(keep ? view_room() : 0);
   for (const int number : faces()) {
     set_face(gaussians, number);
-    trace_window(gaussians, whole(), keep);
+    const TileWindow window = keep ? whole() : share();
+    if (window.rows > 0) trace_window(gaussians, window, keep);
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -50,6 +51,12 @@ class CameraTracer {
                const Camera& camera,
                bool keep_hits = false,
                ViewSizes sizes = ViewSizes::kAwaited);
+  /// From the next forward() without keep_hits on: traces the rows of tiles that are part `part` of
+  /// `parts` equal ones, and leaves the others' pixels as they are. Whoever traces the parts gets
+  /// the pixels of the whole.
+  void set_share(std::size_t part, std::size_t parts);
+  /// First and last (exclusive) row of pixels that the last forward() has traced.
+  std::array<int, 2> rows() const;
   /// Not 0 in its word once a view with ViewSizes::kAhead had too little room: that view and those
   /// after it show the background alone and have no gradients, until clear_overflow().
   const Buffer<std::uint32_t>& overflow() const;

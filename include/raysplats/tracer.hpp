@@ -100,6 +100,12 @@ class Tracer {
   /// of a degree or not finite.
   void set_background(const std::array<float, 3>& background, const SkyLight& sky = {});
 
+  /// Of the library itself: from the next render() that is not differentiable on, trace part `part`
+  /// of `parts` equal ones of the picture's rows, and leave the others' pixels open; the rows,
+  /// first and last (exclusive), of the last picture.
+  void set_share(std::size_t part, std::size_t parts);
+  std::array<int, 2> rows() const;
+
   /// Of the library itself; not installed.
   struct Impl;
   Impl& impl() const { return *impl_; }

@@ -71,6 +71,36 @@ TEST_CASE("lists of devices that make no sense are refused") {
   }
 }
 
+TEST_CASE("ranks draw bands of a frame where there are fewer frames than ranks") {
+  const Orbit orbit;
+  // Bands of whole tiles, of none, ray by ray, averaged samples and moments; layers beside colours.
+  const std::vector<Words> ways{{"--depth", "--normals", "--hits"},
+                                {"--traversal", "bvh", "--depth"},
+                                {"--supersample", "2", "--shutter-samples", "2", "--depth"},
+                                {"--format", "exr"}};
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    CAPTURE(i);
+    const auto command = [&](const std::string& out) {
+      return Words{"render", orbit.model, "--orbit",          "2", "--width",
+                   "70",     "-o",        orbit.folder / out, "-q"} +
+             ways[i];
+    };
+    const std::string one = "one " + std::to_string(i);
+    const Outcome alone = raysplats_program(command(one));
+    INFO(alone.err);
+    REQUIRE(alone.code == 0);
+    for (const std::string devices : {"0,0,0", "0,0,0,0,0,0,0"}) {
+      CAPTURE(devices);
+      const std::string out = std::to_string(i) + " of " + devices;
+      const Outcome shared = raysplats_program(command(out) + Words{"--device", devices});
+      INFO(shared.err);
+      REQUIRE(shared.code == 0);
+      CHECK(has(shared.out, "2 frames in"));
+      CHECK(files_of(orbit.folder / out) == files_of(orbit.folder / one));
+    }
+  }
+}
+
 TEST_CASE("a video is for one rank") {
   const Orbit orbit;
   const Outcome outcome =

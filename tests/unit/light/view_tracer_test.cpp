@@ -3,7 +3,10 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "raysplats/error.hpp"
 #include "unit/light/view_fixture.hpp"
@@ -44,6 +47,54 @@ TEST_CASE("a pinhole's gradients ray by ray are those of packets") {
   ViewTracer exact(context, options), exact_batches(context, tight);
   CHECK(trace_and_differentiate(context, exact, gaussians, large, noise, true).gradients ==
         trace_and_differentiate(context, exact_batches, gaussians, large, noise, true).gradients);
+}
+
+TEST_CASE("parts of a picture have its pixels, and nobody traces another's") {
+  Context context = make_test_context();
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(context, reference::random_scene(300, 17, 1), ScaleActivation::kExp);
+  const Camera pinhole = look_at({0.4, -0.6, -4.0}, {0, 0, 0}, {0, 1, 0}, 50, 58, 70);
+  for (const auto& [camera, traversal] : {std::pair{pinhole, Traversal::kTiles},
+                                          {pinhole, Traversal::kBvh},
+                                          {fisheye_camera(160, 160), Traversal::kTiles}}) {
+    CAPTURE(static_cast<int>(traversal));
+    CAPTURE(static_cast<int>(camera.model));
+    TraceOptions options;
+    options.traversal = traversal;
+    ViewTracer tracer(context, options);
+    tracer.forward(gaussians, camera);
+    const Image black = tracer.download_image();
+    tracer.set_background({0.2f, 0.7f, 0.4f});
+    tracer.forward(gaussians, camera);
+    const Image green = tracer.download_image();
+    const std::uint64_t hits = tracer.statistics().hits;
+    // Also more parts than rows of tiles.
+    for (const std::size_t parts : {1u, 3u, 7u}) {
+      CAPTURE(parts);
+      int row = 0;
+      std::uint64_t sum = 0;
+      for (std::size_t part = 0; part < parts; ++part) {
+        tracer.set_share(0, 1);
+        tracer.set_background({});
+        tracer.forward(gaussians, camera);
+        tracer.set_share(part, parts);
+        tracer.set_background({0.2f, 0.7f, 0.4f});
+        tracer.forward(gaussians, camera);
+        sum += tracer.statistics().hits;
+        const auto [first, last] = tracer.rows();
+        CHECK(first == row);
+        row = last;
+        const Image got = tracer.download_image();
+        const auto begin = static_cast<std::ptrdiff_t>(4 * camera.width * first);
+        const auto end = static_cast<std::ptrdiff_t>(4 * camera.width * last);
+        std::vector<float> expected = black.data;
+        std::copy(green.data.begin() + begin, green.data.begin() + end, expected.begin() + begin);
+        CHECK(got.data == expected);
+      }
+      CHECK(row == camera.height);
+      CHECK(sum == hits);
+    }
+  }
 }
 
 TEST_CASE("what a tracer of rays refuses, and a tree that is refitted") {
