@@ -42,8 +42,11 @@ typedef struct {
 // the host retries with less work or more memory.
 uint stream_push(HitStream* stream, uint reference, uint window) {
   if (stream->chunk == RS_NO_CHUNK || stream->used == CHUNK) {
-    const uint next =
-        *stream->cursor < RS_MOST_CHUNKS ? atomic_inc(stream->cursor) : RS_MOST_CHUNKS;
+    uint next = atomic_inc(stream->cursor);
+    if (next >= RS_MOST_CHUNKS) {
+      next = RS_MOST_CHUNKS;
+      atomic_min(stream->cursor, RS_MOST_CHUNKS);
+    }
     if (next < stream->capacity) stream->pool[(size_t)next * CHUNK] = (uint2)(stream->chunk, 0);
     stream->chunk = next;
     stream->used = 1;
