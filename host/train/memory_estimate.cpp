@@ -95,15 +95,15 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   const std::size_t record =
       2 * sizeof(RsLine) + exact + sizeof(RsViewBounds) + sizeof(RsAabb) + 44;
   if (packets) out.tracing = demand.gaussians * record;
-  // Image, gradient, depth, 15 planes of the loss, a photo that found no room and its floats at
-  // half the size.
+  // Image, gradient, depth, 15 planes of the loss, a photo that found no room (two where the next
+  // one comes meanwhile) and its floats at half the size.
   const std::size_t photo = demand.photo_words * sizeof(std::uint32_t);
-  out.images =
-      std::min(static_cast<std::size_t>(options.image_budget) * kMiB,
-               demand.views * demand.pixels * photo) +
-      demand.pixels *
-          (photo + (25 + (options.exposure ? 4 : 0) + (options.background == "sky" ? 8 : 0)) *
-                       sizeof(float));
+  const std::size_t passing = device.type == DeviceType::kCpu ? 1 : 2;
+  out.images = std::min(static_cast<std::size_t>(options.image_budget) * kMiB,
+                        demand.views * demand.pixels * photo) +
+               demand.pixels * (passing * photo + (25 + (options.exposure ? 4 : 0) +
+                                                   (options.background == "sky" ? 8 : 0)) *
+                                                      sizeof(float));
   if (packets) {
     out.hits = std::min(MemoryShares(options.trace, device).all(),
                         demand.pixels * static_cast<std::size_t>(options.trace.max_hits) * 12);

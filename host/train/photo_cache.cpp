@@ -27,16 +27,30 @@ PhotoCache::PhotoCache(Context& context,
       budget_(budget),
       entries_(views.size()),
       reduce_(context.kernel("train/photo_reduce.cl", "reduce_photo")),
-      loader_(views, ahead * largest_photo(views)) {}
+      loader_(views, ahead * largest_photo(views)) {
+  if (context.device().type != DeviceType::kCpu) uploads_.emplace(context);
+}
 
 const PhotoCache::Entry& PhotoCache::full_size(std::size_t view) {
   Entry& entry = entries_[view];
+  // What was enqueued until now is all that uses the last passing photo.
+  if (uploads_ && passing_used_) {
+    passing_[turn_].free = uploads_->moment();
+    turn_ = (turn_ + 1) % passing_.size();
+  }
+  passing_used_ = false;
   if (entry.width > 0) return entry;
   const std::shared_ptr<const io::Photo> photo = loader_.get(view);
   const bool stays = cached_ + photo->bytes() <= budget_;
-  Entry& target = stays ? entry : passing_;
+  passing_used_ = !stays;
+  Entry& target = stays ? entry : passing_[turn_].entry;
   target.words.ensure(context_, photo->words.size(), "photo");
-  target.words.upload_later({photo, &photo->words});
+  if (uploads_) {
+    uploads_->upload(photo->words, target.words,
+                     stays ? UploadQueue::Moment() : std::move(passing_[turn_].free));
+  } else {
+    target.words.upload_later({photo, &photo->words});
+  }
   target.width = photo->width;
   target.height = photo->height;
   target.planes = photo->planes;

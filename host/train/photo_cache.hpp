@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "device/kernel.hpp"
+#include "device/upload_queue.hpp"
 #include "io/view_loader.hpp"
 #include "raysplats/dataset.hpp"
 #include "train/device_photo.hpp"
@@ -19,6 +22,8 @@ namespace raysplats {
 /// that fit the budget stay there, and nowhere else; the others are loaded again whenever they are
 /// asked for (every view comes once per pass, so replacing the oldest one would never find
 /// anything). Smaller sizes are made on the device, from unrounded sums, for the step that asks.
+/// Except on CPUs, whose memory they are in already, photos come to the device while it runs what
+/// was enqueued before (UploadQueue).
 class PhotoCache {
  public:
   /// `budget` in bytes of the device. The host holds `ahead` photos that are about to be asked for.
@@ -43,13 +48,22 @@ class PhotoCache {
     Buffer<std::uint32_t> words;
   };
 
+  // A photo that found no room, and the moment from which on no step uses it.
+  struct Passing {
+    Entry entry;
+    UploadQueue::Moment free;
+  };
+
   const Entry& full_size(std::size_t view);
 
   Context& context_;
   std::size_t budget_;
   std::size_t cached_ = 0;
   std::vector<Entry> entries_;
-  Entry passing_;  // the view that found no room
+  std::array<Passing, 2> passing_;  // in turns, so that one can come while the other is used
+  std::size_t turn_ = 0;
+  bool passing_used_ = false;  // by the last step, the one of this turn
+  std::optional<UploadQueue> uploads_;
   Buffer<std::uint32_t> reduced_;
   Kernel reduce_;
   io::ViewLoader loader_;

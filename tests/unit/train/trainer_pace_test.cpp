@@ -58,6 +58,7 @@ TEST_CASE("between reports and density passes the host never waits for the devic
   for (const double budget : {-1.0, 1000.0}) {
     CAPTURE(budget);
     options.trace.launch_budget_ms = budget;
+    options.image_budget = budget < 0 ? 1024 : 0;  // then every photo comes again for its step
     Trainer trainer(context, load_dataset((photos.folder / "data").string()), options,
                     photos.folder / "run", true);
     // Photos, room and sizes of launches come with the first steps; a model that grows needs more
@@ -73,6 +74,18 @@ TEST_CASE("between reports and density passes the host never waits for the devic
     trainer.step(options.iterations);  // with the report of the last one
     CHECK(context.host_waits() > before);
   }
+}
+
+TEST_CASE("photos that come again for every step train as those that stay on the device") {
+  const Photos photos;
+  TrainOptions options = quiet_training();
+  const Gaussians stayed = trained(photos, options, "RAYSPLATS_FAIL_HITS", 0);
+  options.image_budget = 0;
+  const Gaussians came = trained(photos, options, "RAYSPLATS_FAIL_HITS", 0);
+  CHECK(came.means == stayed.means);
+  CHECK(came.log_scales == stayed.log_scales);
+  CHECK(came.opacities == stayed.opacities);
+  CHECK(came.sh == stayed.sh);
 }
 
 TEST_CASE("steps whose views had no room are made again and leave the same parameters") {
