@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits how the time of a training step follows the number of ranks, one core each (docs/scaling.md):
 t(R) = own + views B / R + latency + bytes / bandwidth.
-`own` (what every rank does) and `views` (for each view) are processor time of one rank, which other work on the machine does
-not change; latency and bandwidth are fitted to what two ranks take more. Their time is that of a clock, a low quantile over
-the steps of a run: they have to have their cores for so long, by `nice -n -19` on a machine with other work. Every step takes
-the same two photos, once or twice.
+`own` (what every rank does) and `views` (for each view) are processor time of one rank, which other work on the machine
+does not change; latency and bandwidth are fitted to what two ranks take more. Their time is that of a clock, a low
+quantile over the steps of a run: they have to have their cores for so long, by `nice -n -19` on a machine with other work. Every
+step takes the same two photos, once or twice.
 usage: scripts/bench/scaling.py [PROGRAM] [--steps N] [--size PIXELS]"""
 import argparse
 import csv
@@ -24,7 +24,8 @@ QUANTILE = 0.02
 def train(program, data, run, ranks, views, count, steps):
     """Trains so many steps of one core a rank; processor seconds, and what the program has printed."""
     words = [program, "train", data, "-o", run, "-n", str(steps), "--views-per-step", str(views), "--init", "random",
-             "--init-count", str(count), "--max-gaussians", str(count), "--densify-until", "0", "--resolution-schedule", "",
+             "--init-count", str(count), "--max-gaussians", str(count), "--densify-until", "0",
+             "--resolution-schedule", "",
              "--sh-degree", "3", "--sh-degree-interval", "0", "--log-every", "1", "--eval-at", "", "--save-at", "",
              "--eval-renders", "0", "--checkpoint-every", "0", "--overwrite",
              "--profile", "-q"]
@@ -75,8 +76,9 @@ def main():
     one, two, sent = {}, {}, {}
     with tempfile.TemporaryDirectory(prefix="raysplats_scaling_") as folder:
         data, run = os.path.join(folder, "data"), os.path.join(folder, "run")
-        subprocess.run([program, "generate", data, "--size", str(flags.size), "--train-views", "2", "--test-views", "1", "-q"],
-                       check=True)
+        photos = ["--size", str(flags.size), "--train-views", "2", "--test-views", "1"]
+        subprocess.run([program, "generate", data, *photos, "-q"], check=True)
+        train(program, data, run, 1, 2, COUNTS[0], 3)  # compiles kernels
         for count in COUNTS:
             for views in VIEWS:
                 one[count, views] = of_one(program, data, run, views, count, flags.steps)
@@ -94,8 +96,10 @@ def main():
     for (count, views), measured in two.items():
         predicted = own[count] + view[count] * views / 2 + latency + per_byte * sent[count, views]
         errors.append(predicted / measured - 1)
-        print(f"| {count} | {1e3 * own[count]:.1f} ms | {1e3 * view[count]:.1f} ms | {views} | {1e3 * one[count, views]:.1f} ms | "
-              f"{1e3 * measured:.1f} ms | {1e3 * predicted:.1f} ms | {sent[count, views] / 1e6:.2f} MB |")
+        times = (own[count], view[count], one[count, views], measured, predicted)
+        cells = [f"{1e3 * seconds:.1f} ms" for seconds in times]
+        cells.insert(2, str(views))
+        print(f"| {count} | {' | '.join(cells)} | {sent[count, views] / 1e6:.2f} MB |")
     print(f"largest error {100 * max(map(abs, errors)):.0f} %, mean {100 * statistics.fmean(map(abs, errors)):.0f} %")
 
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Bytes that ranks would send each other if each held a part of the model (docs/scaling.md, "A model larger than one
-device"). The Gaussians of a model are split into as many as asked for, drawn from their parents, put along a Morton curve
-and cut into one run a rank; the picture of a view is cut into bands of rows, one a rank, and a Gaussian goes to every band
-that the disc around its mean meets, of three times its longest axis.
+device"). The Gaussians of a model are split into as many as asked for, drawn from their parents, put along a Morton
+curve and cut into one run a rank; the picture of a view is cut into bands of rows, one a rank, and a Gaussian goes to
+every band that the disc around its mean meets, of three times its longest axis.
 usage: PYTHON scripts/bench/shards.py MODEL CAMERAS [--count 3000000]     with numpy and the raysplats module"""
 import argparse
 
@@ -66,7 +66,8 @@ def main():
     order = morton(means)
     means, longest = means[order], longest[order]
     cameras = rs.read_cameras(flags.cameras)
-    print(f"{len(means)} Gaussians, {len(cameras)} views; data parallel: {PARAMETERS * len(means) / 1e6:.0f} MB to add a step")
+    print(f"{len(means)} Gaussians, {len(cameras)} views; data parallel: "
+          f"{PARAMETERS * len(means) / 1e6:.0f} MB to add a step")
     print("| ranks | seen by a view | foreign to their band | most for one band | MB forward | MB back |")
     print("|---|---|---|---|---|---|")
     for ranks in (2, 4, 8, 64):
