@@ -45,7 +45,7 @@ uint stream_push(HitStream* stream, uint reference, uint window) {
     uint next = atomic_inc(stream->cursor);
     if (next >= RS_MOST_CHUNKS) {
       next = RS_MOST_CHUNKS;
-      atomic_min(stream->cursor, RS_MOST_CHUNKS);
+      atomic_add(stream->cursor, 0xffffffffu);  // back: a least value is a swap on some devices
     }
     if (next < stream->capacity) stream->pool[(size_t)next * CHUNK] = (uint2)(stream->chunk, 0);
     stream->chunk = next;
