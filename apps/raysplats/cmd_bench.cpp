@@ -11,6 +11,7 @@
 #include "bench/bench.hpp"
 #include "bench/compare.hpp"
 #include "bench/device_report.hpp"
+#include "bench/forecast.hpp"
 #include "bench/kernel_folders.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
@@ -33,6 +34,7 @@ struct Options {
   std::optional<std::string> resolution;
   bool list = false;
   std::string report;
+  bool forecast = false;
   std::string kernels;
   std::string against;
   std::string json;
@@ -153,6 +155,9 @@ void run(const CLI::App& command, const Options& options) {
   }
   bench.trace = options.trace.over(bench.trace);
   const BenchModel* chosen = model ? &*model : nullptr;
+  if (options.forecast && (!options.report.empty() || !options.kernels.empty())) {
+    throw UsageError("--forecast goes with neither --report nor --kernels: run them one by one");
+  }
   if (options.list) {
     for (const std::string& id : bench_ids(bench, chosen)) fmt::print("{}\n", id);
     return;
@@ -180,6 +185,10 @@ void run(const CLI::App& command, const Options& options) {
           "The device {} does not compute what it should: please send us {}, and see docs/gpu.md",
           device.name, options.report));
     }
+    return;
+  }
+  if (options.forecast) {
+    fmt::print("{}", forecast_text(make_forecast(context, bench, chosen)));
     return;
   }
   const BenchReport report = run_bench(context, bench, chosen);
@@ -238,6 +247,9 @@ Command add_bench_command(CLI::App& app) {
   command->add_option("--repeat", options->bench.repeat, "Repetitions of every row")
       ->transform(whole_between(1, 1000))
       ->capture_default_str();
+  command->add_flag("--forecast", options->forecast,
+                    "What a model of speed, from counted work, says of this CPU, beside the "
+                    "measurement, and of four graphics cards");
   command
       ->add_option(
           "--report", options->report,

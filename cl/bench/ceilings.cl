@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the device can do at best, for comparison with what the other kernels do: the rate of fused
-// multiply-adds in registers, and the bandwidth of reading and writing large buffers.
+// multiply-adds in registers, and the bandwidth of reading and writing large buffers; for the model
+// of speed also other instructions, and reading and writing at random (below).
 //   fma_chains   CHAINS independent float16 accumulators per work-item; `rounds` times CHAINS * 16
 //                multiply-adds each                             global: any number of work-items
 //   copy_runs    every work-item copies `run` consecutive float16s (suits CPUs)   global: runs
@@ -68,4 +69,103 @@ __kernel void copy_stride(__global const float4* restrict in, __global float4* r
 __kernel void rewrite_runs(__global float16* data, uint run) {
   const size_t begin = get_global_id(0) * (size_t)run;
   for (uint k = 0; k < run; ++k) data[begin + k] = -data[begin + k];
+}
+
+// Instructions that are no fused multiply-adds, as the tracing kernels have them: four chains of
+// four dependent ones a round.                                  global: any number of work-items
+__kernel void vector_steps(__global float16* out, uint rounds, float factor, float bound) {
+  const uint i = get_global_id(0);
+  const float16 a = (float16)(factor), b = (float16)(bound), c = (float16)(0.25f * bound);
+  float16 x0 = (float16)((float)i), x1 = x0 + 1.0f, x2 = x0 + 2.0f, x3 = x0 + 3.0f;
+  for (uint k = 0; k < rounds; ++k) {
+    x0 = min(max(x0 * a, b) - c, a);
+    x1 = min(max(x1 * a, b) - c, a);
+    x2 = min(max(x2 * a, b) - c, a);
+    x3 = min(max(x3 * a, b) - c, a);
+  }
+  out[i] = x0 + x1 + x2 + x3;
+}
+
+// Divisions and roots: four chains of one each a round.         global: any number of work-items
+__kernel void slow_steps(__global float16* out, uint rounds, float factor) {
+  const uint i = get_global_id(0);
+  const float16 a = (float16)(factor);
+  float16 x0 = (float16)(1.0f + (float)i), x1 = x0 + 1.0f, x2 = x0 + 2.0f, x3 = x0 + 3.0f;
+  for (uint k = 0; k < rounds; ++k) {
+    x0 = sqrt(a / x0);
+    x1 = sqrt(a / x1);
+    x2 = sqrt(a / x2);
+    x3 = sqrt(a / x3);
+  }
+  out[i] = x0 + x1 + x2 + x3;
+}
+
+// Lines of 64 bytes at random, of a table of mask + 1: no address waits for what was read.
+//                                                               global: any number of work-items
+__kernel void random_lines(__global const float16* restrict table,
+                           __global float16* restrict out,
+                           uint rounds,
+                           uint mask) {
+  const uint i = get_global_id(0);
+  uint place = 0x9e3779b9u * (i + 1);
+  float16 sum = (float16)(0.0f);
+  for (uint k = 0; k < rounds; ++k) {
+    place = place * 1664525u + 1013904223u;
+    sum += table[(place >> 6) & mask];
+  }
+  out[i] = sum;
+}
+
+// Whole numbers, one at a time: four chains of four dependent instructions a round.
+//                                                               global: any number of work-items
+__kernel void scalar_steps(__global uint* out, uint rounds, uint factor) {
+  const uint i = get_global_id(0);
+  uint x0 = i, x1 = i + factor, x2 = i ^ factor, x3 = i * factor;
+  for (uint k = 0; k < rounds; ++k) {
+    x0 = ((x0 ^ (x0 >> 7)) + k) | 1u;
+    x1 = ((x1 + (x1 << 3)) ^ k) - 5u;
+    x2 = ((x2 - (x2 >> 5)) + k) ^ 9u;
+    x3 = ((x3 ^ (x3 << 9)) - k) + 3u;
+  }
+  out[i] = x0 + x1 + x2 + x3;
+}
+
+// The same in runs of 16 lines: of a table of 16 (mask + 1).
+//                                                               global: any number of work-items
+__kernel void random_runs(__global const float16* restrict table,
+                          __global float16* restrict out,
+                          uint rounds,
+                          uint mask) {
+  const uint i = get_global_id(0);
+  uint place = 0x9e3779b9u * (i + 1);
+  float16 sum = (float16)(0.0f);
+  for (uint k = 0; k < rounds; ++k) {
+    place = place * 1664525u + 1013904223u;
+    __global const float16* run = table + (size_t)((place >> 6) & mask) * 16;
+    for (uint j = 0; j < 16; ++j) sum += run[j];
+  }
+  out[i] = sum;
+}
+
+// The same of single lines where every one tells where the next one is: the table holds a cycle.
+//                                                               global: any number of work-items
+__kernel void chased_lines(__global const uint16* restrict table,
+                           __global uint* restrict out,
+                           uint rounds,
+                           uint mask) {
+  const uint i = get_global_id(0);
+  uint place = (0x9e3779b9u * (i + 1)) & mask;
+  for (uint k = 0; k < rounds; ++k) place = table[place].s0;
+  out[i] = place;
+}
+
+// Words of 8 bytes written at random into a table of mask + 1: what a sort's scatter waits for.
+//                                                               global: any number of work-items
+__kernel void random_stores(__global uint2* restrict table, uint rounds, uint mask) {
+  const uint i = get_global_id(0);
+  uint place = 0x9e3779b9u * (i + 1);
+  for (uint k = 0; k < rounds; ++k) {
+    place = place * 1664525u + 1013904223u;
+    table[(place >> 6) & mask] = (uint2)(place, k);
+  }
 }

@@ -13,6 +13,11 @@
 
 #include "bvh/lbvh_node.h"
 
+// Builds with COUNT_WORK 1 count the nodes that they test (trace/rays.cl).
+#ifndef COUNT_WORK
+#define COUNT_WORK 0
+#endif
+
 // The tree as RS_TREE_ARGUMENTS tell it.
 typedef struct {
   int levels;
@@ -31,12 +36,18 @@ typedef struct {
   uint number;          // of the node within its level
   int level, root;
   bool arrived;  // at a node that is not tested yet
+#if COUNT_WORK
+  uint nodes;  // tested
+#endif
 } TreeWalk;
 
 RS_INLINE void walk_begin(TreeWalk* walk, const RayTree* tree, const float t_min) {
   (void)t_min;
   walk->number = 0;
   walk->level = walk->root = tree->levels;
+#if COUNT_WORK
+  walk->nodes = 0;
+#endif
   walk->arrived = tree->levels > 0;
   walk->children[walk->root] = 0;
 }
@@ -63,6 +74,9 @@ RS_INLINE uint walk_next(
     if (walk->arrived) {
       const size_t node = (size_t)(tree->level_begin[walk->level] + walk->number);
       fv depth;
+#if COUNT_WORK
+      ++walk->nodes;
+#endif
       const uint bits = ray_meets_boxes(ray, tree->nodes + node * RS_NODE_VECTORS, t_end, &depth);
       walk->arrived = false;
       if (walk->level == 1) {
@@ -100,10 +114,16 @@ typedef struct {
   uint node[RS_NODE_STACK];  // level in the lowest four bits
   int top;
   float here;  // entry of the node that walk_next() returned last
+#if COUNT_WORK
+  uint nodes;  // tested
+#endif
 } TreeWalk;
 
 RS_INLINE void walk_begin(TreeWalk* walk, const RayTree* tree, const float t_min) {
   walk->top = tree->levels > 0 ? 1 : 0;
+#if COUNT_WORK
+  walk->nodes = 0;
+#endif
   walk->entry[0] = t_min;
   walk->node[0] = (uint)tree->levels;
 }
@@ -126,6 +146,9 @@ RS_INLINE uint walk_next(
     walk->here = walk->entry[bottom];
     RayLanes entry;
     const size_t node = (size_t)(tree->level_begin[level] + number);
+#if COUNT_WORK
+    ++walk->nodes;
+#endif
     uint bits = ray_meets_boxes(ray, tree->nodes + node * RS_NODE_VECTORS, t_end, &entry.v);
     if (level == 1) {
       if (bits == 0) continue;

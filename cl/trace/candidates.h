@@ -7,6 +7,7 @@
 #define RS_TRACE_CANDIDATES_H
 
 #include "trace/packet.h"
+#include "trace/work_tally.h"
 
 // Packets a side of a work-item's block.
 #ifndef BLOCK
@@ -30,6 +31,9 @@ typedef struct {
   uint read[RS_BLOCK_PACKETS];                       // up to here the list is in the queue
   uint count[RS_BLOCK_PACKETS];                      // of the queue
   uint queue[RS_BLOCK_PACKETS][RS_QUEUE];
+#if COUNT_WORK
+  uint tally[RS_TALLIES];
+#endif
 } BlockCandidates;
 
 typedef struct {
@@ -71,6 +75,7 @@ void block_candidates_read(BlockCandidates* b, const uint packet) {
                      RS_MASK(y1 >= b->y0[q]);
     b->count[q] += rs_append_lanes(b->queue[q] + b->count[q], base, rs_lane_bits(meets) & inside);
     b->read[q] = base + PACKET;
+    RS_TALLY(b, RS_TALLY_BOXES, 1);
   }
 }
 

@@ -52,6 +52,9 @@ __kernel void trace_forward(RS_LIST_ARGUMENTS,
     return;
 
   BlockCandidates block;
+#if COUNT_WORK
+  tally_clear(block.tally);
+#endif
   block_candidates_init(&block, boxes, stride, offsets[tile], offsets[tile + 1]);
   for (int q = 0; q < RS_BLOCK_PACKETS; ++q) {
     const int px = block_x + q % BLOCK * PACKET_WIDTH;
@@ -82,6 +85,10 @@ __kernel void trace_forward(RS_LIST_ARGUMENTS,
     if (px >= width || py >= height) continue;
     Candidates candidates = {&block, q, 0, block.end};
     PacketState p;
+#if COUNT_WORK
+    tally_clear(p.tally);
+    tally_clear(stream.tally);
+#endif
     const PacketRays rays = rs_packet_rays(&camera, tangents, px, py);
     p.X = rays.X;
     p.Y = rays.Y;
@@ -105,9 +112,16 @@ __kernel void trace_forward(RS_LIST_ARGUMENTS,
 #else
     (void)stream_ends;
 #endif
+#if COUNT_WORK
+    tally_add(p.tally, counters);
+    tally_add(stream.tally, counters);
+#endif
     capped_rays += popcount(rs_lane_bits(capped));
     hits += (uint)rs_lane_sum(rs_to_float(p.hits));
   }
+#if COUNT_WORK
+  tally_add(block.tally, counters);
+#endif
   if (capped_rays != 0) atomic_add(counters + 1, capped_rays);
   rs_count(counters + 2, hits);
 }

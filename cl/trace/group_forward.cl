@@ -89,6 +89,9 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   p.Y = rays.Y;
   p.valid = works ? rays.valid : 0;
   packet_clear(&p);
+#if COUNT_WORK
+  tally_clear(p.tally);
+#endif
 
   GroupCandidates candidates;
   candidates.boxes = boxes;
@@ -109,6 +112,9 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   stream.capacity = forward.pool_capacity;
   stream.cursor = counters;
   stream_restart(&stream);
+#if COUNT_WORK
+  tally_clear(stream.tally);
+#endif
 
   // All rays together; where that does not fit, half as many of them, and so on.
   bool capped = false;
@@ -158,6 +164,10 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   const uint hits = memory.words[0], capped_rays = memory.words[1];
 #endif
   if (lane == 0) {
+#if COUNT_WORK
+    tally_add(p.tally, counters);
+    tally_add(stream.tally, counters);
+#endif
     rs_count(counters + 2, hits);
     if (capped_rays != 0) atomic_add(counters + 1, capped_rays);
   }

@@ -201,6 +201,8 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
       }
 #endif
     }
+    RS_TALLY(p, RS_TALLY_ROUNDS, 1);
+    RS_TALLY(p, RS_TALLY_TESTED, batch);
 #if SUBGROUP
     const bool some_alive = sub_group_any(alive != 0);
 #else
@@ -226,6 +228,8 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
       ready += key < INFINITY && key <= bound;
     }
     if (!some_alive) ready = 0;
+    RS_TALLY(p, RS_TALLY_FOUND, found - waiting);
+    RS_TALLY(p, RS_TALLY_ORDERED, total * (1 + (total + GROUP - 1) / GROUP));
     __local WaitingRows* w = &memory->waiting;
     float moved_first[RS_WAITING_EACH], moved_last[RS_WAITING_EACH];
     uint moved_candidate[RS_WAITING_EACH];
@@ -268,6 +272,8 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
       const int order = as_int(hit.key) & 0x7fffffff;
       uint closing = 0;
       float before = 1.0f;
+      RS_TALLY(p, RS_TALLY_OPENED, 1);
+      RS_TALLY(p, RS_TALLY_COMPARED, popcount(open));
       for (uint rest = open; rest != 0; rest &= rest - 1) {
         const uint other = rs_lowest_bit(rest);
         if (rows->last_key[other] < first_key) {
@@ -311,6 +317,7 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
     waiting = found - ready;
     alive &= RS_MASK(p->T >= min_transmittance);
   }
+  RS_TALLY(p, RS_TALLY_BOXES, (candidates->read - candidates->begin + GROUP - 1) / GROUP);
 #if KEEP_HITS
   if (lane == 0 && fits) group_push_rows(rows, open, settled_rows, stream);
 #endif

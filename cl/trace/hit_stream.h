@@ -10,6 +10,7 @@
 
 #include "trace/packet.h"
 #include "trace/view_sizes.h"
+#include "trace/work_tally.h"
 
 // Rows per chunk; row 0 links to the previous chunk.
 #ifndef CHUNK
@@ -36,6 +37,9 @@ typedef struct {
   volatile __global uint* cursor;  // chunks taken, of which those past the capacity do not exist
   uint chunk;                      // last chunk, RS_NO_CHUNK when empty
   uint used;                       // rows used in it, the link included
+#if COUNT_WORK
+  uint tally[RS_TALLIES];
+#endif
 } HitStream;
 
 // Returns the row of the pool, or RS_NO_ROW past the capacity: then only the demand is counted, and
@@ -55,6 +59,7 @@ uint stream_push(HitStream* stream, uint reference, uint window) {
       stream->chunk < stream->capacity ? stream->chunk * CHUNK + stream->used : RS_NO_ROW;
   if (row != RS_NO_ROW) stream->pool[row] = (uint2)(reference, window);
   ++stream->used;
+  RS_TALLY(stream, RS_TALLY_WINDOWS, window);
   return row;
 }
 

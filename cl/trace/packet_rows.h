@@ -101,7 +101,8 @@ __attribute__((always_inline)) int rows_find(Rows* rows,
   return count;
 }
 
-void row_wait(Slots* slots, const ushort slot, const float first_key) {
+// Returns how many rows it moved.
+int row_wait(Slots* slots, const ushort slot, const float first_key) {
   int i = slots->waiting_count++;
   for (; i > 0 && slots->first_key[i - 1] < first_key; --i) {
     slots->first_key[i] = slots->first_key[i - 1];
@@ -109,6 +110,7 @@ void row_wait(Slots* slots, const ushort slot, const float first_key) {
   }
   slots->first_key[i] = first_key;
   slots->waiting[i] = slot;
+  return slots->waiting_count - 1 - i;
 }
 
 // Blends an open row whose place is known; `settled` is the product over such rows per lane.
@@ -164,7 +166,14 @@ bool trace_in_rows(Candidates* candidates,
     ushort found[RS_BATCH + 1];
     const int found_count = rows_find(&rows, &slots, p, lines, references, limits, batch, size,
                                       alive, found, first_key);
-    for (int j = 0; j < found_count; ++j) row_wait(&slots, found[j], first_key[j]);
+    RS_TALLY(p, RS_TALLY_ROUNDS, 1);
+    RS_TALLY(p, RS_TALLY_TESTED, (size + RS_TOGETHER - 1) / RS_TOGETHER * RS_TOGETHER);
+    RS_TALLY(p, RS_TALLY_FOUND, found_count);
+    for (int j = 0; j < found_count; ++j) {
+      const int passed = row_wait(&slots, found[j], first_key[j]);
+      RS_TALLY(p, RS_TALLY_ORDERED, passed);
+      (void)passed;
+    }
     const bool draining = next == candidates->end;
     const float bound = draining ? INFINITY : limits[next].x;
     while (slots.waiting_count > 0 && slots.first_key[slots.waiting_count - 1] <= bound) {
@@ -179,6 +188,8 @@ bool trace_in_rows(Candidates* candidates,
       uint oldest = opened;
       int left = 0;
       const int open_count = slots.open_count;
+      RS_TALLY(p, RS_TALLY_OPENED, 1);
+      RS_TALLY(p, RS_TALLY_COMPARED, open_count);
       for (int i = 0; i < open_count; ++i) {
         const ushort other = slots.open[i];
         if (rows.last_key[other] < first_key) {

@@ -4,6 +4,7 @@
 #define RS_TRACE_PACKET_STATE_H
 
 #include "trace/packet.h"
+#include "trace/work_tally.h"
 
 #ifndef WITH_DEPTH
 #define WITH_DEPTH 0
@@ -24,6 +25,9 @@ typedef struct {
   iv hits;
 #if WITH_DEPTH
   fv depth_sum, median;
+#endif
+#if COUNT_WORK
+  uint tally[RS_TALLIES];
 #endif
 } PacketState;
 

@@ -13,7 +13,8 @@
 //
 // Who includes this defines RayState, with at least the members
 //   float transmittance; int hits; bool stopped; float last_key; uint last_index;
-// (1, 0, false, -1, 0 before the walk) and
+// (1, 0, false, -1, 0 before the walk; with COUNT_WORK also uint nodes and blocks, that were
+// tested) and
 //   void blend_hits(scene, ray, basis, pending, count, state),
 // which takes the first `count` sorted hits, keeps those members up to date, and ends early, with
 // `stopped`, where the ray does.
@@ -45,6 +46,9 @@ RS_INLINE void walk_ray(
     uint bits, first_block;
     while ((bits = walk_next(&walk, &scene->tree, ray, end, &first_block)) != 0) {
       for (; bits != 0; bits &= bits - 1) {
+#if COUNT_WORK
+        ++state->blocks;
+#endif
         const uint number_of_block = first_block + rs_lowest_bit(bits);
         __global const fv* block = blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
         BlockMeeting meeting;
@@ -81,6 +85,9 @@ RS_INLINE void walk_ray(
         }
       }
     }
+#if COUNT_WORK
+    state->nodes += walk.nodes;
+#endif
     again = pending.size == KEPT;
     blend_hits(scene, ray, basis, &pending, pending.size, state);
     if (state->stopped) break;
@@ -134,6 +141,9 @@ RS_INLINE void walk_ray(
     while (!state->stopped &&
            (bits = walk_next(&walk, &scene->tree, ray, range.end, &first_block)) != 0) {
       for (; bits != 0; bits &= bits - 1) {
+#if COUNT_WORK
+        ++state->blocks;
+#endif
         const uint number_of_block = first_block + rs_lowest_bit(bits);
         __global const fv* block = scene->tree.blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
         BlockMeeting meeting;
@@ -184,6 +194,9 @@ RS_INLINE void walk_ray(
         sorted = pending.size;
       }
     }
+#if COUNT_WORK
+    state->nodes += walk.nodes;
+#endif
     if (state->stopped) break;
     pending_evaluate(&pending, &range, half_quantile, remaining);
     pending_sort(&pending);

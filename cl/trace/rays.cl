@@ -20,6 +20,9 @@ typedef struct {
   float most;    // the largest weight so far, in front of the median
   uint leading;  // the Gaussian of the median depth, or else of the largest weight
 #endif
+#if COUNT_WORK
+  uint nodes, blocks;
+#endif
 } RayState;
 
 RS_INLINE void blend_hits(const RayScene* scene,
@@ -93,15 +96,25 @@ RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
     state.most = 0.0f;
     state.leading = 0;
 #endif
+#if COUNT_WORK
+    state.nodes = state.blocks = 0;
+#endif
     walk_ray(&scene, raw.s7, basis, &ray, &state);
     const float3 color = state.color.xyz + state.transmittance * background;
     const float weight = 1.0f - state.transmittance;
+#if COUNT_WORK
+    // In place of the depths, for the model of speed: nodes and blocks that the walk tested.
+    const float depth = (float)state.nodes;
+    state.median = (float)state.blocks;
+#else
+    const float depth = weight > 0.0f ? state.depth_sum / weight : 0.0f;
+#endif
 #if LEADING
     const uint count = state.leading;
 #else
     const uint count = (uint)state.hits;
 #endif
-    results[id] = (float8)(color, weight, weight > 0.0f ? state.depth_sum / weight : 0.0f,
-                           state.median, as_float(count), as_float((uint)(state.capped ? 1 : 0)));
+    results[id] = (float8)(color, weight, depth, state.median, as_float(count),
+                           as_float((uint)(state.capped ? 1 : 0)));
   }
 }

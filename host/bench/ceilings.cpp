@@ -3,19 +3,25 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
+#include <functional>
 #include <limits>
+#include <vector>
+
+#include "bench/processor_time.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr const char* kProgram = "bench/ceilings.cl";
-constexpr int kRepetitions = 5;
+constexpr int kRepetitions = 25;
 constexpr int kCopies = 25;
-constexpr double kFmaSeconds = 0.01;
+constexpr double kFmaSeconds = 0.003;  // short: others may share the processors
 constexpr std::uint32_t kFirstRounds = 1u << 12;
 constexpr std::uint32_t kMostRounds = 1u << 24;
 constexpr std::size_t kGroup = 64;
+constexpr double kChainSteps = 4 * 4;  // of vector_steps and scalar_steps, a round
 
 using Float4 = std::array<float, 4>;
 using Float16 = std::array<float, 16>;
@@ -26,23 +32,37 @@ double launch_seconds(Context& context) {
   return std::max(seconds, 1e-9);
 }
 
-double fma_rate(Context& context, int chains) {
-  const bool cpu = context.device().type == DeviceType::kCpu;
-  const std::size_t units = std::max<std::size_t>(1, context.device().compute_units);
-  const std::size_t items = cpu ? units * 4 : units * 1024;
-  Kernel kernel = context.kernel(kProgram, "fma_chains", BuildOptions().define("CHAINS", chains));
-  Buffer<Float16> out(context, items, "FMA sums");
-  const Range range = Range::linear(items, cpu ? 1 : kGroup);
+std::size_t chain_items(const DeviceInfo& device) {
+  const std::size_t units = std::max<std::size_t>(1, device.compute_units);
+  return device.type == DeviceType::kCpu ? units * 16 : units * 1024;
+}
+
+Range chain_range(const DeviceInfo& device) {
+  return Range::linear(chain_items(device), device.type == DeviceType::kCpu ? 1 : kGroup);
+}
+
+// Rounds a second, of all work-items together, that `launch(rounds)` does.
+double round_rate(Context& context, const std::function<void(std::uint32_t)>& launch) {
   const auto seconds = [&](std::uint32_t rounds) {
-    kernel.launch(range, out, rounds, 0.999f, 0.001f);
-    return launch_seconds(context);
+    const ProcessorTime processors(context);
+    launch(rounds);
+    const double spent = launch_seconds(context);
+    return spent * processors.share(spent);
   };
   seconds(kFirstRounds);  // compiles for the work-group
   std::uint32_t rounds = kFirstRounds;
   double best = seconds(rounds);
   while (best < kFmaSeconds && rounds < kMostRounds) best = seconds(rounds *= 2);
   for (int i = 1; i < kRepetitions; ++i) best = std::min(best, seconds(rounds));
-  return 2.0 * 16.0 * chains * rounds * static_cast<double>(items) / best;
+  return static_cast<double>(rounds) * static_cast<double>(chain_items(context.device())) / best;
+}
+
+double fma_rate(Context& context, int chains) {
+  Kernel kernel = context.kernel(kProgram, "fma_chains", BuildOptions().define("CHAINS", chains));
+  Buffer<Float16> out(context, chain_items(context.device()), "FMA sums");
+  return 2.0 * 16.0 * chains * round_rate(context, [&](std::uint32_t rounds) {
+           kernel.launch(chain_range(context.device()), out, rounds, 0.999f, 0.001f);
+         });
 }
 
 }  // namespace
@@ -51,6 +71,86 @@ double measure_fma_rate(Context& context) {
   double best = 0;
   for (const int chains : {4, 8, 12}) best = std::max(best, fma_rate(context, chains));
   return best;
+}
+
+double measure_vector_rate(Context& context) {
+  Kernel kernel = context.kernel(kProgram, "vector_steps");
+  Buffer<Float16> out(context, chain_items(context.device()), "sums of steps");
+  return kChainSteps * round_rate(context, [&](std::uint32_t rounds) {
+           kernel.launch(chain_range(context.device()), out, rounds, 0.999f, 0.001f);
+         });
+}
+
+double measure_scalar_rate(Context& context) {
+  Kernel kernel = context.kernel(kProgram, "scalar_steps");
+  Buffer<std::uint32_t> out(context, chain_items(context.device()), "sums of steps");
+  return kChainSteps * round_rate(context, [&](std::uint32_t rounds) {
+           kernel.launch(chain_range(context.device()), out, rounds, 77u);
+         });
+}
+
+double measure_slow_rate(Context& context) {
+  Kernel kernel = context.kernel(kProgram, "slow_steps");
+  Buffer<Float16> out(context, chain_items(context.device()), "sums of steps");
+  return 8.0 * round_rate(context, [&](std::uint32_t rounds) {
+           kernel.launch(chain_range(context.device()), out, rounds, 0.999f);
+         });
+}
+
+double measure_line_rate(Context& context, std::size_t bytes) {
+  const std::size_t lines = std::bit_floor(std::max<std::size_t>(1, bytes / sizeof(Float16)));
+  Kernel kernel = context.kernel(kProgram, "random_lines");
+  Buffer<Float16> table(context, lines, "random lines");
+  Buffer<Float16> out(context, chain_items(context.device()), "sums of lines");
+  table.clear();
+  context.take_launches();
+  return round_rate(context, [&](std::uint32_t rounds) {
+    kernel.launch(chain_range(context.device()), table, out, rounds,
+                  static_cast<std::uint32_t>(lines - 1));
+  });
+}
+
+double measure_run_rate(Context& context, std::size_t bytes) {
+  const std::size_t runs = std::bit_floor(std::max<std::size_t>(1, bytes / sizeof(Float16) / 16));
+  Kernel kernel = context.kernel(kProgram, "random_runs");
+  Buffer<Float16> table(context, 16 * runs, "random runs");
+  Buffer<Float16> out(context, chain_items(context.device()), "sums of runs");
+  table.clear();
+  context.take_launches();
+  return 16 * round_rate(context, [&](std::uint32_t rounds) {
+           kernel.launch(chain_range(context.device()), table, out, rounds,
+                         static_cast<std::uint32_t>(runs - 1));
+         });
+}
+
+double measure_chase_rate(Context& context, std::size_t bytes) {
+  using Line = std::array<std::uint32_t, 16>;
+  const std::size_t lines = std::bit_floor(std::max<std::size_t>(1, bytes / sizeof(Line)));
+  // A full cycle: a linear congruence with an odd term and a factor of 1 modulo 4.
+  std::vector<Line> next(lines);
+  for (std::size_t i = 0; i < lines; ++i)
+    next[i][0] = static_cast<std::uint32_t>((i * 1664525u + 1013904223u) & (lines - 1));
+  Kernel kernel = context.kernel(kProgram, "chased_lines");
+  Buffer<Line> table(context, lines, "chased lines");
+  Buffer<std::uint32_t> out(context, chain_items(context.device()), "ends of chases");
+  table.upload(next);
+  context.take_launches();
+  return round_rate(context, [&](std::uint32_t rounds) {
+    kernel.launch(chain_range(context.device()), table, out, rounds,
+                  static_cast<std::uint32_t>(lines - 1));
+  });
+}
+
+double measure_store_rate(Context& context, std::size_t bytes) {
+  const std::size_t words = std::bit_floor(std::max<std::size_t>(1, bytes / sizeof(std::uint64_t)));
+  Kernel kernel = context.kernel(kProgram, "random_stores");
+  Buffer<std::uint64_t> table(context, words, "random words");
+  table.clear();
+  context.take_launches();
+  return round_rate(context, [&](std::uint32_t rounds) {
+    kernel.launch(chain_range(context.device()), table, rounds,
+                  static_cast<std::uint32_t>(words - 1));
+  });
 }
 
 double measure_copy_bandwidth(Context& context, std::size_t wanted) {
@@ -72,13 +172,16 @@ double measure_copy_bandwidth(Context& context, std::size_t wanted) {
   Range stride{{elements, 1, 1}, {0, 0, 0}};
   if (!cpu) stride.local = {kGroup, 1, 1};
   double best = std::numeric_limits<double>::infinity();
+  const auto take = [&](const auto& launch) {
+    const ProcessorTime processors(context);
+    launch();
+    const double spent = launch_seconds(context);
+    best = std::min(best, spent * processors.share(spent));
+  };
   for (int i = 0; i < kCopies; ++i) {
-    by_runs.launch(Range::linear(runs, 1), in, out, static_cast<std::uint32_t>(run));
-    best = std::min(best, launch_seconds(context));
-    by_stride.launch(stride, in, out);
-    best = std::min(best, launch_seconds(context));
-    in_place.launch(Range::linear(runs, 1), out, static_cast<std::uint32_t>(run));
-    best = std::min(best, launch_seconds(context));
+    take([&] { by_runs.launch(Range::linear(runs, 1), in, out, static_cast<std::uint32_t>(run)); });
+    take([&] { by_stride.launch(stride, in, out); });
+    take([&] { in_place.launch(Range::linear(runs, 1), out, static_cast<std::uint32_t>(run)); });
   }
   return 2.0 * sizeof(Float4) * static_cast<double>(elements) / best;
 }

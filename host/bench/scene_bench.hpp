@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bench/bench.hpp"
+#include "bench/executed_work.hpp"
 #include "bench/operation.hpp"
 #include "device/context.hpp"
 
@@ -19,6 +20,10 @@ class SceneBench {
 
   /// They refer to this object.
   std::vector<BenchOperation> operations();
+  /// What kernels of either form do on this view and through the same arbitrary rays, counted by
+  /// the kernels themselves; waits for the device. Rays of groups need a device that runs their
+  /// kernels.
+  ExecutedCounts counts(bool grouped);
 
   struct Impl;
 

@@ -231,6 +231,19 @@ const Buffer<std::uint32_t>& CameraTracer::overflow() const { return impl_->over
 void CameraTracer::clear_overflow() { impl_->overflow.clear(); }
 const Buffer<std::uint32_t>& CameraTracer::counters() const { return impl_->counters; }
 
+void CameraTracer::count_work() {
+  impl_->counters.ensure(impl_->context, RS_COUNT_WORDS + 2 * RS_TALLIES, "counted work");
+  impl_->forward_variant = -1;  // other kernels
+}
+
+std::vector<std::uint64_t> CameraTracer::work() const {
+  const std::vector<std::uint32_t> words = impl_->counters.download();
+  std::vector<std::uint64_t> out;
+  for (std::size_t i = RS_COUNT_WORDS; i + 1 < words.size(); i += 2)
+    out.push_back(std::uint64_t{words[i + 1]} << 32 | words[i]);
+  return out;
+}
+
 void CameraTracer::forward(const DeviceGaussians& gaussians,
                            const Camera& camera,
                            bool keep_hits,
@@ -391,6 +404,7 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
     build.define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
         .define("WITH_DEPTH", options.depth ? 1 : 0)
         .define("KEEP_HITS", keep ? 1 : 0);
+    if (counters.size() > RS_COUNT_WORDS) build.define("COUNT_WORK", 1);
     kernel = packet.grouped ? group_kernel("trace/group_forward.cl", "trace_forward_group", build)
                             : context.kernel("trace/forward.cl", "trace_forward", build);
   }

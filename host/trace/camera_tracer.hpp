@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "device/context.hpp"
 #include "raysplats/camera.hpp"
@@ -86,7 +87,12 @@ class CameraTracer {
 
   /// Of the last forward(); waits for the device unless that one kept its hits and waited itself.
   Statistics statistics() const;
-  /// The same on the device: RS_COUNT_WORDS words (cl/trace/view_sizes.h).
+  /// From the next forward() on its kernels count what they really do, RS_TALLIES kinds of work
+  /// (cl/trace/view_sizes.h), for the model of speed; they are then slower. Read after forward(),
+  /// waits for the device; empty without count_work().
+  void count_work();
+  std::vector<std::uint64_t> work() const;
+  /// The statistics on the device: RS_COUNT_WORDS words (cl/trace/view_sizes.h).
   const Buffer<std::uint32_t>& counters() const;
   TraceOptions& options();
 

@@ -52,6 +52,8 @@ struct RayTracer::Impl {
   Buffer<std::uint32_t> no_flags;
   Buffer<Ray> rays;
   Buffer<RayResult> results;
+  bool counts_work = false;
+  bool as_gpu = false;
 };
 
 RayTracer::RayTracer(Context& context, const TraceOptions& options, int lanes)
@@ -114,18 +116,26 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   }
   if (results.size() < count) results.ensure(self.context, count, "ray results");
   const TraceOptions& options = self.options;
-  const bool cpu = self.context.device().type == DeviceType::kCpu;
+  DeviceInfo device = self.context.device();
+  if (self.as_gpu) device.type = DeviceType::kGpu;
+  const bool cpu = device.type == DeviceType::kCpu;
   const Lbvh& tree = self.tree.tree();
   const bool ordered = self.order.compute(tree, rays, count);
   const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
-  BuildOptions build = ray_walk_build(self.context.device(), options, self.near, tree.lanes(),
-                                      gaussians.active_sh_degree);
+  BuildOptions build =
+      ray_walk_build(device, options, self.near, tree.lanes(), gaussians.active_sh_degree);
+  if (self.counts_work) build.define("COUNT_WORK", 1);
   build.define("LEADING", color_mode == kFlagPerRay ? 1 : 0);
   launch_in_bands(
       self.context, self.budget, self.context.kernel("trace/rays.cl", "trace_rays", build),
       (count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup, u32(count), u32(rays_per_item),
       self.tree.arguments(), gaussians.sh, ray_walk(options, self.near, gaussians, color_mode),
       self.order.arguments(rays, ordered), from_origin, results);
+}
+
+void RayTracer::count_work(bool grouped) {
+  impl_->counts_work = true;
+  impl_->as_gpu = grouped;
 }
 
 void RayTracer::set_background(const std::array<float, 3>& background) {

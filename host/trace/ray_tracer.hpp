@@ -61,6 +61,10 @@ class RayTracer {
   const TraceOptions& options() const;
   /// Throws UsageError unless the tree is that of these Gaussians as they are now.
   void require_current(const DeviceGaussians& gaussians) const;
+  /// Rays of the next trace() tell in place of their depths how many nodes (`depth`) and blocks
+  /// (`median_depth`) they tested, for the model of speed; with `grouped` by the walk of GPUs,
+  /// whose tree must have been made with 4 lanes.
+  void count_work(bool grouped);
   /// The tree of the last update() or refit().
   const RayTree& tree() const;
 

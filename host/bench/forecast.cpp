@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/forecast.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+
+#include "bench/bench_cases.hpp"
+#include "bench/ceilings.hpp"
+#include "bench/operation.hpp"
+#include "bench/processor_time.hpp"
+#include "bench/scene_bench.hpp"
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr double kLeastSeconds = 2.0;  // that a row is repeated for
+constexpr double kSmallStage = 0.1;    // of an operation
+constexpr std::size_t kMebi = std::size_t{1} << 20;
+// Sizes between which caches end.
+constexpr std::size_t kLevels[] = {2 * kMebi, 8 * kMebi, 32 * kMebi, 128 * kMebi, 512 * kMebi};
+
+Prediction on_card(const std::string& row, const ExecutedCounts& groups, const Card& card) {
+  return predict(executed_work(row, groups), card.speeds,
+                 resident_waves(card, compiled_kernel(row, card.target)));
+}
+
+double seconds_of(const std::vector<std::string>& rows,
+                  const ExecutedCounts& groups,
+                  const Card& card) {
+  double sum = 0;
+  for (const std::string& row : rows) sum += on_card(row, groups, card).seconds;
+  return sum;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+// What an operation and its stages took by the device's clock, and of it the processors' time.
+struct Spent {
+  double all = 0;
+  double worked = 0;
+  std::vector<double> stages;
+  std::vector<double> least;
+};
+
+void run_once(Context& context, const BenchOperation& operation, Spent& spent) {
+  if (operation.reset) operation.reset();
+  context.finish();
+  context.take_launches();
+  const ProcessorTime processors(context);
+  operation.run();
+  context.finish();
+  const std::size_t count = operation.stages.size();
+  spent.stages.resize(count, 0.0);
+  spent.least.resize(count, std::numeric_limits<double>::infinity());
+  std::vector<double> stages(count, 0.0);
+  double all = 0;
+  for (const LaunchTime& launch : context.take_launches()) {
+    all += launch.seconds;
+    for (std::size_t k = 0; k < count; ++k)
+      if (operation.stages[k].takes(launch)) stages[k] += launch.seconds;
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    spent.stages[k] += stages[k];
+    spent.least[k] = std::min(spent.least[k], stages[k]);
+  }
+  spent.all += all;
+  spent.worked += all * processors.share(all);
+}
+
+// Every stage by its part of the time that the processors worked: others may share them, and a
+// kernel that waits for a processor is not slow. Of a stage that is a small part of its operation
+// nobody knows whether it waited as much as the rest: its least time counts.
+void measure_rows(Context& context,
+                  SceneBench& bench,
+                  const BenchOptions& options,
+                  Forecast& forecast) {
+  const std::vector<std::string>& wanted = modelled_rows();
+  const IdFilter keep = [&wanted](const std::string& id) {
+    return std::find(wanted.begin(), wanted.end(), id.substr(0, id.find('/'))) != wanted.end();
+  };
+  const auto operations = selected(bench.operations(), keep, forecast.scene, forecast.size);
+  for (const BenchOperation& operation : operations) {
+    Spent spent;
+    operation.prepare();
+    run_once(context, operation, spent);
+    spent = {};
+    int runs = 0;
+    const auto begin = std::chrono::steady_clock::now();
+    for (; runs < options.repeat || seconds_since(begin) < kLeastSeconds; ++runs)
+      run_once(context, operation, spent);
+    for (std::size_t k = 0; k < spent.stages.size(); ++k) {
+      for (Forecast::Row& row : forecast.rows) {
+        if (row.name != operation.stages[k].name) continue;
+        const bool small = spent.stages[k] < kSmallStage * spent.all;
+        row.measured = small ? spent.least[k] : spent.stages[k] * spent.worked / (spent.all * runs);
+      }
+    }
+  }
+}
+
+Forecast forecast_of(Context& context,
+                     const BenchOptions& options,
+                     const BenchModel& model,
+                     const DeviceSpeeds& device) {
+  Forecast out;
+  out.scene = model.name;
+  out.size = model.gaussians.size();
+  out.width = model.camera.width;
+  out.height = model.camera.height;
+  SceneBench bench(context, model, options);
+  out.vectors = bench.counts(false);
+  out.groups = bench.counts(true);
+  for (const std::string& name : modelled_rows()) {
+    Forecast::Row row;
+    row.name = name;
+    row.device = predict(executed_work(name, out.vectors), device);
+    for (const Card& card : cards()) row.cards.push_back(on_card(name, out.groups, card));
+    out.rows.push_back(row);
+  }
+  measure_rows(context, bench, options, out);
+  for (const Card& card : cards()) {
+    out.frames.push_back(1 / view_seconds(out.groups, card));
+    out.iterations.push_back(1 / iteration_seconds(out.groups, card));
+  }
+  return out;
+}
+
+std::string rate_line(const char* name, const std::vector<double>& rates) {
+  std::string out = fmt::format("{:<15}", name);
+  for (const double rate : rates) out += fmt::format(" {:>9.0f} {:<12}", rate, "");
+  return out + "\n";
+}
+
+}  // namespace
+
+double view_seconds(const ExecutedCounts& groups, const Card& card) {
+  return seconds_of({"prepare-view", "tile-lists", "forward"}, groups, card);
+}
+
+// Boxes of the Gaussians and the statistics of density are small beside the others.
+double iteration_seconds(const ExecutedCounts& groups, const Card& card) {
+  return seconds_of({"prepare-view", "tile-lists", "forward-train", "loss-value", "loss-gradient",
+                     "backward", "finalize", "adam"},
+                    groups, card);
+}
+
+DeviceSpeeds measure_speeds(Context& context) {
+  DeviceSpeeds out;
+  out.name = context.device().name;
+  out.cpu = context.device().type == DeviceType::kCpu;
+  out.vectors = measure_vector_rate(context);
+  out.scalars = measure_scalar_rate(context);
+  out.slow = measure_slow_rate(context);
+  for (const std::size_t bytes : kLevels) {
+    out.bandwidth.push_back(
+        {static_cast<double>(bytes), measure_copy_bandwidth(context, bytes / 2)});
+    out.lines.push_back({static_cast<double>(bytes), measure_line_rate(context, bytes)});
+    out.runs.push_back({static_cast<double>(bytes), measure_run_rate(context, bytes)});
+    out.chases.push_back({static_cast<double>(bytes), measure_chase_rate(context, bytes)});
+    out.stores.push_back({static_cast<double>(bytes), measure_store_rate(context, bytes)});
+  }
+  return out;
+}
+
+ForecastReport make_forecast(Context& context,
+                             const BenchOptions& options,
+                             const BenchModel* model) {
+  if (context.device().type != DeviceType::kCpu) {
+    throw UsageError(
+        "--forecast counts with the kernels of a CPU and compares with it: give --device a CPU");
+  }
+  ForecastReport report;
+  report.device = measure_speeds(context);
+  if (model != nullptr) {
+    report.forecasts.push_back(forecast_of(context, options, *model, report.device));
+  } else {
+    for (const BenchCase& one : wanted_cases(options))
+      report.forecasts.push_back(
+          forecast_of(context, options, generated(one, options), report.device));
+  }
+  return report;
+}
+
+std::string forecast_text(const ForecastReport& report) {
+  const DeviceSpeeds& d = report.device;
+  std::string out = fmt::format(
+      "{}: {:.2f} G vector, {:.2f} G scalar instructions/s, {:.2f} G divisions and roots/s\n",
+      d.name, 1e-9 * d.vectors, 1e-9 * d.scalars, 1e-9 * d.slow);
+  for (std::size_t i = 0; i < d.bandwidth.size(); ++i) {
+    out += fmt::format(
+        "  up to {:>4.0f} MiB: {:>6.1f} GB/s in order, {:>7.1f} M lines/s at random, {:>6.1f} "
+        "chased\n",
+        d.bandwidth[i].bytes / static_cast<double>(kMebi), 1e-9 * d.bandwidth[i].per_second,
+        1e-6 * d.lines[i].per_second, 1e-6 * d.chases[i].per_second);
+  }
+  for (const Forecast& f : report.forecasts) {
+    out += fmt::format("\n{}, {} Gaussians, {}x{}\n", f.scene, f.size, f.width, f.height);
+    for (const ExecutedCounts* c : {&f.vectors, &f.groups}) {
+      out += fmt::format(
+          "{}: of a packet {:.0f} candidates tested, {:.0f} hit by {:.1f} rays each, {:.0f} pairs "
+          "of "
+          "open rows;\n  of a ray through the tree {:.0f} nodes, {:.0f} blocks, {:.0f} hits\n",
+          c->grouped ? "groups of 32 rays" : "vectors of 16 rays", c->tested / c->packets,
+          c->opened / c->packets, c->hits / std::max(c->opened, 1.0), c->compared / c->packets,
+          c->ray_nodes / c->rays, c->ray_blocks / c->rays, c->ray_hits / c->rays);
+    }
+    out += fmt::format("{:<15} {:>10} {:>10} {:>16}  {}\n", "on this device", "measured",
+                       "model, ms", "measured / model", "bound");
+    for (const Forecast::Row& row : f.rows) {
+      out += fmt::format("{:<15} {:>10.3f} {:>10.3f} {:>16.2f}  {}\n", row.name, 1e3 * row.measured,
+                         1e3 * row.device.seconds, row.measured / row.device.seconds,
+                         row.device.bound);
+    }
+    out += fmt::format("{:<15}", "model, ms");
+    for (const Card& card : cards()) out += fmt::format(" {:>22}", card.speeds.name);
+    out += "\n";
+    for (const Forecast::Row& row : f.rows) {
+      out += fmt::format("{:<15}", row.name);
+      for (const Prediction& card : row.cards)
+        out += fmt::format(" {:>9.3f} {:<12}", 1e3 * card.seconds, card.bound);
+      out += "\n";
+    }
+    out += rate_line("frames/s", f.frames);
+    out += rate_line("iterations/s", f.iterations);
+  }
+  return out;
+}
+
+}  // namespace raysplats

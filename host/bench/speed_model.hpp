@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace raysplats {
+
+/// What the kernels of a row execute, work that finds nothing included: counted, not measured.
+struct KernelWork {
+  double vectors = 0;    ///< instructions on a whole vector or wave, but for the next two kinds
+  double scalars = 0;    ///< instructions on one number for a whole vector or wave
+  double slow = 0;       ///< divisions and roots of a vector or wave; GPUs: and exponentials
+  double bytes = 0;      ///< read and written in order
+  double footprint = 0;  ///< bytes that these come from: which memory they can be in
+  double lines = 0;      ///< of 64 bytes at random
+  double runs = 0;       ///< of these lines in runs of about 16, which lie at random
+  double table = 0;      ///< bytes that both come from
+  double chases = 0;     ///< of these lines where the address of one is in the one before
+  double path = 0;       ///< bytes that those come from
+  double stores = 0;     ///< of 8 bytes at random
+  double targets = 0;    ///< bytes of the lines that they go to
+  double local = 0;      ///< accesses of a wave to local memory
+  double atomics = 0;    ///< floats added to shared memory
+  double trips = 0;      ///< times that a wave waits for global memory
+  double barriers = 0;   ///< of a wave
+  double launches = 0;   ///< kernels
+
+  KernelWork operator+(const KernelWork& other) const;
+};
+
+/// What a device does at best, measured or published.
+struct DeviceSpeeds {
+  /// Figures that hold up to so many bytes; the last one also beyond.
+  struct Level {
+    double bytes = 0;
+    double per_second = 0;
+  };
+
+  std::string name;
+  bool cpu = false;
+  double vectors = 0;            ///< instructions a second
+  double scalars = 0;            ///< 0: they take the slots of vectors
+  double slow = 0;               ///< a second; their vectors' slots are not counted
+  std::vector<Level> bandwidth;  ///< bytes a second
+  std::vector<Level> lines;      ///< a second; none: by the bandwidth
+  std::vector<Level> runs;       ///< a second; like the next two, none where there are no lines
+  std::vector<Level> chases;
+  std::vector<Level> stores;
+  double local = 0;         ///< accesses a second; 0: none apart
+  double atomics = 0;       ///< a second; 0: none apart
+  double clock = 0;         ///< Hz, of what follows
+  double issue_cycles = 0;  ///< from an instruction to one that needs its result
+  double trip_cycles = 0;   ///< of a wait for global memory
+  double local_cycles = 0;  ///< of a wait for local memory or a barrier
+  double launch_seconds = 0;
+};
+
+struct Prediction {
+  double seconds = 0;
+  std::string bound;  ///< "arithmetic", "memory", "local memory", "atomics", "latency", "launches"
+};
+
+/// The slowest of: instructions, bytes and lines, local accesses, additions, and the way of one
+/// wave after the other through its instructions and waits where `resident` waves run at once (0:
+/// not asked). Of a CPU the three kinds of instructions add up, and lines and words at random,
+/// which nothing fetches ahead, come on top; so do launches.
+Prediction predict(const KernelWork& work, const DeviceSpeeds& device, double resident = 0);
+
+/// A graphics card that nothing has run on: public figures (docs/gpu.md) and what the vendor's
+/// compiler says of the kernels (scripts/gpu/baseline.json).
+struct Card {
+  DeviceSpeeds speeds;
+  std::string target;    ///< of scripts/gpu_compile.py, or the nearest one
+  double units = 0;      ///< that share registers and local memory
+  double registers = 0;  ///< of a unit, in waves' registers of 32 lanes; Intel: its threads
+  double most = 0;       ///< waves of a unit
+  double local = 0;      ///< bytes of a unit
+  int granule = 1;       ///< registers are given out in
+};
+
+/// Radeon RX 7900 XTX, Arc A770, GeForce RTX 4090, H200 SXM.
+const std::vector<Card>& cards();
+
+/// A kernel as a vendor's compiler left it.
+struct CompiledKernel {
+  std::string target;
+  std::string name;      ///< of the baseline
+  double registers = 0;  ///< of a work-item
+  double local = 0;      ///< bytes of a group
+  double group = 0;      ///< work-items
+  double width = 0;      ///< of a wave
+};
+
+/// The kernels that decide rows of run_bench() on GPUs, one per target.
+const std::vector<CompiledKernel>& compiled_kernels();
+/// Of a row and target. Throws UsageError where there is none.
+const CompiledKernel& compiled_kernel(const std::string& row, const std::string& target);
+
+/// Waves of 32 work-items of a kernel that the card holds at once.
+double resident_waves(const Card& card, const CompiledKernel& kernel);
+
+}  // namespace raysplats
