@@ -17,11 +17,13 @@
 namespace raysplats {
 namespace {
 
-constexpr double kLeastSeconds = 2.0;  // that a row is repeated for
-constexpr double kSmallStage = 0.1;    // of an operation
+constexpr double kLeastSeconds = 2.0;    // that a row is repeated for
+constexpr double kSmallStage = 0.1;      // of an operation
+constexpr double kShortSeconds = 0.004;  // that may pass without a change of the scheduler
 constexpr std::size_t kMebi = std::size_t{1} << 20;
 // Sizes between which caches end.
-constexpr std::size_t kLevels[] = {2 * kMebi, 8 * kMebi, 32 * kMebi, 128 * kMebi, 512 * kMebi};
+constexpr std::size_t kLevels[] = {32 << 10,   512 << 10,   2 * kMebi,  8 * kMebi,
+                                   32 * kMebi, 128 * kMebi, 512 * kMebi};
 
 Prediction on_card(const std::string& row, const ExecutedCounts& groups, const Card& card) {
   return predict(executed_work(row, groups), card.speeds,
@@ -75,7 +77,7 @@ void run_once(Context& context, const BenchOperation& operation, Spent& spent) {
 
 // Every stage by its part of the time that the processors worked: others may share them, and a
 // kernel that waits for a processor is not slow. Of a stage that is a small part of its operation
-// nobody knows whether it waited as much as the rest: its least time counts.
+// nobody knows whether it waited as much as the rest: where it is short its least time counts.
 void measure_rows(Context& context,
                   SceneBench& bench,
                   const BenchOptions& options,
@@ -97,8 +99,9 @@ void measure_rows(Context& context,
     for (std::size_t k = 0; k < spent.stages.size(); ++k) {
       for (Forecast::Row& row : forecast.rows) {
         if (row.name != operation.stages[k].name) continue;
-        const bool small = spent.stages[k] < kSmallStage * spent.all;
-        row.measured = small ? spent.least[k] : spent.stages[k] * spent.worked / (spent.all * runs);
+        const double by_share = spent.stages[k] * spent.worked / (spent.all * runs);
+        const bool small = spent.stages[k] < kSmallStage * spent.all && by_share < kShortSeconds;
+        row.measured = small ? spent.least[k] : by_share;
       }
     }
   }
@@ -194,10 +197,10 @@ std::string forecast_text(const ForecastReport& report) {
       d.name, 1e-9 * d.vectors, 1e-9 * d.scalars, 1e-9 * d.slow);
   for (std::size_t i = 0; i < d.bandwidth.size(); ++i) {
     out += fmt::format(
-        "  up to {:>4.0f} MiB: {:>6.1f} GB/s in order, {:>7.1f} M lines/s at random, {:>6.1f} "
+        "  up to {:>6.0f} KiB: {:>6.1f} GB/s in order, {:>7.1f} M lines/s at random, {:>6.1f} "
         "chased\n",
-        d.bandwidth[i].bytes / static_cast<double>(kMebi), 1e-9 * d.bandwidth[i].per_second,
-        1e-6 * d.lines[i].per_second, 1e-6 * d.chases[i].per_second);
+        d.bandwidth[i].bytes / 1024, 1e-9 * d.bandwidth[i].per_second, 1e-6 * d.lines[i].per_second,
+        1e-6 * d.chases[i].per_second);
   }
   for (const Forecast& f : report.forecasts) {
     out += fmt::format("\n{}, {} Gaussians, {}x{}\n", f.scene, f.size, f.width, f.height);

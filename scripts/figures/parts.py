@@ -252,6 +252,12 @@ def price(run):
     return plain(run, "price.sh", "--iterations", run.size(60, 3), "--repeat", run.size(3, 1))
 
 
+def forecast(run):
+    options = ["--sizes", run.size("10k,100k,1M", "1k"), "--repeat", 3, *run.size([], ["--resolution", "64x64", "--rays", 1024])]
+    text = run.call(run.raysplats, "-q", "bench", "--forecast", *options)
+    return f"`raysplats bench --forecast {shown(*options)}`:\n\n```text\n{text.rstrip()}\n```\n"
+
+
 PARTS = [
     Part("kernels", 2.0, "every stage against the machine's limits (bench)", kernels),
     Part("iteration", 0.5, "kernels of a training iteration on the fox (train --profile)", iteration),
@@ -265,4 +271,5 @@ PARTS = [
     Part("spread", 1.0, "spread of runs with and without exact sums (spread.sh)", spread),
     Part("kills", 1.5, "runs killed at random moments (kill_loop.sh)", kills),
     Part("price", 1.0, "gradients added in each way (price.sh)", price),
+    Part("forecast", 4.0, "a model of speed, on this device and on graphics cards (bench --forecast)", forecast),
 ]
