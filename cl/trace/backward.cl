@@ -12,6 +12,8 @@
 //                     of the packets, with integer atomics only.       global: packets of the band
 //   otherwise:        one copy of shared floats (float_add.h).               global: packets of the
 //   band
+// With DEPTH_GRADIENT depth_gradient is that of the sum of T alpha t of every pixel, t being the
+// depth of a hit; else it is not read.
 // Components of a line's gradient follow the line; slot 2 (m_z, of which order makes no gradient)
 // sums the per-ray lengths of the screen gradient instead, the densification signal of AbsGS (Ye et
 // al. 2024).
@@ -126,6 +128,7 @@ void packet_backward(const RsCamera* camera,
                      const int py,
                      __global const RsLine* restrict lines,
                      __global const float* restrict image_gradient,
+                     __global const float* restrict depth_gradient,
                      __global const float* restrict transmittances,
                      __global const uint2* restrict stream_ends,
                      __global const uint2* restrict pool,
@@ -140,7 +143,7 @@ void packet_backward(const RsCamera* camera,
   if (tail.x == RS_NO_CHUNK) return;
   const size_t plane = (size_t)width * height;
   Pixels p;
-  load_pixels(&p, camera, tangents, image_gradient, screen_x, screen_y, px, py);
+  load_pixels(&p, camera, tangents, image_gradient, depth_gradient, screen_x, screen_y, px, py);
   const fv T = rs_load_pixels(transmittances, width, height, px, py);
   const fv T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
   OpenRows rows;
@@ -169,7 +172,7 @@ void packet_backward(const RsCamera* camera,
       __global const float* v = lines[row.x >> 1].v;
       const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
       const fv alpha = v[12] * rs_exp(-0.5f * m.numerator / m.direction2);
-      const fv projected = v[13] * p.gR + v[14] * p.gG + v[15] * p.gB + p.gA;
+      const fv projected = rs_projected(&p, v, &m);
       const fv mine = before * alpha * projected;
       fv farther = behind;
       const uint open_end = rows.head + rows.size;
@@ -199,6 +202,7 @@ __kernel void trace_backward(RS_VIEW_ARGUMENTS,
                              RS_STREAM_ARGUMENTS(const),
                              __global const RsLine* restrict lines,
                              __global const float* restrict image_gradient,
+                             __global const float* restrict depth_gradient,
                              __global float* restrict gradients) {
   const RsCamera camera = camera_argument;
   const RsBackward backward = backward_argument;
@@ -220,9 +224,9 @@ __kernel void trace_backward(RS_VIEW_ARGUMENTS,
     const int y0 = tile / tiles_x * TILE;
     for (int y = y0; y < min(y0 + TILE, camera.height); y += PACKET_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += PACKET_WIDTH) {
-        packet_backward(&camera, tangents, x, y, lines, image_gradient, transmittances, stream_ends,
-                        pool, pool_transmittance, background, backward.screen_x, backward.screen_y,
-                        &sums);
+        packet_backward(&camera, tangents, x, y, lines, image_gradient, depth_gradient,
+                        transmittances, stream_ends, pool, pool_transmittance, background,
+                        backward.screen_x, backward.screen_y, &sums);
       }
     }
   }
@@ -231,7 +235,8 @@ __kernel void trace_backward(RS_VIEW_ARGUMENTS,
   const int y = get_global_id(1) * PACKET_HEIGHT + tile_row * TILE;
   if (x >= camera.width || y >= camera.height) return;
   if (!rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE)) return;
-  packet_backward(&camera, tangents, x, y, lines, image_gradient, transmittances, stream_ends, pool,
-                  pool_transmittance, background, backward.screen_x, backward.screen_y, &sums);
+  packet_backward(&camera, tangents, x, y, lines, image_gradient, depth_gradient, transmittances,
+                  stream_ends, pool, pool_transmittance, background, backward.screen_x,
+                  backward.screen_y, &sums);
 #endif
 }

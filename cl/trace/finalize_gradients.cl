@@ -105,8 +105,16 @@ __kernel void finalize_gradients(const uint begin,
 
   ViewGaussian g;
   load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
+  gv line[16];
+  load_columns(lines[i].v, 16, 16, line);
   ViewGradient view;
+#if DEPTH_GRADIENT
+  const gv depth = take_depth_gradient(line, touched, kind, v);
+#endif
   line_gradient(&g, v, touched, kind, &view);
+#if DEPTH_GRADIENT
+  view.m[2] += depth;
+#endif
   gv seen[3];
   screen_statistics(&g, v, touched, kind, finalize.screen_x, finalize.screen_y, seen);
 #if ACCUMULATE
@@ -124,8 +132,6 @@ __kernel void finalize_gradients(const uint begin,
 #endif
   store_columns3(seen[0], seen[1], seen[2], screen + 3 * i);
 
-  gv line[16];
-  load_columns(lines[i].v, 16, 16, line);
   ColourGradient colour;
   colour_gradient(g.offset, line, v, touched, &colour);
   ParameterGradient out;

@@ -93,9 +93,8 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
 }
 
 // Of the Gaussian of line v in the packet's rays.
-float group_alpha(const Pixels* p, __global const float* v, const uint reference) {
-  const PacketMeeting m = rs_meet(v, reference & 1, 0.0f, p->X, p->Y);
-  return v[12] * rs_exp(-0.5f * m.numerator / m.direction2);
+float group_alpha(__global const float* v, const PacketMeeting* m) {
+  return v[12] * rs_exp(-0.5f * m->numerator / m->direction2);
 }
 
 // The row of the slot has met all rows that it may change places with: its gradient is complete.
@@ -112,14 +111,15 @@ RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
                                ClosedHit* closed) {
   const uint reference = memory->reference[slot];
   __global const float* v = lines[reference >> 1].v;
-  const float alpha = group_alpha(p, v, reference);
+  const PacketMeeting m = rs_meet(v, reference & 1, 0.0f, p->X, p->Y);
+  const float alpha = group_alpha(v, &m);
   const float before = rs_row_get(memory->before, own->before, slot, lane);
   const float from_here = rs_row_get(memory->from_here, own->from_here, slot, lane);
   if (before > closed->before) {
     closed->before = before;
     closed->from_here = from_here;
   }
-  const float projected = v[13] * p->gR + v[14] * p->gG + v[15] * p->gB + p->gA;
+  const float projected = rs_projected(p, v, &m);
   // Only the last hit of a ray can be opaque, and only the background is behind that.
   const float behind = before <= T_last ? before * sky
                                         : (from_here - before * alpha * projected + T * sky) *
@@ -140,6 +140,7 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
                                     const int group_y,
                                     __global const RsLine* restrict lines,
                                     __global const float* restrict image_gradient,
+                                    __global const float* restrict depth_gradient,
                                     __global const float* restrict transmittances,
                                     __global const uint2* restrict stream_ends,
                                     __global const uint2* restrict pool,
@@ -155,7 +156,7 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
   const int py = group_y + lane / RS_GROUP_WIDTH;
   const size_t plane = (size_t)width * height;
   Pixels p;
-  load_pixels(&p, camera, tangents, image_gradient, screen_x, screen_y, px, py);
+  load_pixels(&p, camera, tangents, image_gradient, depth_gradient, screen_x, screen_y, px, py);
   const float T = rs_load_pixels(transmittances, width, height, px, py);
   const float T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
   const float sky = background.x * p.gR + background.y * p.gG + background.z * p.gB;
@@ -180,8 +181,8 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
       const uint2 row = pool[first + n];
       const float before = pool_transmittance[(first + n) * GROUP + lane];
       __global const float* v = lines[row.x >> 1].v;
-      const float projected = v[13] * p.gR + v[14] * p.gG + v[15] * p.gB + p.gA;
-      const float mine = before * group_alpha(&p, v, row.x) * projected;
+      const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
+      const float mine = before * group_alpha(v, &m) * rs_projected(&p, v, &m);
       ClosedHit next = closed;  // the nearest behind this one
       for (uint rest = open; rest != 0; rest &= rest - 1) {
         const uint slot = rs_lowest_bit(rest);
@@ -217,6 +218,7 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
                                                    RS_STREAM_ARGUMENTS(const),
                                                    __global const RsLine* restrict lines,
                                                    __global const float* restrict image_gradient,
+                                                   __global const float* restrict depth_gradient,
                                                    __global float* restrict gradients) {
   __local BackwardMemory memory;
   const RsCamera camera = camera_argument;
@@ -241,8 +243,8 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
     for (int y = y0; y < min(y0 + TILE, camera.height); y += RS_GROUP_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += RS_GROUP_WIDTH) {
         group_backward(&memory, lane, works, &camera, tangents, x, y, lines, image_gradient,
-                       transmittances, stream_ends, pool, pool_transmittance, background,
-                       backward.screen_x, backward.screen_y, &sums);
+                       depth_gradient, transmittances, stream_ends, pool, pool_transmittance,
+                       background, backward.screen_x, backward.screen_y, &sums);
       }
     }
   }
@@ -252,7 +254,7 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
   const bool works = x < camera.width && y < camera.height &&
                      rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE);
   group_backward(&memory, lane, works, &camera, tangents, x, y, lines, image_gradient,
-                 transmittances, stream_ends, pool, pool_transmittance, background,
+                 depth_gradient, transmittances, stream_ends, pool, pool_transmittance, background,
                  backward.screen_x, backward.screen_y, &sums);
 #endif
 }

@@ -176,6 +176,11 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   for (int k = 0; k < 13; ++k) v[k] = row[k];
   ViewGaussian g;
   load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
+#if DEPTH_GRADIENT
+  float line[12];
+  for (int k = 3; k < 12; ++k) line[k] = lines[i].v[k];
+  const float depth = take_depth_gradient(line, touched, kind, v);
+#endif
   float seen[3];
   screen_statistics(&g, v, touched, kind, finalize.screen_x, finalize.screen_y, seen);
 #if ACCUMULATE
@@ -189,6 +194,9 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   ViewGradient view;
   park(row, &g, v[12], out.mean);
   line_gradient(&g, v, touched, kind, &view);
+#if DEPTH_GRADIENT
+  view.m[2] += depth;
+#endif
   const float opacity_slope = unpark(row, &g, out.mean);
   parameter_gradient(&g, &view, opacity_slope, touched, &camera, &out);
   for (int j = 0; j < 3; ++j) {

@@ -5,10 +5,19 @@
 
 #include "trace/packet.h"
 
+// Depth has a gradient too. The depth of a hit is that of its greatest response, and so depends on
+// m_z; its gradient takes the slot of D0, whose own follows from the others (view_gradient.h).
+#ifndef DEPTH_GRADIENT
+#define DEPTH_GRADIENT 0
+#endif
+
 // What the rays of a packet share, and the gradient of its pixels.
 typedef struct {
   fv X, Y;
   fv gR, gG, gB, gA;
+#if DEPTH_GRADIENT
+  fv gS;  // of the sum of T alpha t
+#endif
   float screen_x, screen_y;
 } Pixels;
 
@@ -18,6 +27,7 @@ void load_pixels(Pixels* p,
                  const RsCamera* camera,
                  __global const float* restrict tangents,
                  __global const float* restrict image_gradient,
+                 __global const float* restrict depth_gradient,
                  const float screen_x,
                  const float screen_y,
                  const int px,
@@ -34,6 +44,25 @@ void load_pixels(Pixels* p,
   p->gB = rs_load_pixels(image_gradient + 2 * plane, width, height, px, py);
   // Alpha is a fourth colour channel that is 1 in every Gaussian and 0 in the background.
   p->gA = rs_load_pixels(image_gradient + 3 * plane, width, height, px, py);
+#if DEPTH_GRADIENT
+  p->gS = rs_load_pixels(depth_gradient, width, height, px, py);
+#if LENS == 2
+  p->gS *= sqrt(1.0f + p->X * p->X + p->Y * p->Y);  // depths lie along the rays
+#endif
+#else
+  (void)depth_gradient;
+#endif
+}
+
+// What a pixel gains from each unit of T alpha that a Gaussian blends.
+fv rs_projected(const Pixels* p, __global const float* v, const PacketMeeting* m) {
+  const fv colour = v[13] * p->gR + v[14] * p->gG + v[15] * p->gB + p->gA;
+#if DEPTH_GRADIENT
+  return colour + p->gS * (m->along / m->direction2);
+#else
+  (void)m;
+  return colour;
+#endif
 }
 
 #if LENS == 2
@@ -47,19 +76,29 @@ fv rs_angular_length(const float x, const float y, const fv gx, const fv gy) {
 
 // Gradient of the line but for opacity and colour, from that of the squared distance. Each form
 // meets the Gaussian by itself: behind one branch for both compilers may gather the line's numbers.
-void line_gradient_projective(const Pixels* p,
-                              __global const float* v,
-                              const fv g_distance2,
-                              fv* g) {
+void line_gradient_projective(
+    const Pixels* p, __global const float* v, const fv g_distance2, const fv weight, fv* g) {
   const PacketMeeting m = rs_meet_projective(v, 0.0f, p->X, p->Y);
   const fv inverse = 1.0f / m.direction2;
   const fv dx = p->X - v[0];
   const fv dy = p->Y - v[1];
   const fv gN = g_distance2 * inverse;
+#if DEPTH_GRADIENT
+  // t = m_z (D0 + E) / D with E = e . (dx, dy)
+  const fv g_depth = weight * p->gS * inverse;
+  const fv gD = -(gN * m.numerator + g_depth * m.along) * inverse;
+  const fv gE = g_depth * v[2];
+#else
+  (void)weight;
   const fv gD = -gN * m.numerator * inverse;
+#endif
   const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
   g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
   g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
+#if DEPTH_GRADIENT
+  g[0] -= gE * v[7];
+  g[1] -= gE * v[8];
+#endif
 #if LENS == 2
   g[2] = rs_angular_length(v[0], v[1], g[0], g[1]) * p->screen_x;
 #else
@@ -69,22 +108,39 @@ void line_gradient_projective(const Pixels* p,
   g[3] = gNx * dx;
   g[4] = 2.0f * gNx * dy;
   g[5] = gNy * dy;
+#if DEPTH_GRADIENT
+  g[6] = g_depth * (v[6] + v[7] * dx + v[8] * dy);
+  g[7] = 2.0f * gDx + gE * dx;
+  g[8] = 2.0f * gDy + gE * dy;
+#else
   g[6] = gD;
   g[7] = 2.0f * gDx;
   g[8] = 2.0f * gDy;
+#endif
   g[9] = gDx * dx;
   g[10] = 2.0f * gDx * dy;
   g[11] = gDy * dy;
 }
 
-// g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'.
-void line_gradient_general(const Pixels* p, __global const float* v, const fv g_distance2, fv* g) {
+// g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'. The peak itself is
+// -<o', d'> / <d', d'>.
+void line_gradient_general(
+    const Pixels* p, __global const float* v, const fv g_distance2, const fv weight, fv* g) {
   const PacketMeeting m = rs_meet_general(v, 0.0f, p->X, p->Y);
   const fv peak = m.along / m.direction2;
+#if DEPTH_GRADIENT
+  const fv g_depth = weight * p->gS / m.direction2;
+#else
+  (void)weight;
+#endif
   for (int k = 0; k < 3; ++k) {
     const fv direction = v[3 * k] * p->X + v[3 * k + 1] * p->Y + v[3 * k + 2];
-    const fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
-    const fv g_direction = peak * g_origin;
+    fv g_origin = 2.0f * g_distance2 * (v[9 + k] + peak * direction);
+    fv g_direction = peak * g_origin;
+#if DEPTH_GRADIENT
+    g_origin -= g_depth * direction;
+    g_direction -= g_depth * (v[9 + k] + 2.0f * peak * direction);
+#endif
     g[3 * k] = g_direction * p->X;
     g[3 * k + 1] = g_direction * p->Y;
     g[3 * k + 2] = g_direction;
@@ -107,9 +163,9 @@ void line_gradient(const Pixels* p,
   g[14] = weight * p->gG;
   g[15] = weight * p->gB;
   if (general) {
-    line_gradient_general(p, v, g_distance2, g);
+    line_gradient_general(p, v, g_distance2, weight, g);
   } else {
-    line_gradient_projective(p, v, g_distance2, g);
+    line_gradient_projective(p, v, g_distance2, weight, g);
   }
 }
 

@@ -13,6 +13,11 @@
 #define ANGULAR 0
 #endif
 
+// The lines' gradients have that of m_z in the slot of D0 (line_gradient.h).
+#ifndef DEPTH_GRADIENT
+#define DEPTH_GRADIENT 0
+#endif
+
 typedef struct {
   gv m[3];
   gv axis[9];
@@ -98,6 +103,22 @@ void line_gradient(
   const gi general = kind == RS_LINE_GENERAL;
   if (RS_ANY_GAUSSIAN(touched & general)) general_gradient(g, v, general, out);
 }
+
+#if DEPTH_GRADIENT
+// Takes the gradient of m_z out of that of a projective line, v[6], and puts that of D0 there: N
+// and D are of first degree in v[3..5] and v[6..11], and squared distance and depth of degree 0 in
+// them all, so that the products of numbers and gradients add up to 0 (Euler).
+gv take_depth_gradient(const gv* line, const gi touched, const gi kind, gv* v) {
+  gv sum = 0;
+  for (int k = 3; k < 12; ++k) {
+    if (k != 6) sum += line[k] * v[k];
+  }
+  const gi counts = touched & (kind == RS_LINE_PROJECTIVE);
+  const gv depth = counts ? v[6] : (gv)(0.0f);
+  v[6] = counts ? -sum / line[6] : v[6];
+  return depth;
+}
+#endif
 
 // What density control reads: screen gradient, the sum of its absolute values, 1 where a ray met.
 void screen_statistics(const ViewGaussian* g,

@@ -6,13 +6,16 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <map>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "io/byte_reader.hpp"
 #include "io/image_file.hpp"
@@ -219,12 +222,13 @@ void read_images_binary(const fs::path& path, ColmapModel& model) {
   const std::uint64_t count = reader.count("number of images", 4 + 7 * 8 + 4 + 2 + 8);
   model.images.reserve(static_cast<std::size_t>(count));
   for (std::uint64_t i = 0; i < count; ++i) {
-    reader.skip(4, "the image number");
+    const auto id = reader.read<std::uint32_t>("the image number");
     std::array<double, 7> pose;
     for (double& value : pose) value = reader.read<double>("the pose of an image");
     const auto camera = reader.read<std::uint32_t>("the camera of an image");
     std::string name = reader.zero_terminated("the name of an image", kMaxNameBytes);
     model.images.push_back(make_image(std::move(name), camera, pose, fail));
+    model.images.back().id = id;
     constexpr std::uint64_t kPointBytes = 24;
     reader.skip(kPointBytes * reader.count("number of image points", kPointBytes),
                 "the points of an image");
@@ -236,12 +240,26 @@ void read_images_text(const fs::path& path, ColmapModel& model) {
   TextReader reader(bytes, path);
   const Fail fail = [&](const std::string& message) { reader.fail(message); };
   while (reader.next_content_line()) {
-    reader.unsigned_integer("the image number");
+    const std::uint64_t id = reader.unsigned_integer("the image number");
     std::array<double, 7> pose;
     for (double& value : pose) value = reader.number("the pose of an image");
     const std::uint64_t camera = reader.unsigned_integer("the camera of an image");
     model.images.push_back(make_image(std::string(reader.rest()), camera, pose, fail));
+    model.images.back().id = static_cast<std::uint32_t>(id);
     reader.next_line();  // the image's points, an empty line when there are none
+  }
+}
+
+/// Images that show a point: number of the image, place of the point.
+using Tracks = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+/// Gives every image the points that it shows.
+void share_tracks(const Tracks& tracks, ColmapModel& model) {
+  std::map<std::uint32_t, ColmapImage*> by_id;
+  for (ColmapImage& image : model.images) by_id.emplace(image.id, &image);
+  for (const auto& [image, point] : tracks) {
+    const auto found = by_id.find(image);
+    if (found != by_id.end()) found->second->points.push_back(point);
   }
 }
 
@@ -256,6 +274,7 @@ void read_points_binary(const fs::path& path, ColmapModel& model) {
   ByteReader reader(bytes, path);
   const Fail fail = [&](const std::string& message) { reader.fail(message); };
   const std::uint64_t count = reader.count("number of points", 8 + 3 * 8 + 3 + 8 + 8);
+  Tracks tracks;
   model.points.positions.reserve(3 * static_cast<std::size_t>(count));
   model.points.colors.reserve(3 * static_cast<std::size_t>(count));
   model.positions.reserve(3 * static_cast<std::size_t>(count));
@@ -269,15 +288,21 @@ void read_points_binary(const fs::path& path, ColmapModel& model) {
     const auto error = reader.read<double>("the error of a point");
     add_point(model, position, rgb, fail);
     const std::uint64_t length = reader.count("track length", 8);
-    reader.skip(8 * length, "the track of a point");
+    for (std::uint64_t k = 0; k < length; ++k) {
+      tracks.emplace_back(reader.read<std::uint32_t>("the track of a point"),
+                          static_cast<std::uint32_t>(i));
+      reader.skip(4, "the track of a point");
+    }
     add_track(model.points, length, error);
   }
+  share_tracks(tracks, model);
 }
 
 void read_points_text(const fs::path& path, ColmapModel& model) {
   const auto bytes = read_file(path);
   TextReader reader(bytes, path);
   const Fail fail = [&](const std::string& message) { reader.fail(message); };
+  Tracks tracks;
   while (reader.next_content_line()) {
     reader.unsigned_integer("the number of a point");
     glm::dvec3 position;
@@ -288,9 +313,17 @@ void read_points_text(const fs::path& path, ColmapModel& model) {
     add_point(model, position, rgb, fail);
     const double error = reader.number("the error of a point");
     std::istringstream track{std::string(reader.rest())};
-    const auto words = std::distance(std::istream_iterator<std::string>(track), {});
-    add_track(model.points, static_cast<std::uint64_t>(words) / 2, error);
+    const std::vector<std::string> words{std::istream_iterator<std::string>(track), {}};
+    for (std::size_t k = 0; k + 1 < words.size(); k += 2) {
+      std::uint32_t image = 0;
+      const char* end = words[k].data() + words[k].size();
+      // Numbers that are none name no image.
+      if (std::from_chars(words[k].data(), end, image).ptr == end)
+        tracks.emplace_back(image, static_cast<std::uint32_t>(model.points.size() - 1));
+    }
+    add_track(model.points, words.size() / 2, error);
   }
+  share_tracks(tracks, model);
 }
 
 /// The binary file of `stem`, else the text file, else nothing.

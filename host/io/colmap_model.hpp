@@ -20,6 +20,8 @@ struct ColmapImage {
   std::uint32_t camera_id = 0;
   glm::dmat3 rotation{1.0};     ///< world to camera
   glm::dvec3 translation{0.0};  ///< world to camera
+  std::uint32_t id = 0;
+  std::vector<std::uint32_t> points;  ///< places of the points that it shows, ascending
 };
 
 /// What this program uses of a COLMAP sparse model.

@@ -197,6 +197,7 @@ Dataset load_colmap(const fs::path& root,
     }
     view.image_path = *photo;
     view.mask_path = find_mask(root, image.name);
+    view.points = image.points;
     Camera nominal = model.cameras.at(image.camera_id);
     nominal.name = io::inner_name(image.name);
     nominal.rotation = image.rotation;
@@ -238,6 +239,13 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
       // Names may repeat in several folders (train/r_0, test/r_0).
       view.mask_path = find_mask(folder, io::inner_name(name));
       if (view.mask_path.empty()) view.mask_path = find_mask(folder, photo->filename());
+    }
+    if (!frame.depth_path.empty()) {
+      view.depth_path = folder / frame.depth_path;
+      if (!is_file(view.depth_path)) {
+        throw DataError(fmt::format("{}: the depth map '{}' of frame {} does not exist",
+                                    file.path.string(), frame.depth_path, i));
+      }
     }
     const io::ImageSize size = io::image_size(*photo);
     Camera nominal = io::frame_camera(file, i, frame.width.value_or(size.width),

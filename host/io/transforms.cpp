@@ -239,6 +239,7 @@ TransformsFile read_transforms(const fs::path& path) {
     read_pose(frame_scope, frame);
     frame.file_path = portable_path(frame_scope.text("file_path"));
     frame.mask_path = portable_path(frame_scope.text("mask_path"));
+    frame.depth_path = portable_path(frame_scope.text("depth_file_path"));
     file.frames.push_back(std::move(frame));
   }
   return file;

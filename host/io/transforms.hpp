@@ -14,8 +14,9 @@ namespace raysplats::io {
 
 /// Intrinsics of one frame, as far as the file states them.
 struct TransformsFrame {
-  std::string file_path;  ///< as in the file; may be empty
-  std::string mask_path;  ///< as in the file; usually empty
+  std::string file_path;   ///< as in the file; may be empty
+  std::string mask_path;   ///< as in the file; usually empty
+  std::string depth_path;  ///< likewise
   std::optional<int> width, height;
   std::optional<double> fx, fy, cx, cy;       ///< pixels
   std::optional<double> angle_x, angle_y;     ///< field of view, radians

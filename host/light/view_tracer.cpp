@@ -318,7 +318,8 @@ Image ViewTracer::download_depth() const {
 void ViewTracer::backward(const DeviceGaussians& gaussians,
                           const Buffer<float>& image_gradient,
                           GaussianGradients& gradients,
-                          PoseGradient* pose) {
+                          PoseGradient* pose,
+                          const Buffer<float>* depth_gradient) {
   Impl& self = *impl_;
   if (!self.kept || self.revision != gaussians.revision) {
     throw UsageError(
@@ -334,13 +335,18 @@ void ViewTracer::backward(const DeviceGaussians& gaussians,
         "The gradient of a pose is not known where there is a sky, which turns with it: choose a "
         "background of one colour");
   }
+  if (self.by_rays && depth_gradient != nullptr) {
+    throw UsageError(
+        "The gradient of depth is not known where rays are traced one by one: choose traversal "
+        "auto or tiles, and cameras with a centre");
+  }
   const Buffer<float>& over_black =
       self.sky ? self.sky->backward(self.camera, image(), image_gradient) : image_gradient;
   if (self.by_rays) {
     self.backward_rays(gaussians, over_black, gradients, pose);
     return;
   }
-  self.packets.backward(gaussians, over_black, gradients, pose);
+  self.packets.backward(gaussians, over_black, gradients, pose, depth_gradient);
 }
 
 void ViewTracer::Impl::backward_rays(const DeviceGaussians& gaussians,

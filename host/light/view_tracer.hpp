@@ -69,11 +69,13 @@ class ViewTracer {
   /// Gradients of the last forward(keep = true) view from `image_gradient` (planar dL/dR, dL/dG,
   /// dL/dB, dL/dA; 4 x height x width). Overwrites `gradients`, growing its buffers as needed. With
   /// `pose` also the gradient for the camera's pose. Throws UsageError when the Gaussians changed
-  /// since, and for the pose of a camera that looks into mirrors or sees a sky.
+  /// since, and for the pose of a camera that looks into mirrors or sees a sky. `depth_gradient` as
+  /// in CameraTracer::backward(); UsageError for views that are traced ray by ray.
   void backward(const DeviceGaussians& gaussians,
                 const Buffer<float>& image_gradient,
                 GaussianGradients& gradients,
-                PoseGradient* pose = nullptr);
+                PoseGradient* pose = nullptr,
+                const Buffer<float>* depth_gradient = nullptr);
 
   /// From the next forward() on `watch` hears the share of the picture that is done, several times
   /// a second, and lets forward() end with Error(kInterrupted) by returning false.

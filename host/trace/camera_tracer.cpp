@@ -50,6 +50,7 @@ struct CameraTracer::Impl {
         lens(context_in, packet.tile),
         no_tiles(context_in, 1, "no tiles of a lens"),
         no_tangents(context_in, 1, "no tangents of a lens"),
+        no_depth_gradient(context_in, 1, "no depth gradient"),
         forward_budget(options_in.launch_budget_ms, context_in.device().type),
         backward_budget(options_in.launch_budget_ms, context_in.device().type),
         watched_budget(kWatchedMilliseconds, context_in.device().type),
@@ -150,6 +151,7 @@ struct CameraTracer::Impl {
   LensTiles lens;
   Buffer<RsLensTile> no_tiles;  // what kernels take for pinholes
   Buffer<float> no_tangents;
+  Buffer<float> no_depth_gradient;
   LaunchBudget forward_budget;
   LaunchBudget backward_budget;
   LaunchBudget watched_budget;  // of launches that somebody watches, where no other bounds them
@@ -178,6 +180,7 @@ struct CameraTracer::Impl {
   bool hits_kept = false;           // the last forward() was asked to keep hits
   bool hits_complete = false;       // and all of them fit
   GradientSums sums;
+  const Buffer<float>* depth_gradient = nullptr;  // of this backward()
   Buffer<float> pose;
   GaussianGradients pose_scratch;
 };
@@ -490,6 +493,7 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
   BuildOptions build = packet_build();
+  build.define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0);
   sums.define(build);
   Kernel kernel = packet.grouped
                       ? group_kernel("trace/group_backward.cl", "trace_backward_group", build)
@@ -512,7 +516,7 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
     pass.tile_row = shared ? row : row + first;
     pass.tile_rows = number;
     kernel.launch(range, view_arguments(), pass, stream_arguments(), lists.lines(), image_gradient,
-                  sums.target());
+                  depth_gradient != nullptr ? *depth_gradient : no_depth_gradient, sums.target());
   });
 }
 
@@ -557,6 +561,7 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("POSE", with_pose ? 1 : 0)
       .define("ACCUMULATE", accumulate ? 1 : 0)
+      .define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0)
       .define("ANGULAR", lens_kind == 2 ? 1 : 0)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
@@ -572,12 +577,14 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
 void CameraTracer::backward(const DeviceGaussians& gaussians,
                             const Buffer<float>& image_gradient,
                             GaussianGradients& gradients,
-                            PoseGradient* pose) {
+                            PoseGradient* pose,
+                            const Buffer<float>* depth_gradient) {
   Impl& self = *impl_;
   if (!self.hits_kept || self.count != gaussians.count || self.revision != gaussians.revision) {
     throw UsageError(
         "CameraTracer::backward() must follow forward(keep_hits = true) of the same Gaussians");
   }
+  self.depth_gradient = depth_gradient;
   bool further = false;
   for (const int number : self.faces()) {
     if (self.faces().size() > 1) self.set_face(gaussians, number);

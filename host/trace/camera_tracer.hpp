@@ -79,11 +79,14 @@ class CameraTracer {
 
   /// Gradients of the last forward(keep_hits = true) view from `image_gradient` (planar dL/dR,
   /// dL/dG, dL/dB, dL/dA; 4 x height x width). Overwrites `gradients`, growing its buffers as
-  /// needed; with `pose` also the gradient for the pose of the view.
+  /// needed; with `pose` also the gradient for the pose of the view. `depth_gradient` adds that of
+  /// depth: dL/dS per pixel (height x width) for the sum S of T alpha depth, of which the expected
+  /// depth is S / A.
   void backward(const DeviceGaussians& gaussians,
                 const Buffer<float>& image_gradient,
                 GaussianGradients& gradients,
-                PoseGradient* pose = nullptr);
+                PoseGradient* pose = nullptr,
+                const Buffer<float>* depth_gradient = nullptr);
 
   /// Of the last forward(); waits for the device unless that one kept its hits and waited itself.
   Statistics statistics() const;

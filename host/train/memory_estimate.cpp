@@ -104,6 +104,8 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                demand.pixels * (passing * photo + (25 + (options.exposure ? 4 : 0) +
                                                    (options.background == "sky" ? 8 : 0)) *
                                                       sizeof(float));
+  // Depth, its gradient, and what is known of every view.
+  if (options.depth_weight > 0) out.images += demand.pixels * (4 + demand.views) * sizeof(float);
   if (packets) {
     out.hits = std::min(MemoryShares(options.trace, device).all(),
                         demand.pixels * static_cast<std::size_t>(options.trace.max_hits) * 12);

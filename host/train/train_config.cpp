@@ -269,6 +269,11 @@ void validate(const TrainOptions& options) {
         "The option 'poses' cannot be used with 'mirrors': behind a mirror the gradient of a pose "
         "is not known");
   }
+  if (options.depth_weight > 0 && !options.mirrors.empty()) {
+    throw UsageError(
+        "The option 'depth-weight' cannot be used with 'mirrors': what is seen in them has no "
+        "single depth");
+  }
   if (options.background == "sky" && !options.mirrors.empty()) {
     throw UsageError(
         "The option 'background' = sky cannot be used with 'mirrors', which show one colour "

@@ -237,6 +237,13 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
            "how strongly an affine colour stays where it is when its photo is fitted anew: the "
            "weight of the square of its change beside the mean squared error of the colours");
 
+  t.number("depth-weight", o.depth_weight, 0, 1e3,
+           "weight of the mean relative error of depth in the loss, where the data set has depth "
+           "maps or sparse points with the photos that show them; 0 = off");
+  t.number("depth-unit", o.depth_unit, 1e-12, 1e12,
+           "units of the data set for each unit of its depth maps (millimetres in a scene in "
+           "metres: 0.001)");
+
   t.flag("poses", o.poses,
          "train the poses of the training photos too, for captures whose poses are not exact; what "
          "all of them have in common is taken off, so that the model stays where the data set has "

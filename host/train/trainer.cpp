@@ -105,6 +105,14 @@ Trainer::Impl::Impl(Context& device,
         "The data set {} has no training views: {}", dataset.root.string(),
         held_out ? "--test-every 1 holds all of them out" : "its files name none to train on"));
   }
+  if (options.depth_weight > 0) {
+    if (ray_views() > 0) {
+      throw UsageError(
+          "The option 'depth-weight' is for views that are traced in packets: choose 'traversal' = "
+          "auto or tiles, and cameras with a centre");
+    }
+    depths.emplace(device, dataset, train_views, options.depth_weight, options.depth_unit);
+  }
   if (apart.size() < static_cast<std::size_t>(options.validate_views)) {
     throw UsageError(fmt::format(
         "The option 'validate-views' = {} leaves less than {} of the {} training views to train "

@@ -22,6 +22,7 @@
 #include "train/adam.hpp"
 #include "train/checkpoint.hpp"
 #include "train/density_control.hpp"
+#include "train/depth_supervision.hpp"
 #include "train/exposure.hpp"
 #include "train/footprint.hpp"
 #include "train/gradient_tree.hpp"
@@ -193,10 +194,11 @@ struct Trainer::Impl {
   std::vector<std::size_t> apart;
   DensityControl density;
   Footprint footprint;
-  std::optional<Exposure> exposure;     // with the option
-  std::optional<SkyAdam> sky;           // with a background that is one; the tracer has it
-  std::optional<PoseRefinement> poses;  // with the option
-  std::optional<Mcmc> mcmc;             // with the strategy
+  std::optional<Exposure> exposure;        // with the option
+  std::optional<DepthSupervision> depths;  // likewise
+  std::optional<SkyAdam> sky;              // with a background that is one; the tracer has it
+  std::optional<PoseRefinement> poses;     // with the option
+  std::optional<Mcmc> mcmc;                // with the strategy
   StepGuard guard;
   std::optional<ModelValidator> validator;  // once it is asked for
   PhotoCache photo_cache;

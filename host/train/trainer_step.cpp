@@ -46,7 +46,12 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
     exposure->observe(tracer.image(), photo, cut_out, behind, camera.width, camera.height, slot);
     exposure->backward(image_gradient, view, camera.width, camera.height);
   }
-  tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr);
+  if (depths) {
+    depths->backward(view, camera.width, camera.height, tracer.image(), tracer.depth(),
+                     image_gradient);
+  }
+  tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr,
+                  depths ? &depths->gradient() : nullptr);
   if (slots.size() == 1) return;
   if (sky) {
     const Buffer<float>& slope = tracer.sky()->gradient();

@@ -28,6 +28,8 @@ struct View {
   Camera camera;                     ///< of the picture that load_view_image() gives
   std::filesystem::path image_path;  ///< the photo on disk, possibly distorted and larger
   std::filesystem::path mask_path;   ///< optional mask (black = ignore); empty when there is none
+  std::filesystem::path depth_path;  ///< optional depth map (PNG or .npy); empty when there is none
+  std::vector<std::uint32_t> points;  ///< numbers of the sparse points that it is known to show
   bool mask_apart = false;  ///< alpha is coverage, and what the mask ignores is a plane of its own
   Camera source_camera;     ///< of the photo on disk, with its lens
   int sample_bytes = 1;     ///< of a number in the photo on disk: 1, 2 or 4 (floats)

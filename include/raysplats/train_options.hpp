@@ -123,6 +123,8 @@ struct TrainOptions {
   double ssim_weight = 0.2;
   bool exposure = false;           ///< an affine colour per training photo is trained too
   double exposure_damping = 0.02;  ///< of its change at a visit of the photo
+  double depth_weight = 0;         ///< of the relative error of depth in the loss; 0 = off
+  double depth_unit = 1e-3;        ///< world units of a number in depth maps
   bool poses = false;              ///< the poses of the training photos are trained too
 
   // Optimiser

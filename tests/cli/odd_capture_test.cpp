@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -117,6 +118,36 @@ TEST_CASE("a run without test views says that nothing is measured") {
   CHECK_FALSE(contains(outcome.out, "PSNR"));
   check_refused(train(data, folder / "all", {"-q", "--test-every", "1"}), 2,
                 "--test-every 1 holds all of them out");
+}
+
+TEST_CASE("depth maps are taken as far as they know something, and refused with their name") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  make_data(data);
+  const Words weight{"--depth-weight", "0.5", "--depth-unit", "1"};
+  Words quiet = weight;
+  quiet.push_back("-q");
+  check_refused(train(data, folder / "without", quiet), 2, "neither depth maps nor sparse points");
+
+  nlohmann::json json = training_file(data);
+  json["frames"][1]["depth_file_path"] = "depth.npy";
+  write_file(data + "/transforms_train.json", json.dump());
+  check_refused(train(data, folder / "missing", quiet), 3, "the depth map 'depth.npy' of frame 1");
+  const auto write_map = [&](int width, int height, float value, float first) {
+    std::vector<float> numbers(static_cast<std::size_t>(width * height), value);
+    numbers[0] = first;
+    write_npy(data + "/depth.npy", "False",
+              "(" + std::to_string(height) + ", " + std::to_string(width) + ")", numbers);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  write_map(kSize, kSize, 4.0f, nan);
+  check_trains(train(data, folder / "nan", weight), "1 of 256 numbers of the depth map");
+  write_map(kSize, kSize, nan, nan);
+  check_refused(train(data, folder / "nothing", quiet), 3, "depth.npy has no number above 0");
+  write_map(kSize, kSize / 2, 4.0f, 4.0f);
+  check_refused(train(data, folder / "shape", quiet), 3, "depth.npy has 16 x 8 pixels");
+  // Maps are not read by runs that do not ask for them.
+  check_trains(train(data, folder / "off"), "iterations, up to");
 }
 
 TEST_CASE("a cap below the start takes a part of it, and never what was asked for by number") {

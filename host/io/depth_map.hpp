@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "raysplats/dataset.hpp"
+
+namespace raysplats::io {
+
+/// Depths of a picture, row by row; 0 where nothing is known.
+struct DepthMap {
+  int width = 0;
+  int height = 0;
+  std::vector<float> values;
+};
+
+/// Reads depths: a picture of one channel with 16 bits or floats, or a .npy file of height x width
+/// floats, each number times `unit`. Numbers that are not finite or not above 0 are unknown; those
+/// that are not finite are counted in a warning. Throws DataError for another format or shape, and
+/// for a map that knows nothing.
+DepthMap read_depth_map(const std::filesystem::path& path, double unit);
+
+/// What is known of the depths of a view at the size of its camera: from its depth map where it has
+/// one (the nearest pixel, lenses taken out as for its photo), else those of the sparse points that
+/// it is known to show; empty without both. Along the viewing axis, for fisheye and
+/// equirectangular cameras along the ray. Throws DataError as read_depth_map() and for a map of
+/// another shape than its photo.
+DepthMap view_depths(const Dataset& dataset, const View& view, double unit);
+
+/// The same with fewer pixels: the median of what is known in the area of each.
+DepthMap reduced(const DepthMap& depths, int width, int height);
+
+}  // namespace raysplats::io
