@@ -53,6 +53,17 @@ __kernel void limit_scales(
   vstore3(select(raised, (float3)(high), raised > (float3)(high)), i, scales);
 }
 
+// Keeps the third scale parameter, a logarithm, at the smaller of the others + `thinner`. A guard
+// word that is not 0 turns it off.
+__kernel void flatten_scales(uint count,
+                             float thinner,
+                             __global const uint* guard,
+                             __global float* scales) {
+  const size_t i = get_global_id(0);
+  if (i >= count || guard[0] != 0) return;
+  scales[3 * i + 2] = fmin(scales[3 * i], scales[3 * i + 1]) + thinner;
+}
+
 // Raises scale parameters to their least value. A guard word that is not 0 turns it off.
 __kernel void raise_scales(uint count,
                            __global const float* lows,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "train/flat_start.hpp"
 
 namespace raysplats {
 namespace {
@@ -77,10 +78,12 @@ RsFootprintView footprint_view(const Camera& camera) {
 Footprint::Footprint(Context& context,
                      std::span<const Camera> cameras,
                      double share,
-                     const ScaleLimits& limits)
+                     const ScaleLimits& limits,
+                     bool flat)
     : context_(context),
       share_(share),
       limits_(limits),
+      flat_(flat),
       views_(static_cast<std::uint32_t>(cameras.size())) {
   if (share <= 0) return;
   std::vector<RsFootprintView> views;
@@ -114,7 +117,15 @@ void Footprint::apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& g
                 high > 0 ? scale_parameter(high, gaussians.activation) : kNoLimit, guard,
                 gaussians.scales);
   }
-  if (share_ <= 0) return;
+  if (share_ > 0) raise(gaussians, guard);
+  if (flat_) {
+    context_.kernel(kProgram, "flatten_scales", build_options(gaussians))
+        .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
+                static_cast<float>(std::log(kFlatness)), guard, gaussians.scales);
+  }
+}
+
+void Footprint::raise(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard) {
   if (lows_.size() < gaussians.count) {
     throw UsageError(fmt::format("The least sizes are known for {} Gaussians, not {}: update first",
                                  lows_.size(), gaussians.count));

@@ -21,11 +21,13 @@ struct ScaleLimits {
 /// themselves, so the model that is written needs nothing else to look as it did in training.
 class Footprint {
  public:
-  /// `share` of a pixel as a standard deviation; 0 = without.
+  /// `share` of a pixel as a standard deviation; 0 = without. `flat` Gaussians keep a third axis of
+  /// kFlatness instead (ScaleActivation::kExp).
   Footprint(Context& context,
             std::span<const Camera> cameras,
             double share,
-            const ScaleLimits& limits = {});
+            const ScaleLimits& limits = {},
+            bool flat = false);
 
   /// Finds the least sizes for the Gaussians' present means; enqueues without waiting.
   void update(const DeviceGaussians& gaussians);
@@ -35,14 +37,17 @@ class Footprint {
   /// Puts them back: what a resumed run does until its next update() depends on them.
   void restore(std::span<const float> lows);
 
-  /// Raises what is smaller and keeps to the limits; update() has to have seen this number of
-  /// Gaussians. A guard whose first word is not 0 keeps them as they are.
+  /// Raises what is smaller, keeps to the limits and flattens; update() has to have seen this
+  /// number of Gaussians. A guard whose first word is not 0 keeps them as they are.
   void apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard);
 
  private:
+  void raise(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard);
+
   Context& context_;
   double share_;
   ScaleLimits limits_;
+  bool flat_;
   std::uint32_t views_ = 0;
   Buffer<RsFootprintView> cameras_;
   Buffer<float> lows_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/step_options.hpp"
 
+#include "train/flat_start.hpp"
 #include "train/schedule.hpp"
 #include "train/sky_adam.hpp"
 
@@ -27,7 +28,8 @@ AdamOptions adam_options_of(const TrainOptions& options) {
 AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t iteration) {
   AdamRates rates;
   rates.means = extent * learning_rate(options.position_lr, options, iteration);
-  rates.quaternions = learning_rate(options.rotation_lr, options, iteration);
+  rates.quaternions =
+      (options.flat ? kFlatTurn : 1.0) * learning_rate(options.rotation_lr, options, iteration);
   rates.scales = (options.scale_lr_by_extent ? extent : 1.0) *
                  learning_rate(options.scale_lr, options, iteration);
   rates.opacities = learning_rate(options.opacity_lr, options, iteration);

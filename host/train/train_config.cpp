@@ -269,6 +269,11 @@ void validate(const TrainOptions& options) {
         "The option 'poses' cannot be used with 'mirrors': behind a mirror the gradient of a pose "
         "is not known");
   }
+  if (options.flat && options.scale_activation != ScaleActivation::kExp) {
+    throw UsageError(
+        "The option 'flat' needs 'scale-activation' = exp, whose numbers are the logarithms of "
+        "sizes");
+  }
   if (options.depth_weight > 0 && !options.mirrors.empty()) {
     throw UsageError(
         "The option 'depth-weight' cannot be used with 'mirrors': what is seen in them has no "

@@ -222,6 +222,8 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
       "scale-activation", o.scale_activation,
       {{"exp", ScaleActivation::kExp}, {"sigmoid", ScaleActivation::kSigmoid}},
       "standard deviation from the trained number: exp (3DGS) or sigmoid (the paper; below 1)");
+  t.flag("flat", o.flat,
+         "train flat Gaussians: the third axis stays a hundredth of the smaller of the others");
 
   t.section("Loss");
   t.choice<PixelLoss>("pixel-loss", o.pixel_loss, {{"l1", PixelLoss::kL1}, {"l2", PixelLoss::kL2}},

@@ -6,6 +6,7 @@
 
 #include "core/gaussian_selection.hpp"
 #include "core/morton_order.hpp"
+#include "train/flat_start.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
 #include "train/train_config.hpp"
@@ -130,6 +131,7 @@ void Trainer::Impl::upload_start(std::size_t most) {
                               dataset, train_cameras, [this]() -> const auto& { return photos(); },
                               most, options);
   first_model.reset();
+  if (options.flat) flatten(model, train_cameras);
   if (model.size() == 0) {
     throw UsageError(options.bounds
                          ? "No Gaussian of the start lies within --bounds: give a larger box"
