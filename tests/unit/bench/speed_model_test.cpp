@@ -93,7 +93,7 @@ TEST_CASE("the model's registers and local memory are those of the compilers' ba
   CHECK_THROWS_AS(executed_work("densify", {}), UsageError);
 }
 
-TEST_CASE("kernels that count their work find the same hits and change no pixel [tiny]") {
+TEST_CASE("kernels that count their work find the same hits and change no pixel") {
   Context context(select_device(""), timed_options());
   const BenchOptions options = tiny_bench(1);
   const BenchModel model{"random", bench_scene("random", 1000, 1, 0),
