@@ -27,9 +27,9 @@ struct VideoOptions {
 };
 
 /// By the name's extension: .mp4 (H.264) and .webm (VP9) by the program ffmpeg found in PATH, .gif
-/// (256 colours, up to 50 frames a second, which begin on whole 1/100 s) and .apng (without losses) without it. Throws UsageError for
-/// other names, for frames per second that the format does not have, and when ffmpeg is needed and
-/// not there.
+/// (256 colours, up to 50 frames a second, which begin on whole 1/100 s) and .apng (without losses)
+/// without it. Throws UsageError for other names, for frames per second that the format does not
+/// have, and when ffmpeg is needed and not there.
 std::unique_ptr<VideoFile> open_video(const std::filesystem::path& path,
                                       const VideoOptions& options);
 

@@ -2,6 +2,7 @@
 // Captures that lack what training expects: each is said in one sentence, and only what cannot be
 // trained on ends the run.
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <filesystem>
 #include <limits>
@@ -136,8 +137,7 @@ TEST_CASE("depth maps are taken as far as they know something, and refused with 
   const auto write_map = [&](int width, int height, float value, float first) {
     std::vector<float> numbers(static_cast<std::size_t>(width * height), value);
     numbers[0] = first;
-    write_npy(data + "/depth.npy", "False",
-              "(" + std::to_string(height) + ", " + std::to_string(width) + ")", numbers);
+    write_npy(data + "/depth.npy", "False", fmt::format("({}, {})", height, width), numbers);
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
   write_map(kSize, kSize, 4.0f, nan);

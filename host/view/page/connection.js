@@ -28,7 +28,7 @@ export class Connection {
     this.#socket.onopen = () => {
       this.#waiting = null;
       this.on.open();
-      this.rest();
+      if (!document.hidden) this.rest();
     };
     this.#socket.onmessage = ({ data }) => {
       if (typeof data === 'string') this.on.text(JSON.parse(data));

@@ -29,8 +29,11 @@ export class Run {
   }
 
   async #loop() {
-    if (!document.hidden) await this.ask();
-    setTimeout(() => this.#loop(), ASK);
+    try {
+      if (!document.hidden) await this.ask();
+    } finally {
+      setTimeout(() => this.#loop(), ASK);
+    }
   }
 
   // Asks how far the run is and shows it.

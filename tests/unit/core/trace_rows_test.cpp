@@ -105,8 +105,8 @@ TEST_CASE("packets have widths that their form allows") {
     }
     return true;
   };
-  for (const PacketForm form : {PacketForm::kAuto, PacketForm::kVector, PacketForm::kGroup,
-                                PacketForm::kSubgroup}) {
+  for (const PacketForm form :
+       {PacketForm::kAuto, PacketForm::kVector, PacketForm::kGroup, PacketForm::kSubgroup}) {
     CAPTURE(packet_shape_name(form));
     CHECK(accepts(form, 0));
     CHECK(accepts(form, 8));

@@ -69,8 +69,7 @@ TEST_CASE("tuning: stored per device, driver and version, and found again") {
   CHECK(store.path() == folder.path() / "cache" / "tuning.json");
   CHECK(TuningStore(directory).find(device("A")) == kTuning);
   CHECK(TuningStore(directory).find(device("B")) == DeviceTuning{true, 32, 32, 48, 0});
-  CHECK(TuningStore(directory).find(device("S")) ==
-        DeviceTuning{true, 16, 32, 48, 0, false, true});
+  CHECK(TuningStore(directory).find(device("S")) == DeviceTuning{true, 16, 32, 48, 0, false, true});
   CHECK_FALSE(TuningStore(directory).find(device("A", "2.0")));
   CHECK_FALSE(TuningStore(directory).find(device("C")));
   DeviceInfo elsewhere = device("A");
