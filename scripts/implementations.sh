@@ -65,7 +65,7 @@ trap 'rm -rf -- "$work"' EXIT
 # What an implementation gets wrong, by the names of cases; docs/gpu.md says what is known of each.
 known() {
   case $1 in
-    intel-gpu) echo 'a few gradients of rays in shared sums*,gradients of a few pixels equal*' ;;
+    intel-gpu) echo 'a few gradients of rays in shared sums*,gradients of a few pixels equal*,steps of one?s own train as a run does' ;;
     rusticl | rusticl-gpu) echo 'lbvh: every size*,lbvh: the device?s own shape*,lbvh: a few boxes far away*,lbvh validation*' ;;
     *) echo '' ;;
   esac

@@ -241,7 +241,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"sm_86", "prepare sh0: prepare_view", 48, 4608, 64, 32},
       {"sm_86", "lists: fill_tiles", 56, 0, 64, 32},
       {"sm_86", "group forward render: trace_forward_group", 72, 7824, 32, 32},
-      {"sm_86", "group forward train: trace_forward_group", 79, 7824, 32, 32},
+      {"sm_86", "group forward train: trace_forward_group", 80, 7824, 32, 32},
       {"sm_86", "group backward atomic: trace_backward_group", 56, 7712, 32, 32},
       {"sm_86", "finalize group sh3: finalize_group", 64, 4608, 64, 32},
       {"sm_86", "loss group: group_slopes", 60, 12064, 256, 32},
