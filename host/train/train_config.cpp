@@ -27,17 +27,13 @@ constexpr std::size_t kCommentWidth = 110;
 // The first line of what to_toml() writes.
 constexpr std::string_view kRunMark = "# ---- Run ----\n";
 
-// A file that a run wrote, in the dialect of older versions: strings without escapes, seeds beyond
-// the integers of TOML, and rates of exposures, which are fitted now.
+// A file that a run wrote, in the dialect of older versions: strings without escapes and seeds
+// beyond the integers of TOML.
 std::string modern(std::string text) {
   std::string out;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size() - 1) + 1;
     const std::string_view line = std::string_view(text).substr(begin, end - begin);
-    if (line.starts_with("exposure-lr")) {
-      begin = end;
-      continue;
-    }
     constexpr std::string_view kSeed = "seed = ";
     constexpr std::size_t kMostDigits = 18;
     if (line.starts_with(kSeed)) {

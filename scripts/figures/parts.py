@@ -233,11 +233,15 @@ def limits(run):
             + table(["option", "value", "held-out PSNR, dB", "SSIM", "hits a step"], lines))
 
 
+def printed(command, text):
+    """What a command printed, as it stands."""
+    return f"`{command.rstrip()}`:\n\n```text\n{text.rstrip()}\n```\n"
+
+
 def plain(run, script, *options):
-    """A script of scripts/reliability whose output is a table as it stands."""
+    """A script of scripts/reliability whose output is a table."""
     text = run.call(ROOT / "scripts/reliability" / script, "--raysplats", run.raysplats, *options)
-    command = f"scripts/reliability/{script} {shown(*options)}".rstrip()
-    return f"`{command}`:\n\n```text\n{text.rstrip()}\n```\n"
+    return printed(f"scripts/reliability/{script} {shown(*options)}", text)
 
 
 def spread(run):
@@ -255,7 +259,7 @@ def price(run):
 def forecast(run):
     options = ["--sizes", run.size("10k,100k,1M", "1k"), "--repeat", 3, *run.size([], ["--resolution", "64x64", "--rays", 1024])]
     text = run.call(run.raysplats, "-q", "bench", "--forecast", *options)
-    return f"`raysplats bench --forecast {shown(*options)}`:\n\n```text\n{text.rstrip()}\n```\n"
+    return printed(f"raysplats bench --forecast {shown(*options)}", text)
 
 
 PARTS = [
