@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "core/model_summary.hpp"
+#include "info_files.hpp"
 #include "io/mesh_file.hpp"
 #include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
@@ -56,22 +58,6 @@ const char* kind_name(DatasetKind kind) {
       break;
   }
   return "nerfstudio";
-}
-
-const char* model_name(CameraModel model) {
-  switch (model) {
-    case CameraModel::kOpenCv:
-      return "opencv";
-    case CameraModel::kFisheye:
-      return "fisheye";
-    case CameraModel::kEquirectangular:
-      return "equirectangular";
-    case CameraModel::kOrthographic:
-      return "orthographic";
-    case CameraModel::kPinhole:
-      break;
-  }
-  return "pinhole";
 }
 
 const char* kind_name(Material::Kind kind) {
@@ -391,6 +377,16 @@ void info_scene(const Options& options) {
   }
 }
 
+void info_file(const Options& options, const Json& described) {
+  Json json = described;
+  json["path"] = options.path;
+  if (options.json) {
+    print_json(json);
+  } else {
+    print_file(json);
+  }
+}
+
 void info_dataset(const Options& options) {
   const Dataset dataset = load_dataset(options.path);
   Json json{{"type", "dataset"}, {"path", options.path}};
@@ -409,7 +405,11 @@ void run(const Options& options) {
         "{} does not exist: name a PLY, a mesh, a scene file, a data set or a run", path.string()));
   }
   const bool folder = std::filesystem::is_directory(path);
-  if (folder && !is_run_folder(path)) {
+  std::optional<Json> other;
+  if (!folder) other = describe_file(path);
+  if (other) {
+    info_file(options, *other);
+  } else if (folder && !is_run_folder(path)) {
     info_dataset(options);
   } else if (!folder && is_scene_file(options.path)) {
     info_scene(options);
@@ -424,11 +424,12 @@ void run(const Options& options) {
 
 Command add_info_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
-      "info", "Describe a model, a mesh, a scene file, a data set or a training run");
+      "info", "Describe a model, a data set, a training run, or any other file that is read");
   auto options = std::make_shared<Options>();
   command
       ->add_option("PATH", options->path,
-                   "Model (PLY, .splat, SPZ, SOG, glTF), mesh, scene file, data set or run folder")
+                   "Model (PLY, .splat, SPZ, SOG, glTF), mesh, scene file, data set or run folder; "
+                   "cameras, camera path, rays (.npy), picture, checkpoint or configuration")
       ->required()
       ->type_name("");
   command->add_flag("--json", options->json, "Print JSON");

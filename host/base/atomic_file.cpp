@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <random>
 
 #include "raysplats/error.hpp"
 
@@ -22,7 +23,7 @@ void sync_folder(const std::filesystem::path& folder) {
   ::close(directory);
 }
 
-// .NAME.PROCESS.tmp or .NAME.PROCESS.tmp.EXTENSION, as AtomicFile makes them.
+// .NAME.NUMBER.tmp or .NAME.NUMBER.tmp.EXTENSION, as AtomicFile makes them.
 bool is_temporary_name(const std::string& name) {
   const std::size_t mark = name.rfind(".tmp");
   if (mark == std::string::npos || name.front() != '.') return false;
@@ -44,9 +45,13 @@ AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)
   }
   synced_folders_.insert(synced_folders_.begin(), folder);
   std::filesystem::create_directories(folder, error);
-  temporary_ = folder / fmt::format(".{}.{}.tmp{}", target_.stem().string(), ::getpid(),
-                                    target_.extension().string());
-  descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  // By chance: processes on several machines that share the folder may have one number.
+  std::random_device chance;
+  do {
+    temporary_ = folder / fmt::format(".{}.{}.tmp{}", target_.stem().string(), chance(),
+                                      target_.extension().string());
+    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  } while (descriptor_ < 0 && errno == EEXIST);
   if (descriptor_ < 0) fail("be created");
 }
 

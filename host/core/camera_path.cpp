@@ -133,6 +133,8 @@ std::vector<Keyframe> path_views(const CameraPath& path, int frames) {
   Ruler ruler = path.constant_speed ? by_length(track) : by_seconds(track);
   // A path that turns on the spot has no length.
   if (!(ruler.distances.back() > 0.0)) ruler = by_seconds(track);
+  // One without seconds takes the same time for each of its spans.
+  if (!(ruler.distances.back() > 0.0)) ruler.distances = ruler.places;
   const double steps = path.closed ? frames : std::max(frames - 1, 1);
   std::vector<Keyframe> views;
   views.reserve(count);

@@ -25,12 +25,17 @@ constexpr int kMaxDepth = 64;
 /// The folder of the file, and what has been read from it; many buffers may name one large file.
 struct Folder {
   std::filesystem::path path;
+  bool closed = false;  ///< nothing of it may be read
   std::uint64_t bytes = 0;
 };
 
 tinygltf::FsCallbacks file_access(Folder& folder) {
   tinygltf::FsCallbacks calls{};
   calls.FileExists = [](const std::string& name, void* data) {
+    if (static_cast<Folder*>(data)->closed) {
+      throw DataError(
+          "The glTF file names other files, which are not read here: export it as one GLB");
+    }
     std::error_code error;
     return std::filesystem::is_regular_file(static_cast<Folder*>(data)->path / name, error);
   };
@@ -38,6 +43,7 @@ tinygltf::FsCallbacks file_access(Folder& folder) {
   calls.ReadWholeFile = [](std::vector<unsigned char>* out, std::string*, const std::string& name,
                            void* data) {
     auto& from = *static_cast<Folder*>(data);
+    if (from.closed) return false;
     const auto bytes = read_file(from.path / name, kMaxBytes - from.bytes);
     from.bytes += bytes.size();
     const auto* begin = reinterpret_cast<const unsigned char*>(bytes.data());
@@ -168,11 +174,20 @@ float load_integer(const std::byte* bytes, bool normalized) {
 }  // namespace
 
 tinygltf::Model parse_gltf(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = read_file(path, kMaxBytes);
+  return parse_gltf(path, read_file(path, kMaxBytes), false);
+}
+
+tinygltf::Model parse_gltf(const std::filesystem::path& path,
+                           std::span<const std::byte> bytes,
+                           bool alone) {
+  if (bytes.size() > kMaxBytes) {
+    throw DataError(
+        fmt::format("{} has more than {} bytes: make it smaller", path.string(), kMaxBytes));
+  }
   const auto* text = reinterpret_cast<const char*>(bytes.data());
   const bool binary = bytes.size() >= 4 && load<std::uint32_t>(bytes.data()) == kGlbMagic;
   check_depth(binary ? glb_json(bytes, path) : std::string_view(text, bytes.size()), path);
-  Folder folder{path.parent_path()};
+  Folder folder{path.parent_path(), alone};
   tinygltf::TinyGLTF loader;
   loader.SetFsCallbacks(file_access(folder));
   loader.SetImageLoader(keep_image, nullptr);

@@ -16,6 +16,11 @@ namespace raysplats::io {
 /// (bytes_of()). Throws DataError for what tinygltf refuses and for what it does not check: the
 /// sizes of the chunks of a GLB, the depth of the JSON, extensions that are required but not known.
 tinygltf::Model parse_gltf(const std::filesystem::path& path);
+/// The same of a file that has been read. One that stands alone must not name others: no file is
+/// opened.
+tinygltf::Model parse_gltf(const std::filesystem::path& path,
+                           std::span<const std::byte> bytes,
+                           bool alone);
 
 /// Untrusted parts of a parsed file, every index and range checked. Throws DataError with the
 /// file's name.

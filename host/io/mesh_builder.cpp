@@ -12,21 +12,19 @@
 namespace raysplats::io {
 namespace {
 
-/// Of vertices and of triangles.
-constexpr std::size_t kMaxCount = std::size_t{1} << 27;
 /// Cutting ears takes cubic time on the worst polygons.
 constexpr std::size_t kMaxPolygon = 4096;
 
 }  // namespace
 
 void MeshBuilder::check_room(std::size_t vertices, std::size_t triangles) const {
-  const auto fits = [](std::size_t has, std::size_t more) {
-    return more <= kMaxCount && has <= kMaxCount - more;
+  const auto fits = [this](std::size_t has, std::size_t more) {
+    return more <= most_ && has <= most_ - more;
   };
   if (fits(vertex_count(), vertices) && fits(triangle_count(), triangles)) return;
   throw DataError(fmt::format(
       "The mesh {} has more than {} million vertices or triangles: make it smaller or split it",
-      path_.string(), kMaxCount >> 20));
+      path_.string(), most_ >> 20));
 }
 
 std::uint32_t MeshBuilder::add_vertex(const std::array<float, 3>& position,

@@ -14,13 +14,16 @@
 
 namespace raysplats::io {
 
+/// Most vertices, and most triangles, of a mesh and the files beside it.
+constexpr std::size_t kMostTogether = std::size_t{1} << 27;
+
 /// Puts a mesh together whose parts may or may not have normals and texture coordinates. A vertex
 /// without a normal among others that have one is flat in every triangle (glTF 2.0, section
 /// 3.7.2.1); a missing texture coordinate is (0, 0).
 class MeshBuilder {
  public:
-  /// `path` names the file in errors.
-  explicit MeshBuilder(std::filesystem::path path) : path_(std::move(path)) {}
+  /// `path` names the file in errors; `most` vertices, and as many triangles, are taken.
+  MeshBuilder(std::filesystem::path path, std::size_t most) : path_(std::move(path)), most_(most) {}
 
   std::size_t vertex_count() const { return mesh_.vertex_count(); }
   std::size_t triangle_count() const { return mesh_.triangle_count(); }
@@ -39,6 +42,7 @@ class MeshBuilder {
 
  private:
   std::filesystem::path path_;
+  std::size_t most_;
   Mesh mesh_;  ///< with normals and uvs for every vertex
   std::vector<bool> has_normal_;
   bool has_uvs_ = false;

@@ -6,33 +6,57 @@
 #include <string>
 
 #include "core/mesh.hpp"
+#include "io/byte_reader.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
+namespace {
+
+MeshFile read_format(MeshFormat format, MeshBytes bytes) {
+  const std::string name = bytes.path.string();
+  MeshFile file;
+  switch (format) {
+    case MeshFormat::kObj:
+      file = read_obj(std::move(bytes));
+      break;
+    case MeshFormat::kPly:
+      file = read_ply_mesh(std::move(bytes));
+      break;
+    case MeshFormat::kGltf:
+      file = read_gltf(std::move(bytes));
+      break;
+  }
+  if (file.mesh.triangles.empty())
+    throw DataError(fmt::format("The mesh {} has no triangles", name));
+  validate(file.mesh, file.materials.size(), name);
+  normalize_normals(file.mesh);
+  return file;
+}
+
+}  // namespace
 
 MeshFile read_mesh(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
-  MeshFile file;
+  MeshFormat format = MeshFormat::kGltf;
   if (extension == ".obj") {
-    file = read_obj(path);
+    format = MeshFormat::kObj;
   } else if (extension == ".ply") {
-    file = read_ply_mesh(path);
-  } else if (extension == ".gltf" || extension == ".glb") {
-    file = read_gltf(path);
-  } else {
+    format = MeshFormat::kPly;
+  } else if (extension != ".gltf" && extension != ".glb") {
     throw DataError(
         fmt::format("The mesh {} has an unknown extension: it must be .obj, .ply, .gltf or .glb",
                     path.string()));
   }
-  if (file.mesh.triangles.empty()) {
-    throw DataError(fmt::format("The mesh {} has no triangles", path.string()));
-  }
-  validate(file.mesh, file.materials.size(), path.string());
-  normalize_normals(file.mesh);
-  return file;
+  return read_format(format, {path, read_file(path)});
+}
+
+Mesh read_mesh_alone(MeshFormat format, std::vector<std::byte> bytes, const std::string& name) {
+  Mesh mesh = read_format(format, {name, std::move(bytes), true}).mesh;
+  mesh.materials.assign(mesh.triangle_count(), 0);
+  return mesh;
 }
 
 Image to_texture(const Image& image) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "raysplats/image.hpp"
@@ -22,10 +24,27 @@ struct MeshFile {
 /// missing, malformed, truncated or oversized; a missing .mtl file is only logged.
 MeshFile read_mesh(const std::filesystem::path& path);
 
+enum class MeshFormat { kObj, kPly, kGltf };
+
+/// Most vertices, and most triangles, of a mesh that stands alone.
+constexpr std::size_t kMostAlone = std::size_t{1} << 21;
+
+/// A mesh from memory that may be anyone's: whatever it names, no other file is opened, and no
+/// picture is decoded; it has one material. `name` is that of messages. Throws DataError as
+/// read_mesh(), also for buffers in other files and for more than kMostAlone.
+Mesh read_mesh_alone(MeshFormat format, std::vector<std::byte> bytes, const std::string& name);
+
+/// The bytes of a mesh file.
+struct MeshBytes {
+  std::filesystem::path path;  ///< that messages name; beside it is what the file names
+  std::vector<std::byte> bytes;
+  bool alone = false;  ///< as read_mesh_alone()
+};
+
 /// read_mesh() of one format whatever the extension, without the final validate().
-MeshFile read_obj(const std::filesystem::path& path);
-MeshFile read_ply_mesh(const std::filesystem::path& path);
-MeshFile read_gltf(const std::filesystem::path& path);
+MeshFile read_obj(MeshBytes file);
+MeshFile read_ply_mesh(MeshBytes file);
+MeshFile read_gltf(MeshBytes file);
 
 /// A texture has 3 channels: grey is repeated, an alpha channel left out.
 Image to_texture(const Image& image);

@@ -46,10 +46,10 @@ std::vector<std::uint32_t> separate(const std::vector<std::uint32_t>& corners,
 /// Walks the scene and puts its primitives together.
 class SceneWalk {
  public:
-  explicit SceneWalk(const GltfReader& reader)
+  SceneWalk(const GltfReader& reader, std::size_t most)
       : reader_(reader),
         materials_(reader),
-        builder_(reader.path()),
+        builder_(reader.path(), most),
         parts_(reader.model().meshes.size()) {}
 
   MeshFile run() {
@@ -143,10 +143,14 @@ class SceneWalk {
 
 }  // namespace
 
-MeshFile read_gltf(const std::filesystem::path& path) {
-  const tinygltf::Model model = parse_gltf(path);
-  const GltfReader reader(model, path);
-  return SceneWalk(reader).run();
+MeshFile read_gltf(MeshBytes file) {
+  tinygltf::Model model = parse_gltf(file.path, file.bytes, file.alone);
+  if (file.alone) {
+    for (tinygltf::Mesh& mesh : model.meshes)
+      for (tinygltf::Primitive& primitive : mesh.primitives) primitive.material = -1;
+  }
+  const GltfReader reader(model, file.path);
+  return SceneWalk(reader, file.alone ? kMostAlone : kMostTogether).run();
 }
 
 }  // namespace raysplats::io

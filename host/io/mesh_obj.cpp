@@ -15,7 +15,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "io/byte_reader.hpp"
 #include "io/mesh_builder.hpp"
 #include "io/mesh_file.hpp"
 #include "io/mtl_materials.hpp"
@@ -55,9 +54,10 @@ void normalize(std::vector<std::byte>& bytes, const std::filesystem::path& path)
 }
 
 /// Checks the numbers of the lines v, vt and vn: tinyobjloader reads what is no number as 0. Reads
-/// the material files on the way.
+/// the material files on the way, unless the file stands alone.
 void check_lines(std::span<const std::byte> bytes,
                  const std::filesystem::path& path,
+                 bool alone,
                  MtlMaterials& materials) {
   TextReader reader(bytes, path);
   const auto check = [&](const char* what, int count) {
@@ -80,7 +80,7 @@ void check_lines(std::span<const std::byte> bytes,
           reader.fail(fmt::format("a texture coordinate is '{}', not a finite number", v));
         }
       }
-    } else if (key == "mtllib") {
+    } else if (key == "mtllib" && !alone) {
       materials.add_library(reader.rest());
     }
   }
@@ -109,8 +109,8 @@ struct CornerHash {
 /// What tinyobjloader calls back: collects the lines of the file in order.
 class Collector {
  public:
-  Collector(const std::filesystem::path& path, MtlMaterials& materials)
-      : path_(path), materials_(materials), builder_(path) {}
+  Collector(const std::filesystem::path& path, bool alone, MtlMaterials& materials)
+      : path_(path), materials_(materials), builder_(path, alone ? kMostAlone : kMostTogether) {}
 
   static tinyobj::callback_t callbacks() {
     tinyobj::callback_t calls;
@@ -222,12 +222,13 @@ class Collector {
 
 }  // namespace
 
-MeshFile read_obj(const std::filesystem::path& path) {
-  std::vector<std::byte> bytes = read_file(path);
+MeshFile read_obj(MeshBytes source) {
+  std::vector<std::byte>& bytes = source.bytes;
+  const std::filesystem::path& path = source.path;
   normalize(bytes, path);
   MtlMaterials materials(path);
-  check_lines(bytes, path, materials);
-  Collector collector(path, materials);
+  check_lines(bytes, path, source.alone, materials);
+  Collector collector(path, source.alone, materials);
   ByteStream buffer(bytes);
   std::istream stream(&buffer);
   std::string warnings;

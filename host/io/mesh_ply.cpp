@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "io/mesh_builder.hpp"
@@ -44,8 +45,9 @@ std::array<float, N> pick(std::span<const double> row, const std::array<std::siz
 
 }  // namespace
 
-MeshFile read_ply_mesh(const std::filesystem::path& path) {
-  const PlyFile file(path);
+MeshFile read_ply_mesh(MeshBytes source) {
+  const std::filesystem::path& path = source.path;
+  const PlyFile file(path, std::move(source.bytes));
   const auto position = columns<3>(file, {{"x", "y", "z"}});
   const auto normal = columns<3>(file, {{"nx", "ny", "nz"}});
   const auto uv =
@@ -54,7 +56,7 @@ MeshFile read_ply_mesh(const std::filesystem::path& path) {
     throw DataError(
         fmt::format("{} has no properties x, y and z: it holds no mesh", path.string()));
   }
-  MeshBuilder builder(path);
+  MeshBuilder builder(path, source.alone ? kMostAlone : kMostTogether);
   file.for_each_row([&](std::size_t, std::span<const double> row) {
     std::optional<std::array<float, 3>> n;
     std::optional<std::array<float, 2>> t;

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/gaussian_check.hpp"
 #include "core/gaussian_transform.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/model_formats.hpp"
@@ -158,7 +159,9 @@ void write_model(const std::filesystem::path& path,
                  const ModelEncoding& encoding,
                  const std::optional<TraceOptions>& trace,
                  const std::array<double, 3>& origin) {
-  switch (io::output_format(path)) {
+  const io::ModelFormat format = io::output_format(path);
+  check_gaussians(model);
+  switch (format) {
     case io::ModelFormat::kPly:
       return write_ply(path, model, trace, origin);
     case io::ModelFormat::kCompressedPly:

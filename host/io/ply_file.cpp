@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "raysplats/error.hpp"
 
@@ -69,7 +70,12 @@ double read_number(ByteReader& reader, PlyType type, std::endian order, const ch
 }  // namespace
 
 PlyFile::PlyFile(const std::filesystem::path& path, std::string_view element)
-    : path_(path), element_(element), bytes_(read_file(path)) {
+    : PlyFile(path, read_file(path), element) {}
+
+PlyFile::PlyFile(const std::filesystem::path& path,
+                 std::vector<std::byte> bytes,
+                 std::string_view element)
+    : path_(path), element_(element), bytes_(std::move(bytes)) {
   parse_header();
   locate_rows();
 }
@@ -84,6 +90,53 @@ std::optional<std::size_t> PlyFile::column(std::string_view name) const {
                                   [&](const PlyProperty& p) { return p.name == name; });
   if (found == properties_.end()) return std::nullopt;
   return static_cast<std::size_t>(found - properties_.begin());
+}
+
+void PlyFile::read_format(TextReader& reader) {
+  const std::string_view format = reader.word();
+  if (format == "ascii") {
+    ascii_ = true;
+  } else if (format == "binary_big_endian") {
+    order_ = std::endian::big;
+  } else if (format != "binary_little_endian") {
+    reader.fail(fmt::format("the PLY format '{}' is unknown", format));
+  }
+}
+
+// Of the table, or of an element before it; its bytes.
+std::size_t PlyFile::read_property(TextReader& reader, bool of_table) {
+  const std::string_view type_name = reader.word();
+  if (type_name == "list") {
+    reader.fail(fmt::format("{} has a list property, which is not supported",
+                            of_table ? fmt::format("the {} element", element_)
+                                     : fmt::format("an element before the {} element", element_)));
+  }
+  const std::optional<PlyType> type = type_named(type_name);
+  if (!type) reader.fail(fmt::format("the property type '{}' is unknown", type_name));
+  if (!of_table) return size_of(*type);
+  const std::string name(reader.word());
+  if (name.empty()) reader.fail("a property has no name");
+  if (column(name)) reader.fail(fmt::format("the property '{}' appears twice", name));
+  if (properties_.size() == kMaxProperties) {
+    reader.fail(fmt::format("there are more than {} properties", kMaxProperties));
+  }
+  properties_.push_back({name, *type});
+  row_bytes_ += size_of(*type);
+  return size_of(*type);
+}
+
+// Of an element behind the table.
+void PlyFile::add_later_property(TextReader& reader) {
+  LaterProperty property;
+  std::string_view type = reader.word();
+  property.list = type == "list";
+  if (property.list) {
+    property.count_type = type_named(reader.word());
+    type = reader.word();
+  }
+  property.type = type_named(type);
+  property.name = reader.word();
+  later_.back().properties.push_back(std::move(property));
 }
 
 void PlyFile::parse_header() {
@@ -112,14 +165,7 @@ void PlyFile::parse_header() {
     if (key == "end_header") {
       ended = true;
     } else if (key == "format") {
-      const std::string_view format = reader.word();
-      if (format == "ascii") {
-        ascii_ = true;
-      } else if (format == "binary_big_endian") {
-        order_ = std::endian::big;
-      } else if (format != "binary_little_endian") {
-        reader.fail(fmt::format("the PLY format '{}' is unknown", format));
-      }
+      read_format(reader);
       has_format = true;
     } else if (key == "element") {
       close_element();
@@ -136,37 +182,10 @@ void PlyFile::parse_header() {
       }
     } else if (key == "property") {
       if (at == At::kAfter) {
-        LaterProperty property;
-        std::string_view type = reader.word();
-        property.list = type == "list";
-        if (property.list) {
-          property.count_type = type_named(reader.word());
-          type = reader.word();
-        }
-        property.type = type_named(type);
-        property.name = reader.word();
-        later_.back().properties.push_back(std::move(property));
-        continue;
+        add_later_property(reader);
+      } else {
+        element_bytes += read_property(reader, at == At::kTable);
       }
-      const std::string_view type_name = reader.word();
-      if (type_name == "list") {
-        reader.fail(fmt::format("{} has a list property, which is not supported",
-                                at == At::kTable
-                                    ? fmt::format("the {} element", element_)
-                                    : fmt::format("an element before the {} element", element_)));
-      }
-      const std::optional<PlyType> type = type_named(type_name);
-      if (!type) reader.fail(fmt::format("the property type '{}' is unknown", type_name));
-      element_bytes += size_of(*type);
-      if (at != At::kTable) continue;
-      const std::string name(reader.word());
-      if (name.empty()) reader.fail("a property has no name");
-      if (column(name)) reader.fail(fmt::format("the property '{}' appears twice", name));
-      if (properties_.size() == kMaxProperties) {
-        reader.fail(fmt::format("there are more than {} properties", kMaxProperties));
-      }
-      properties_.push_back({name, *type});
-      row_bytes_ += size_of(*type);
     } else if (key != "comment" && key != "obj_info" && !key.empty()) {
       reader.fail(fmt::format("the PLY header has the unknown keyword '{}'", key.substr(0, 40)));
     }

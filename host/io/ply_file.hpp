@@ -31,6 +31,10 @@ struct PlyProperty {
 class PlyFile {
  public:
   explicit PlyFile(const std::filesystem::path& path, std::string_view element = "vertex");
+  /// The same of a file that has been read; `path` is named in errors.
+  PlyFile(const std::filesystem::path& path,
+          std::vector<std::byte> bytes,
+          std::string_view element = "vertex");
 
   std::size_t rows() const { return rows_; }
   const std::vector<PlyProperty>& properties() const { return properties_; }
@@ -79,6 +83,9 @@ class PlyFile {
     std::vector<LaterProperty> properties;
   };
   void parse_header();
+  void read_format(TextReader& reader);
+  std::size_t read_property(TextReader& reader, bool of_table);
+  void add_later_property(TextReader& reader);
   void locate_rows();
   void check_types(const LaterElement& element) const;
   TextReader text_rows() const;

@@ -31,6 +31,10 @@ glm::dmat4 turned(double degrees, const glm::dvec3& axis) {
   return glm::rotate(glm::dmat4(1.0), glm::radians(degrees), glm::normalize(axis));
 }
 
+glm::dmat4 turned(const glm::dvec3& angles) {
+  return turned(angles.z, {0, 0, 1}) * turned(angles.y, {0, 1, 0}) * turned(angles.x, {1, 0, 0});
+}
+
 glm::dmat4 read_rotation(TomlTable& table) {
   if (table.is_table("rotate")) {
     TomlTable rotate = *table.table("rotate");
@@ -41,8 +45,7 @@ glm::dmat4 read_rotation(TomlTable& table) {
     return turned(*degrees, *axis);
   }
   const auto angles = table.vector("rotate");
-  if (!angles) return glm::dmat4(1.0);
-  return turned(angles->z, {0, 0, 1}) * turned(angles->y, {0, 1, 0}) * turned(angles->x, {1, 0, 0});
+  return angles ? turned(*angles) : glm::dmat4(1.0);
 }
 
 glm::dvec3 read_scale(TomlTable& table) {
@@ -304,6 +307,13 @@ void check_materials(const SceneFile& scene) {
 }
 
 }  // namespace
+
+glm::dmat4 scene_transform(const glm::dvec3& scale,
+                           const glm::dvec3& rotate,
+                           const glm::dvec3& translate) {
+  return glm::translate(glm::dmat4(1.0), translate) * turned(rotate) *
+         glm::scale(glm::dmat4(1.0), scale);
+}
 
 glm::dmat4 SceneMesh::placement(double time) const {
   if (!moves()) return transform;

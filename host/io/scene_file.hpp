@@ -17,6 +17,12 @@
 
 namespace raysplats {
 
+/// How scene files place what they name: scaled, then turned about the fixed axes x, y and z in
+/// this order (degrees), then moved.
+glm::dmat4 scene_transform(const glm::dvec3& scale,
+                           const glm::dvec3& rotate,
+                           const glm::dvec3& translate);
+
 /// [[model]]: Gaussians and where they are.
 struct SceneModel {
   std::filesystem::path file;  ///< as read_model(), or the folder of a training run

@@ -32,7 +32,7 @@ Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& enc
 
 /// Writes atomically what the name's extension says: .ply, .compressed.ply, .splat, .spz or .glb.
 /// `trace` and `origin` as for write_ply(); other formats do not keep them. Throws UsageError for
-/// other names, DataError for what the format cannot hold.
+/// other names, DataError for numbers that are not finite and for what the format cannot hold.
 void write_model(const std::filesystem::path& path,
                  const Gaussians& model,
                  const ModelEncoding& encoding = {},

@@ -120,3 +120,58 @@ TEST_CASE("info describes meshes, scene files and the header of a model") {
   CHECK(scene.at("camera").at("source") == "orbit");
   CHECK(scene.at("lights") == nlohmann::json{"sphere"});
 }
+
+TEST_CASE("info describes every kind of file that is read") {
+  const TemporaryFolder folder;
+  const auto write_array = [&](const std::string& name, const std::string& shape, int count) {
+    std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + shape + "), }";
+    header.resize(117, ' ');
+    header += '\n';
+    std::string bytes = std::string("\x93NUMPY\x01\x00", 8) + char(header.size()) + '\0' + header;
+    bytes.append(static_cast<std::size_t>(4 * count), '\0');
+    write_file(folder / name, bytes);
+  };
+  write_array("rays.npy", "2, 3, 6", 36);
+  nlohmann::json json = json_of(folder / "rays.npy");
+  CHECK(json["type"] == "rays");
+  CHECK(json["rays"] == 6);
+  CHECK(json["range"] == nlohmann::json{0.0, 0.0});
+  CHECK(has(told(folder / "rays.npy"), "2, 3, 6"));
+  write_array("depth.npy", "4, 5", 20);
+  CHECK(json_of(folder / "depth.npy")["type"] == "array");
+  const std::string matrix = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+  write_file(folder / "cameras.json",
+             "{\"w\":8,\"h\":6,\"fl_x\":5,\"frames\":[{\"file_path\":\"a.png\","
+             "\"transform_matrix\":" +
+                 matrix + "}]}");
+  json = json_of(folder / "cameras.json");
+  CHECK(json["type"] == "cameras");
+  CHECK(json["cameras"] == 1);
+  CHECK(json["sizes"][0]["width"] == 8);
+  write_file(folder / "viewer.json",
+             "[{\"id\":0,\"width\":8,\"height\":6,\"position\":[0,0,0],\"rotation\":[]}]");
+  CHECK(json_of(folder / "viewer.json")["type"] == "cameras of viewers");
+  write_file(folder / "path.toml",
+             "seconds = 1\nfps = 4\n[[key]]\neye = [0,0,-5]\ntarget = [0,0,0]\n"
+             "[[key]]\neye = [1,0,-5]\ntarget = [0,0,0]\n");
+  json = json_of(folder / "path.toml");
+  CHECK(json["type"] == "camera path");
+  CHECK(json["frames"] == 4);
+  write_file(folder / "run.toml", "iterations = 123\n");
+  json = json_of(folder / "run.toml");
+  CHECK(json["type"] == "configuration");
+  CHECK(json["iterations"] == 123);
+  CHECK(json["given"] == nlohmann::json{"iterations"});
+  raysplats::write_image(folder / "a.png", raysplats::Image(8, 6, 3, 0.5f));
+  json = json_of(folder / "a.png");
+  CHECK(json["type"] == "picture");
+  CHECK(json["height"] == 6);
+  write_file(folder / "damaged.npy", "no array");
+  write_file(folder / "damaged.json", "[{}]");
+  write_file(folder / "damaged.rsck", "");
+  for (const char* name : {"damaged.npy", "damaged.json", "damaged.rsck"}) {
+    const Outcome outcome = raysplats_program({"info", folder / name});
+    CHECK(outcome.code == 3);
+    CHECK(has(outcome.err, name));
+  }
+}

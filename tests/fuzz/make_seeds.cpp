@@ -270,7 +270,15 @@ void make_meshes(const fs::path& root) {
   glb.add(44u).add_text(std::string_view("BIN\0", 4));
   for (const float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) glb.add(value);
   for (const std::uint16_t index : {0, 1, 2, 0}) glb.add(index);
-  corpus.add("triangle.glb", glb.take(3));
+  const std::string binary = glb.take(3);
+  corpus.add("triangle.glb", binary);
+  // The same from memory.
+  corpus.add("alone.obj", "\4mtllib input.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+  corpus.add("alone.ply",
+             "\5ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+             "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+             "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  corpus.add("alone.glb", "\6" + binary.substr(1));
 }
 
 void make_models(const fs::path& root) {
@@ -343,6 +351,9 @@ void make_view(const fs::path& root) {
                               R"("output":"depth"})");
   corpus.add("pick.json", R"({"type":"pick",)" + seen + R"(,"px":[0.5,0.25]})");
   corpus.add("pause.json", R"({"type":"pause"})");
+  const std::string placed = R"("material":"glass","at":[0,0,1],"rotate":[0,90,0],"size":0.5})";
+  corpus.add("mesh.json", R"({"type":"mesh","format":"obj","name":"a.obj","bytes":100,)" + placed);
+  corpus.add("place.json", R"({"type":"place","mesh":1,"moving":true,)" + placed);
 }
 
 void make_scenes(const fs::path& root) {

@@ -79,6 +79,23 @@ TEST_CASE("atomic file: the target changes at commit and not before") {
   CHECK(folder.entries() == 1);
 }
 
+TEST_CASE("atomic file: two writers of one file have temporary files of their own") {
+  // Processes on machines that share the folder may have one number.
+  const Folder folder;
+  const fs::path target = folder / "model.ply";
+  AtomicFile first(target);
+  AtomicFile second(target);
+  CHECK(first.temporary() != second.temporary());
+  first.write("first");
+  second.write("the second");
+  second.commit();
+  CHECK(read_all(target) == "the second");
+  first.commit();
+  CHECK(read_all(target) == "first");
+  AtomicFile left(target);
+  CHECK(remove_stale_temporaries(folder.path()) == 1);
+}
+
 TEST_CASE("atomic file: without commit nothing remains") {
   const Folder folder;
   const fs::path target = folder / "out.txt";

@@ -91,6 +91,13 @@ TEST_CASE("seconds share out the time, and constant speed leaves them aside") {
   views = path_views(path, 101);
   for (std::size_t i = 1; i < views.size(); ++i)
     CHECK(views[i].eye.x - views[i - 1].eye.x == doctest::Approx(0.05).epsilon(0.02));
+  // Without any seconds the spans take the same time.
+  path.constant_speed = false;
+  path.keys[0].seconds = path.keys[1].seconds = path.keys[2].seconds = 0;
+  views = path_views(path, 5);
+  CHECK(views[0].eye.x == doctest::Approx(0));
+  CHECK(views[2].eye.x == doctest::Approx(1));
+  CHECK(views[4].eye.x == doctest::Approx(5));
   // A path that only turns has no length to go along.
   CameraPath turning;
   turning.constant_speed = true;

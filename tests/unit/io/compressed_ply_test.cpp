@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/morton_order.hpp"
 #include "model_bytes.hpp"
@@ -157,4 +158,21 @@ TEST_CASE("compressed PLY: damage ends in one sentence") {
   CHECK(contains(error_of(compressed(257, 0, 9, 1)), "257 Gaussians have 1 chunks"));
   CHECK(contains(error_of(compressed(1, 10)), "10 properties"));
   CHECK(contains(error_of(compressed(1, 0, 5)), "min_scale_z"));
+}
+
+TEST_CASE("a model with a number that is not finite is written in no format") {
+  const Scratch scratch;
+  Gaussians model;
+  model.resize(2);
+  std::fill(model.quaternions.begin(), model.quaternions.end(), 0.5f);
+  for (const char* name : {"m.ply", "m.compressed.ply", "m.splat", "m.spz", "m.sog", "m.glb"}) {
+    CAPTURE(name);
+    Gaussians bad = model;
+    bad.means[4] = std::numeric_limits<float>::quiet_NaN();
+    const std::string told = data_error([&] { write_model(scratch / name, bad); });
+    CHECK(contains(told, "Number 4 of the Gaussians' means is not finite"));
+    CHECK(!fs::exists(scratch / name));
+    write_model(scratch / name, model);
+    CHECK(read_model(scratch / name).size() == 2);
+  }
 }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -298,4 +299,44 @@ TEST_CASE("glTF: primitives without normals among others that have them are flat
     const float* normal = &mesh.normals[3 * std::size_t{mesh.triangles[i]}];
     CHECK(normal[i < 6 ? 0 : 2] == 1.0f);
   }
+}
+
+TEST_CASE("a mesh alone opens no other file, decodes no picture and has a limit of its own") {
+  const auto bytes_of = [](const std::string& text) {
+    const auto bytes = std::as_bytes(std::span(text));
+    return std::vector<std::byte>(bytes.begin(), bytes.end());
+  };
+  const auto read_alone = [&](io::MeshFormat format, const std::string& text) {
+    return io::read_mesh_alone(format, bytes_of(text), "alone");
+  };
+  const Scratch scratch;
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  // Read, this material file would be an error.
+  write_bytes(scratch / "m.mtl", "newmtl a\nmap_Kd absent.png\n");
+  const std::string obj =
+      "mtllib " + (scratch / "m.mtl").string() + "\n" + corners + "usemtl a\nf 1 2 3\n";
+  write_bytes(scratch / "m.obj", obj);
+  CHECK_THROWS_AS(io::read_mesh(scratch / "m.obj"), DataError);
+  CHECK(read_alone(io::MeshFormat::kObj, obj).triangle_count() == 1);
+  CHECK(
+      contains(data_error([&] { read_alone(io::MeshFormat::kGltf, square().gltf("beside.bin")); }),
+               "one GLB"));
+  GltfFile picture = square();
+  picture.json["images"] = {{{"uri", "absent.png"}}};
+  CHECK_THROWS_AS(read_alone(io::MeshFormat::kGltf, picture.glb()), DataError);
+  // Small files can place one mesh many times.
+  GltfFile many;
+  many.add_mesh(many.add_vec3(Floats(3 * 65538, 1.0f)))["mode"] = 6;
+  many.json["nodes"] = json::array();
+  many.json["scenes"] = {{{"nodes", json::array()}}};
+  many.json["scene"] = 0;
+  for (int i = 0; i < 33; ++i) {
+    many.json["nodes"].push_back({{"mesh", 0}});
+    many.json["scenes"][0]["nodes"].push_back(i);
+  }
+  CHECK(contains(data_error([&] { read_alone(io::MeshFormat::kGltf, many.glb()); }),
+                 "more than 2 million"));
+  CHECK(read_alone(io::MeshFormat::kGltf, square().glb()).triangle_count() == 2);
+  CHECK(contains(data_error([&] { read_alone(io::MeshFormat::kObj, "v 0 0 0\nf 1 2 3\n"); }),
+                 "alone"));
 }

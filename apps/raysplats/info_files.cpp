@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "info_files.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/byte_reader.hpp"
+#include "io/camera_path_file.hpp"
+#include "io/image_file.hpp"
+#include "io/json_file.hpp"
+#include "io/npy_file.hpp"
+#include "io/toml_table.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "train/checkpoint.hpp"
+#include "train/train_config.hpp"
+
+namespace raysplats::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Number, sizes and lenses of cameras.
+Json describe(std::span<const Camera> cameras) {
+  std::map<std::pair<int, int>, std::size_t> sizes;
+  std::map<std::string, std::size_t> models;
+  for (const Camera& camera : cameras) {
+    ++sizes[{camera.width, camera.height}];
+    ++models[model_name(camera.model)];
+  }
+  Json out{
+      {"cameras", cameras.size()}, {"sizes", Json::array()}, {"camera_models", Json::object()}};
+  for (const auto& [size, count] : sizes) {
+    out["sizes"].push_back({{"width", size.first}, {"height", size.second}, {"cameras", count}});
+  }
+  for (const auto& [name, count] : models) out["camera_models"][name] = count;
+  return out;
+}
+
+Json describe_path(const std::filesystem::path& path) {
+  const CameraPathFile file = read_camera_path(path, {});
+  Json out{{"type", "camera path"},
+           {"frames", file.cameras.size()},
+           {"fps", file.fps},
+           {"closed", file.closed}};
+  out.update(describe(file.cameras));
+  out.erase("cameras");
+  return out;
+}
+
+/// cameras.json of a run, which viewers of 3DGS read: a list of views.
+Json describe_views(const nlohmann::json& views, const std::filesystem::path& path) {
+  std::vector<Camera> cameras;
+  for (const nlohmann::json& view : views) {
+    const bool sound = view.is_object() && view.contains("position") && view.contains("rotation") &&
+                       view.value("width", nlohmann::json()).is_number_integer() &&
+                       view.value("height", nlohmann::json()).is_number_integer();
+    if (!sound) {
+      throw DataError(
+          fmt::format("{}: entry {} is no view with position, rotation, width and height",
+                      path.string(), cameras.size()));
+    }
+    Camera camera;
+    camera.width = view["width"].get<int>();
+    camera.height = view["height"].get<int>();
+    cameras.push_back(camera);
+  }
+  Json out{{"type", "cameras of viewers"}};
+  out.update(describe(cameras));
+  out.erase("camera_models");
+  return out;
+}
+
+std::optional<Json> describe_json(const std::filesystem::path& path) {
+  const std::vector<std::byte> bytes = io::read_file(path);
+  const auto* text = reinterpret_cast<const char*>(bytes.data());
+  const auto begin = std::find_if_not(text, text + bytes.size(), [](char c) {
+    return c == ' ' || c == '\n' || c == '\r' || c == '\t';
+  });
+  if (begin != text + bytes.size() && *begin == '[') {
+    // The reader of objects knows how deep a file may be.
+    std::string wrapped = "{\"views\":" + std::string(text, bytes.size()) + "}";
+    return describe_views(
+        io::parse_json_object(std::as_bytes(std::span(wrapped)), path).at("views"), path);
+  }
+  const nlohmann::json json = io::parse_json_object(bytes, path);
+  if (json.contains("camera_path") || json.contains("keyframes")) return describe_path(path);
+  if (!json.contains("frames")) return std::nullopt;
+  Json out{{"type", "cameras"}};
+  out.update(describe(read_cameras(path)));
+  return out;
+}
+
+Json describe_array(const std::filesystem::path& path) {
+  const io::NpyArray array = io::read_npy(path);
+  const std::size_t last = array.shape.empty() ? 0 : array.shape.back();
+  float low = std::numeric_limits<float>::infinity();
+  float high = -low;
+  std::size_t odd = 0;
+  for (const float value : array.data) {
+    if (std::isfinite(value)) {
+      low = std::min(low, value);
+      high = std::max(high, value);
+    } else {
+      ++odd;
+    }
+  }
+  const bool rays = array.shape.size() > 1 && (last == 6 || last == 8);
+  Json out{{"type", rays ? "rays" : "array"}, {"shape", array.shape}};
+  if (rays) {
+    out["rays"] = array.data.size() / last;
+    out["limits"] = last == 8;
+  }
+  if (low <= high) out["range"] = {low, high};
+  out["not_finite"] = odd;
+  return out;
+}
+
+Json describe_picture(const std::filesystem::path& path) {
+  const io::ImageSize size = io::image_size(path);
+  return {{"type", "picture"},
+          {"width", size.width},
+          {"height", size.height},
+          {"bytes_per_number", size.sample_bytes}};
+}
+
+Json describe_checkpoint(const std::filesystem::path& path) {
+  const Checkpoint checkpoint = read_checkpoint(path);
+  return {{"type", "checkpoint"},
+          {"iteration", checkpoint.iteration},
+          {"iterations", parse_train_config(checkpoint.config).iterations},
+          {"gaussians", checkpoint.count},
+          {"sh_degree", checkpoint.sh_degree},
+          {"seed", checkpoint.seed}};
+}
+
+/// Scene files are described elsewhere.
+std::optional<Json> describe_toml(const std::filesystem::path& path) {
+  const toml::table table = io::read_toml(path);
+  if (table.contains("key")) return describe_path(path);
+  for (const char* part : {"model", "mesh", "camera", "light", "material", "environment", "render"})
+    if (table.contains(part)) return std::nullopt;
+  TrainOptions options;
+  read_train_config(path, options);
+  const auto* nested = table["train"].as_table();
+  std::vector<std::string> given;
+  for (const auto& [key, value] : nested != nullptr ? *nested : table)
+    given.emplace_back(key.str());
+  return Json{{"type", "configuration"}, {"iterations", options.iterations}, {"given", given}};
+}
+
+}  // namespace
+
+const char* model_name(CameraModel model) {
+  switch (model) {
+    case CameraModel::kOpenCv:
+      return "opencv";
+    case CameraModel::kFisheye:
+      return "fisheye";
+    case CameraModel::kEquirectangular:
+      return "equirectangular";
+    case CameraModel::kOrthographic:
+      return "orthographic";
+    case CameraModel::kPinhole:
+      break;
+  }
+  return "pinhole";
+}
+
+std::optional<Json> describe_file(const std::filesystem::path& path) {
+  const std::string extension = io::lower_extension(path);
+  // meta.json is a model of SOG.
+  if (extension == ".json" && path.filename() != "meta.json") return describe_json(path);
+  if (extension == ".npy") return describe_array(path);
+  if (extension == ".rsck") return describe_checkpoint(path);
+  if (extension == ".toml") return describe_toml(path);
+  if (io::has_image_extension(path)) return describe_picture(path);
+  return std::nullopt;
+}
+
+void print_file(const Json& file) {
+  for (const auto& [key, value] : file.items()) {
+    if (key == "path") continue;
+    std::string name = key;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    std::string text;
+    if (key == "sizes") {
+      for (const Json& size : value) {
+        text += fmt::format("{}{}x{} ({})", text.empty() ? "" : ", ", size["width"].get<int>(),
+                            size["height"].get<int>(), size["cameras"].get<std::size_t>());
+      }
+    } else if (value.is_array() || value.is_object()) {
+      for (const auto& [part, entry] : value.items()) {
+        const std::string said = entry.is_string() ? entry.get<std::string>() : entry.dump();
+        text += (text.empty() ? "" : ", ") + (value.is_object() ? part + " " + said : said);
+      }
+    } else if (value.is_boolean()) {
+      text = value.get<bool>() ? "yes" : "no";
+    } else {
+      text = value.is_string() ? value.get<std::string>() : value.dump();
+    }
+    fmt::print("{:<16} {}\n", name, text);
+  }
+}
+
+}  // namespace raysplats::cli
