@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <memory>
 #include <new>
+#include <string_view>
 #include <utility>
 
 #include "base/memory_limit.hpp"
@@ -45,12 +47,13 @@ std::string build_log(const cl::Program& program, const cl::Device& device) {
 cl::Program compile(Context::Impl& context,
                     const std::string& path,
                     const std::string& source,
-                    const std::string& options) {
+                    const std::string& options,
+                    bool told = true) {
   auto program = std::make_unique<cl::Program>(context.context, source);
   const auto tell = [&](const std::string& what) {
-    if (context.options.compiling) context.options.compiling(context.compiled, what);
+    if (told && context.options.compiling) context.options.compiling(context.compiled, what);
   };
-  ++context.compiled;
+  if (told) ++context.compiled;
   tell(path);
   try {
     context.faults.check(Fault::kBuild);
@@ -92,6 +95,15 @@ std::optional<cl::Program> from_binary(Context::Impl& context,
   } catch (const cl::Error&) {
     return std::nullopt;
   }
+}
+
+// PoCL keeps compiled kernels by their source, each for the work-groups that it was launched in. To
+// give a binary it compiles all of them once more, for any work-group, which takes as long as the
+// first time; programs that are built again are as fast without. The cache keeps an empty entry.
+bool driver_keeps_programs(const DeviceInfo& device) {
+  if (device.platform.find("Portable Computing Language") == std::string::npos) return false;
+  const char* kept = std::getenv("POCL_KERNEL_CACHE");
+  return kept == nullptr || std::string_view(kept) != "0";
 }
 
 void store_binary(const ProgramCache& cache, const std::string& key, const cl::Program& program) {
@@ -224,9 +236,14 @@ cl::Program Context::Impl::make_program(const std::string& path, const BuildOpti
 
   const ProgramCache cache(options.cache_directory);
   const std::string cache_key = ProgramCache::key(source, flags, info);
+  const bool kept = driver_keeps_programs(info);
+  if (kept) {
+    const auto entry = cache.load(cache_key);
+    if (entry && entry->empty()) return compile(*this, path, source, flags, false);
+  }
   const auto cached = [&]() -> std::optional<cl::Program> {
     const auto binary = cache.load(cache_key);
-    if (!binary) return std::nullopt;
+    if (!binary || binary->empty()) return std::nullopt;
     auto program = from_binary(*this, *binary, flags);
     if (!program) cache.remove(cache_key);
     if (program && check_arguments && !tells_arguments(*program)) return std::nullopt;
@@ -240,7 +257,11 @@ cl::Program Context::Impl::make_program(const std::string& path, const BuildOpti
     program = cached();
     if (!program) {
       program = compile(*this, path, source, flags);
-      store_binary(cache, cache_key, *program);
+      if (kept) {
+        cache.store(cache_key, {});
+      } else {
+        store_binary(cache, cache_key, *program);
+      }
       return *program;
     }
   }

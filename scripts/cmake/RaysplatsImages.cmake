@@ -19,7 +19,7 @@ else()
   add_dependencies(raysplats_io raysplats_images)
   target_link_libraries(raysplats_io PRIVATE ${CMAKE_DL_LIBS})
   target_link_options(raysplats_io
-                      INTERFACE "$<INSTALL_INTERFACE:LINKER:-rpath,$<INSTALL_PREFIX>/${CMAKE_INSTALL_LIBDIR}>")
+                      INTERFACE "$<INSTALL_INTERFACE:LINKER:-rpath,$<INSTALL_PREFIX>/${RAYSPLATS_MODULE_DIR}>")
 endif()
 target_include_directories(raysplats_images PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/host)
 target_compile_definitions(raysplats_images PRIVATE RAYSPLATS_VERSION="${PROJECT_VERSION}")

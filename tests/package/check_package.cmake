@@ -39,6 +39,15 @@ if(installed)
   message(FATAL_ERROR "No package has ${installed}")
 endif()
 
+# What the program loads by itself lies in a folder of its own, where it finds it: photos are written by such a library.
+file(GLOB stray ${prefix}/lib/*.so ${prefix}/lib/*/*.so)
+if(stray)
+  message(FATAL_ERROR "${stray} is where libraries for everybody are")
+endif()
+if(EXISTS ${prefix}/bin/raysplats)
+  run("installed program" ${prefix}/bin/raysplats generate ${WORK}/photos --size 8 --train-views 1 --test-views 1)
+endif()
+
 set(flags "")
 if(SANITIZE)
   set(flags -fsanitize=${SANITIZE})

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <thread>
 #include <vector>
@@ -39,11 +40,18 @@ std::vector<fs::path> entries(const fs::path& directory) {
   return found;
 }
 
+// PoCL is not asked for binaries while it keeps kernels itself.
+class AskedForBinaries {
+  ScopedVariable pocl_{"POCL_KERNEL_CACHE", "0"};
+};
+
 // Runs a kernel that needs no arguments but a buffer in a context with this cache; the words it
 // wrote.
-std::uint32_t probe(const fs::path& cache) {
+std::uint32_t probe(const fs::path& cache,
+                    const std::function<void(std::size_t, const std::string&)>& compiling = {}) {
   ContextOptions options;
   options.cache_directory = cache.string();
+  options.compiling = compiling;
   Context context(select_device(""), options);
   Buffer<std::uint32_t> layout(context, 256, "layout");
   context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, layout);
@@ -114,6 +122,7 @@ TEST_CASE("program cache: the key depends on source, options, device and driver"
 }
 
 TEST_CASE("program cache: a context fills it, uses it and repairs it") {
+  const AskedForBinaries asked;
   // Where programs from binaries cannot tell their arguments, checking them passes the cache by.
   const ScopedVariable unchecked("RAYSPLATS_CHECK_ARGUMENTS", "0");
   const TemporaryDirectory folder;
@@ -136,7 +145,32 @@ TEST_CASE("program cache: a context fills it, uses it and repairs it") {
   }
 }
 
+TEST_CASE("program cache: a driver that keeps kernels itself is not asked for binaries") {
+  const TemporaryDirectory folder;
+  const ScopedVariable keeps("POCL_KERNEL_CACHE", "1");
+  const ScopedVariable plain("RAYSPLATS_CHECK_ARGUMENTS", "0");
+  const bool pocl =
+      select_device("").platform.find("Portable Computing Language") != std::string::npos;
+  std::size_t compiled = 0;
+  const auto count = [&](std::size_t number, const std::string&) { compiled = number; };
+  CHECK(probe(folder.path(), count) > 1);
+  CHECK(compiled == 1);
+  REQUIRE(entries(folder.path()).size() == 1);
+  const ProgramCache cache(folder.path().string());
+  const std::string key = entries(folder.path())[0].stem().string();
+  CHECK(cache.load(key)->empty() == pocl);
+  compiled = 0;
+  CHECK(probe(folder.path(), count) > 1);
+  CHECK(compiled == 0);  // nobody hears of what the driver had
+  {
+    const AskedForBinaries asked;
+    CHECK(probe(folder.path(), count) > 1);
+    CHECK_FALSE(cache.load(key)->empty());
+  }
+}
+
 TEST_CASE("program cache: a sound entry with a binary the driver refuses is replaced") {
+  const AskedForBinaries asked;
   const TemporaryDirectory folder;
   const std::uint32_t expected = probe(folder.path());
   const fs::path file = entries(folder.path()).at(0);
