@@ -27,8 +27,8 @@
 
 // What an open row brings, per ray: the transmittance in front, 0 in rays that do not blend it, and
 // the sum of T alpha (colour . gradient) over it and all hits behind it. Of two hits of a ray the
-// one with more transmittance in front is nearer, and the sum from the nearest hit behind a row on
-// is all that is behind it: no row has to be asked for its own share.
+// one with more transmittance in front is nearer (of a tie either), and the sum from the nearest
+// hit behind a row on is all that is behind it: no row has to be asked for its own share.
 typedef struct {
   float before[OPEN_LOCAL][GROUP];
   float from_here[OPEN_LOCAL][GROUP];
@@ -115,7 +115,7 @@ RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
   const float alpha = group_alpha(v, &m);
   const float before = rs_row_get(memory->before, own->before, slot, lane);
   const float from_here = rs_row_get(memory->from_here, own->from_here, slot, lane);
-  if (before > closed->before) {
+  if (before >= closed->before) {
     closed->before = before;
     closed->from_here = from_here;
   }
@@ -184,18 +184,27 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
       const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
       const float mine = before * group_alpha(v, &m) * rs_projected(&p, v, &m);
       ClosedHit next = closed;  // the nearest behind this one
+      // Hits too faint to change the transmittance tie with the one behind them. Whatever ties has
+      // one sum, that of all of them, so that it does not matter which is taken for the nearest.
+      ClosedHit tied = {0.0f, 0.0f};
       for (uint rest = open; rest != 0; rest &= rest - 1) {
         const uint slot = rs_lowest_bit(rest);
         const float other = rs_row_get(memory->before, own.before, slot, lane);
-        if (other <= next.before) continue;
+        const bool farther = other < before;
+        if (farther ? other <= next.before : before <= 0.0f) continue;
         const float from_there = rs_row_get(memory->from_here, own.from_here, slot, lane);
-        if (other < before) {
+        if (farther) {
           next.before = other;
           next.from_here = from_there;
         } else {
           rs_row_set(memory->from_here, own.from_here, slot, lane, from_there + mine);
+          if (other == before) {
+            tied.before = other;
+            tied.from_here = from_there;
+          }
         }
       }
+      if (tied.before > 0.0f) next = tied;
       const uint slot = rs_lowest_bit(~open & RS_ALL_SLOTS);
       open |= 1u << slot;
       rs_row_set(memory->before, own.before, slot, lane, before);

@@ -21,9 +21,10 @@
 #define RS_GROUP_BATCH (GROUP < 16 ? GROUP : 16)
 // Candidates found and not tested yet: a power of two.
 #define RS_GROUP_QUEUE (2 * GROUP)
-// Rows that wait, those of a batch included.
+// Rows that wait, those of a batch included. More rays meet more Gaussians at once; where the list
+// is full they are traced in parts, and every part has rows of its own.
 #ifndef WAITING
-#define WAITING 64
+#define WAITING (GROUP > 32 ? 128 : 64)
 #endif
 
 // Per ray: the key, alpha, 0 where it misses, and the product over the nearer hits so far.

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <utility>
 
 #include "raysplats/error.hpp"
@@ -45,6 +47,20 @@ void check_packet_width(const TraceOptions& options) {
                   width));
 }
 
+void check_trace_options(TraceOptions options) {
+  OptionTable table;
+  add_trace_rows(table, options);
+  for (const OptionRow& row : table.take()) {
+    std::string text = row.text();
+    std::erase(text, '"');
+    row.set({text});
+  }
+}
+
+float stopping_transmittance(const TraceOptions& options) {
+  return std::max(options.min_transmittance, std::numeric_limits<float>::min());
+}
+
 void add_trace_rows(OptionTable& t, TraceOptions& o) {
   t.choice<HitOrder>("hit-order", o.hit_order,
                      {{"entry", HitOrder::kEntry}, {"peak", HitOrder::kPeak}},
@@ -53,7 +69,7 @@ void add_trace_rows(OptionTable& t, TraceOptions& o) {
   t.number("quantile", o.quantile, 0.01, 100,
            "squared radius of the ellipsoids in standard deviations (chi^2(3))");
   t.number("min-transmittance", o.min_transmittance, 0, 0.5,
-           "a ray stops below this transmittance");
+           "a ray stops below this transmittance; 0 = only behind what is opaque");
   t.number("max-hits", o.max_hits, 1, 1e6,
            "a ray stops after so many hits; rays that do are reported");
   t.flag("adaptive-radius", o.adaptive_radius,

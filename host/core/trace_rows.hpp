@@ -22,6 +22,13 @@ std::string packet_shape_name(PacketForm form);
 /// Throws UsageError for a width that packets of that form cannot have.
 void check_packet_width(const TraceOptions& options);
 
+/// Throws UsageError for a value that its row would refuse, as programs may set it.
+void check_trace_options(TraceOptions options);
+
+/// Where kernels stop a ray: min-transmittance, or, where that is 0, the least number above 0, so
+/// that a ray ends behind what is opaque and nowhere else.
+float stopping_transmittance(const TraceOptions& options);
+
 /// All of these rows, bound to `options`.
 std::vector<OptionRow> trace_rows(TraceOptions& options);
 

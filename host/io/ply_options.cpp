@@ -11,6 +11,7 @@
 #include <functional>
 #include <string_view>
 
+#include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -65,30 +66,32 @@ bool parse_sky(std::string_view text, SkyLight& sky) {
   return std::find(kSizes.begin(), kSizes.end(), sky.size()) != kSizes.end();
 }
 
+// What an option of tracing is called in a header.
+std::string header_key(std::string name) {
+  if (name == "near") return "near_depth";
+  std::ranges::replace(name, '-', '_');
+  return name;
+}
+
+// The options of tracing that a header names.
+constexpr std::array kOptions{"hit-order", "quantile",          "adaptive-radius",
+                              "near",      "min-transmittance", "max-hits"};
+
 // False for a value that the option cannot have. Keys that are unknown, of a later version perhaps,
 // are left alone.
 bool set_option(std::string_view key, std::string_view value, TraceOptions& out) {
-  if (key == "hit_order") {
-    out.hit_order = value == "entry" ? HitOrder::kEntry : HitOrder::kPeak;
-    return value == "entry" || value == "peak";
-  }
-  if (key == "adaptive_radius") {
-    out.adaptive_radius = value == "true";
-    return value == "true" || value == "false";
-  }
-  if (key == "quantile") {
-    return parse(value, out.quantile) && out.quantile > 0 && std::isfinite(out.quantile);
-  }
-  if (key == "min_transmittance") {
-    return parse(value, out.min_transmittance) && out.min_transmittance >= 0 &&
-           out.min_transmittance < 1;
-  }
-  if (key == "near_depth") {
-    return parse(value, out.near_depth) && out.near_depth >= 0 && std::isfinite(out.near_depth);
-  }
-  if (key == "max_hits") return parse(value, out.max_hits) && out.max_hits >= 1;
+  // Of any size here: the light of a scene may be brighter than what a picture shows.
   if (key == "background") return parse_triple(value, out.background);
   if (key == "sky") return parse_sky(value, out.sky);
+  const std::vector<OptionRow> rows = trace_rows(out);
+  for (const char* name : kOptions) {
+    if (key != header_key(name)) continue;
+    try {
+      find_row(rows, name)->set({std::string(value)});
+    } catch (const UsageError&) {
+      return false;
+    }
+  }
   return true;
 }
 
@@ -123,12 +126,13 @@ std::string io::ply_option_comments(const TraceOptions& options) {
   const auto add = [&](std::string_view key, const auto& value) {
     out += fmt::format("{}{} {}\n", kPrefix, key, value);
   };
-  add("hit_order", options.hit_order == HitOrder::kPeak ? "peak" : "entry");
-  add("quantile", options.quantile);
-  add("adaptive_radius", options.adaptive_radius);
-  add("near_depth", options.near_depth);
-  add("min_transmittance", options.min_transmittance);
-  add("max_hits", options.max_hits);
+  TraceOptions written = options;
+  const std::vector<OptionRow> rows = trace_rows(written);
+  for (const char* name : kOptions) {
+    std::string text = find_row(rows, name)->text();
+    std::erase(text, '"');
+    add(header_key(name), text);
+  }
   add("background", fmt::format("{},{},{}", background[0], background[1], background[2]));
   if (options.sky.empty()) return out;
   std::string sky;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/gaussian_check.hpp"
 #include "light/path_memory.hpp"
 #include "light/surface_store.hpp"
 #include "primitives/scan.hpp"

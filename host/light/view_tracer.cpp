@@ -212,7 +212,8 @@ void ViewTracer::forward(const DeviceGaussians& gaussians,
   self.kept = false;
   if (self.packets_revision != gaussians.revision) self.packets.update(gaussians);
   self.packets_revision = gaussians.revision;
-  self.packets.options().background = self.options.background = self.background;
+  self.options.background = self.background;
+  self.packets.set_background(self.background);
   self.packets.forward(gaussians, camera, keep, sizes);
   // Now: backward() may trace parts again.
   if (keep) {

@@ -63,6 +63,9 @@ class CameraTracer {
   const Buffer<std::uint32_t>& overflow() const;
   void clear_overflow();
 
+  /// Of the views from the next forward() on.
+  void set_background(const std::array<float, 3>& background);
+
   /// From the next forward() on `watch` hears the share of the picture that is done after every
   /// launch, which then are short ones; what it throws ends forward(). Nothing is heard with {}.
   void set_watch(std::function<void(double share)> watch);
@@ -97,7 +100,6 @@ class CameraTracer {
   std::vector<std::uint64_t> work() const;
   /// The statistics on the device: RS_COUNT_WORDS words (cl/trace/view_sizes.h).
   const Buffer<std::uint32_t>& counters() const;
-  TraceOptions& options();
 
  private:
   struct Impl;

@@ -18,16 +18,12 @@ namespace {
 
 // Vector loads of boxes may run past the end of a list by one vector.
 constexpr std::size_t kBoxPadding = 16;
-constexpr std::size_t kBytesPerCandidate =
-    2 * 2 * 4 + 4 * 4 + 8;  // keys and values twice (sort), box, limits
 constexpr std::size_t kGatherGroup = 64;
 constexpr int kMaxSide = 1 << 20;
 // Tile numbers have 16 bits.
 constexpr std::size_t kMaxTiles = 65535;
 // What the sort takes; a sum that does not fit 32 bits reads as Scan::kMost, which is more.
 constexpr std::size_t kMaxCandidates = (std::size_t{1} << 31) - 1;
-
-std::size_t with_headroom(std::size_t count) { return count + count / 4 + 1024; }
 
 // What the kernels divide by or turn into whole numbers.
 void check_camera(const Camera& camera, const RsCamera& converted) {

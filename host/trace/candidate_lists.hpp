@@ -51,6 +51,12 @@ struct ViewFace {
 /// of candidates whose outline meets the tile, sorted by a lower bound of the hit depth.
 class CandidateLists {
  public:
+  /// Key and value, box, limits, and two pairs of the sort.
+  static constexpr std::size_t kBytesPerCandidate = 2 * 4 + 4 * 4 + 8 + 2 * 8;
+
+  /// Candidates that there is room for once a view had so many.
+  static constexpr std::size_t with_headroom(std::size_t count) { return count + count / 4 + 1024; }
+
   CandidateLists(Context& context, int tile_size);
 
   /// Lines and culling records of all Gaussians for a view.

@@ -16,6 +16,9 @@ namespace raysplats {
 /// How the gradients of many rays are added (TraceOptions::gradient_sum and ::deterministic on a
 /// device), with kAuto decided.
 struct GradientSumChoice {
+  /// Copies of packets' gradients for each compute unit: more share the tiles out more evenly.
+  static constexpr std::size_t kPacketCopies = 2;
+
   GradientSum sum = GradientSum::kCopies;  ///< never kAuto
   std::size_t copies = 1;                  ///< more than one with kCopies only
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/trace_rows.hpp"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
@@ -72,7 +73,7 @@ RsRayWalk ray_walk(const TraceOptions& options,
   std::copy(near.plane.begin(), near.plane.end(), out.near);
   std::copy(options.background.begin(), options.background.end(), out.background);
   out.quantile = options.quantile;
-  out.min_transmittance = options.min_transmittance;
+  out.min_transmittance = stopping_transmittance(options);
   out.max_hits = options.max_hits;
   out.sh_coefficients = sh_coefficients(gaussians.sh_degree);
   out.active_degree = gaussians.active_sh_degree;

@@ -153,10 +153,7 @@ class TrainTable : public OptionTable {
   }
 };
 
-}  // namespace
-
-std::vector<OptionRow> train_keys(TrainOptions& o) {
-  TrainTable t;
+void add_run_keys(TrainTable& t, TrainOptions& o) {
   t.section("Run");
   t.number("iterations", o.iterations, 0, kMaxCount,
            "training steps, of one view each or of views-per-step");
@@ -169,7 +166,9 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
       "deterministic", o.trace.deterministic,
       "the same seed gives the same bytes on the same device, whatever the scheduling; CPUs always "
       "do, others add gradients in long integers for it");
+}
 
+void add_data_keys(TrainTable& t, TrainOptions& o) {
   t.section("Data");
   add_data_rows(t, o.data);
   t.number(
@@ -198,20 +197,24 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
           "meshes (OBJ, PLY, GLB) of mirrors that are known: photos may show the scene in them");
   t.number("mirror-bounces", o.mirror_bounces, 0, 64,
            "mirrors that a ray may meet one after the other; behind the last it is black");
+}
 
+void add_start_keys(TrainTable& t, TrainOptions& o) {
   t.section("Start");
   t.text("init", o.init,
          "\"colmap\" (sparse points of the data set), \"photos\" (inside what cut-out photos show, "
          "else where neighbouring photos agree), \"random\" (the region that the cameras see), the "
          "path of a model, or \"auto\" (points when there are any, else photos)");
   t.number("init-count", o.init_count, 0, 1e9,
-           "Gaussians of a start without points; 0 = a share of max-gaussians");
+           "Gaussians of a start without points, or beside few; 0 = a share of max-gaussians");
   t.number("init-opacity", o.init_opacity, 1e-4, 0.9999,
            "opacity of the first Gaussians (not of a model)");
   t.box("bounds", o.bounds,
         "box of the model in world units, least and greatest x, y, z as in -1,-1,0,1,1,2: "
         "Gaussians with their mean outside are not made and not kept; [] = everywhere");
+}
 
+void add_model_keys(TrainTable& t, TrainOptions& o) {
   t.section("Model");
   t.number("sh-degree", o.sh_degree, 0, 4,
            "degree of the spherical harmonics of colour; 0 = plain RGB");
@@ -224,7 +227,9 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
       "standard deviation from the trained number: exp (3DGS) or sigmoid (the paper; below 1)");
   t.flag("flat", o.flat,
          "train flat Gaussians: the third axis stays a hundredth of the smaller of the others");
+}
 
+void add_loss_keys(TrainTable& t, TrainOptions& o) {
   t.section("Loss");
   t.choice<PixelLoss>("pixel-loss", o.pixel_loss, {{"l1", PixelLoss::kL1}, {"l2", PixelLoss::kL2}},
                       "pixel term: l1 (mean absolute error) or l2 (mean squared error)");
@@ -250,7 +255,9 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
          "train the poses of the training photos too, for captures whose poses are not exact; what "
          "all of them have in common is taken off, so that the model stays where the data set has "
          "it; cameras_refined.json in the run has them");
+}
 
+void add_optimiser_keys(TrainTable& t, TrainOptions& o) {
   t.section("Optimiser (Adam)");
   t.learning_rate("position-lr", o.position_lr, "the means, times the scene extent");
   t.learning_rate("rotation-lr", o.rotation_lr, "the quaternions");
@@ -270,10 +277,9 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.number("adam-beta2", o.adam_beta2, 0, 0.9999999, "decay of the second moment");
   t.number("adam-epsilon", o.adam_epsilon, 1e-30, 1, "added to the root of the second moment");
   t.flag("sparse-adam", o.sparse_adam, "leave Gaussians alone that no ray of the view met");
+}
 
-  t.section("Ray tracing");
-  add_trace_rows(t, o.trace);
-
+void add_density_keys(TrainTable& t, TrainOptions& o) {
   t.section("Density control");
   t.choice<DensityStrategy>(
       "strategy", o.strategy,
@@ -288,7 +294,7 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.share("densify-until", o.densify_until, true, "last one that may; 0 = never");
   t.share("densify-every", o.densify_every, true,
           "iterations (or share of the run) between two passes; 0 = whole passes over the photos, "
-          "at least 50 iterations and a hundredth of the run");
+          "at least 50 iterations (a tenth of a run below 500) and a hundredth of the run");
   t.share("replace-until", o.replace_until, true,
           "up to here (share of the run, or iteration) passes of the budget strategy go on without "
           "growth: what they remove is replaced");
@@ -348,7 +354,9 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
            "opacities are lowered to opacity-reset-value every so many iterations until "
            "densify-until; 0 = never");
   t.number("opacity-reset-value", o.opacity_reset_value, 1e-4, 0.9999, "opacity after a reset");
+}
 
+void add_report_keys(TrainTable& t, TrainOptions& o) {
   t.section("Reports and files");
   t.number("validate-every", o.validate_every, 0, kMaxCount,
            "iterations between checks of the model, its optimiser, boxes and tree; the first fault "
@@ -369,6 +377,22 @@ std::vector<OptionRow> train_keys(TrainOptions& o) {
   t.number("checkpoint-every", o.checkpoint_every, 0, kMaxCount,
            "iterations between checkpoints; 0 = only the last");
   t.number("keep-checkpoints", o.keep_checkpoints, 1, 1e9, "checkpoints kept in the run folder");
+}
+
+}  // namespace
+
+std::vector<OptionRow> train_keys(TrainOptions& o) {
+  TrainTable t;
+  add_run_keys(t, o);
+  add_data_keys(t, o);
+  add_start_keys(t, o);
+  add_model_keys(t, o);
+  add_loss_keys(t, o);
+  add_optimiser_keys(t, o);
+  t.section("Ray tracing");
+  add_trace_rows(t, o.trace);
+  add_density_keys(t, o);
+  add_report_keys(t, o);
   return t.take();
 }
 

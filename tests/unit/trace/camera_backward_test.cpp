@@ -133,7 +133,18 @@ TEST_CASE("gradients of opaque and of vanishing Gaussians") {
     if (i % 3 == 0) model.opacities[i] = 40.0f;  // the sigmoid is exactly 1 in float
     if (i % 3 == 1) model.opacities[i] = -12.0f;
   }
-  CHECK_ERRORS(compare_gradients(context, model, {}, reference::cube_camera(30, 30)), 2e-3);
+  const Camera camera = reference::cube_camera(30, 30);
+  CHECK_ERRORS(compare_gradients(context, model, {}, camera), 2e-3);
+  for (const Packet& packet : packets({1, 16}, {8, 32})) {
+    // 0: rays end behind what is opaque, and nowhere else.
+    for (const float stop : {1e-4f, 0.0f}) {
+      CAPTURE(packet);
+      CAPTURE(stop);
+      TraceOptions options = packet.over({});
+      options.min_transmittance = stop;
+      CHECK_ERRORS(compare_gradients(context, model, options, camera), 2e-3);
+    }
+  }
 }
 
 TEST_CASE("gradients of packets that are sorted because rays reach the cap on hits") {

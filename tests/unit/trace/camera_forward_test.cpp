@@ -3,6 +3,7 @@
 
 #include <array>
 #include <glm/matrix.hpp>
+#include <limits>
 
 #include "raysplats/error.hpp"
 #include "trace/candidate_lists.hpp"
@@ -138,6 +139,40 @@ TEST_CASE("more pending hits than the list holds are still blended in exact orde
     CHECK(difference.mean < 1e-4);
     CHECK(difference.maximum < 2e-3);
   }
+}
+
+TEST_CASE("rays that never stop early meet everything, and end behind what is opaque") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(900, 8, 0);
+  for (std::size_t i = 0; i < model.size(); ++i) model.opacities[i] = i % 10 == 0 ? 40.0f : 3.0f;
+  TraceOptions options;
+  options.min_transmittance = 0;
+  const Camera camera = reference::cube_camera(24, 16);
+  const reference::Render expected =
+      reference::render(reference::Parameters(model), options, camera);
+  for (const Packet& packet : packets({1, 4, 16}, {32})) {
+    CAPTURE(packet);
+    const Difference difference =
+        compare(trace_image(context, model, packet.over(options), camera), expected);
+    CHECK(difference.mean < 1e-4);
+    CHECK(difference.maximum < 2e-3);
+  }
+}
+
+TEST_CASE("values that no row of the options accepts are refused") {
+  Context context = make_test_context();
+  const auto refused = [&](auto change) {
+    TraceOptions options;
+    change(options);
+    CHECK_THROWS_AS(CameraTracer(context, options), UsageError);
+  };
+  refused([](TraceOptions& o) { o.quantile = 0; });
+  refused([](TraceOptions& o) { o.quantile = 101; });
+  refused([](TraceOptions& o) { o.min_transmittance = -1e-9f; });
+  refused([](TraceOptions& o) { o.min_transmittance = 0.6f; });
+  refused([](TraceOptions& o) { o.min_transmittance = std::numeric_limits<float>::quiet_NaN(); });
+  refused([](TraceOptions& o) { o.max_hits = 0; });
+  refused([](TraceOptions& o) { o.near_depth = -1; });
 }
 
 TEST_CASE("packets that share a list have more candidates than their queues hold") {

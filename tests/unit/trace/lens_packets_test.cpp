@@ -207,25 +207,35 @@ TEST_CASE("packets through a lens in little memory are traced band by band") {
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   for (const View& view : views()) {
     CAPTURE(view.name);
-    TraceOptions options;
-    CameraTracer roomy(context, options);
-    options.memory_budget = 256 << 10;
-    CameraTracer tight(context, options);
-    roomy.update(gaussians);
-    tight.update(gaussians);
-    roomy.forward(gaussians, view.camera, true);
-    tight.forward(gaussians, view.camera, true);
-    CHECK(roomy.download_image().data == tight.download_image().data);
-    CHECK(tight.statistics().hits == roomy.statistics().hits);
-    const std::size_t pixels = roomy.download_image().pixels();
-    const std::vector<float> gradient = random_image_gradient(pixels, 3);
-    const HostGradients a = backward(context, roomy, gaussians, gradient);
-    const HostGradients b = backward(context, tight, gaussians, gradient);
-    const auto wide = [](const std::vector<float>& v) {
-      return std::vector<double>(v.begin(), v.end());
-    };
-    CHECK(relative_error(b.means, wide(a.means)) < 1e-4);
-    CHECK(relative_error(b.sh, wide(a.sh)) < 1e-4);
+    for (const GradientSum sum : {GradientSum::kAuto, GradientSum::kExact}) {
+      CAPTURE(static_cast<int>(sum));
+      TraceOptions options;
+      options.gradient_sum = sum;
+      CameraTracer roomy(context, options);
+      options.memory_budget = 256 << 10;
+      CameraTracer tight(context, options);
+      roomy.update(gaussians);
+      tight.update(gaussians);
+      roomy.forward(gaussians, view.camera, true);
+      tight.forward(gaussians, view.camera, true);
+      CHECK(roomy.download_image().data == tight.download_image().data);
+      CHECK(tight.statistics().hits == roomy.statistics().hits);
+      const std::size_t pixels = roomy.download_image().pixels();
+      const std::vector<float> gradient = random_image_gradient(pixels, 3);
+      const HostGradients a = backward(context, roomy, gaussians, gradient);
+      const HostGradients b = backward(context, tight, gaussians, gradient);
+      if (sum == GradientSum::kExact) {
+        CHECK(a == b);
+        continue;
+      }
+      const auto wide = [](const std::vector<float>& v) {
+        return std::vector<double>(v.begin(), v.end());
+      };
+      // Sums in the order in which work-groups come vary by 1.1e-4 in the same tracer.
+      const bool ordered = context.device().type == DeviceType::kCpu;
+      CHECK(relative_error(b.means, wide(a.means)) < (ordered ? 1e-4 : 1e-3));
+      CHECK(relative_error(b.sh, wide(a.sh)) < 1e-4);
+    }
   }
 }
 

@@ -242,7 +242,7 @@ TEST_CASE("gradients of rays that stop early, at the cap on hits, or have more h
                                    ColorDirection::kFromOrigin),
                  1e-3);
   }
-  for (const float stop : {0.5f, 0.05f}) {
+  for (const float stop : {0.5f, 0.05f, 0.0f}) {
     CAPTURE(stop);
     TraceOptions options;
     options.min_transmittance = stop;

@@ -284,7 +284,7 @@ TEST_CASE("opaque Gaussians stop rays where the reference stops them") {
   Context context = make_test_context();
   Gaussians model = reference::random_scene(3000, 52, 0);
   for (float& opacity : model.opacities) opacity += 4.0f;
-  for (const float stop : {1e-4f, 0.05f, 0.5f}) {
+  for (const float stop : {0.0f, 1e-4f, 0.05f, 0.5f}) {
     CAPTURE(stop);
     TraceOptions options;
     options.min_transmittance = stop;

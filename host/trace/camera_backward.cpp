@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <glm/matrix.hpp>
+
+#include "raysplats/error.hpp"
+#include "trace/camera_tracer_impl.hpp"
+#include "trace/gaussian_kernel.hpp"
+
+namespace raysplats {
+
+void CameraTracer::backward(const DeviceGaussians& gaussians,
+                            const Buffer<float>& image_gradient,
+                            GaussianGradients& gradients,
+                            PoseGradient* pose,
+                            const Buffer<float>* depth_gradient) {
+  Impl& self = *impl_;
+  if (!self.hits_kept || self.count != gaussians.count || self.revision != gaussians.revision) {
+    throw UsageError(
+        "CameraTracer::backward() must follow forward(keep_hits = true) of the same Gaussians");
+  }
+  self.depth_gradient = depth_gradient;
+  bool further = false;
+  for (const int number : self.faces()) {
+    if (self.faces().size() > 1) self.set_face(gaussians, number);
+    self.backward_face(gaussians, image_gradient);
+    self.sums.round();
+    self.finalize(gaussians, gradients, further, false);
+    self.sums.settle();
+    if (pose != nullptr) {
+      if (!further) *pose = {};
+      self.add_pose(gaussians, *pose);
+    }
+    further = true;
+  }
+}
+
+// Gradients of the lines of one face.
+void CameraTracer::Impl::backward_face(const DeviceGaussians& gaussians,
+                                       const Buffer<float>& image_gradient) {
+  sums.prepare(GradientSumChoice::of(options, context.device(), gaussians.count,
+                                     shares.packet_gradients(), GradientSumChoice::kPacketCopies),
+               gaussians.count);
+  if (hits_complete) {
+    launch_backward(image_gradient, 0, lists.tile_rows());
+    return;
+  }
+  // Bands whose hits should fit, so that few are traced only to find that they do not.
+  const std::size_t wanted = saved.stream_bytes / streams.chunk_bytes();
+  const std::size_t all = lists.tile_rows();
+  const auto band = static_cast<std::uint32_t>(
+      std::max<std::size_t>(1, all * streams.capacity() * 3 / 4 / wanted));
+  for (std::uint32_t row = 0; row < all; row += band) {
+    backward_rows(gaussians, image_gradient, row,
+                  std::min(band, static_cast<std::uint32_t>(all) - row));
+  }
+}
+
+// Traces rows again with the pool to themselves, then runs them backwards; halves them until their
+// hits fit.
+void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
+                                       const Buffer<float>& image_gradient,
+                                       std::uint32_t row,
+                                       std::uint32_t rows) {
+  counters.clear();
+  trace_rows(gaussians, row, rows);
+  const std::size_t wanted = counters.read(RS_COUNT_CHUNKS);
+  if (wanted > streams.capacity() && rows > 1) {
+    backward_rows(gaussians, image_gradient, row, rows / 2);
+    backward_rows(gaussians, image_gradient, row + rows / 2, rows - rows / 2);
+    return;
+  }
+  // A row of tiles is the least, whatever its share of the budget.
+  if (wanted > streams.capacity()) {
+    if (wanted > streams.largest()) {
+      throw ResourceError(fmt::format(
+          "The hits of one row of tiles need {:.1f} MiB, the device has buffers of {:.1f} MiB: "
+          "raise --downscale",
+          static_cast<double>(wanted * streams.chunk_bytes()) / (1 << 20),
+          static_cast<double>(streams.largest() * streams.chunk_bytes()) / (1 << 20)));
+    }
+    streams.grow(wanted, wanted);
+    counters.clear();
+    trace_rows(gaussians, row, rows);
+  }
+  launch_backward(image_gradient, row, rows);
+}
+
+void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
+                                         std::uint32_t row,
+                                         std::uint32_t rows) {
+  BuildOptions build = kernels.build(lens_kind);
+  build.define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0);
+  sums.define(build);
+  Kernel kernel = kernels.backward(build);
+  RsBackward pass{};
+  pass.gaussians = static_cast<std::uint32_t>(count);
+  pass.copies = static_cast<std::uint32_t>(sums.copies());
+  pass.tiles_x = lists.tiles_x();
+  std::copy(options.background.begin(), options.background.end(), pass.background);
+  pass.screen_x = screen_x();
+  pass.screen_y = screen_y();
+  // No ray meets a Gaussian twice.
+  pass.limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet().lanes));
+  const bool shared = !sums.is_private();
+  in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
+    const Range range =
+        shared ? kernels.range(kernel, 1, camera.width, {lists.tiles_x(), first, number})
+               : Range{{sums.copies() * kernels.items(), 1, 1}, {kernels.items(), 1, 1}, {}};
+    // Shared sums find their rows by the offset of the launch.
+    pass.tile_row = shared ? row : row + first;
+    pass.tile_rows = number;
+    kernel.launch(range, view_arguments(), pass, streams.arguments(), lists.lines(), image_gradient,
+                  depth_gradient != nullptr ? *depth_gradient : no_depth_gradient, sums.target());
+  });
+}
+
+void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
+                                  GaussianGradients& gradients,
+                                  bool accumulate,
+                                  bool with_pose) {
+  const std::size_t n = gaussians.count;
+  gradients.ensure(context, gaussians);
+  pose.ensure(context, with_pose ? 6 * n : 1, "pose gradients");
+  BuildOptions build;
+  build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
+      .define("POSE", with_pose ? 1 : 0)
+      .define("ACCUMULATE", accumulate ? 1 : 0)
+      .define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0)
+      .define("ANGULAR", lens_kind == 2 ? 1 : 0)
+      .define("SH_DEGREE", gaussians.active_sh_degree)
+      .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
+  const bool cpu = context.device().type == DeviceType::kCpu;
+  GaussianKernel kernel(context, cpu ? "trace/finalize_gradients.cl" : "trace/group_finalize.cl",
+                        cpu ? "finalize_gradients" : "finalize_group", build);
+  const RsFinalize pass{static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(sums.copies()),
+                        screen_x(), screen_y()};
+  kernel.launch(n, pass, camera, sums.lines(), lists.bounds(), lists.lines(), gaussians.arguments(),
+                gradients.arguments(), pose);
+}
+
+// What the lines of one face, whose sums are still there, say of the pose.
+void CameraTracer::Impl::add_pose(const DeviceGaussians& gaussians, PoseGradient& sum) {
+  finalize(gaussians, pose_scratch, false, true);
+  const std::vector<float> parts = pose.download();
+  std::array<double, 6> total{};
+  for (std::size_t i = 0; i + 6 <= parts.size(); i += 6) {
+    for (std::size_t j = 0; j < 6; ++j) total[j] += static_cast<double>(parts[i + j]);
+  }
+  // A turn in camera axes is the same turn in the axes of the face.
+  const glm::dvec3 turn =
+      glm::transpose(LensTiles::rotation(face)) * glm::dvec3(total[3], total[4], total[5]);
+  for (std::size_t j = 0; j < 3; ++j) {
+    sum.center[j] += total[j];
+    sum.rotation[j] += turn[static_cast<int>(j)];
+  }
+}
+
+}  // namespace raysplats

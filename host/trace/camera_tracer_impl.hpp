@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the parts of CameraTracer share: the tracer itself in camera_tracer.cpp, its passes in
+// camera_forward.cpp and camera_backward.cpp.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "trace/camera_tracer.hpp"
+#include "trace/candidate_lists.hpp"
+#include "trace/gradient_sums.hpp"
+#include "trace/hit_streams.hpp"
+#include "trace/launch_budget.hpp"
+#include "trace/lens_tiles.hpp"
+#include "trace/memory_shares.hpp"
+#include "trace/packet_kernels.hpp"
+#include "trace/view_sizes.h"
+
+namespace raysplats {
+
+struct CameraTracer::Impl {
+  Impl(Context& context_in, const TraceOptions& options_in);
+
+  // camera_forward.cpp: the faces of a view, from lists to hits.
+  void set_face(const DeviceGaussians& gaussians, int face);
+  void trace_faces(const DeviceGaussians& gaussians, bool keep);
+  bool can_trace_ahead() const;
+  void trace_ahead(const DeviceGaussians& gaussians);
+  void trace_rows(const DeviceGaussians& gaussians, std::uint32_t row, std::uint32_t rows);
+  void trace_window(const DeviceGaussians& gaussians, const TileWindow& window, bool keep);
+  void launch_forward(const TileWindow& window, bool keep);
+  Kernel& forward_kernel(bool keep);
+
+  // camera_backward.cpp: from hits to gradients of lines, and from those to parameters.
+  void backward_face(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient);
+  void backward_rows(const DeviceGaussians& gaussians,
+                     const Buffer<float>& image_gradient,
+                     std::uint32_t row,
+                     std::uint32_t rows);
+  void launch_backward(const Buffer<float>& image_gradient, std::uint32_t row, std::uint32_t rows);
+  void finalize(const DeviceGaussians& gaussians,
+                GaussianGradients& gradients,
+                bool accumulate,
+                bool pose);
+  void add_pose(const DeviceGaussians& gaussians, PoseGradient& sum);
+
+  Statistics count_statistics() const;
+  std::size_t chunks_wanted();
+
+  TileWindow whole() const { return tile_window(0, lists.tile_rows()); }
+  // The rows of tiles of set_share().
+  TileWindow share() const {
+    const std::size_t first = tile_rows() * part / parts;
+    return tile_window(static_cast<std::uint32_t>(first),
+                       static_cast<std::uint32_t>(tile_rows() * (part + 1) / parts - first));
+  }
+  std::size_t tile_rows() const {
+    return static_cast<std::size_t>((camera.height + packet().tile - 1) / packet().tile);
+  }
+  TileWindow tile_window(std::uint32_t row, std::uint32_t rows) const {
+    return {0, static_cast<std::int32_t>(row), static_cast<std::int32_t>(lists.tiles_x()),
+            static_cast<std::int32_t>(rows)};
+  }
+  const std::vector<int>& faces() const;
+  const PacketShape& packet() const { return kernels.shape(); }
+  // RS_VIEW_ARGUMENTS of cl/trace/arguments.h.
+  auto view_arguments() const {
+    const bool bent = lens_kind > 0;
+    return argument_pack(camera, face, bent ? lens.tiles() : no_tiles,
+                         bent ? lens.tangents() : no_tangents);
+  }
+  float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
+  float screen_y() const { return static_cast<float>(camera.height) / (2.0f * camera.fy); }
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  }
+  std::size_t packet_count() const {
+    return static_cast<std::size_t>((camera.width + packet().width - 1) / packet().width) *
+           static_cast<std::size_t>((camera.height + packet().height - 1) / packet().height);
+  }
+
+  Context& context;
+  TraceOptions options;
+  MemoryShares shares;
+  PacketKernels kernels;
+  std::size_t count = 0;       // Gaussians of the last update()
+  std::uint64_t revision = 0;  // of their parameters
+  Buffer<RsAabb> boxes;
+  CandidateLists lists;
+  LensTiles lens;
+  Buffer<RsLensTile> no_tiles;  // what kernels take for pinholes
+  Buffer<float> no_tangents;
+  Buffer<float> no_depth_gradient;
+  LaunchBudget forward_budget;
+  LaunchBudget backward_budget;
+  LaunchBudget watched_budget;  // of launches that somebody watches, where no other bounds them
+  std::function<void(double)> watch;
+  std::size_t watched_tiles = 0;  // of this forward() that are done
+  Camera view;                    // of the last forward()
+  int lens_kind = 0;
+  int face = 0;
+  RsCamera camera{};                      // of the face that is being traced
+  std::array<Kernel, 2> forward_kernels;  // without and with kept hits
+  int forward_variant = -1;
+  Buffer<float> image;
+  Buffer<float> depth;
+  HitStreams streams;
+  Buffer<std::uint32_t> counters;  // trace/view_sizes.h
+  Buffer<std::uint32_t> overflow;
+  std::uint32_t room = 0;     // chunks of the pool that launches may use
+  bool traced_whole = false;  // the last view that was waited for fits the memory budget
+  Statistics saved;
+  bool statistics_saved = false;
+  std::size_t part = 0, parts = 1;  // set_share()
+  bool hits_kept = false;           // the last forward() was asked to keep hits
+  bool hits_complete = false;       // and all of them fit
+  GradientSums sums;
+  const Buffer<float>* depth_gradient = nullptr;  // of this backward()
+  Buffer<float> pose;
+  GaussianGradients pose_scratch;
+};
+
+}  // namespace raysplats

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "device/build_options.hpp"
+#include "device/context.hpp"
+#include "device/kernel.hpp"
+#include "raysplats/trace_options.hpp"
+#include "trace/packet_shape.hpp"
+
+namespace raysplats {
+
+/// Rows [row, row + rows) of `columns` tiles of a picture.
+struct TileRows {
+  std::uint32_t columns = 0;
+  std::uint32_t row = 0;
+  std::uint32_t rows = 0;
+};
+
+/// Kernels that trace packets of rays: which there are, how they are built and over what they run.
+class PacketKernels {
+ public:
+  PacketKernels(Context& context, const TraceOptions& options);
+
+  const PacketShape& shape() const { return shape_; }
+  /// Work-items of a packet.
+  std::size_t items() const { return shape_.grouped ? static_cast<std::size_t>(shape_.lanes) : 1; }
+
+  /// What the kernels of both passes are built with, besides their own.
+  BuildOptions build(int lens_kind) const;
+  /// trace_forward or trace_forward_group.
+  Kernel forward(const BuildOptions& build);
+  /// trace_backward or trace_backward_group.
+  Kernel backward(const BuildOptions& build);
+
+  /// A work-item for every block x block packets, or a work-group for every packet, of a picture
+  /// that is `width` pixels wide.
+  Range range(const Kernel& kernel, int block, int width, const TileRows& tiles) const;
+
+ private:
+  Kernel group_kernel(const char* file, const char* name, const BuildOptions& build);
+
+  Context& context_;
+  PacketForm form_;
+  PacketShape shape_;
+};
+
+}  // namespace raysplats
