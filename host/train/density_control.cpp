@@ -20,6 +20,8 @@ constexpr std::uint64_t kSplitStream = 0x73706c6974;
 constexpr std::uint64_t kMoveStream = 0x6d6f7665;
 
 constexpr std::int64_t kLeastPeriod = 50;   // iterations between passes
+constexpr double kShortRunShare = 0.1;      // but not more than this share of a short run
+constexpr std::int64_t kShortPeriod = 10;   // and not less than these iterations
 constexpr double kPeriodShare = 0.01;       // of the run
 constexpr double kLongestPassShare = 0.05;  // longer passes over the photos are not waited for
 constexpr double kLeastOpacity = 0.004;     // that fading leaves
@@ -30,7 +32,9 @@ std::int64_t fitted_period(std::int64_t iterations, std::int64_t views) {
   const auto share = [iterations](double s) {
     return std::llround(s * static_cast<double>(iterations));
   };
-  const std::int64_t least = std::max<std::int64_t>(kLeastPeriod, share(kPeriodShare));
+  const std::int64_t usual =
+      std::clamp<std::int64_t>(share(kShortRunShare), kShortPeriod, kLeastPeriod);
+  const std::int64_t least = std::max<std::int64_t>(usual, share(kPeriodShare));
   const std::int64_t whole = (least + views - 1) / views * views;
   return whole <= std::max(2 * least, static_cast<std::int64_t>(share(kLongestPassShare))) ? whole
                                                                                            : least;

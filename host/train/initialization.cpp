@@ -12,6 +12,8 @@
 #include <glm/matrix.hpp>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <set>
 
 #include "base/rng.hpp"
 #include "core/gaussian_selection.hpp"
@@ -31,11 +33,11 @@ constexpr double kMaxScale = 0.1;                 // of the distance to the near
 constexpr std::uint32_t kReliableTrack = 3;
 constexpr float kReliableError = 2.0f;
 constexpr std::size_t kEnoughPoints = 2000;
-constexpr double kStartShare = 0.5;                 // of the limit that points may take
-constexpr double kPhotoShare = 0.3;                 // of the limit that a start from photos takes
-constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of such a start, times the typical one
-constexpr double kUnsureShare = 0.25;  // of a start from photos alone: points at a random depth
-constexpr double kLimitFactor = 4.5;   // Gaussians per root of (pixels of a photo x iterations)
+constexpr std::size_t kFewPoints = 1000;  // fewer leave most of the photos without a start
+constexpr double kStartShare = 0.5;       // of the limit that points may take
+constexpr double kPhotoShare = 0.3;       // of the limit that a start from photos takes
+constexpr double kUnsureShare = 0.25;     // of a start from photos alone: points at a random depth
+constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
 
@@ -166,6 +168,27 @@ glm::dvec3 mean_center(std::span<const Camera> cameras) {
   return cameras.empty() ? sum : sum / static_cast<double>(cameras.size());
 }
 
+// The finite points within the box, each place once: equal neighbours would leave a point no size.
+PointCloud distinct_points(const PointCloud& points, const std::optional<Bounds>& bounds) {
+  std::set<std::array<float, 3>> places;
+  PointCloud out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
+    if (bounds && !bounds->contains(p[0], p[1], p[2])) continue;
+    if (places.insert({p[0], p[1], p[2]}).second) append_point(points, i, out);
+  }
+  return out;
+}
+
+// At most `limit` of the points, evenly spread over their order.
+PointCloud subset(const PointCloud& points, std::size_t limit) {
+  if (points.size() <= limit) return points;
+  PointCloud out;
+  for (std::size_t i = 0; i < limit; ++i) append_point(points, i * points.size() / limit, out);
+  return out;
+}
+
 // At most `limit` of the model's Gaussians, evenly spread over their order.
 Gaussians subset(const Gaussians& model, std::size_t limit) {
   if (model.size() <= limit) return model;
@@ -173,6 +196,26 @@ Gaussians subset(const Gaussians& model, std::size_t limit) {
   for (std::size_t i = 0; i < limit; ++i)
     indices[i] = static_cast<std::uint32_t>(i * model.size() / limit);
   return gathered(model, indices);
+}
+
+// Points that the photos tell of: of a body that is cut out, else of what a sweep finds.
+PointCloud photo_points(const Dataset& dataset,
+                        std::span<const Camera> cameras,
+                        const Region& region,
+                        const std::vector<SmallPhoto>& photos,
+                        std::size_t count,
+                        std::uint64_t seed) {
+  if (dataset.alpha_is_background) {
+    PointCloud hull = carved_points(photos, region, count, seed);
+    if (hull.size() > 0) return hull;
+    spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
+    return random_points(region, count, seed);
+  }
+  // Cameras in one place have no middle to be distant from.
+  const double middle = median_distance(cameras, region.center);
+  const double extent = scene_extent(cameras);
+  const double guess = middle > 1e-3 * extent ? middle : extent;
+  return swept_points(photos, swept_depths(photos, guess, seed), count, kUnsureShare, seed);
 }
 
 }  // namespace
@@ -344,32 +387,31 @@ Gaussians initial_model(const Dataset& dataset,
     return inside(gaussians_from_points(points, options.sh_degree, options.init_opacity, cameras),
                   bounds);
   };
-  if (has_points && (options.init == "auto" || options.init == "colmap")) {
-    const Gaussians model = start(reliable_points(dataset.points));
-    const std::size_t most = share(kStartShare);
-    if (model.size() > most) {
-      spdlog::info(
-          "the start takes {} of {} sparse points, so that at most {} Gaussians have room to grow "
-          "(--max-gaussians)",
-          most, model.size(), limit);
-    }
-    return subset(model, most);
-  }
-
   const std::size_t count = options.init_count > 0
                                 ? std::min(limit, static_cast<std::size_t>(options.init_count))
                                 : share(kPhotoShare);
+  PointCloud points;
+  if (has_points && (options.init == "auto" || options.init == "colmap")) {
+    points = distinct_points(reliable_points(dataset.points), bounds);
+    const std::size_t most = share(kStartShare);
+    if (points.size() > most) {
+      spdlog::info(
+          "the start takes {} of {} sparse points, so that at most {} Gaussians have room to grow "
+          "(--max-gaussians)",
+          most, points.size(), limit);
+    }
+    // Sizes follow from the distances between the points that are left.
+    if (options.init == "colmap" || points.size() >= std::min(kFewPoints, count / 2))
+      return start(subset(points, most));
+    spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
+                 points.size(), count);
+  }
   const Region region = visible_region(cameras);
   if (options.init == "random") return start(random_points(region, count, options.seed));
-  if (dataset.alpha_is_background) {
-    const PointCloud hull = carved_points(photos(), region, count, options.seed);
-    if (hull.size() > 0) return start(hull);
-    spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
-    return start(random_points(region, count, options.seed));
-  }
-  const double distance = median_distance(cameras, region.center);
-  return start(swept_points(photos(), {kNearest * distance, distance, kFarthest * distance}, count,
-                            kUnsureShare, options.seed));
+  const std::size_t room = std::min(count, limit - std::min(limit, points.size()));
+  const PointCloud seen = photo_points(dataset, cameras, region, photos(), room, options.seed);
+  for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, points);
+  return start(points);
 }
 
 }  // namespace raysplats

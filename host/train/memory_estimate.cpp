@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <cstdint>
 #include <string>
 
 #include "bvh/lbvh.hpp"
@@ -14,9 +16,11 @@
 #include "raysplats/gaussians.hpp"
 #include "shared/layout.h"
 #include "shared/light_layout.h"
+#include "trace/candidate_lists.hpp"
 #include "trace/exact_sum.h"
 #include "trace/gradient_sums.hpp"
 #include "trace/memory_shares.hpp"
+#include "trace/packet_shape.hpp"
 #include "trace/ray_backward.hpp"
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
@@ -68,6 +72,33 @@ std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels, const Dev
   return rays * (segment + order + mirrors + reflected);
 }
 
+// What the packets of a view hold at most beside the records of Gaussians: streams of hits, lists
+// of tiles, and the copies of gradient lines but one.
+std::size_t packet_bytes(const TrainOptions& options,
+                         const MemoryDemand& demand,
+                         const DeviceInfo& device) {
+  const MemoryShares shares(options.trace, device);
+  const PacketShape packet = packet_shape(device, options.trace);
+  // Each hit in a row of its own (and those of packets that start again are few), and a quarter
+  // more for views to come.
+  const std::size_t row = sizeof(std::uint32_t) * (2 + static_cast<std::size_t>(packet.lanes));
+  const std::size_t hits = demand.pixels * static_cast<std::size_t>(options.trace.max_hits);
+  // Of a square picture.
+  const auto side = static_cast<std::size_t>(
+      std::ceil(std::sqrt(static_cast<double>(demand.pixels)) / packet.tile));
+  const std::size_t pairs = demand.gaussians * side * side;
+  const GradientSum sum = options.trace.gradient_sum;
+  const bool copied =
+      sum == GradientSum::kCopies || (sum == GradientSum::kAuto && device.type == DeviceType::kCpu);
+  const std::size_t copies =
+      copied ? GradientSumChoice::kPacketCopies * std::max<std::size_t>(device.compute_units, 1) - 1
+             : 0;
+  return std::min(shares.hit_streams(), hits / 4 * 5 * row) +
+         std::min(shares.tile_lists(),
+                  CandidateLists::with_headroom(pairs) * CandidateLists::kBytesPerCandidate) +
+         std::min(shares.packet_gradients(), demand.gaussians * copies * sizeof(RsLine));
+}
+
 double mib(std::size_t bytes) { return static_cast<double>(bytes) / static_cast<double>(kMiB); }
 
 }  // namespace
@@ -106,10 +137,7 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                                                       sizeof(float));
   // Depth, its gradient, and what is known of every view.
   if (options.depth_weight > 0) out.images += demand.pixels * (4 + demand.views) * sizeof(float);
-  if (packets) {
-    out.hits = std::min(MemoryShares(options.trace, device).all(),
-                        demand.pixels * static_cast<std::size_t>(options.trace.max_hits) * 12);
-  }
+  if (packets) out.hits = packet_bytes(options, demand, device);
   std::size_t largest = std::max({sh * sizeof(float), sizeof(RsLine), packets ? exact : 0});
   if (demand.ray_views > 0) {
     const RayShare share = rays_per_gaussian(options, demand.gaussians, device);

@@ -8,12 +8,14 @@
 #include <glm/matrix.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
+#include <iterator>
 #include <optional>
 #include <thread>
 #include <vector>
 
 #include "base/rng.hpp"
 #include "core/camera_model.hpp"
+#include "core/statistics.hpp"
 
 namespace raysplats {
 namespace {
@@ -21,14 +23,29 @@ namespace {
 // Random streams of one seed are told apart by a constant.
 constexpr std::uint64_t kCarveStream = 0x6361727665;
 constexpr std::uint64_t kSweepStream = 0x7377656570;
+constexpr std::uint64_t kProbeStream = 0x70726f6265;
 constexpr std::size_t kTriesPerPoint = 200;
 
 constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
+constexpr double kLeastBase = 1e-3;     // between them, of the distance of what they show
 constexpr std::size_t kDepths = 48;
 constexpr double kAgreement = 0.012;   // largest mean squared difference of what agrees
 constexpr double kClear = 0.5;         // and the best depth's share of the median one
 constexpr double kUnique = 0.7;        // and of the best one elsewhere: patterns repeat
 constexpr std::size_t kElsewhere = 3;  // depth steps from the best one
+constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of a sweep, times the typical one
+
+// The search for the typical depth, from kNearest times the guess on.
+constexpr std::size_t kProbes = 2000;      // pixels that are looked at
+constexpr std::size_t kFewProbes = 40;     // that tell less are no reason to doubt the guess
+constexpr std::size_t kProbeDepths = 112;  // steps to 1000 times the guess
+constexpr double kProbeReach = 1000.0;
+constexpr double kProbeTurn = 0.15;   // 1 - cosine between photos that are compared: 32 degrees
+constexpr double kAsGood = 1.3;       // costs up to that multiple of the best agree as well
+constexpr double kFloorCost = 1e-4;   // of photos' noise
+constexpr double kWrongGuess = 3.0;   // factor
+constexpr double kDoubtShare = 0.25;  // of probes that see no end of the depths: doubts the guess
+constexpr double kOpenShare = 0.5;    // and leaves most depths open
 
 void append(PointCloud& cloud, const glm::dvec3& position, const glm::dvec3& color) {
   for (int a = 0; a < 3; ++a) {
@@ -59,21 +76,22 @@ glm::dvec3 median_color(std::vector<glm::dvec3>& colors) {
   return out;
 }
 
+glm::dvec3 axis_of(const SmallPhoto& photo) {
+  const Camera& camera = photo.camera;
+  return camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height).direction;
+}
+
 // The photos that see most of what a photo sees from somewhere else: near centres, like axes.
 std::vector<std::size_t> neighbours_of(std::span<const SmallPhoto> photos,
                                        std::size_t index,
                                        double distance) {
-  const auto axis = [&photos](std::size_t i) {
-    const Camera& camera = photos[i].camera;
-    return camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height).direction;
-  };
   std::vector<std::pair<double, std::size_t>> ranked;
   for (std::size_t i = 0; i < photos.size(); ++i) {
     const double base =
         glm::distance(photos[i].camera.center(), photos[index].camera.center()) / distance;
     // Two photos from the same place say nothing about depth.
-    if (i == index || base < 1e-3) continue;
-    const double turn = 1.0 - glm::dot(axis(i), axis(index));
+    if (i == index || base < kLeastBase) continue;
+    const double turn = 1.0 - glm::dot(axis_of(photos[i]), axis_of(photos[index]));
     ranked.emplace_back(std::abs(base - 0.15) + 2.0 * turn, i);
   }
   const std::size_t count = std::min(kNeighbours, ranked.size());
@@ -110,8 +128,68 @@ double depth_at(double share, const DepthRange& depths) {
   return depths.nearest * std::pow(depths.farthest / depths.nearest, share);
 }
 
-double depth_of(std::size_t step, const DepthRange& depths) {
-  return depth_at(static_cast<double>(step) / (kDepths - 1), depths);
+// A shell beyond that depth, and what may stand before it.
+DepthRange open_range(double depth) { return {depth / kFarthest, 2.0 * depth, 3.0 * depth, true}; }
+
+// How much the neighbours differ from the photo if it shows that point, or -1 where few see it.
+double cost_at(std::span<const SmallPhoto> photos,
+               std::span<const std::size_t> neighbours,
+               const glm::dvec3& world,
+               const Patch& reference) {
+  std::array<double, kNeighbours> differences{};
+  std::size_t count = 0;
+  for (const std::size_t i : neighbours) {
+    const auto point = photos[i].sees(world);
+    if (point && photos[i].at(*point).w >= 0.5)
+      differences[count++] = difference(reference, patch_at(photos[i], *point));
+  }
+  if (2 * count < neighbours.size() || count < 2) return -1;
+  // The better half: what hides the point from some photos does not speak against it.
+  const std::size_t half = (count + 1) / 2 + (count > 3 ? 1 : 0);
+  const auto begin = differences.begin();
+  std::partial_sort(begin, begin + static_cast<std::ptrdiff_t>(half),
+                    begin + static_cast<std::ptrdiff_t>(count));
+  double sum = 0;
+  for (std::size_t k = 0; k < half; ++k) sum += differences[k];
+  return sum / static_cast<double>(half);
+}
+
+// The costs at depths of even steps of the logarithm, of which those below 0 are unknown.
+std::vector<double> costs_along(std::span<const SmallPhoto> photos,
+                                std::span<const std::size_t> neighbours,
+                                const CameraRay& ray,
+                                const Patch& reference,
+                                const DepthRange& depths,
+                                std::size_t steps) {
+  std::vector<double> costs(steps);
+  for (std::size_t step = 0; step < steps; ++step) {
+    const double share = static_cast<double>(step) / static_cast<double>(steps - 1);
+    costs[step] = cost_at(photos, neighbours, ray.origin + depth_at(share, depths) * ray.direction,
+                          reference);
+  }
+  return costs;
+}
+
+// The step of the least known cost; `costs` has a known one.
+std::size_t best_step(std::span<const double> costs) {
+  std::size_t best = costs.size();
+  for (std::size_t step = 0; step < costs.size(); ++step) {
+    if (costs[step] >= 0 && (best == costs.size() || costs[step] < costs[best])) best = step;
+  }
+  return best;
+}
+
+// The known cost that the share `rank` of the known ones lies below; nothing when less than a
+// quarter is known.
+std::optional<double> known_cost(std::span<const double> costs, double rank) {
+  std::vector<double> known;
+  std::copy_if(costs.begin(), costs.end(), std::back_inserter(known),
+               [](double cost) { return cost >= 0; });
+  if (known.empty() || known.size() < costs.size() / 4) return std::nullopt;
+  const auto place =
+      known.begin() + static_cast<std::ptrdiff_t>(rank * static_cast<double>(known.size()));
+  std::nth_element(known.begin(), place, known.end());
+  return *place;
 }
 
 // The depth along the ray at which the neighbours agree with the photo, if there is one.
@@ -120,41 +198,54 @@ std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
                                    const CameraRay& ray,
                                    const Patch& reference,
                                    const DepthRange& depths) {
-  std::array<double, kDepths> costs{};
-  std::vector<double> differences;
-  std::vector<double> known;
-  for (std::size_t step = 0; step < kDepths; ++step) {
-    const glm::dvec3 world = ray.origin + depth_of(step, depths) * ray.direction;
-    differences.clear();
-    for (const std::size_t i : neighbours) {
-      const auto point = photos[i].sees(world);
-      if (point && photos[i].at(*point).w >= 0.5)
-        differences.push_back(difference(reference, patch_at(photos[i], *point)));
-    }
-    costs[step] = -1;
-    if (2 * differences.size() < neighbours.size() || differences.size() < 2) continue;
-    // The better half: what hides the point from some photos does not speak against it.
-    const std::size_t half = (differences.size() + 1) / 2 + (differences.size() > 3 ? 1 : 0);
-    std::partial_sort(differences.begin(), differences.begin() + static_cast<std::ptrdiff_t>(half),
-                      differences.end());
-    double sum = 0;
-    for (std::size_t k = 0; k < half; ++k) sum += differences[k];
-    costs[step] = sum / static_cast<double>(half);
-    known.push_back(costs[step]);
-  }
-  if (known.size() < kDepths / 4) return std::nullopt;
-  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-  std::nth_element(known.begin(), middle, known.end());
-  std::size_t best = kDepths;
-  for (std::size_t step = 0; step < kDepths; ++step) {
-    if (costs[step] >= 0 && (best == kDepths || costs[step] < costs[best])) best = step;
-  }
-  if (costs[best] > kAgreement || costs[best] > kClear * *middle) return std::nullopt;
+  const std::vector<double> costs =
+      costs_along(photos, neighbours, ray, reference, depths, kDepths);
+  const std::optional<double> middle = known_cost(costs, 0.5);
+  if (!middle) return std::nullopt;
+  const std::size_t best = best_step(costs);
+  if (costs[best] > kAgreement || costs[best] >= kClear * *middle) return std::nullopt;
   for (std::size_t step = 0; step < kDepths; ++step) {
     const bool elsewhere = step + kElsewhere < best || step > best + kElsewhere;
     if (elsewhere && costs[step] >= 0 && costs[best] > kUnique * costs[step]) return std::nullopt;
   }
-  return depth_of(best, depths);
+  return depth_at(static_cast<double>(best) / (kDepths - 1), depths);
+}
+
+// A random pixel of a photo.
+struct Pixel {
+  std::size_t view = 0;
+  glm::dvec2 point;
+  CameraRay ray;
+  glm::dvec4 color;
+  bool shows() const { return ray.valid && color.w >= 0.5; }
+};
+
+Pixel random_pixel(std::span<const SmallPhoto> photos, CounterRng& rng) {
+  Pixel out;
+  out.view = rng.below(photos.size());
+  const SmallPhoto& photo = photos[out.view];
+  out.point.y = rng.uniform() * photo.camera.height;
+  out.point.x = rng.uniform() * photo.camera.width;
+  out.ray = camera_ray(photo.camera, out.point.x, out.point.y);
+  out.color = photo.at(out.point);
+  return out;
+}
+
+// Every number below `count` once, on all cores.
+template <class Work>
+void in_parallel(std::size_t count, const Work& work) {
+  const std::size_t threads = std::max(1u, std::thread::hardware_concurrency());
+  std::vector<std::jthread> workers;
+  for (std::size_t t = 0; t < threads; ++t) {
+    workers.emplace_back([&, t] {
+      for (std::size_t i = t; i < count; i += threads) work(i);
+    });
+  }
+}
+
+// Where in the range what has no clear depth begins: about the typical depth.
+double unsure_share(const DepthRange& depths) {
+  return std::log(depths.typical / depths.nearest) / std::log(depths.farthest / depths.nearest);
 }
 
 struct Sample {
@@ -168,20 +259,69 @@ Sample sweep_pixel(std::span<const SmallPhoto> photos,
                    std::uint64_t seed,
                    std::size_t index) {
   CounterRng rng(seed, kSweepStream, 8 * index);
-  const std::size_t view = rng.below(photos.size());
-  const SmallPhoto& photo = photos[view];
-  const glm::dvec2 pixel(rng.uniform() * photo.camera.width, rng.uniform() * photo.camera.height);
+  const Pixel pixel = random_pixel(photos, rng);
   const double jitter = rng.uniform();
-  const CameraRay ray = camera_ray(photo.camera, pixel.x, pixel.y);
-  const glm::dvec4 color = photo.at(pixel);
   Sample out;
-  out.color = glm::dvec3(color);
-  if (!ray.valid || color.w < 0.5) return out;
-  const auto depth = agreed_depth(photos, neighbours[view], ray, patch_at(photo, pixel), depths);
+  out.color = glm::dvec3(pixel.color);
+  if (!pixel.shows()) return out;
+  const auto depth = agreed_depth(photos, neighbours[pixel.view], pixel.ray,
+                                  patch_at(photos[pixel.view], pixel.point), depths);
   out.agreed = depth.has_value();
-  const double along = depth ? *depth : depth_at(0.4 + 0.6 * jitter, depths);
-  out.position = ray.origin + along * ray.direction;
+  const double along =
+      depth ? *depth : depth_at(jitter + (1.0 - jitter) * unsure_share(depths), depths);
+  out.position = pixel.ray.origin + along * pixel.ray.direction;
   return out;
+}
+
+// Photos that look the same way, those farthest apart first.
+std::vector<std::size_t> distant_neighbours(std::span<const SmallPhoto> photos,
+                                            std::size_t index,
+                                            double distance) {
+  std::vector<std::pair<double, std::size_t>> ranked;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    const double base = glm::distance(photos[i].camera.center(), photos[index].camera.center());
+    const bool apart = i != index && base >= kLeastBase * distance;
+    if (apart && 1.0 - glm::dot(axis_of(photos[i]), axis_of(photos[index])) < kProbeTurn)
+      ranked.emplace_back(-base, i);
+  }
+  const std::size_t count = std::min(kNeighbours, ranked.size());
+  std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count),
+                    ranked.end());
+  std::vector<std::size_t> out(count);
+  for (std::size_t i = 0; i < count; ++i) out[i] = ranked[i].second;
+  return out;
+}
+
+// What a pixel tells of its depth.
+struct Probe {
+  double depth = 0;   // 0: nothing
+  bool open = false;  // all greater depths agree as well
+};
+
+Probe probe_pixel(std::span<const SmallPhoto> photos,
+                  const std::vector<std::vector<std::size_t>>& neighbours,
+                  const DepthRange& depths,
+                  std::uint64_t seed,
+                  std::size_t index) {
+  CounterRng rng(seed, kProbeStream, 8 * index);
+  const Pixel pixel = random_pixel(photos, rng);
+  if (!pixel.shows()) return {};
+  const std::vector<double> costs =
+      costs_along(photos, neighbours[pixel.view], pixel.ray,
+                  patch_at(photos[pixel.view], pixel.point), depths, kProbeDepths);
+  // Depths at which photos cannot differ any more are as good as the best one, and may be most.
+  const std::optional<double> wrong = known_cost(costs, 0.75);
+  if (!wrong) return {};
+  std::size_t best = best_step(costs);
+  if (costs[best] > kAgreement || costs[best] >= kClear * *wrong) return {};
+  const double enough = kAsGood * costs[best] + kFloorCost;
+  std::size_t last = best;
+  while (last + 1 < costs.size() && costs[last + 1] >= 0 && costs[last + 1] <= enough) ++last;
+  const bool open = last + 1 == costs.size();
+  while (open && best > 0 && costs[best - 1] >= 0 && costs[best - 1] <= enough) --best;
+  // What agrees at every depth has no texture.
+  if (open && (best == 0 || costs[best - 1] < 0)) return {};
+  return {depth_at(static_cast<double>(best) / (kProbeDepths - 1), depths), open};
 }
 
 }  // namespace
@@ -213,6 +353,38 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
   return out;
 }
 
+DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed) {
+  const DepthRange around{kNearest * guess, guess, kFarthest * guess};
+  std::vector<std::vector<std::size_t>> neighbours(photos.size());
+  for (std::size_t i = 0; i < photos.size(); ++i)
+    neighbours[i] = distant_neighbours(photos, i, guess);
+  const bool one_place = std::all_of(photos.begin(), photos.end(), [&](const SmallPhoto& photo) {
+    return glm::distance(photo.camera.center(), photos[0].camera.center()) < kLeastBase * guess;
+  });
+  if (photos.size() > 1 && one_place) return open_range(guess);
+  std::vector<Probe> probes(kProbes);
+  in_parallel(kProbes, [&](std::size_t i) {
+    probes[i] =
+        probe_pixel(photos, neighbours, {kNearest * guess, guess, kProbeReach * guess}, seed, i);
+  });
+  std::vector<double> depths;
+  std::size_t open = 0;
+  for (const Probe& probe : probes) {
+    if (probe.depth == 0) continue;
+    depths.push_back(probe.depth);
+    open += probe.open ? 1 : 0;
+  }
+  if (depths.size() < kFewProbes) return around;
+  const std::array<double, 2> ranks{0.5, 0.75};
+  const std::vector<double> found = quantiles(depths, ranks);
+  const double open_share = static_cast<double>(open) / static_cast<double>(depths.size());
+  if (open_share > kOpenShare) return open_range(found[1]);
+  // Photos far apart may agree by chance beyond what they show together, but at an end.
+  const double typical = found[0];
+  if (open_share < kDoubtShare || typical < kWrongGuess * guess) return around;
+  return {kNearest * typical, typical, kFarthest * typical};
+}
+
 PointCloud swept_points(std::span<const SmallPhoto> photos,
                         const DepthRange& depths,
                         std::size_t count,
@@ -223,22 +395,17 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
     neighbours[i] = neighbours_of(photos, i, depths.typical);
   const std::size_t tries = 4 * count;
   std::vector<Sample> samples(tries);
-  {
-    const std::size_t threads = std::max(1u, std::thread::hardware_concurrency());
-    std::vector<std::jthread> workers;
-    for (std::size_t t = 0; t < threads; ++t) {
-      workers.emplace_back([&, t] {
-        for (std::size_t i = t; i < tries; i += threads)
-          samples[i] = sweep_pixel(photos, neighbours, depths, seed, i);
-      });
-    }
-  }
+  in_parallel(
+      tries, [&](std::size_t i) { samples[i] = sweep_pixel(photos, neighbours, depths, seed, i); });
   const auto fog = static_cast<std::size_t>(unsure * static_cast<double>(count));
+  const auto sure = static_cast<std::size_t>(std::count_if(
+      samples.begin(), samples.end(), [](const Sample& sample) { return sample.agreed; }));
+  const std::size_t most_random = depths.open ? count - std::min(sure, count - fog) : fog;
   PointCloud out;
   std::size_t agreed = 0, random = 0;
   for (const Sample& sample : samples) {
     std::size_t& number = sample.agreed ? agreed : random;
-    if (number >= (sample.agreed ? count - fog : fog) || sample.position == glm::dvec3(0.0))
+    if (number >= (sample.agreed ? count - fog : most_random) || sample.position == glm::dvec3(0.0))
       continue;
     ++number;
     append(out, sample.position, sample.color);

@@ -28,13 +28,18 @@ struct DepthRange {
   double nearest = 0;
   double typical = 0;  ///< of what most cameras look at
   double farthest = 0;
+  bool open = false;  ///< the photos are too near to each other to tell any depth
 };
+
+/// The range of depths around `guess`, unless many photos cannot tell what they show from the
+/// infinitely far, as from a tripod: then it lies around what they do tell, or, where that is less
+/// than half (`open`), beyond the depth up to which they would tell it. `guess` is positive.
+DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
 
 /// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
 /// sweep, Collins 1996, over single pixels with their surroundings). Of the pixels that no depth
-/// explains clearly, the share `unsure` of `count` at most get a random depth, so that everything
-/// seen has something in front of it. `distance` is that of what the cameras look at; depths reach
-/// from a fifth of it to ten times. Colours are the photos'.
+/// explains clearly, the share `unsure` of `count` at most (all, where the range is open) get a
+/// random depth, so that everything seen has something in front of it. Colours are the photos'.
 PointCloud swept_points(std::span<const SmallPhoto> photos,
                         const DepthRange& depths,
                         std::size_t count,

@@ -32,6 +32,16 @@ constexpr char kCsvHeader[] = "iteration,seconds,loss,psnr,gaussians,it_per_s,ca
 
 std::ptrdiff_t columns(std::string_view row) { return std::count(row.begin(), row.end(), ','); }
 
+/// A row of metrics.csv below `header` with all the columns of today: those that came later are 0.
+/// Nothing for one that was cut off, as by a power failure.
+std::string with_all_columns(const std::string& row, const std::string& header) {
+  const bool known = std::string_view(kCsvHeader).starts_with(header);
+  if (!known || columns(row) != columns(header) || row.ends_with(',')) return "";
+  std::string out = row;
+  for (std::ptrdiff_t i = columns(header); i < columns(kCsvHeader); ++i) out += ",0";
+  return out + "\n";
+}
+
 nlohmann::json to_json(const EvaluationRow& row) {
   nlohmann::json json{{"iteration", row.iteration},
                       {"training_seconds", row.training_seconds},
@@ -233,13 +243,12 @@ void RunFolder::begin_metrics(std::int64_t iteration) {
   std::string csv = kCsvHeader;
   if (iteration > 0) {
     std::ifstream rows(path_ / "metrics.csv");
+    std::string header;
+    std::getline(rows, header);
     std::string line;
-    std::getline(rows, line);
     while (std::getline(rows, line)) {
       const long long recorded = std::strtoll(line.c_str(), nullptr, 10);
-      // Rows that a power failure cut off are dropped.
-      if (recorded > 0 && recorded <= iteration && columns(line) == columns(kCsvHeader))
-        csv += line + "\n";
+      if (recorded > 0 && recorded <= iteration) csv += with_all_columns(line, header);
     }
     std::ifstream metrics(path_ / "metrics.json");
     try {

@@ -2,21 +2,28 @@
 #include "train/run_time.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
 #include "core/statistics.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/gaussians.hpp"
 #include "train/schedule.hpp"
 
 namespace raysplats {
 namespace {
 
-// Of a pixel and of a hit beside that of a Gaussian.
-constexpr double kPixelWork = 0.58;
-constexpr double kHitWork = 0.016;
-constexpr double kLeastHits = 48.0;    // of a trained model, per pixel that shows something
-constexpr double kHitGrowth = 1.15;    // from the first steps at full size to the end
+// Beside that of a Gaussian.
+constexpr double kBasisWork = 0.037;  // of one of its spherical harmonics
+constexpr double kPixelWork = 0.13;
+constexpr double kHitWork = 0.0244;
+constexpr double kCandidateWork = 1.25;
+constexpr double kUsualHits = 52.0;        // of a trained model, per pixel that shows something
+constexpr double kCandidateGrowth = 1.15;  // from Gaussians split evenly to those of the end
+// Steps of trained models take longer than timed ones that do as much (long thin Gaussians are
+// candidates of more rays that miss them), and there is density control between them.
+constexpr double kBeyond = 1.1;
 constexpr double kLarge = 0.5;         // of the largest view: steps that tell the speed
 constexpr std::int64_t kSlices = 400;  // of a run, when its steps are added up
 constexpr std::int64_t kMostIterations = 10'000'000;
@@ -34,25 +41,41 @@ double full_size_from(const TrainOptions& options) {
 
 }  // namespace
 
-double step_work(double pixels, double gaussians, double hits) {
-  return gaussians + kPixelWork * pixels + kHitWork * hits;
+double step_work(const StepLoad& load) {
+  return load.gaussians * (1.0 + kBasisWork * load.bases) + kPixelWork * load.pixels +
+         kHitWork * load.hits + kCandidateWork * load.candidates;
 }
 
 double seconds_per_work(std::span<const StepSample> samples) {
   double most = 0;
-  for (const StepSample& s : samples) most = std::max(most, s.seconds > 0 ? s.pixels : 0.0);
+  for (const StepSample& s : samples) most = std::max(most, s.seconds > 0 ? s.load.pixels : 0.0);
   std::vector<double> speeds;
   for (const StepSample& s : samples) {
-    if (s.seconds > 0 && s.pixels >= kLarge * most)
-      speeds.push_back(s.seconds / step_work(s.pixels, s.gaussians, s.hits));
+    if (s.seconds > 0 && s.load.pixels >= kLarge * most)
+      speeds.push_back(s.seconds / step_work(s.load));
   }
   if (speeds.empty()) throw UsageError("No step was timed: there is nothing to estimate from");
   const double half = 0.5;
   return quantiles(std::move(speeds), std::span<const double>(&half, 1))[0];
 }
 
-HitCurve expected_hits(double at_start, double at_full_size, double opaque_share) {
-  return {at_start, std::max(kHitGrowth * at_full_size, kLeastHits * opaque_share)};
+LoadRates LoadRates::of(std::span<const StepSample> samples) {
+  StepLoad sum;
+  for (const StepSample& s : samples) {
+    sum.pixels += s.load.pixels, sum.gaussians += s.load.gaussians;
+    sum.hits += s.load.hits, sum.candidates += s.load.candidates;
+  }
+  if (!(sum.pixels > 0) || !(sum.gaussians > 0)) return {};
+  return {sum.hits / sum.pixels, sum.candidates / sum.gaussians};
+}
+
+RateCurve expected_rates(const LoadRates& at_start,
+                         const LoadRates& at_full_size,
+                         double opaque_share) {
+  const double usual = kUsualHits * opaque_share;
+  double hits = at_full_size.hits;
+  if (hits > 0) hits = hits > usual ? std::sqrt(usual * hits) : usual;
+  return {at_start, {hits, kCandidateGrowth * at_full_size.candidates}};
 }
 
 double expected_gaussians(const TrainOptions& options,
@@ -66,8 +89,12 @@ double expected_gaussians(const TrainOptions& options,
   return limit - (limit - first) * (1.0 - x) * (1.0 - x);
 }
 
-double run_work(
-    const TrainOptions& options, double pixels, const HitCurve& hits, double first, double limit) {
+double run_work(const TrainOptions& options,
+                double pixels,
+                const RateCurve& rates,
+                double first,
+                double limit) {
+  const auto between = [](double begin, double end, double x) { return begin + (end - begin) * x; };
   const std::int64_t slices = std::min(kSlices, options.iterations);
   const double full = full_size_from(options);
   double sum = 0;
@@ -79,11 +106,14 @@ double run_work(
     const double risen = full > 0 ? std::min(share / full, 1.0) : 1.0;
     const double divisor = resolution_divisor(options, middle);
     const double rays = pixels / (divisor * divisor);
+    const double gaussians = expected_gaussians(options, middle, first, limit);
+    const int bases = sh_coefficients(active_sh_degree(options, middle));
     sum += static_cast<double>(end - begin) *
-           step_work(rays, expected_gaussians(options, middle, first, limit),
-                     rays * (hits.first + (hits.last - hits.first) * risen));
+           step_work({rays, gaussians, static_cast<double>(bases),
+                      rays * between(rates.first.hits, rates.last.hits, risen),
+                      gaussians * between(rates.first.candidates, rates.last.candidates, risen)});
   }
-  return sum;
+  return kBeyond * sum;
 }
 
 std::int64_t iterations_within(double seconds,

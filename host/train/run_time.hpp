@@ -10,34 +10,55 @@
 
 namespace raysplats {
 
-/// A step of training that was timed.
+/// What a step of training has to do.
+struct StepLoad {
+  double pixels = 0;      ///< rays of the view
+  double gaussians = 0;   ///< of the model
+  double bases = 0;       ///< spherical harmonics of a Gaussian: 16 at degree 3
+  double hits = 0;        ///< blended (ray, Gaussian) pairs; 0 where they are not counted
+  double candidates = 0;  ///< (tile, Gaussian) pairs that the rays of the tiles are tested against
+};
+
+/// A step that was timed.
 struct StepSample {
-  double pixels = 0;     ///< rays of the view
-  double gaussians = 0;  ///< of the model
-  double hits = 0;       ///< blended (ray, Gaussian) pairs; 0 where they are not counted
+  StepLoad load;
   double seconds = 0;
 };
 
 /// What a step costs, in units of what one Gaussian of the model does: each Gaussian is moved by
-/// Adam and put into lists, each pixel has a loss, each hit is blended and has a gradient. The
-/// ratios are those of nine captures on two CPU cores (docs/training.md).
-double step_work(double pixels, double gaussians, double hits);
+/// Adam and put into lists, each of its spherical harmonics too, each pixel has a loss, each
+/// candidate is tested by the rays of its tile and has a gradient, each hit is blended. The ratios
+/// are those of twelve captures on two CPU cores (docs/training.md).
+double step_work(const StepLoad& load);
 
 /// Seconds of a unit of work: the median of the steps that have the most pixels, so that a step
-/// that had to wait (a photo was decoded, a buffer grew) counts no more than any other. Throws
-/// UsageError without samples.
+/// that had to wait (a photo was decoded, a buffer grew) counts no more than any other. A device is
+/// slower where a model outgrows its caches: the steps are those of one count of Gaussians, the one
+/// that counts. Throws UsageError without samples.
 double seconds_per_work(std::span<const StepSample> samples);
 
-/// Hits per pixel in a run: they rise evenly from the first steps until the photos have their full
-/// size, and stay.
-struct HitCurve {
-  double first = 0, last = 0;
+/// What the rays of a view meet.
+struct LoadRates {
+  double hits = 0;        ///< per pixel
+  double candidates = 0;  ///< per Gaussian of the model
+
+  /// Of timed steps together.
+  static LoadRates of(std::span<const StepSample> samples);
 };
 
-/// The curve from a run's first steps, and from steps at full size with the Gaussians of its end,
-/// both per pixel. A start that leaves the rays much light fills up: few trained models have less
-/// than about 48 hits per pixel that shows something, `opaque_share` of all.
-HitCurve expected_hits(double at_start, double at_full_size, double opaque_share);
+/// Rates in a run: they rise evenly from the first steps until the photos have their full size,
+/// and stay.
+struct RateCurve {
+  LoadRates first, last;
+};
+
+/// The curve from a run's first steps, and from steps at full size with the Gaussians of its end. A
+/// start that leaves the rays much light fills up, one that leaves them little clears: most trained
+/// models have about 52 hits per pixel that shows something, `opaque_share` of all. Rays that
+/// count no hits, those traced one by one, have none at the end either.
+RateCurve expected_rates(const LoadRates& at_start,
+                         const LoadRates& at_full_size,
+                         double opaque_share);
 
 /// The Gaussians of a run after `iteration` steps, on the curve of the budget strategy from `first`
 /// at its start to `limit`.
@@ -49,7 +70,7 @@ double expected_gaussians(const TrainOptions& options,
 /// Work of all steps of a run with these options. `pixels` is the mean of the training views at
 /// full size, `first` and `limit` are its Gaussians at the start and the most that it may have.
 double run_work(
-    const TrainOptions& options, double pixels, const HitCurve& hits, double first, double limit);
+    const TrainOptions& options, double pixels, const RateCurve& rates, double first, double limit);
 
 /// The most iterations, from `least` on, whose run takes no more than `seconds`;
 /// `seconds_of(iterations)` must not fall.

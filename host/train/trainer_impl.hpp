@@ -237,6 +237,7 @@ struct Trainer::Impl {
   bool stop_agreed = false;        // after it: by any of them
   std::atomic<bool> busy = false;  // in run() or step()
   bool stepped = false;            // since this object was made
+  bool reads_ahead = true;         // photos, before their turn
   bool prepared = false;           // for steps of the caller's own
   std::optional<FileLock> folder_lock;
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <set>
+#include <thread>
 #include <vector>
 
 #include "raysplats/error.hpp"
@@ -14,8 +16,9 @@
 namespace raysplats {
 namespace {
 
-constexpr double kMeasuredShare = 0.05;  // of the time of a run that measuring may take
+constexpr double kMeasuredShare = 0.05;  // of the time of a run that timed steps may take
 constexpr int kLeastSteps = 3;           // of a kind that are timed
+constexpr int kViews = 6;                // that they show
 constexpr double kCoarseShare = 0.2;     // of the time for steps that coarse ones take
 constexpr double kFullShare = 0.5;       // and these together with those at full size
 constexpr int kMostPasses = 12;          // that double the count
@@ -43,10 +46,10 @@ double mean_pixels(const std::vector<Camera>& cameras) {
 // What a small run of the same shape told.
 struct Trainer::Impl::Pilot {
   double per_work = 0;       // seconds of a unit of work
-  double first_hits = 0;     // per pixel, of the first steps
-  double last_hits = 0;      // per pixel, of the steps that are most like those of the end
+  LoadRates at_start;        // of the first steps
+  LoadRates at_full_size;    // of the steps that are most like those of the end
   double start_seconds = 0;  // of making the first model
-  double photo_seconds = 0;  // of getting one photo
+  double photo_seconds = 0;  // that a photo adds to the run
   double seconds = 0;        // all of it
   double opaque_share = 1;   // of the photos' pixels
   std::size_t first = 0;     // Gaussians of the start
@@ -77,73 +80,93 @@ double Trainer::Impl::seconds_of(const Pilot& pilot,
   const double first = std::min(static_cast<double>(pilot.first), kFillShare * limit);
   const auto photos = static_cast<double>(
       std::min(iterations * options.views_per_step, static_cast<std::int64_t>(train_views.size())));
-  const HitCurve hits = expected_hits(pilot.first_hits, pilot.last_hits, pilot.opaque_share);
+  const RateCurve rates = expected_rates(pilot.at_start, pilot.at_full_size, pilot.opaque_share);
   return pilot.start_seconds + photos * pilot.photo_seconds +
          pilot.per_work * run_work(shaped, options.views_per_step * mean_pixels(train_cameras),
-                                   hits, first, limit);
+                                   rates, first, limit);
 }
 
 // Times steps from the start on the device: coarse ones, ones at full size, and ones with as many
 // Gaussians as the run will have at its end. `run`: the seconds of the run, if they are given.
 void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot& pilot) {
-  const Timer clock(context);
   std::vector<StepSample> samples;
+  double spent = 0;  // without the photos, which the run has to get as well
   double photo_seconds = 0;
-  int photos = 0;
+  std::set<std::size_t> read;  // views
+  std::size_t timed = 0;       // steps of the last kind
   const auto timed_step = [&] {
-    const std::size_t view = order.at(turn_of(share.first));
     const int divisor = resolution_divisor(options, iteration);
-    const Camera camera =
-        divisor > 1 ? downscaled(train_cameras[view], divisor) : train_cameras[view];
-    const Timer photo(context);
-    photo_cache.get(view, camera.width, camera.height);
-    context.finish();
-    photo_seconds += photo.seconds();
-    ++photos;
+    Camera camera;
+    for (std::size_t slot = 0; slot < slots.size(); ++slot) {
+      if (!share.holds(slot)) continue;
+      const std::size_t view = order.at(turn_of(slot));
+      camera = divisor > 1 ? downscaled(train_cameras[view], divisor) : train_cameras[view];
+      const Timer photo(context);
+      photo_cache.get(view, camera.width, camera.height);
+      context.finish();
+      if (read.insert(view).second) photo_seconds += photo.seconds();
+    }
     const Timer timer(context);
     step();
     settle();
     const double seconds_of_step = timer.seconds();
+    spent += seconds_of_step;
     // Its views are taken to be like the last one.
     const auto views = static_cast<double>(slots.size());
-    return StepSample{views * static_cast<double>(pixels_of(camera)),
-                      static_cast<double>(gaussians.count),
-                      views * static_cast<double>(tracer.statistics().hits), seconds_of_step};
+    const auto work = tracer.statistics();
+    return StepSample{
+        {views * static_cast<double>(pixels_of(camera)), static_cast<double>(gaussians.count),
+         static_cast<double>(sh_coefficients(gaussians.active_sh_degree)),
+         views * static_cast<double>(work.hits), views * static_cast<double>(work.candidates)},
+        seconds_of_step};
   };
-  // The first step of a kind compiles kernels and makes buffers: it does not count. Returns the
-  // hits per pixel.
+  // The first step of a kind compiles kernels and makes buffers: it does not count. A few views
+  // come again and again: reading photos would slow down a CPU that trains.
   const auto stage = [&](double until) {
+    const std::int64_t first_step = iteration;
     timed_step();
     const std::size_t begin = samples.size();
     // The first rank's clock counts for all.
-    for (int i = 0; i < kLeastSteps || ranks.said_by(0, clock.seconds() < until * seconds); ++i)
+    for (int i = 0; i < kLeastSteps || ranks.said_by(0, spent < until * seconds); ++i) {
+      iteration = first_step + i % kViews;
       samples.push_back(timed_step());
-    double hits = 0, pixels = 0;
-    for (std::size_t i = begin; i < samples.size(); ++i)
-      hits += samples[i].hits, pixels += samples[i].pixels;
-    pilot.per_work = ranks.said_by(0, seconds_per_work(samples));
-    return ranks.said_by(0, hits / pixels);
+    }
+    const std::span<const StepSample> own = std::span(samples).subspan(begin);
+    const LoadRates met = LoadRates::of(own);
+    pilot.per_work = ranks.said_by(0, seconds_per_work(own));
+    timed = own.size();
+    return LoadRates{ranks.said_by(0, met.hits), ranks.said_by(0, met.candidates)};
   };
   iteration = 0;
-  pilot.first_hits = pilot.last_hits = stage(kCoarseShare);
+  reads_ahead = false;
+  pilot.at_start = pilot.at_full_size = stage(kCoarseShare);
   const auto rough = [&](std::int64_t iterations) {
     return seconds_of(pilot, iterations, gaussians.count);
   };
   if (run || rough(options.iterations) > kShortRun) {
     const std::int64_t middle = options.iterations / 2;
     iteration = middle;
-    pilot.last_hits = stage(kFullShare);
+    pilot.at_full_size = stage(kFullShare);
     const std::size_t most =
         most_gaussians(run ? iterations_within(*run, kLeastIterations, rough) : options.iterations);
     for (int pass = 0; pass < kMostPasses && density.accumulates_at(0) && gaussians.count < most;
          ++pass)
       follow_plan(density.split_evenly(gaussians, most));
-    pilot.last_hits = stage(1);
+    pilot.at_full_size = stage(1);
   }
-  for (const StepSample& s : samples)
-    spdlog::debug("a step of {} rays, {} Gaussians and {} hits took {:.2f} ms", s.pixels,
-                  s.gaussians, s.hits, 1e3 * s.seconds);
-  pilot.photo_seconds = ranks.said_by(0, photo_seconds / photos);
+  spdlog::debug(
+      "the last {} of {} timed steps took {:.3g} us a unit of work; {:.3g} hits a pixel and {:.3g} "
+      "candidates a Gaussian at first, {:.3g} and {:.3g} with {} Gaussians; a photo is read in "
+      "{:.3g} ms",
+      timed, samples.size(), 1e6 * pilot.per_work, pilot.at_start.hits, pilot.at_start.candidates,
+      pilot.at_full_size.hits, pilot.at_full_size.candidates, gaussians.count,
+      1e3 * photo_seconds / static_cast<double>(read.size()));
+  // The run reads several at a time, each rank its own.
+  const std::size_t readers =
+      std::min<std::size_t>(kReadAhead, std::max(1u, std::thread::hardware_concurrency()));
+  pilot.photo_seconds = ranks.said_by(
+      0, photo_seconds /
+             static_cast<double>(read.size() * readers * static_cast<std::size_t>(ranks.size())));
 }
 
 // Everything as it was before the first step.
@@ -157,6 +180,7 @@ void Trainer::Impl::forget_pilot() {
   if (poses)
     poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
   iteration = 0;
+  reads_ahead = true;
   traced_rays = 0;
   whole = stepped = false;
 }
@@ -174,7 +198,12 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   upload_start(most);
   pilot.first = gaussians.count;
   if (cut_out) pilot.opaque_share = opaque_share(photos());
-  time_steps(std::max(seconds - clock.seconds(), 0.0), run_time, pilot);
+  try {
+    time_steps(seconds, run_time, pilot);
+  } catch (...) {
+    forget_pilot();
+    throw;
+  }
   forget_pilot();
   first_model = std::move(made);
   pilot.seconds = ranks.said_by(0, clock.seconds());

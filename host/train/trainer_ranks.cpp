@@ -34,6 +34,7 @@ struct SlotWord {
 
 // The photos of this rank that come after a view.
 void Trainer::Impl::read_ahead(std::int64_t turn) {
+  if (!reads_ahead) return;
   constexpr std::size_t kOthers = kReadAhead - 1;
   std::vector<std::size_t> own;
   for (const std::size_t view : order.upcoming(kOthers * static_cast<std::size_t>(ranks.size()))) {

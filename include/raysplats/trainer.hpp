@@ -96,9 +96,9 @@ class Trainer {
   /// there is none that is whole or another run has the folder.
   void resume(const std::filesystem::path& source);
 
-  /// How long the run will take. Trains a small run of the same shape for at most about `seconds`
-  /// (less when the estimate is that short) and puts everything back: the run is as without. Throws
-  /// UsageError once training has begun.
+  /// How long the run will take. Times steps of a small run of the same shape for about `seconds`
+  /// (less when the estimate is that short; a start and some photos come on top) and puts
+  /// everything back: the run is as without. Throws UsageError once training has begun.
   RunEstimate estimate(double seconds);
   /// Sets options.iterations, and max_gaussians where that is 0, so that measuring (a twentieth of
   /// it) and training take `seconds`; RUN/config.toml names both. Throws UsageError once training

@@ -222,7 +222,7 @@ class Place {
       // A run by time has no number of iterations.
       const auto time = std::find(words.begin(), words.end(), "--time");
       if (time != words.end()) {
-        *std::next(time) = "1s";
+        *std::next(time) = "4s";  // less may be too short on a busy machine
       } else {
         words.insert(words.end(), {"-n", resumed ? "3" : "2"});
       }

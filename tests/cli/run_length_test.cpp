@@ -39,7 +39,7 @@ TEST_CASE("the length of a run follows from a time or a quality, and is said bef
   const std::string data = folder / "data", timed = folder / "timed", look = folder / "look";
   succeed({"generate", data, "--size", "48", "--train-views", "5", "--test-views", "1", "-q"});
 
-  const Outcome outcome = succeed({"train", data, "-o", timed, "--time", "2s"});
+  const Outcome outcome = succeed({"train", data, "-o", timed, "--time", "4s"});
   CHECK(contains(outcome.err, "iterations, up to"));
   CHECK(contains(outcome.err, "of training"));
   const std::string iterations = value_of(timed, "iterations");

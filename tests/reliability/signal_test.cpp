@@ -207,40 +207,46 @@ TEST_CASE("a folder takes one run at a time, and a lock that was left behind non
 }
 
 TEST_CASE("eight processes fill one kernel cache at once") {
-  const TemporaryFolder folder;
-  std::vector<pid_t> children;
-  for (int i = 0; i < 8; ++i) {
-    const pid_t child = ::fork();
-    REQUIRE(child >= 0);
-    if (child == 0) {
-      // Nothing in this program has used OpenCL before, so that every child has its own.
-      int status = 1;
-      ::setenv("POCL_CACHE_DIR", (folder / "driver").c_str(), 1);
-      try {
-        raysplats::ContextOptions options;
-        options.cache_directory = folder / "cache";
-        raysplats::Context context(raysplats::select_device(""), options);
-        raysplats::Scan scan(context);
-        raysplats::Buffer<std::uint32_t> values(context, 4, "values");
-        values.upload(std::array<std::uint32_t, 4>{5, 6, 7, 0});
-        scan.exclusive(values, 3);
-        status = values.download() == std::vector<std::uint32_t>{0, 5, 11, 18} ? 0 : 2;
-      } catch (const std::exception& error) {
-        std::fprintf(stderr, "%s\n", error.what());
+  // PoCL keeps kernels in a folder of its own, or where it keeps none is asked for binaries.
+  for (const bool driver_keeps : {true, false}) {
+    CAPTURE(driver_keeps);
+    const TemporaryFolder folder;
+    std::vector<pid_t> children;
+    for (int i = 0; i < 8; ++i) {
+      const pid_t child = ::fork();
+      REQUIRE(child >= 0);
+      if (child == 0) {
+        // Nothing in this program has used OpenCL before, so that every child has its own.
+        int status = 1;
+        const std::string own = driver_keeps ? "" : std::to_string(i);
+        ::setenv("POCL_CACHE_DIR", (folder / ("driver" + own)).c_str(), 1);
+        ::setenv("POCL_KERNEL_CACHE", driver_keeps ? "1" : "0", 1);
+        try {
+          raysplats::ContextOptions options;
+          options.cache_directory = folder / "cache";
+          raysplats::Context context(raysplats::select_device(""), options);
+          raysplats::Scan scan(context);
+          raysplats::Buffer<std::uint32_t> values(context, 4, "values");
+          values.upload(std::array<std::uint32_t, 4>{5, 6, 7, 0});
+          scan.exclusive(values, 3);
+          status = values.download() == std::vector<std::uint32_t>{0, 5, 11, 18} ? 0 : 2;
+        } catch (const std::exception& error) {
+          std::fprintf(stderr, "%s\n", error.what());
+        }
+        ::_exit(status);
       }
-      ::_exit(status);
+      children.push_back(child);
     }
-    children.push_back(child);
+    for (const pid_t child : children) {
+      int status = -1;
+      CHECK(::waitpid(child, &status, 0) == child);
+      CHECK(status == 0);
+    }
+    std::size_t kept = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "cache")) {
+      CHECK(entry.path().extension() == ".bin");  // nothing half-written stays
+      ++kept;
+    }
+    CHECK(kept >= 1);
   }
-  for (const pid_t child : children) {
-    int status = -1;
-    CHECK(::waitpid(child, &status, 0) == child);
-    CHECK(status == 0);
-  }
-  std::size_t kept = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder / "cache")) {
-    CHECK(entry.path().extension() == ".bin");  // nothing half-written stays
-    ++kept;
-  }
-  CHECK(kept >= 1);
 }

@@ -94,6 +94,7 @@ TEST_CASE("a resumed run goes on with the photos' colours, bit for bit") {
   TrainOptions options = options_of(true);
   options.iterations = 40;
   options.max_gaussians = 600;
+  options.trace.deterministic = true;
   Trainer whole(context, gains, options, folder.path() / "whole");
   whole.run(false);
   options.checkpoint_every = 17;

@@ -166,6 +166,36 @@ TEST_CASE("points that few photos show or that fit them badly are left out when 
   CHECK(reliable_points(few).size() == few.size());
 }
 
+TEST_CASE("sizes are those of the points that a start takes, each place once") {
+  Dataset dataset;
+  // A square grid of unit steps, every point four times.
+  for (int i = 0; i < 4 * 400; ++i) {
+    dataset.points.positions.insert(
+        dataset.points.positions.end(),
+        {static_cast<float>(i / 4 % 20), static_cast<float>(i / 80), 0.0f});
+    dataset.points.colors.insert(dataset.points.colors.end(), 3, 0.5f);
+  }
+  TrainOptions options;
+  options.init = "colmap";
+  const std::vector<Camera> cameras = ring(6, 100.0, {10, 10, 0});
+  const std::vector<SmallPhoto> none;
+  const auto sizes = [&](std::size_t limit) {
+    const Gaussians model = initial_model(
+        dataset, cameras, [&none]() -> const auto& { return none; }, limit, options);
+    std::vector<double> out;
+    for (std::size_t i = 0; i < model.size(); ++i) out.push_back(std::exp(model.log_scales[3 * i]));
+    std::sort(out.begin(), out.end());
+    return out;
+  };
+  const std::vector<double> all = sizes(1000);
+  REQUIRE(all.size() == 400);
+  CHECK(all[200] == doctest::Approx(1.0));
+  // Every other point of a row is left: neighbours are one, one and two steps away.
+  const std::vector<double> some = sizes(200);
+  REQUIRE(some.size() == 100);
+  CHECK(some[50] == doctest::Approx(4.0 / 3.0));
+}
+
 TEST_CASE("the limit grows with the roots of pixels and iterations") {
   CHECK(fitted_limit(100000, 1000) == 45000);
   CHECK(fitted_limit(100000, 4000) == 90000);
@@ -191,12 +221,13 @@ TEST_CASE("the first model follows the options") {
   CHECK(first(1000).size() == 300);
   options.init = "colmap";
   CHECK_THROWS_AS(first(1000), UsageError);
-  options.init = "auto";
   for (int i = 0; i < 90; ++i) {
     dataset.points.positions.push_back(static_cast<float>(i) * 0.01f);
     dataset.points.colors.push_back(0.5f);
   }
   CHECK(first(1000).size() == 30);
+  options.init = "auto";
+  CHECK(first(100).size() == 30);
   // Half of the limit: the start leaves room to grow.
   const Gaussians few = first(14);
   CHECK(few.size() == 7);

@@ -129,7 +129,7 @@ TEST_CASE("options in a PLY that nobody can trace with are named") {
   const TemporaryFolder folder;
   const fs::path ply = folder.path / "model.ply";
   for (const char* text : {"hit_order last", "quantile -1", "quantile nan", "max_hits 0",
-                           "max_hits", "min_transmittance 1", "near_depth inf", "background 1,0",
+                           "max_hits", "min_transmittance 0.6", "near_depth inf", "background 1,0",
                            "background 1,0,0,0", "adaptive_radius 1"}) {
     CAPTURE(text);
     std::ofstream(ply) << "ply\ncomment raysplats " << text << "\nend_header\n";

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/camera_model.hpp"
+#include "train/initialization.hpp"
 
 using namespace raysplats;
 
@@ -152,4 +153,85 @@ TEST_CASE("photos without a common view give no sure points and do not fail") {
   const PointCloud points = swept_points(one, {0.4, 2.0, 20.0}, 100, 0.25, 1);
   CHECK(points.size() == 25);
   for (const float p : points.positions) CHECK(std::isfinite(p));
+}
+
+TEST_CASE("cameras on a tripod look at what is far away") {
+  // Around one point that is 0.01 wide, in a ball of 6 whose pattern has no finer parts than
+  // pixels.
+  const auto ball_around = [](const CameraRay& ray) {
+    const double along = glm::dot(ray.origin, ray.direction);
+    const double t = std::sqrt(36.0 - glm::dot(ray.origin, ray.origin) + along * along) - along;
+    const glm::dvec3 p = ray.origin + t * ray.direction;
+    return glm::dvec4(0.5 + 0.4 * std::sin(2.1 * p.y + 0.7 * p.z) * std::sin(1.3 * p.x),
+                      0.5 + 0.4 * std::cos(2.3 * p.z - 1.1 * p.y + p.x),
+                      0.5 + 0.4 * std::sin(2.7 * p.y - 1.9 * p.x), 1.0);
+  };
+  for (const double radius : {0.0, 0.005}) {
+    std::vector<SmallPhoto> photos;
+    for (int i = 0; i < 16; ++i) {
+      const glm::dvec3 to(std::cos(0.4 * i), std::sin(0.4 * i), 0.2 * (i % 3 - 1));
+      photos.push_back(photo_of(look_at(radius * to, to, {0, 0, 1}, 80, 60, 70), ball_around));
+    }
+    const double guess = radius > 0 ? radius : 1.0;
+    const DepthRange depths = swept_depths(photos, guess, 3);
+    CHECK(depths.open);
+    const PointCloud points = swept_points(photos, depths, 400, 0.25, 3);
+    CHECK(points.size() > 390);
+    std::size_t far = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float* p = points.positions.data() + 3 * i;
+      if (glm::length(glm::dvec3(p[0], p[1], p[2])) > (radius > 0 ? 10 * radius : 1.0)) ++far;
+    }
+    MESSAGE(far << " of " << points.size() << " points beyond 10 radii");
+    CHECK(far > points.size() * 8 / 10);
+  }
+  // Photos that tell depths keep the guess.
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 9; ++i) {
+    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
+    photos.push_back(
+        photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90), wall));
+  }
+  const DepthRange depths = swept_depths(photos, 3.0, 3);
+  CHECK(!depths.open);
+  CHECK(depths.typical == 3.0);
+  // So do those of an object before a white backdrop, which agrees with itself at any depth.
+  std::vector<SmallPhoto> studio;
+  for (const SmallPhoto& photo : photos) {
+    studio.push_back(photo_of(photo.camera, [](const CameraRay& ray) {
+      const glm::dvec3 p = ray.origin + (4.0 - ray.origin.x) / ray.direction.x * ray.direction;
+      return std::abs(p.y) < 0.5 && std::abs(p.z) < 0.5 ? wall(ray) : glm::dvec4(1.0);
+    }));
+  }
+  const DepthRange before_white = swept_depths(studio, 3.0, 3);
+  CHECK(!before_white.open);
+  CHECK(before_white.typical == 3.0);
+}
+
+TEST_CASE("few sparse points get company from the photos, up to the limit") {
+  Dataset dataset;
+  std::vector<SmallPhoto> photos;
+  std::vector<Camera> cameras;
+  for (int i = 0; i < 9; ++i) {
+    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
+    cameras.push_back(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90));
+    photos.push_back(photo_of(cameras.back(), wall));
+  }
+  for (int i = 0; i < 60; ++i) {
+    dataset.points.positions.insert(dataset.points.positions.end(),
+                                    {4.0f, 0.01f * static_cast<float>(i), 0.1f});
+    dataset.points.colors.insert(dataset.points.colors.end(), {0.5f, 0.5f, 0.5f});
+  }
+  TrainOptions options;
+  const auto first = [&](std::size_t limit) {
+    return initial_model(
+               dataset, cameras, [&photos]() -> const auto& { return photos; }, limit, options)
+        .size();
+  };
+  CHECK(first(1000) > 60 + 200);
+  options.init_count = 500;
+  CHECK(first(500) > 400);
+  CHECK(first(500) <= 500);
+  options.init = "colmap";
+  CHECK(first(1000) == 60);
 }

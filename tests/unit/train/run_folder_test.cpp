@@ -2,7 +2,12 @@
 #include "train/run_folder.hpp"
 
 #include <doctest/doctest.h>
+#include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
 #include <vector>
 
 using namespace raysplats;
@@ -27,4 +32,21 @@ TEST_CASE("a run that ends below its best evaluation is told, unless that saw ot
   const auto best = better_before(std::vector{row(5, 21, 3), row(10, 23, 3), row(20, 20, 3)});
   REQUIRE(best.has_value());
   CHECK(best->iteration == 10);
+}
+
+TEST_CASE("rows of an older metrics.csv stay when its run goes on") {
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() /
+                                       ("raysplats_run_folder_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  // Without the two columns that came later; the third row was cut off.
+  std::ofstream(folder / "metrics.csv") << "iteration,seconds,loss,psnr,gaussians,it_per_s\n10,1.5,"
+                                           "0.5,12,100,7\n20,3,0.4,13,100,7\n30,4";
+  RunFolder run(folder);
+  run.begin_metrics(30);
+  std::ifstream stream(folder / "metrics.csv");
+  const std::string text(std::istreambuf_iterator<char>(stream), {});
+  CHECK(text ==
+        "iteration,seconds,loss,psnr,gaussians,it_per_s,candidates,hits\n10,1.5,0.5,12,100,7,0,0\n"
+        "20,3,0.4,13,100,7,0,0\n");
+  std::filesystem::remove_all(folder);
 }
