@@ -12,6 +12,7 @@
 #include "base/interrupt.hpp"
 #include "core/morton_order.hpp"
 #include "core/orbit.hpp"
+#include "core/trace_rows.hpp"
 #include "io/data_origin.hpp"
 #include "io/scene_loader.hpp"
 #include "options.hpp"
@@ -20,6 +21,7 @@
 #include "render_flags.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/model_source.hpp"
+#include "view/dropped_meshes.hpp"
 #include "view/photos.hpp"
 #include "view/view_state.hpp"
 #include "view/viewer.hpp"
@@ -66,16 +68,59 @@ std::optional<glm::dvec3> up_of(const Options& options) {
   return glm::dvec3(up[0], up[1], up[2]);
 }
 
+/// A model with the light that dropped meshes get, as scene_head() and scene_tail() say it.
+Scene scene_of(const Gaussians& gaussians, const TraceOptions& trace, const glm::dvec3& up) {
+  Scene scene;
+  scene.gaussians = gaussians;
+  scene.trace = trace;
+  scene.lights.push_back(view::page_light(up));
+  if (trace.sky.empty()) {
+    scene.environment.color = trace.background;
+  } else {
+    scene.environment.color = {1, 1, 1};
+    scene.environment.sky = trace.sky;
+  }
+  return scene;
+}
+
+std::string scene_head(const ModelSource& source) {
+  return fmt::format(
+      "# What the page of `raysplats view` showed. The files of the meshes belong beside this "
+      "one.\n"
+      "\n[[model]]\nfile = {}\n",
+      view::quoted(std::filesystem::absolute(source.file).string()));
+}
+
+/// Light, samples, and how tracing differs from what the model itself says.
+std::string scene_tail(const ModelSource& source, TraceOptions trace, const glm::dvec3& up) {
+  const Light light = view::page_light(up);
+  std::string text = fmt::format(
+      "\n[[light]]\nkind = \"directional\"\ndirection = [{}, {}, {}]\n\n[render]\nsamples = 16\n",
+      light.direction[0], light.direction[1], light.direction[2]);
+  TraceOptions own = trace_options(source, false);
+  const std::vector<OptionRow> given = trace_rows(trace);
+  const std::vector<OptionRow> trained = trace_rows(own);
+  std::string rows;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (given[i].text() != trained[i].text())
+      rows += fmt::format("{} = {}\n", given[i].name, given[i].text());
+  }
+  return rows.empty() ? text : text + "\n[trace]\n" + rows;
+}
+
 /// Draws for the pages until a signal comes.
 void serve(const Options& options,
            view::PictureSource& pictures,
            view::ViewState state,
+           view::DroppedMeshes* meshes,
            view::Photos* photos = nullptr) {
   state.name = std::filesystem::path(options.model).filename().string();
   if (state.name.empty()) state.name = options.model;
   state.has_depth = pictures.has_depth();
   view::ViewerOptions viewer_options = options.viewer;
   state.has_photos = photos != nullptr;
+  state.takes_meshes = meshes != nullptr;
+  viewer_options.meshes = meshes;
   viewer_options.state = view::state_json(state);
   if (photos != nullptr)
     viewer_options.photo = [photos](std::size_t number) { return photos->jpeg(number); };
@@ -103,7 +148,10 @@ void view_scene(const Options& options) {
                             loaded.scene.meshes.size(), loaded.scene.lights.size());
   const std::unique_ptr<Context> context = open_context(options.device);
   const auto pictures = view::scene_pictures(*context, loaded.scene);
-  serve(options, *pictures, std::move(state));
+  view::DroppedMeshes meshes(
+      [&](const std::vector<Mesh>& shown) { pictures->set_meshes(shown); },
+      "# To be added to the scene file; the files of the meshes belong beside it.\n", "");
+  serve(options, *pictures, std::move(state), &meshes);
 }
 
 void view_model(const Options& options) {
@@ -120,12 +168,19 @@ void view_model(const Options& options) {
   const Mirrors mirrors = mirrors_of(source);
   const std::unique_ptr<Context> context = open_context(options.device);
   const Model model(*context, gaussians);
-  const auto pictures = view::model_pictures(*context, model, trace, mirrors);
+  const glm::dvec3 above = state.up;
+  const auto pictures =
+      view::pictures_with_meshes(*context, view::model_pictures(*context, model, trace, mirrors),
+                                 [&] { return scene_of(gaussians, trace, above); });
+  view::DroppedMeshes meshes([&](const std::vector<Mesh>& shown) { pictures->set_meshes(shown); },
+                             scene_head(source), scene_tail(source, trace, above));
   state.has_near = mirrors.meshes.empty();
   state.near_depth = trace.near_depth;
   state.has_order = true;
   view::Photos photos(views, trace.background);
-  serve(options, *pictures, std::move(state), options.cameras.empty() ? &photos : nullptr);
+  // Mirrors that a model was trained with are no part of a scene.
+  serve(options, *pictures, std::move(state), mirrors.meshes.empty() ? &meshes : nullptr,
+        options.cameras.empty() ? &photos : nullptr);
 }
 
 void check(const Options& options) {

@@ -83,6 +83,19 @@ Image GaussianPictures::normals_of(const Camera& camera, const Watch& watch) {
 
 Image GaussianPictures::draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) {
   const auto turn = context_.lock();
+  try {
+    return drawn(request, sample, watch);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInterrupted) return {};
+    // Others may need what it has; half of it is of no use here.
+    if (error.code() != ErrorCode::kUsage) release();
+    throw;
+  }
+}
+
+Image GaussianPictures::drawn(const ViewRequest& request,
+                              std::uint64_t sample,
+                              const Watch& watch) {
   const bool depth = request.output == Output::kDepth || request.output == Output::kHits;
   const bool normals = request.output == Output::kNormals;
   if (normals && !has_depth()) throw UsageError("A scene with mirrors has no single normal");
@@ -92,13 +105,8 @@ Image GaussianPictures::draw(const ViewRequest& request, std::uint64_t sample, c
   const Watched watched(views, watch);
   const Camera camera = jittered(request.camera, sample);
   Image sums;
-  try {
-    views.forward(gaussians_, camera);
-    if (normals) sums = normals_of(camera, watch);
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::kInterrupted) throw;
-    return {};
-  }
+  views.forward(gaussians_, camera);
+  if (normals) sums = normals_of(camera, watch);
   const Image rgba = views.download_image();
   if (normals) return normals_picture(sums, rgba, camera);
   if (request.output == Output::kHits) return hits_picture(views.download_depth());

@@ -35,10 +35,11 @@ class GaussianPictures : public PictureSource {
     options_.background = background;
     options_.sky = sky;
   }
-  /// Gives the device's memory back until the next picture.
-  void release();
 
  private:
+  /// Gives the device's memory back until the next picture.
+  void release();
+  Image drawn(const ViewRequest& request, std::uint64_t sample, const Watch& watch);
   ViewTracer& tracer(bool depth, const ViewRequest& request);
 
   Image normals_of(const Camera& camera, const Watch& watch);

@@ -6,6 +6,7 @@
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "raysplats/context.hpp"
 #include "raysplats/image.hpp"
@@ -37,6 +38,14 @@ class PictureSource {
   virtual bool has_depth() const = 0;
 };
 
+/// Pictures into which pages can drop meshes.
+class MeshPictures : public PictureSource {
+ public:
+  /// Draws exactly these besides its own, in the world; their materials index surface_materials().
+  /// Throws what PathTracer throws, and draws what it drew before then.
+  virtual void set_meshes(const std::vector<Mesh>& meshes) = 0;
+};
+
 /// Gaussians alone, or with mirrors: what `render MODEL` draws. The model and the context outlive
 /// it.
 std::unique_ptr<PictureSource> model_pictures(Context& context,
@@ -45,6 +54,13 @@ std::unique_ptr<PictureSource> model_pictures(Context& context,
                                               const Mirrors& mirrors);
 
 /// A scene file's: what `render scene.toml` draws, its first frame's meshes.
-std::unique_ptr<PictureSource> scene_pictures(Context& context, const Scene& scene);
+std::unique_ptr<MeshPictures> scene_pictures(Context& context, Scene scene);
+
+/// `plain` until there are meshes, then `scene` with them, of colour and alpha; the other outputs
+/// are those of `plain` always. `scene` is asked for when the first mesh comes, and its memory is
+/// given back with the last.
+std::unique_ptr<MeshPictures> pictures_with_meshes(Context& context,
+                                                   std::unique_ptr<PictureSource> plain,
+                                                   std::function<Scene()> scene);
 
 }  // namespace raysplats::view

@@ -7,8 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "raysplats/error.hpp"
-
 namespace raysplats::view {
 namespace {
 
@@ -73,7 +71,7 @@ bool RunView::wants_look() {
   const double passed = std::chrono::duration<double>(now - last_).count();
   last_ = now;
   if (viewer_.asked()) return true;
-  if (viewer_.watchers() == 0 || out_of_memory_) {
+  if (viewer_.watchers() == 0) {
     time_.reset();
     return false;
   }
@@ -87,16 +85,8 @@ RunWish RunView::look(const RunMoment& moment, const std::function<bool()>& stop
   pictures_.set_background(moment.background, moment.sky);
   // The model is another one than that of the last picture.
   if (goes_on && !viewer_.awaited()) viewer_.refresh();
-  try {
-    viewer_.work(pictures_, moment.iteration, paused_ ? kPausedWait : 0.0, stopping);
-  } catch (const ResourceError& error) {
-    // The run itself has what it needs, and goes on.
-    pictures_.release();
-    out_of_memory_ = true;
-    spdlog::warn("no pictures for the page: {}", error.what());
-    viewer_.tell(nlohmann::json{{"type", "error"}, {"text", error.what()}}.dump(
-        -1, ' ', false, nlohmann::json::error_handler_t::replace));
-  }
+  // What cannot be drawn is the page's trouble: the run itself goes on.
+  viewer_.work(pictures_, moment.iteration, paused_ ? kPausedWait : 0.0, stopping);
   if (goes_on) time_.spend(std::chrono::duration<double>(Clock::now() - start).count());
   return {paused_, std::exchange(save_, false)};
 }

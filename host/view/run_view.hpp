@@ -50,7 +50,6 @@ class RunView : public RunWatcher {
   Clock::time_point last_ = Clock::now();  ///< of wants_look()
   bool paused_ = false;
   bool save_ = false;
-  bool out_of_memory_ = false;
   Viewer viewer_;  // last: its thread uses the history
 };
 

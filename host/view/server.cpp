@@ -144,6 +144,10 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
       if (self->socket_.got_text()) {
         const std::string text = beast::buffers_to_string(self->buffer_.data());
         self->server_.handlers.message(self->id_, text);
+      } else if (self->server_.handlers.bytes) {
+        const auto data = self->buffer_.data();
+        self->server_.handlers.bytes(self->id_,
+                                     {static_cast<const std::byte*>(data.data()), data.size()});
       }
       self->buffer_.consume(self->buffer_.size());
       self->read();

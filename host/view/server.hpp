@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,6 +33,8 @@ struct ServerHandlers {
   std::function<HttpReply(std::string_view path)> get;
   std::function<void(ClientId)> opened;
   std::function<void(ClientId, std::string_view text)> message;
+  /// A binary message; none: they are left alone.
+  std::function<void(ClientId, std::span<const std::byte> bytes)> bytes;
   std::function<void(ClientId)> closed;
 };
 

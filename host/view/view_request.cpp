@@ -20,6 +20,9 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr double kFarthest = 1e6;
+constexpr double kMostTurn = 3600.0;  // degrees
+constexpr double kLeastSize = 1e-6;   // of a mesh
+constexpr std::size_t kLongestName = 200;
 constexpr double kRigid = 1e-2;  // deviation of a pose from a rotation that rounding may cause
 
 [[noreturn]] void refuse(const std::string& what) {
@@ -126,6 +129,58 @@ ViewRequest view_of(const Json& json, int max_side) {
   return request;
 }
 
+glm::dvec3 vector(const Json& json, const char* key, double most) {
+  const std::array<double, 3> v = numbers<3>(json, key, -most, most);
+  return {v[0], v[1], v[2]};
+}
+
+Placement placement_of(const Json& json) {
+  Placement out;
+  const std::string surface = text(json, "material");
+  if (surface == "glass") {
+    out.surface = Surface::kGlass;
+  } else if (surface == "diffuse") {
+    out.surface = Surface::kDiffuse;
+  } else if (surface != "mirror") {
+    refuse("asks for an unknown 'material'");
+  }
+  out.at = vector(json, "at", kFarthest);
+  out.rotate = vector(json, "rotate", kMostTurn);
+  out.size = number(member(json, "size"), "size", kLeastSize, kFarthest);
+  return out;
+}
+
+MeshOffer offer_of(const Json& json) {
+  MeshOffer out;
+  const std::string format = text(json, "format");
+  if (format == "ply") {
+    out.format = io::MeshFormat::kPly;
+  } else if (format == "glb") {
+    out.format = io::MeshFormat::kGltf;
+  } else if (format != "obj") {
+    refuse("has a mesh that is neither OBJ nor PLY nor GLB");
+  }
+  out.name = text(json, "name");
+  const bool plain = std::none_of(out.name.begin(), out.name.end(), [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '/' || c == '\\';
+  });
+  if (out.name.empty() || out.name.size() > kLongestName || !plain)
+    refuse(fmt::format("has a 'name' that is no file name of up to {} bytes", kLongestName));
+  const double bytes = number(member(json, "bytes"), "bytes", 0.0, kFarthest * kFarthest);
+  if (bytes < 1.0 || bytes > static_cast<double>(kMostMeshBytes)) {
+    throw UsageError(
+        fmt::format("A mesh has 1 byte to {} MiB here: put a larger one into a scene file",
+                    kMostMeshBytes >> 20));
+  }
+  out.bytes = static_cast<std::size_t>(bytes);
+  out.placement = placement_of(json);
+  return out;
+}
+
+std::uint32_t mesh_of(const Json& json) {
+  return static_cast<std::uint32_t>(number(member(json, "mesh"), "mesh", 0.0, 4294967295.0));
+}
+
 }  // namespace
 
 Message parse_message(std::string_view message, int max_side) {
@@ -146,6 +201,11 @@ Message parse_message(std::string_view message, int max_side) {
     return RunCommand{Kind::kShare, number(member(json, "share"), "share", 0.0, kMostShare)};
   }
   if (type == "leave") return Leave{};
+  if (type == "mesh") return offer_of(json);
+  if (type == "place") return PlaceMesh{mesh_of(json), placement_of(json), flag(json, "moving")};
+  if (type == "remove") return RemoveMesh{mesh_of(json)};
+  if (type == "meshes") return MeshQuestion{};
+  if (type == "scene") return SceneQuestion{view_of(json, max_side).camera};
   refuse("has an unknown 'type'");
 }
 

@@ -3,10 +3,13 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <variant>
 
+#include "io/mesh_file.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/trace_options.hpp"
 
@@ -44,7 +47,53 @@ constexpr double kMostShare = 0.9;
 /// The page is out of sight: it wants nothing until its next ViewRequest.
 struct Leave {};
 
-using Message = std::variant<ViewRequest, PickRequest, RunCommand, Leave>;
+enum class Surface { kMirror, kGlass, kDiffuse };
+
+/// Where a dropped mesh is and what it is made of: scaled, turned about the fixed axes x, y and z
+/// in this order, and the middle of its box then put to `at`, as a scene file does.
+struct Placement {
+  Surface surface = Surface::kMirror;
+  glm::dvec3 at{0.0};      ///< world
+  glm::dvec3 rotate{0.0};  ///< degrees
+  double size = 1.0;       ///< half the diagonal of its box, world units
+};
+
+/// A mesh that is to come in binary messages.
+struct MeshOffer {
+  io::MeshFormat format = io::MeshFormat::kObj;
+  std::string name;       ///< what the page calls its file; nothing here opens it
+  std::size_t bytes = 0;  ///< of the file, 1 to kMostMeshBytes
+  Placement placement;
+};
+constexpr std::size_t kMostMeshBytes = std::size_t{32} << 20;
+
+struct PlaceMesh {
+  std::uint32_t mesh = 0;  ///< number that it was given
+  Placement placement;
+  bool moving = false;  ///< more are to follow
+};
+
+struct RemoveMesh {
+  std::uint32_t mesh = 0;
+};
+
+/// Asks for the list of meshes.
+struct MeshQuestion {};
+
+/// Asks for the scene file of what the page sees.
+struct SceneQuestion {
+  Camera camera;
+};
+
+using Message = std::variant<ViewRequest,
+                             PickRequest,
+                             RunCommand,
+                             Leave,
+                             MeshOffer,
+                             PlaceMesh,
+                             RemoveMesh,
+                             MeshQuestion,
+                             SceneQuestion>;
 
 /// Longest message that is parsed, in bytes.
 constexpr std::size_t kMaxMessage = 16384;

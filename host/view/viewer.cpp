@@ -9,14 +9,19 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <limits>
 #include <map>
 #include <mutex>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <utility>
+#include <variant>
 
 #include "raysplats/error.hpp"
+#include "view/mesh_uploads.hpp"
 #include "view/pace.hpp"
 #include "view/page.hpp"
 #include "view/picture_file.hpp"
@@ -36,9 +41,19 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+/// What pages say about meshes, in the order in which they say it.
+using MeshMessage = std::variant<SentMesh, PlaceMesh, RemoveMesh, MeshQuestion, SceneQuestion>;
+
 /// Pictures are sent at 1, 2, 4, 8, ... samples, and at the last one.
 bool worth_sending(std::uint64_t samples, std::uint64_t most) {
   return samples == most || (samples & (samples - 1)) == 0;
+}
+
+/// What went wrong, for people.
+std::string sentence(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)
+    return "There is not enough memory for the picture: make the window smaller";
+  return error.what();
 }
 
 /// One page.
@@ -76,6 +91,7 @@ struct Viewer::Impl {
                {[this](std::string_view path) { return get(path); },
                 [this](ClientId id) { opened(id); },
                 [this](ClientId id, std::string_view text) { heard(id, text); },
+                [this](ClientId id, std::span<const std::byte> bytes) { received(id, bytes); },
                 [this](ClientId id) { closed(id); }}) {}
 
   HttpReply get(std::string_view path) const {
@@ -109,6 +125,7 @@ struct Viewer::Impl {
   void closed(ClientId id) {
     const std::lock_guard<std::mutex> guard(mutex);
     clients.erase(id);
+    uploads.forget(id);
   }
   void heard(ClientId id, std::string_view text) {
     try {
@@ -127,14 +144,57 @@ struct Viewer::Impl {
           client.wish = ++wishes;  // what is drawn of the last one comes too late
         } else if (auto* pick = std::get_if<PickRequest>(&message)) {
           if (picks.size() < kMostWaiting) picks.emplace_back(id, std::move(*pick));
-        } else if (commands.size() < kMostWaiting) {
-          commands.push_back(std::get<RunCommand>(message));
+        } else if (auto* command = std::get_if<RunCommand>(&message)) {
+          if (commands.size() < kMostWaiting) commands.push_back(*command);
+        } else if (options.meshes == nullptr) {
+          throw UsageError("Meshes can be dropped into `raysplats view` alone");
+        } else if (auto* offer = std::get_if<MeshOffer>(&message)) {
+          uploads.begin(id, *offer, Clock::now());
+        } else {
+          wait(id, std::move(message));
         }
       }
       news.notify_one();
     } catch (const Error& error) {
       complain(id, error.what());
     }
+  }
+
+  void received(ClientId id, std::span<const std::byte> bytes) {
+    try {
+      {
+        const std::lock_guard<std::mutex> guard(mutex);
+        std::optional<SentMesh> sent = uploads.take(id, bytes, Clock::now());
+        if (!sent) return;
+        const bool room = std::none_of(about_meshes.begin(), about_meshes.end(), [](const auto& m) {
+          return std::holds_alternative<SentMesh>(m.second);
+        });
+        if (!room) throw UsageError("A mesh is being read already: drop this one again");
+        about_meshes.emplace_back(id, std::move(*sent));
+      }
+      news.notify_one();
+    } catch (const Error& error) {
+      complain(id, error.what());
+    }
+  }
+
+  /// Puts a message about meshes in line; of a mesh that moves only the newest place stays.
+  void wait(ClientId id, Message message) {
+    MeshMessage next;
+    if (auto* place = std::get_if<PlaceMesh>(&message)) {
+      if (!about_meshes.empty()) {
+        auto* last = std::get_if<PlaceMesh>(&about_meshes.back().second);
+        if (last != nullptr && last->mesh == place->mesh) about_meshes.pop_back();
+      }
+      next = *place;
+    } else if (auto* remove = std::get_if<RemoveMesh>(&message)) {
+      next = *remove;
+    } else if (std::holds_alternative<MeshQuestion>(message)) {
+      next = MeshQuestion{};
+    } else {
+      next = std::get<SceneQuestion>(message);
+    }
+    if (about_meshes.size() < kMostWaiting) about_meshes.emplace_back(id, std::move(next));
   }
 
   void complain(ClientId id, const std::string& what) {
@@ -165,6 +225,11 @@ struct Viewer::Impl {
   }
 
   void answer(PictureSource& source, ClientId id, const PickRequest& pick);
+  void obey(ClientId id, MeshMessage message);
+  /// The page's wish cannot be drawn: it is told why, and nothing is tried until it wishes again.
+  void give_up(ClientId id, std::uint64_t wish, const std::exception& error);
+  void tell(const std::string& json);
+  void refresh();
   void draw(PictureSource& source,
             std::int64_t iteration,
             ClientId id,
@@ -178,6 +243,8 @@ struct Viewer::Impl {
   std::map<ClientId, Client> clients;
   std::deque<std::pair<ClientId, PickRequest>> picks;
   std::deque<RunCommand> commands;
+  MeshUploads uploads;
+  std::deque<std::pair<ClientId, MeshMessage>> about_meshes;
   std::uint64_t wishes = 0;
   std::uint64_t turns = 0;
   double hurry = 0.0;  ///< seconds for a picture of a page that rests; 0 = as long as it takes
@@ -198,8 +265,60 @@ void Viewer::Impl::answer(PictureSource& source, ClientId id, const PickRequest&
     if (const std::optional<glm::dvec3> point = source.point(request))
       reply["point"] = {point->x, point->y, point->z};
     server.send_text(id, reply.dump());
-  } catch (const UsageError& error) {
+  } catch (const std::exception& error) {
+    complain(id, sentence(error));
+  }
+}
+
+void Viewer::Impl::give_up(ClientId id, std::uint64_t wish, const std::exception& error) {
+  const std::string what = sentence(error);
+  if (dynamic_cast<const UsageError*>(&error) == nullptr)
+    spdlog::warn("no picture for the page: {}", what);
+  complain(id, what);
+  const std::lock_guard<std::mutex> guard(mutex);
+  const auto found = clients.find(id);
+  if (found != clients.end() && found->second.wish == wish) found->second.wanted.reset();
+}
+
+void Viewer::Impl::obey(ClientId id, MeshMessage message) {
+  DroppedMeshes& meshes = *options.meshes;
+  bool moving = false;
+  try {
+    if (auto* sent = std::get_if<SentMesh>(&message)) {
+      meshes.add(std::move(*sent));
+    } else if (const auto* place = std::get_if<PlaceMesh>(&message)) {
+      meshes.place(place->mesh, place->placement);
+      moving = place->moving;
+    } else if (const auto* remove = std::get_if<RemoveMesh>(&message)) {
+      meshes.remove(remove->mesh);
+    } else if (std::holds_alternative<MeshQuestion>(message)) {
+      return server.send_text(id, meshes.json());
+    } else {
+      const nlohmann::json reply{
+          {"type", "scene"}, {"text", meshes.scene_text(std::get<SceneQuestion>(message).camera)}};
+      return server.send_text(id, reply.dump());
+    }
+  } catch (const Error& error) {
     complain(id, error.what());
+    return server.send_text(id, meshes.json());
+  } catch (const std::bad_alloc&) {
+    return complain(id, "There is not enough memory for that mesh: simplify it first");
+  }
+  refresh();
+  if (!moving) tell(meshes.json());
+}
+
+void Viewer::Impl::tell(const std::string& json) {
+  const std::lock_guard<std::mutex> guard(mutex);
+  for (const auto& each : clients) server.send_text(each.first, json);
+}
+
+void Viewer::Impl::refresh() {
+  const std::lock_guard<std::mutex> guard(mutex);
+  for (auto& each : clients) {
+    if (!each.second.wanted || each.second.wanted->moving) continue;
+    each.second.drawn = 0;
+    each.second.sum = {};
   }
 }
 
@@ -244,12 +363,8 @@ void Viewer::Impl::draw(PictureSource& source,
   Image picture;
   try {
     picture = source.draw(request, sample, watch);
-  } catch (const UsageError& error) {
-    complain(id, error.what());
-    const std::lock_guard<std::mutex> guard(mutex);
-    const auto found = clients.find(id);
-    if (found != clients.end() && found->second.wish == wish) found->second.wanted.reset();
-    return;
+  } catch (const std::exception& error) {
+    return give_up(id, wish, error);
   }
   const double seconds = seconds_since(start);
   if (picture.pixels() == 0) return;
@@ -325,24 +440,14 @@ void Viewer::on_command(std::function<void(RunCommand)> handler) {
   impl_->on_command = std::move(handler);
 }
 
-void Viewer::tell(const std::string& json) {
-  const std::lock_guard<std::mutex> guard(impl_->mutex);
-  for (const auto& each : impl_->clients) impl_->server.send_text(each.first, json);
-}
+void Viewer::tell(const std::string& json) { impl_->tell(json); }
 
 void Viewer::tell_last(const std::string& json) {
   tell(json);
   impl_->server.flush(1.0);
 }
 
-void Viewer::refresh() {
-  const std::lock_guard<std::mutex> guard(impl_->mutex);
-  for (auto& each : impl_->clients) {
-    if (!each.second.wanted || each.second.wanted->moving) continue;
-    each.second.drawn = 0;
-    each.second.sum = {};
-  }
-}
+void Viewer::refresh() { impl_->refresh(); }
 
 void Viewer::set_hurry(double seconds) {
   const std::lock_guard<std::mutex> guard(impl_->mutex);
@@ -359,14 +464,19 @@ bool Viewer::work(PictureSource& source,
   std::optional<ClientId> client;
   std::optional<std::pair<ClientId, PickRequest>> pick;
   std::deque<RunCommand> commands;
+  std::optional<std::pair<ClientId, MeshMessage>> about_mesh;
   {
     std::unique_lock<std::mutex> lock(self.mutex);
     const auto something = [&] {
-      return !self.picks.empty() || !self.commands.empty() || self.next(source.samples());
+      return !self.picks.empty() || !self.commands.empty() || !self.about_meshes.empty() ||
+             self.next(source.samples());
     };
     if (!self.news.wait_for(lock, std::chrono::duration<double>(wait), something)) return false;
     commands.swap(self.commands);
-    if (!self.picks.empty()) {
+    if (!self.about_meshes.empty()) {
+      about_mesh = std::move(self.about_meshes.front());
+      self.about_meshes.pop_front();
+    } else if (!self.picks.empty()) {
       pick = std::move(self.picks.front());
       self.picks.pop_front();
     } else {
@@ -376,7 +486,9 @@ bool Viewer::work(PictureSource& source,
   for (const RunCommand command : commands) {
     if (self.on_command) self.on_command(command);
   }
-  if (pick) {
+  if (about_mesh) {
+    self.obey(about_mesh->first, std::move(about_mesh->second));
+  } else if (pick) {
     self.answer(source, pick->first, pick->second);
   } else if (client) {
     self.draw(source, iteration, *client, stop);

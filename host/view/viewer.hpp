@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "view/dropped_meshes.hpp"
 #include "view/picture_source.hpp"
 #include "view/server.hpp"
 
@@ -22,6 +23,9 @@ struct ViewerOptions {
   /// The JPEG of /api/photo/N, asked for from that thread too; nothing for a number that there is
   /// not. None: there are no photos.
   std::function<std::optional<std::string>(std::size_t number)> photo;
+  /// Meshes that pages drop, used in the thread of work(), and outliving the viewer. None: pages
+  /// cannot drop any.
+  DroppedMeshes* meshes = nullptr;
 };
 
 /// Shows a PictureSource to the pages that are open: takes what they want to see, the newest wish
@@ -50,9 +54,9 @@ class Viewer {
   /// The same as the last word: waits up to a second until it is on its way.
   void tell_last(const std::string& json);
 
-  /// Draws the next picture that a page waits for; `iteration` is that of the model. With nothing
-  /// to do waits for up to `wait` seconds and returns false. `stop` is asked within pictures, whose
-  /// drawing it ends.
+  /// Draws the next picture that a page waits for, or tells it why it cannot be drawn; `iteration`
+  /// is that of the model. With nothing to do waits for up to `wait` seconds and returns false.
+  /// `stop` is asked within pictures, whose drawing it ends.
   bool work(PictureSource& source,
             std::int64_t iteration,
             double wait,

@@ -135,6 +135,7 @@ class Channel:
 
     def receive(self):
         """The next message: ("text", object), ("picture", header, bytes) or ("close",)."""
+        kind, parts = 0, b""
         while True:
             first, second = self._take(2)
             size = second & 127
@@ -144,6 +145,11 @@ class Channel:
                 size, = struct.unpack("!Q", self._take(8))
             data = self._take(size)
             code = first & 15
+            if code < 8:  # the first frame of a message says what it is, the last one that it ends
+                kind, parts = code or kind, parts + data
+                if not first & 0x80:
+                    continue
+                code, data, parts = kind, parts, b""
             if code == 1:
                 return "text", json.loads(data)
             if code == 2:
@@ -151,6 +157,8 @@ class Channel:
                 return "picture", dict(zip(names, struct.unpack("<7I", data[:28]))), data[32:]
             if code == 8:
                 return ("close",)
+            if code == 9:  # a ping: whoever stays silent for a minute is shut out
+                self.send(data, code=10)
 
 
 def write_model(path):
@@ -169,6 +177,16 @@ def write_model(path):
         file.write(b"end_header\n")
         for row in rows:
             file.write(struct.pack(f"<{len(row)}f", *row))
+
+
+def psnr(first, second):
+    """Of the colours of two pictures, in dB."""
+    told = subprocess.run(["oiiotool", first, "--ch", "R,G,B", second, "--ch", "R,G,B", "--diff"],
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True).stdout
+    found = re.search(r"Peak SNR = (\S+)", told)
+    if not found:
+        raise RuntimeError(f"no PSNR in {told!r}")
+    return float(found.group(1))
 
 
 def view(number, size=(64, 48), eye=(0, 0, -6), **more):

@@ -6,6 +6,7 @@ import { Connection } from './connection.js';
 import { Crop } from './crop.js';
 import { Keyframes } from './keyframes.js';
 import { TrainingCameras } from './cameras.js';
+import { Meshes } from './meshes.js';
 import { Photo } from './photo.js';
 import { Pointers } from './pointers.js';
 import { Run } from './run.js';
@@ -25,6 +26,8 @@ let home = null;
 let saving = 0; // id of the picture to be saved as a file
 let picking = 0; // id of the last question for a point
 let frames = []; // when the last pictures of movements came
+let came = 0; // pictures so far
+let drawn = 0; // the one on the page, as they came
 const held = new Set(); // keys
 let run = null; // while the model trains
 let over = false; // the run has said that it ends
@@ -96,8 +99,10 @@ async function show(header, blob) {
     saving = 0;
     download(blob, 'view.png');
   }
+  const number = ++came;
   const bitmap = await createImageBitmap(blob);
-  if (header.id < seen.id) return; // a newer one has been quicker
+  if (number < drawn) return bitmap.close(); // a newer one has been quicker
+  drawn = number;
   picture.width = bitmap.width;
   picture.height = bitmap.height;
   picture.getContext('2d').drawImage(bitmap, 0, 0);
@@ -133,6 +138,12 @@ function heard(message) {
   } else if (message.type === 'error') {
     seen.errors.push(message.text);
     $('status').textContent = message.text;
+  } else if (message.type === 'meshes') {
+    meshes.take(message.meshes);
+    seen.meshes = message.meshes;
+  } else if (message.type === 'scene') {
+    seen.scene = message.text;
+    download(new Blob([message.text], { type: 'text/plain' }), 'scene.toml');
   } else if (message.type === 'run' && run) {
     if (message.ended) run.ended(message.ended);
     else run.ask();
@@ -219,6 +230,13 @@ function keyDown(event) {
 const cameras = new TrainingCameras($('cameras'), goTo);
 const photo = new Photo(drawOverlay);
 const crop = new Crop($('crop-sliders'), $('crop-text'), drawOverlay);
+const meshes = new Meshes($('mesh-section'), {
+  send: (message) => link.send(message),
+  sendBytes: (bytes) => link.sendBytes(bytes),
+  say: (text) => { $('status').textContent = text; },
+  changed,
+  target: () => rig.target,
+});
 const keyframes = new Keyframes({
   list: $('keyframes'),
   settings: () => ({
@@ -282,6 +300,18 @@ function wire() {
     $('fps').value = stored.fps;
     $('closed').checked = stored.closed;
   });
+  const stage = $('stage');
+  stage.addEventListener('dragover', (event) => event.preventDefault());
+  stage.addEventListener('drop', (event) => {
+    event.preventDefault();
+    if (!state.takes_meshes) $('status').textContent = 'Meshes cannot be dropped here';
+    else if (event.dataTransfer.files.length > 0) meshes.drop(event.dataTransfer.files[0]);
+  });
+  $('mesh-file').addEventListener('change', (event) => {
+    meshes.drop(event.target.files[0]);
+    event.target.value = '';
+  });
+  $('mesh-save').addEventListener('click', () => link.send({ type: 'scene', id: link.nextId(), ...wanted() }));
   document.addEventListener('visibilitychange', () => {
     if (document.hidden) link.leave();
     else link.rest();
@@ -309,10 +339,15 @@ async function start() {
   $('order').disabled = !state.has_order;
   cameras.fill(state.cameras, state.center);
   crop.begin(state.center, state.radius);
+  $('mesh-section').hidden = !state.takes_meshes;
+  meshes.begin(state.radius);
   link = new Connection(wanted, {
     picture: show,
     text: heard,
-    open: () => banner(''),
+    open: () => {
+      banner('');
+      if (state.takes_meshes) link.send({ type: 'meshes' });
+    },
     lost: () => {
       seen.lost += 1;
       if (!over) banner('The program does not answer: it may have ended. Trying again.');

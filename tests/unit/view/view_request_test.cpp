@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "raysplats/error.hpp"
 
@@ -138,4 +140,51 @@ TEST_CASE("messages that are not understood are refused in one sentence") {
   const std::string sound = sound_view().dump();
   for (std::size_t length = 0; length < sound.size(); ++length)
     CHECK(!refusal(sound.substr(0, length)).empty());
+}
+
+TEST_CASE("messages about meshes are understood, and refused where they are out of range") {
+  const json sound = {{"type", "mesh"},       {"format", "glb"},     {"name", "a b.glb"},
+                      {"bytes", 100},         {"material", "glass"}, {"at", {1, 2, 3}},
+                      {"rotate", {0, 90, 0}}, {"size", 0.5}};
+  const auto offer = std::get<MeshOffer>(parse_message(sound.dump(), 9));
+  CHECK(offer.format == io::MeshFormat::kGltf);
+  CHECK(offer.name == "a b.glb");
+  CHECK(offer.bytes == 100);
+  CHECK(offer.placement.surface == Surface::kGlass);
+  CHECK(offer.placement.at == glm::dvec3(1, 2, 3));
+  CHECK(offer.placement.rotate == glm::dvec3(0, 90, 0));
+  CHECK(offer.placement.size == 0.5);
+  const std::vector<std::pair<const char*, json>> wrong = {{"format", "gltf"},
+                                                           {"format", 1},
+                                                           {"name", "../a.obj"},
+                                                           {"name", "a\nb"},
+                                                           {"name", std::string(201, 'x')},
+                                                           {"name", ""},
+                                                           {"bytes", 0},
+                                                           {"bytes", 33554433},
+                                                           {"bytes", 1e300},
+                                                           {"material", "gold"},
+                                                           {"at", {0, 0, 1e7}},
+                                                           {"at", {0, 0}},
+                                                           {"rotate", {0, 0, 1e5}},
+                                                           {"size", 0},
+                                                           {"size", -1}};
+  for (const auto& [key, value] : wrong) {
+    json message = sound;
+    message[key] = value;
+    INFO(message.dump());
+    CHECK(!refusal(message.dump()).empty());
+  }
+  json place = sound;
+  place["type"] = "place";
+  place["mesh"] = 3;
+  place["moving"] = true;
+  const auto placed = std::get<PlaceMesh>(parse_message(place.dump(), 9));
+  CHECK(placed.mesh == 3);
+  CHECK(placed.moving);
+  CHECK(std::get<RemoveMesh>(parse_message(R"({"type":"remove","mesh":4})", 9)).mesh == 4);
+  CHECK(!refusal(R"({"type":"remove","mesh":-1})").empty());
+  json scene = sound_view();
+  scene["type"] = "scene";
+  CHECK(std::get<SceneQuestion>(parse_message(scene.dump(), 1000)).camera.width == 400);
 }

@@ -8,10 +8,14 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <functional>
+#include <memory>
+#include <new>
 #include <optional>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "raysplats/error.hpp"
 
@@ -147,4 +151,27 @@ TEST_CASE("a picture ends when its page has gone") {
   CHECK(pictures.drawn == 2);
   CHECK(!pictures.goes_on);
   CHECK(!viewer->work(pictures, 0, 0.0));
+}
+
+TEST_CASE("a picture that cannot be drawn is told to its page, which may ask again") {
+  const std::unique_ptr<Viewer> viewer = opened();
+  if (!viewer) return;
+  Page page(*viewer);
+  Pictures pictures;
+  for (const auto& fail : std::vector<std::function<void()>>{
+           [] { throw ResourceError("no memory"); }, [] { throw DeviceError("no kernel"); },
+           [] { throw UsageError("no depth"); }, [] { throw std::bad_alloc(); }}) {
+    pictures.meanwhile = fail;
+    page.say(kView);
+    wait_until([&] { return viewer->watchers() == 1; });
+    CHECK(viewer->work(pictures, 0, 1.0));
+    // Until it asks again nothing is tried.
+    CHECK(viewer->watchers() == 0);
+    CHECK(!viewer->work(pictures, 0, 0.0));
+  }
+  pictures.meanwhile = {};
+  page.say(kView);
+  wait_until([&] { return viewer->watchers() == 1; });
+  CHECK(viewer->work(pictures, 0, 1.0));
+  CHECK(pictures.drawn == 5);
 }
