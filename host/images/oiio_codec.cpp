@@ -69,6 +69,7 @@ class OiioDecoder : public ImageDecoder {
     const unsigned char type = input_->spec().format.basetype;
     return type == OIIO::TypeDesc::UINT8 ? 1 : type == OIIO::TypeDesc::UINT16 ? 2 : 4;
   }
+  int orientation() const override { return input_->spec().get_int_attribute("Orientation", 1); }
   RawImage decode() override {
     switch (sample_bytes()) {
       case 1:

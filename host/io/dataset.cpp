@@ -17,6 +17,7 @@
 #include "io/colmap_model.hpp"
 #include "io/data_origin.hpp"
 #include "io/image_file.hpp"
+#include "io/photo_turn.hpp"
 #include "io/ply_points.hpp"
 #include "io/transforms.hpp"
 #include "raysplats/error.hpp"
@@ -52,18 +53,26 @@ fs::path find_mask(const fs::path& root, const fs::path& name) {
   return {};
 }
 
+bool has_shape(const io::ImageSize& photo, const Camera& camera) {
+  const double expected_height = static_cast<double>(camera.height) * photo.width / camera.width;
+  return std::abs(expected_height - photo.height) <= std::max(2.0, 0.02 * photo.height);
+}
+
 /// Sets the cameras of a view: `nominal` is the camera at the size that its model states, the photo
-/// may have another (reduced copies, rounding by a pixel), and is used reduced by `factor`.
+/// may have another (reduced copies, rounding by a pixel) or lie on its side (photo_turn.hpp), and
+/// is used reduced by `factor`.
 void set_cameras(
-    View& view, const Camera& nominal, const io::ImageSize& photo, double factor, bool undistort) {
+    View& view, const Camera& nominal, io::ImageSize photo, double factor, bool undistort) {
+  if (!has_shape(photo, nominal)) {
+    const io::ImageSize turned{photo.height, photo.width, photo.sample_bytes};
+    if (has_shape(turned, nominal) && io::lies_on_its_side(view.image_path)) photo = turned;
+  }
   const double scale_x = static_cast<double>(photo.width) / nominal.width;
   const double scale_y = static_cast<double>(photo.height) / nominal.height;
-  const double expected_height = nominal.height * scale_x;
-  if (std::abs(expected_height - photo.height) > std::max(2.0, 0.02 * photo.height)) {
+  if (!has_shape(photo, nominal)) {
     throw DataError(fmt::format(
         "The image {} has {} x {} pixels but its camera {} x {}, which is another shape: use the "
-        "photos that "
-        "the cameras belong to",
+        "photos that the cameras belong to",
         view.image_path.string(), photo.width, photo.height, nominal.width, nominal.height));
   }
   view.source_camera = nominal;

@@ -43,6 +43,8 @@ class ImageDecoder {
   virtual int height() const = 0;
   /// Bytes of a number that decode() gives: 1, 2 or 4.
   virtual int sample_bytes() const = 0;
+  /// As EXIF counts; 1 is upright.
+  virtual int orientation() const { return 1; }
   /// Throws DataError.
   virtual RawImage decode() = 0;
 };

@@ -203,6 +203,10 @@ ImageSize image_size(const std::filesystem::path& path) {
   return {input->width(), input->height(), bytes ? 1 : input->sample_bytes()};
 }
 
+int image_orientation(const std::filesystem::path& path) {
+  return image_codec().open(checked_format(path, false), path.string(), {})->orientation();
+}
+
 Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const std::string_view format = format_of(text);

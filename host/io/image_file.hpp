@@ -22,6 +22,9 @@ struct ImageSize {
 /// Reads the header of an image that read_image() accepts. Throws DataError as read_image() does.
 ImageSize image_size(const std::filesystem::path& path);
 
+/// The EXIF orientation of such an image; 1 (upright) where it says none. Throws DataError.
+int image_orientation(const std::filesystem::path& path);
+
 /// read_image() without a conversion of its numbers.
 RawImage read_raw_image(const std::filesystem::path& path);
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/image_file.hpp"
+#include "io/photo_turn.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
@@ -30,6 +31,10 @@ MaskPlane load_mask(const View& view) {
 }  // namespace
 
 ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
+  // Sizes that differ by a turn alone are of set_cameras() (dataset.cpp).
+  const bool across = raw_.width != raw_.height && raw_.width == view.source_camera.height &&
+                      raw_.height == view.source_camera.width;
+  if (across && lies_on_its_side(view.image_path)) raw_ = upright(raw_, view.image_path);
   if (raw_.width != view.source_camera.width || raw_.height != view.source_camera.height) {
     throw DataError(
         fmt::format("The image {} has {} x {} pixels now, but {} x {} when the data set was opened",

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "io/image_codec.hpp"
+
+namespace raysplats::io {
+
+/// Cameras belong to the pixels as they are stored, as COLMAP and most tools see them; others turn
+/// photos of telephones upright first, as their EXIF orientation says. Which of both a camera's
+/// maker did shows in its shape alone, so that a photo is turned only where that fits.
+
+/// Whether the file says that its photo lies on its side: EXIF orientation 6 or 8. Throws DataError
+/// as image_size().
+bool lies_on_its_side(const std::filesystem::path& path);
+
+/// The picture of such a file, turned upright.
+RawImage upright(const RawImage& raw, const std::filesystem::path& path);
+
+}  // namespace raysplats::io
