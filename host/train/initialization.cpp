@@ -7,13 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <set>
 
 #include "base/rng.hpp"
 #include "core/gaussian_selection.hpp"
@@ -21,6 +18,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "train/photo_start.hpp"
+#include "train/point_check.hpp"
 
 namespace raysplats {
 namespace {
@@ -140,44 +138,27 @@ void append_point(const PointCloud& from, std::size_t i, PointCloud& to) {
   to.colors.insert(to.colors.end(), from.colors.data() + 3 * i, from.colors.data() + 3 * i + 3);
 }
 
-// Infinite without cameras.
-double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Camera& camera : cameras)
-    least = std::min(least, glm::distance(camera.center(), point));
-  return least;
-}
-
-double median_distance(std::span<const Camera> cameras, const glm::dvec3& point) {
-  std::vector<double> distances;
-  distances.reserve(cameras.size());
-  for (const Camera& camera : cameras)
-    distances.push_back(std::max(glm::distance(camera.center(), point), 1e-6));
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
-}
-
-glm::dvec3 view_axis(const Camera& camera) {
-  return glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1);
-}
-
-glm::dvec3 mean_center(std::span<const Camera> cameras) {
-  glm::dvec3 sum(0.0);
-  for (const Camera& camera : cameras) sum += camera.center();
-  return cameras.empty() ? sum : sum / static_cast<double>(cameras.size());
-}
-
 // The finite points within the box, each place once: equal neighbours would leave a point no size.
 PointCloud distinct_points(const PointCloud& points, const std::optional<Bounds>& bounds) {
-  std::set<std::array<float, 3>> places;
-  PointCloud out;
+  const auto place = [&points](std::uint32_t i) {
+    const float* p = points.positions.data() + 3 * static_cast<std::size_t>(i);
+    return std::array<float, 3>{p[0], p[1], p[2]};
+  };
+  std::vector<std::uint32_t> order;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const float* p = points.positions.data() + 3 * i;
-    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
-    if (bounds && !bounds->contains(p[0], p[1], p[2])) continue;
-    if (places.insert({p[0], p[1], p[2]}).second) append_point(points, i, out);
+    const auto [x, y, z] = place(static_cast<std::uint32_t>(i));
+    if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z)) continue;
+    if (!bounds || bounds->contains(x, y, z)) order.push_back(static_cast<std::uint32_t>(i));
   }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
+  const auto end = std::unique(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return place(a) == place(b);
+  });
+  order.erase(end, order.end());
+  std::sort(order.begin(), order.end());
+  PointCloud out;
+  for (const std::uint32_t i : order) append_point(points, i, out);
   return out;
 }
 
@@ -218,47 +199,39 @@ PointCloud photo_points(const Dataset& dataset,
   return swept_points(photos, swept_depths(photos, guess, seed), count, kUnsureShare, seed);
 }
 
+std::string match_text(const PointMatch& match) {
+  std::string out = fmt::format("{:.0f} % lie before a camera", 100 * match.seen);
+  if (match.difference)
+    out += fmt::format(", colours differ by {:.2f} of what chance does", *match.difference);
+  if (match.scale != 1)
+    out += fmt::format(", and by {:.2f} at {:.3g} times the size", match.scaled_difference,
+                       match.scale);
+  return out;
+}
+
+// The data set's points to start from: none where a start is free to do without and the photos show
+// something else.
+PointCloud start_points(const Dataset& dataset,
+                        std::span<const Camera> cameras,
+                        const PhotoSource& photos,
+                        const TrainOptions& options) {
+  const PointCloud reliable = reliable_points(dataset.points);
+  if (options.init == "auto") {
+    const PointMatch match = match_points(reliable, cameras, photos(PhotoChoice::kSome));
+    spdlog::debug("sparse points: {}", match_text(match));
+    if (!plausible(match)) {
+      spdlog::warn(
+          "the sparse points of {} are not where the photos show them ({}): they may be in other "
+          "units or axes, and the start takes points from the photos instead; --init colmap takes "
+          "those of the data set",
+          dataset.root.string(), match_text(match));
+      return {};
+    }
+  }
+  return distinct_points(reliable, about_origin(options.bounds, dataset.origin));
+}
+
 }  // namespace
-
-double scene_extent(std::span<const Camera> cameras) {
-  const glm::dvec3 center = mean_center(cameras);
-  double radius = 0;
-  for (const Camera& camera : cameras)
-    radius = std::max(radius, glm::distance(camera.center(), center));
-  return radius > 1e-6 ? 1.1 * radius : 1.0;
-}
-
-Region visible_region(std::span<const Camera> cameras) {
-  const Region around{mean_center(cameras), 3.0 * scene_extent(cameras)};
-  // Least squares over the distances to the view axes: sum (I - d d^T) p = sum (I - d d^T) c.
-  glm::dmat3 normal(0.0);
-  glm::dvec3 right(0.0);
-  for (const Camera& camera : cameras) {
-    const glm::dvec3 d = view_axis(camera);
-    const glm::dmat3 projector = glm::dmat3(1.0) - glm::outerProduct(d, d);
-    normal += projector;
-    right += projector * camera.center();
-  }
-  const auto count = static_cast<double>(cameras.size());
-  // Parallel axes leave the depth open.
-  if (cameras.size() < 2 || std::abs(glm::determinant(normal)) < 1e-4 * count * count * count)
-    return around;
-  const glm::dvec3 target = glm::inverse(normal) * right;
-  std::vector<double> half_sides;
-  for (const Camera& camera : cameras) {
-    const double depth = glm::dot(target - camera.center(), view_axis(camera));
-    if (depth <= 0) continue;
-    // A panorama sees everything around it, parallel rays see as much at every depth.
-    if (camera.model == CameraModel::kEquirectangular) return around;
-    const double reach = camera.model == CameraModel::kOrthographic ? 1.0 : depth;
-    half_sides.push_back(reach *
-                         std::min(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy));
-  }
-  if (4 * half_sides.size() < 3 * cameras.size()) return around;
-  const auto middle = half_sides.begin() + static_cast<std::ptrdiff_t>(half_sides.size() / 2);
-  std::nth_element(half_sides.begin(), middle, half_sides.end());
-  return {target, *middle};
-}
 
 std::vector<float> neighbour_distances(std::span<const float> positions) {
   const KdTree tree(positions);
@@ -392,7 +365,7 @@ Gaussians initial_model(const Dataset& dataset,
                                 : share(kPhotoShare);
   PointCloud points;
   if (has_points && (options.init == "auto" || options.init == "colmap")) {
-    points = distinct_points(reliable_points(dataset.points), bounds);
+    points = start_points(dataset, cameras, photos, options);
     const std::size_t most = share(kStartShare);
     if (points.size() > most) {
       spdlog::info(
@@ -403,13 +376,16 @@ Gaussians initial_model(const Dataset& dataset,
     // Sizes follow from the distances between the points that are left.
     if (options.init == "colmap" || points.size() >= std::min(kFewPoints, count / 2))
       return start(subset(points, most));
-    spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
-                 points.size(), count);
+    if (points.size() > 0) {
+      spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
+                   points.size(), count);
+    }
   }
   const Region region = visible_region(cameras);
   if (options.init == "random") return start(random_points(region, count, options.seed));
   const std::size_t room = std::min(count, limit - std::min(limit, points.size()));
-  const PointCloud seen = photo_points(dataset, cameras, region, photos(), room, options.seed);
+  const PointCloud seen =
+      photo_points(dataset, cameras, region, photos(PhotoChoice::kAll), room, options.seed);
   for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, points);
   return start(points);
 }

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <glm/vec3.hpp>
 #include <optional>
 #include <span>
 #include <vector>
@@ -13,25 +12,10 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/train_options.hpp"
+#include "train/capture_geometry.hpp"
 #include "train/photo_set.hpp"
 
 namespace raysplats {
-
-/// Radius of the camera centres about their mean, times 1.1, as in 3DGS: the length that learning
-/// rates and size thresholds are relative to. Never below a small positive number.
-double scene_extent(std::span<const Camera> cameras);
-
-/// An axis-aligned cube, world units.
-struct Region {
-  glm::dvec3 center{0.0};
-  double half_side = 1.0;
-};
-
-/// Where a random start puts its Gaussians. When most cameras look at a common point (the point
-/// nearest to all view axes in the least-squares sense lies in front of at least 3 of 4 cameras) it
-/// is the cube about that point that the median camera sees at the point's depth; otherwise the
-/// cube of three scene extents about the mean camera centre.
-Region visible_region(std::span<const Camera> cameras);
 
 /// Mean distance from each of N points (3 N numbers) to its three nearest neighbours (fewer when
 /// there are fewer points; 0 for a single one). k-d tree, O(N log N).
@@ -65,12 +49,16 @@ std::optional<Bounds> about_origin(const std::optional<Bounds>& bounds,
 /// The Gaussians whose mean lies in the box; all of them without one.
 Gaussians inside(const Gaussians& model, const std::optional<Bounds>& bounds);
 
+/// Of the training views: all, or a few that are spread evenly over them.
+enum class PhotoChoice { kAll, kSome };
+
 /// Photos of the training views, loaded when they are first asked for.
-using PhotoSource = std::function<const std::vector<SmallPhoto>&()>;
+using PhotoSource = std::function<const std::vector<SmallPhoto>&(PhotoChoice)>;
 
 /// The model a run starts from, by options.init, at most `limit` Gaussians (an even subset of more;
 /// of points and photos at most half of it, so that there is room to grow), all within
-/// options.bounds. Throws UsageError when
+/// options.bounds. Sparse points that photos contradict (plausible()) are left out by `auto`, with a
+/// warning. Throws UsageError when
 /// the data set has no points and `colmap` is asked for, DataError for a bad PLY.
 Gaussians initial_model(const Dataset& dataset,
                         std::span<const Camera> cameras,

@@ -29,10 +29,11 @@ constexpr std::size_t kTriesPerPoint = 200;
 constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
 constexpr double kLeastBase = 1e-3;     // between them, of the distance of what they show
 constexpr std::size_t kDepths = 48;
-constexpr double kAgreement = 0.012;   // largest mean squared difference of what agrees
-constexpr double kClear = 0.5;         // and the best depth's share of the median one
-constexpr double kUnique = 0.7;        // and of the best one elsewhere: patterns repeat
-constexpr std::size_t kElsewhere = 3;  // depth steps from the best one
+constexpr int kFiner = 4;             // parts of a step in which the best depth is looked for again
+constexpr double kAgreement = 0.012;  // largest mean squared difference of what agrees
+constexpr double kClear = 0.5;        // and the best depth's share of the median one
+constexpr double kUnique = 0.7;       // and of the best one elsewhere: patterns repeat
+constexpr std::size_t kElsewhere = 3;               // depth steps from the best one
 constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of a sweep, times the typical one
 
 // The search for the typical depth, from kNearest times the guess on.
@@ -208,7 +209,18 @@ std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
     const bool elsewhere = step + kElsewhere < best || step > best + kElsewhere;
     if (elsewhere && costs[step] >= 0 && costs[best] > kUnique * costs[step]) return std::nullopt;
   }
-  return depth_at(static_cast<double>(best) / (kDepths - 1), depths);
+  // Between the steps beside it.
+  double share = static_cast<double>(best), least = costs[best];
+  for (int part = 1 - kFiner; part < kFiner; ++part) {
+    const double between = static_cast<double>(best) + static_cast<double>(part) / kFiner;
+    const double depth = depth_at(between / (kDepths - 1), depths);
+    const double cost = cost_at(photos, neighbours, ray.origin + depth * ray.direction, reference);
+    if (cost >= 0 && cost < least) {
+      least = cost;
+      share = between;
+    }
+  }
+  return depth_at(share / (kDepths - 1), depths);
 }
 
 // A random pixel of a photo.

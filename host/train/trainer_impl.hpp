@@ -82,7 +82,7 @@ struct Trainer::Impl {
   void start();
   void upload_start(std::size_t most);
   std::vector<std::size_t> first_views() const;
-  const std::vector<SmallPhoto>& photos();
+  const std::vector<SmallPhoto>& photos(PhotoChoice choice);
   std::vector<SmallPhoto> reduced_photos(std::span<const std::size_t> views) const;
   void choose_background();
   void forget_sky();
@@ -211,7 +211,7 @@ struct Trainer::Impl {
   GradientTree sum;
   Buffer<float> image_gradient;
   std::int64_t iteration = 0;            // completed
-  std::vector<SmallPhoto> small_photos;  // once they are asked for
+  std::vector<SmallPhoto> small_photos, some_photos;  // once they are asked for
   std::optional<Gaussians> first_model;  // that estimate() has made
   bool started = false;
   bool ended = false;  // before its time, by patience

@@ -192,12 +192,13 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   const std::size_t most = limit();
   choose_background();
   first_model = initial_model(
-      dataset, train_cameras, [this]() -> const auto& { return photos(); }, most, options);
+      dataset, train_cameras,
+      [this](PhotoChoice choice) -> const auto& { return photos(choice); }, most, options);
   std::optional<Gaussians> made = first_model;
   pilot.start_seconds = ranks.said_by(0, clock.seconds());
   upload_start(most);
   pilot.first = gaussians.count;
-  if (cut_out) pilot.opaque_share = opaque_share(photos());
+  if (cut_out) pilot.opaque_share = opaque_share(photos(PhotoChoice::kAll));
   try {
     time_steps(seconds, run_time, pilot);
   } catch (...) {

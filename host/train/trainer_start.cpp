@@ -18,13 +18,33 @@ namespace {
 constexpr int kSmallPhoto = 200;         // longer side of photos that the start looks at, in pixels
 constexpr std::size_t kFewViews = 3;     // below, photos say next to nothing of depth
 constexpr double kSigmoidExtent = 20;    // then one unit is less than 0.05 extents, a usual limit
-constexpr std::size_t kMeanPhotos = 24;  // whose typical colour is the background
+constexpr std::size_t kSomePhotos = 24;  // that tell what is typical of all
+
+std::vector<std::size_t> evenly_spread(const std::vector<std::size_t>& all, std::size_t most) {
+  std::vector<std::size_t> out;
+  const std::size_t count = std::min(most, all.size());
+  for (std::size_t i = 0; i < count; ++i) out.push_back(all[i * all.size() / count]);
+  return out;
+}
+
+// Of poses that are wrong, as a rule.
+void warn_of_strays(std::span<const Camera> cameras) {
+  const std::vector<std::size_t> strays = stray_cameras(cameras);
+  if (strays.empty()) return;
+  spdlog::warn(
+      "{} of {} training views were taken far from all others, {} among them: learning rates and "
+      "sizes leave them out; where their poses are wrong, take the photos out of the data set",
+      strays.size(), cameras.size(), cameras[strays.front()].name);
+}
 
 }  // namespace
 
-const std::vector<SmallPhoto>& Trainer::Impl::photos() {
-  if (small_photos.empty()) small_photos = reduced_photos(first_views());
-  return small_photos;
+const std::vector<SmallPhoto>& Trainer::Impl::photos(PhotoChoice choice) {
+  std::vector<SmallPhoto>& out = choice == PhotoChoice::kAll ? small_photos : some_photos;
+  if (!out.empty()) return out;
+  std::vector<std::size_t> views = first_views();
+  if (choice == PhotoChoice::kSome) views = evenly_spread(views, kSomePhotos);
+  return out = reduced_photos(views);
 }
 
 std::vector<SmallPhoto> Trainer::Impl::reduced_photos(std::span<const std::size_t> views) const {
@@ -55,12 +75,7 @@ void Trainer::Impl::forget_sky() {
 // with it.
 void Trainer::Impl::choose_background() {
   if ((options.background != "auto" && !sky) || cut_out) return;
-  const std::vector<std::size_t> all = first_views();
-  std::vector<std::size_t> some;
-  const std::size_t count = std::min(kMeanPhotos, all.size());
-  for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
-  // Not those that a start has looked at: the colour is not to depend on what came before.
-  const std::array<float, 3> color = typical_color(reduced_photos(some));
+  const std::array<float, 3> color = typical_color(photos(PhotoChoice::kSome));
   if (sky) {
     tracer.set_background({}, even_sky(options.sky_degree, color));
     return;
@@ -89,7 +104,7 @@ std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {
   double pixels = 0;
   for (const Camera& camera : train_cameras) pixels += static_cast<double>(pixels_of(camera));
   pixels /= static_cast<double>(train_cameras.size());
-  if (cut_out) pixels *= opaque_share(photos());
+  if (cut_out) pixels *= opaque_share(photos(PhotoChoice::kAll));
   const MemoryDemand demand{fitted_limit(pixels, iterations),
                             largest_photo(),
                             train_views.size(),
@@ -128,7 +143,8 @@ void Trainer::Impl::upload_start(std::size_t most) {
   Gaussians model = first_model
                         ? std::move(*first_model)
                         : initial_model(
-                              dataset, train_cameras, [this]() -> const auto& { return photos(); },
+                              dataset, train_cameras,
+                              [this](PhotoChoice choice) -> const auto& { return photos(choice); },
                               most, options);
   first_model.reset();
   if (options.flat) flatten(model, train_cameras);
@@ -159,7 +175,8 @@ void Trainer::Impl::start() {
     started = true;
     whole = true;
   }
-  small_photos = {};
+  small_photos = some_photos = {};
+  warn_of_strays(train_cameras);
   if (train_views.size() < kFewViews) {
     spdlog::warn("{} training view{} of {}: depth is open, and other views will look wrong",
                  train_views.size(), train_views.size() == 1 ? "" : "s", dataset.root.string());

@@ -10,8 +10,10 @@
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "test_photos.hpp"
 
 using namespace raysplats;
+using namespace raysplats::test;
 
 namespace {
 
@@ -47,16 +49,6 @@ std::vector<float> brute_force_distances(const std::vector<float>& p) {
     out.push_back(k > 0 ? static_cast<float>(sum / static_cast<double>(k)) : 0.0f);
   }
   return out;
-}
-
-std::vector<Camera> ring(int count, double radius, const glm::dvec3& target) {
-  std::vector<Camera> cameras;
-  for (int i = 0; i < count; ++i) {
-    const double angle = 2 * 3.14159265358979 * i / count;
-    const glm::dvec3 eye = target + radius * glm::dvec3(std::cos(angle), std::sin(angle), 0.4);
-    cameras.push_back(look_at(eye, target, {0, 0, 1}, 80, 100, 160));
-  }
-  return cameras;
 }
 
 }  // namespace
@@ -100,33 +92,6 @@ TEST_CASE("points become Gaussians with their colour, clamped scales and the opa
   pair.colors.assign(6, 0.5f);
   CHECK(std::exp(gaussians_from_points(pair, 0, 0.1, cameras).log_scales[0]) ==
         doctest::Approx(22.0 * 1e-4));
-}
-
-TEST_CASE(
-    "the region is the cube that inward cameras see, and surrounds cameras without a common "
-    "target") {
-  const glm::dvec3 target(3, -2, 1);
-  const Region inward = visible_region(ring(12, 4.0, target));
-  CHECK(glm::distance(inward.center, target) < 1e-6);
-  const double distance = 4.0 * std::sqrt(1 + 0.16);
-  CHECK(inward.half_side == doctest::Approx(distance * 40.0 / 160.0));
-
-  std::vector<Camera> parallel;
-  for (int i = 0; i < 5; ++i) {
-    parallel.push_back(look_at({i, 0, 0}, {static_cast<double>(i), 10, 0}, {0, 0, 1}, 80, 80, 80));
-  }
-  const Region along = visible_region(parallel);
-  CHECK(along.center.x == doctest::Approx(2.0));
-  CHECK(along.half_side == doctest::Approx(3.0 * 1.1 * 2.0));
-
-  std::vector<Camera> outward;
-  for (const Camera& camera : ring(8, 4.0, target)) {
-    outward.push_back(
-        look_at(camera.center(), 2.0 * camera.center() - target, {0, 0, 1}, 80, 80, 80));
-  }
-  CHECK(visible_region(outward).half_side == doctest::Approx(3.0 * scene_extent(outward)));
-  CHECK(scene_extent(ring(12, 4.0, target)) == doctest::Approx(4.4));
-  CHECK(scene_extent(std::vector<Camera>(1)) > 0);
 }
 
 TEST_CASE("a random start is a function of the seed and fills the region") {
@@ -181,7 +146,7 @@ TEST_CASE("sizes are those of the points that a start takes, each place once") {
   const std::vector<SmallPhoto> none;
   const auto sizes = [&](std::size_t limit) {
     const Gaussians model = initial_model(
-        dataset, cameras, [&none]() -> const auto& { return none; }, limit, options);
+        dataset, cameras, [&none](PhotoChoice) -> const auto& { return none; }, limit, options);
     std::vector<double> out;
     for (std::size_t i = 0; i < model.size(); ++i) out.push_back(std::exp(model.log_scales[3 * i]));
     std::sort(out.begin(), out.end());
@@ -213,7 +178,7 @@ TEST_CASE("the first model follows the options") {
   const std::vector<SmallPhoto> none;
   const auto first = [&](std::size_t limit) {
     return initial_model(
-        dataset, cameras, [&none]() -> const auto& { return none; }, limit, options);
+        dataset, cameras, [&none](PhotoChoice) -> const auto& { return none; }, limit, options);
   };
   options.init = "random";
   CHECK(first(1000).size() == 50);

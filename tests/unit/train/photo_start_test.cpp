@@ -12,30 +12,13 @@
 #include <vector>
 
 #include "core/camera_model.hpp"
+#include "test_photos.hpp"
 #include "train/initialization.hpp"
 
 using namespace raysplats;
+using namespace raysplats::test;
 
 namespace {
-
-// The photo that `color` of each pixel's ray makes.
-template <class Color>
-SmallPhoto photo_of(const Camera& camera, const Color& color) {
-  auto picture = std::make_shared<io::Photo>();
-  picture->width = camera.width;
-  picture->height = camera.height;
-  for (int y = 0; y < camera.height; ++y) {
-    for (int x = 0; x < camera.width; ++x) {
-      const CameraRay ray = camera_ray(camera, x + 0.5, y + 0.5);
-      const glm::dvec4 c = color(ray);
-      std::uint32_t pixel = 0;
-      for (int k = 0; k < 4; ++k)
-        pixel |= static_cast<std::uint32_t>(std::lround(255 * std::clamp(c[k], 0.0, 1.0))) << 8 * k;
-      picture->words.push_back(pixel);
-    }
-  }
-  return {camera, picture};
-}
 
 constexpr double kRadius = 0.5;
 const glm::dvec3 kMiddle(0.2, -0.1, 0.3);
@@ -45,15 +28,6 @@ glm::dvec4 ball(const CameraRay& ray) {
   const glm::dvec3 to = kMiddle - ray.origin;
   const glm::dvec3 off = to - glm::dot(to, ray.direction) * ray.direction;
   return glm::length(off) < kRadius ? glm::dvec4(0.9, 0.5, 0.1, 1.0) : glm::dvec4(0.0);
-}
-
-// A wall at x = 4 with a pattern that does not repeat within a pixel's neighbourhood.
-glm::dvec4 wall(const CameraRay& ray) {
-  const double t = (4.0 - ray.origin.x) / ray.direction.x;
-  const glm::dvec3 p = ray.origin + t * ray.direction;
-  return {0.5 + 0.4 * std::sin(3.1 * p.y + 0.7 * p.z) * std::sin(1.3 * p.z),
-          0.5 + 0.4 * std::cos(2.3 * p.z - 1.1 * p.y), 0.5 + 0.4 * std::sin(4.7 * p.y - 2.9 * p.z),
-          1.0};
 }
 
 std::vector<SmallPhoto> ring_of_ball() {
@@ -93,12 +67,7 @@ TEST_CASE("carving fills the body that the photos show, in its colour") {
 }
 
 TEST_CASE("sweeping finds a textured wall and its colours") {
-  std::vector<SmallPhoto> photos;
-  for (int i = 0; i < 9; ++i) {
-    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
-    photos.push_back(
-        photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90), wall));
-  }
+  const std::vector<SmallPhoto> photos = photos_of_wall();
   const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5);
   CHECK(points.positions == swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5).positions);
   REQUIRE(points.size() >= 300);
@@ -186,12 +155,7 @@ TEST_CASE("cameras on a tripod look at what is far away") {
     CHECK(far > points.size() * 8 / 10);
   }
   // Photos that tell depths keep the guess.
-  std::vector<SmallPhoto> photos;
-  for (int i = 0; i < 9; ++i) {
-    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
-    photos.push_back(
-        photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90), wall));
-  }
+  const std::vector<SmallPhoto> photos = photos_of_wall();
   const DepthRange depths = swept_depths(photos, 3.0, 3);
   CHECK(!depths.open);
   CHECK(depths.typical == 3.0);
@@ -210,13 +174,9 @@ TEST_CASE("cameras on a tripod look at what is far away") {
 
 TEST_CASE("few sparse points get company from the photos, up to the limit") {
   Dataset dataset;
-  std::vector<SmallPhoto> photos;
+  const std::vector<SmallPhoto> photos = photos_of_wall();
   std::vector<Camera> cameras;
-  for (int i = 0; i < 9; ++i) {
-    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
-    cameras.push_back(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90));
-    photos.push_back(photo_of(cameras.back(), wall));
-  }
+  for (const SmallPhoto& photo : photos) cameras.push_back(photo.camera);
   for (int i = 0; i < 60; ++i) {
     dataset.points.positions.insert(dataset.points.positions.end(),
                                     {4.0f, 0.01f * static_cast<float>(i), 0.1f});
@@ -225,7 +185,8 @@ TEST_CASE("few sparse points get company from the photos, up to the limit") {
   TrainOptions options;
   const auto first = [&](std::size_t limit) {
     return initial_model(
-               dataset, cameras, [&photos]() -> const auto& { return photos; }, limit, options)
+               dataset, cameras, [&photos](PhotoChoice) -> const auto& { return photos; }, limit,
+               options)
         .size();
   };
   CHECK(first(1000) > 60 + 200);

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/capture_geometry.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "core/statistics.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kLeastCameras = 8;  // of which one may be a stray
+constexpr std::size_t kOneStrayIn = 20;
+constexpr double kStrayFactor = 8.0;
+
+glm::dvec3 view_axis(const Camera& camera) {
+  return glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1);
+}
+
+glm::dvec3 mean_center(std::span<const Camera> cameras) {
+  glm::dvec3 sum(0.0);
+  for (const Camera& camera : cameras) sum += camera.center();
+  return cameras.empty() ? sum : sum / static_cast<double>(cameras.size());
+}
+
+std::vector<Camera> usual(std::span<const Camera> cameras) {
+  const std::vector<std::size_t> strays = stray_cameras(cameras);
+  std::vector<Camera> out;
+  out.reserve(cameras.size());
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (!std::binary_search(strays.begin(), strays.end(), i)) out.push_back(cameras[i]);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::size_t> stray_cameras(std::span<const Camera> cameras) {
+  if (cameras.size() < kLeastCameras) return {};
+  const std::array<double, 1> half{0.5};
+  glm::dvec3 middle;
+  std::vector<double> values(cameras.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < cameras.size(); ++i) values[i] = cameras[i].center()[axis];
+    middle[axis] = quantiles(values, half)[0];
+  }
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    values[i] = glm::distance(cameras[i].center(), middle);
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  // Not interpolated: of a few cameras the stray one itself would count.
+  const double reach = sorted[(cameras.size() - 1) * 9 / 10];
+  if (reach <= 0) return {};
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (values[i] > kStrayFactor * reach) out.push_back(i);
+  }
+  if (out.size() > std::max<std::size_t>(1, cameras.size() / kOneStrayIn)) out.clear();
+  return out;
+}
+
+double scene_extent(std::span<const Camera> all) {
+  const std::vector<Camera> cameras = usual(all);
+  const glm::dvec3 center = mean_center(cameras);
+  double radius = 0;
+  for (const Camera& camera : cameras)
+    radius = std::max(radius, glm::distance(camera.center(), center));
+  return radius > 1e-6 ? 1.1 * radius : 1.0;
+}
+
+Region visible_region(std::span<const Camera> all) {
+  const std::vector<Camera> cameras = usual(all);
+  const Region around{mean_center(cameras), 3.0 * scene_extent(cameras)};
+  // Least squares over the distances to the view axes: sum (I - d d^T) p = sum (I - d d^T) c.
+  glm::dmat3 normal(0.0);
+  glm::dvec3 right(0.0);
+  for (const Camera& camera : cameras) {
+    const glm::dvec3 d = view_axis(camera);
+    const glm::dmat3 projector = glm::dmat3(1.0) - glm::outerProduct(d, d);
+    normal += projector;
+    right += projector * camera.center();
+  }
+  const auto count = static_cast<double>(cameras.size());
+  // Parallel axes leave the depth open.
+  if (cameras.size() < 2 || std::abs(glm::determinant(normal)) < 1e-4 * count * count * count)
+    return around;
+  const glm::dvec3 target = glm::inverse(normal) * right;
+  std::vector<double> half_sides;
+  for (const Camera& camera : cameras) {
+    const double depth = glm::dot(target - camera.center(), view_axis(camera));
+    if (depth <= 0) continue;
+    // A panorama sees everything around it, parallel rays see as much at every depth.
+    if (camera.model == CameraModel::kEquirectangular) return around;
+    const double reach = camera.model == CameraModel::kOrthographic ? 1.0 : depth;
+    half_sides.push_back(reach *
+                         std::min(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy));
+  }
+  if (4 * half_sides.size() < 3 * cameras.size()) return around;
+  const auto middle = half_sides.begin() + static_cast<std::ptrdiff_t>(half_sides.size() / 2);
+  std::nth_element(half_sides.begin(), middle, half_sides.end());
+  return {target, *middle};
+}
+
+double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Camera& camera : cameras)
+    least = std::min(least, glm::distance(camera.center(), point));
+  return least;
+}
+
+double median_distance(std::span<const Camera> cameras, const glm::dvec3& point) {
+  std::vector<double> distances;
+  distances.reserve(cameras.size());
+  for (const Camera& camera : cameras)
+    distances.push_back(std::max(glm::distance(camera.center(), point), 1e-6));
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+}  // namespace raysplats

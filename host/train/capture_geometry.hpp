@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+
+namespace raysplats {
+
+/// Numbers of the cameras that stand far outside of where nearly all others do: farther from the
+/// median centre than eight times what 9 of 10 cameras keep. At most one in 20 (or a single one of
+/// eight or more): beyond that they are no exceptions, and there are none.
+std::vector<std::size_t> stray_cameras(std::span<const Camera> cameras);
+
+/// Radius of the camera centres about their mean, times 1.1, as in 3DGS, without the stray ones:
+/// the length that learning rates and size thresholds are relative to. Never below a small positive
+/// number.
+double scene_extent(std::span<const Camera> cameras);
+
+/// An axis-aligned cube, world units.
+struct Region {
+  glm::dvec3 center{0.0};
+  double half_side = 1.0;
+};
+
+/// Where a random start puts its Gaussians. When most cameras look at a common point (the point
+/// nearest to all view axes in the least-squares sense lies in front of at least 3 of 4 cameras) it
+/// is the cube about that point that the median camera sees at the point's depth; otherwise the
+/// cube of three scene extents about the mean camera centre. Stray cameras have no say.
+Region visible_region(std::span<const Camera> cameras);
+
+/// From the point to the nearest camera; infinite without cameras.
+double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point);
+
+/// Median of the distances from the point to the cameras, each at least 1e-6.
+double median_distance(std::span<const Camera> cameras, const glm::dvec3& point);
+
+}  // namespace raysplats

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/point_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <vector>
+
+#include "core/camera_model.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kLooks = 2000;    // points that are looked at
+constexpr std::size_t kFewLooks = 100;  // that the photos see; fewer tell nothing
+constexpr double kLeastSeen = 0.3;
+constexpr double kMostDifference = 0.77;
+constexpr double kClearlyBetter = 0.6;    // at another scale
+constexpr std::size_t kFewerLooks = 500;  // at every scale
+constexpr int kScaleSteps = 20;           // of half an octave, up and down
+constexpr double kEvenColors = 1e-4;      // squared difference of points that tell nothing
+
+glm::dvec3 triple(const std::vector<float>& values, std::size_t i) {
+  return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+}
+
+bool sees(const Camera& camera, const glm::dvec3& world) {
+  const std::optional<glm::dvec2> point = project(camera, world);
+  return point && point->x >= 0 && point->y >= 0 && point->x < camera.width &&
+         point->y < camera.height;
+}
+
+// Mean of the lower half, of two at least: something may hide the point from the others.
+double better_half(std::vector<double>& differences) {
+  const std::size_t half = std::max<std::size_t>(2, (differences.size() + 1) / 2);
+  std::partial_sort(differences.begin(), differences.begin() + static_cast<std::ptrdiff_t>(half),
+                    differences.end());
+  double sum = 0;
+  for (std::size_t i = 0; i < half; ++i) sum += differences[i];
+  return sum / static_cast<double>(half);
+}
+
+// PointMatch::difference of `count` of the points, moved by a factor about the world's origin.
+std::optional<double> color_difference(const PointCloud& points,
+                                       std::span<const SmallPhoto> photos,
+                                       std::size_t count,
+                                       double scale) {
+  std::size_t looks = 0;
+  double own_sum = 0, other_sum = 0, apart = 0;
+  std::vector<double> own, other;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = k * points.size() / count;
+    const glm::dvec3 world = scale * triple(points.positions, i);
+    // The colour of a point half the cloud away.
+    const std::size_t j = (k + count / 2) % count * points.size() / count;
+    const glm::dvec3 color = triple(points.colors, i), wrong = triple(points.colors, j);
+    own.clear(), other.clear();
+    for (const SmallPhoto& photo : photos) {
+      const std::optional<glm::dvec2> place = photo.sees(world);
+      if (!place || !photo.known(*place)) continue;
+      const glm::dvec4 shown = photo.at(*place);
+      if (shown.w < 0.5) continue;
+      const glm::dvec3 a = color - glm::dvec3(shown), b = wrong - glm::dvec3(shown);
+      own.push_back(glm::dot(a, a)), other.push_back(glm::dot(b, b));
+    }
+    // Along the ray of one photo every depth fits.
+    if (own.size() < 2) continue;
+    ++looks;
+    own_sum += better_half(own), other_sum += better_half(other);
+    apart += glm::dot(color - wrong, color - wrong);
+  }
+  if (looks < kFewLooks || apart <= kEvenColors * static_cast<double>(looks)) return std::nullopt;
+  return own_sum / other_sum;
+}
+
+}  // namespace
+
+PointMatch match_points(const PointCloud& points,
+                        std::span<const Camera> cameras,
+                        std::span<const SmallPhoto> photos) {
+  PointMatch out;
+  const std::size_t count = std::min(kLooks, points.size());
+  if (count == 0) return out;
+  std::size_t seen = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const glm::dvec3 world = triple(points.positions, k * points.size() / count);
+    seen += std::any_of(cameras.begin(), cameras.end(),
+                        [&](const Camera& camera) { return sees(camera, world); })
+                ? 1
+                : 0;
+  }
+  out.seen = static_cast<double>(seen) / static_cast<double>(count);
+  out.difference = color_difference(points, photos, count, 1.0);
+  if (!out.difference) return out;
+  out.scaled_difference = *out.difference;
+  const std::size_t few = std::min(kFewerLooks, count);
+  for (int step = -kScaleSteps; step <= kScaleSteps; ++step) {
+    const double scale = std::exp2(0.5 * step);
+    const std::optional<double> other = color_difference(points, photos, few, scale);
+    if (step == 0 || !other || *other >= out.scaled_difference) continue;
+    out.scale = scale;
+    out.scaled_difference = *other;
+  }
+  return out;
+}
+
+bool plausible(const PointMatch& match) {
+  const double difference = match.difference.value_or(0);
+  return match.seen >= kLeastSeen && difference <= kMostDifference &&
+         match.scaled_difference >= kClearlyBetter * difference;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/capture_geometry.hpp"
+
+#include <doctest/doctest.h>
+
+#include <glm/geometric.hpp>
+
+#include "test_photos.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+TEST_CASE(
+    "the region is the cube that inward cameras see, and surrounds cameras without a common "
+    "target") {
+  const glm::dvec3 target(3, -2, 1);
+  const Region inward = visible_region(ring(12, 4.0, target));
+  CHECK(glm::distance(inward.center, target) < 1e-6);
+  const double distance = 4.0 * std::sqrt(1 + 0.16);
+  CHECK(inward.half_side == doctest::Approx(distance * 40.0 / 160.0));
+
+  std::vector<Camera> parallel;
+  for (int i = 0; i < 5; ++i) {
+    parallel.push_back(look_at({i, 0, 0}, {static_cast<double>(i), 10, 0}, {0, 0, 1}, 80, 80, 80));
+  }
+  const Region along = visible_region(parallel);
+  CHECK(along.center.x == doctest::Approx(2.0));
+  CHECK(along.half_side == doctest::Approx(3.0 * 1.1 * 2.0));
+
+  std::vector<Camera> outward;
+  for (const Camera& camera : ring(8, 4.0, target)) {
+    outward.push_back(
+        look_at(camera.center(), 2.0 * camera.center() - target, {0, 0, 1}, 80, 80, 80));
+  }
+  CHECK(visible_region(outward).half_side == doctest::Approx(3.0 * scene_extent(outward)));
+  CHECK(scene_extent(ring(12, 4.0, target)) == doctest::Approx(4.4));
+  CHECK(scene_extent(std::vector<Camera>(1)) > 0);
+}
+
+TEST_CASE("cameras far from all others have no say in lengths, as long as they are exceptions") {
+  const glm::dvec3 target(3, -2, 1);
+  const std::vector<Camera> sound = ring(20, 4.0, target);
+  CHECK(stray_cameras(sound).empty());
+  std::vector<Camera> cameras = sound;
+  cameras[7] = look_at({500, 80, 3}, target, {0, 0, 1}, 80, 100, 160);
+  CHECK(stray_cameras(cameras) == std::vector<std::size_t>{7});
+  CHECK(scene_extent(cameras) == doctest::Approx(scene_extent(sound)).epsilon(0.1));
+  CHECK(glm::distance(visible_region(cameras).center, target) < 1e-6);
+  // A second one of twenty is a part of the capture, and so is one within the reach of others.
+  cameras[8] = cameras[7];
+  CHECK(stray_cameras(cameras).empty());
+  CHECK(scene_extent(cameras) > 100);
+  cameras = sound;
+  cameras[7] = look_at(target + glm::dvec3(20, 0, 0), target, {0, 0, 1}, 80, 100, 160);
+  CHECK(stray_cameras(cameras).empty());
+  // Few cameras, or all but one in one place, leave nothing to compare with.
+  CHECK(stray_cameras(std::vector<Camera>(cameras.begin(), cameras.begin() + 7)).empty());
+  std::vector<Camera> tripod(12, cameras[0]);
+  tripod.push_back(cameras[1]);
+  CHECK(stray_cameras(tripod).empty());
+}

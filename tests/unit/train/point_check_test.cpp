@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/point_check.hpp"
+
+#include <doctest/doctest.h>
+
+#include "base/rng.hpp"
+#include "core/camera_model.hpp"
+#include "test_photos.hpp"
+#include "train/initialization.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+std::vector<Camera> cameras_of(const std::vector<SmallPhoto>& photos) {
+  std::vector<Camera> out;
+  for (const SmallPhoto& photo : photos) out.push_back(photo.camera);
+  return out;
+}
+
+// Points on the wall with its colours, moved by `moved` from (x, y, z) afterwards.
+template <class Moved>
+PointCloud points_of_wall(const Moved& moved) {
+  CounterRng rng(3, 1);
+  PointCloud out;
+  for (int i = 0; i < 3000; ++i) {
+    const glm::dvec3 p(4.0, 3.0 * rng.uniform() - 1.5, 2.4 * rng.uniform() - 1.2);
+    const glm::dvec4 color = wall({{0, 0, 0}, p / 4.0, true});
+    const glm::dvec3 place = moved(p);
+    for (int k = 0; k < 3; ++k) {
+      out.positions.push_back(static_cast<float>(place[k]));
+      out.colors.push_back(static_cast<float>(color[k]));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("points in other units or axes than the cameras are told from those in place") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const std::vector<Camera> cameras = cameras_of(photos);
+  const auto match = [&](const auto& moved) {
+    return match_points(points_of_wall(moved), cameras, photos);
+  };
+  const PointMatch sound = match([](const glm::dvec3& p) { return p; });
+  CHECK(sound.seen > 0.9);
+  REQUIRE(sound.difference);
+  CHECK(*sound.difference < 0.1);
+  CHECK(plausible(sound));
+  for (const double scale : {0.25, 0.5, 2.0, 10.0, 1000.0}) {
+    CAPTURE(scale);
+    CHECK(!plausible(match([&](const glm::dvec3& p) { return scale * p; })));
+  }
+  CHECK(!plausible(match([](const glm::dvec3& p) { return glm::dvec3(p.y, p.x, p.z); })));
+  CHECK(!plausible(match([](const glm::dvec3& p) { return glm::dvec3(p.x, p.z, -p.y); })));
+  CHECK(!plausible(match([](const glm::dvec3& p) { return -p; })));
+  const PointMatch larger = match([](const glm::dvec3& p) { return 4.0 * p; });
+  CHECK(larger.scale == doctest::Approx(0.25));
+  CHECK(larger.scaled_difference < 0.2 * *larger.difference);
+}
+
+TEST_CASE("points without colours, or that few photos see, are believed") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const std::vector<Camera> cameras = cameras_of(photos);
+  PointCloud grey = points_of_wall([](const glm::dvec3& p) { return 2.0 * p; });
+  grey.colors.assign(grey.colors.size(), 0.5f);
+  const PointMatch match = match_points(grey, cameras, photos);
+  CHECK(!match.difference);
+  CHECK(plausible(match));
+  const PointCloud sound = points_of_wall([](const glm::dvec3& p) { return p; });
+  CHECK(!match_points(sound, cameras, {}).difference);
+  CHECK(plausible(match_points(sound, cameras, {})));
+  CHECK(match_points({}, cameras, photos).seen == 0);
+}
+
+TEST_CASE("a start leaves points out that the photos contradict, unless it is told not to") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const std::vector<Camera> cameras = cameras_of(photos);
+  Dataset dataset;
+  TrainOptions options;
+  const auto mean_depth = [&](const PointCloud& points) {
+    dataset.points = points;
+    const Gaussians model = initial_model(
+        dataset, cameras, [&photos](PhotoChoice) -> const auto& { return photos; }, 1000, options);
+    double sum = 0;
+    for (std::size_t i = 0; i < model.size(); ++i) sum += model.means[3 * i];
+    return sum / static_cast<double>(model.size());
+  };
+  const PointCloud sound = points_of_wall([](const glm::dvec3& p) { return p; });
+  const PointCloud far = points_of_wall([](const glm::dvec3& p) { return 10.0 * p; });
+  CHECK(mean_depth(sound) == doctest::Approx(4.0));
+  CHECK(mean_depth(far) < 15.0);
+  options.init = "colmap";
+  CHECK(mean_depth(far) == doctest::Approx(40.0));
+}
