@@ -102,8 +102,15 @@ std::string scene_tail(const ModelSource& source, TraceOptions trace, const glm:
   const std::vector<OptionRow> trained = trace_rows(own);
   std::string rows;
   for (std::size_t i = 0; i < given.size(); ++i) {
+    // Rays that leave a mirror have no camera that could be near.
+    if (given[i].name == "near") continue;
     if (given[i].text() != trained[i].text())
       rows += fmt::format("{} = {}\n", given[i].name, given[i].text());
+  }
+  if (trace.near_depth > 0) {
+    text += fmt::format(
+        "\n# The page left out Gaussians nearer than {} to the camera, which scene files cannot.\n",
+        trace.near_depth);
   }
   return rows.empty() ? text : text + "\n[trace]\n" + rows;
 }

@@ -197,8 +197,10 @@ struct Viewer::Impl {
     if (about_meshes.size() < kMostWaiting) about_meshes.emplace_back(id, std::move(next));
   }
 
-  void complain(ClientId id, const std::string& what) {
-    server.send_text(id, nlohmann::json{{"type", "error"}, {"text", what}}.dump(
+  void complain(ClientId id, const std::string& what) { say(id, "error", what); }
+  void note(ClientId id, const std::string& what) { say(id, "note", what); }
+  void say(ClientId id, const char* type, const std::string& what) {
+    server.send_text(id, nlohmann::json{{"type", type}, {"text", what}}.dump(
                              -1, ' ', false, nlohmann::json::error_handler_t::replace));
   }
 
@@ -249,6 +251,7 @@ struct Viewer::Impl {
   std::uint64_t turns = 0;
   double hurry = 0.0;  ///< seconds for a picture of a page that rests; 0 = as long as it takes
   std::optional<Clock::time_point> last_motion;
+  std::string last_trouble;  ///< of give_up()
   std::function<void(RunCommand)> on_command;
   Server server;  // last: its thread uses all of the above
 };
@@ -272,8 +275,10 @@ void Viewer::Impl::answer(PictureSource& source, ClientId id, const PickRequest&
 
 void Viewer::Impl::give_up(ClientId id, std::uint64_t wish, const std::exception& error) {
   const std::string what = sentence(error);
-  if (dynamic_cast<const UsageError*>(&error) == nullptr)
+  // A page that moves asks many times a second.
+  if (dynamic_cast<const UsageError*>(&error) == nullptr && what != last_trouble)
     spdlog::warn("no picture for the page: {}", what);
+  last_trouble = what;
   complain(id, what);
   const std::lock_guard<std::mutex> guard(mutex);
   const auto found = clients.find(id);
@@ -285,6 +290,8 @@ void Viewer::Impl::obey(ClientId id, MeshMessage message) {
   bool moving = false;
   try {
     if (auto* sent = std::get_if<SentMesh>(&message)) {
+      note(id, "Placing " + sent->offer.name +
+                   ": the first mesh takes a minute where its kernels are still to be compiled");
       meshes.add(std::move(*sent));
     } else if (const auto* place = std::get_if<PlaceMesh>(&message)) {
       meshes.place(place->mesh, place->placement);

@@ -232,9 +232,10 @@ class MeshesTest(unittest.TestCase):
         return self.text(channel)
 
     def text(self, channel):
+        """The next text that is no mere note of what is going on."""
         while True:
             kind, *rest = channel.receive()
-            if kind == "text":
+            if kind == "text" and rest[0]["type"] != "note":
                 return rest[0]
 
     def still(self, channel, number, **more):

@@ -138,6 +138,8 @@ function heard(message) {
   } else if (message.type === 'error') {
     seen.errors.push(message.text);
     $('status').textContent = message.text;
+  } else if (message.type === 'note') {
+    $('status').textContent = message.text;
   } else if (message.type === 'meshes') {
     meshes.take(message.meshes);
     seen.meshes = message.meshes;
