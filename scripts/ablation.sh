@@ -10,7 +10,7 @@ usage: scripts/ablation.sh DATA OUT [OPTIONS] [-- TRAIN OPTIONS...]
 Trains on DATA (any data set of raysplats train) with the axes of the paper's figure 7 (max-hits, min-transmittance,
 quantile) and hit-order, adaptive-radius, packet-width varied one at a time, everything else and the seed equal,
 and evaluates each model on the held-out views. Writes OUT/ablation.csv (PSNR, SSIM, Gaussians, seconds) and
-OUT/ablation_AXIS.png. A finished run in OUT/runs is not repeated, so that the command goes on where it stopped;
+OUT/ablation.html, one page of tables and plots. A finished run in OUT/runs is not repeated, so that the command goes on where it stopped;
 a run that fails is reported, named in the table, and the others go on (exit status 1 at the end).
 
   --iterations N      training steps of each run (500)

@@ -16,6 +16,7 @@
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "report/bench_page.hpp"
 #include "synth/bench_scenes.hpp"
 #include "train/model_source.hpp"
 
@@ -39,6 +40,7 @@ struct Options {
   std::string against;
   std::string json;
   std::string csv;
+  std::string html;
   BenchOptions bench;
   TraceSettings trace;
   DeviceFlags device;
@@ -121,7 +123,8 @@ void check_alone(const CLI::App& command, const Options& options) {
   if (!options.report.empty() && !options.kernels.empty()) {
     throw UsageError("--report measures the kernels that are built in: leave out --kernels");
   }
-  for (const char* name : {"--model", "--cameras", "--json", "--csv", "--list", "--profile"}) {
+  for (const char* name :
+       {"--model", "--cameras", "--json", "--csv", "--html", "--list", "--profile"}) {
     if (command.get_option(name)->count() > 0)
       throw UsageError(fmt::format("{} does not go with {}: leave it out", name, whole));
   }
@@ -165,6 +168,7 @@ void run(const CLI::App& command, const Options& options) {
   // Before anything is measured: a result without a place to go is lost.
   check_result_file(options.json);
   check_result_file(options.csv);
+  check_result_file(options.html);
   check_result_file(options.report);
   ContextOptions timed;
   timed.profile = timed.keep_launches = true;
@@ -195,6 +199,7 @@ void run(const CLI::App& command, const Options& options) {
   fmt::print("{}", bench_table(report));
   if (!options.json.empty()) write_text_file(options.json, bench_json(report));
   if (!options.csv.empty()) write_text_file(options.csv, bench_csv(report));
+  if (!options.html.empty()) write_text_file(options.html, bench_page(report));
   if (options.device.profile) fmt::print("{}", context.profile_table());
 }
 
@@ -264,6 +269,8 @@ Command add_bench_command(CLI::App& app) {
       ->type_name("DIR");
   command->add_option("--json", options->json, "Also write the result as JSON")->type_name("FILE");
   command->add_option("--csv", options->csv, "Also write the result as CSV")->type_name("FILE");
+  command->add_option("--html", options->html, "Also write the result as a page")
+      ->type_name("FILE");
   add_trace_flags(*command, options->trace);
   add_device_flags(*command, options->device);
 

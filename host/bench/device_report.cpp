@@ -7,6 +7,8 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "bench/bench_cases.hpp"
+#include "bench/scene_bench.hpp"
 #include "device/device_json.hpp"
 #include "raysplats/error.hpp"
 
@@ -44,6 +46,52 @@ void add_speeds(const BenchReport& run, int width, int height, DeviceReport& rep
     if (row.name == "view") report.frames.push_back(speed);
     if (row.name == "iteration") report.iterations.push_back(speed);
   }
+}
+
+// Counted by kernels of its own, which not every device can run.
+void add_model(Context& context, const BenchOptions& one, DeviceReport& report) {
+  const BenchCase scene{one.scenes.front(), one.sizes.front()};
+  try {
+    SceneBench bench(context, generated(scene, one), one);
+    report.models.push_back(
+        {scene.scene, scene.size, one.width, one.height, forecast_cards(bench.counts(true))});
+  } catch (const DeviceError& error) {
+    report.left_out.push_back(fmt::format("the model of speed of {}, {} Gaussians: {}", scene.scene,
+                                          scene.size, error.what()));
+  }
+}
+
+// The measured time of a row beside that of the cards.
+std::string model_text(const DeviceReport& report, const DeviceReport::Model& model) {
+  std::string out = fmt::format("\nModel of speed: {}, {} Gaussians, {}x{}\n{}", model.scene,
+                                model.size, model.width, model.height, cards_text(model.cards));
+  const std::string resolution = fmt::format("{}x{}", model.width, model.height);
+  for (const BenchReport& run : report.runs) {
+    if (run.options.at("resolution") != resolution) continue;
+    for (const BenchRow& row : run.rows) {
+      const bool modelled = std::any_of(model.cards.rows.begin(), model.cards.rows.end(),
+                                        [&](const auto& each) { return each.name == row.name; });
+      if (modelled && row.scene == model.scene && row.size == model.size)
+        out +=
+            fmt::format("measured here: {:<15} {:>10.3f} ms\n", row.name, 1e3 * row.seconds.median);
+    }
+  }
+  return out;
+}
+
+nlohmann::ordered_json model_json(const DeviceReport::Model& model) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::object();
+  for (const CardForecast::Row& row : model.cards.rows) {
+    for (std::size_t i = 0; i < row.cards.size(); ++i) {
+      rows[row.name][cards()[i].speeds.name] = {{"seconds", row.cards[i].seconds},
+                                                {"bound", row.cards[i].bound}};
+    }
+  }
+  return {{"scene", model.scene},
+          {"size", model.size},
+          {"width", model.width},
+          {"height", model.height},
+          {"rows", rows}};
 }
 
 std::string speed_lines(const char* unit, const std::vector<DeviceReport::Speed>& speeds) {
@@ -114,6 +162,7 @@ DeviceReport make_device_report(Context& context,
         before = run.measuring();
         size_before = size;
         add_speeds(report.runs.back(), width, height, report);
+        if (!large && clock.seconds() < most_seconds) add_model(context, one, report);
       }
     }
   }
@@ -133,6 +182,7 @@ std::string device_report_text(const DeviceReport& report) {
     out += fmt::format("\n{}\n", run.options.at("resolution"));
     out += bench_table(run);
   }
+  for (const DeviceReport::Model& model : report.models) out += model_text(report, model);
   out += "\n" + speed_lines("frames/s", report.frames);
   out += speed_lines("training iterations/s", report.iterations);
   for (const std::string& what : report.left_out)
@@ -153,6 +203,8 @@ std::string device_report_json(const DeviceReport& report) {
   nlohmann::ordered_json runs = nlohmann::ordered_json::array();
   for (const BenchReport& run : report.runs)
     runs.push_back(nlohmann::ordered_json::parse(bench_json(run)));
+  nlohmann::ordered_json models = nlohmann::ordered_json::array();
+  for (const DeviceReport::Model& model : report.models) models.push_back(model_json(model));
   const nlohmann::ordered_json out{{"schema", "raysplats-device-report"},
                                    {"schema_version", kSchemaVersion},
                                    {"device", device_json(report.device)},
@@ -160,6 +212,7 @@ std::string device_report_json(const DeviceReport& report) {
                                    {"self_test", checks},
                                    {"frames", speeds_json(report.frames)},
                                    {"training_iterations", speeds_json(report.iterations)},
+                                   {"models", models},
                                    {"left_out", report.left_out},
                                    {"compile_seconds", report.compile_seconds},
                                    {"seconds", report.seconds},

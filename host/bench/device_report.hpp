@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bench/bench.hpp"
+#include "bench/card_forecast.hpp"
 #include "bench/self_test.hpp"
 #include "device/context.hpp"
 
@@ -21,11 +22,22 @@ struct DeviceReport {
     double per_second = 0;
   };
 
+  /// What a model of speed says of a generated scene on cards(), from the work that kernels of
+  /// their form do: to be held against the rows of a card that it is about.
+  struct Model {
+    std::string scene;
+    std::size_t size = 0;
+    int width = 0;
+    int height = 0;
+    CardForecast cards;
+  };
+
   DeviceInfo device;
   std::vector<SelfTestCheck> checks;
   std::vector<BenchReport> runs;      ///< one per number of Gaussians and resolution
   std::vector<Speed> frames;          ///< of rows `view`
   std::vector<Speed> iterations;      ///< of rows `iteration`
+  std::vector<Model> models;          ///< of the runs at options' resolution
   std::vector<std::string> left_out;  ///< what would not have ended in time
   double compile_seconds = 0;
   double seconds = 0;  ///< of the whole

@@ -25,19 +25,6 @@ constexpr std::size_t kMebi = std::size_t{1} << 20;
 constexpr std::size_t kLevels[] = {32 << 10,   512 << 10,   2 * kMebi,  8 * kMebi,
                                    32 * kMebi, 128 * kMebi, 512 * kMebi};
 
-Prediction on_card(const std::string& row, const ExecutedCounts& groups, const Card& card) {
-  return predict(executed_work(row, groups), card.speeds,
-                 resident_waves(card, compiled_kernel(row, card.target)));
-}
-
-double seconds_of(const std::vector<std::string>& rows,
-                  const ExecutedCounts& groups,
-                  const Card& card) {
-  double sum = 0;
-  for (const std::string& row : rows) sum += on_card(row, groups, card).seconds;
-  return sum;
-}
-
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
@@ -123,35 +110,14 @@ Forecast forecast_of(Context& context,
     Forecast::Row row;
     row.name = name;
     row.device = predict(executed_work(name, out.vectors), device);
-    for (const Card& card : cards()) row.cards.push_back(on_card(name, out.groups, card));
     out.rows.push_back(row);
   }
   measure_rows(context, bench, options, out);
-  for (const Card& card : cards()) {
-    out.frames.push_back(1 / view_seconds(out.groups, card));
-    out.iterations.push_back(1 / iteration_seconds(out.groups, card));
-  }
+  out.cards = forecast_cards(out.groups);
   return out;
 }
 
-std::string rate_line(const char* name, const std::vector<double>& rates) {
-  std::string out = fmt::format("{:<15}", name);
-  for (const double rate : rates) out += fmt::format(" {:>9.0f} {:<12}", rate, "");
-  return out + "\n";
-}
-
 }  // namespace
-
-double view_seconds(const ExecutedCounts& groups, const Card& card) {
-  return seconds_of({"prepare-view", "tile-lists", "forward"}, groups, card);
-}
-
-// Boxes of the Gaussians and the statistics of density are small beside the others.
-double iteration_seconds(const ExecutedCounts& groups, const Card& card) {
-  return seconds_of({"prepare-view", "tile-lists", "forward-train", "loss-value", "loss-gradient",
-                     "backward", "finalize", "adam"},
-                    groups, card);
-}
 
 DeviceSpeeds measure_speeds(Context& context) {
   DeviceSpeeds out;
@@ -220,17 +186,7 @@ std::string forecast_text(const ForecastReport& report) {
                          1e3 * row.device.seconds, row.measured / row.device.seconds,
                          row.device.bound);
     }
-    out += fmt::format("{:<15}", "model, ms");
-    for (const Card& card : cards()) out += fmt::format(" {:>22}", card.speeds.name);
-    out += "\n";
-    for (const Forecast::Row& row : f.rows) {
-      out += fmt::format("{:<15}", row.name);
-      for (const Prediction& card : row.cards)
-        out += fmt::format(" {:>9.3f} {:<12}", 1e3 * card.seconds, card.bound);
-      out += "\n";
-    }
-    out += rate_line("frames/s", f.frames);
-    out += rate_line("iterations/s", f.iterations);
+    out += cards_text(f.cards);
   }
   return out;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bench/bench.hpp"
+#include "bench/card_forecast.hpp"
 #include "bench/executed_work.hpp"
 #include "bench/speed_model.hpp"
 
@@ -21,7 +22,6 @@ struct Forecast {
     std::string name;
     double measured = 0;  ///< seconds of the processors' time, the mean
     Prediction device;
-    std::vector<Prediction> cards;  ///< of cards()
   };
 
   std::string scene;
@@ -29,8 +29,8 @@ struct Forecast {
   int width = 0;
   int height = 0;
   ExecutedCounts vectors, groups;
-  std::vector<Row> rows;                   ///< modelled_rows()
-  std::vector<double> frames, iterations;  ///< a second, of cards()
+  std::vector<Row> rows;  ///< modelled_rows()
+  CardForecast cards;
 };
 
 struct ForecastReport {
@@ -43,10 +43,6 @@ struct ForecastReport {
 ForecastReport make_forecast(Context& context,
                              const BenchOptions& options,
                              const BenchModel* model = nullptr);
-
-/// Rows on a card: what a picture, or a training iteration, takes.
-double view_seconds(const ExecutedCounts& groups, const Card& card);
-double iteration_seconds(const ExecutedCounts& groups, const Card& card);
 
 /// Fixed-width text.
 std::string forecast_text(const ForecastReport& report);

@@ -4,33 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
+
+#include "bench/format.hpp"
 
 namespace raysplats {
 namespace {
 
-// 12.3 k, 4.56 M and so on; three digits are more than repetitions agree on.
-std::string engineering(double value) {
-  constexpr std::array<const char*, 5> kPrefixes{"", "k", "M", "G", "T"};
-  std::size_t prefix = 0;
-  for (; value >= 999.5 && prefix + 1 < kPrefixes.size(); ++prefix) value /= 1000.0;
-  return fmt::format("{:.3g} {}", value, kPrefixes[prefix]);
-}
-
-std::string milliseconds(double seconds) {
-  const double ms = 1e3 * seconds;
-  return fmt::format("{:.{}f}", ms, ms < 1 ? 4 : ms < 100 ? 3 : 1);
-}
-
 std::string percent(double share) { return share > 0 ? fmt::format("{:.1f}", 100 * share) : "-"; }
 
 double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
-
-std::string rate(const BenchRow& row, std::size_t index) {
-  if (index >= row.work.items.size() || row.seconds.median <= 0) return "-";
-  const BenchWork::Items& items = row.work.items[index];
-  return fmt::format("{}{}/s", engineering(items.count / row.seconds.median), items.unit);
-}
 
 }  // namespace
 
@@ -64,12 +46,12 @@ std::string bench_table(const BenchReport& report) {
   for (const BenchRow& row : report.rows) {
     const BenchShare share = share_of(row, report.ceilings);
     const double seconds = std::max(row.seconds.median, 1e-12);
-    out += fmt::format("{:<{}} {:>10} {:>9} {:>10} {:>20} {:>18} {:>8.2f} {:>6} {:>9.2f} {:>6}\n",
-                       row.id(), widest, milliseconds(row.seconds.median),
-                       milliseconds(row.seconds.deviation), row.wall ? milliseconds(*row.wall) : "",
-                       rate(row, 0), row.work.items.size() > 1 ? rate(row, 1) : "",
-                       1e-9 * row.work.bytes / seconds, percent(share.copy),
-                       1e-9 * row.work.flops / seconds, percent(share.fma));
+    out += fmt::format(
+        "{:<{}} {:>10} {:>9} {:>10} {:>20} {:>18} {:>8.2f} {:>6} {:>9.2f} {:>6}\n", row.id(),
+        widest, format_milliseconds(row.seconds.median), format_milliseconds(row.seconds.deviation),
+        row.wall ? format_milliseconds(*row.wall) : "", format_rate(row, 0),
+        row.work.items.size() > 1 ? format_rate(row, 1) : "", 1e-9 * row.work.bytes / seconds,
+        percent(share.copy), 1e-9 * row.work.flops / seconds, percent(share.fma));
   }
   out += fmt::format("peak memory: process {:.1f} MiB, device buffers {:.1f} MiB\n",
                      mebibytes(report.peak_process_bytes), mebibytes(report.peak_device_bytes));

@@ -30,6 +30,7 @@ polyline.c0{stroke:var(--c0)}circle.c0,svg text.c0{fill:var(--c0)}th.c0{color:va
 polyline.c2{stroke:var(--c2)}circle.c2,svg text.c2{fill:var(--c2)}th.c2{color:var(--c2)}polyline.c3{stroke:var(--c3)}circle.c3,svg text.c3{fill:var(--c3)}th.c3{color:var(--c3)}
 polyline.c4{stroke:var(--c4)}circle.c4,svg text.c4{fill:var(--c4)}th.c4{color:var(--c4)}polyline.c5{stroke:var(--c5)}circle.c5,svg text.c5{fill:var(--c5)}th.c5{color:var(--c5)}
 table{border-collapse:collapse}td,th{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid var(--line)}
+svg.bar{width:90px}svg.bar rect{fill:var(--c0)}
 figure{margin:14px 0}img{max-width:100%;height:auto}pre{white-space:pre-wrap;overflow-wrap:anywhere}
 )";
 

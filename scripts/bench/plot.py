@@ -3,11 +3,14 @@
 """Plots of what growth.sh and ablation.sh measured.
 
 usage: plot.py growth DIR      DIR/*.json of `raysplats bench --json` -> growth.csv, growth_*.png
-       plot.py ablation DIR    the runs of ablation.sh in DIR -> ablation.csv, ablation_*.png
+       plot.py ablation DIR    the runs of ablation.sh in DIR -> ablation.csv, ablation.html
 Needs matplotlib (Debian package python3-matplotlib).
 """
 
+import base64
 import csv
+import html
+import io
 import json
 import sys
 from collections import Counter
@@ -164,6 +167,55 @@ def read_runs(folder: Path) -> list[dict[str, str]]:
     return rows
 
 
+def axis_plot(axis: str, rows: list[dict[str, str]]) -> bytes:
+    """The runs of one axis as an SVG file."""
+    columns = (("psnr", "PSNR [dB]"), ("ssim", "SSIM"), ("gaussians", "Gaussians"),
+               ("train_seconds", "training [s]"))
+    xs, labels, logarithmic = axis_values(rows)
+    figure, all_axes = plt.subplots(1, len(columns), figsize=(4 * len(columns), 3.6))
+    for axes, (column, y_label) in zip(all_axes, columns):
+        axes.plot(xs, [float(r[column]) for r in rows], "o-")
+        if logarithmic:
+            axes.set_xscale("log")
+            axes.minorticks_off()
+        axes.set_xticks(xs, labels, rotation=30)
+        axes.set_xlabel(axis)
+        axes.set_ylabel(y_label)
+        axes.grid(True, linewidth=0.3)
+    figure.tight_layout()
+    file = io.BytesIO()
+    figure.savefig(file, format="svg")
+    plt.close(figure)
+    return file.getvalue()
+
+
+def html_table(fields: list[str], rows: list[dict[str, str]]) -> str:
+    lines = ["".join(f"<th>{html.escape(field)}</th>" for field in fields)]
+    lines += ["".join(f"<td>{html.escape(row.get(field, ''))}</td>" for field in fields) for row in rows]
+    return "<table>\n" + "".join(f"<tr>{line}</tr>\n" for line in lines) + "</table>\n"
+
+
+def ablation_page(fields: list[str], runs: list[dict[str, str]]) -> str:
+    """One file without script or anything from elsewhere: for every axis its runs and their plot."""
+    body = ""
+    for axis in dict.fromkeys(r["axis"] for r in runs):
+        chosen = [r for r in runs if r["axis"] == axis]
+        body += f"<h2>{html.escape(axis)}</h2>\n" + html_table(fields[1:], chosen)
+        measured = [r for r in chosen if r["status"] == "ok"]
+        if measured:
+            picture = base64.b64encode(axis_plot(axis, measured)).decode()
+            body += f'<img alt="{html.escape(axis)}" src="data:image/svg+xml;base64,{picture}"/>\n'
+    return f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"/><title>Ablation</title>
+<meta http-equiv="Content-Security-Policy" content="default-src &#39;none&#39;; img-src data:; style-src &#39;unsafe-inline&#39;"/>
+<style>:root{{color-scheme:light dark}}body{{max-width:1200px;margin:24px auto;padding:0 16px;font:15px/1.5 system-ui,sans-serif}}
+table{{border-collapse:collapse}}td,th{{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid #8886}}
+img{{max-width:100%;background:#fff}}</style></head>
+<body><h1>Ablation: one option at a time</h1>
+{body}</body></html>
+"""
+
+
 def ablation(folder: Path) -> None:
     if not (folder / "plan.csv").exists():
         sys.exit(f"plot.py: {folder} holds no runs, run ablation.sh first.")
@@ -174,28 +226,8 @@ def ablation(folder: Path) -> None:
         writer.writeheader()
         writer.writerows(runs)
     print(folder / "ablation.csv")
-    rows = [r for r in runs if r["status"] == "ok"]
-    columns = (("psnr", "PSNR [dB]"), ("ssim", "SSIM"), ("gaussians", "Gaussians"),
-               ("train_seconds", "training [s]"))
-    for axis in dict.fromkeys(r["axis"] for r in rows):
-        chosen = [r for r in rows if r["axis"] == axis]
-        xs, labels, logarithmic = axis_values(chosen)
-        figure, all_axes = plt.subplots(1, len(columns), figsize=(4 * len(columns), 3.6))
-        for axes, (column, y_label) in zip(all_axes, columns):
-            axes.plot(xs, [float(r[column]) for r in chosen], "o-")
-            if logarithmic:
-                axes.set_xscale("log")
-                axes.minorticks_off()
-            axes.set_xticks(xs, labels, rotation=30)
-            axes.set_xlabel(axis)
-            axes.set_ylabel(y_label)
-            axes.grid(True, linewidth=0.3)
-        figure.suptitle(f"{axis}, {chosen[0]['iterations']} iterations each")
-        figure.tight_layout()
-        path = folder / f"ablation_{axis}.png"
-        figure.savefig(path, dpi=120)
-        plt.close(figure)
-        print(path)
+    (folder / "ablation.html").write_text(ablation_page(fields, runs))
+    print(folder / "ablation.html")
 
 
 def main() -> None:

@@ -32,9 +32,9 @@ const std::map<std::string, Names> kBelow{{"base", {}},
                                           {"train", {"eval"}},
                                           {"view", {"train"}},
                                           {"prepare", {"io"}},
-                                          {"report", {"train"}},
                                           {"synth", {"io"}},
                                           {"bench", {"train", "synth", "reference"}},
+                                          {"report", {"bench"}},
                                           {"reference", {"core"}}};
 
 /// The module that a public header is the face of.

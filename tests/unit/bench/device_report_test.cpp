@@ -41,6 +41,10 @@ TEST_CASE("a device's report holds its self-test, every size that fits the time,
   CHECK(json.at("self_test_passed") == true);
   CHECK(json.at("device").at("name") == context.device().name);
   CHECK(json.at("runs").at(1).at("rows").size() == report.runs[1].rows.size());
+  REQUIRE(report.models.size() == 1);
+  for (const double rate : report.models[0].cards.iterations) CHECK(rate > 1.0);
+  CHECK(json.at("models").at(0).at("rows").at("forward").size() == cards().size());
+  CHECK(device_report_text(report).find("measured here: adam") != std::string::npos);
   CHECK(device_report_text(report).find("self-test passed") != std::string::npos);
 
   options.sizes = {options.sizes[0], 1'000'000'000};  // nothing is made of what cannot end in time

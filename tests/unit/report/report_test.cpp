@@ -9,6 +9,7 @@
 
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "report/bench_page.hpp"
 #include "report/html.hpp"
 #include "report/run_report.hpp"
 
@@ -176,4 +177,35 @@ TEST_CASE("text, bytes and curves as HTML has them") {
   CHECK(has(svg, ",30.0"));  // the spike reaches the top
   report::Curve one{"one", {{3, 4}}};
   CHECK(has(report::chart("one", "x", std::span(&one, 1)), "<circle"));
+}
+
+TEST_CASE("a benchmark becomes a page with all rows, bars and, of several sizes, charts") {
+  BenchReport bench;
+  bench.device = "a card <1> & co";
+  bench.options["filter"] = "^\"view\"";
+  bench.ceilings = {1e9, 1e10};
+  for (const std::size_t size : {1000u, 10000u}) {
+    BenchRow row;
+    row.name = "forward";
+    row.scene = "a<b>";
+    row.size = size;
+    row.clock = "device";
+    row.seconds = {5, 1e-6 * static_cast<double>(size), 1e-5, 0, 0};
+    row.work = {{{"rays", 64000}, {"hits", 1e6}}, 250.0 * static_cast<double>(size), 0};
+    bench.rows.push_back(row);
+  }
+  bench.left_out = {"view/a<b>/1000000"};
+  const std::string page = bench_page(bench);
+  CHECK(fault(page) == "");
+  CHECK(has(page, "a card &lt;1&gt; &amp; co"));
+  CHECK(has(page, "a&lt;b&gt;, 10000 Gaussians"));
+  CHECK(has(page, "64 Mrays/s"));
+  CHECK(has(page, "25.0 %"));
+  CHECK(has(page, "An image by tiles: log10"));
+  CHECK(!has(page, "Training: log10"));
+  CHECK(has(page, "view/a&lt;b&gt;/1000000"));
+  CHECK(!has(page, "<script"));
+  bench.rows.pop_back();
+  CHECK(!has(bench_page(bench), "log10"));
+  CHECK(fault(bench_page({})) == "");
 }
