@@ -30,13 +30,22 @@ double weighted_quantile(std::span<const double> values,
 std::vector<double> quantiles(std::vector<double> values, std::span<const double> q) {
   std::vector<double> out(q.size(), 0.0);
   if (values.empty()) return out;
-  std::sort(values.begin(), values.end());
+  std::size_t settled = 0;  // from here on values are in no order, before it none is greater
+  double last = 0.0;
   for (std::size_t k = 0; k < q.size(); ++k) {
+    if (q[k] < last) settled = 0;
+    last = q[k];
     const double position = q[k] * static_cast<double>(values.size() - 1);
     const auto low = static_cast<std::size_t>(std::floor(position));
-    const std::size_t high = std::min(low + 1, values.size() - 1);
+    const auto at = [&values](std::size_t i) {
+      return values.begin() + static_cast<std::ptrdiff_t>(i);
+    };
+    std::nth_element(at(settled), at(low), values.end());
+    settled = low;
     const double share = position - static_cast<double>(low);
-    out[k] = values[low] + share * (values[high] - values[low]);
+    const double next =
+        low + 1 < values.size() ? *std::min_element(at(low + 1), values.end()) : values[low];
+    out[k] = values[low] + share * (next - values[low]);
   }
   return out;
 }

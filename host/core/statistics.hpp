@@ -11,7 +11,7 @@ namespace raysplats {
 double weighted_quantile(std::span<const double> values, std::span<const double> weights, double q);
 
 /// Quantiles of equally weighted values, linearly interpolated, one per entry of `q` (each 0..1);
-/// zeros for no values. O(N log N).
+/// zeros for no values. O(N) for each of them.
 std::vector<double> quantiles(std::vector<double> values, std::span<const double> q);
 
 }  // namespace raysplats

@@ -36,10 +36,11 @@ PacketForm default_form(const DeviceInfo& device, int lanes) {
 
 int default_lanes(const DeviceInfo& device, PacketForm form) {
   if (form != PacketForm::kVector) return kGroupLanes;
-  int lanes = 1;
-  while (device.type == DeviceType::kCpu && lanes < 16 &&
-         static_cast<std::uint32_t>(2 * lanes) <= device.float_vector_width)
-    lanes *= 2;
+  const std::uint32_t own = device.float_vector_width;
+  if (device.type != DeviceType::kCpu || own < 2) return 1;
+  // Two of the device's vectors: what a packet does once is shared by more rays.
+  int lanes = 2;
+  while (lanes < 16 && static_cast<std::uint32_t>(lanes) <= own) lanes *= 2;
   return lanes;
 }
 

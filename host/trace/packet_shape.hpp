@@ -25,9 +25,10 @@ struct PacketShape {
 };
 
 /// Lanes and form as the options say; what they leave open is the device's tuning, or without one
-/// vectors as wide as the device's own on CPUs and elsewhere subgroups, or groups, of 32, or single
-/// rays where local memory is short. The rest follows the tuning when that has the same form and
-/// width. Throws UsageError for other widths, DeviceError for what the device does not have.
+/// vectors twice as wide as the device's own (at most 16) on CPUs and elsewhere subgroups, or
+/// groups, of 32, or single rays where local memory is short. The rest follows the tuning when that
+/// has the same form and width. Throws UsageError for other widths, DeviceError for what the device
+/// does not have.
 PacketShape packet_shape(const DeviceInfo& device, const TraceOptions& options);
 
 PacketForm tuned_form(const DeviceTuning& tuning);

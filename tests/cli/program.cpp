@@ -39,7 +39,17 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
   }
   process_ = ::fork();
   if (process_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
-  if (process_ > 0) return;
+  if (process_ > 0) {
+    if (surroundings.full_once) {
+      attend_ = [this, full = surroundings.full_once, most = surroundings.file_size_limit] {
+        if (!full()) return;
+        const rlimit limit{most, most};
+        ::prlimit(process_, RLIMIT_FSIZE, &limit, nullptr);
+        attend_ = {};
+      };
+    }
+    return;
+  }
   const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600);
   const int err_file = surroundings.terminal ? ::open(::ptsname(terminal_), O_WRONLY | O_NOCTTY)
                                              : ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
@@ -52,7 +62,7 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
   if (!surroundings.folder.empty() && ::chdir(surroundings.folder.c_str()) != 0) ::_exit(126);
   for (const auto& [name, value] : surroundings.environment)
     ::setenv(name.c_str(), value.c_str(), 1);
-  if (surroundings.file_size_limit != RLIM_INFINITY) {
+  if (surroundings.file_size_limit != RLIM_INFINITY && !surroundings.full_once) {
     const rlimit limit{surroundings.file_size_limit, surroundings.file_size_limit};
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(126);
   }
@@ -97,8 +107,9 @@ bool RunningProgram::runs() {
 
 Outcome RunningProgram::wait() {
   // A terminal that nobody reads takes no more.
-  while (terminal_ >= 0 && runs()) {
-    read_terminal();
+  while ((terminal_ >= 0 || attend_) && runs()) {
+    if (terminal_ >= 0) read_terminal();
+    if (attend_) attend_();
     ::usleep(1000);
   }
   if (!ended_ && ::waitpid(process_, &status_, 0) != process_)

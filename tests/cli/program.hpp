@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,12 +22,15 @@ struct Outcome {
 struct Surroundings {
   std::vector<std::pair<std::string, std::string>> environment;  ///< added to the test's own
   rlim_t file_size_limit = RLIM_INFINITY;  ///< bytes; beyond it writes fail, as on a full disk
-  rlim_t memory_limit = RLIM_INFINITY;     ///< bytes of address space, as by ulimit -v
-  bool permissions_count = false;          ///< even for root: what may not be written cannot be
-  std::string out_file = {};               ///< where standard output goes, such as /dev/full
-  std::string err_file = {};               ///< the same of standard error
-  bool terminal = false;                   ///< standard error is one, 80 columns wide
-  bool closed_out = false;                 ///< as by >&-
+  /// Says from when on that limit holds, asked while the program runs; from its start without. A
+  /// driver writes files of its own when kernels are built.
+  std::function<bool()> full_once = {};
+  rlim_t memory_limit = RLIM_INFINITY;  ///< bytes of address space, as by ulimit -v
+  bool permissions_count = false;       ///< even for root: what may not be written cannot be
+  std::string out_file = {};            ///< where standard output goes, such as /dev/full
+  std::string err_file = {};            ///< the same of standard error
+  bool terminal = false;                ///< standard error is one, 80 columns wide
+  bool closed_out = false;              ///< as by >&-
   bool closed_err = false;
   std::string folder = {};                 ///< to run in; the test's own when empty
   std::vector<std::string> launcher = {};  ///< what starts the program, such as mpirun -n 2
@@ -71,6 +75,7 @@ class RunningProgram {
   TemporaryFolder folder_;
   void read_terminal() const;
 
+  std::function<void()> attend_;  // once in a while, until it has nothing left to do
   pid_t process_ = -1;
   int terminal_ = -1;           // the near end of the program's terminal
   mutable std::string screen_;  // what came out of it so far

@@ -172,8 +172,17 @@ TEST_CASE("a GIF lasts as long as its frames, and is whole or not there") {
   // The encoder does not notice a full disk.
   Surroundings around;
   around.file_size_limit = 4096;
+  around.full_once = [&] {
+    for (const auto& entry : fs::directory_iterator(folder.path())) {
+      std::error_code gone;
+      if (entry.path().filename().string().starts_with(".full") &&
+          fs::file_size(entry.path(), gone) > 0 && !gone)
+        return true;
+    }
+    return false;
+  };
   const Outcome outcome =
-      raysplats_program(orbit(folder, "60") + Words{"--video", folder / "full.gif"}, around);
+      raysplats_program(orbit(folder, "600") + Words{"--video", folder / "full.gif"}, around);
   CHECK(outcome.code == 3);
   CHECK(outcome.err.find("full disk") != std::string::npos);
   CHECK(!fs::exists(folder / "full.gif"));

@@ -96,10 +96,10 @@ TEST_CASE("other data, a newer file and a folder without checkpoints") {
 TEST_CASE("a full disk ends the run with exit code 3 and whole files, and the run goes on later") {
   const TemporaryFolder folder;
   const std::string run = folder / "run";
-  broken_off(run);
-  const std::string before = read_file(checkpoint_of(run, 25));
+  undisturbed();  // so that a driver that keeps kernels by their launches has all of them
   Surroundings full;
   full.file_size_limit = 16384;
+  full.full_once = [&] { return fs::exists(checkpoint_of(run, 20)); };
   const Words arguments = tiny_training(run) + Words{"--resume", "latest"};
   const Outcome outcome = raysplats_program(arguments, full);
   INFO(outcome.err);
@@ -107,7 +107,7 @@ TEST_CASE("a full disk ends the run with exit code 3 and whole files, and the ru
   CHECK(one_sentence(outcome));
   CHECK(has(outcome.err, "File too large"));
   CHECK(temporaries(run) == 0);
-  CHECK(read_file(checkpoint_of(run, 25)) == before);
+  CHECK(!fs::exists(model_of(run)));
   REQUIRE(raysplats_program(arguments).code == 0);
   CHECK(same_result(run, undisturbed()));
 }

@@ -3,10 +3,12 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "base/rng.hpp"
 #include "core/statistics.hpp"
 
 using namespace raysplats;
@@ -21,6 +23,24 @@ TEST_CASE("weighted quantile weighs, and falls back to equal weights") {
   CHECK(weighted_quantile({}, {}, 0.5) == 0.0);
   const std::array<double, 3> q{0.0, 0.5, 1.0};
   CHECK(quantiles({3, 1, 2, 10}, q) == std::vector<double>{1.0, 2.5, 10.0});
+}
+
+TEST_CASE("quantiles in any order are those of the sorted values") {
+  CounterRng rng(5, 1);
+  std::vector<double> values;
+  for (int i = 0; i < 1000; ++i) values.push_back(static_cast<double>(rng.below(300)));
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  const std::array<double, 6> q{0.25, 0.9, 0.5, 0.5, 1.0, 0.0};
+  const std::vector<double> found = quantiles(values, q);
+  for (std::size_t k = 0; k < q.size(); ++k) {
+    const double at = q[k] * 999.0;
+    const auto low = static_cast<std::size_t>(at);
+    const double high = sorted[std::min<std::size_t>(low + 1, 999)];
+    CHECK(found[k] == doctest::Approx(sorted[low] + (at - std::floor(at)) * (high - sorted[low])));
+  }
+  CHECK(quantiles({}, q) == std::vector<double>(6, 0.0));
+  CHECK(quantiles({7.0}, q) == std::vector<double>(6, 7.0));
 }
 
 TEST_CASE("a model's summary counts what is there") {

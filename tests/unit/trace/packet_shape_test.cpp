@@ -36,7 +36,9 @@ DeviceInfo gpu_of(std::uint64_t local_memory) {
 
 TEST_CASE("packet shape: follows the device's vectors") {
   CHECK(packet_shape(cpu(16), width_of(0)).lanes == 16);
-  CHECK(packet_shape(cpu(8), width_of(0)).lanes == 8);
+  CHECK(packet_shape(cpu(8), width_of(0)).lanes == 16);
+  CHECK(packet_shape(cpu(4), width_of(0)).lanes == 8);
+  CHECK(packet_shape(cpu(2), width_of(0)).lanes == 4);
   CHECK(packet_shape(cpu(1), width_of(0)).lanes == 1);
   const DeviceInfo gpu = gpu_of(1000);  // too little local memory for groups
   CHECK(packet_shape(gpu, width_of(0)).lanes == 1);
