@@ -18,7 +18,7 @@ TEST_CASE("tune: candidates are valid, differ in one axis and begin with the cur
   device.float_vector_width = 8;
   device.max_work_group_size = 64;
   const DeviceTuning start = default_tuning(device);
-  CHECK(start.packet_width == 8);
+  CHECK(start.packet_width == 16);
   for (const std::string& axis : tune_axes()) {
     const std::vector<DeviceTuning> candidates = tune_candidates(axis, start, device);
     if (axis == "packet-shape") {
