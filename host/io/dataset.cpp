@@ -183,7 +183,7 @@ std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name)
     if (is_file(folder / candidate)) return folder / candidate;
     fs::path stem = candidate;
     stem.replace_extension();
-    if (const auto found = io::find_image(folder, stem)) return found;
+    if (auto found = io::find_image(folder, stem)) return found;
   }
   return std::nullopt;
 }

@@ -255,7 +255,7 @@ Gaussians gaussians_from_points(const PointCloud& points,
   model.sh_degree = sh_degree;
   model.resize(finite.size());
   const std::vector<float> distances = neighbour_distances(finite.positions);
-  const auto stride = static_cast<std::size_t>(3 * sh_coefficients(sh_degree));
+  const auto stride = 3 * static_cast<std::size_t>(sh_coefficients(sh_degree));
   const auto logit = static_cast<float>(std::log(opacity / (1.0 - opacity)));
   const double least = kMinScale * scene_extent(cameras);
   for (std::size_t i = 0; i < model.size(); ++i) {

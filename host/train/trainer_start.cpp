@@ -140,12 +140,13 @@ std::size_t Trainer::Impl::ray_views() const {
 
 // The first model on the device, with at most that many Gaussians.
 void Trainer::Impl::upload_start(std::size_t most) {
-  Gaussians model = first_model
-                        ? std::move(*first_model)
-                        : initial_model(
-                              dataset, train_cameras,
-                              [this](PhotoChoice choice) -> const auto& { return photos(choice); },
-                              most, options);
+  Gaussians model =
+      first_model
+          ? std::move(*first_model)
+          : initial_model(
+                dataset,
+                train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
+                most, options);
   first_model.reset();
   if (options.flat) flatten(model, train_cameras);
   if (model.size() == 0) {
