@@ -11,6 +11,7 @@
 #include <iterator>
 #include <optional>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/rng.hpp"
@@ -29,11 +30,10 @@ constexpr std::size_t kTriesPerPoint = 200;
 constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
 constexpr double kLeastBase = 1e-3;     // between them, of the distance of what they show
 constexpr std::size_t kDepths = 48;
-constexpr int kFiner = 4;             // parts of a step in which the best depth is looked for again
-constexpr double kAgreement = 0.012;  // largest mean squared difference of what agrees
-constexpr double kClear = 0.5;        // and the best depth's share of the median one
-constexpr double kUnique = 0.7;       // and of the best one elsewhere: patterns repeat
-constexpr std::size_t kElsewhere = 3;               // depth steps from the best one
+constexpr double kAgreement = 0.012;   // largest mean squared difference of what agrees
+constexpr double kClear = 0.5;         // and the best depth's share of the median one
+constexpr double kUnique = 0.7;        // and of the best one elsewhere: patterns repeat
+constexpr std::size_t kElsewhere = 3;  // depth steps from the best one
 constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of a sweep, times the typical one
 
 // The search for the typical depth, from kNearest times the guess on.
@@ -82,6 +82,16 @@ glm::dvec3 axis_of(const SmallPhoto& photo) {
   return camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height).direction;
 }
 
+// Of photos with their ranks those of the least, at most kNeighbours.
+std::vector<std::size_t> foremost(std::vector<std::pair<double, std::size_t>> ranked) {
+  const std::size_t count = std::min(kNeighbours, ranked.size());
+  std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count),
+                    ranked.end());
+  std::vector<std::size_t> out(count);
+  for (std::size_t i = 0; i < count; ++i) out[i] = ranked[i].second;
+  return out;
+}
+
 // The photos that see most of what a photo sees from somewhere else: near centres, like axes.
 std::vector<std::size_t> neighbours_of(std::span<const SmallPhoto> photos,
                                        std::size_t index,
@@ -95,12 +105,7 @@ std::vector<std::size_t> neighbours_of(std::span<const SmallPhoto> photos,
     const double turn = 1.0 - glm::dot(axis_of(photos[i]), axis_of(photos[index]));
     ranked.emplace_back(std::abs(base - 0.15) + 2.0 * turn, i);
   }
-  const std::size_t count = std::min(kNeighbours, ranked.size());
-  std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count),
-                    ranked.end());
-  std::vector<std::size_t> out(count);
-  for (std::size_t i = 0; i < count; ++i) out[i] = ranked[i].second;
-  return out;
+  return foremost(std::move(ranked));
 }
 
 struct Patch {
@@ -209,18 +214,7 @@ std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
     const bool elsewhere = step + kElsewhere < best || step > best + kElsewhere;
     if (elsewhere && costs[step] >= 0 && costs[best] > kUnique * costs[step]) return std::nullopt;
   }
-  // Between the steps beside it.
-  double share = static_cast<double>(best), least = costs[best];
-  for (int part = 1 - kFiner; part < kFiner; ++part) {
-    const double between = static_cast<double>(best) + static_cast<double>(part) / kFiner;
-    const double depth = depth_at(between / (kDepths - 1), depths);
-    const double cost = cost_at(photos, neighbours, ray.origin + depth * ray.direction, reference);
-    if (cost >= 0 && cost < least) {
-      least = cost;
-      share = between;
-    }
-  }
-  return depth_at(share / (kDepths - 1), depths);
+  return depth_at(static_cast<double>(best) / (kDepths - 1), depths);
 }
 
 // A random pixel of a photo.
@@ -296,12 +290,7 @@ std::vector<std::size_t> distant_neighbours(std::span<const SmallPhoto> photos,
     if (apart && 1.0 - glm::dot(axis_of(photos[i]), axis_of(photos[index])) < kProbeTurn)
       ranked.emplace_back(-base, i);
   }
-  const std::size_t count = std::min(kNeighbours, ranked.size());
-  std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count),
-                    ranked.end());
-  std::vector<std::size_t> out(count);
-  for (std::size_t i = 0; i < count; ++i) out[i] = ranked[i].second;
-  return out;
+  return foremost(std::move(ranked));
 }
 
 // What a pixel tells of its depth.

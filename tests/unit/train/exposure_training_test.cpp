@@ -55,7 +55,7 @@ double corrected(Context& context, const Dataset& dataset, const fs::path& run, 
 
 }  // namespace
 
-TEST_CASE("planted gains cost little when every photo has a colour of its own") {
+TEST_CASE("planted gains cost nothing when every photo has a colour of its own") {
   const TemporaryDirectory folder;
   Context context{select_device("")};
   const fs::path data = folder.path() / "data";
@@ -67,7 +67,7 @@ TEST_CASE("planted gains cost little when every photo has a colour of its own") 
   const double ignored = corrected(context, gains, folder.path() / "ignored", false);
   MESSAGE("clean " << clean << " dB, modelled " << modelled << ", ignored " << ignored);
   CHECK(modelled > ignored + 3);
-  CHECK(modelled > clean - 0.8);
+  CHECK(modelled > clean - 0.5);
 
   // The run folder says what the photos' colours are: the brightest one's matrix is largest.
   std::ifstream stream(folder.path() / "modelled/exposures.json");

@@ -65,5 +65,5 @@ TEST_CASE("a moving box under masks costs next to nothing, and much without them
   const double bare = trained_psnr(context, data, folder.path() / "bare");
   MESSAGE("clean " << clean << " dB, masked " << masked << ", without masks " << bare);
   CHECK(masked > clean - 0.3);
-  CHECK(bare < clean - 0.4);
+  CHECK(bare < clean - 0.5);
 }
