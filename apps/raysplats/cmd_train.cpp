@@ -159,6 +159,10 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   check_choices(command, options);
   if (!options.time.empty()) parse_duration("--time", options.time);  // before anything is loaded
   keep_run_options(command, options);
+  // The end of a run by time is not that of a run which is given another length.
+  if (command.get_option("--iterations")->count() > 0 &&
+      command.get_option("--end-iteration")->count() == 0)
+    options.train.end_iteration = 0;
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
     train(command, options, global.quiet, ranks, context);
   });

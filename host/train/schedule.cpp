@@ -53,6 +53,19 @@ int resolution_divisor(const TrainOptions& options, std::int64_t iteration) {
   return 1;
 }
 
+std::int64_t last_iteration(const TrainOptions& options) {
+  return options.end_iteration > 0 ? options.end_iteration : options.iterations;
+}
+
+std::int64_t steady_from(const TrainOptions& options) {
+  std::int64_t from =
+      std::max(options.densify_until.of(options.iterations),
+               options.sh_degree * options.sh_degree_interval.of(options.iterations));
+  for (const ResolutionStep& step : options.resolution_schedule)
+    from = std::max(from, step.until.of(options.iterations));
+  return from;
+}
+
 std::array<float, 3> step_background(const TrainOptions& options,
                                      bool cut_out,
                                      const std::array<float, 3>& constant,

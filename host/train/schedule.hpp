@@ -25,6 +25,13 @@ int active_sh_degree(const TrainOptions& options, std::int64_t iteration);
 /// 2^k by which the image size is divided (resolution-schedule).
 int resolution_divisor(const TrainOptions& options, std::int64_t iteration);
 
+/// Iteration that the run ends with.
+std::int64_t last_iteration(const TrainOptions& options);
+
+/// From when on steps are alike: photos have their full size, all SH bands are on, and density
+/// control is over.
+std::int64_t steady_from(const TrainOptions& options);
+
 /// Background of a step: `constant` unless the option is "random" and the photos are cut out by
 /// their alpha.
 std::array<float, 3> step_background(const TrainOptions& options,

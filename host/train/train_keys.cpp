@@ -157,6 +157,9 @@ void add_run_keys(TrainTable& t, TrainOptions& o) {
   t.section("Run");
   t.number("iterations", o.iterations, 0, kMaxCount,
            "training steps, of one view each or of views-per-step");
+  t.number("end-iteration", o.end_iteration, 0, kMaxCount,
+           "iteration that the run ends with, though its schedules are those of iterations; --time "
+           "sets it once the last steps are timed; 0 = iterations");
   t.number("views-per-step", o.views_per_step, 1, 1024,
            "views of an iteration, whose gradients are added in an order of their own; time and "
            "memory for gradients grow with it");

@@ -181,7 +181,7 @@ void Trainer::save() {
   self.context.finish();
   self.save_model();
   self.save_checkpoint();
-  self.write_metrics(self.iteration == self.options.iterations);
+  self.write_metrics(self.iteration == last_iteration(self.options));
 }
 
 TrainLoss Trainer::loss() {

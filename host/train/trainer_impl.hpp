@@ -119,6 +119,7 @@ struct Trainer::Impl {
   void forget_pilot();
   RunEstimate estimate(double seconds);
   RunEstimate fit_time(double seconds);
+  void keep_time();
 
   // trainer_validation.cpp: training views that judge the run.
   void judge();
@@ -210,9 +211,9 @@ struct Trainer::Impl {
   StepGradients gradients;      // of the last view, then of the step
   GradientTree sum;
   Buffer<float> image_gradient;
-  std::int64_t iteration = 0;            // completed
+  std::int64_t iteration = 0;                         // completed
   std::vector<SmallPhoto> small_photos, some_photos;  // once they are asked for
-  std::optional<Gaussians> first_model;  // that estimate() has made
+  std::optional<Gaussians> first_model;               // that estimate() has made
   bool started = false;
   bool ended = false;  // before its time, by patience
   bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
@@ -225,6 +226,8 @@ struct Trainer::Impl {
   PsnrRise rise;
   Stopwatch training{context};
   Stopwatch evaluating{context};
+  std::optional<double> run_seconds;     // that fit_time() was given
+  std::optional<double> steady_seconds;  // of training, when the last steps began
   double last_loss = 0;
   std::int64_t row_iteration = 0;
   double row_seconds = 0;

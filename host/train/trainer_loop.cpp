@@ -3,13 +3,17 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <limits>
 #include <new>
 
 #include "base/interrupt.hpp"
+#include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {
 namespace {
+
+constexpr std::int64_t kWholeRun = std::numeric_limits<std::int64_t>::max();
 
 // The same error with a remark at its end.
 [[noreturn]] void throw_with(const Error& error, const std::string& remark) {
@@ -57,17 +61,18 @@ void Trainer::Impl::run_iterations(std::int64_t until,
     training.start();
   };
   bool stop = false;
-  while (iteration < until && !stop) {
+  while (iteration < std::min(until, last_iteration(options)) && !stop) {
     const auto turn = context.lock();
     if (ranks.size() > 1) stop_wished = interrupted() || stop_asked;
     step();
-    const bool last = iteration == options.iterations;
+    keep_time();
+    const bool last = iteration == last_iteration(options);
     if (last || every(options.log_every, iteration)) report(progress);
     if (every(options.validate_every, iteration)) pause([this] { validate_model(); });
     if (callback) {
       const auto hear = callback;  // it may be replaced meanwhile
       try {
-        pause([&] { hear({iteration, options.iterations, gaussians.count}); });
+        pause([&] { hear({iteration, last_iteration(options), gaussians.count}); });
       } catch (...) {
         if (!last) control_density();  // what is saved then has this iteration complete
         throw;
@@ -130,12 +135,13 @@ void Trainer::Impl::advance(std::int64_t until,
                             bool scheduled,
                             bool show_progress,
                             const std::function<bool()>& interrupted) {
-  Progress progress("Training", options.iterations, iteration, show_progress ? stderr : nullptr);
+  Progress progress("Training", last_iteration(options), iteration,
+                    show_progress ? stderr : nullptr);
   row_iteration = iteration;
   row_seconds = training.seconds();
   training.start();
   try {
-    if (scheduled && iteration == options.iterations) {
+    if (scheduled && iteration == last_iteration(options)) {
       const auto turn = context.lock();
       finish_resumed();
     }
@@ -166,20 +172,21 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     const auto turn = context.lock();
     start();
   }
-  advance(options.iterations, true, show_progress, [&] { return interrupt.requested(); });
+  advance(kWholeRun, true, show_progress, [&] { return interrupt.requested(); });
   ranks.barrier();  // what rank 0 writes is written
   settle_validation();
-  write_metrics(ended || iteration == options.iterations);
+  const bool complete = iteration == last_iteration(options);
+  write_metrics(ended || complete);
   if (const std::uint64_t capped = guard.counts().capped_rays; capped > 0)
     warn_of_capped_rays(capped);
-  if (iteration == options.iterations) warn_of_no_progress();
+  if (complete) warn_of_no_progress();
   if (const auto best = better_before(run.evaluations())) {
     spdlog::warn(
         "the last PSNR of the test views, {:.2f} dB, is below that of iteration {}, {:.2f} dB: the "
         "run learns its photos by heart or its rates are too high",
         run.evaluations().back().psnr, best->iteration, best->psnr);
   }
-  if (iteration < options.iterations && !stop_asked && !ended) {
+  if (!complete && !stop_asked && !ended) {
     throw Error(
         ErrorCode::kInterrupted,
         fmt::format("Interrupted at iteration {}; everything is saved: continue with --resume {}",
@@ -203,9 +210,9 @@ bool Trainer::Impl::train_some(std::int64_t count) {
   }
   const Busy busy(*this);
   prepare();
-  const std::int64_t left = std::max<std::int64_t>(options.iterations - iteration, 0);
-  advance(iteration + std::min(count, left), false, false, [] { return false; });
-  return iteration < options.iterations;
+  advance(count < kWholeRun - iteration ? iteration + count : kWholeRun, false, false,
+          [] { return false; });
+  return iteration < last_iteration(options);
 }
 
 // For steps of the caller's own: the folder stays locked until the trainer goes.

@@ -11,6 +11,7 @@
 
 #include "raysplats/error.hpp"
 #include "train/run_time.hpp"
+#include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {
@@ -23,8 +24,10 @@ constexpr double kCoarseShare = 0.2;     // of the time for steps that coarse on
 constexpr double kFullShare = 0.5;       // and these together with those at full size
 constexpr int kMostPasses = 12;          // that double the count
 constexpr std::int64_t kLeastIterations = 10;
-constexpr double kShortRun = 20;    // seconds of a run that is not worth more measuring
-constexpr double kFillShare = 0.5;  // of the limit that a start takes at most
+constexpr double kShortRun = 20;     // seconds of a run that is not worth more measuring
+constexpr double kFillShare = 0.5;   // of the limit that a start takes at most
+constexpr double kTimedShare = 0.1;  // of a run, once its steps are alike, that is timed
+constexpr double kLatestEnd = 2;     // of the iterations that were planned
 
 class Timer {
  public:
@@ -192,8 +195,8 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   const std::size_t most = limit();
   choose_background();
   first_model = initial_model(
-      dataset, train_cameras,
-      [this](PhotoChoice choice) -> const auto& { return photos(choice); }, most, options);
+      dataset, train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
+      most, options);
   std::optional<Gaussians> made = first_model;
   pilot.start_seconds = ranks.said_by(0, clock.seconds());
   upload_start(most);
@@ -216,8 +219,11 @@ RunEstimate Trainer::Impl::estimate(double seconds) {
   const Pilot pilot = run_pilot(seconds, std::nullopt);
   const std::size_t most = most_gaussians(options.iterations);
   const bool grows = density.accumulates_at(0);
-  return {options.iterations, grows ? most : pilot.first,
-          seconds_of(pilot, options.iterations, grows ? most : pilot.first)};
+  const double planned = seconds_of(pilot, options.iterations, grows ? most : pilot.first);
+  const std::int64_t end = last_iteration(options);
+  return {end, grows ? most : pilot.first,
+          planned * static_cast<double>(end) /
+              static_cast<double>(std::max<std::int64_t>(options.iterations, 1))};
 }
 
 RunEstimate Trainer::Impl::fit_time(double seconds) {
@@ -240,9 +246,35 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
   options.max_gaussians = static_cast<std::int64_t>(most_gaussians(options.iterations));
   first_model.reset();  // it was made for another limit
   follow_options();
+  options.end_iteration = 0;
   training.set(pilot.seconds);
+  run_seconds = seconds;
   return {options.iterations, static_cast<std::size_t>(options.max_gaussians),
           pilot.seconds + duration(options.iterations)};
+}
+
+// Of a run by time: its last steps are alike, and once a part of them is timed the time that is
+// left tells how many more there can be. What the steps do depends on the schedules alone, so that
+// a run which is given this end from the beginning has the same bytes.
+void Trainer::Impl::keep_time() {
+  if (!run_seconds) return;
+  const std::int64_t from = steady_from(options);
+  const std::int64_t timed = std::llround(kTimedShare * static_cast<double>(options.iterations));
+  if (iteration == from) {
+    settle();
+    steady_seconds = training.seconds();
+    return;
+  }
+  if (!steady_seconds || iteration != from + timed || iteration >= options.iterations) return;
+  settle();
+  const double now = training.seconds();
+  const double more = (*run_seconds - now) / (now - *steady_seconds) * static_cast<double>(timed);
+  const auto latest = kLatestEnd * static_cast<double>(options.iterations);
+  const double end =
+      std::clamp(static_cast<double>(iteration) + more, static_cast<double>(iteration) + 1, latest);
+  options.end_iteration = static_cast<std::int64_t>(ranks.said_by(0, end));
+  run.write_config(options);
+  spdlog::debug("{} iterations after all, not {}", options.end_iteration, options.iterations);
 }
 
 }  // namespace raysplats

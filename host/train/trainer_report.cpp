@@ -126,7 +126,7 @@ void Trainer::Impl::write_metrics(bool complete) {
   const StepGuard::Counts counts = guard.counts();
   run.write_metrics({{"complete", complete},
                      {"iteration", iteration},
-                     {"iterations", options.iterations},
+                     {"iterations", last_iteration(options)},
                      {"gaussians", gaussians.count},
                      {"loss", last_loss},
                      {"training_seconds", training.seconds()},

@@ -139,11 +139,11 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
                     checkpoint.iteration, dataset.root.string()));
   }
   check_data_options(checkpoint);
-  if (checkpoint.iteration > options.iterations) {
+  if (checkpoint.iteration > last_iteration(options)) {
     throw UsageError(fmt::format(
         "The run is at iteration {} already, beyond --iterations {}: raise them, or resume from an "
         "earlier checkpoint",
-        checkpoint.iteration, options.iterations));
+        checkpoint.iteration, last_iteration(options)));
   }
   const bool file = !std::filesystem::is_directory(place);
   const std::filesystem::path folder = file ? place.parent_path().parent_path() : place;

@@ -73,7 +73,7 @@ bool Trainer::Impl::out_of_patience() const {
 // At the end of a run: its best model stays, and is named, if the last validation was worse.
 void Trainer::Impl::settle_validation() {
   const std::vector<EvaluationRow>& rows = run.validations();
-  if (rows.empty() || (iteration < options.iterations && !ended)) return;
+  if (rows.empty() || (iteration < last_iteration(options) && !ended)) return;
   const EvaluationRow& best = best_of(rows);
   if (best.psnr > rows.back().psnr + kMargin) {
     spdlog::warn(

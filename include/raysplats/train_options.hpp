@@ -91,6 +91,8 @@ inline TraceOptions peak_order() {
 struct TrainOptions {
   // Run
   std::int64_t iterations = 10000;
+  /// Where the run ends, though schedules are those of `iterations`; 0: with them.
+  std::int64_t end_iteration = 0;
   int views_per_step = 1;  ///< whose gradients are added
   std::uint64_t seed = 42;
 

@@ -101,20 +101,22 @@ class Trainer {
   /// everything back: the run is as without. Throws UsageError once training has begun.
   RunEstimate estimate(double seconds);
   /// Sets options.iterations, and max_gaussians where that is 0, so that measuring (a twentieth of
-  /// it) and training take `seconds`; RUN/config.toml names both. Throws UsageError once training
-  /// has begun, and for a time in which nothing can be trained.
+  /// it) and training take `seconds`; RUN/config.toml names both. When the run's last steps have
+  /// begun, some are timed and options.end_iteration is set to where the time will be over, there
+  /// too. Throws UsageError once training has begun, and for a time in which nothing can be
+  /// trained.
   RunEstimate fit_time(double seconds);
 
-  /// Trains up to options.iterations. SIGINT and SIGTERM finish the iteration, save a checkpoint
-  /// and the model and throw Error(kInterrupted). Ten steps in a row that are not finite
-  /// (StepGuard) leave RUN/dump and throw Error(kRuntime) naming the iteration. After other
+  /// Trains up to options.iterations, or end_iteration. SIGINT and SIGTERM finish the iteration,
+  /// save a checkpoint and the model and throw Error(kInterrupted). Ten steps in a row that are not
+  /// finite (StepGuard) leave RUN/dump and throw Error(kRuntime) naming the iteration. After other
   /// failures, and after an exception from a callback, the last whole state is saved when the
   /// device still gives it, and the error says which iteration that is; what a callback throws
   /// comes out as it is. Throws DataError when another run has the folder.
   TrainSummary run(bool show_progress = true);
 
   /// At most `count` iterations more, without the evaluations and files of the schedule; returns
-  /// whether options.iterations are still to come. Throws UsageError for a count below 1, and what
+  /// whether iterations are still to come. Throws UsageError for a count below 1, and what
   /// run() throws for a model that is damaged.
   bool step(std::int64_t count = 1);
   /// `callback` hears of every iteration of run() and step(), in their thread, before density

@@ -133,3 +133,19 @@ TEST_CASE("a random background is a function of seed and iteration, for cut-out 
   for (const float c : color) CHECK((c >= 0.0f && c < 1.0f));
   CHECK(step_background(options, false, white, 5) == std::array<float, 3>{0, 0, 0});
 }
+
+TEST_CASE("steps are alike once photos are whole, bands are on and density control is over") {
+  TrainOptions options;
+  options.iterations = 1000;
+  options.densify_until = 0.5;
+  options.resolution_schedule = {{2, 0.3}};
+  options.sh_degree_interval = 0.1;
+  CHECK(steady_from(options) == 500);
+  options.resolution_schedule = {{4, 0.3}, {2, 700}};
+  CHECK(steady_from(options) == 700);
+  options.sh_degree_interval = 0.25;
+  CHECK(steady_from(options) == 750);
+  CHECK(last_iteration(options) == 1000);
+  options.end_iteration = 800;
+  CHECK(last_iteration(options) == 800);
+}
