@@ -89,6 +89,19 @@ struct Box {
   }
 };
 
+// Leaves packets without a watch when it goes, whatever was thrown in between: what a watch refers
+// to ends before they do.
+class Unwatched {
+ public:
+  explicit Unwatched(CameraTracer& packets) : packets_(packets) {}
+  ~Unwatched() { packets_.set_watch({}); }
+  Unwatched(const Unwatched&) = delete;
+  Unwatched& operator=(const Unwatched&) = delete;
+
+ private:
+  CameraTracer& packets_;
+};
+
 Box box_of(const Gaussians& gaussians) {
   Box box;
   box.add(gaussians.means);
@@ -278,6 +291,7 @@ bool PathTracer::Impl::trace_packets(const Camera& camera,
   struct Stopped {};
   if (!packets_updated) packets.update(gaussians);
   packets_updated = true;
+  const Unwatched afterwards(packets);
   if (within) {
     packets.set_watch([&within](double) {
       if (!within(0.0)) throw Stopped();
@@ -286,10 +300,8 @@ bool PathTracer::Impl::trace_packets(const Camera& camera,
   try {
     packets.forward(gaussians, camera);
   } catch (const Stopped&) {
-    packets.set_watch({});
     return false;
   }
-  packets.set_watch({});
   statistics.capped_rays += packets.statistics().capped_rays;
   packet_pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   return true;
@@ -414,6 +426,7 @@ Image PathTracer::render(const Camera& camera, const std::function<bool(double)>
 }
 
 void PathTracer::set_sampling(int samples, std::uint64_t seed) {
+  const auto turn = impl_->context.lock();
   RenderSettings settings = impl_->settings;
   settings.samples = samples;
   settings.seed = seed;
@@ -423,6 +436,9 @@ void PathTracer::set_sampling(int samples, std::uint64_t seed) {
 
 const Context& PathTracer::context() const { return impl_->context; }
 
-PathTracer::Statistics PathTracer::statistics() const { return impl_->statistics; }
+PathTracer::Statistics PathTracer::statistics() const {
+  const auto turn = impl_->context.lock();
+  return impl_->statistics;
+}
 
 }  // namespace raysplats

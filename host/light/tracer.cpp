@@ -184,7 +184,10 @@ void Tracer::set_share(std::size_t part, std::size_t parts) {
   impl_->views.set_share(part, parts);
 }
 
-std::array<int, 2> Tracer::rows() const { return impl_->views.rows(); }
+std::array<int, 2> Tracer::rows() const {
+  const auto turn = impl_->context.lock();
+  return impl_->views.rows();
+}
 
 Image Tracer::depth() const {
   const Impl& self = *impl_;

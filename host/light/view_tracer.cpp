@@ -233,6 +233,8 @@ void ViewTracer::forward(const DeviceGaussians& gaussians,
   self.revision = gaussians.revision;
 }
 
+RayTracer* ViewTracer::ray_tracer() { return impl_->rays ? &impl_->rays->tracer : nullptr; }
+
 void ViewTracer::forward_rays(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
   Impl& self = *impl_;
   require_pixels(camera);

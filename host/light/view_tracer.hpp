@@ -19,6 +19,8 @@
 
 namespace raysplats {
 
+class RayTracer;
+
 /// Pictures of Gaussians from cameras of every model, forward and backward: in packets of rays
 /// where the camera has a centre (CameraTracer); with Traversal::kBvh, other cameras and scenes
 /// with mirrors ray by ray (RayTracer, MirrorPaths). Boxes and trees follow the revision of the
@@ -37,6 +39,9 @@ class ViewTracer {
   std::size_t triangles() const;
   /// Whether a view of this camera is traced ray by ray.
   bool by_rays(const Camera& camera) const;
+
+  /// What traces views ray by ray; null where none has asked for it yet.
+  RayTracer* ray_tracer();
 
   /// Traces one view. With `keep` backward() may follow; what it needs stays where the memory
   /// budget has room and is traced again where not. Throws UsageError for a camera without pixels

@@ -70,11 +70,12 @@ void RayTracer::refit(const DeviceGaussians& gaussians) {
   impl_->revision = gaussians.revision;
 }
 
-void RayTracer::follow(const DeviceGaussians& gaussians) {
+bool RayTracer::follow(const DeviceGaussians& gaussians) {
   Impl& self = *impl_;
-  if (self.revision > 0 && gaussians.revision == self.revision) return;
-  self.tree.follow(gaussians);
+  if (self.revision > 0 && gaussians.revision == self.revision) return false;
+  const bool built = self.tree.follow(gaussians);
   self.revision = gaussians.revision;
+  return built;
 }
 
 void RayTracer::require_current(const DeviceGaussians& gaussians) const {

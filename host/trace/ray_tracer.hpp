@@ -31,8 +31,8 @@ class RayTracer {
   /// slower the farther they moved. Throws UsageError when their number changed.
   void refit(const DeviceGaussians& gaussians);
   /// update() or refit(), whichever the measured growth of the tree asks for (RayTree::follow()),
-  /// where the Gaussians changed since, else nothing.
-  void follow(const DeviceGaussians& gaussians);
+  /// where the Gaussians changed since, else nothing. Returns whether it was update().
+  bool follow(const DeviceGaussians& gaussians);
 
   std::vector<RayResult> trace(const DeviceGaussians& gaussians,
                                std::span<const Ray> rays,

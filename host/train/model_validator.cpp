@@ -40,7 +40,9 @@ std::string ModelValidator::find_non_finite(const Buffer<float>& values,
                      found[0], name, found[1]);
 }
 
-std::string ModelValidator::find_fault(const DeviceGaussians& gaussians, const Adam& adam) {
+std::string ModelValidator::find_fault(const DeviceGaussians& gaussians,
+                                       const Adam& adam,
+                                       RayTracer* rays) {
   if (gaussians.count == 0) return "";
   for (const ParameterGroup group : kParameterGroups) {
     const std::string name = group_name(group);
@@ -53,9 +55,9 @@ std::string ModelValidator::find_fault(const DeviceGaussians& gaussians, const A
       if (!fault.empty()) return fault;
     }
   }
-  const bool built = tree_.follow(gaussians);
-  return validate_ray_tree(RayTreeCopy::of(tree_), gaussians.download(),
-                           built ? LeafOrder::kCurve : LeafOrder::kAny);
+  const bool built = rays != nullptr ? rays->follow(gaussians) : tree_.follow(gaussians);
+  return validate_ray_tree(RayTreeCopy::of(rays != nullptr ? rays->tree() : tree_),
+                           gaussians.download(), built ? LeafOrder::kCurve : LeafOrder::kAny);
 }
 
 }  // namespace raysplats

@@ -8,6 +8,7 @@
 #include "device/context.hpp"
 #include "raysplats/trace_options.hpp"
 #include "trace/device_gaussians.hpp"
+#include "trace/ray_tracer.hpp"
 #include "trace/ray_tree.hpp"
 #include "train/adam.hpp"
 
@@ -20,8 +21,12 @@ class ModelValidator {
  public:
   ModelValidator(Context& context, const TraceOptions& options);
 
-  /// "" or one sentence about the first fault: which array, which Gaussian, how many.
-  std::string find_fault(const DeviceGaussians& gaussians, const Adam& adam);
+  /// "" or one sentence about the first fault: which array, which Gaussian, how many. The tree is
+  /// the one that `rays` walk, brought up to date as before the next view; null: one of its own,
+  /// made the same way.
+  std::string find_fault(const DeviceGaussians& gaussians,
+                         const Adam& adam,
+                         RayTracer* rays = nullptr);
 
  private:
   std::string find_non_finite(const Buffer<float>& values,
@@ -31,7 +36,7 @@ class ModelValidator {
   Context& context_;
   std::size_t chunk_;  // Gaussians per work-item
   Kernel kernel_;
-  RayTree tree_;  // refitted or built from one call to the next, as in training
+  RayTree tree_;  // its own: refitted or built from one call to the next, as in training
   Buffer<std::uint32_t> found_;
 };
 

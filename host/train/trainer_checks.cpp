@@ -37,7 +37,7 @@ void Trainer::Impl::validate_model() {
   if (!validator) {
     validator.emplace(context, trace_options_of(options, background));
   }
-  const std::string fault = validator->find_fault(gaussians, adam);
+  const std::string fault = validator->find_fault(gaussians, adam, tracer.ray_tracer());
   if (fault.empty()) return;
   throw Error(ErrorCode::kRuntime,
               fmt::format("The model is damaged after iteration {}: {}; resume from an earlier "

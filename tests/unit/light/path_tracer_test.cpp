@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
+#include <memory>
+#include <stdexcept>
 
 #include "base/rng.hpp"
 #include "light/view_tracer.hpp"
@@ -338,6 +340,26 @@ TEST_CASE("camera rays in packets and ray by ray give the same picture, through 
       }
     }
   }
+}
+
+TEST_CASE("what a watch throws comes out, and nothing calls it afterwards [small]") {
+  Context context = make_test_context();
+  PathTracer tracer(context, cloud_scene(2));
+  int calls = 0;
+  {
+    const auto owned = std::make_unique<int>(0);
+    CHECK_THROWS_AS(tracer.render(kCamera,
+                                  [&, number = owned.get()](double share) -> bool {
+                                    *number = ++calls;
+                                    if (share == 0.0) throw std::out_of_range("of the watch");
+                                    return true;
+                                  }),
+                    std::out_of_range);
+  }
+  CHECK(calls == 1);
+  const Image picture = tracer.render(kCamera);
+  CHECK(calls == 1);
+  CHECK(picture.data == PathTracer(context, cloud_scene(2)).render(kCamera).data);
 }
 
 TEST_CASE("transparent surfaces") {

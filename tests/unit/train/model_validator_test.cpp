@@ -66,3 +66,19 @@ TEST_CASE("model validator: the first number that is not finite is named [small]
     CHECK(f.fault().empty());
   }
 }
+
+TEST_CASE("model validator: the tree that rays walk is the one that is looked at [small]") {
+  Fixture f;
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(f.context, f.model, ScaleActivation::kExp);
+  RayTracer rays(f.context, {});
+  CHECK(f.validator.find_fault(gaussians, f.adam, &rays).empty());
+  CHECK(rays.tree().tree().size() == f.model.size());
+  CHECK_FALSE(rays.follow(gaussians));  // it is up to date
+  // A tree of other Gaussians that passes for theirs.
+  Gaussians moved = f.model;
+  for (float& mean : moved.means) mean += 100.0f;
+  DeviceGaussians others = DeviceGaussians::upload(f.context, moved, ScaleActivation::kExp);
+  others.revision = gaussians.revision;
+  CHECK_FALSE(f.validator.find_fault(others, f.adam, &rays).empty());
+}
