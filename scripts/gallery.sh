@@ -1,12 +1,20 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Renders the scenes of configs/gallery around a trained model: mirrors, glass, shadows, transparency and an animation.
-# usage: scripts/gallery.sh [OUTPUT [RUN]]
+# With --data the model is one of photos: a mirror with a ball, a ball on its way around, glass and a shadow around its
+# subject, wherever its cameras say that this is.
+# usage: scripts/gallery.sh [--data DATA] [OUTPUT [RUN]]
+#   DATA    data set of `raysplats train`, trained with --quality low
 #   OUTPUT  folder for the pictures (default: gallery/ in the project)
-#   RUN     folder of a training run on the generated data set; trained into OUTPUT/run when left out
+#   RUN     folder of a training run on the generated data set, or on DATA; trained into OUTPUT/run when left out
 # RAYSPLATS_DEVICE chooses the OpenCL device (index or part of its name).
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+data=
+if [[ ${1:-} == --data ]]; then
+  data=$(realpath -- "${2:?--data takes a data set}")
+  shift 2
+fi
 output=$(realpath -m -- "${1:-$root/gallery}")
 run=${2:-}
 cd "$root"
@@ -22,8 +30,12 @@ if [[ -z $run ]]; then
   run=$output/run
   if [[ ! -e $run/metrics.json ]]; then
     say "Training a model to put things into: $run"
-    "$raysplats" generate "$output/data" --size 320
-    "$raysplats" train "$output/data" -o "$run" --config configs/quick.toml --max-gaussians 60000 "${device[@]}"
+    if [[ -n $data ]]; then
+      "$raysplats" train "$data" -o "$run" --quality low "${device[@]}"
+    else
+      "$raysplats" generate "$output/data" --size 320
+      "$raysplats" train "$output/data" -o "$run" --config configs/quick.toml --max-gaussians 60000 "${device[@]}"
+    fi
   fi
 fi
 run=$(realpath -- "$run")
@@ -67,10 +79,18 @@ awk -v n=64 'BEGIN {
 }' > "$output/scenes/ball.obj"
 
 ln -sfn -- "$run" "$output/scenes/model"
-for scene in configs/gallery/*.toml; do
+if [[ -n $data ]]; then
+  python3 scripts/gallery/around.py "$run" "$output/scenes"
+  scenes=("$output"/scenes/captured_*.toml)
+else
+  scenes=(configs/gallery/*.toml)
+  cp -- "${scenes[@]}" "$output/scenes/"
+fi
+for scene in "${scenes[@]}"; do
   name=$(basename "$scene" .toml)
   say "$name"
-  cp -- "$scene" "$output/scenes/"
-  "$raysplats" render "$output/scenes/$name.toml" -o "$output/$name" "${device[@]}"
+  video=()
+  [[ $name != captured_turn ]] || video=(--video "$output/turn.gif" --fps 10)
+  "$raysplats" render "$output/scenes/$name.toml" -o "$output/$name" "${video[@]}" "${device[@]}"
 done
 say "Pictures: $output"
