@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/model_summary.hpp"
+#include "core/trace_rows.hpp"
 #include "info_files.hpp"
 #include "io/mesh_file.hpp"
 #include "io/model_formats.hpp"
@@ -106,12 +107,9 @@ const char* source_name(SceneCamera::Source source) {
 }
 
 Json describe(const TraceOptions& trace) {
-  return {{"hit_order", trace.hit_order == HitOrder::kPeak ? "peak" : "entry"},
-          {"quantile", trace.quantile},
-          {"adaptive_radius", trace.adaptive_radius},
-          {"near_depth", trace.near_depth},
-          {"min_transmittance", trace.min_transmittance},
-          {"max_hits", trace.max_hits}};
+  return {{"hit_order", hit_order_name(trace.hit_order)}, {"quantile", trace.quantile},
+          {"adaptive_radius", trace.adaptive_radius},     {"near_depth", trace.near_depth},
+          {"min_transmittance", trace.min_transmittance}, {"max_hits", trace.max_hits}};
 }
 
 Json describe(const io::MeshFile& file) {
@@ -327,8 +325,8 @@ void info_model(const Options& options) {
   print(summary);
   if (source.header) {
     fmt::print("traced           in {} order, quantile {:.4g}, {} radius\n",
-               source.header->hit_order == HitOrder::kPeak ? "peak" : "entry",
-               source.header->quantile, source.header->adaptive_radius ? "adaptive" : "whole");
+               hit_order_name(source.header->hit_order), source.header->quantile,
+               source.header->adaptive_radius ? "adaptive" : "whole");
   }
   if (!source.sky.empty()) {
     fmt::print("sky              trained, by direction, {} coefficients a channel\n",

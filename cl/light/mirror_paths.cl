@@ -42,7 +42,7 @@ __kernel void reflect_rays(const uint count,
   if (dot(direction, point.normal) <= 0.0f) direction = reflected(d, point.normal);
   const float3 start = start_off_surface(point.position, point.normal, direction, point.offset);
   const uint to = starts[i];
-  next_rays[to] = (float8)(start, 0.0f, direction, 3.402823466e38f);
+  next_rays[to] = (float8)(start, 0.0f, direction, FLT_MAX);
   next_paths[to].skip = hit.triangle;
 }
 
@@ -120,7 +120,6 @@ __kernel void spread_gradients(const uint count,
   }
 }
 
-// Adds a count of 64 bits to another. One work-item.
 // What the rays of the pixels from `first` on saw, as planes of a picture of `pixels`.
 __kernel void store_picture(const uint count,
                             const uint first,

@@ -21,8 +21,6 @@
 #define RS_RESULT_MEDIAN s5
 #define RS_RESULT_LEADING s6
 
-#define RS_FAR 3.402823466e+38f
-
 // direct: 1 when the rays leave the camera's centre.
 __kernel void begin_paths(const uint count,
                           const int direct,
@@ -87,7 +85,7 @@ __kernel void load_surfaces(const uint count,
   const RsSurfaceHit hit = hits[i];
   float8 ray = rays[i];
   ray.s3 = paths[i].begin;
-  ray.s7 = paths[i].blind ? -1.0f : (hit.triangle < 0 ? RS_FAR : hit.t);
+  ray.s7 = paths[i].blind ? -1.0f : (hit.triangle < 0 ? FLT_MAX : hit.t);
   rays[i] = ray;
   from_origin[i] = (uint)paths[i].direct;
   RsSurface s;
@@ -124,7 +122,7 @@ float3 light_at(__global const RsLight* light, float3 p, float3* direction, floa
   const float3 color = vload3(0, light->color);
   if (light->kind == RS_LIGHT_DIRECTIONAL) {
     *direction = -vload3(0, light->direction);
-    *distance = RS_FAR;
+    *distance = FLT_MAX;
     return color;
   }
   const float3 v = vload3(0, light->position) - p;
@@ -208,7 +206,7 @@ __kernel void shadow_rays(const uint count,
   }
   if (wanted) {
     if (lights[number].kind == RS_LIGHT_DIRECTIONAL) {
-      distance = RS_FAR;
+      distance = FLT_MAX;
     } else {
       float3 to = vload3(0, lights[number].position);
       const float radius = lights[number].radius;
@@ -295,7 +293,7 @@ Continuation straight_on(const RsPath* path, float8 ray, const RsSurface* s, flo
   out.path.skip = s->triangle;
   vstore3(throughput, 0, out.path.throughput);
   ray.s3 = s->t;
-  ray.s7 = RS_FAR;
+  ray.s7 = FLT_MAX;
   out.ray = ray;
   return out;
 }
@@ -314,7 +312,7 @@ Continuation new_direction(const RsPath* path,
   const float3 d = normalize(direction), from = load3(s->position);
   const bool back = dot(d, normal) >= 0.0f;  // to where it came from
   const float3 p = back ? start_off_surface(from, normal, d, s->offset) : from - s->offset * normal;
-  out.ray = (float8)(p, 0.0f, d, RS_FAR);
+  out.ray = (float8)(p, 0.0f, d, FLT_MAX);
   return out;
 }
 

@@ -7,6 +7,13 @@
 
 #include "shared/compat.h"
 
+// The basis function of degree 0, 1 / (2 sqrt(pi)).
+#ifdef __OPENCL_C_VERSION__
+#define RS_SH0 0.28209479177387814f
+#else
+#define RS_SH0 0.28209479177387814
+#endif
+
 #ifndef RS_SH_REAL
 #define RS_SH_REAL rs_float
 #endif
@@ -21,7 +28,7 @@
 RS_SH_FUNCTION rs_sh_basis(
     int degree, RS_SH_REAL x, RS_SH_REAL y, RS_SH_REAL z, RS_SH_REAL* basis) {
   const RS_SH_REAL xx = x * x, yy = y * y, zz = z * z;
-  basis[0] = 0.28209479177387814f;
+  basis[0] = (rs_float)RS_SH0;
   if (degree < 1) return;
   basis[1] = -0.4886025119029199f * y;
   basis[2] = 0.4886025119029199f * z;

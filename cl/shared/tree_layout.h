@@ -8,6 +8,8 @@
 #define RS_NODE_VECTORS 6
 // Gaussians; `adaptive` is 1 where each has a radius of its own, else 0.
 #define RS_GAUSSIAN_VECTORS(adaptive) (15 + (adaptive))
+#define RS_GAUSSIAN_MEAN 6
+#define RS_GAUSSIAN_INDEX(adaptive) (10 + (adaptive))
 #define RS_TRIANGLE_VECTORS 10
 
 #endif

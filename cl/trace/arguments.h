@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kernel arguments that come together, declared once. Functions of the host of the same name set
-// them in this order (host/trace/arguments.hpp, host/trace/camera_tracer.cpp).
+// them in this order (host/trace/camera_tracer_impl.hpp, host/trace/ray_launch.hpp).
 #ifndef RS_TRACE_ARGUMENTS_H
 #define RS_TRACE_ARGUMENTS_H
 

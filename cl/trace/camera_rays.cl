@@ -5,8 +5,6 @@
 #include "shared/random.h"
 #include "trace/lens.h"
 
-#define RS_FAR 3.402823466e38f
-
 __kernel void camera_rays(const RsLensCamera camera,
                           const uint first_pixel,
                           const uint count,
@@ -52,5 +50,5 @@ __kernel void camera_rays(const RsLensCamera camera,
   const float3 o = (float3)(camera.center[0], camera.center[1], camera.center[2]) +
                    origin.x * right + origin.y * down;
   const float3 d = direction.x * right + direction.y * down + direction.z * forward;
-  rays[id] = (float8)(o, 0.0f, d / sqrt(dot(d, d)), valid ? RS_FAR : -1.0f);
+  rays[id] = (float8)(o, 0.0f, d / sqrt(dot(d, d)), valid ? FLT_MAX : -1.0f);
 }

@@ -4,6 +4,7 @@
 #include "bvh/box.h"
 #include "primitives/prefetch.h"
 #include "shared/color.h"
+#include "shared/sh.h"
 #include "trace/arguments.h"
 #include "trace/gaussian.h"
 #include "trace/ray_block.h"
@@ -95,7 +96,7 @@ __kernel void fill_blocks(const uint count,
         v[9] = 0.5f * Q;
         v[RS_BLOCK_OPACITY] = opacity;
       }
-      color = 0.5f + 0.28209479177387814f * vload3(0, sh + (size_t)index * 3 * sh_coefficients);
+      color = 0.5f + RS_SH0 * vload3(0, sh + (size_t)index * 3 * sh_coefficients);
       color = fmin(fmax(color, (float3)(0.0f)), (float3)(RS_MAX_COLOR));
     }
     __global float* record = blocks + (size_t)block * (RS_BLOCK_VECTORS * PACKET);

@@ -7,9 +7,8 @@
 // gaussian_normals: one work-item per Gaussian; scales before their activation, which keeps their
 //   order. eye: the camera's centre, or with eye.w = 0 the direction in which all rays go. n = 0
 //   for a quaternion of length 0. O(1) each.
-#include "shared/compat.h"
+#include "shared/sh.h"
 
-#define RS_SH0 0.28209479177387814f
 
 __kernel void gaussian_normals(__global const float* restrict means,
                                __global const float* restrict quaternions,

@@ -26,10 +26,10 @@
 // ADAPTIVE_RADIUS; the opacities; the indices of the Gaussians as bits; then per lane the colour of
 // SH degree 0 and a zero.
 #define RS_BLOCK_OPACITY (9 + ADAPTIVE_RADIUS)
-#define RS_BLOCK_INDEX (RS_BLOCK_OPACITY + 1)
+#define RS_BLOCK_INDEX RS_GAUSSIAN_INDEX(ADAPTIVE_RADIUS)
 #define RS_BLOCK_COLOR (RS_BLOCK_INDEX + 1)
 #define RS_BLOCK_VECTORS RS_GAUSSIAN_VECTORS(ADAPTIVE_RADIUS)
-#if RS_BLOCK_VECTORS != RS_BLOCK_COLOR + 4
+#if RS_BLOCK_VECTORS != RS_BLOCK_COLOR + 4 || RS_BLOCK_INDEX != RS_BLOCK_OPACITY + 1
 #error "the colours are the end of a block"
 #endif
 

@@ -83,7 +83,7 @@ RS_INLINE float4 hit_color(const RayScene* scene,
   float3 v = ray->d;
   if (scene->color_from_origin) {
     __global const float* mean =
-        (__global const float*)(blocks + slot / PACKET * RS_BLOCK_VECTORS) + 6 * PACKET +
+        (__global const float*)(blocks + slot / PACKET * RS_BLOCK_VECTORS) + RS_GAUSSIAN_MEAN * PACKET +
         slot % PACKET;
     v = (float3)(mean[0], mean[PACKET], mean[2 * PACKET]) - ray->o;
   }
@@ -122,7 +122,7 @@ RS_INLINE float4 hit_color(const RayScene* scene,
   const float* basis = ray_basis;
   if (scene->color_from_origin) {
     __global const float* mean =
-        (__global const float*)(blocks + slot / PACKET * RS_BLOCK_VECTORS) + 6 * PACKET +
+        (__global const float*)(blocks + slot / PACKET * RS_BLOCK_VECTORS) + RS_GAUSSIAN_MEAN * PACKET +
         slot % PACKET;
     const float3 v = (float3)(mean[0], mean[PACKET], mean[2 * PACKET]) - ray->o;
     const float3 n = v * rsqrt(fmax(dot(v, v), 1e-30f));

@@ -6,6 +6,7 @@
 //   finish_ray_gradients  adds the private copies of the sums (ray_sums.h) in a fixed order, leaves
 //                         zeros in the copies behind the first, and carries the sums to the
 //                         parameters and to the screen statistics that density control reads
+#include "shared/sh.h"
 #include "trace/arguments.h"
 #include "trace/gaussian.h"
 #include "trace/ray_sums.h"
@@ -133,7 +134,7 @@ __kernel void finish_ray_gradients(const uint begin,
 
   gv c[3 * SH_COEFFICIENTS];
 #if SH_DEGREE == 0
-  for (int j = 0; j < 3; ++j) c[j] = touched ? 0.28209479177387814f * v[11 + j] : zero;
+  for (int j = 0; j < 3; ++j) c[j] = touched ? RS_SH0 * v[11 + j] : zero;
 #else
   for (int j = 0; j < 3; ++j) mean[j] += v[11 + j];
   for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) {

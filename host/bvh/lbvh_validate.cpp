@@ -10,6 +10,8 @@
 #include <limits>
 #include <utility>
 
+#include "shared/tree_layout.h"
+
 namespace raysplats {
 namespace {
 
@@ -250,7 +252,7 @@ LbvhCopy LbvhCopy::of(const Lbvh& tree) {
 
 RsAabb LbvhCopy::child(std::size_t node, std::size_t lane) const {
   RsAabb box;
-  const std::size_t from = node * 6 * lanes + lane;
+  const std::size_t from = node * RS_NODE_VECTORS * lanes + lane;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     box.lo[axis] = nodes[from + axis * lanes];
     box.hi[axis] = nodes[from + (3 + axis) * lanes];

@@ -24,14 +24,25 @@ const std::vector<std::pair<std::string, PacketForm>>& packet_shapes() {
   return shapes;
 }
 
-}  // namespace
+const std::vector<std::pair<std::string, HitOrder>>& hit_orders() {
+  static const std::vector<std::pair<std::string, HitOrder>> orders{{"entry", HitOrder::kEntry},
+                                                                    {"peak", HitOrder::kPeak}};
+  return orders;
+}
 
-std::string packet_shape_name(PacketForm form) {
-  for (const auto& [name, each] : packet_shapes()) {
-    if (each == form) return name;
+template <class Value>
+std::string name_of(const std::vector<std::pair<std::string, Value>>& names, Value value) {
+  for (const auto& [name, each] : names) {
+    if (each == value) return name;
   }
   return "";
 }
+
+}  // namespace
+
+std::string hit_order_name(HitOrder order) { return name_of(hit_orders(), order); }
+
+std::string packet_shape_name(PacketForm form) { return name_of(packet_shapes(), form); }
 
 void check_packet_width(const TraceOptions& options) {
   const int width = options.packet_width;
@@ -62,8 +73,7 @@ float stopping_transmittance(const TraceOptions& options) {
 }
 
 void add_trace_rows(OptionTable& t, TraceOptions& o) {
-  t.choice<HitOrder>("hit-order", o.hit_order,
-                     {{"entry", HitOrder::kEntry}, {"peak", HitOrder::kPeak}},
+  t.choice<HitOrder>("hit-order", o.hit_order, hit_orders(),
                      "depth that orders a ray's hits: entry (near side of the ellipsoid, the "
                      "paper) or peak (strongest response)");
   t.number("quantile", o.quantile, 0.01, 100,

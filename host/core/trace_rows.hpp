@@ -17,7 +17,9 @@ void add_trace_rows(OptionTable& table, TraceOptions& options);
 /// The colour behind the Gaussians.
 void add_background_row(OptionTable& table, TraceOptions& options);
 
-/// "auto", "vector" or "group".
+/// "entry" or "peak".
+std::string hit_order_name(HitOrder order);
+/// "auto", "vector", "group" or "subgroup".
 std::string packet_shape_name(PacketForm form);
 /// Throws UsageError for a width that packets of that form cannot have.
 void check_packet_width(const TraceOptions& options);

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstdint>
 
+#include "shared/sh.h"
+
 /// How the numbers of a Gaussian are coded in files other than PLY.
 namespace raysplats::io {
 
 /// The value of the constant spherical harmonic.
-constexpr double kSh0 = 0.28209479177387814;
+constexpr double kSh0 = RS_SH0;
 
 /// Opacities of floats and of bytes are kept this far from 0 and 1, where the logit is infinite.
 constexpr double kFloatOpacityMargin = 1e-7;

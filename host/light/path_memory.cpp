@@ -38,8 +38,7 @@ constexpr std::size_t kPixelBytes = 4 * kFloat;
 // Picture of packets, transmittances and the place of a pixel behind a lens.
 constexpr std::size_t kPacketPixelBytes = 13 * kFloat;
 
-// Position, normal and uv of three corners.
-constexpr std::size_t kVertexBytes = 3 * (3 + 3 + 2) * kFloat;
+constexpr std::size_t kVertexBytes = RS_TRIANGLE_FLOATS * kFloat;  // of the corners of a triangle
 
 bool has_glass(const Scene& scene) {
   return std::any_of(scene.materials.begin(), scene.materials.end(),

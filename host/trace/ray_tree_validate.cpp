@@ -10,19 +10,16 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
+#include "shared/tree_layout.h"
+
 namespace raysplats {
 namespace {
 
-// Vectors of a block (cl/trace/ray_block.h): whitening 6, mean 3, with an adaptive radius Q / 2,
-// opacity, index, colour 4.
-constexpr std::size_t kMeanVector = 6;
-constexpr std::size_t kIndexVector = 10;
-constexpr std::size_t kBlockVectors = 15;
 // Alphas about which the device may disagree whether any ray meets the Gaussian.
 constexpr double kMargin = 1.001;
 
 std::size_t block_vectors(const TraceOptions& options) {
-  return kBlockVectors + (options.adaptive_radius ? 1 : 0);
+  return RS_GAUSSIAN_VECTORS(options.adaptive_radius ? 1 : 0);
 }
 
 bool is_empty(const RsAabb& box) { return box.lo[0] > box.hi[0]; }
@@ -108,15 +105,13 @@ RayTreeCopy RayTreeCopy::of(const RayTree& tree) {
 
 std::size_t RayTreeCopy::index_at(std::size_t slot) const {
   const std::size_t lanes = tree.lanes;
-  return (slot / lanes * block_vectors(options) + kIndexVector +
-          (options.adaptive_radius ? 1 : 0)) *
-             lanes +
-         slot % lanes;
+  const std::size_t vector = RS_GAUSSIAN_INDEX(options.adaptive_radius ? 1 : 0);
+  return (slot / lanes * block_vectors(options) + vector) * lanes + slot % lanes;
 }
 
 std::size_t RayTreeCopy::mean_at(std::size_t slot, std::size_t axis) const {
   const std::size_t lanes = tree.lanes;
-  return (slot / lanes * block_vectors(options) + kMeanVector + axis) * lanes + slot % lanes;
+  return (slot / lanes * block_vectors(options) + RS_GAUSSIAN_MEAN + axis) * lanes + slot % lanes;
 }
 
 std::string validate_ray_tree(const RayTreeCopy& tree, const Gaussians& model, LeafOrder order) {

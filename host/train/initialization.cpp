@@ -17,6 +17,7 @@
 #include "io/model_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "shared/sh.h"
 #include "train/photo_start.hpp"
 #include "train/point_check.hpp"
 
@@ -24,10 +25,9 @@ namespace raysplats {
 namespace {
 
 constexpr std::uint64_t kPointStream =
-    0x706f696e7473;  // random streams of one seed are told apart by a constant
-constexpr double kShBand0 = 0.28209479177387814;  // 1 / (2 sqrt(pi))
-constexpr double kMinScale = 1e-4;                // of the scene extent
-constexpr double kMaxScale = 0.1;                 // of the distance to the nearest camera
+    0x706f696e7473;                 // random streams of one seed are told apart by a constant
+constexpr double kMinScale = 1e-4;  // of the scene extent
+constexpr double kMaxScale = 0.1;   // of the distance to the nearest camera
 constexpr std::uint32_t kReliableTrack = 3;
 constexpr float kReliableError = 2.0f;
 constexpr std::size_t kEnoughPoints = 2000;
@@ -265,7 +265,7 @@ Gaussians gaussians_from_points(const PointCloud& points,
     for (std::size_t a = 0; a < 3; ++a) {
       model.means[3 * i + a] = p[a];
       model.log_scales[3 * i + a] = static_cast<float>(std::log(scale));
-      model.sh[stride * i + a] = static_cast<float>((finite.colors[3 * i + a] - 0.5) / kShBand0);
+      model.sh[stride * i + a] = static_cast<float>((finite.colors[3 * i + a] - 0.5) / RS_SH0);
     }
     model.opacities[i] = logit;
   }

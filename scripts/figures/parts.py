@@ -230,7 +230,7 @@ def limits(run):
     lines = [[f"`{row['axis']}`", row["value"], f"{float(row['psnr']):.2f}", f"{float(row['ssim']):.4f}",
               number(float(row["train_seconds"]))] for row in rows]
     return (f"`scripts/ablation.sh DATA/colmap/fox_undistorted OUT {shown(*options, *values)} -- {shown(*train)}`.\n\n"
-            + table(["option", "value", "held-out PSNR, dB", "SSIM", "hits a step"], lines))
+            + table(["option", "value", "held-out PSNR, dB", "SSIM", "seconds of training"], lines))
 
 
 def printed(command, text):

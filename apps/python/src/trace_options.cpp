@@ -34,7 +34,7 @@ void bind_choices(nb::class_<TraceOptions>& type) {
           [](TraceOptions& o, const std::string& name) {
             o.packet_form = value_of(kPacketForms, "packet_form", name);
           },
-          "'auto', 'vector' or 'group'.")
+          "'auto', 'vector', 'group' or 'subgroup'.")
       .def_prop_rw(
           "gradient_sum",
           [](const TraceOptions& o) { return name_of(kGradientSums, o.gradient_sum); },
