@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
@@ -106,7 +107,7 @@ std::unique_ptr<view::RunView> show(Context& context,
   auto shown = std::make_unique<view::RunView>(context, trainer.gaussians(), options.train.trace,
                                                mirrors, options.train.iterations, viewer);
   trainer.set_watcher(shown.get());
-  fmt::print("Open {} in a browser to watch\n", shown->url());
+  fmt::print("Open {} in a browser to watch\n", fmt::join(shown->urls(), " or "));
   std::fflush(stdout);
   return shown;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <cstdio>
@@ -133,7 +134,7 @@ void serve(const Options& options,
     viewer_options.photo = [photos](std::size_t number) { return photos->jpeg(number); };
   const InterruptGuard interrupt;
   view::Viewer viewer(viewer_options);
-  fmt::print("Open {} in a browser; Ctrl-C ends it\n", viewer.url());
+  fmt::print("Open {} in a browser; Ctrl-C ends it\n", fmt::join(viewer.urls(), " or "));
   std::fflush(stdout);
   constexpr double kWait = 0.1;
   while (!interrupt.requested()) {

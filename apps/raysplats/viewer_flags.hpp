@@ -18,8 +18,8 @@ inline std::vector<CLI::Option*> add_viewer_flags(CLI::App& command, view::Viewe
   return {
       command
           .add_option("--host", viewer.server.host,
-                      "Address to listen on; other machines can reach any but 127.0.0.1, and "
-                      "whoever has the printed address may look")
+                      "Address to listen on, 0.0.0.0 or :: for all of this machine; other machines "
+                      "can reach any but 127.0.0.1, and whoever has the printed address may look")
           ->type_name("ADDRESS")
           ->capture_default_str(),
       command.add_option("--port", viewer.server.port, "Port to listen on; 0 = any that is free")

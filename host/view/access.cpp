@@ -12,6 +12,8 @@
 namespace raysplats::view {
 namespace {
 
+constexpr std::uint16_t kHttpPort = 80;
+
 /// The value of `name` in a list such as "a=1; b=2", "" when it is not there.
 std::string_view value_in(std::string_view list, std::string_view name, char separator) {
   while (!list.empty()) {
@@ -45,13 +47,20 @@ bool equal_secrets(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-Access::Access(std::string token, const std::string& host, std::uint16_t port)
+Access::Access(std::string token, const std::vector<std::string>& addresses, std::uint16_t port)
     : token_(std::move(token)), cookie_name_(fmt::format("raysplats-{}", port)) {
-  // An address of IPv6 stands in brackets.
-  const std::string own = host.find(':') == std::string::npos ? host : fmt::format("[{}]", host);
-  for (const std::string& name :
-       {own, std::string("127.0.0.1"), std::string("localhost"), std::string("[::1]")}) {
+  std::vector<std::string> names;
+  for (const std::string& address : addresses) {
+    // One of IPv6 stands in brackets.
+    names.push_back(address.find(':') == std::string::npos ? address
+                                                           : fmt::format("[{}]", address));
+    urls_.push_back(fmt::format("http://{}:{}/?token={}", names.back(), port, token_));
+  }
+  names.insert(names.end(), {"127.0.0.1", "localhost", "[::1]"});
+  for (const std::string& name : names) {
     hosts_.push_back(fmt::format("{}:{}", name, port));
+    // Browsers leave out the port that HTTP has anyway.
+    if (port == kHttpPort) hosts_.push_back(name);
   }
 }
 
@@ -70,10 +79,6 @@ Verdict Access::judge(const Credentials& credentials) const {
 
 std::string Access::cookie() const {
   return fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", cookie_name_, token_);
-}
-
-std::string Access::url() const {
-  return fmt::format("http://{}/?token={}", hosts_.front(), token_);
 }
 
 }  // namespace raysplats::view

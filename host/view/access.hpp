@@ -30,21 +30,22 @@ enum class Verdict {
 
 class Access {
  public:
-  /// `host` is the address that the server listens on, beside the names of this machine itself.
-  Access(std::string token, const std::string& host, std::uint16_t port);
+  /// `addresses` reach the server, beside the names of this machine itself.
+  Access(std::string token, const std::vector<std::string>& addresses, std::uint16_t port);
 
   /// Forbidden: another host than ours, an origin other than our own page (none is allowed, as the
   /// token is known then), neither the token nor the cookie.
   Verdict judge(const Credentials& credentials) const;
   /// The value of the Set-Cookie header.
   std::string cookie() const;
-  /// The address to open first.
-  std::string url() const;
+  /// What to open first, one for each of the addresses.
+  const std::vector<std::string>& urls() const { return urls_; }
 
  private:
   std::string token_;
   std::string cookie_name_;
-  std::vector<std::string> hosts_;  ///< with the port
+  std::vector<std::string> hosts_;  ///< as browsers write them: with the port
+  std::vector<std::string> urls_;
 };
 
 /// Compares without telling by the time how much was right.

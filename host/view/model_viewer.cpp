@@ -26,7 +26,7 @@ ModelViewer::ModelViewer(Context& context,
   state.near_depth = trace.near_depth;
   options.state = state_json(state);
   viewer_ = std::make_unique<Viewer>(options);
-  url_ = viewer_->url();
+  url_ = viewer_->urls().front();
   thread_ = std::thread([this] { work(); });
 }
 

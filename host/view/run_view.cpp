@@ -30,7 +30,7 @@ RunView::RunView(Context& context,
   viewer_.on_command([this](const RunCommand& command) { obey(command); });
 }
 
-std::string RunView::url() const { return viewer_.url(); }
+std::vector<std::string> RunView::urls() const { return viewer_.urls(); }
 
 void RunView::finish(const std::string& text) {
   history_.finish(text);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "raysplats/context.hpp"
 #include "raysplats/mirrors.hpp"
@@ -30,7 +31,8 @@ class RunView : public RunWatcher {
           std::int64_t iterations,
           ViewerOptions options);
 
-  std::string url() const;
+  /// As Server::urls().
+  std::vector<std::string> urls() const;
   /// Tells the pages that the run is over, and why.
   void finish(const std::string& text);
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
@@ -22,6 +23,7 @@
 
 #include "raysplats/error.hpp"
 #include "view/access.hpp"
+#include "view/own_addresses.hpp"
 
 namespace raysplats::view {
 namespace {
@@ -75,6 +77,8 @@ struct Server::Impl {
     const tcp::endpoint endpoint(address, options.port);
     acceptor.open(endpoint.protocol(), error);
     if (!error) acceptor.set_option(net::socket_base::reuse_address(true), error);
+    // Systems differ in whether :: takes IPv4 too unless it is said.
+    if (!error && address.is_v6()) acceptor.set_option(net::ip::v6_only(false), error);
     if (!error) acceptor.bind(endpoint, error);
     if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
     if (error) {
@@ -82,7 +86,10 @@ struct Server::Impl {
           fmt::format("The viewer cannot listen on {}, port {}: {}; choose another --port",
                       options.host, options.port, error.message()));
     }
-    access.emplace(random_token(), options.host, acceptor.local_endpoint().port());
+    const std::vector<std::string> addresses = address.is_unspecified()
+                                                   ? own_addresses(address.is_v6())
+                                                   : std::vector{address.to_string()};
+    access.emplace(random_token(), addresses, acceptor.local_endpoint().port());
     accept();
     thread = std::thread([this] { io.run(); });
   }
@@ -298,7 +305,7 @@ Server::Server(const ServerOptions& options, ServerHandlers handlers)
 
 Server::~Server() = default;
 
-std::string Server::url() const { return impl_->access->url(); }
+std::vector<std::string> Server::urls() const { return impl_->access->urls(); }
 
 void Server::send_picture(ClientId client, std::vector<std::byte> bytes) {
   net::post(impl_->io, [impl = impl_.get(), client, bytes = std::move(bytes)]() mutable {

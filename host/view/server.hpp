@@ -22,7 +22,7 @@ struct HttpReply {
 };
 
 struct ServerOptions {
-  std::string host = "127.0.0.1";  ///< address to listen on
+  std::string host = "127.0.0.1";  ///< address to listen on; 0.0.0.0 and ::, all of this machine
   std::uint16_t port = 0;          ///< 0 = any that is free
   std::size_t max_clients = 8;     ///< pages at once
 };
@@ -51,8 +51,8 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// The address to open, with the token.
-  std::string url() const;
+  /// The addresses to open, with the token: one, or those of all interfaces when it listens on all.
+  std::vector<std::string> urls() const;
   /// From any thread. A picture replaces the one that still waits; texts wait in line.
   void send_picture(ClientId client, std::vector<std::byte> bytes);
   void send_text(ClientId client, std::string text);

@@ -15,7 +15,7 @@ Server::Server(const ServerOptions&, ServerHandlers) {
 
 Server::~Server() = default;
 
-std::string Server::url() const { return {}; }
+std::vector<std::string> Server::urls() const { return {}; }
 
 void Server::send_picture(ClientId, std::vector<std::byte>) {}
 

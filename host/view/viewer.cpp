@@ -415,7 +415,7 @@ Viewer::Viewer(const ViewerOptions& options) : impl_(std::make_unique<Impl>(opti
 
 Viewer::~Viewer() = default;
 
-std::string Viewer::url() const { return impl_->server.url(); }
+std::vector<std::string> Viewer::urls() const { return impl_->server.urls(); }
 
 std::size_t Viewer::watchers() const {
   const std::lock_guard<std::mutex> guard(impl_->mutex);

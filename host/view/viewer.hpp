@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "view/dropped_meshes.hpp"
 #include "view/picture_source.hpp"
@@ -38,7 +39,8 @@ class Viewer {
   explicit Viewer(const ViewerOptions& options);
   ~Viewer();
 
-  std::string url() const;
+  /// As Server::urls().
+  std::vector<std::string> urls() const;
   /// Pages that want to see something.
   std::size_t watchers() const;
   /// Whether a page that moves waits for its picture.

@@ -14,7 +14,7 @@ namespace {
 void parse(std::span<const std::uint8_t> input) {
   const std::string_view text(reinterpret_cast<const char*>(input.data()), input.size());
   // Nobody knows this token; whatever is sent, the answer is no.
-  const view::Access access("0123456789abcdef0123456789abcdef", "127.0.0.1", 1);
+  const view::Access access("0123456789abcdef0123456789abcdef", {"127.0.0.1"}, 1);
   const std::size_t half = text.size() / 2;
   for (const view::Credentials& sent :
        {view::Credentials{"127.0.0.1:1", "", text, text},

@@ -48,20 +48,20 @@ class Address:
 
 class Viewer(Address):
     """Runs `raysplats view` on a small model until the end of a with block, or `command` with
-    `arguments`."""
+    `arguments`, and `more` in either case."""
 
-    def __init__(self, program, arguments=(), command="view"):
+    def __init__(self, program, arguments=(), command="view", port=0, more=()):
         self.folder = tempfile.TemporaryDirectory(prefix="raysplats_view_")
         model = os.path.join(self.folder.name, "model.ply")
         write_model(model)
         self.process = subprocess.Popen(
-            [program, command, *(arguments or [model]), "--port", "0", "-q"],
+            [program, command, *(arguments or [model]), *more, "--port", str(port), "-q"],
             stdout=subprocess.PIPE, text=True)
         line = self.process.stdout.readline()
-        found = re.search(r"http://\S+", line)
-        if not found:
+        self.urls = re.findall(r"http://\S+", line)
+        if not self.urls:
             raise RuntimeError(f"no address in {line!r}")
-        super().__init__(found.group())
+        super().__init__(self.urls[0])
         self.model = arguments[0] if arguments else model
 
     def __enter__(self):

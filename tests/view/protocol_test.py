@@ -4,6 +4,7 @@
 usage: protocol_test.py PROGRAM"""
 import json
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -11,10 +12,23 @@ import time
 import unittest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from program import Channel, Viewer, psnr, view, write_model  # noqa: E402
+from program import Address, Channel, Viewer, psnr, view, write_model  # noqa: E402
 
 PROGRAM = ""
 LAST, PNG = 1, 2
+
+
+def listening(port):
+    """The addresses on which this machine listens at a port, as the kernel writes them."""
+    found = set()
+    for table in ("tcp", "tcp6"):
+        with open(f"/proc/net/{table}") as rows:
+            for row in list(rows)[1:]:
+                address, _, state = row.split()[1:4]
+                host, number = address.split(":")
+                if int(number, 16) == port and state == "0A":
+                    found.add(host)
+    return sorted(found)
 
 
 class ViewerTest(unittest.TestCase):
@@ -175,6 +189,28 @@ class ViewerTest(unittest.TestCase):
         self.last_picture(channels[1], 9)
         for each in channels:
             each.socket.close()
+
+
+class HostTest(unittest.TestCase):
+    def test_it_listens_where_it_is_told_and_every_printed_address_opens_the_page(self):
+        hosts = {None: "0100007F", "0.0.0.0": "0" * 8}
+        if socket.has_dualstack_ipv6():
+            hosts["::"] = "0" * 32
+        for host, bound in hosts.items():
+            with Viewer(PROGRAM, more=["--host", host] if host else []) as viewer:
+                self.assertEqual(listening(viewer.address.port), [bound])
+                if host is None:
+                    self.assertEqual(len(viewer.urls), 1)
+                for url in viewer.urls:
+                    each = Address(url)
+                    self.assertNotIn(each.address.hostname, hosts)
+                    self.assertEqual(each.ask(f"/?token={each.token}")[0], 303, url)
+                    with Channel(each) as channel:
+                        self.assertEqual(channel.status, 101, url)
+                    for stranger in ("http://192.0.2.1:80", f"http://{each.address.hostname}"):
+                        self.assertEqual(Channel(each, Origin=stranger).status, 403, url)
+                    # The address is ours, the name is anybody's.
+                    self.assertEqual(each.ask("/", Cookie=each.cookie(), Host="evil.example:80")[0], 403)
 
 
 class CamerasTest(unittest.TestCase):

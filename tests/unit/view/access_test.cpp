@@ -3,13 +3,17 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <string>
+#include <vector>
+
+#include "view/own_addresses.hpp"
 
 using namespace raysplats::view;
 
 TEST_CASE("only our own page, asked for under our own name with the secret, is let in") {
   const std::string token = "0123456789abcdef0123456789abcdef";
-  const Access access(token, "127.0.0.1", 7000);
+  const Access access(token, {"127.0.0.1"}, 7000);
   const std::string query = "token=" + token;
   const std::string cookie = "a=b; raysplats-7000=" + token;
   const auto judge = [&](std::string_view host, std::string_view origin, std::string_view sent,
@@ -43,9 +47,48 @@ TEST_CASE("only our own page, asked for under our own name with the secret, is l
   CHECK(judge("127.0.0.1:7000", "", "raysplats-7001=" + token, "") == Verdict::kForbidden);
   CHECK(judge("127.0.0.1:7000", "", "", "nottoken=" + token) == Verdict::kForbidden);
   CHECK(judge("127.0.0.1:7000", "", "", "a=b&token=" + token) == Verdict::kTakeCookie);
-  CHECK(access.url() == "http://127.0.0.1:7000/?token=" + token);
+  CHECK(access.urls() == std::vector{"http://127.0.0.1:7000/?token=" + token});
   CHECK(access.cookie().find("HttpOnly; SameSite=Strict") != std::string::npos);
-  CHECK(Access(token, "::", 5).url() == "http://[::]:5/?token=" + token);
+}
+
+TEST_CASE("all addresses that reach the server are names of it, and no other is") {
+  const std::string token = "0123456789abcdef0123456789abcdef";
+  const std::string query = "token=" + token;
+  const Access access(token, {"192.0.2.7", "2001:db8::7"}, 7000);
+  CHECK(access.urls() == std::vector{"http://192.0.2.7:7000/?token=" + token,
+                                     "http://[2001:db8::7]:7000/?token=" + token});
+  for (const char* host : {"192.0.2.7:7000", "[2001:db8::7]:7000", "localhost:7000"}) {
+    INFO(host);
+    CHECK(access.judge({host, "", "", query}) == Verdict::kTakeCookie);
+    CHECK(access.judge({host, std::string("http://") + host, "", query}) == Verdict::kTakeCookie);
+    CHECK(access.judge({host, "http://192.0.2.8:7000", "", query}) == Verdict::kForbidden);
+  }
+  for (const char* host : {"192.0.2.7", "192.0.2.8:7000", "2001:db8::7:7000", "0.0.0.0:7000"}) {
+    INFO(host);
+    CHECK(access.judge({host, "", "", query}) == Verdict::kForbidden);
+  }
+}
+
+TEST_CASE("the port of HTTP may be left out, as browsers do") {
+  const std::string token = "0123456789abcdef0123456789abcdef";
+  const std::string query = "token=" + token;
+  const Access access(token, {"127.0.0.1"}, 80);
+  for (const char* host : {"127.0.0.1", "localhost", "[::1]", "127.0.0.1:80"}) {
+    INFO(host);
+    CHECK(access.judge({host, "", "", query}) == Verdict::kTakeCookie);
+    CHECK(access.judge({host, std::string("http://") + host, "", query}) == Verdict::kTakeCookie);
+  }
+  CHECK(access.judge({"localhost:8080", "", "", query}) == Verdict::kForbidden);
+  CHECK(access.judge({"evil.example", "", "", query}) == Verdict::kForbidden);
+}
+
+TEST_CASE("this machine has a loopback address, which comes first") {
+  const std::vector<std::string> addresses = own_addresses(false);
+  REQUIRE(!addresses.empty());
+  CHECK(addresses.front().starts_with("127."));
+  for (const std::string& each : addresses) CHECK(each.find(':') == std::string::npos);
+  const std::vector<std::string> all = own_addresses(true);
+  for (const std::string& each : addresses) CHECK(std::count(all.begin(), all.end(), each) == 1);
 }
 
 TEST_CASE("tokens are random and secrets are compared whole") {

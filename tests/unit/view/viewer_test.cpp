@@ -31,7 +31,7 @@ constexpr const char* kView =
 class Page {
  public:
   explicit Page(const Viewer& viewer) {
-    const std::string url = viewer.url();  // http://127.0.0.1:PORT/?token=TOKEN
+    const std::string url = viewer.urls().front();  // http://127.0.0.1:PORT/?token=TOKEN
     const std::size_t slash = url.find('/', 7);
     const std::string host = url.substr(7, slash - 7);
     socket_ = ::socket(AF_INET, SOCK_STREAM, 0);
