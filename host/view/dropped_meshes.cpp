@@ -136,8 +136,15 @@ void DroppedMeshes::place(std::uint32_t mesh, const Placement& placement) {
 }
 
 void DroppedMeshes::remove(std::uint32_t mesh) {
-  meshes_.erase(meshes_.begin() + (&find(mesh) - meshes_.data()));
-  show();
+  const auto at = meshes_.begin() + (&find(mesh) - meshes_.data());
+  Dropped removed = std::move(*at);
+  const auto behind = meshes_.erase(at);
+  try {
+    show();
+  } catch (...) {
+    meshes_.insert(behind, std::move(removed));
+    throw;
+  }
 }
 
 DroppedMeshes::Dropped& DroppedMeshes::find(std::uint32_t mesh) {

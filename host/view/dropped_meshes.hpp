@@ -35,7 +35,8 @@ class DroppedMeshes {
   /// Parses and places a mesh. Throws DataError for one that is damaged, UsageError for one too
   /// many, and what `show` throws; nothing has changed then.
   void add(SentMesh sent);
-  /// The same for one that is there; UsageError where it is not.
+  /// The same for one that is there; UsageError where it is not. Nothing has changed when they
+  /// throw.
   void place(std::uint32_t mesh, const Placement& placement);
   void remove(std::uint32_t mesh);
 

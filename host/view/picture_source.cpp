@@ -46,7 +46,7 @@ class ScenePictures : public MeshPictures {
     }
     try {
       tracer_.set_meshes(all);
-    } catch (const Error&) {
+    } catch (...) {
       tracer_.set_meshes(shown_);
       throw;
     }

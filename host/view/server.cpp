@@ -3,6 +3,7 @@
 #include "view/server.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
@@ -15,6 +16,7 @@
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <deque>
+#include <exception>
 #include <future>
 #include <map>
 #include <optional>
@@ -91,7 +93,7 @@ struct Server::Impl {
                                                    : std::vector{address.to_string()};
     access.emplace(random_token(), addresses, acceptor.local_endpoint().port());
     accept();
-    thread = std::thread([this] { io.run(); });
+    thread = std::thread([this] { serve(); });
   }
   ~Impl() {
     io.stop();
@@ -99,6 +101,7 @@ struct Server::Impl {
   }
 
   void accept();
+  void serve();
 
   std::size_t connections = 0;  // before what may hold connections to the end
   net::io_context io{1};
@@ -127,7 +130,7 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
       if (error) return;
       self->server_.channels[self->id_] = self;
       self->open_ = true;
-      self->server_.handlers.opened(self->id_);
+      self->attempt([&] { self->server_.handlers.opened(self->id_); });
       self->read();
     });
   }
@@ -148,17 +151,31 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
   void read() {
     socket_.async_read(buffer_, [self = shared_from_this()](Code error, std::size_t) {
       if (error) return self->close();
-      if (self->socket_.got_text()) {
-        const std::string text = beast::buffers_to_string(self->buffer_.data());
-        self->server_.handlers.message(self->id_, text);
-      } else if (self->server_.handlers.bytes) {
-        const auto data = self->buffer_.data();
-        self->server_.handlers.bytes(self->id_,
-                                     {static_cast<const std::byte*>(data.data()), data.size()});
-      }
+      self->attempt([&] { self->take(); });
       self->buffer_.consume(self->buffer_.size());
       self->read();
     });
+  }
+
+  void take() {
+    const auto data = buffer_.data();
+    if (socket_.got_text()) {
+      server_.handlers.message(id_, {static_cast<const char*>(data.data()), data.size()});
+    } else if (server_.handlers.bytes) {
+      server_.handlers.bytes(id_, {static_cast<const std::byte*>(data.data()), data.size()});
+    }
+  }
+
+  /// A page whose message ends in an error that nobody expected is let go: what it is owed is not
+  /// known. Others are served on.
+  template <class Work>
+  void attempt(const Work& work) {
+    try {
+      work();
+    } catch (...) {
+      close();
+      throw;
+    }
   }
 
   void write() {
@@ -298,6 +315,19 @@ void Server::Impl::accept() {
       if (!stopped) accept();
     });
   });
+}
+
+/// The program that shows something has more to do than to show it: a training run does not end by
+/// what a page did.
+void Server::Impl::serve() {
+  for (bool ended = false; !ended;) {
+    try {
+      io.run();
+      ended = true;
+    } catch (const std::exception& error) {
+      spdlog::warn("the viewer has dropped a request: {}", error.what());
+    }
+  }
 }
 
 Server::Server(const ServerOptions& options, ServerHandlers handlers)

@@ -49,12 +49,24 @@ bool worth_sending(std::uint64_t samples, std::uint64_t most) {
   return samples == most || (samples & (samples - 1)) == 0;
 }
 
-/// What went wrong, for people.
-std::string sentence(const std::exception& error) {
-  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)
-    return "There is not enough memory for the picture: make the window smaller";
-  return error.what();
+constexpr const char* kNoRoomForPicture =
+    "There is not enough memory for the picture: make the window smaller";
+constexpr const char* kNoRoomForMesh =
+    "There is not enough memory for that mesh: simplify it first";
+constexpr const char* kNoRoom = "There is not enough memory: close other programs and try again";
+
+/// What went wrong, for people; `no_room` where it was memory.
+std::string sentence(const std::exception& error, const char* no_room) {
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ? no_room : error.what();
 }
+
+/// A sample that is to be drawn.
+struct Order {
+  ViewRequest request;
+  std::optional<Pace> pace;  ///< where its size is chosen by time
+  std::uint64_t wish = 0;
+  std::uint64_t sample = 0;
+};
 
 /// One page.
 struct Client {
@@ -95,6 +107,16 @@ struct Viewer::Impl {
                 [this](ClientId id) { closed(id); }}) {}
 
   HttpReply get(std::string_view path) const {
+    try {
+      return found(path);
+    } catch (const std::exception& error) {
+      const std::string what = sentence(error, kNoRoom);
+      spdlog::warn("no {} for the page: {}", path, what);
+      return {500, "text/plain; charset=utf-8", what + "\n"};
+    }
+  }
+
+  HttpReply found(std::string_view path) const {
     if (path == "/api/state") return {200, "application/json", options.state};
     if (path == "/api/run" && options.run) return {200, "application/json", options.run()};
     if (path.starts_with(kPhotoPath) && options.photo) return photo(path.substr(kPhotoPath.size()));
@@ -108,12 +130,8 @@ struct Viewer::Impl {
     const char* end = number.data() + number.size();
     const auto [read, error] = std::from_chars(number.data(), end, index);
     if (error != std::errc() || read != end) return {404, "text/plain", "Not found\n"};
-    try {
-      if (const std::optional<std::string> jpeg = options.photo(index))
-        return {200, "image/jpeg", *jpeg};
-    } catch (const Error& problem) {
-      return {500, "text/plain; charset=utf-8", problem.what() + std::string("\n")};
-    }
+    if (const std::optional<std::string> jpeg = options.photo(index))
+      return {200, "image/jpeg", *jpeg};
     return {404, "text/plain", "Not found\n"};
   }
 
@@ -155,8 +173,8 @@ struct Viewer::Impl {
         }
       }
       news.notify_one();
-    } catch (const Error& error) {
-      complain(id, error.what());
+    } catch (const std::exception& error) {
+      excuse(id, error, kNoRoom);
     }
   }
 
@@ -173,8 +191,8 @@ struct Viewer::Impl {
         about_meshes.emplace_back(id, std::move(*sent));
       }
       news.notify_one();
-    } catch (const Error& error) {
-      complain(id, error.what());
+    } catch (const std::exception& error) {
+      excuse(id, error, kNoRoomForMesh);
     }
   }
 
@@ -197,6 +215,13 @@ struct Viewer::Impl {
     if (about_meshes.size() < kMostWaiting) about_meshes.emplace_back(id, std::move(next));
   }
 
+  /// A page's message has failed. What is not its own fault is said here as well.
+  void excuse(ClientId id, const std::exception& error, const char* no_room) {
+    const std::string what = sentence(error, no_room);
+    if (dynamic_cast<const Error*>(&error) == nullptr)
+      spdlog::warn("a message of the page has failed: {}", what);
+    complain(id, what);
+  }
   void complain(ClientId id, const std::string& what) { say(id, "error", what); }
   void note(ClientId id, const std::string& what) { say(id, "note", what); }
   void say(ClientId id, const char* type, const std::string& what) {
@@ -236,6 +261,12 @@ struct Viewer::Impl {
             std::int64_t iteration,
             ClientId id,
             const std::function<bool()>& stop);
+  /// Draws the next sample of what was ordered and sends what there is of it.
+  void deliver(PictureSource& source,
+               std::int64_t iteration,
+               ClientId id,
+               Order& order,
+               const std::function<bool()>& stop);
 
   static constexpr std::size_t kMostWaiting = 16;
 
@@ -269,12 +300,12 @@ void Viewer::Impl::answer(PictureSource& source, ClientId id, const PickRequest&
       reply["point"] = {point->x, point->y, point->z};
     server.send_text(id, reply.dump());
   } catch (const std::exception& error) {
-    complain(id, sentence(error));
+    complain(id, sentence(error, kNoRoomForPicture));
   }
 }
 
 void Viewer::Impl::give_up(ClientId id, std::uint64_t wish, const std::exception& error) {
-  const std::string what = sentence(error);
+  const std::string what = sentence(error, kNoRoomForPicture);
   // A page that moves asks many times a second.
   if (dynamic_cast<const UsageError*>(&error) == nullptr && what != last_trouble)
     spdlog::warn("no picture for the page: {}", what);
@@ -305,11 +336,9 @@ void Viewer::Impl::obey(ClientId id, MeshMessage message) {
           {"type", "scene"}, {"text", meshes.scene_text(std::get<SceneQuestion>(message).camera)}};
       return server.send_text(id, reply.dump());
     }
-  } catch (const Error& error) {
-    complain(id, error.what());
+  } catch (const std::exception& error) {
+    excuse(id, error, kNoRoomForMesh);
     return server.send_text(id, meshes.json());
-  } catch (const std::bad_alloc&) {
-    return complain(id, "There is not enough memory for that mesh: simplify it first");
   }
   refresh();
   if (!moving) tell(meshes.json());
@@ -333,26 +362,39 @@ void Viewer::Impl::draw(PictureSource& source,
                         std::int64_t iteration,
                         ClientId id,
                         const std::function<bool()>& stop) {
-  ViewRequest request;
-  std::optional<Pace> pace;
-  std::uint64_t wish = 0;
-  std::uint64_t sample = 0;
+  Order order;
   {
     // It may have gone since it was chosen.
     const std::lock_guard<std::mutex> guard(mutex);
     const auto found = clients.find(id);
     if (found == clients.end() || !found->second.wanted) return;
     Client& client = found->second;
-    request = *client.wanted;
-    if (request.moving) {
-      pace = client.pace;
-    } else if (hurry > 0.0 && !request.png) {
-      pace = client.rest;
+    order.request = *client.wanted;
+    if (order.request.moving) {
+      order.pace = client.pace;
+    } else if (hurry > 0.0 && !order.request.png) {
+      order.pace = client.rest;
     }
-    wish = client.wish;
-    sample = client.drawn;
+    order.wish = client.wish;
+    order.sample = client.drawn;
     client.turn = ++turns;
   }
+  try {
+    deliver(source, iteration, id, order, stop);
+  } catch (const std::exception& error) {
+    give_up(id, order.wish, error);
+  }
+}
+
+void Viewer::Impl::deliver(PictureSource& source,
+                           std::int64_t iteration,
+                           ClientId id,
+                           Order& order,
+                           const std::function<bool()>& stop) {
+  ViewRequest& request = order.request;
+  const std::optional<Pace>& pace = order.pace;
+  const std::uint64_t wish = order.wish;
+  const std::uint64_t sample = order.sample;
   if (pace) request.camera = pace->sized(request.camera);
   const auto watch = [&](double) {
     if (stop && stop()) return false;
@@ -367,12 +409,7 @@ void Viewer::Impl::draw(PictureSource& source,
     });
   };
   const auto start = Clock::now();
-  Image picture;
-  try {
-    picture = source.draw(request, sample, watch);
-  } catch (const std::exception& error) {
-    return give_up(id, wish, error);
-  }
+  Image picture = source.draw(request, sample, watch);
   const double seconds = seconds_since(start);
   if (picture.pixels() == 0) return;
   const std::uint64_t most = samples_of(request, source.samples());
