@@ -36,12 +36,17 @@ namespace http = beast::http;
 namespace websocket = beast::websocket;
 using tcp = net::ip::tcp;
 using Code = boost::system::error_code;
+using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 constexpr std::uint32_t kMostHeader = 8192;
 constexpr std::size_t kMostMessage = 65536;
 constexpr std::size_t kMostTexts = 64;        ///< that wait for a client
 constexpr std::size_t kMostConnections = 64;  ///< open at once
+constexpr auto kMessageTime = 4ms;            ///< of a page's messages, at the least
+constexpr auto kBurst = 1s;                   ///< that they may come before their time
+constexpr std::size_t kMostDrained = 1 << 20;
+constexpr auto kDrainTime = 2s;
 constexpr auto kRequestTime = 10s;
 constexpr auto kIdleTime = 60s;
 constexpr auto kAcceptPause = 200ms;
@@ -119,7 +124,7 @@ struct Server::Impl {
 class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
  public:
   Channel(Impl& server, beast::tcp_stream stream)
-      : server_(server), id_(++server.last_client), socket_(std::move(stream)) {}
+      : server_(server), id_(++server.last_client), socket_(std::move(stream)), rest_(server.io) {}
 
   void start(const http::request<http::empty_body>& request) {
     socket_.next_layer().expires_never();
@@ -153,7 +158,19 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
       if (error) return self->close();
       self->attempt([&] { self->take(); });
       self->buffer_.consume(self->buffer_.size());
-      self->read();
+      self->read_in_time();
+    });
+  }
+
+  /// A page that talks faster than anybody can has to wait. Nothing of what it says is lost: a mesh
+  /// comes in many messages.
+  void read_in_time() {
+    const auto now = Clock::now();
+    due_ = std::max(due_, now - kBurst) + kMessageTime;
+    if (due_ <= now) return read();
+    rest_.expires_at(due_);
+    rest_.async_wait([self = shared_from_this()](Code stopped) {
+      if (!stopped) self->read();
     });
   }
 
@@ -210,6 +227,8 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
   Impl& server_;
   ClientId id_;
   websocket::stream<beast::tcp_stream> socket_;
+  net::steady_timer rest_;
+  Clock::time_point due_;  ///< of the next message
   beast::flat_buffer buffer_;
   std::deque<std::string> texts_;
   std::optional<std::vector<std::byte>> picture_;
@@ -294,7 +313,18 @@ class Server::Impl::Connection : public std::enable_shared_from_this<Connection>
       if (!error && keep) return self->read();
       Code ignored;
       self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+      self->stream_.expires_after(kDrainTime);
+      self->drain(kMostDrained);
     });
+  }
+
+  /// To close with bytes unread would reset the connection, and the reply might never be seen.
+  void drain(std::size_t most) {
+    buffer_.clear();
+    stream_.async_read_some(buffer_.prepare(kMostHeader),
+                            [self = shared_from_this(), most](Code error, std::size_t count) {
+                              if (!error && count < most) self->drain(most - count);
+                            });
   }
 
   Impl& server_;
@@ -352,8 +382,8 @@ void Server::send_text(ClientId client, std::string text) {
 }
 
 void Server::flush(double seconds) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-  for (bool idle = false; !idle && std::chrono::steady_clock::now() < end;) {
+  const auto end = Clock::now() + std::chrono::duration<double>(seconds);
+  for (bool idle = false; !idle && Clock::now() < end;) {
     std::promise<bool> answer;
     net::post(impl_->io, [&] {
       answer.set_value(std::all_of(impl_->channels.begin(), impl_->channels.end(),

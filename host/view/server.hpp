@@ -40,8 +40,8 @@ struct ServerHandlers {
 
 /// HTTP and WebSocket on one address, for those whom Access allows; everybody else gets 403. Only
 /// GET and HEAD are answered; what a request may cost is limited (8 KiB of header, no body, 64 KiB
-/// a message, 10 s to make up one's mind). One thread serves all. A slow client costs nothing: of
-/// the pictures that it has not taken only the newest waits.
+/// a message, 250 messages a second, 10 s to make up one's mind). One thread serves all. A slow
+/// client costs nothing: of the pictures that it has not taken only the newest waits.
 class Server {
  public:
   /// Listens. Throws UsageError for an address that is none, DataError for a port that is taken,

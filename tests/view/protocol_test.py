@@ -81,7 +81,9 @@ class ViewerTest(unittest.TestCase):
         self.assertEqual(status, 200)
         self.assertIn(b"<!doctype html>", body)
         self.assertIn("default-src 'none'", fields["content-security-policy"])
-        self.assertEqual(fields["x-content-type-options"], "nosniff")
+        for name, value in (("x-content-type-options", "nosniff"), ("x-frame-options", "DENY"),
+                            ("referrer-policy", "no-referrer"), ("cache-control", "no-store")):
+            self.assertEqual(fields[name], value)
         self.assertNotIn("access-control-allow-origin", fields)
 
     def test_only_reading_and_only_what_there_is(self):
@@ -97,13 +99,35 @@ class ViewerTest(unittest.TestCase):
 
     def test_requests_have_limits(self):
         ask, cookie = self.viewer.ask, self.viewer.cookie()
-        self.assertIn(ask("/", Cookie=cookie, X="x" * 20000)[0], (0, 431))
-        self.assertIn(ask("/" + "x" * 20000, Cookie=cookie)[0], (0, 431))
+        for size in (10000, 20000, 500000):
+            self.assertEqual(ask("/", Cookie=cookie, X="x" * size)[0], 431, size)
+            self.assertEqual(ask("/" + "x" * size, Cookie=cookie)[0], 431, size)
+        self.assertEqual(ask("/", Cookie=cookie, X="x" * 7000)[0], 200)
         self.assertEqual(ask("/", "POST", b"x" * 100, Cookie=cookie, Content_Length=100)[0], 413)
         with self.viewer.connect() as channel:
             channel.sendall(b"\x16\x03\x01 this is no HTTP\r\n\r\n")
             self.assertIn(channel.recv(100)[:5], (b"", b"HTTP/"))
         self.assertEqual(ask("/", Cookie=cookie)[0], 200)
+
+    def test_who_says_nothing_is_not_waited_for(self):
+        with self.viewer.connect() as silent, self.viewer.connect() as slow:
+            slow.sendall(b"GET / HTTP/1.1\r\nHost: ")
+            for channel in (silent, slow):
+                channel.settimeout(30)
+                self.assertEqual(channel.recv(100), b"")
+
+    def test_a_page_that_talks_too_fast_is_heard_at_the_pace_of_others(self):
+        with Channel(self.viewer) as channel:
+            start = time.monotonic()
+            for _ in range(1000):
+                channel.send_json(type="leave")
+            channel.send_json(**view(7, moving=True))
+            with Channel(self.viewer) as other:  # which does not wait
+                other.send_json(**view(8, moving=True))
+                self.assertEqual(other.receive()[1]["view"], 8)
+            self.assertEqual(channel.receive()[1]["view"], 7)  # nothing is lost
+            # 250 a second, and those of one second at once. Machines that are slow take longer.
+            self.assertGreater(time.monotonic() - start, 2.9)
 
     def test_pictures_arrive_and_get_better(self):
         with Channel(self.viewer) as channel:
