@@ -303,6 +303,40 @@ class ViewTest(PageCase):
         self.assertIn("does not answer", self.page.find_element(By.ID, "banner").text)
         self.screenshot("ended")
 
+    def banner(self):
+        return self.page.find_element(By.ID, "banner").text
+
+    def restart(self, arguments):
+        self.viewer.stop()
+        self.viewer = Viewer(PROGRAM, arguments, port=self.viewer.address.port)
+        self.addCleanup(self.viewer.folder.cleanup)
+        self.addCleanup(self.viewer.stop)
+        self.wait("the sentence", lambda: "open the address that it has printed" in self.banner())
+        # A new token is the new program's alone, until a person opens its address.
+        old = self.page.current_window_handle
+        self.page.switch_to.new_window("tab")
+        self.page.get(self.viewer.url)
+        self.rest()
+        self.page.close()
+        self.page.switch_to.window(old)
+
+    def test_the_page_comes_back_to_a_program_that_was_started_anew(self):
+        first = self.rest()
+        self.drag(60, 0)
+        before = self.rest(first["id"])
+        eye = self.page.execute_script("return window.raysplats.rig.eye")
+        self.restart(self.arguments_given)
+        # The same model again: the view stays, and pictures of it come.
+        self.rest(before["id"])
+        self.assertEqual(self.page.execute_script("return window.raysplats.rig.eye"), eye)
+        self.assertEqual(self.banner(), "")
+        # Another one: the page is that of the new program.
+        self.restart([self.arguments_given[0]])
+        self.wait("the other page", lambda: self.page.execute_script(
+            "return document.getElementById('camera-section').hidden;") and self.seen()["lost"] == 0)
+        self.rest()
+        self.assertEqual(self.banner(), "")
+
 
 class PhotoTest(PageCase):
     """A model beside the photos that it was to be like."""

@@ -20,6 +20,7 @@ const CLICK = 4; // pixels that a click may slip
 const picture = $('picture');
 const overlay = $('overlay');
 let state = null;
+let told = ''; // the state as the program wrote it
 let rig = null;
 let link = null;
 let home = null;
@@ -155,6 +156,18 @@ function heard(message) {
 function banner(text) {
   $('banner').textContent = text;
   $('banner').hidden = text === '';
+}
+
+// Whether the program that this page shows is there. A new start has a new token, which comes to this
+// page too once its address is open in another one; what shows something else needs another page.
+async function answers() {
+  const reply = await fetch('api/state').catch(() => null);
+  if (reply?.status === 403) {
+    banner('The program has been started anew: open the address that it has printed.');
+  }
+  if (!reply?.ok) return false;
+  if (await reply.text() !== told) location.reload();
+  return true;
 }
 
 function go(pose, fov) {
@@ -322,8 +335,9 @@ function wire() {
 
 async function start() {
   const reply = await fetch('api/state');
-  if (!reply.ok) throw new Error(await reply.text());
-  state = await reply.json();
+  told = await reply.text();
+  if (!reply.ok) throw new Error(told);
+  state = JSON.parse(told);
   rig = new Rig(state.up);
   rig.pose = state.start.c2w;
   rig.fov = state.start.fov;
@@ -354,6 +368,7 @@ async function start() {
       seen.lost += 1;
       if (!over) banner('The program does not answer: it may have ended. Trying again.');
     },
+    answers,
   });
   if (state.trains) {
     run = new Run((message) => link.send(message), (text) => {

@@ -15,7 +15,7 @@ export class Connection {
   #timer = 0;
 
   // `view()` gives what is to be seen now; `on` has picture(header, blob), text(message),
-  // open() and lost().
+  // open(), lost() and answers(), which finds out whether there is somebody to come back to.
   constructor(view, on) {
     this.view = view;
     this.on = on;
@@ -36,8 +36,15 @@ export class Connection {
     };
     this.#socket.onclose = () => {
       this.on.lost();
-      setTimeout(() => this.#open(), RETRY);
+      this.#comeBack();
     };
+  }
+
+  #comeBack() {
+    setTimeout(async () => {
+      if (await this.on.answers()) this.#open();
+      else this.#comeBack();
+    }, RETRY);
   }
 
   #take(data) {
