@@ -85,6 +85,30 @@ void set_pose(Camera& camera, const std::array<double, 12>& c2w) {
   camera.translation = -(camera.rotation * eye);
 }
 
+/// `fov` is in degrees along the height: of a fisheye, whose angle grows evenly from the middle, up
+/// to all around. A panorama has none: it shows everything.
+void set_lens(Camera& camera, const Json& json) {
+  camera.cx = 0.5 * camera.width;
+  camera.cy = 0.5 * camera.height;
+  const std::string model = json.contains("model") ? text(json, "model") : "pinhole";
+  constexpr double kRadians = std::numbers::pi / 180.0;
+  const auto half_fov = [&](double most) {
+    return 0.5 * kRadians * number(member(json, "fov"), "fov", 1.0, most);
+  };
+  double image = 1.0;  // radius at half the angle of view, in focal lengths
+  if (model == "pinhole") {
+    image = std::tan(half_fov(170.0));
+  } else if (model == "fisheye") {
+    camera.model = CameraModel::kFisheye;
+    image = half_fov(360.0);
+  } else if (model == "equirectangular") {
+    camera.model = CameraModel::kEquirectangular;
+  } else {
+    refuse("asks for an unknown 'model'");
+  }
+  camera.fy = camera.fx = 0.5 * camera.height / image;
+}
+
 ViewRequest view_of(const Json& json, int max_side) {
   ViewRequest request;
   request.id = id_of(json);
@@ -94,10 +118,7 @@ ViewRequest view_of(const Json& json, int max_side) {
   Camera& camera = request.camera;
   camera.width = std::max(1, static_cast<int>(std::lround(cut * size[0])));
   camera.height = std::max(1, static_cast<int>(std::lround(cut * size[1])));
-  const double fov = number(member(json, "fov"), "fov", 1.0, 170.0);
-  camera.fy = camera.fx = 0.5 * camera.height / std::tan(fov * std::numbers::pi / 360.0);
-  camera.cx = 0.5 * camera.width;
-  camera.cy = 0.5 * camera.height;
+  set_lens(camera, json);
   request.moving = flag(json, "moving");
   request.png = flag(json, "png");
   if (json.contains("output")) {
@@ -205,7 +226,12 @@ Message parse_message(std::string_view message, int max_side) {
   if (type == "place") return PlaceMesh{mesh_of(json), placement_of(json), flag(json, "moving")};
   if (type == "remove") return RemoveMesh{mesh_of(json)};
   if (type == "meshes") return MeshQuestion{};
-  if (type == "scene") return SceneQuestion{view_of(json, max_side).camera};
+  if (type == "scene") {
+    const Camera camera = view_of(json, max_side).camera;
+    if (camera.model != CameraModel::kPinhole)
+      throw UsageError("Scenes are saved as a pinhole sees them: choose that camera first");
+    return SceneQuestion{camera};
+  }
   refuse("has an unknown 'type'");
 }
 

@@ -20,7 +20,7 @@ enum class Output { kColor, kDepth, kAlpha, kNormals, kHits };
 /// A picture that the page wants to see.
 struct ViewRequest {
   std::uint32_t id = 0;  ///< the page's own number, sent back with the picture
-  Camera camera;         ///< at its full size
+  Camera camera;         ///< at its full size: a pinhole, a fisheye without distortion, a panorama
   Output output = Output::kColor;
   bool moving = false;  ///< more are to follow: speed before size
   bool png = false;     ///< without losses, to be kept

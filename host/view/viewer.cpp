@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -20,6 +21,7 @@
 #include <utility>
 #include <variant>
 
+#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
 #include "view/mesh_uploads.hpp"
 #include "view/pace.hpp"
@@ -58,6 +60,22 @@ constexpr const char* kNoRoom = "There is not enough memory: close other program
 /// What went wrong, for people; `no_room` where it was memory.
 std::string sentence(const std::exception& error, const char* no_room) {
   return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ? no_room : error.what();
+}
+
+/// Sees one pixel, at a place that is given in shares of the picture.
+Camera pixel_of(Camera camera, double x, double y) {
+  x *= camera.width;
+  y *= camera.height;
+  if (camera.model == CameraModel::kPinhole) {
+    camera.cx += 0.5 - x;
+    camera.cy += 0.5 - y;
+    camera.width = camera.height = 1;
+    return camera;
+  }
+  // What other lenses call near is near along the ray, as it is for a pinhole that looks there.
+  const CameraRay ray = camera_ray(camera, x, y);
+  const glm::dvec3 up = std::abs(ray.direction.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0);
+  return look_at(ray.origin, ray.origin + ray.direction, up, 1, 1, camera.fy);
 }
 
 /// A sample that is to be drawn.
@@ -288,12 +306,8 @@ struct Viewer::Impl {
 };
 
 void Viewer::Impl::answer(PictureSource& source, ClientId id, const PickRequest& pick) {
-  // A picture of one pixel, at the place that was pointed at.
   ViewRequest request = pick.view;
-  Camera& camera = request.camera;
-  camera.cx += 0.5 - pick.x * camera.width;
-  camera.cy += 0.5 - pick.y * camera.height;
-  camera.width = camera.height = 1;
+  request.camera = pixel_of(request.camera, pick.x, pick.y);
   nlohmann::json reply{{"type", "pick"}, {"id", pick.id}, {"point", nullptr}};
   try {
     if (const std::optional<glm::dvec3> point = source.point(request))

@@ -350,6 +350,7 @@ void make_view(const fs::path& root) {
                               R"(,"moving":true,"near":0.5,"background":[0,0.5,1],"order":"peak",)"
                               R"("output":"depth"})");
   corpus.add("pick.json", R"({"type":"pick",)" + seen + R"(,"px":[0.5,0.25]})");
+  corpus.add("fisheye.json", R"({"type":"view",)" + seen + R"(,"model":"fisheye"})");
   corpus.add("pause.json", R"({"type":"pause"})");
   const std::string placed = R"("material":"glass","at":[0,0,1],"rotate":[0,90,0],"size":0.5})";
   corpus.add("mesh.json", R"({"type":"mesh","format":"obj","name":"a.obj","bytes":100,)" + placed);

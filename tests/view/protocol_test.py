@@ -3,6 +3,7 @@
 """What `raysplats view` says to its page, to strangers and to damaged messages.
 usage: protocol_test.py PROGRAM"""
 import json
+import math
 import os
 import socket
 import subprocess
@@ -161,6 +162,34 @@ class ViewerTest(unittest.TestCase):
             self.assertAlmostEqual(z, 0, delta=0.7)
             channel.send_json(**{**view(6, eye=(0, 0, 50)), "type": "pick", "px": [0.5, 0.5]})
             self.assertIsNone(channel.receive()[1]["point"])
+
+    def test_other_lenses_see_what_render_draws(self):
+        # x to the right, y down, z ahead, as the picture is; the file has y up and z back.
+        pose = [[1, 0, 0, 0.5], [0, -1, 0, 0.2], [0, 0, -1, -2], [0, 0, 0, 1]]
+        lenses = {"fisheye": ((96, 64), {"camera_model": "OPENCV_FISHEYE", "fl_x": 32 / math.radians(100),
+                                         "fl_y": 32 / math.radians(100), "cx": 48, "cy": 32}),
+                  "equirectangular": ((128, 64), {"camera_model": "EQUIRECTANGULAR"})}
+        for number, (model, (size, lens)) in enumerate(lenses.items(), 20):
+            folder = os.path.join(self.viewer.folder.name, model)
+            cameras = folder + ".json"
+            with open(cameras, "w") as file:
+                json.dump({"w": size[0], "h": size[1], **lens,
+                           "frames": [{"file_path": "drawn.png", "transform_matrix": pose}]}, file)
+            subprocess.run([PROGRAM, "render", self.viewer.model, "--cameras", cameras, "-o", folder,
+                            "--supersample", "4", "-q"], check=True, stdout=subprocess.DEVNULL)
+            with Channel(self.viewer) as channel:
+                wish = view(number, size, (0.5, 0.2, -2), model=model, fov=200)
+                channel.send_json(**wish, png=True)
+                with open(os.path.join(folder, "shown.png"), "wb") as file:
+                    file.write(self.last_picture(channel, number)[1])
+                self.assertGreater(psnr(*(os.path.join(folder, f"{name}.png") for name in ("shown", "drawn"))), 35)
+                # A pixel is pointed at through the same lens: the wall, 45 degrees to the left of a panorama's middle.
+                if model == "equirectangular":
+                    channel.send_json(**{**wish, "type": "pick", "px": [0.375, 0.5]})
+                    x, y, z = channel.receive()[1]["point"]
+                    self.assertAlmostEqual((x - 0.5) / (z + 2), -1, places=5)
+                    self.assertAlmostEqual(y, 0.2, places=5)
+                    self.assertAlmostEqual(z, 3, delta=0.5)
 
     def test_the_newest_wish_wins(self):
         with Channel(self.viewer) as channel:

@@ -38,15 +38,23 @@ let nearChosen = false; // the model's own holds until somebody moves the slider
 const seen = { pictures: 0, last: null, lost: 0, id: 0, errors: [] };
 window.raysplats = seen;
 
+// The part of the stage that the picture fills: all of it, or what a panorama leaves black.
+function box() {
+  const [width, height] = [picture.clientWidth, picture.clientHeight];
+  if (rig.model !== 'equirectangular') return { left: 0, top: 0, width, height };
+  const wide = Math.min(width, 2 * height);
+  return { left: (width - wide) / 2, top: (height - wide / 2) / 2, width: wide, height: wide / 2 };
+}
+
 function size() {
   const density = Math.min(window.devicePixelRatio || 1, 2);
-  return [Math.max(1, Math.round(picture.clientWidth * density)),
-    Math.max(1, Math.round(picture.clientHeight * density))];
+  const { width, height } = box();
+  return [width, height].map((side) => Math.max(1, Math.round(side * density)));
 }
 
 function wanted() {
   const color = $('background').value;
-  const view = { c2w: rig.pose, fov: rig.fov, size: size(), output: $('output').value };
+  const view = { c2w: rig.pose, model: rig.model, fov: rig.fov, size: size(), output: $('output').value };
   if (nearChosen) view.near = nearDepth();
   if ($('order').value) view.order = $('order').value;
   if ($('own-background').checked) {
@@ -60,8 +68,13 @@ function nearDepth() {
 }
 
 function changed() {
+  const around = rig.model === 'equirectangular';
+  $('model').value = rig.model;
+  $('fov').max = rig.widest;
   $('fov').value = rig.fov;
-  $('fov-text').textContent = `${Math.round(rig.fov)}\u00b0`;
+  $('fov').disabled = around;
+  $('fov-text').textContent = around ? 'all around' : `${Math.round(rig.fov)}\u00b0`;
+  picture.classList.toggle('whole', around);
   $('near-text').textContent = nearDepth().toPrecision(2);
   link.changed();
   drawOverlay();
@@ -73,7 +86,10 @@ function drawOverlay() {
   overlay.height = Math.round(overlay.clientHeight * density);
   const context = overlay.getContext('2d');
   context.scale(density, density);
-  $('photo-section').hidden = !photo.at(rig.pose);
+  // Other lenses bend lines and photos.
+  const straight = rig.model === 'pinhole';
+  $('photo-section').hidden = !straight || !photo.at(rig.pose);
+  if (!straight) return;
   for (const layer of [crop, cameras]) layer.draw(context, rig, overlay.clientWidth, overlay.clientHeight);
   photo.draw(context, picture, rig, overlay.clientWidth, overlay.clientHeight);
 }
@@ -178,20 +194,22 @@ function go(pose, fov) {
 }
 
 function click(x, y) {
+  if (rig.model !== 'pinhole') return;
   const found = cameras.at(rig, x, y, overlay.clientWidth, overlay.clientHeight);
   if (found) goTo(found);
 }
 
 function pick(x, y) {
-  if (!state.has_depth) return;
+  const { left, top, width, height } = box();
+  const px = [(x - left) / width, (y - top) / height];
+  if (!state.has_depth || px.some((share) => share < 0 || share > 1)) return;
   picking = link.nextId();
-  link.send({ type: 'pick', id: picking, ...wanted(), output: 'color',
-    px: [x / picture.clientWidth, y / picture.clientHeight] });
+  link.send({ type: 'pick', id: picking, ...wanted(), output: 'color', px });
 }
 
 function drag(dx, dy, sideways) {
   if (sideways) {
-    const unit = 2 * rig.distance * Math.tan(0.5 * rig.fov * Math.PI / 180) / picture.clientHeight;
+    const unit = rig.pixel(box().height);
     rig.move(-dx * unit, -dy * unit, 0);
   } else if ($('mode').value === 'fly') {
     // What is under the pointer goes along: the camera turns the other way, ...
@@ -258,6 +276,7 @@ const keyframes = new Keyframes({
     seconds: Number($('seconds').value) || 5,
     fps: Number($('fps').value) || 30,
     closed: $('closed').checked,
+    model: rig.model,
     ...(([width, height]) => ({ width, height }))(size()),
   }),
   view: () => rig.keyframe,
@@ -272,6 +291,7 @@ function wire() {
   window.addEventListener('blur', () => held.clear());
   new ResizeObserver(() => changed()).observe(picture);
   $('fov').addEventListener('input', () => { rig.fov = Number($('fov').value); changed(); });
+  $('model').addEventListener('change', () => { rig.lens = $('model').value; changed(); });
   $('near').addEventListener('input', () => { nearChosen = true; });
   $('output').addEventListener('change', changed);
   $('order').addEventListener('change', changed);
@@ -314,6 +334,8 @@ function wire() {
     $('seconds').value = stored.seconds;
     $('fps').value = stored.fps;
     $('closed').checked = stored.closed;
+    rig.lens = stored.model;
+    changed();
   });
   const stage = $('stage');
   stage.addEventListener('dragover', (event) => event.preventDefault());

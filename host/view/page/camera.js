@@ -12,6 +12,24 @@ export class Rig {
     this.target = [0, 0, 1];
     this.axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
     this.fov = 50;
+    this.model = 'pinhole';
+  }
+
+  // Degrees that the lens may see along the height.
+  get widest() {
+    return this.model === 'fisheye' ? 360 : 120;
+  }
+
+  set lens(model) {
+    this.model = model;
+    this.fov = Math.min(this.fov, this.widest);
+  }
+
+  // What a pixel in the middle of a picture of this height covers at the centre to turn around.
+  pixel(height) {
+    const half = 0.5 * this.fov * Math.PI / 180;
+    const radius = { pinhole: Math.tan(half), fisheye: half, equirectangular: Math.PI / 2 }[this.model];
+    return 2 * this.distance * radius / height;
   }
 
   // 3 x 4 by rows, row after row: axes and eye to the world.
@@ -86,7 +104,8 @@ export class Rig {
     this.axes = [right, v.normalized(v.cross(forward, right)), forward];
   }
 
-  // Where a point of the world is seen: [column, row] of a picture of this size, null from behind.
+  // Where a pinhole sees a point of the world: [column, row] of a picture of this size, null from
+  // behind.
   project(point, width, height) {
     const ray = v.sub(point, this.eye);
     const depth = v.dot(ray, this.axes[2]);

@@ -62,18 +62,25 @@ function viewOf(matrix, fov, distance) {
   };
 }
 
+const TYPES = { pinhole: 'perspective', fisheye: 'fisheye', equirectangular: 'equirectangular' };
+const DEGREE = Math.PI / 180;
+
+// nerfstudio gives a fisheye the focal length of the pinhole with that angle.
+const fileFov = (model, fov) => (model === 'fisheye' ? 2 * Math.atan(fov * DEGREE / 2) / DEGREE : fov);
+const lensFov = (model, fov) => (model === 'fisheye' ? 2 * Math.tan(fov * DEGREE / 2) / DEGREE : fov);
+
 // A camera path of nerfstudio: its frames one by one, and the keyframes that they are made of.
-export function pathFile(keys, { seconds, fps, closed, width, height }) {
+export function pathFile(keys, { seconds, fps, closed, width, height, model }) {
   const count = Math.max(1, Math.round(seconds * fps));
   const last = closed ? count : Math.max(count - 1, 1);
   const aspect = width / height;
   const camera_path = [];
   for (let i = 0; i < count; ++i) {
     const view = viewAt(keys, i / last, closed);
-    camera_path.push({ camera_to_world: matrixOf(view), fov: view.fov, aspect });
+    camera_path.push({ camera_to_world: matrixOf(view), fov: fileFov(model, view.fov), aspect });
   }
   return {
-    camera_type: 'perspective',
+    camera_type: TYPES[model],
     render_width: width,
     render_height: height,
     fps,
@@ -81,7 +88,7 @@ export function pathFile(keys, { seconds, fps, closed, width, height }) {
     is_cycle: closed,
     default_transition_sec: seconds / Math.max(closed ? keys.length : keys.length - 1, 1),
     keyframes: keys.map((key) => ({
-      matrix: matrixOf(key), fov: key.fov, aspect, raysplats_distance: key.distance,
+      matrix: matrixOf(key), fov: fileFov(model, key.fov), aspect, raysplats_distance: key.distance,
     })),
     camera_path,
   };
@@ -92,10 +99,12 @@ export function pathFile(keys, { seconds, fps, closed, width, height }) {
 export function keyframesOf(file, distance) {
   const list = file && (file.keyframes?.length ? file.keyframes : file.camera_path);
   if (!Array.isArray(list) || list.length === 0) return null;
+  const model = Object.keys(TYPES).find((each) => TYPES[each] === (file.camera_type ?? 'perspective'));
+  if (!model) return null;
   const keys = list.map((key) => viewOf(key.matrix ?? key.camera_to_world,
-    Number(key.fov ?? file.default_fov ?? 50), Number(key.raysplats_distance ?? distance)));
+    lensFov(model, Number(key.fov ?? file.default_fov ?? 50)), Number(key.raysplats_distance ?? distance)));
   const sound = keys.every((key) => [...key.eye, ...key.turn, key.fov, key.distance].every(Number.isFinite));
   if (!sound) return null;
   const fps = Number(file.fps) || 30;
-  return { keys, fps, closed: file.is_cycle === true, seconds: Number(file.seconds) || list.length / fps };
+  return { keys, model, fps, closed: file.is_cycle === true, seconds: Number(file.seconds) || list.length / fps };
 }

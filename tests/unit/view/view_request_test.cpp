@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
 
 using namespace raysplats;
@@ -86,6 +87,30 @@ TEST_CASE("a view message becomes a camera") {
     turned["output"] = name;
     CHECK(view_of(turned).output == output);
   }
+}
+
+TEST_CASE("a view may have the lens of a fisheye or show everything around") {
+  json message = sound_view();
+  message["model"] = "pinhole";
+  CHECK(view_of(message).camera.model == CameraModel::kPinhole);
+  message["model"] = "fisheye";
+  message["fov"] = 270;
+  const Camera fisheye = view_of(message).camera;
+  CHECK(fisheye.model == CameraModel::kFisheye);
+  // Its upper edge is seen 135 degrees off the axis.
+  const CameraRay ray = camera_ray(fisheye, 200, 0);
+  CHECK(ray.direction.z == doctest::Approx(-std::sqrt(0.5)));
+  CHECK(ray.direction.y == doctest::Approx(-std::sqrt(0.5)));
+  message["fov"] = 361;
+  CHECK(refusal(message.dump()).find("fov") != std::string::npos);
+  message["model"] = "equirectangular";
+  message.erase("fov");
+  CHECK(view_of(message).camera.model == CameraModel::kEquirectangular);
+  message["type"] = "scene";
+  CHECK(refusal(message.dump()).find("pinhole") != std::string::npos);
+  CHECK(refusal(with("fov", 171)).find("fov") != std::string::npos);
+  CHECK(refusal(with("model", "pinhol")).find("model") != std::string::npos);
+  CHECK(refusal(with("model", 1)).find("model") != std::string::npos);
 }
 
 TEST_CASE("picks and commands are understood") {
