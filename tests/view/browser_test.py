@@ -22,7 +22,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from program import Viewer, write_model  # noqa: E402
+from program import Viewer, psnr, write_model  # noqa: E402
 
 PROGRAM = ""
 FOLDER = None
@@ -83,6 +83,11 @@ class PageCase(unittest.TestCase):
 
     def console(self):
         return [entry for entry in self.page.get_log("browser") if entry["level"] == "SEVERE"]
+
+    def painted(self, canvas):
+        return self.page.execute_script(
+            "const c = document.getElementById(arguments[0]);"
+            "return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v > 0);", canvas)
 
     def drag(self, dx, dy, steps=20):
         stage = self.page.find_element(By.ID, "picture")
@@ -205,7 +210,7 @@ class ViewTest(PageCase):
             "return import('/path.js').then(m => JSON.stringify(m.pathFile("
             "[{eye: [0, 0, -6], turn: [1, 0, 0, 0], fov: 50, distance: 6},"
             " {eye: [1, 0, -6], turn: [1, 0, 0, 0], fov: 50, distance: 6}],"
-            "{seconds: 1, fps: 3, closed: false, width: 32, height: 24})))")
+            "{seconds: 1, fps: 3, closed: false, width: 32, height: 24, model: 'pinhole'})))")
         folder = self.viewer.folder.name
         with open(os.path.join(folder, "path.json"), "w") as file:
             file.write(text)
@@ -236,6 +241,94 @@ class ViewTest(PageCase):
             "image.onerror = () => done(null);"
             "image.src = 'data:image/apng;base64,' + arguments[0];", video)
         self.assertEqual(played, [32, 24])
+        self.assertEqual(self.console(), [])
+
+    def module(self, expression, *arguments):
+        """What an expression of a page's modules gives: path, toml or vectors."""
+        return self.page.execute_async_script(
+            "const [...given] = arguments; const done = given.pop();"
+            "Promise.all(['path', 'toml', 'vectors'].map((name) => import(`/${name}.js`)))"
+            f".then(([path, toml, vectors]) => done({expression}), (error) => done(String(error)));", *arguments)
+
+    def test_keyframes_in_toml_are_those_of_render(self):
+        first = self.rest()
+        turns = [(1, 0, 0, 0), (0.8, 0.36, 0.48, 0), (0.5, 0.5, -0.5, 0.5)]
+        keys = [{"eye": [i, 1e-7 * i, -6], "turn": turn, "fov": 50 + 10 * i, "distance": 2.5, "seconds": [1, 3, 1][i]}
+                for i, turn in enumerate(turns)]
+        settings = {"seconds": 2, "fps": 4, "closed": False, "width": 32, "height": 24, "model": "pinhole"}
+        text = self.module("toml.tomlOf(given[0], given[1])", keys, settings)
+        back = self.module("toml.keyframesIn(given[0])", text)
+        self.assertEqual((back["seconds"], back["fps"], back["closed"], len(back["keys"])), (2, 4, False, 3))
+        for key, own in zip(back["keys"], keys):
+            for name in ("eye", "turn"):
+                self.assertLess(math.dist(key[name], own[name]), 1e-9, name)
+            self.assertAlmostEqual(key["distance"], 2.5)
+            self.assertEqual((key["fov"], key["seconds"]), (own["fov"], own["seconds"]))
+        # `render` draws the same frames of it as of the page's frames one by one.
+        folder = self.viewer.folder.name
+        files = {"a.toml": text, "b.json": json.dumps(self.module("path.pathFile(given[0], given[1])", keys, settings))}
+        for name, content in files.items():
+            with open(os.path.join(folder, name), "w") as file:
+                file.write(content)
+            subprocess.run([PROGRAM, "render", self.viewer.model, "--path", os.path.join(folder, name), "-o",
+                            os.path.join(folder, name[0]), "-q"], check=True, stdout=subprocess.DEVNULL)
+        names = sorted(os.listdir(os.path.join(folder, "a")))
+        self.assertEqual(len(names), 8)
+        for name in names:
+            self.assertGreater(psnr(os.path.join(folder, "a", name), os.path.join(folder, "b", name)), 50, name)
+        # As people write it, through the page's own button; what is none is a sentence.
+        written = os.path.join(folder, "hand.toml")
+        with open(written, "w") as file:
+            file.write('# by hand\nfps = 25\nclosed = true\nspeed = "by-seconds"\n\n[[key]]  # one\neye = [0, 0,\n -6]\n'
+                       "target = [0, 0, 0,]\n[[key]]\neye = [1_0, 0, 0]\ntarget = [0, 0, 0]\nseconds = 2.5\n")
+        self.page.find_element(By.ID, "load-path").send_keys(written)
+        self.wait("the keyframes", lambda: len(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")) == 2)
+        self.assertEqual([self.page.find_element(By.ID, name).get_attribute("value") for name in ("seconds", "fps")],
+                         ["3.5", "25"])
+        self.assertTrue(self.page.find_element(By.ID, "closed").is_selected())
+        self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")[1].find_element(By.TAG_NAME, "button").click()
+        self.rest(first["id"])
+        self.assertLess(math.dist(self.page.execute_script("return window.raysplats.rig.eye"), (10, 0, 0)), 1e-9)
+        for damaged in ("", "[[key]]", "[[key]]\neye = [0, 0, 0]\ntarget = [0, 1, 0]", "[camera]\nx = 1",
+                        "[[key]]\neye = [0, 0]\ntarget = [0, 0, 1]", "[[key]]\neye = 1\ntarget = 2", "key = [[1]]"):
+            self.assertIsNone(self.module("toml.keyframesIn(given[0])", damaged), damaged)
+        self.assertEqual(self.console(), [])
+
+    def test_other_lenses(self):
+        shown = self.rest()
+        lens, slider = Select(self.page.find_element(By.ID, "model")), self.page.find_element(By.ID, "fov")
+        self.page.find_element(By.ID, "show-crop").click()
+        self.assertTrue(self.painted("overlay"))
+        for name, widest in (("fisheye", "360"), ("equirectangular", "120")):
+            before = self.pixels()
+            lens.select_by_value(name)
+            if name == "fisheye":
+                self.page.execute_script("arguments[0].value = 220; arguments[0].dispatchEvent(new Event('input'));",
+                                         slider)
+            shown = self.rest(shown["id"])
+            self.assertNotEqual(before, self.pixels())
+            self.assertEqual(slider.get_attribute("max"), widest)
+            self.assertFalse(self.painted("overlay"))
+            self.screenshot(name)
+            # Paths keep the lens, in nerfstudio's terms.
+            key = {"eye": [0, 0, -6], "turn": [1, 0, 0, 0], "fov": 90, "distance": 6}
+            path = self.module("path.pathFile([given[0]], given[1])", key, {
+                "seconds": 1, "fps": 1, "closed": False, "width": 32, "height": 16, "model": name})
+            self.assertEqual(path["camera_type"], name)
+            back = self.module("path.keyframesOf(given[0], 6)", path)
+            self.assertEqual(back["model"], name)
+            self.assertAlmostEqual(back["keys"][0]["fov"], 90)
+        self.assertFalse(slider.is_enabled())
+        self.assertEqual((shown["last"]["width"], shown["last"]["samples"]), (2 * shown["last"]["height"], 16))
+        self.assertFalse(self.page.find_element(By.ID, "save-toml").is_enabled())
+        # A double click picks what is there: the ball in the middle.
+        ActionChains(self.page).double_click(self.page.find_element(By.ID, "picture")).perform()
+        self.wait("a new centre", lambda: math.dist(
+            self.page.execute_script("return window.raysplats.rig.target"), (0, 0, 0)) < 0.8)
+        lens.select_by_value("pinhole")
+        self.assertLessEqual(self.page.execute_script("return window.raysplats.rig.fov"), 120)
+        self.assertTrue(self.painted("overlay"))
+        self.assertEqual(self.seen()["errors"], [])
         self.assertEqual(self.console(), [])
 
     def test_reload_two_pages_touch_and_the_dark(self):
@@ -456,11 +549,6 @@ class TrainTest(PageCase):
     def iteration(self):
         return self.page.execute_script("const s = window.raysplats.run && window.raysplats.run.state;"
                                         "return s && s.rows.length ? s.rows[s.rows.length - 1][0] : 0;")
-
-    def painted(self, canvas):
-        return self.page.execute_script(
-            "const c = document.getElementById(arguments[0]);"
-            "return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v > 0);", canvas)
 
     def test_a_run_is_watched_paused_saved_and_resumed(self):
         self.wait("iterations", lambda: self.iteration() > 420)

@@ -75,6 +75,7 @@ function changed() {
   $('fov').disabled = around;
   $('fov-text').textContent = around ? 'all around' : `${Math.round(rig.fov)}\u00b0`;
   picture.classList.toggle('whole', around);
+  $('save-toml').disabled = rig.model !== 'pinhole';
   $('near-text').textContent = nearDepth().toPrecision(2);
   link.changed();
   drawOverlay();
@@ -324,6 +325,7 @@ function wire() {
   $('clear-keys').addEventListener('click', () => keyframes.clear());
   $('play').addEventListener('click', () => keyframes.play());
   $('save-path').addEventListener('click', () => keyframes.save());
+  $('save-toml').addEventListener('click', () => keyframes.saveToml());
   $('load-path').addEventListener('change', async (event) => {
     const stored = await keyframes.load(event.target.files[0]);
     event.target.value = '';

@@ -2,6 +2,7 @@
 // The list of keyframes: views to go back to, to play, to save as a camera path.
 
 import { keyframesOf, pathFile, viewAt } from './path.js';
+import { keyframesIn, tomlOf } from './toml.js';
 
 export class Keyframes {
   #keys = [];
@@ -64,16 +65,25 @@ export class Keyframes {
   }
 
   save() {
+    this.#save((...path) => JSON.stringify(pathFile(...path), null, 1), 'application/json', 'path.json');
+  }
+
+  saveToml() {
+    this.#save(tomlOf, 'application/toml', 'path.toml');
+  }
+
+  #save(write, type, name) {
     if (this.#keys.length === 0) this.add();
-    const text = JSON.stringify(pathFile(this.#keys, this.page.settings()), null, 1);
-    this.page.download(new Blob([text], { type: 'application/json' }), 'path.json');
+    this.page.download(new Blob([write(this.#keys, this.page.settings())], { type }), name);
   }
 
   // Takes the keyframes of a file; its settings, or null where it has none.
   async load(file) {
+    const text = await file.text();
     let stored = null;
     try {
-      stored = keyframesOf(JSON.parse(await file.text()), this.page.view().distance);
+      stored = file.name.endsWith('.toml') ? keyframesIn(text)
+        : keyframesOf(JSON.parse(text), this.page.view().distance);
     } catch {
       return null;
     }

@@ -22,9 +22,11 @@ function smooth(p0, p1, p2, p3, t) {
 export function viewAt(keys, share, closed) {
   if (keys.length === 1) return keys[0];
   const spans = closed ? keys.length : keys.length - 1;
-  const at = Math.min(share * spans, spans - 1e-9);
-  const index = Math.floor(at);
-  const t = at - index;
+  const times = keys.slice(0, spans).map((key) => key.seconds ?? 1);
+  let at = share * times.reduce((sum, time) => sum + time, 0);
+  let index = 0;
+  while (index < spans - 1 && at >= times[index]) at -= times[index++];
+  const t = times[index] > 0 ? Math.min(at / times[index], 1) : 0;
   const key = (i) => (closed ? keys[(i + keys.length) % keys.length]
     : keys[Math.min(Math.max(i, 0), keys.length - 1)]);
   const [a, b] = [key(index), key(index + 1)];

@@ -105,9 +105,10 @@ TEST_CASE("the library holds the page, and nothing else is served") {
   for (const char* path : {"", "/..", "/../app.js", "//app.js", "/etc/passwd", "/app.js/", "/x.js"})
     CHECK(!page_file(path).has_value());
   // No script, style or picture from elsewhere.
-  for (const char* path : {"/", "/app.js", "/style.css", "/connection.js", "/cameras.js",
-                           "/keyframes.js", "/path.js", "/pointers.js", "/vectors.js", "/camera.js",
-                           "/run.js", "/curves.js", "/photo.js", "/crop.js"}) {
+  for (const char* path :
+       {"/", "/app.js", "/style.css", "/connection.js", "/cameras.js", "/keyframes.js", "/path.js",
+        "/pointers.js", "/vectors.js", "/camera.js", "/run.js", "/curves.js", "/photo.js",
+        "/crop.js", "/meshes.js", "/toml.js"}) {
     INFO(path);
     REQUIRE(page_file(path).has_value());
     CHECK(page_file(path)->content.find("https:") == std::string::npos);
