@@ -3,6 +3,7 @@
 """The viewer's page in Chromium, as a person uses it.
 usage: browser_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
 import base64
+import http.server
 import json
 import math
 import os
@@ -11,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -18,6 +20,7 @@ from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
 
@@ -37,6 +40,19 @@ def browser():
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     return webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+
+
+class Elsewhere(http.server.BaseHTTPRequestHandler):
+    """Somebody's page, on another port of the same host."""
+
+    def do_GET(self):
+        self.send_response(200)
+        self.send_header("Content-Type", "text/html")
+        self.end_headers()
+        self.wfile.write(b"<!doctype html><body>")
+
+    def log_message(self, *_):
+        pass
 
 
 class PageCase(unittest.TestCase):
@@ -250,6 +266,72 @@ class ViewTest(PageCase):
             "Promise.all(['path', 'toml', 'vectors'].map((name) => import(`/${name}.js`)))"
             f".then(([path, toml, vectors]) => done({expression}), (error) => done(String(error)));", *arguments)
 
+    def test_a_frustum_in_the_picture_is_clicked(self):
+        first = self.rest()
+        stage = self.page.find_element(By.ID, "picture")
+        ActionChains(self.page).scroll_from_origin(ScrollOrigin.from_element(stage), 0, 200).perform()
+        ActionChains(self.page).send_keys("c").perform()
+        away = self.rest(first["id"])
+        self.assertTrue(self.painted("overlay"))
+        eye = "return window.raysplats.rig.eye"
+        self.assertLess(self.page.execute_script(eye)[2], -7)
+        # Beside its tip there is nothing to go to. The tip itself is in the middle, as the camera came from there.
+        ActionChains(self.page).move_to_element_with_offset(stage, 120, 90).click().perform()
+        self.assertLess(self.page.execute_script(eye)[2], -7)
+        ActionChains(self.page).move_to_element(stage).click().perform()
+        self.assertLess(math.dist(self.page.execute_script(eye), (0, 0, -6)), 1e-6)
+        self.rest(away["id"])
+        self.assertEqual(self.console(), [])
+
+    def test_a_page_from_elsewhere_gets_nothing(self):
+        self.rest()  # the cookie is there, and goes to all ports of the host
+        with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Elsewhere) as elsewhere:
+            threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
+            self.addCleanup(elsewhere.shutdown)
+            self.page.get(f"http://127.0.0.1:{elsewhere.server_port}/")
+            told = self.page.execute_async_script(
+                "const [host, done] = arguments;"
+                "const socket = new WebSocket(`ws://${host}/ws`);"
+                "const opened = new Promise((then) => { socket.onopen = () => then('open');"
+                " socket.onerror = () => then('refused'); });"
+                "const read = fetch(`http://${host}/api/state`, {credentials: 'include'})"
+                ".then(() => 'read', () => 'refused');"
+                "const frame = document.createElement('iframe'); frame.src = `http://${host}/`;"
+                "const framed = new Promise((then) => { frame.onload = then; });"
+                "document.body.append(frame);"
+                "Promise.all([opened, read, framed]).then(([socket, state]) => done([socket, state]));",
+                self.viewer.host)
+            self.assertEqual(told, ["refused"] * 2)
+            logged = "\n".join(entry["message"] for entry in self.console())
+            for said in ("Unexpected response code: 403", "blocked by CORS policy", "frame-ancestors"):
+                self.assertIn(said, logged)
+
+    def test_a_hundred_quick_moves_leave_one_stale_picture_at_most(self):
+        before = self.rest()
+        # What was asked for by which number, and what was shown when.
+        self.page.execute_script(
+            "const seen = window.raysplats; const asked = new Map(); const shown = []; let last = seen.last;"
+            "const send = WebSocket.prototype.send;"
+            "WebSocket.prototype.send = function (data) { const m = typeof data === 'string' ? JSON.parse(data) : {};"
+            " if (m.type === 'view') asked.set(m.id, m.c2w.join()); return send.call(this, data); };"
+            "Object.defineProperty(seen, 'last', {get: () => last, set: (h) => { last = h; shown.push(h.id); }});"
+            "const p = document.getElementById('picture'); p.setPointerCapture = () => {};"
+            "const fire = (t, x) => p.dispatchEvent(new PointerEvent(t, {pointerId: 1, clientX: x, clientY: 200,"
+            " buttons: 1, bubbles: true}));"
+            "fire('pointerdown', 200); let i = 0;"
+            "const step = () => { fire('pointermove', 200 + ++i); if (i < 100) return setTimeout(step, 4);"
+            " fire('pointerup', 300); const newest = seen.rig.pose.join(); const until = shown.length;"
+            " seen.after = () => ({moving: until,"
+            " stale: shown.slice(until).filter((id) => asked.get(id) !== newest)}); };"
+            "step();")
+        self.wait("the end of the movement", lambda: self.page.execute_script("return !!window.raysplats.after"))
+        self.rest(before["id"])
+        self.wait("the last view", lambda: self.page.execute_script(
+            "return window.raysplats.last.last && window.raysplats.last.samples === 16"))
+        told = self.page.execute_script("return window.raysplats.after()")
+        self.assertGreater(told["moving"], 0)
+        self.assertLessEqual(len(told["stale"]), 1, told)
+
     def test_keyframes_in_toml_are_those_of_render(self):
         first = self.rest()
         turns = [(1, 0, 0, 0), (0.8, 0.36, 0.48, 0), (0.5, 0.5, -0.5, 0.5)]
@@ -279,8 +361,8 @@ class ViewTest(PageCase):
         # As people write it, through the page's own button; what is none is a sentence.
         written = os.path.join(folder, "hand.toml")
         with open(written, "w") as file:
-            file.write('# by hand\nfps = 25\nclosed = true\nspeed = "by-seconds"\n\n[[key]]  # one\neye = [0, 0,\n -6]\n'
-                       "target = [0, 0, 0,]\n[[key]]\neye = [1_0, 0, 0]\ntarget = [0, 0, 0]\nseconds = 2.5\n")
+            file.write('# by hand\nfps = 25\nclosed = true\nspeed = "by-seconds"\n\n[[key]]  # one\n'
+                       "eye = [0, 0,\n -6]\ntarget = [0, 0, 0,]\n[[key]]\neye = [1_0, 0, 0]\ntarget = [0, 0, 0]\nseconds = 2.5\n")
         self.page.find_element(By.ID, "load-path").send_keys(written)
         self.wait("the keyframes", lambda: len(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")) == 2)
         self.assertEqual([self.page.find_element(By.ID, name).get_attribute("value") for name in ("seconds", "fps")],
