@@ -153,8 +153,9 @@ class Channel:
             if code == 1:
                 return "text", json.loads(data)
             if code == 2:
-                names = ("magic", "view", "width", "height", "samples", "flags", "iteration")
-                return "picture", dict(zip(names, struct.unpack("<7I", data[:28]))), data[32:]
+                names = ("magic", "view", "width", "height", "samples", "flags", "iteration",
+                         "milliseconds")
+                return "picture", dict(zip(names, struct.unpack("<7If", data[:32]))), data[32:]
             if code == 8:
                 return ("close",)
             if code == 9:  # a ping: whoever stays silent for a minute is shut out
