@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 
 #include "base/atomic_file.hpp"
 #include "comm/communicator.hpp"
@@ -104,6 +106,25 @@ std::vector<MeasuredView> of_all_ranks(Communicator& ranks, const std::vector<Me
   return all;
 }
 
+// Indices of the views whose pictures tell most: worst, middle and best by PSNR, then as they come;
+// `most` at most.
+std::set<std::size_t> telling(const std::vector<MeasuredView>& all, std::size_t most) {
+  std::vector<MeasuredView> sorted;
+  std::ranges::copy_if(all, std::back_inserter(sorted), &MeasuredView::compared);
+  std::vector<std::size_t> wanted;
+  for (const MeasuredView& view : sorted) wanted.push_back(view.index);
+  std::ranges::stable_sort(sorted, {}, &MeasuredView::psnr);
+  if (!sorted.empty()) {
+    wanted.insert(wanted.begin(),
+                  {sorted.front().index, sorted[sorted.size() / 2].index, sorted.back().index});
+  }
+  std::set<std::size_t> out;
+  for (const std::size_t index : wanted) {
+    if (out.size() < most) out.insert(index);
+  }
+  return out;
+}
+
 nlohmann::json to_json(const EvaluationMetrics& metrics) {
   nlohmann::json json;
   if (!metrics.name.empty()) json["name"] = metrics.name;
@@ -112,6 +133,7 @@ nlohmann::json to_json(const EvaluationMetrics& metrics) {
   json["psnr_corrected"] = metrics.psnr_corrected;
   if (metrics.psnr_all) json["psnr_all"] = *metrics.psnr_all;
   if (metrics.lpips) json["lpips"] = *metrics.lpips;
+  if (!metrics.picture.empty()) json["picture"] = metrics.picture;
   return json;
 }
 
@@ -198,34 +220,55 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
 
   Communicator alone;
   Communicator& ranks = options.ranks != nullptr ? *options.ranks : alone;
-  std::vector<MeasuredView> measured;
-  bool stopped = false;
-  const auto step = static_cast<std::size_t>(ranks.size());
-  for (std::size_t i = static_cast<std::size_t>(ranks.rank()); i < views.size() && !stopped;
-       i += step) {
+  const auto compare_view = [&](std::size_t i) -> std::optional<Comparison> {
     const ViewPicture picture = load_view_picture(dataset.views[views[i]]);
     const Image& rgba = picture.rgba;
     const Image traced = render(dataset.views[views[i]].camera);
-    stopped = traced.data.empty();
-    if (stopped) break;
+    if (traced.data.empty()) return std::nullopt;
     if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
       throw UsageError(fmt::format(
           "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names[i],
           traced.width, traced.height, traced.channels, rgba.width, rgba.height));
     }
-    const Comparison pair = compare(traced, picture, dataset.alpha_is_background, background);
-    measured.push_back(measure(i, pair, options.lpips));
-    if (pair.valid > 0 && !output.empty() && i < options.max_pictures.value_or(views.size()))
-      write_image(output / (names[i] + ".png"), side_by_side(pair.photo, pair.render));
+    return compare(traced, picture, dataset.alpha_is_background, background);
+  };
+  const auto picture_of = [&](std::size_t i) { return names[i] + ".png"; };
+  const auto write_picture = [&](std::size_t i, const Comparison& pair) {
+    write_image(output / picture_of(i), side_by_side(pair.photo, pair.render));
+  };
+
+  const std::size_t pictures = output.empty() ? 0 : options.max_pictures.value_or(views.size());
+  const bool all_shown = pictures >= views.size();
+  std::vector<MeasuredView> measured;
+  bool stopped = false;
+  const auto rank = static_cast<std::size_t>(ranks.rank());
+  const auto step = static_cast<std::size_t>(ranks.size());
+  for (std::size_t i = rank; i < views.size() && !stopped; i += step) {
+    const std::optional<Comparison> pair = compare_view(i);
+    stopped = !pair;
+    if (stopped) break;
+    measured.push_back(measure(i, *pair, options.lpips));
+    if (all_shown && pair->valid > 0) write_picture(i, *pair);
     stopped = options.done && !options.done(measured.size());
   }
   stopped = ranks.any(stopped);
 
+  const std::vector<MeasuredView> all = of_all_ranks(ranks, measured);
+  const std::set<std::size_t> shown = telling(all, pictures);
+  // Which views tell most is known only now; tracing them again takes less than keeping all.
+  for (const std::size_t i : shown) {
+    if (all_shown || i % step != rank) continue;
+    const std::optional<Comparison> pair = compare_view(i);
+    if (!pair) break;
+    write_picture(i, *pair);
+  }
+
   EvaluationReport report;
-  for (const MeasuredView& view : of_all_ranks(ranks, measured)) {
+  for (const MeasuredView& view : all) {
     EvaluationMetrics metrics = metrics_of(view);
     const std::string& view_name = dataset.views[views[view.index]].camera.name;
     metrics.name = view_name.empty() ? names[view.index] : view_name;
+    if (shown.contains(view.index)) metrics.picture = picture_of(view.index);
     if (view.compared) {
       report.images.push_back(metrics);
     } else if (ranks.leads()) {

@@ -51,6 +51,11 @@ double number(const Json& json, const char* key) {
   return found != json.end() && found->is_number() ? found->get<double>() : 0.0;
 }
 
+std::string text(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
 std::vector<Json> objects(const Json& json, const char* key) {
   std::vector<Json> out;
   const auto found = json.find(key);
@@ -128,20 +133,32 @@ std::vector<Json> views_of(const fs::path& run, const std::vector<Json>& evaluat
   return objects(io::read_json_object(file), "images");
 }
 
-std::string picture(const fs::path& folder, const Json& view, const std::string& what) {
-  const std::string name = view.value("name", "");
-  const fs::path file = folder / fs::path(name).stem().concat(".png");
+fs::path picture_file(const fs::path& folder, const Json& view) {
+  fs::path name = text(view, "picture");
+  // Runs of older versions do not say it.
+  if (name.empty()) name = fs::path(text(view, "name")).stem().concat(".png");
+  const fs::path file = folder / name.filename();
   std::error_code error;
-  if (!fs::is_regular_file(file, error)) return "";
+  return fs::is_regular_file(file, error) ? file : fs::path();
+}
+
+std::string picture(const fs::path& folder, const Json& view, const std::string& what) {
+  const std::string name = text(view, "name");
+  const std::string caption =
+      fmt::format("{}: {}, {:.2f} dB", escaped(what), escaped(name), number(view, "psnr"));
+  const fs::path file = picture_file(folder, view);
+  if (file.empty()) {
+    return fmt::format("<p>{}: the run wrote no picture of it (--eval-renders).</p>\n", caption);
+  }
   io::ImageEncoding encoding;
   encoding.format = "jpeg";
   encoding.quality = kPictureQuality;
   const std::vector<unsigned char> bytes =
       io::image_codec().encode("picture.jpg", read_image(file), encoding);
   return fmt::format(
-      "<figure><img alt=\"{0}\" src=\"{1}\"/><figcaption>{2}: {0}, {3:.2f} dB (photo, render, "
+      "<figure><img alt=\"{}\" src=\"{}\"/><figcaption>{} (photo, render, "
       "error)</figcaption></figure>\n",
-      escaped(name), data_url("image/jpeg", bytes), escaped(what), number(view, "psnr"));
+      escaped(name), data_url("image/jpeg", bytes), caption);
 }
 
 }  // namespace raysplats::report

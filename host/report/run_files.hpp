@@ -22,6 +22,8 @@ std::string text_of(const std::filesystem::path& path);
 
 /// A number of a JSON object; 0 when it has none.
 double number(const nlohmann::json& json, const char* key);
+/// A text of a JSON object; "" when it has none.
+std::string text(const nlohmann::json& json, const char* key);
 /// The objects of a list.
 std::vector<nlohmann::json> objects(const nlohmann::json& json, const char* key);
 
@@ -46,7 +48,9 @@ std::filesystem::path pictures_of(const std::filesystem::path& run,
                                   const std::vector<nlohmann::json>& evaluations);
 std::vector<nlohmann::json> views_of(const std::filesystem::path& run,
                                      const std::vector<nlohmann::json>& evaluations);
-/// The picture of a view (photo, render, error side by side) as a figure; "" where there is none.
+/// The file of a view's picture (photo, render, error side by side); empty where there is none.
+std::filesystem::path picture_file(const std::filesystem::path& folder, const nlohmann::json& view);
+/// That picture as a figure, or a line that says that there is none.
 std::string picture(const std::filesystem::path& folder,
                     const nlohmann::json& view,
                     const std::string& what);

@@ -157,10 +157,19 @@ std::string held_out(const std::vector<Run>& runs) {
   if (common.empty()) return "<p>The runs have no held-out view in common.</p>\n";
   std::stable_sort(common.begin(), common.end(),
                    [](const Common& a, const Common& b) { return a.spread > b.spread; });
+  const auto all_have_pictures = [&](const Common& entry) {
+    return std::all_of(runs.begin(), runs.end(), [&](const Run& run) {
+      return !picture_file(pictures_of(run.folder, run.evaluations), *view_named(run, entry.name))
+                  .empty();
+    });
+  };
+  std::vector<Common> shown = common;
+  std::stable_partition(shown.begin(), shown.end(), all_have_pictures);
+  shown.resize(std::min(kShownViews, shown.size()));
   std::string out;
-  for (std::size_t i = 0; i < std::min(kShownViews, common.size()); ++i) {
+  for (const Common& entry : shown) {
     for (const Run& run : runs) {
-      out += picture(pictures_of(run.folder, run.evaluations), *view_named(run, common[i].name),
+      out += picture(pictures_of(run.folder, run.evaluations), *view_named(run, entry.name),
                      run.letter);
     }
   }

@@ -372,8 +372,10 @@ void add_report_keys(TrainTable& t, TrainOptions& o) {
            "further shares of the run, or iterations, to evaluate at; the last one always is");
   t.number("eval-views", o.eval_views, 0, 1e9,
            "test views of an evaluation before the last; 0 = all");
-  t.number("eval-renders", o.eval_renders, 0, 1e9,
-           "test views written as pictures beside the photo per evaluation");
+  t.number(
+      "eval-renders", o.eval_renders, 0, 1e9,
+      "test views written as pictures beside the photo per evaluation: worst, median and best, "
+      "then the first ones");
   t.shares("save-at", o.save_at,
            "shares of the run, or iterations, at which the PLY is written; after the last one it "
            "always is");

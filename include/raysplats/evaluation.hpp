@@ -27,6 +27,7 @@ struct EvaluationMetrics {
   double psnr_corrected = 0;
   std::optional<double> psnr_all;  ///< over all pixels, when some are masked out
   std::optional<double> lpips;     ///< when a network was given
+  std::string picture;             ///< its file in the output folder; empty when none was written
 };
 
 struct EvaluationReport {
@@ -36,14 +37,16 @@ struct EvaluationReport {
   /// One line per image and the mean, aligned.
   std::string table() const;
   /// {"psnr", "ssim", "psnr_corrected", "psnr_all" (if some pixels are masked out), "lpips" (if
-  /// measured), "images": [{"name", "psnr", "ssim", ...}]}.
+  /// measured), "images": [{"name", "psnr", "ssim", ..., "picture" (if written)}]}.
   std::string json() const;
 };
 
 struct EvaluationOptions {
-  std::size_t max_views = 0;                ///< 0 = all; else so many, spread evenly over the split
-  std::optional<std::size_t> max_pictures;  ///< side-by-side pictures at most; all when unset
-  Lpips* lpips = nullptr;                   ///< not owned
+  std::size_t max_views = 0;  ///< 0 = all; else so many, spread evenly over the split
+  /// Side-by-side pictures at most; all when unset. Fewer than there are views show the worst, the
+  /// median and the best by PSNR, then the first ones, and are traced a second time.
+  std::optional<std::size_t> max_pictures;
+  Lpips* lpips = nullptr;  ///< not owned
   std::function<bool(std::size_t)> done =
       {};  ///< hears the number of finished views, returns false to stop early
   /// Of the library itself; its type is not installed. With it every rank calls evaluate() and
@@ -58,7 +61,7 @@ std::vector<std::string> evaluated_names(const Dataset& dataset, Split split);
 /// of the camera's size, `background` blended in, or an empty image to stop early; it is clamped to
 /// [0, 1] and compared in floating point. The photo is composited over `background` when the data
 /// set's alpha is background; else alpha is a mask, and render and photo are blended to be equal
-/// where it is 0. With an output folder every view's photo | render | error goes to NAME.png there,
+/// where it is 0. With an output folder the photo | render | error of views goes to NAME.png there,
 /// and the report to metrics.json, unless it was stopped before the first comparison. Throws
 /// UsageError when the split has no views or a render has another size than its photo, DataError
 /// when masks leave no pixel of any view; single views without one are left out with a warning.

@@ -57,7 +57,9 @@ void bind_report(nb::module_& module) {
       .def_ro("psnr_corrected", &EvaluationMetrics::psnr_corrected,
               "PSNR when exposure and white balance do not count.")
       .def_ro("psnr_all", &EvaluationMetrics::psnr_all,
-              "Over all pixels, when some are masked out.");
+              "Over all pixels, when some are masked out.")
+      .def_ro("picture", &EvaluationMetrics::picture,
+              "Its file in the output folder; empty when none was written.");
   nb::class_<EvaluationReport>(module, "EvaluationReport")
       .def_ro("mean", &EvaluationReport::mean)
       .def_ro("images", &EvaluationReport::images)

@@ -172,6 +172,55 @@ TEST_CASE("evaluator: equal pictures have a PSNR, and views without a pixel are 
   CHECK_THROWS_AS(evaluate(photo, scene.dataset, Split::kTest, kBackground), DataError);
 }
 
+TEST_CASE("evaluator: few pictures show worst, median and best, then the first, by name") {
+  Scene scene;
+  const View view = scene.dataset.views[0];
+  scene.dataset.views.clear();
+  // Names whose stems are equal, as cameras side by side give them.
+  const std::array<float, 6> errors{0.2f, 0.1f, 0.5f, 0.3f, 0.05f, 0.25f};
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    scene.dataset.views.push_back(view);
+    scene.dataset.views.back().camera.name = "side_" + std::to_string(i) + "/0001.png";
+    scene.dataset.views.back().test = true;
+  }
+  std::size_t traced = 0;
+  const auto render = [&](const Camera& camera) {
+    ++traced;
+    Image image = load_view_image(view);
+    const float error = errors.at(static_cast<std::size_t>(camera.name[5] - '0'));
+    for (float& value : image.data) value += value < 0.5f ? error : -error;
+    return image;
+  };
+  const auto pictured = [&](std::size_t most) {
+    const auto output = scene.path("telling") / std::to_string(most);
+    EvaluationOptions options;
+    options.max_pictures = most;
+    const EvaluationReport report =
+        evaluate(render, scene.dataset, Split::kTest, kBackground, output, options);
+    std::ifstream stream(output / "metrics.json");
+    const nlohmann::json images = nlohmann::json::parse(stream).at("images");
+    std::string numbers;
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      CHECK(images.at(i).value("picture", "") == report.images.at(i).picture);
+      if (report.images[i].picture.empty()) continue;
+      CHECK(std::filesystem::exists(output / report.images[i].picture));
+      numbers += std::to_string(i);
+    }
+    const auto files = std::distance(std::filesystem::directory_iterator(output),
+                                     std::filesystem::directory_iterator());
+    CHECK(files == static_cast<std::ptrdiff_t>(numbers.size() + 1));
+    return numbers;
+  };
+  CHECK(pictured(0).empty());
+  CHECK(pictured(1) == "2");
+  CHECK(pictured(3) == "024");
+  traced = 0;
+  CHECK(pictured(4) == "0124");
+  CHECK(traced == 10);
+  CHECK(pictured(6) == "012345");
+  CHECK(traced == 16);  // all are written as they are measured
+}
+
 TEST_CASE("evaluator: limits, early stop, LPIPS and refusals") {
   Scene scene;
   const auto render = [](const Camera& camera) {

@@ -100,7 +100,7 @@ TEST_CASE("a report holds what the run says, escaped, and nothing from elsewhere
   CHECK(has(page, "&lt;cpu&gt; &amp; co"));
   CHECK(has(page, "Worst: a&lt;b&gt;&amp;.png, 10.00 dB"));
   CHECK(has(page, "Best: good.png, 30.00 dB"));
-  CHECK(!has(page, "Typical"));  // its picture is missing
+  CHECK(has(page, "Typical: mid.png, 20.00 dB: the run wrote no picture of it"));
   CHECK(has(page, "data:image/jpeg;base64,/9j/"));
   CHECK(has(page, "&quot;&lt;script&gt;&quot;"));
   CHECK(!has(page, "<script"));
@@ -123,6 +123,19 @@ TEST_CASE("a report of a run that is under way or damaged says so") {
   CHECK_THROWS_AS(run_report(run.path()), DataError);
   fs::remove(run.path() / "metrics.json");
   CHECK_THROWS_AS(run_report(run.path()), DataError);
+}
+
+TEST_CASE("a picture is the file that its evaluation names, of that folder alone") {
+  const Run run;
+  const fs::path eval = run.path() / "eval/iteration_200";
+  write_image(eval / "left_0001.png", Image(12, 4, 3, 0.5f));
+  run.write("eval/iteration_200/metrics.json",
+            R"({"images":[{"name":"left/0001.png","psnr":30,"picture":"left_0001.png"}]})");
+  CHECK(has(run_report(run.path()), "alt=\"left/0001.png\" src=\"data:"));
+  write_image(run.path() / "outside.png", Image(12, 4, 3, 0.5f));
+  run.write("eval/iteration_200/metrics.json",
+            R"({"images":[{"name":"0001.png","psnr":30,"picture":"../../outside.png"}]})");
+  CHECK(!has(run_report(run.path()), "data:image"));
 }
 
 TEST_CASE("several runs stand side by side, with what differs between them") {
@@ -151,6 +164,11 @@ TEST_CASE("several runs stand side by side, with what differs between them") {
   CHECK(has(page, "<tr><th>iterations</th><td>200</td><td>300</td></tr>"));
   CHECK(!has(page, "<th>name</th>"));
   CHECK(!has(page, "<script"));
+  // Views of which all runs have a picture come first, however little they differ.
+  fs::remove(second.path() / "eval/iteration_200/good.png");
+  const std::string pictured = runs_report({first.path(), second.path()});
+  CHECK(pictured.find("A: a&lt;b") < pictured.find("A: good.png"));
+  CHECK(has(pictured, "B: good.png, 36.00 dB: the run wrote no picture of it"));
   // A run without held-out views, and settings that are the same.
   third.write("metrics.json", R"({"iteration":7})");
   const std::string bare = runs_report({first.path(), third.path()});
