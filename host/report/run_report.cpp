@@ -95,7 +95,7 @@ std::string held_out(const fs::path& run, const std::vector<Json>& evaluations) 
       "</tr>\n";
   for (const Json& view : views) {
     out += fmt::format("<tr><td>{}</td><td>{:.2f}</td><td>{:.4f}</td></tr>\n",
-                       escaped(view.value("name", "")), number(view, "psnr"), number(view, "ssim"));
+                       escaped(text(view, "name")), number(view, "psnr"), number(view, "ssim"));
   }
   return out + "</table></details>\n";
 }
@@ -134,7 +134,7 @@ std::string run_report(const fs::path& run) {
                                        number(metrics, "kernel_build_seconds")));
   facts += row("Device memory",
                fmt::format("{:.0f} MiB at most", number(metrics, "peak_device_bytes") / 1048576.0));
-  facts += row("Device", metrics.value("device", ""));
+  facts += row("Device", text(metrics, "device"));
   std::string warnings;
   for (const std::string& each : warnings_of(metrics, evaluations))
     warnings += fmt::format("<p class=\"warn\">{}.</p>\n", escaped(each));

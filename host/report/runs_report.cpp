@@ -98,7 +98,7 @@ std::string figures(const std::vector<Run>& runs) {
                      metric("peak_device_bytes", 1.0 / 1048576.0));
   out += "<tr><th>Device</th>";
   for (const Run& run : runs)
-    out += fmt::format("<td>{}</td>", escaped(run.metrics.value("device", "")));
+    out += fmt::format("<td>{}</td>", escaped(text(run.metrics, "device")));
   return out + "</tr>\n</table>\n";
 }
 
@@ -129,7 +129,7 @@ std::string charts(const std::vector<Run>& runs) {
 
 const Json* view_named(const Run& run, const std::string& name) {
   const auto found = std::find_if(run.views.begin(), run.views.end(),
-                                  [&](const Json& view) { return view.value("name", "") == name; });
+                                  [&](const Json& view) { return text(view, "name") == name; });
   return found == run.views.end() ? nullptr : &*found;
 }
 
@@ -141,7 +141,7 @@ std::string held_out(const std::vector<Run>& runs) {
   };
   std::vector<Common> common;
   for (const Json& view : runs.front().views) {
-    Common entry{view.value("name", ""), 0};
+    Common entry{text(view, "name"), 0};
     double least = number(view, "psnr"), most = least;
     bool everywhere = true;
     for (const Run& run : runs) {

@@ -212,6 +212,23 @@ void make_reports(const fs::path& root) {
   Corpus(root, "report").add("one.json", bench_json(report));
 }
 
+void make_runs(const fs::path& root) {
+  const Corpus runs(root, "run");
+  const auto add = [&](const char* name, char choice, const std::string& text) {
+    runs.add(name, std::string(1, choice) + text);
+  };
+  add("metrics", 0, R"({"complete":true,"iteration":2,"iterations":2,"gaussians":9,"device":"cpu",
+"traced_rays":9,"capped_rays":1,"evaluations":[{"iteration":1,"psnr":21.5,"ssim":0.8,"views":1},
+{"iteration":2,"training_seconds":3,"psnr":20,"ssim":0.75,"views":1}]})");
+  add("other_types", 0, R"({"complete":"<script>","iteration":[],"gaussians":"1","device":{},
+"psnr_rise":true,"evaluations":[1,{"iteration":"2","psnr":null}]})");
+  add("views", 1,
+      R"({"images":[{"name":"a<script>.png","psnr":30,"ssim":0.9,"picture":"a.png"}]})");
+  add("views_of_other_types", 1, R"({"images":[{"name":7,"picture":["a.png"],"psnr":"30"},[]]})");
+  add("rows", 2, "iteration,seconds,loss,psnr,gaussians,it_per_s\n10,1.5,0.5,12,100,7\n20,cut");
+  add("settings", 3, "# <script>\niterations = 200\nname = \"<script>\"\n");
+}
+
 void make_checkpoints(const fs::path& root) {
   const Corpus corpus(root, "checkpoint");
   Checkpoint checkpoint;
@@ -421,6 +438,7 @@ int main(int argc, char** argv) {
   make_device_files(root);
   make_images(root);
   make_reports(root);
+  make_runs(root);
   make_checkpoints(root);
   make_meshes(root);
   make_models(root);

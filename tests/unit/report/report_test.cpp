@@ -125,6 +125,16 @@ TEST_CASE("a report of a run that is under way or damaged says so") {
   CHECK_THROWS_AS(run_report(run.path()), DataError);
 }
 
+TEST_CASE("members of another type count as missing") {
+  const Run run;
+  run.write("metrics.json", R"({"device":7,"iteration":"x","complete":1,"evaluations":[
+    {"iteration":200,"psnr":"good"}]})");
+  run.write("eval/iteration_200/metrics.json",
+            R"({"images":[{"name":["a"],"picture":{},"psnr":"30","ssim":null},{"name":"b"}]})");
+  CHECK(fault(run_report(run.path())) == "");
+  CHECK(fault(runs_report({run.path(), run.path()})) == "");
+}
+
 TEST_CASE("a picture is the file that its evaluation names, of that folder alone") {
   const Run run;
   const fs::path eval = run.path() / "eval/iteration_200";
