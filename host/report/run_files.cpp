@@ -10,10 +10,8 @@
 #include <sstream>
 
 #include "base/number_text.hpp"
-#include "io/image_codec.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
-#include "raysplats/io.hpp"
 
 namespace raysplats::report {
 namespace {
@@ -22,7 +20,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr std::uint64_t kMostText = std::uint64_t{64} << 20;
-constexpr int kPictureQuality = 85;
 
 }  // namespace
 
@@ -133,32 +130,17 @@ std::vector<Json> views_of(const fs::path& run, const std::vector<Json>& evaluat
   return objects(io::read_json_object(file), "images");
 }
 
-fs::path picture_file(const fs::path& folder, const Json& view) {
+Figure picture(const fs::path& folder, const Json& view, const std::string& what) {
+  Figure out;
+  out.name = text(view, "name");
+  out.caption = fmt::format("{}: {}, {:.2f} dB", what, out.name, number(view, "psnr"));
   fs::path name = text(view, "picture");
   // Runs of older versions do not say it.
-  if (name.empty()) name = fs::path(text(view, "name")).stem().concat(".png");
+  if (name.empty()) name = fs::path(out.name).stem().concat(".png");
   const fs::path file = folder / name.filename();
   std::error_code error;
-  return fs::is_regular_file(file, error) ? file : fs::path();
-}
-
-std::string picture(const fs::path& folder, const Json& view, const std::string& what) {
-  const std::string name = text(view, "name");
-  const std::string caption =
-      fmt::format("{}: {}, {:.2f} dB", escaped(what), escaped(name), number(view, "psnr"));
-  const fs::path file = picture_file(folder, view);
-  if (file.empty()) {
-    return fmt::format("<p>{}: the run wrote no picture of it (--eval-renders).</p>\n", caption);
-  }
-  io::ImageEncoding encoding;
-  encoding.format = "jpeg";
-  encoding.quality = kPictureQuality;
-  const std::vector<unsigned char> bytes =
-      io::image_codec().encode("picture.jpg", read_image(file), encoding);
-  return fmt::format(
-      "<figure><img alt=\"{}\" src=\"{}\"/><figcaption>{} (photo, render, "
-      "error)</figcaption></figure>\n",
-      escaped(name), data_url("image/jpeg", bytes), caption);
+  if (fs::is_regular_file(file, error)) out.file = file;
+  return out;
 }
 
 }  // namespace raysplats::report

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "report/figures.hpp"
 #include "report/html.hpp"
 
 /// What the files of a training run say, for pages about runs. Members of a run's JSON that are
@@ -48,11 +49,9 @@ std::filesystem::path pictures_of(const std::filesystem::path& run,
                                   const std::vector<nlohmann::json>& evaluations);
 std::vector<nlohmann::json> views_of(const std::filesystem::path& run,
                                      const std::vector<nlohmann::json>& evaluations);
-/// The file of a view's picture (photo, render, error side by side); empty where there is none.
-std::filesystem::path picture_file(const std::filesystem::path& folder, const nlohmann::json& view);
-/// That picture as a figure, or a line that says that there is none.
-std::string picture(const std::filesystem::path& folder,
-                    const nlohmann::json& view,
-                    const std::string& what);
+/// The picture of a view in that folder, captioned by `what` it is, its name and its PSNR.
+Figure picture(const std::filesystem::path& folder,
+               const nlohmann::json& view,
+               const std::string& what);
 
 }  // namespace raysplats::report

@@ -87,9 +87,10 @@ std::string held_out(const fs::path& run, const std::vector<Json>& evaluations) 
   std::stable_sort(views.begin(), views.end(), [](const Json& a, const Json& b) {
     return number(a, "psnr") < number(b, "psnr");
   });
-  std::string out = picture(folder, views.front(), "Worst");
-  if (views.size() > 2) out += picture(folder, views[views.size() / 2], "Typical");
-  if (views.size() > 1) out += picture(folder, views.back(), "Best");
+  std::vector<Figure> shown{picture(folder, views.front(), "Worst")};
+  if (views.size() > 2) shown.push_back(picture(folder, views[views.size() / 2], "Typical"));
+  if (views.size() > 1) shown.push_back(picture(folder, views.back(), "Best"));
+  std::string out = figures(shown);
   out +=
       "<details><summary>All views</summary><table>\n<tr><th>view</th><th>PSNR</th><th>SSIM</th>"
       "</tr>\n";

@@ -81,7 +81,7 @@ double last_of(const Run& run, const char* key) {
   return run.evaluations.empty() ? std::nan("") : number(run.evaluations.back(), key);
 }
 
-std::string figures(const std::vector<Run>& runs) {
+std::string facts(const std::vector<Run>& runs) {
   const auto metric = [](const char* key, double scale = 1.0) {
     return [key, scale](const Run& run) { return scale * number(run.metrics, key); };
   };
@@ -157,22 +157,27 @@ std::string held_out(const std::vector<Run>& runs) {
   if (common.empty()) return "<p>The runs have no held-out view in common.</p>\n";
   std::stable_sort(common.begin(), common.end(),
                    [](const Common& a, const Common& b) { return a.spread > b.spread; });
-  const auto all_have_pictures = [&](const Common& entry) {
-    return std::all_of(runs.begin(), runs.end(), [&](const Run& run) {
-      return !picture_file(pictures_of(run.folder, run.evaluations), *view_named(run, entry.name))
-                  .empty();
-    });
+  const auto pictures = [&](const Common& entry) {
+    std::vector<Figure> of_runs;
+    for (const Run& run : runs) {
+      of_runs.push_back(picture(pictures_of(run.folder, run.evaluations),
+                                *view_named(run, entry.name), run.letter));
+    }
+    return of_runs;
   };
   std::vector<Common> shown = common;
-  std::stable_partition(shown.begin(), shown.end(), all_have_pictures);
+  std::stable_partition(shown.begin(), shown.end(), [&](const Common& entry) {
+    const std::vector<Figure> of_runs = pictures(entry);
+    return std::none_of(of_runs.begin(), of_runs.end(),
+                        [](const Figure& figure) { return figure.file.empty(); });
+  });
   shown.resize(std::min(kShownViews, shown.size()));
-  std::string out;
+  std::vector<Figure> all;
   for (const Common& entry : shown) {
-    for (const Run& run : runs) {
-      out += picture(pictures_of(run.folder, run.evaluations), *view_named(run, entry.name),
-                     run.letter);
-    }
+    const std::vector<Figure> of_runs = pictures(entry);
+    all.insert(all.end(), of_runs.begin(), of_runs.end());
   }
+  std::string out = figures(all);
   out += "<details><summary>All views</summary><table>\n" + heads(runs);
   for (const Common& entry : common) {
     out += numbers_row(
@@ -217,7 +222,7 @@ std::string runs_report(const std::vector<fs::path>& folders) {
   const std::vector<Run> runs = read_runs(folders);
   std::string title;
   for (const Run& run : runs) title += (title.empty() ? "" : ", ") + run.name;
-  return page(title, figures(runs) + "<h2>Curves</h2>\n" + charts(runs) +
+  return page(title, facts(runs) + "<h2>Curves</h2>\n" + charts(runs) +
                          "<h2>Held-out views that differ most</h2>\n" + held_out(runs) +
                          "<h2>Settings that differ</h2>\n" + differences(runs));
 }

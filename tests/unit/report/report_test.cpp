@@ -2,14 +2,18 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "report/bench_page.hpp"
+#include "report/figures.hpp"
 #include "report/html.hpp"
 #include "report/run_report.hpp"
 
@@ -133,6 +137,82 @@ TEST_CASE("members of another type count as missing") {
             R"({"images":[{"name":["a"],"picture":{},"psnr":"30","ssim":null},{"name":"b"}]})");
   CHECK(fault(run_report(run.path())) == "");
   CHECK(fault(runs_report({run.path(), run.path()})) == "");
+}
+
+TEST_CASE("pages stay below 3 MB whatever the photos are") {
+  // Noise, which JPEG cannot make small; the panels are red, green and blue.
+  Image large(3 * 600, 400, 3);
+  std::uint32_t state = 1;
+  for (int y = 0; y < large.height; ++y) {
+    for (int x = 0; x < large.width; ++x) {
+      state = state * 1664525u + 1013904223u;
+      large.at(x, y, x / 600) = static_cast<float>(state >> 8) / 16777216.0f;
+    }
+  }
+  constexpr std::size_t kMost = 3'000'000;
+  std::vector<std::unique_ptr<Run>> runs;
+  std::vector<fs::path> folders;
+  for (int i = 0; i < 12; ++i) {
+    runs.push_back(std::make_unique<Run>(std::to_string(i)));
+    folders.push_back(runs.back()->path());
+    const fs::path eval = folders.back() / "eval/iteration_200";
+    for (const char* name : {"good.png", "a<b>&.png"}) {
+      fs::remove(eval / name);
+      if (i == 0) {
+        write_image(eval / name, large);
+      } else {
+        fs::create_symlink(folders.front() / "eval/iteration_200/good.png", eval / name);
+      }
+    }
+  }
+  const std::string one = run_report(folders.front());
+  CHECK(one.size() < kMost);
+  CHECK(one.size() > 100'000);  // and not smaller than has to be
+  const std::string twelve = runs_report(folders);
+  CHECK(twelve.size() < kMost);
+  CHECK(twelve.size() > 500'000);
+}
+
+TEST_CASE("panels are averaged apart, and small ones are kept as they are") {
+  const Run run;
+  const fs::path file = run.path() / "wide.png";
+  Image wide(3 * 961, 300, 3);
+  for (int y = 0; y < wide.height; ++y) {
+    for (int x = 0; x < wide.width; ++x) {
+      wide.at(x, y, x / 961) = x % 2 == 0 ? 0.9f : 0.5f;
+    }
+  }
+  write_image(file, wide);
+  const report::Figure figure{file, "wide", "wide"};
+  const auto decoded = [&](const std::string& html) {
+    const std::string mark = "base64,";
+    const std::size_t at = html.find(mark) + mark.size();
+    const std::string text = html.substr(at, html.find('"', at) - at);
+    std::vector<unsigned char> bytes;
+    std::uint32_t word = 0;
+    int bits = 0;
+    for (const char c : text) {
+      const std::string letters =
+          "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+      if (c == '=') break;
+      word = word << 6 | static_cast<std::uint32_t>(letters.find(c));
+      bits += 6;
+      if (bits >= 8) bytes.push_back(static_cast<unsigned char>(word >> (bits -= 8) & 255u));
+    }
+    run.write("shown.jpg", std::string(bytes.begin(), bytes.end()));
+    return read_image(run.path() / "shown.jpg");
+  };
+  const Image shown = decoded(report::figures(std::span(&figure, 1)));
+  CHECK(shown.width == 3 * 480);
+  CHECK(shown.height == 150);
+  for (int panel = 0; panel < 3; ++panel) {
+    CHECK(shown.at(480 * panel + 240, 75, panel) == doctest::Approx(0.7).epsilon(0.03));
+    CHECK(shown.at(480 * panel + 240, 75, (panel + 1) % 3) < 0.05f);
+  }
+  write_image(file, Image(30, 20, 3, 0.5f));
+  const Image same = decoded(report::figures(std::span(&figure, 1)));
+  CHECK(same.width == 30);
+  CHECK(same.height == 20);
 }
 
 TEST_CASE("a picture is the file that its evaluation names, of that folder alone") {
