@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
+#include <exception>
 #include <filesystem>
 #include <memory>
 
@@ -112,6 +113,18 @@ std::unique_ptr<view::RunView> show(Context& context,
   return shown;
 }
 
+/// The model is what the run was for: no failure of its page fails it.
+void report(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "report.html";
+  try {
+    write_run_report(folder, file);
+    fmt::print("Report: {}\n", file.string());
+  } catch (const std::exception& error) {
+    spdlog::warn("the run is whole, but has no report: {}; try again by 'raysplats report {}'",
+                 error.what(), folder.string());
+  }
+}
+
 void print_results(const TrainSummary& summary, const std::string& folder) {
   fmt::print("{} iterations in {}: {} Gaussians in {}\n", summary.iterations,
              with_compiling(format_duration(summary.training_seconds) + " of training",
@@ -122,9 +135,7 @@ void print_results(const TrainSummary& summary, const std::string& folder) {
     fmt::print("PSNR {:.2f} dB, SSIM {:.4f} on {} held-out views\n", last.psnr, last.ssim,
                last.views);
   }
-  const std::filesystem::path report = std::filesystem::path(folder) / "report.html";
-  write_run_report(folder, report);
-  fmt::print("Report: {}\n", report.string());
+  report(folder);
 }
 
 /// As one of the ranks that share the run.

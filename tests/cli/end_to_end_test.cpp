@@ -164,3 +164,22 @@ TEST_CASE("a PLY that leaves its run shows what the run shows") {
                                    "16", "-o", folder / "foreign"});
   CHECK(foreign.err.find("peak order") != std::string::npos);
 }
+
+TEST_CASE("a report that cannot be written fails no run") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", run = folder / "run";
+  succeed({"generate", data, "--size", "24", "--train-views", "4", "--test-views", "1"});
+  const std::vector<std::string> train{"train", data, "-o", run, "--init-count", "200"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), train.begin(), train.end());
+    return more;
+  };
+  CHECK(succeed(with({"-n", "5"})).out.find("Report: ") != std::string::npos);
+  const fs::path report = fs::path(run) / "report.html";
+  fs::remove(report);
+  write_file(report / "in_the_way", "");
+  const Outcome outcome = succeed(with({"-n", "8", "--resume", "latest"}));
+  CHECK(outcome.out.find("Report: ") == std::string::npos);
+  CHECK(outcome.err.find("the run is whole, but has no report") != std::string::npos);
+  CHECK(outcome.err.find("raysplats report " + run) != std::string::npos);
+}
