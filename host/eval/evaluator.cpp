@@ -12,6 +12,7 @@
 
 #include "base/atomic_file.hpp"
 #include "comm/communicator.hpp"
+#include "core/sharpness.hpp"
 #include "eval/error_map.hpp"
 #include "eval/frame_writer.hpp"
 #include "eval/metrics.hpp"
@@ -63,7 +64,7 @@ Comparison compare(const Image& traced,
 struct MeasuredView {
   std::size_t index;  // among those that are evaluated
   bool compared, has_all, has_lpips;
-  double psnr, psnr_corrected, psnr_all, ssim, lpips;
+  double psnr, psnr_corrected, psnr_all, ssim, lpips, sharpness;
 };
 
 MeasuredView measure(std::size_t index, const Comparison& pair, Lpips* lpips) {
@@ -79,6 +80,7 @@ MeasuredView measure(std::size_t index, const Comparison& pair, Lpips* lpips) {
   out.ssim = ssim(pair.render, pair.photo);
   out.has_lpips = lpips != nullptr;
   if (out.has_lpips) out.lpips = lpips->distance(pair.render, pair.photo);
+  out.sharpness = sharpness(pair.photo);
   return out;
 }
 
@@ -89,6 +91,7 @@ EvaluationMetrics metrics_of(const MeasuredView& view) {
   out.psnr_corrected = view.psnr_corrected;
   if (view.has_all) out.psnr_all = view.psnr_all;
   if (view.has_lpips) out.lpips = view.lpips;
+  out.sharpness = view.sharpness;
   return out;
 }
 
@@ -127,7 +130,11 @@ std::set<std::size_t> telling(const std::vector<MeasuredView>& all, std::size_t 
 
 nlohmann::json to_json(const EvaluationMetrics& metrics) {
   nlohmann::json json;
-  if (!metrics.name.empty()) json["name"] = metrics.name;
+  if (!metrics.name.empty()) {
+    json["name"] = metrics.name;
+    json["center"] = metrics.center;
+    json["sharpness"] = metrics.sharpness;
+  }
   json["psnr"] = metrics.psnr;
   json["ssim"] = metrics.ssim;
   json["psnr_corrected"] = metrics.psnr_corrected;
@@ -266,8 +273,10 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   EvaluationReport report;
   for (const MeasuredView& view : all) {
     EvaluationMetrics metrics = metrics_of(view);
-    const std::string& view_name = dataset.views[views[view.index]].camera.name;
-    metrics.name = view_name.empty() ? names[view.index] : view_name;
+    const Camera& camera = dataset.views[views[view.index]].camera;
+    metrics.name = camera.name.empty() ? names[view.index] : camera.name;
+    const glm::dvec3 center = camera.center();
+    metrics.center = {center.x, center.y, center.z};
     if (shown.contains(view.index)) metrics.picture = picture_of(view.index);
     if (view.compared) {
       report.images.push_back(metrics);

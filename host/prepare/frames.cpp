@@ -10,6 +10,7 @@
 
 #include "base/number_text.hpp"
 #include "base/program.hpp"
+#include "core/sharpness.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -27,13 +28,6 @@ bool is_photo(const fs::path& path) {
   constexpr std::array<const char*, 7> kKnown{".jpg",  ".jpeg", ".png", ".tif",
                                               ".tiff", ".bmp",  ".webp"};
   return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end();
-}
-
-double brightness(const Image& image, int x, int y) {
-  double sum = 0.0;
-  const int colors = std::min(image.channels, 3);
-  for (int c = 0; c < colors; ++c) sum += static_cast<double>(image.at(x, y, c));
-  return sum / colors;
 }
 
 double seconds_of(const fs::path& video, const fs::path& log, const std::function<bool()>& stop) {
@@ -61,19 +55,6 @@ std::vector<std::string> photos_in(const fs::path& folder) {
   }
   std::sort(names.begin(), names.end());
   return names;
-}
-
-double sharpness(const Image& image) {
-  double sum = 0.0;
-  for (int y = 1; y + 1 < image.height; ++y) {
-    for (int x = 1; x + 1 < image.width; ++x) {
-      const double laplacian = brightness(image, x - 1, y) + brightness(image, x + 1, y) +
-                               brightness(image, x, y - 1) + brightness(image, x, y + 1) -
-                               4.0 * brightness(image, x, y);
-      sum += laplacian * laplacian;
-    }
-  }
-  return sum / std::max<double>(1.0, static_cast<double>(image.pixels()));
 }
 
 void copy_photos(const fs::path& from,

@@ -8,16 +8,10 @@
 #include <string_view>
 #include <vector>
 
-#include "raysplats/image.hpp"
-
 namespace raysplats {
 
 /// Names of the files in a folder that are photos by their extension, sorted.
 std::vector<std::string> photos_in(const std::filesystem::path& folder);
-
-/// How sharp a picture is, compared with others of the same thing: the mean square of the Laplacian
-/// of its brightness (Pech-Pacheco et al. 2000).
-double sharpness(const Image& image);
 
 /// Copies photos to a new folder.
 void copy_photos(const std::filesystem::path& from,

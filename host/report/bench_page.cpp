@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bench/format.hpp"
+#include "report/chart.hpp"
 #include "report/html.hpp"
 
 namespace raysplats {
@@ -33,15 +34,6 @@ const std::vector<Group>& groups() {
 }
 
 std::string cell(const std::string& text) { return "<td>" + escaped(text) + "</td>"; }
-
-/// The share of a limit as a bar and a number.
-std::string share_cell(double share) {
-  if (!(share > 0)) return "<td></td>";
-  return fmt::format(
-      "<td><svg class=\"bar\" viewBox=\"0 0 100 8\" role=\"img\" aria-label=\"{0:.0f} %\"><rect "
-      "width=\"{1:.1f}\" height=\"8\"/></svg> {0:.1f} %</td>",
-      100 * share, std::min(100.0, 100 * share));
-}
 
 std::string rows_of(const BenchReport& report, const std::string& scene, std::size_t size) {
   std::string out =

@@ -4,37 +4,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 namespace raysplats::report {
 namespace {
-
-constexpr double kWidth = 460.0;
-constexpr double kHeight = 230.0;
-constexpr double kLeft = 52.0;
-constexpr double kRight = 12.0;
-constexpr double kTop = 30.0;
-constexpr double kBottom = 36.0;
-constexpr std::size_t kColumns = 400;  ///< of a curve; each keeps its extremes
 
 constexpr const char* kStyle = R"(
 :root{color-scheme:light dark;--text:#1d1d1b;--line:#d5d5d0;--warn:#9c3a1a;--c0:#1d5fa8;--c1:#c2561b;--c2:#2c7d3c;--c3:#8a3fa0;--c4:#8a6d14;--c5:#b02358}
 @media (prefers-color-scheme:dark){:root{--text:#e6e6e3;--line:#3c3e42;--warn:#f0906a;--c0:#7db4ee;--c1:#f0a15e;--c2:#7fd08f;--c3:#cf93e6;--c4:#d9bd5c;--c5:#f288ab}body{background:#1c1d1f}}
 body{max-width:1000px;margin:24px auto;padding:0 16px;color:var(--text);font:15px/1.5 system-ui,sans-serif}
 h1{font-size:22px}h2{font-size:17px;margin-top:28px;border-top:1px solid var(--line);padding-top:10px}
-.warn{color:var(--warn)}.charts{display:grid;grid-template-columns:repeat(auto-fit,minmax(380px,1fr));gap:12px}
+.warn{color:var(--warn)}.charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(380px,1fr));gap:12px}
 svg{width:100%;height:auto}svg text{fill:currentColor;font-size:11px}svg .title{font-size:13px;font-weight:600}
 svg line{stroke:var(--line)}polyline{fill:none;stroke-width:1.6}
 polyline.c0{stroke:var(--c0)}circle.c0,svg text.c0{fill:var(--c0)}th.c0{color:var(--c0)}polyline.c1{stroke:var(--c1)}circle.c1,svg text.c1{fill:var(--c1)}th.c1{color:var(--c1)}
 polyline.c2{stroke:var(--c2)}circle.c2,svg text.c2{fill:var(--c2)}th.c2{color:var(--c2)}polyline.c3{stroke:var(--c3)}circle.c3,svg text.c3{fill:var(--c3)}th.c3{color:var(--c3)}
 polyline.c4{stroke:var(--c4)}circle.c4,svg text.c4{fill:var(--c4)}th.c4{color:var(--c4)}polyline.c5{stroke:var(--c5)}circle.c5,svg text.c5{fill:var(--c5)}th.c5{color:var(--c5)}
 table{border-collapse:collapse}td,th{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid var(--line)}
-svg.bar{width:90px}svg.bar rect{fill:var(--c0)}
-figure{margin:14px 0}img{max-width:100%;height:auto}pre{white-space:pre-wrap;overflow-wrap:anywhere}
+svg.bar{width:90px}svg.bar rect,rect.c0{fill:var(--c0)}circle.plain{fill:currentColor;opacity:.55}svg line.look{stroke:currentColor;opacity:.4}
+figure{margin:14px 0}img{max-width:100%;min-width:min(100%,640px);height:auto}pre{white-space:pre-wrap;overflow-wrap:anywhere}
 )";
-
-using Points = std::vector<std::pair<double, double>>;
 
 /// Bytes of the character that starts here, 0 when it is no UTF-8.
 std::size_t character(std::string_view text) {
@@ -57,63 +45,6 @@ std::size_t character(std::string_view text) {
     return 0;
   return size;
 }
-
-Points thinned(const Points& points) {
-  if (points.size() <= 2 * kColumns) return points;
-  Points out;
-  for (std::size_t column = 0; column < kColumns; ++column) {
-    const auto begin =
-        points.begin() + static_cast<std::ptrdiff_t>(column * points.size() / kColumns);
-    const auto end =
-        points.begin() + static_cast<std::ptrdiff_t>((column + 1) * points.size() / kColumns);
-    auto [low, high] = std::minmax_element(
-        begin, end, [](const auto& a, const auto& b) { return a.second < b.second; });
-    if (high < low) std::swap(low, high);
-    out.push_back(*low);
-    if (high != low) out.push_back(*high);
-  }
-  return out;
-}
-
-/// Round numbers between low and high.
-std::vector<double> ticks(double low, double high) {
-  constexpr double kWanted = 4.0;
-  const double raw = (high - low) / kWanted;
-  const double power = std::pow(10.0, std::floor(std::log10(raw)));
-  const double step = power * (raw / power > 5.0   ? 10.0
-                               : raw / power > 2.0 ? 5.0
-                               : raw / power > 1.0 ? 2.0
-                                                   : 1.0);
-  std::vector<double> out;
-  for (double at = std::ceil(low / step) * step; at <= high + 1e-9 * step && out.size() < 20;
-       at += step)
-    out.push_back(std::abs(at) < 1e-9 * step ? 0.0 : at);
-  return out;
-}
-
-std::string short_number(double value) {
-  const double size = std::abs(value);
-  if (size >= 1e6) return fmt::format("{:.3g}M", value / 1e6);
-  if (size >= 1e4) return fmt::format("{:.3g}k", value / 1e3);
-  return fmt::format("{:.4g}", value);
-}
-
-struct Range {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -low;
-  void add(double value) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  void widen() {
-    if (!(high > low)) {
-      const double margin = std::max(0.5, 0.05 * std::abs(low));
-      low -= margin;
-      high += margin;
-    }
-  }
-  double share(double value) const { return (value - low) / (high - low); }
-};
 
 }  // namespace
 
@@ -163,63 +94,12 @@ std::string data_url(std::string_view type, std::span<const unsigned char> bytes
   return out;
 }
 
-std::string chart(std::string_view title, std::string_view x_label, std::span<const Curve> curves) {
-  Range x;
-  Range y;
-  std::vector<Points> drawn;
-  for (const Curve& curve : curves) {
-    Points finite;
-    std::copy_if(curve.points.begin(), curve.points.end(), std::back_inserter(finite),
-                 [](const auto& p) { return std::isfinite(p.first) && std::isfinite(p.second); });
-    for (const auto& [px, py] : finite) {
-      x.add(px);
-      y.add(py);
-    }
-    drawn.push_back(thinned(finite));
-  }
-  if (!(x.high >= x.low)) return "";
-  x.widen();
-  y.widen();
-  const auto place_x = [&](double value) {
-    return kLeft + x.share(value) * (kWidth - kLeft - kRight);
-  };
-  const auto place_y = [&](double value) {
-    return kHeight - kBottom - y.share(value) * (kHeight - kTop - kBottom);
-  };
-  std::string out = fmt::format(
-      "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\"><text x=\"{}\" y=\"16\" "
-      "class=\"title\">{}</text>",
-      kWidth, kHeight, escaped(title), kLeft, escaped(title));
-  for (const double at : ticks(y.low, y.high)) {
-    out += fmt::format(
-        "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/><text x=\"{3}\" y=\"{4:.1f}\" "
-        "text-anchor=\"end\">{5}</text>",
-        kLeft, kWidth - kRight, place_y(at), kLeft - 5, place_y(at) + 4, short_number(at));
-  }
-  for (const double at : ticks(x.low, x.high)) {
-    out += fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{}</text>", place_x(at),
-                       kHeight - kBottom + 15, short_number(at));
-  }
-  out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>", kWidth - kRight,
-                     kHeight - 5, escaped(x_label));
-  for (std::size_t i = 0; i < drawn.size(); ++i) {
-    std::string places;
-    for (const auto& [px, py] : drawn[i])
-      places += fmt::format("{:.1f},{:.1f} ", place_x(px), place_y(py));
-    out += fmt::format("<polyline class=\"c{}\" points=\"{}\"/>", i % kColors, places);
-    if (drawn[i].size() <= 30) {
-      for (const auto& [px, py] : drawn[i])
-        out += fmt::format("<circle class=\"c{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.5\"/>",
-                           i % kColors, place_x(px), place_y(py));
-    }
-    if (drawn.size() > 1) {
-      out += fmt::format("<text class=\"c{}\" x=\"{}\" y=\"{}\">{}</text>", i % kColors,
-                         kLeft + std::min(110.0, 300.0 / static_cast<double>(drawn.size())) *
-                                     static_cast<double>(i),
-                         kHeight - 5, escaped(curves[i].name));
-    }
-  }
-  return out + "</svg>\n";
+std::string share_cell(double share) {
+  if (!(share > 0)) return "<td></td>";
+  return fmt::format(
+      "<td><svg class=\"bar\" viewBox=\"0 0 100 8\" role=\"img\" aria-label=\"{0:.0f} %\"><rect "
+      "width=\"{1:.1f}\" height=\"8\"/></svg> {0:.1f} %</td>",
+      100 * share, std::min(100.0, 100 * share));
 }
 
 std::string page(std::string_view title, std::string_view body) {

@@ -5,8 +5,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 namespace raysplats::report {
 
@@ -17,11 +15,8 @@ std::string escaped(std::string_view text);
 /// Bytes as a data: address.
 std::string data_url(std::string_view type, std::span<const unsigned char> bytes);
 
-/// A line of a chart.
-struct Curve {
-  std::string name;
-  std::vector<std::pair<double, double>> points;  ///< by rising x; others than finite are left out
-};
+/// A cell of a table: a share, 0 .. 1, as a bar and a number; empty for none.
+std::string share_cell(double share);
 
 /// A whole page: well-formed XML, no scripts, nothing from elsewhere, light and dark. `title` is
 /// escaped here, `body` has been.
@@ -29,9 +24,5 @@ std::string page(std::string_view title, std::string_view body);
 
 /// Colours of curves and of headings, in classes c0, c1, ...; further ones begin again.
 constexpr std::size_t kColors = 6;
-
-/// Curves as an SVG with axes, a grid and a legend, named for readers that do not see it. Curves of
-/// many points keep the least and greatest of each column. Empty without points.
-std::string chart(std::string_view title, std::string_view x_label, std::span<const Curve> curves);
 
 }  // namespace raysplats::report

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "report/chart.hpp"
 #include "report/figures.hpp"
-#include "report/html.hpp"
 
 /// What the files of a training run say, for pages about runs. Members of a run's JSON that are
 /// missing or of another type count as 0 or as nothing.

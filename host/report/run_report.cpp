@@ -4,14 +4,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/atomic_file.hpp"
+#include "base/number_text.hpp"
+#include "io/json_file.hpp"
+#include "raysplats/io.hpp"
+#include "report/camera_map.hpp"
+#include "report/chart.hpp"
 #include "report/html.hpp"
 #include "report/run_files.hpp"
+#include "report/run_warnings.hpp"
 #include "train/train_config.hpp"
 
 namespace raysplats {
@@ -21,49 +29,12 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using namespace report;
 
-constexpr double kCappedShare = 1e-3;  ///< of rays, from which the cap on hits is worth a warning
-constexpr double kBelowBest = 0.1;     ///< dB
-constexpr double kNothingLearned = 0.1;
-
 std::string row(const std::string& name, const std::string& value) {
   return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", escaped(name), escaped(value));
 }
 
-std::vector<std::string> warnings_of(const Json& metrics, const std::vector<Json>& evaluations) {
-  std::vector<std::string> out;
-  const auto complete = metrics.find("complete");
-  if (complete == metrics.end() || !complete->is_boolean() || !complete->get<bool>()) {
-    out.push_back(fmt::format("The run is not over: {:.0f} of {:.0f} iterations",
-                              number(metrics, "iteration"), number(metrics, "iterations")));
-  }
-  const double rays = number(metrics, "traced_rays");
-  const double capped = number(metrics, "capped_rays");
-  if (capped > kCappedShare * rays) {
-    out.push_back(fmt::format("{:.2f} % of the rays stopped at --max-hits: raise it",
-                              100.0 * capped / std::max(rays, 1.0)));
-  }
-  if (number(metrics, "bad_steps") > 0 || number(metrics, "skipped_updates") > 0) {
-    out.push_back(fmt::format("{:.0f} steps were not finite, {:.0f} updates were left out",
-                              number(metrics, "bad_steps"), number(metrics, "skipped_updates")));
-  }
-  const auto rise = metrics.find("psnr_rise");
-  if (rise != metrics.end() && rise->is_number() && rise->get<double>() < kNothingLearned)
-    out.emplace_back("No view became better by 0.1 dB: poses or photos may be wrong");
-  if (evaluations.size() > 1) {
-    const auto best = std::max_element(
-        evaluations.begin(), evaluations.end(),
-        [](const Json& a, const Json& b) { return number(a, "psnr") < number(b, "psnr"); });
-    const double below = number(*best, "psnr") - number(evaluations.back(), "psnr");
-    if (below > kBelowBest) {
-      out.push_back(fmt::format("The run ends {:.2f} dB below its best, at iteration {:.0f}", below,
-                                number(*best, "iteration")));
-    }
-  }
-  return out;
-}
-
-std::string charts(const fs::path& run, const std::vector<Json>& evaluations) {
-  auto columns = columns_of(run / "metrics.csv");
+std::string charts(std::map<std::string, std::vector<double>> columns,
+                   const std::vector<Json>& evaluations) {
   const Curve psnr[] = {curve("training view", columns, "iteration", "psnr"),
                         evaluated("held-out views", evaluations, "iteration", "psnr")};
   const Curve timed[] = {curve("training view", columns, "seconds", "psnr"),
@@ -79,10 +50,11 @@ std::string charts(const fs::path& run, const std::vector<Json>& evaluations) {
          chart("Iterations a second", "iterations", speed) + "</div>\n";
 }
 
-std::string held_out(const fs::path& run, const std::vector<Json>& evaluations) {
+std::string held_out(const fs::path& run,
+                     const std::vector<Json>& evaluations,
+                     std::vector<Json> views) {
   if (evaluations.empty()) return "<p>The run has no held-out views.</p>\n";
   const fs::path folder = pictures_of(run, evaluations);
-  std::vector<Json> views = views_of(run, evaluations);
   if (views.empty()) return "";
   std::stable_sort(views.begin(), views.end(), [](const Json& a, const Json& b) {
     return number(a, "psnr") < number(b, "psnr");
@@ -99,6 +71,105 @@ std::string held_out(const fs::path& run, const std::vector<Json>& evaluations) 
                        escaped(text(view, "name")), number(view, "psnr"), number(view, "ssim"));
   }
   return out + "</table></details>\n";
+}
+
+/// A heading and what stands below it; nothing without that.
+std::string section(const char* heading, const std::string& content) {
+  return content.empty() ? "" : fmt::format("<h2>{}</h2>\n{}", heading, content);
+}
+
+std::string in_grid(const std::string& charts) {
+  return charts.empty() ? "" : "<div class=\"charts\">\n" + charts + "</div>\n";
+}
+
+/// The model that the run has last written.
+fs::path newest_model(const fs::path& run) {
+  constexpr std::string_view kPrefix = "iteration_";
+  fs::path out;
+  double newest = -1;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(run / "point_cloud", error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(kPrefix)) continue;
+    const double iteration = parse_real(name.substr(kPrefix.size())).value_or(-1);
+    const fs::path file = entry.path() / "point_cloud.ply";
+    if (iteration <= newest || !fs::is_regular_file(file, error)) continue;
+    newest = iteration;
+    out = file;
+  }
+  return out;
+}
+
+std::string model_histograms(const fs::path& run) {
+  const fs::path file = newest_model(run);
+  if (file.empty()) return "";
+  const Gaussians model = read_ply(file);
+  std::vector<double> opacities, sizes;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const float* scales = model.log_scales.data() + 3 * i;
+    opacities.push_back(1.0 / (1.0 + std::exp(-static_cast<double>(model.opacities[i]))));
+    sizes.push_back(static_cast<double>(*std::max_element(scales, scales + 3)) / std::log(10.0));
+  }
+  if (sizes.empty()) return "";
+  std::sort(sizes.begin(), sizes.end());
+  // A few strays are not to squeeze all others into one bar.
+  constexpr double kStrays = 1e-3;
+  const auto strays = static_cast<std::size_t>(kStrays * static_cast<double>(sizes.size()));
+  const double least = sizes[strays], most = std::max(sizes[sizes.size() - 1 - strays], least + 1);
+  return in_grid(
+      histogram("Opacity", "opacity", opacities, 0, 1) +
+      histogram("Size: log10 of the longest axis", "units of the data set", sizes, least, most));
+}
+
+/// Gains of the colours of all training photos, in the order of their names.
+std::string exposures(const fs::path& run) {
+  const fs::path file = run / "exposures.json";
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return "";
+  // In the order in which their names fit the colours of curves: blue, orange, green.
+  constexpr std::size_t kChannels[] = {2, 0, 1};
+  Curve gains[] = {{"blue", {}}, {"red", {}}, {"green", {}}};
+  double photo = 0;
+  const Json json = io::read_json_object(file);
+  for (const auto& [name, rows] : json.items()) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t c = kChannels[i];
+      const bool sound = rows.is_array() && rows.size() == 3 && rows[c].is_array() &&
+                         rows[c].size() == 4 && rows[c][c].is_number();
+      if (sound) gains[i].points.emplace_back(photo, rows[c][c].get<double>());
+    }
+    ++photo;
+  }
+  return in_grid(chart("Gain of the colours", "photos by name", gains));
+}
+
+std::string kernels(const Json& metrics) {
+  constexpr double kLeastShare = 0.01;
+  std::string rows;
+  for (const Json& kernel : objects(metrics, "kernels")) {
+    if (number(kernel, "share") < kLeastShare) continue;
+    rows += fmt::format("<tr><th>{}</th><td>{:.0f}</td><td>{:.1f}</td>{}</tr>\n",
+                        escaped(text(kernel, "name")), number(kernel, "calls"),
+                        number(kernel, "ms"), share_cell(number(kernel, "share")));
+  }
+  if (rows.empty()) return "";
+  return "<table>\n<tr><th>kernel</th><th>launches</th><th>ms</th><th>share</th></tr>\n" + rows +
+         "</table>\n";
+}
+
+/// What somebody needs to make the run again, as far as its files say it.
+std::string origin(const Json& metrics) {
+  std::string rows;
+  const auto named = [&](const char* name, const char* key) {
+    const std::string value = text(metrics, key);
+    if (!value.empty()) rows += row(name, value);
+  };
+  named("Device", "device");
+  named("Driver", "driver");
+  named("RaySplats-CL", "version");
+  named("Fingerprint of the data set", "data");
+  if (metrics.contains("seed")) rows += row("Seed", fmt::format("{:.0f}", number(metrics, "seed")));
+  return rows;
 }
 
 std::string configuration(const fs::path& run) {
@@ -120,7 +191,8 @@ std::string configuration(const fs::path& run) {
 std::string run_report(const fs::path& run) {
   const Json metrics = metrics_of(run);
   const std::vector<Json> evaluations = objects(metrics, "evaluations");
-  const std::string name = run_name(run);
+  const std::vector<Json> views = views_of(run, evaluations);
+  const auto columns = columns_of(run / "metrics.csv");
   std::string facts;
   if (!evaluations.empty()) {
     const Json& last = evaluations.back();
@@ -135,15 +207,19 @@ std::string run_report(const fs::path& run) {
                                        number(metrics, "kernel_build_seconds")));
   facts += row("Device memory",
                fmt::format("{:.0f} MiB at most", number(metrics, "peak_device_bytes") / 1048576.0));
-  facts += row("Device", text(metrics, "device"));
+  facts += origin(metrics);
   std::string warnings;
-  for (const std::string& each : warnings_of(metrics, evaluations))
+  for (const std::string& each : warnings_of(metrics, columns, views))
     warnings += fmt::format("<p class=\"warn\">{}.</p>\n", escaped(each));
-  return report::page(name, warnings + "<table>\n" + facts + "</table>\n<h2>Curves</h2>\n" +
-                                charts(run, evaluations) + "<h2>Held-out views</h2>\n" +
-                                held_out(run, evaluations) +
-                                "<h2>Settings that differ from the defaults</h2>\n" +
-                                configuration(run));
+  return report::page(run_name(run),
+                      warnings + "<table>\n" + facts + "</table>\n" +
+                          section("Curves", charts(columns, evaluations)) +
+                          section("Held-out views", held_out(run, evaluations, views)) +
+                          section("Cameras", in_grid(camera_map(run, views))) +
+                          section("Model", model_histograms(run)) +
+                          section("Exposure", exposures(run)) +
+                          section("Kernels", kernels(metrics)) +
+                          section("Settings that differ from the defaults", configuration(run)));
 }
 
 void write_run_report(const fs::path& run, const fs::path& file) {

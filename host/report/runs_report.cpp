@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "report/chart.hpp"
 #include "report/html.hpp"
 #include "report/run_files.hpp"
 #include "report/run_report.hpp"

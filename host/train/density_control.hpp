@@ -25,6 +25,7 @@ class DensityControl {
 
   /// The count that max-gaussians = 0 stands for.
   void set_limit(std::size_t limit) { limit_ = limit; }
+  std::size_t limit() const { return limit_; }
 
   /// Adds the statistics of one view, or of several whose gradients are added; enqueues without
   /// waiting. A `guard` whose first word is not 0 keeps them as they are.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "device/profiler.hpp"
 #include "eval/metrics.hpp"
 #include "raysplats/evaluation.hpp"
 #include "train/step_options.hpp"
@@ -14,6 +15,16 @@ namespace raysplats {
 namespace {
 
 constexpr double kManyCapped = 1e-3;  // share of rays at which the cap on hits gets a warning
+
+// With --profile: what every kernel took so far.
+nlohmann::json kernels_of(Context& context) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const Profiler::Row& row : context.profiler().rows()) {
+    out.push_back(
+        {{"name", row.kernel}, {"calls", row.calls}, {"ms", row.total_ms}, {"share", row.share}});
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -124,10 +135,15 @@ void Trainer::Impl::save_model() {
 void Trainer::Impl::write_metrics(bool complete) {
   if (!ranks.leads()) return;
   const StepGuard::Counts counts = guard.counts();
-  run.write_metrics({{"complete", complete},
+  const DeviceInfo& device = context.device();
+  run.write_metrics({{"version", RAYSPLATS_VERSION},
+                     {"seed", options.seed},
+                     {"data", fingerprint},
+                     {"complete", complete},
                      {"iteration", iteration},
                      {"iterations", last_iteration(options)},
                      {"gaussians", gaussians.count},
+                     {"most_gaussians", density.limit()},
                      {"loss", last_loss},
                      {"training_seconds", training.seconds()},
                      {"evaluation_seconds", evaluating.seconds()},
@@ -138,7 +154,9 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"skipped_updates", adam.skipped()},
                      {"bad_steps", counts.bad_steps},
                      {"peak_device_bytes", context.peak_allocated_bytes()},
-                     {"device", context.device().name}});
+                     {"device", device.name},
+                     {"driver", fmt::format("{}, {}", device.platform, device.driver_version)},
+                     {"kernels", kernels_of(context)}});
 }
 
 }  // namespace raysplats

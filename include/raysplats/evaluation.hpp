@@ -28,6 +28,10 @@ struct EvaluationMetrics {
   std::optional<double> psnr_all;  ///< over all pixels, when some are masked out
   std::optional<double> lpips;     ///< when a network was given
   std::string picture;             ///< its file in the output folder; empty when none was written
+  std::array<double, 3> center{};  ///< of the camera, from Dataset::origin
+  /// Of the photo, to compare with others of the scene: the mean square of the Laplacian of its
+  /// brightness.
+  double sharpness = 0;
 };
 
 struct EvaluationReport {
@@ -37,7 +41,8 @@ struct EvaluationReport {
   /// One line per image and the mean, aligned.
   std::string table() const;
   /// {"psnr", "ssim", "psnr_corrected", "psnr_all" (if some pixels are masked out), "lpips" (if
-  /// measured), "images": [{"name", "psnr", "ssim", ..., "picture" (if written)}]}.
+  /// measured), "images": [{"name", "psnr", "ssim", ..., "center", "sharpness",
+  /// "picture" (if written)}]}.
   std::string json() const;
 };
 

@@ -218,14 +218,20 @@ void make_runs(const fs::path& root) {
     runs.add(name, std::string(1, choice) + text);
   };
   add("metrics", 0, R"({"complete":true,"iteration":2,"iterations":2,"gaussians":9,"device":"cpu",
-"traced_rays":9,"capped_rays":1,"evaluations":[{"iteration":1,"psnr":21.5,"ssim":0.8,"views":1},
+"traced_rays":9,"capped_rays":1,"most_gaussians":9,"seed":7,"driver":"<script>",
+"kernels":[{"name":"<script>","calls":3,"ms":1.5,"share":0.9},{"name":7}],"evaluations":[{"iteration":1,"psnr":21.5,"ssim":0.8,"views":1},
 {"iteration":2,"training_seconds":3,"psnr":20,"ssim":0.75,"views":1}]})");
   add("other_types", 0, R"({"complete":"<script>","iteration":[],"gaussians":"1","device":{},
 "psnr_rise":true,"evaluations":[1,{"iteration":"2","psnr":null}]})");
   add("views", 1,
-      R"({"images":[{"name":"a<script>.png","psnr":30,"ssim":0.9,"picture":"a.png"}]})");
+      R"({"images":[{"name":"a<script>.png","psnr":30,"ssim":0.9,"picture":"a.png",
+"center":[1,2,3],"sharpness":0.1}]})");
   add("views_of_other_types", 1, R"({"images":[{"name":7,"picture":["a.png"],"psnr":"30"},[]]})");
   add("rows", 2, "iteration,seconds,loss,psnr,gaussians,it_per_s\n10,1.5,0.5,12,100,7\n20,cut");
+  add("cameras", 4,
+      R"([{"img_name":"<script>","position":[1,2,3],"rotation":[[1,0,0],[0,1,0],[0,0,1]]},
+{"position":[1e300,0,0]},{"position":[1,2],"rotation":[1,[],"x"]},7])");
+  add("exposures", 5, R"({"<script>":[[1,0,0,0],[0,1.1,0,0],[0,0,0.9,0]],"b":[1,[2],{}],"c":7})");
   add("settings", 3, "# <script>\niterations = 200\nname = \"<script>\"\n");
 }
 

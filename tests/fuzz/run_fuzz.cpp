@@ -14,8 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<const char*, 4> kFiles{"metrics.json", "eval/iteration_1/metrics.json",
-                                            "metrics.csv", "config.toml"};
+constexpr std::array<const char*, 6> kFiles{"metrics.json", "eval/iteration_1/metrics.json",
+                                            "metrics.csv",  "config.toml",
+                                            "cameras.json", "exposures.json"};
 
 void parse(std::span<const std::uint8_t> input) {
   const fs::path run = scratch().path() / "run";

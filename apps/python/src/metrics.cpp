@@ -59,7 +59,10 @@ void bind_report(nb::module_& module) {
       .def_ro("psnr_all", &EvaluationMetrics::psnr_all,
               "Over all pixels, when some are masked out.")
       .def_ro("picture", &EvaluationMetrics::picture,
-              "Its file in the output folder; empty when none was written.");
+              "Its file in the output folder; empty when none was written.")
+      .def_ro("center", &EvaluationMetrics::center, "Of the camera.")
+      .def_ro("sharpness", &EvaluationMetrics::sharpness,
+              "Of the photo, to compare with others of the scene.");
   nb::class_<EvaluationReport>(module, "EvaluationReport")
       .def_ro("mean", &EvaluationReport::mean)
       .def_ro("images", &EvaluationReport::images)

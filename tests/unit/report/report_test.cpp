@@ -13,6 +13,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "report/bench_page.hpp"
+#include "report/chart.hpp"
 #include "report/figures.hpp"
 #include "report/html.hpp"
 #include "report/run_report.hpp"
@@ -226,6 +227,67 @@ TEST_CASE("a picture is the file that its evaluation names, of that folder alone
   run.write("eval/iteration_200/metrics.json",
             R"({"images":[{"name":"0001.png","psnr":30,"picture":"../../outside.png"}]})");
   CHECK(!has(run_report(run.path()), "data:image"));
+}
+
+TEST_CASE("views that stand out, a full model and blurred photos are warned of") {
+  const Run run;
+  CHECK(!has(run_report(run.path()), "far worse"));  // three views tell nothing
+  std::string images;
+  for (int i = 0; i < 12; ++i) {
+    images += i == 0 ? "" : ",";
+    images += R"({"name":")" + std::to_string(i) + R"(_.png","psnr":)" +
+              std::to_string(i == 3 ? 12 : 20 + i % 5) + R"(,"sharpness":)" +
+              std::to_string(i == 7 ? 0.001 : 0.05 + 0.01 * (i % 3)) + "}";
+  }
+  run.write("eval/iteration_200/metrics.json", R"({"images":[)" + images + "]}");
+  run.write("metrics.json", R"({"complete":true,"gaussians":140,"most_gaussians":141,
+    "evaluations":[{"iteration":200,"psnr":20}]})");
+  const std::string page = run_report(run.path());
+  CHECK(has(page, "whose pose or photo may be wrong: 3_.png."));
+  CHECK(has(page, "less sharp than the others: 7_.png."));
+  CHECK(has(page, "came to its limit of 141"));
+}
+
+TEST_CASE("a report shows model, cameras, exposure, kernels and where it all comes from") {
+  const Run run;
+  const std::string bare = run_report(run.path());
+  for (const char* heading : {"<h2>Model", "<h2>Cameras", "<h2>Exposure", "<h2>Kernels"})
+    CHECK(!has(bare, heading));
+  run.write("metrics.json",
+            R"({"complete":true,"seed":42,"driver":"<d>","data":"00ff","version":"9.8",
+    "kernels":[{"name":"trace<x>","calls":12,"ms":340,"share":0.75}],
+    "evaluations":[{"iteration":200,"psnr":20}]})");
+  run.write("cameras.json", R"([{"img_name":"a","position":[0,0,0],
+    "rotation":[[1,0,0],[0,1,0],[0,0,1]]},{"position":[4,0,0],"rotation":[[1,0,0],[0,1,0],[0,0,1]]},
+    {"position":"none"}])");
+  run.write("eval/iteration_200/metrics.json",
+            R"({"images":[{"name":"<low>","psnr":10,"center":[1,0,0]},
+              {"name":"high","psnr":30,"center":[2,-2,0]}]})");
+  run.write("exposures.json", R"({"a":[[1.5,0,0,0],[0,1,0,0],[0,0,1,0]],"b":[],
+    "c":[[0.5,0,0,0],[0,1,0,0],[0,0,1,0]]})");
+  Gaussians model;
+  model.resize(40);
+  for (std::size_t i = 0; i < 10; ++i) model.opacities[i] = 9;
+  for (const char* folder : {"iteration_100", "iteration_9", "iteration_x"})
+    fs::create_directories(run.path() / "point_cloud" / folder);
+  write_ply(run.path() / "point_cloud/iteration_100/point_cloud.ply", model, {});
+  const std::string page = run_report(run.path());
+  CHECK(fault(page) == "");
+  CHECK(has(page, "<th>Seed</th><td>42</td>"));
+  CHECK(has(page, "<td>&lt;d&gt;</td>"));
+  CHECK(has(page, "<td>00ff</td>"));
+  CHECK(has(page, "<th>trace&lt;x&gt;</th><td>12</td><td>340.0</td>"));
+  CHECK(has(page, "75.0 %"));
+  CHECK(has(page, "held out: orange 10.00 dB to blue 30.00 dB"));
+  CHECK(has(page, "<title>&lt;low&gt;, 10.00 dB</title>"));
+  CHECK(has(page, "fill=\"rgb(214,96,30)\""));
+  // 4 units across fill the width between margins; the view 2 units up stands on top of the side.
+  CHECK(has(page, "cx=\"34.0\""));
+  CHECK(has(page, "cx=\"426.0\""));
+  CHECK(has(page, "cx=\"230.0\" cy=\"52.0\" r=\"5\" fill=\"rgb(60,120,215)\""));
+  CHECK(has(page, "aria-label=\"Gain of the colours\""));
+  // 30 of 40 stand at an opacity of a half: the highest bar, in the middle.
+  CHECK(has(page, "x=\"250.0\" y=\"30.0\""));
 }
 
 TEST_CASE("several runs stand side by side, with what differs between them") {

@@ -252,6 +252,12 @@ TEST_CASE("training improves held-out views and leaves the files of a run") {
   const nlohmann::json metrics = nlohmann::json::parse(std::ifstream(folder / "metrics.json"));
   CHECK(metrics.at("complete") == true);
   CHECK(metrics.at("iteration") == 250);
+  CHECK(metrics.at("most_gaussians") == options.max_gaussians);
+  CHECK(metrics.at("seed") == options.seed);
+  CHECK(!metrics.at("data").get<std::string>().empty());
+  CHECK(metrics.at("kernels").empty());  // are not timed
+  CHECK(views.at(0).at("center").size() == 3);
+  CHECK(views.at(0).at("sharpness") > 0.0);
 }
 
 TEST_CASE("a signal ends the run with everything saved") {

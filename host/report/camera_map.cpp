@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report/camera_map.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <glm/glm.hpp>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "io/json_file.hpp"
+#include "report/html.hpp"
+#include "report/run_files.hpp"
+
+namespace raysplats::report {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr double kWidth = 460.0;
+constexpr double kHeight = 300.0;
+constexpr double kMargin = 34.0;
+constexpr double kLook = 14.0;            ///< length of the line that says where a camera looks
+constexpr std::size_t kMostDrawn = 1500;  ///< of a kind, so that the page stays small
+constexpr double kFarthest = 1e12;        ///< what is farther away is a broken file's
+
+struct Place {
+  glm::dvec3 center;
+  glm::dvec3 look{0};  ///< where it looks, of length 1; 0 for unknown
+  std::optional<double> psnr = {};
+  std::string name = {};
+};
+
+std::optional<glm::dvec3> vector_of(const Json& json) {
+  if (!json.is_array() || json.size() != 3) return std::nullopt;
+  glm::dvec3 out;
+  for (int i = 0; i < 3; ++i) {
+    const Json& value = json.at(static_cast<std::size_t>(i));
+    if (!value.is_number()) return std::nullopt;
+    out[i] = value.get<double>();
+    if (!(std::abs(out[i]) < kFarthest)) return std::nullopt;
+  }
+  return out;
+}
+
+std::optional<glm::dvec3> vector_of(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found == json.end() ? std::nullopt : vector_of(*found);
+}
+
+glm::dvec3 unit(const glm::dvec3& v, const glm::dvec3& otherwise) {
+  const double length = glm::length(v);
+  return length > 1e-9 ? v / length : otherwise;
+}
+
+struct Cameras {
+  std::vector<Place> trained, held_out;
+  glm::dvec3 up{0, 0, 1};
+};
+
+Cameras cameras_of(const fs::path& run, const std::vector<Json>& views) {
+  Cameras out;
+  glm::dvec3 up{0};
+  // The file is a list; the reader of bounded depth takes objects.
+  const std::string text = "{\"cameras\":" + text_of(run / "cameras.json") + "}";
+  std::error_code error;
+  const Json json =
+      fs::is_regular_file(run / "cameras.json", error)
+          ? io::parse_json_object(std::as_bytes(std::span(text)), run / "cameras.json")
+          : Json::object();
+  for (const Json& camera : objects(json, "cameras")) {
+    const std::optional<glm::dvec3> center = vector_of(camera, "position");
+    if (!center) continue;
+    Place place{*center};
+    const auto rotation = camera.find("rotation");
+    if (rotation != camera.end() && rotation->is_array() && rotation->size() == 3) {
+      // Rows of camera to world, whose columns are right, down and forward.
+      for (int row = 0; row < 3; ++row) {
+        const glm::dvec3 axes =
+            vector_of(rotation->at(static_cast<std::size_t>(row))).value_or(glm::dvec3(0));
+        up[row] -= axes[1];
+        place.look[row] = axes[2];
+      }
+    }
+    out.trained.push_back(place);
+  }
+  for (const Json& view : views) {
+    const std::optional<glm::dvec3> center = vector_of(view, "center");
+    if (center)
+      out.held_out.push_back({*center, {}, number(view, "psnr"), report::text(view, "name")});
+  }
+  out.up = unit(up, out.up);
+  return out;
+}
+
+/// Across and upwards on the page, in the world.
+struct Sheet {
+  glm::dvec3 right, up;
+  glm::dvec2 of(const glm::dvec3& v) const { return {glm::dot(v, right), glm::dot(v, up)}; }
+};
+
+/// The horizontal direction in which the cameras reach farthest.
+glm::dvec3 along(const Cameras& cameras) {
+  const glm::dvec3 up = cameras.up;
+  const glm::dvec3 other = std::abs(up.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+  const Sheet ground{glm::normalize(glm::cross(other, up)),
+                     glm::cross(up, glm::normalize(glm::cross(other, up)))};
+  glm::dvec2 mean{0};
+  double count = 0;
+  const auto all = [&](const auto& use) {
+    for (const auto* places : {&cameras.trained, &cameras.held_out}) {
+      for (const Place& place : *places) use(ground.of(place.center));
+    }
+  };
+  all([&](const glm::dvec2& p) { mean += p, ++count; });
+  mean /= std::max(count, 1.0);
+  double xx = 0, xy = 0, yy = 0;
+  all([&](const glm::dvec2& p) {
+    const glm::dvec2 d = p - mean;
+    xx += d.x * d.x, xy += d.x * d.y, yy += d.y * d.y;
+  });
+  const double angle = 0.5 * std::atan2(2 * xy, xx - yy);
+  return std::cos(angle) * ground.right + std::sin(angle) * ground.up;
+}
+
+/// From orange, the least, over grey to blue, which those who see no red or green tell apart.
+std::string color(double share) {
+  const glm::dvec3 low{214, 96, 30}, middle{170, 165, 155}, high{60, 120, 215};
+  const glm::dvec3 mixed =
+      share < 0.5 ? glm::mix(low, middle, 2 * share) : glm::mix(middle, high, 2 * share - 1);
+  return fmt::format("rgb({:.0f},{:.0f},{:.0f})", mixed.r, mixed.g, mixed.b);
+}
+
+std::string drawn(const std::string& title, const Cameras& cameras, const Sheet& sheet) {
+  glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-low);
+  double worst = std::numeric_limits<double>::infinity(), best = -worst;
+  for (const auto* places : {&cameras.trained, &cameras.held_out}) {
+    for (const Place& place : *places) {
+      low = glm::min(low, sheet.of(place.center));
+      high = glm::max(high, sheet.of(place.center));
+      if (place.psnr) worst = std::min(worst, *place.psnr), best = std::max(best, *place.psnr);
+    }
+  }
+  const glm::dvec2 room(kWidth - 2 * kMargin, kHeight - 2 * kMargin);
+  const glm::dvec2 size = glm::max(high - low, glm::dvec2(1e-9));
+  const double scale = std::min(room.x / size.x, room.y / size.y);
+  const auto at = [&](const glm::dvec3& place) {
+    const glm::dvec2 p = scale * (sheet.of(place) - 0.5 * (low + high));
+    return glm::dvec2(0.5 * kWidth + p.x, 0.5 * kHeight - p.y);
+  };
+  std::string out = fmt::format(
+      "<svg viewBox=\"0 0 {0:.0f} {1:.0f}\" role=\"img\" aria-label=\"{2}\"><text x=\"12\" "
+      "y=\"16\" class=\"title\">{2}</text>",
+      kWidth, kHeight, escaped(title));
+  const auto spread = [](const std::vector<Place>& places, const auto& draw) {
+    const std::size_t step = places.size() / kMostDrawn + 1;
+    for (std::size_t i = 0; i < places.size(); i += step) draw(places[i]);
+  };
+  spread(cameras.trained, [&](const Place& place) {
+    const glm::dvec2 from = at(place.center);
+    const glm::dvec2 look = kLook * sheet.of(place.look);
+    out += fmt::format(
+        "<line class=\"look\" x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{2:.1f}\" y2=\"{3:.1f}\"/><circle "
+        "class=\"plain\" cx=\"{0:.1f}\" cy=\"{1:.1f}\" r=\"2\"/>",
+        from.x, from.y, from.x + look.x, from.y - look.y);
+  });
+  spread(cameras.held_out, [&](const Place& place) {
+    const glm::dvec2 center = at(place.center);
+    const double psnr = place.psnr.value_or(0.0);
+    const double share = best > worst ? (psnr - worst) / (best - worst) : 0.5;
+    out += fmt::format(
+        "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"><title>{}, {:.2f} "
+        "dB</title></circle>",
+        center.x, center.y, color(share), escaped(place.name), psnr);
+  });
+  std::string legend = "grey: trained on";
+  if (!cameras.held_out.empty()) {
+    legend = fmt::format("held out: orange {:.2f} dB to blue {:.2f} dB; ", worst, best) + legend;
+  }
+  return out + fmt::format("<text x=\"12\" y=\"{}\">{}</text></svg>\n", kHeight - 6, legend);
+}
+
+}  // namespace
+
+std::string camera_map(const fs::path& run, const std::vector<Json>& views) {
+  const Cameras cameras = cameras_of(run, views);
+  if (cameras.trained.empty() && cameras.held_out.empty()) return "";
+  const glm::dvec3 right = along(cameras);
+  return drawn("From above", cameras, {right, glm::cross(cameras.up, right)}) +
+         drawn("From the side", cameras, {right, cameras.up});
+}
+
+}  // namespace raysplats::report

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace raysplats::report {
+
+/// What somebody should know of a run before looking at its pictures, a sentence each without its
+/// full stop: from its metrics.json, the columns of its metrics.csv, and the views of its last
+/// evaluation.
+std::vector<std::string> warnings_of(const nlohmann::json& metrics,
+                                     const std::map<std::string, std::vector<double>>& columns,
+                                     const std::vector<nlohmann::json>& views);
+
+}  // namespace raysplats::report
