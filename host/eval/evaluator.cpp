@@ -114,8 +114,8 @@ std::vector<MeasuredView> of_all_ranks(Communicator& ranks, const std::vector<Me
 std::set<std::size_t> telling(const std::vector<MeasuredView>& all, std::size_t most) {
   std::vector<MeasuredView> sorted;
   std::ranges::copy_if(all, std::back_inserter(sorted), &MeasuredView::compared);
-  std::vector<std::size_t> wanted;
-  for (const MeasuredView& view : sorted) wanted.push_back(view.index);
+  std::vector<std::size_t> wanted(sorted.size());
+  std::ranges::transform(sorted, wanted.begin(), &MeasuredView::index);
   std::ranges::stable_sort(sorted, {}, &MeasuredView::psnr);
   if (!sorted.empty()) {
     wanted.insert(wanted.begin(),

@@ -76,6 +76,7 @@ std::vector<Bytes> encoded(const std::vector<Image>& images, const Grade& grade)
   encoding.format = "jpeg";
   encoding.quality = grade.quality;
   std::vector<Bytes> out;
+  out.reserve(images.size());
   for (const Image& image : images) {
     out.push_back(io::image_codec().encode("picture.jpg", shrunk(image, grade.side), encoding));
   }

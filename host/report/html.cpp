@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kStyle = R"(
 :root{color-scheme:light dark;--text:#1d1d1b;--line:#d5d5d0;--warn:#9c3a1a;--c0:#1d5fa8;--c1:#c2561b;--c2:#2c7d3c;--c3:#8a3fa0;--c4:#8a6d14;--c5:#b02358}
-@media (prefers-color-scheme:dark){:root{--text:#e6e6e3;--line:#3c3e42;--warn:#f0906a;--c0:#7db4ee;--c1:#f0a15e;--c2:#7fd08f;--c3:#cf93e6;--c4:#d9bd5c;--c5:#f288ab}body{background:#1c1d1f}}
+@media screen and (prefers-color-scheme:dark){:root{--text:#e6e6e3;--line:#3c3e42;--warn:#f0906a;--c0:#7db4ee;--c1:#f0a15e;--c2:#7fd08f;--c3:#cf93e6;--c4:#d9bd5c;--c5:#f288ab}body{background:#1c1d1f}}
 body{max-width:1000px;margin:24px auto;padding:0 16px;color:var(--text);font:15px/1.5 system-ui,sans-serif}
 h1{font-size:22px}h2{font-size:17px;margin-top:28px;border-top:1px solid var(--line);padding-top:10px}
 .warn{color:var(--warn)}.charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(380px,1fr));gap:12px}
@@ -22,6 +22,8 @@ polyline.c4{stroke:var(--c4)}circle.c4,svg text.c4{fill:var(--c4)}th.c4{color:va
 table{border-collapse:collapse}td,th{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid var(--line)}
 svg.bar{width:90px}svg.bar rect,rect.c0{fill:var(--c0)}circle.plain{fill:currentColor;opacity:.55}svg line.look{stroke:currentColor;opacity:.4}
 figure{margin:14px 0}img{max-width:100%;min-width:min(100%,640px);height:auto}pre{white-space:pre-wrap;overflow-wrap:anywhere}
+@media print{:root{color-scheme:light}body{max-width:none;margin:0;padding:0;font-size:10pt}.charts{grid-template-columns:1fr 1fr}
+h2{break-after:avoid}figure,svg,tr{break-inside:avoid}img{min-width:0;max-height:9cm}details{display:none}svg,.warn{print-color-adjust:exact}}
 )";
 
 /// Bytes of the character that starts here, 0 when it is no UTF-8.
@@ -53,7 +55,8 @@ std::string escaped(std::string_view text) {
   while (!text.empty()) {
     const std::size_t size = character(text);
     const char c = text.front();
-    if (size == 0) {
+    const bool control = static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t';
+    if (size == 0 || control) {
       out += "\xef\xbf\xbd";
     } else if (size > 1) {
       out += text.substr(0, size);
@@ -67,8 +70,6 @@ std::string escaped(std::string_view text) {
       out += "&quot;";
     } else if (c == '\'') {
       out += "&#39;";
-    } else if (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') {
-      out += "\xef\xbf\xbd";
     } else {
       out += c;
     }

@@ -160,6 +160,7 @@ std::string held_out(const std::vector<Run>& runs) {
                    [](const Common& a, const Common& b) { return a.spread > b.spread; });
   const auto pictures = [&](const Common& entry) {
     std::vector<Figure> of_runs;
+    of_runs.reserve(runs.size());
     for (const Run& run : runs) {
       of_runs.push_back(picture(pictures_of(run.folder, run.evaluations),
                                 *view_named(run, entry.name), run.letter));
