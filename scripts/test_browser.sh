@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Opens `raysplats view` in a real Chromium without a screen and uses it: tests/view/browser_test.py.
+# Opens `raysplats view` and reports in a real Chromium without a screen and uses them: tests/view/browser_test.py.
 # usage: scripts/test_browser.sh [PROGRAM] [SCREENSHOTS]     (default: build/release/bin/raysplats, no screenshots)
 # Installs Debian's chromium, chromium-driver and python3-selenium when they are missing and root may. Ends with 77 and
 # a line "SKIPPED why" where they cannot be had.

@@ -13,17 +13,17 @@ constexpr const char* kStyle = R"(
 @media screen and (prefers-color-scheme:dark){:root{--text:#e6e6e3;--line:#3c3e42;--warn:#f0906a;--c0:#7db4ee;--c1:#f0a15e;--c2:#7fd08f;--c3:#cf93e6;--c4:#d9bd5c;--c5:#f288ab}body{background:#1c1d1f}}
 body{max-width:1000px;margin:24px auto;padding:0 16px;color:var(--text);font:15px/1.5 system-ui,sans-serif}
 h1{font-size:22px}h2{font-size:17px;margin-top:28px;border-top:1px solid var(--line);padding-top:10px}
-.warn{color:var(--warn)}.charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(380px,1fr));gap:12px}
+.warn{color:var(--warn)}.charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(380px,100%),1fr));gap:12px}
 svg{width:100%;height:auto}svg text{fill:currentColor;font-size:11px}svg .title{font-size:13px;font-weight:600}
 svg line{stroke:var(--line)}polyline{fill:none;stroke-width:1.6}
 polyline.c0{stroke:var(--c0)}circle.c0,svg text.c0{fill:var(--c0)}th.c0{color:var(--c0)}polyline.c1{stroke:var(--c1)}circle.c1,svg text.c1{fill:var(--c1)}th.c1{color:var(--c1)}
 polyline.c2{stroke:var(--c2)}circle.c2,svg text.c2{fill:var(--c2)}th.c2{color:var(--c2)}polyline.c3{stroke:var(--c3)}circle.c3,svg text.c3{fill:var(--c3)}th.c3{color:var(--c3)}
 polyline.c4{stroke:var(--c4)}circle.c4,svg text.c4{fill:var(--c4)}th.c4{color:var(--c4)}polyline.c5{stroke:var(--c5)}circle.c5,svg text.c5{fill:var(--c5)}th.c5{color:var(--c5)}
-table{border-collapse:collapse}td,th{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid var(--line)}
+table{border-collapse:collapse;display:block;overflow-x:auto}td,th{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid var(--line)}
 svg.bar{width:90px}svg.bar rect,rect.c0{fill:var(--c0)}circle.plain{fill:currentColor;opacity:.55}svg line.look{stroke:currentColor;opacity:.4}
 figure{margin:14px 0}img{max-width:100%;min-width:min(100%,640px);height:auto}pre{white-space:pre-wrap;overflow-wrap:anywhere}
 @media print{:root{color-scheme:light}body{max-width:none;margin:0;padding:0;font-size:10pt}.charts{grid-template-columns:1fr 1fr}
-h2{break-after:avoid}figure,svg,tr{break-inside:avoid}img{min-width:0;max-height:9cm}details{display:none}svg,.warn{print-color-adjust:exact}}
+h2{break-after:avoid}figure,svg,tr{break-inside:avoid}img{min-width:0;max-height:9cm}details{display:none}table{display:table}td,th{overflow-wrap:anywhere}svg,.warn{print-color-adjust:exact}}
 )";
 
 /// Bytes of the character that starts here, 0 when it is no UTF-8.

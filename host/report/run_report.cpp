@@ -200,7 +200,9 @@ std::string run_report(const fs::path& run) {
                  fmt::format("PSNR {:.2f} dB, SSIM {:.4f}, {:.0f} views", number(last, "psnr"),
                              number(last, "ssim"), number(last, "views")));
   }
-  facts += row("Gaussians", fmt::format("{:.0f}", number(metrics, "gaussians")));
+  const double most = number(metrics, "most_gaussians");
+  facts += row("Gaussians", fmt::format("{:.0f}", number(metrics, "gaussians")) +
+                                (most > 0 ? fmt::format(", at most {:.0f}", most) : ""));
   facts += row("Iterations", fmt::format("{:.0f}", number(metrics, "iteration")));
   facts += row("Training", fmt::format("{:.0f} s, and {:.0f} s of compiling kernels",
                                        number(metrics, "training_seconds"),
@@ -209,7 +211,8 @@ std::string run_report(const fs::path& run) {
                fmt::format("{:.0f} MiB at most", number(metrics, "peak_device_bytes") / 1048576.0));
   facts += origin(metrics);
   std::string warnings;
-  for (const std::string& each : warnings_of(metrics, columns, views))
+  for (const std::string& each :
+       warnings_of(metrics, settings(text_of(run / "config.toml")), columns, views))
     warnings += fmt::format("<p class=\"warn\">{}.</p>\n", escaped(each));
   return report::page(run_name(run),
                       warnings + "<table>\n" + facts + "</table>\n" +

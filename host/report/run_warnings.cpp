@@ -50,6 +50,19 @@ std::string far_below(const std::vector<Json>& views,
   return count > kNamed ? fmt::format("{} and {} more", names, count - kNamed) : names;
 }
 
+/// Whether the limit has cut off growth. The other strategies go there by plan.
+bool stopped_growing(const Json& metrics,
+                     const std::map<std::string, std::string>& settings,
+                     const std::map<std::string, std::vector<double>>& columns) {
+  const auto strategy = settings.find("strategy");
+  const auto count = columns.find("gaussians");
+  if (strategy == settings.end() || strategy->second != "\"adc\"") return false;
+  if (count == columns.end() || count->second.empty()) return false;
+  const double most = kFullShare * number(metrics, "most_gaussians");
+  return most > 0 && count->second.front() < most &&
+         *std::max_element(count->second.begin(), count->second.end()) >= most;
+}
+
 /// About views that stand out, which tells of their photos and poses more than of the model.
 void warn_of_views(const std::vector<Json>& views, std::vector<std::string>& out) {
   std::vector<double> psnr, octaves;
@@ -68,6 +81,7 @@ void warn_of_views(const std::vector<Json>& views, std::vector<std::string>& out
 }  // namespace
 
 std::vector<std::string> warnings_of(const Json& metrics,
+                                     const std::map<std::string, std::string>& settings,
                                      const std::map<std::string, std::vector<double>>& columns,
                                      const std::vector<Json>& views) {
   const std::vector<Json> evaluations = objects(metrics, "evaluations");
@@ -100,15 +114,10 @@ std::vector<std::string> warnings_of(const Json& metrics,
                                 number(*best, "iteration")));
     }
   }
-  const double most = number(metrics, "most_gaussians");
-  const auto count = columns.find("gaussians");
-  if (most > 0 && count != columns.end() && !count->second.empty() &&
-      *std::max_element(count->second.begin(), count->second.end()) >= kFullShare * most &&
-      count->second.front() < kFullShare * most) {
-    out.push_back(fmt::format(
-        "The number of Gaussians came to its limit of {:.0f}: a larger --max-gaussians may show "
-        "more detail",
-        most));
+  if (stopped_growing(metrics, settings, columns)) {
+    out.push_back(
+        fmt::format("The number of Gaussians stopped at its limit of {:.0f}: raise --max-gaussians",
+                    number(metrics, "most_gaussians")));
   }
   warn_of_views(views, out);
   return out;

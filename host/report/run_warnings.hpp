@@ -9,9 +9,10 @@
 namespace raysplats::report {
 
 /// What somebody should know of a run before looking at its pictures, a sentence each without its
-/// full stop: from its metrics.json, the columns of its metrics.csv, and the views of its last
-/// evaluation.
+/// full stop: from its metrics.json, its settings, the columns of its metrics.csv, and the views of
+/// its last evaluation.
 std::vector<std::string> warnings_of(const nlohmann::json& metrics,
+                                     const std::map<std::string, std::string>& settings,
                                      const std::map<std::string, std::vector<double>>& columns,
                                      const std::vector<nlohmann::json>& views);
 

@@ -43,7 +43,7 @@ def write_run(folder, seed=0):
             json.dump(content, stream, ensure_ascii=False)
     with open(os.path.join(folder, "config.toml"), "wb") as stream:
         # No UTF-8, and characters that XML does not have.
-        stream.write(f"name = \"{HOSTILE}\"\nseed = {seed}\n".encode() + b"bytes = \"\xff\x00\x1b\xed\xa0\x80\"\n")
+        stream.write(f"strategy = \"adc\"\nname = \"{HOSTILE}\"\nseed = {seed}\n".encode() + b"bytes = \"\xff\x00\x1b\xed\xa0\x80\"\n")
     with open(os.path.join(folder, "metrics.csv"), "w", encoding="utf-8") as stream:
         stream.write("iteration,seconds,loss,psnr,gaussians,it_per_s\n10,1,0.5,12,50,7\n20,2,0.4,13,100,7\n")
     for view in views[:-1]:

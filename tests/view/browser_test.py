@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The viewer's page in Chromium, as a person uses it.
+"""The viewer's page and the reports in Chromium, as a person uses them.
 usage: browser_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
 import base64
 import http.server
 import json
 import math
 import os
+import pathlib
 import re
 import shutil
 import subprocess
@@ -24,7 +25,9 @@ from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path[:0] = [HERE, os.path.join(HERE, "../report")]
+from awkward_run import HOSTILE, write_run  # noqa: E402
 from program import Viewer, psnr, write_model  # noqa: E402
 
 PROGRAM = ""
@@ -38,7 +41,7 @@ def browser():
     for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu",
                      "--window-size=1000,640"):
         options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     return webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
 
 
@@ -55,7 +58,25 @@ class Elsewhere(http.server.BaseHTTPRequestHandler):
         pass
 
 
-class PageCase(unittest.TestCase):
+class BrowserCase(unittest.TestCase):
+    def open_browser(self):
+        self.page = browser()
+        self.addCleanup(self.page.quit)
+
+    def screenshot(self, name):
+        if FOLDER:
+            os.makedirs(FOLDER, exist_ok=True)
+            self.page.save_screenshot(os.path.join(FOLDER, f"{name}.png"))
+
+    def console(self):
+        return [entry for entry in self.page.get_log("browser") if entry["level"] == "SEVERE"]
+
+    def prefer(self, scheme, media=""):
+        self.page.execute_cdp_cmd("Emulation.setEmulatedMedia", {
+            "media": media, "features": [{"name": "prefers-color-scheme", "value": scheme}]})
+
+
+class PageCase(BrowserCase):
     command = "view"
 
     def setUp(self):
@@ -63,8 +84,7 @@ class PageCase(unittest.TestCase):
         self.viewer = Viewer(PROGRAM, self.arguments_given, self.command)
         self.addCleanup(self.viewer.folder.cleanup)
         self.addCleanup(self.viewer.stop)
-        self.page = browser()
-        self.addCleanup(self.page.quit)
+        self.open_browser()
         self.page.get(self.viewer.url)
 
     def seen(self):
@@ -91,14 +111,6 @@ class PageCase(unittest.TestCase):
         data = self.page.execute_script(
             "return document.getElementById('picture').toDataURL('image/png')")
         return base64.b64decode(data.split(",", 1)[1])
-
-    def screenshot(self, name):
-        if FOLDER:
-            os.makedirs(FOLDER, exist_ok=True)
-            self.page.save_screenshot(os.path.join(FOLDER, f"{name}.png"))
-
-    def console(self):
-        return [entry for entry in self.page.get_log("browser") if entry["level"] == "SEVERE"]
 
     def painted(self, canvas):
         return self.page.execute_script(
@@ -422,8 +434,7 @@ class ViewTest(PageCase):
         self.rest()
         self.page.close()
         self.page.switch_to.window(self.page.window_handles[0])
-        self.page.execute_cdp_cmd("Emulation.setEmulatedMedia", {
-            "features": [{"name": "prefers-color-scheme", "value": "dark"}]})
+        self.prefer("dark")
         for kind, x in (("touchStart", 300), ("touchMove", 340), ("touchMove", 400), ("touchEnd", None)):
             points = [] if x is None else [{"x": x, "y": 250}]
             self.page.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
@@ -661,6 +672,70 @@ class TrainTest(PageCase):
         self.assertIn("The run has ended: raysplats view", self.page.find_element(By.ID, "banner").text)
         self.assertEqual(self.viewer.process.wait(timeout=60), 0)
         self.screenshot("trained")
+
+
+class ReportTest(BrowserCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="raysplats_report_")
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.open_browser()
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def make(self, *arguments):
+        subprocess.run([PROGRAM, *arguments, "-q"], check=True, stdout=subprocess.DEVNULL)
+
+    def look(self, file, name):
+        """Opens a page in all its dresses: nothing is asked for but the page, nothing sticks out."""
+        url = pathlib.Path(file).as_uri()
+        for dress, scheme, media, width in (("light", "light", "", 1000), ("dark", "dark", "", 1000),
+                                            ("narrow", "light", "", 420), ("print", "dark", "print", 718)):
+            self.prefer(scheme, media)
+            self.page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": width, "height": 800, "deviceScaleFactor": 1, "mobile": False})
+            self.page.get(url)
+            size = self.page.execute_script(
+                "const e = document.documentElement; return [e.scrollWidth, e.scrollHeight]")
+            self.assertLessEqual(size[0], width, dress)
+            self.page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": width, "height": size[1], "deviceScaleFactor": 1, "mobile": False})
+            for image in self.page.find_elements(By.TAG_NAME, "img"):
+                self.assertGreater(image.get_property("naturalWidth"), 0)
+            ground, ink = self.page.execute_script(
+                "const style = getComputedStyle(document.body);"
+                "return [style.backgroundColor, style.color].map(c => Number(c.match(/\\d+/)));")
+            if dress == "dark":
+                self.assertLess(ground, 60)
+                self.assertGreater(ink, 200)
+            else:
+                self.assertLess(ink, 60)
+            self.screenshot(f"report_{name}_{dress}")
+        asked = [json.loads(entry["message"])["message"] for entry in self.page.get_log("performance")]
+        urls = {event["params"]["request"]["url"] for event in asked if event["method"] == "Network.requestWillBeSent"}
+        self.assertEqual({each for each in urls if not each.startswith("data:")}, {url})
+        self.assertEqual(self.console(), [])
+
+    def test_a_run(self):
+        self.make("generate", self.path("data"), "--size", "96", "--train-views", "12", "--test-views", "6")
+        run = self.path("run")
+        self.make("train", self.path("data"), "-o", run, "-n", "120", "--exposure", "--profile")
+        self.look(os.path.join(run, "report.html"), "run")
+        headings = [each.text for each in self.page.find_elements(By.TAG_NAME, "h2")]
+        for heading in ("Curves", "Held-out views", "Cameras", "Model", "Exposure", "Kernels"):
+            self.assertIn(heading, headings)
+        self.assertEqual(len(self.page.find_elements(By.TAG_NAME, "figure")), 3)
+
+    def test_awkward_runs(self):
+        runs = [self.path(f"run_{i}_<b>&'") for i in range(2)]
+        for i, run in enumerate(runs):
+            write_run(run, i)
+        for name, given in (("awkward", runs[:1]), ("several", runs)):
+            file = self.path(f"{name}.html")
+            self.make("report", *given, "-o", file)
+            self.look(file, name)
+            self.assertIn(HOSTILE, self.page.find_element(By.TAG_NAME, "body").text)
 
 
 if __name__ == "__main__":

@@ -245,7 +245,10 @@ TEST_CASE("views that stand out, a full model and blurred photos are warned of")
   const std::string page = run_report(run.path());
   CHECK(has(page, "whose pose or photo may be wrong: 3_.png."));
   CHECK(has(page, "less sharp than the others: 7_.png."));
-  CHECK(has(page, "came to its limit of 141"));
+  CHECK(has(page, "<td>140, at most 141</td>"));
+  CHECK(!has(page, "stopped at its limit"));  // where the budget strategy always ends
+  run.write("config.toml", "strategy = \"adc\"\n");
+  CHECK(has(run_report(run.path()), "stopped at its limit of 141"));
 }
 
 TEST_CASE("a report shows model, cameras, exposure, kernels and where it all comes from") {
