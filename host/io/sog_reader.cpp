@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "io/byte_reader.hpp"
@@ -24,8 +24,10 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr const char* kMeta = "meta.json";
-/// Gaussians that a byte of a file may stand for; real ones take 8 to 16 bytes.
-constexpr std::uint64_t kMostPerByte = 32;
+/// Gaussians that a byte on the disk may stand for; real ones take 8 to 16 bytes.
+constexpr std::uint64_t kMostPerByte = 8;
+/// Bytes of meta.json; real ones have some ten thousand, and parsed text takes more than its bytes.
+constexpr std::size_t kMostMeta = std::size_t{1} << 20;
 /// Texels that a texture may have beyond those in use.
 constexpr std::size_t kSlack = 4096;
 
@@ -35,24 +37,33 @@ class Files {
   explicit Files(const std::filesystem::path& path) : path_(path) {
     if (path.filename() == kMeta) return;
     bytes_ = read_file(path);
+    disk_bytes_ = bytes_.size();
     archive_.emplace(bytes_, path);
   }
-  std::vector<std::byte> read(const std::string& name) const {
+  std::vector<std::byte> read(const std::string& name) {
     if (archive_) return archive_->read(name);
-    return read_file(path_.parent_path() / name);
+    std::vector<std::byte> bytes = read_file(path_.parent_path() / name);
+    disk_bytes_ += bytes.size();
+    return bytes;
   }
   const std::filesystem::path& path() const { return path_; }
+  /// What lies on the disk: the archive, or the files that have been read.
+  std::uint64_t disk_bytes() const { return disk_bytes_; }
 
  private:
   std::filesystem::path path_;
   std::vector<std::byte> bytes_;
+  std::uint64_t disk_bytes_ = 0;
   std::optional<ZipArchive> archive_;
 };
 
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& path) : files_(path) {
-    meta_ = parse_json_object(files_.read(kMeta), path.filename() == kMeta ? path : path / kMeta);
+    const std::vector<std::byte> text = files_.read(kMeta);
+    if (text.size() > kMostMeta)
+      fail(fmt::format("its {} has {} bytes, more than {}", kMeta, text.size(), kMostMeta));
+    meta_ = parse_json_object(text, path.filename() == kMeta ? path : path / kMeta);
   }
 
   Gaussians read() {
@@ -71,7 +82,6 @@ class Reader {
       model.sh_degree = static_cast<int>(degree);
     }
     if (count_ == 0) return model;
-    // Everything that is compressed is read first, so that the count can be compared with its size.
     const Json& means = member(meta_, "means");
     const std::vector<std::byte> low = picture(means, 0), high = picture(means, 1);
     const std::vector<std::byte> scales = picture(member(meta_, "scales"), 0);
@@ -82,12 +92,19 @@ class Reader {
       centroids = picture(*harmonics, 0);
       labels = picture(*harmonics, 1);
     }
-    std::uint64_t bytes = 0;
-    for (const std::vector<std::byte>* part : {&low, &high, &scales, &rotations, &colors,
-                                               &std::as_const(centroids), &std::as_const(labels)})
-      bytes += part->size();
-    if (count_ > saturating_product(bytes, kMostPerByte))
-      fail(fmt::format("it declares {} Gaussians, more than {} bytes can hold", count_, bytes));
+    // A few bytes can stand for any number of equal texels: neither the model nor a texture gets
+    // memory before the count is borne out by the disk and by the header of every picture.
+    if (count_ > saturating_product(files_.disk_bytes(), kMostPerByte)) {
+      fail(fmt::format("it declares {} Gaussians, more than {} bytes can hold", count_,
+                       files_.disk_bytes()));
+    }
+    for (const std::vector<std::byte>* part : {&low, &high, &scales, &rotations, &colors})
+      texture_size(*part, texels(), picture_name());
+    if (harmonics != nullptr) {
+      texture_size(labels, texels(), picture_name());
+      texture_size(centroids, palette_texels(*harmonics, palette_width(model.sh_degree)),
+                   palette_name());
+    }
     model.resize(count_);
     read_means(means, texture(low), texture(high), model);
     read_scales(texture(scales), model);
@@ -137,16 +154,33 @@ class Reader {
     const Json& files = member(object, "files");
     if (!files.is_array() || files.size() <= index || !files[index].is_string())
       fail("'files' does not name its pictures");
-    name_ = files[index].get<std::string>();
+    const std::string name = files[index].get<std::string>();
     // A file beside meta.json, and no other.
-    if (name_.empty() || name_.front() == '.' || name_.find_first_of("/\\") != std::string::npos ||
-        name_.find('\0') != std::string::npos)
+    if (name.empty() || name.front() == '.' || name.find_first_of("/\\") != std::string::npos ||
+        name.find('\0') != std::string::npos)
       fail("'files' names something else than a file beside meta.json");
-    return files_.read(name_);
+    if (!names_.insert(name).second) fail(fmt::format("'files' names {} twice", name));
+    return files_.read(name);
   }
+  std::string picture_name() const { return files_.path().string() + ": a picture"; }
+  TexelRange texels() const { return {count_, count_ + count_ / 4 + kSlack}; }
   Texture texture(const std::vector<std::byte>& bytes) const {
-    return decode_texture(bytes, count_, count_ + count_ / 4 + kSlack,
-                          fmt::format("{}: a picture", files_.path().string()));
+    return decode_texture(bytes, texels(), picture_name());
+  }
+  std::string palette_name() const { return files_.path().string() + ": the palette"; }
+  static std::size_t palette_width(int degree) {
+    return kSogEntriesPerRow * static_cast<std::size_t>(sh_coefficients(degree) - 1);
+  }
+  std::size_t palette_entries(const Json& harmonics) const {
+    const std::int64_t entries = whole(harmonics, "count");
+    if (entries < 1 || entries > static_cast<std::int64_t>(kSogMostEntries))
+      fail(fmt::format("it has {} palette entries", entries));
+    return static_cast<std::size_t>(entries);
+  }
+  TexelRange palette_texels(const Json& harmonics, std::size_t width) const {
+    const std::size_t rows =
+        (palette_entries(harmonics) + kSogEntriesPerRow - 1) / kSogEntriesPerRow;
+    return {width * rows, width * (rows + kSogEntriesPerRow)};
   }
 
   void read_means(const Json& means, const Texture& low, const Texture& high, Gaussians& model) {
@@ -186,7 +220,7 @@ class Reader {
   }
   void read_colors(const Texture& texture, Gaussians& model) {
     const std::vector<float> levels = codebook(member(meta_, "sh0"));
-    const auto stride = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
+    const auto stride = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
     for (std::size_t i = 0; i < count_; ++i) {
       for (std::size_t k = 0; k < 3; ++k)
         model.sh[stride * i + k] = levels[texture.rgba[4 * i + k]];
@@ -197,22 +231,17 @@ class Reader {
                       const std::vector<std::byte>& picture,
                       const Texture& labels,
                       Gaussians& model) {
-    const std::int64_t entries = whole(harmonics, "count");
-    if (entries < 1 || entries > static_cast<std::int64_t>(kSogMostEntries))
-      fail(fmt::format("it has {} palette entries", entries));
+    const std::size_t entries = palette_entries(harmonics);
     const std::vector<float> levels = codebook(harmonics);
     const auto higher = static_cast<std::size_t>(sh_coefficients(model.sh_degree) - 1);
-    const std::size_t row = kSogEntriesPerRow * higher;
-    const auto rows =
-        (static_cast<std::size_t>(entries) + kSogEntriesPerRow - 1) / kSogEntriesPerRow;
+    const std::size_t width = palette_width(model.sh_degree);
     const Texture centroids =
-        decode_texture(picture, row * rows, row * (rows + kSogEntriesPerRow),
-                       fmt::format("{}: the palette", files_.path().string()));
-    if (centroids.width != row) fail(fmt::format("its palette is {} wide", centroids.width));
+        decode_texture(picture, palette_texels(harmonics, width), palette_name());
+    if (centroids.width != width) fail(fmt::format("its palette is {} wide", centroids.width));
     for (std::size_t i = 0; i < count_; ++i) {
-      const int label = labels.rgba[4 * i] | labels.rgba[4 * i + 1] << 8;
+      const auto label = static_cast<std::size_t>(labels.rgba[4 * i] | labels.rgba[4 * i + 1] << 8);
       if (label >= entries) fail(fmt::format("Gaussian {} has no entry of the palette", i));
-      const std::uint8_t* texel = &centroids.rgba[4 * higher * static_cast<std::size_t>(label)];
+      const std::uint8_t* texel = &centroids.rgba[4 * higher * label];
       float* sh = &model.sh[3 * (higher + 1) * i + 3];
       for (std::size_t k = 0; k < higher; ++k) {
         for (std::size_t c = 0; c < 3; ++c) sh[3 * k + c] = levels[texel[4 * k + c]];
@@ -223,7 +252,7 @@ class Reader {
   Files files_;
   Json meta_;
   std::size_t count_ = 0;
-  std::string name_;
+  std::set<std::string> names_;  // of the pictures
 };
 
 }  // namespace

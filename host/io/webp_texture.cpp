@@ -16,27 +16,34 @@ constexpr int kLossless = 2;  // of WebPBitstreamFeatures
 /// Effort of the encoder, 0 to 9: beyond it time doubles for a percent.
 constexpr int kEffort = 6;
 
+const std::uint8_t* webp_pointer(std::span<const std::byte> bytes) {
+  return reinterpret_cast<const std::uint8_t*>(bytes.data());
+}
+
 }  // namespace
 
-Texture decode_texture(std::span<const std::byte> bytes,
-                       std::size_t least,
-                       std::size_t most,
-                       const std::string& name) {
-  const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+Texture texture_size(std::span<const std::byte> bytes, TexelRange range, const std::string& name) {
   WebPBitstreamFeatures features;
-  if (WebPGetFeatures(data, bytes.size(), &features) != VP8_STATUS_OK)
+  if (WebPGetFeatures(webp_pointer(bytes), bytes.size(), &features) != VP8_STATUS_OK)
     throw DataError(fmt::format("{} is no WebP picture, or is damaged", name));
   if (features.format != kLossless || features.has_animation != 0)
     throw DataError(fmt::format("{} is no single lossless WebP picture", name));
   Texture texture{
       static_cast<std::size_t>(features.width), static_cast<std::size_t>(features.height), {}};
-  if (texture.texels() < least || texture.texels() > most) {
+  if (texture.texels() < range.least || texture.texels() > range.most) {
     throw DataError(fmt::format("{} has {} x {} texels where {} to {} are needed", name,
-                                texture.width, texture.height, least, most));
+                                texture.width, texture.height, range.least, range.most));
   }
+  return texture;
+}
+
+Texture decode_texture(std::span<const std::byte> bytes,
+                       TexelRange range,
+                       const std::string& name) {
+  Texture texture = texture_size(bytes, range, name);
   texture.rgba.resize(4 * texture.texels());
-  if (WebPDecodeRGBAInto(data, bytes.size(), texture.rgba.data(), texture.rgba.size(),
-                         4 * features.width) == nullptr) {
+  if (WebPDecodeRGBAInto(webp_pointer(bytes), bytes.size(), texture.rgba.data(),
+                         texture.rgba.size(), static_cast<int>(4 * texture.width)) == nullptr) {
     throw DataError(fmt::format("{} is damaged", name));
   }
   return texture;

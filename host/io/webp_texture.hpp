@@ -17,12 +17,16 @@ struct Texture {
   std::size_t texels() const { return width * height; }
 };
 
-/// Decodes lossless WebP of `least` to `most` texels; throws DataError that begins with `name` for
-/// anything else, sizes before memory is asked for.
-Texture decode_texture(std::span<const std::byte> bytes,
-                       std::size_t least,
-                       std::size_t most,
-                       const std::string& name);
+/// The texels that a texture may have.
+struct TexelRange {
+  std::size_t least = 0, most = 0;
+};
+
+/// The size that the header of a lossless WebP says, without texels; throws DataError that begins
+/// with `name` for anything else and for sizes out of range.
+Texture texture_size(std::span<const std::byte> bytes, TexelRange range, const std::string& name);
+/// Decodes what texture_size() accepts, and throws as it does before memory is asked for.
+Texture decode_texture(std::span<const std::byte> bytes, TexelRange range, const std::string& name);
 
 /// Greatest width and height of WebP.
 constexpr std::size_t kMostTextureSide = 16383;

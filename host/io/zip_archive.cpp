@@ -26,8 +26,10 @@ constexpr std::uint16_t kEncrypted = 1;
 constexpr std::uint16_t kStored = 0;
 constexpr std::uint16_t kDeflated = 8;
 constexpr std::uint16_t kVersion = 20;  // of the format, 2.0
-/// Bytes that one of deflate's can stand for (zlib's "deflate_technical" note).
-constexpr std::uint64_t kMostShrinking = 1032;
+/// What all files may inflate to: pictures do not shrink, and a text of some kilobytes does so
+/// tenfold.
+constexpr std::uint64_t kMostGrowth = 4;
+constexpr std::uint64_t kGrowthSlack = std::uint64_t{1} << 20;
 /// 1 January 1980: equal models make equal files.
 constexpr std::uint16_t kDate = 1 << 5 | 1;
 
@@ -73,6 +75,7 @@ ZipArchive::ZipArchive(std::span<const std::byte> bytes, const std::filesystem::
   const auto begin = end.read<std::uint32_t>("the place of the central directory");
   ByteReader reader(bytes, path);
   reader.skip(begin, "the central directory");
+  std::uint64_t inflated = 0;
   for (std::uint16_t i = 0; i < count; ++i) {
     if (reader.read<std::uint32_t>("a file of the directory") != kCentralHeader)
       reader.fail("the central directory is damaged");
@@ -94,7 +97,12 @@ ZipArchive::ZipArchive(std::span<const std::byte> bytes, const std::filesystem::
     if ((flags & kEncrypted) != 0) reader.fail("a file of the archive is encrypted");
     if (entry.packed == UINT32_MAX || entry.size == UINT32_MAX || entry.header == UINT32_MAX)
       reader.fail("the archive has more than 4 GiB (Zip64)");
+    inflated += entry.size;
     entries_.emplace(std::string(reinterpret_cast<const char*>(bytes.data()) + at, name), entry);
+  }
+  if (inflated > kMostGrowth * bytes.size() + kGrowthSlack) {
+    reader.fail(fmt::format("the files of the archive claim {} bytes, more than its {} can hold",
+                            inflated, bytes.size()));
   }
 }
 
@@ -121,8 +129,6 @@ std::vector<std::byte> ZipArchive::read(const std::string& name) const {
     if (entry.size != entry.packed) fail("has two sizes");
     out.assign(packed.begin(), packed.end());
   } else if (entry.method == kDeflated) {
-    if (entry.size > saturating_product(entry.packed, kMostShrinking))
-      fail(fmt::format("claims {} bytes, more than its {} can hold", entry.size, entry.packed));
     out.resize(entry.size);
     z_stream stream{};
     // Without zlib's header, which zip leaves out.

@@ -13,15 +13,15 @@
 namespace raysplats::io {
 
 /// The files of a zip archive in memory, by its central directory (writers may leave sizes out of
-/// the headers in front of the files): stored or deflated, below 4 GiB, not encrypted. Written here
-/// because libzip brings OpenSSL to everything that links the library. Functions throw DataError,
-/// one sentence with the path. `bytes` have to stay.
+/// the headers in front of the files): stored or deflated, below 4 GiB, not encrypted, all of them
+/// together within a few times the archive. Written here because libzip brings OpenSSL to
+/// everything that links the library. Functions throw DataError, one sentence with the path.
+/// `bytes` have to stay.
 class ZipArchive {
  public:
   ZipArchive(std::span<const std::byte> bytes, const std::filesystem::path& path);
 
-  /// Whole content of a file, checked against its checksum. No memory is asked for beyond what its
-  /// compressed bytes can hold.
+  /// Whole content of a file, checked against its checksum.
   std::vector<std::byte> read(const std::string& name) const;
 
  private:

@@ -85,6 +85,7 @@ void make_ply(const fs::path& root) {
   const Corpus corpus(root, "ply");
   write_ply(corpus.folder() / "degree0.ply", small_model(0, 2));
   write_ply(corpus.folder() / "degree1.ply", small_model(1, 1));
+  write_model(corpus.folder() / "packed.compressed.ply", small_model(1, 2));
   const std::string model_properties =
       "property float x\nproperty float y\nproperty float z\nproperty float f_dc_0\n"
       "property float f_dc_1\nproperty float f_dc_2\nproperty float opacity\n"
@@ -331,6 +332,8 @@ void make_models(const fs::path& root) {
     packed.add_text({reinterpret_cast<const char*>(file.data()), file.size()});
   }
   corpus.add("packed_sog", packed.take(5));
+  corpus.add("deflated_sog", packed.take(7));
+  corpus.add("folder_sog", packed.take(8));
   stream.close();
   fs::remove(sog);
   // What is compressed in SPZ of each older version.

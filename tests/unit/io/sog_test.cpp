@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <zlib.h>
-
 #include <cmath>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
 #include "core/morton_order.hpp"
+#include "deflated_zip.hpp"
 #include "io/webp_texture.hpp"
 #include "io/zip_archive.hpp"
 #include "model_bytes.hpp"
@@ -69,9 +69,9 @@ struct Sog {
     files.emplace_back("c", picture({0, 128, 192, 51, 129, 127, 255, 0}));
     // Entry 65 is the second of the second row of three texels each.
     std::vector<int> centroids(static_cast<std::size_t>(4 * 192 * 2), 128);
-    for (int k = 0; k < 3; ++k) {
-      for (int c = 0; c < 3; ++c)
-        centroids[static_cast<std::size_t>(4 * (192 + 3 + k) + c)] = 136 + 8 * (3 * k + c);
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t c = 0; c < 3; ++c)
+        centroids[4 * (192 + 3 + k) + c] = static_cast<int>(136 + 8 * (3 * k + c));
     }
     files.emplace_back("n", picture(centroids, 192, 2));
     files.emplace_back("i", picture({65, 0, 0, 255, 0, 0, 0, 255}));
@@ -136,34 +136,59 @@ TEST_CASE("SOG: archives of other writers leave sizes out of local headers, or d
   for (std::size_t i = 14; i < 26; ++i) archive[i] = 0;
   check_known(read(archive));
 
+  const Sog sog;
+  Files all = sog.files;
+  all.emplace_back("meta.json", bytes_of_text(sog.meta.dump()));
+  check_known(read(text_of(deflated_zip(all))));
+}
+
+TEST_CASE("SOG: what its archive claims to inflate to is compared with the archive") {
   const std::string text(5000, 'x');
-  std::vector<std::byte> packed(compressBound(5000));
-  z_stream stream{};
-  REQUIRE(deflateInit2(&stream, 9, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY) == Z_OK);
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
-  stream.avail_in = 5000;
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  REQUIRE(deflate(&stream, Z_FINISH) == Z_STREAM_END);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  std::vector<std::byte> zip = io::zip_of({{"a", packed}}, "test");
-  const std::size_t directory = 31 + packed.size();
-  const auto set = [&](std::size_t at, std::uint32_t value, int bytes) {
-    for (int i = 0; i < bytes; ++i)
-      zip[at + static_cast<std::size_t>(i)] = std::byte(value >> 8 * i);
-  };
-  set(directory + 10, 8, 2);
-  set(directory + 16,
-      static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(text.data()), 5000)), 4);
-  set(directory + 24, 5000, 4);
+  std::vector<std::byte> zip = deflated_zip({{"a", bytes_of_text(text)}});
   CHECK(text_of(io::ZipArchive(zip, "test").read("a")) == text);
-  // Four gigabytes out of some bytes: refused before they are asked for.
-  set(directory + 24, 0xfffffffe, 4);
-  CHECK(contains(data_error([&] { io::ZipArchive(zip, "test").read("a"); }), "more than its"));
-  set(directory + 24, 4999, 4);
-  CHECK(contains(data_error([&] { io::ZipArchive(zip, "test").read("a"); }), "is damaged"));
   CHECK(contains(data_error([&] { io::ZipArchive(zip, "test").read("b"); }), "is missing"));
+  const auto claim = [&](std::uint32_t bytes) {
+    std::memcpy(zip.data() + zip.size() - kZipEnd - kZipRecord - 1 + kZipSize, &bytes, 4);
+    return data_error([&] { io::ZipArchive(zip, "test").read("a"); });
+  };
+  CHECK(contains(claim(4999), "is damaged"));
+  CHECK(contains(claim(0xfffffffe), "more than its"));
+  // Honest, but each a thousandth of what it holds.
+  const std::vector<std::byte> zeros(std::size_t{1} << 20);
+  CHECK(contains(data_error([&] {
+                   io::ZipArchive(deflated_zip({{"a", zeros}, {"b", zeros}}), "test");
+                 }),
+                 "more than its"));
+}
+
+TEST_CASE("SOG: a count has to be borne out by the disk, not by what inflates from it") {
+  const Scratch scratch;
+  Sog sog;
+  // Pictures that deflate to nothing, and that are none.
+  for (auto& [name, bytes] : sog.files) bytes.assign(100000, std::byte{0});
+  sog.meta["count"] = 400000;
+  Files all = sog.files;
+  all.emplace_back("meta.json", bytes_of_text(sog.meta.dump()));
+  CHECK(contains(data_error([&] { read(text_of(deflated_zip(all))); }), "bytes can hold"));
+  // An unpacked one, whose pictures are of a few bytes.
+  for (const auto& [name, bytes] : Sog().files) write_bytes(scratch / name, text_of(bytes));
+  write_bytes(scratch / "meta.json", sog.meta.dump());
+  CHECK(contains(data_error([&] { read_model(scratch / "meta.json"); }), "bytes can hold"));
+  // One file for all pictures would be as many times its size.
+  sog = Sog();
+  sog.meta["means"]["files"][1] = "l";
+  CHECK(contains(error_of(sog), "twice"));
+  sog = Sog();
+  sog.meta["comment"] = std::string(1100000, 'x');
+  CHECK(contains(error_of(sog), "meta.json has"));
+}
+
+TEST_CASE("SOG: equal Gaussians, which pack best, are read again") {
+  const Scratch scratch;
+  Gaussians model;
+  model.resize(20000);
+  write_model(scratch / "a.sog", model);
+  CHECK(read_model(scratch / "a.sog").size() == model.size());
 }
 
 TEST_CASE("SOG: round trips stay within the steps of the format at every degree and size") {
