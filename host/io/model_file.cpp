@@ -9,6 +9,7 @@
 #include <cmath>
 #include <fstream>
 #include <glm/mat4x4.hpp>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "io/gltf_gaussians.hpp"
 #include "io/model_formats.hpp"
 #include "io/sog_file.hpp"
+#include "io/spz_codes.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
@@ -46,6 +48,39 @@ glm::dmat4 rub_turn() {
   glm::dmat4 turn(1.0);
   turn[1][1] = turn[2][2] = -1.0;
   return turn;
+}
+
+/// What of a model lies beyond what SPZ has codes for, and is cut.
+std::string spz_clamped(const Gaussians& model) {
+  const std::size_t stride = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
+  constexpr double most_color = 0.5 / kSpzColorScale;
+  std::size_t scales = 0, colors = 0, harmonics = 0;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const auto beyond = [](std::span<const float> values, double least, double most) {
+      return std::any_of(values.begin(), values.end(),
+                         [&](float v) { return v < least || v > most; });
+    };
+    const std::span<const float> sh(&model.sh[stride * i], stride);
+    scales += beyond({&model.log_scales[3 * i], 3}, kSpzLeastLogScale, kSpzMostLogScale);
+    colors += beyond(sh.first(3), -most_color, most_color);
+    harmonics += beyond(sh.subspan(3), -1.0, 1.0);
+  }
+  std::string out;
+  const auto tell = [&](std::size_t count, const char* what) {
+    if (count > 0)
+      out += fmt::format(", {} ({} of {} Gaussians) are clamped", what, count, model.size());
+  };
+  tell(scales, "scales beyond 4.5e-5 to 380");
+  tell(colors, "colours beyond +-3.33 in SH");
+  tell(harmonics, "SH beyond +-1");
+  return out;
+}
+
+std::string spz_losses(const Gaussians& model) {
+  return fmt::format(
+      "positions are kept to 1/{}, scales to 3 %, opacities and colours to 8 bits{}{}",
+      1 << spz_fractional_bits(model), model.sh_degree > 0 ? ", SH to 4 or 5 bits" : "",
+      spz_clamped(model));
 }
 
 }  // namespace
@@ -101,16 +136,8 @@ std::string losses(ModelFormat format, const Gaussians& model) {
       return fmt::format(
           "{}colours are cut to 0..1, colours, opacities and rotations have 8 bits",
           model.sh_degree > 0 ? "colours no longer change with the view (no SH), " : "");
-    case ModelFormat::kSpz: {
-      const bool beyond =
-          std::any_of(model.log_scales.begin(), model.log_scales.end(),
-                      [](float s) { return s < kSpzLeastLogScale || s > kSpzMostLogScale; });
-      return fmt::format(
-          "positions are kept to 1/4096, scales to 3 %, opacities and colours to 8 bits{}{}",
-          model.sh_degree > 0 ? ", SH to 4 or 5 bits" : "",
-          beyond ? ", and some scales are beyond what SPZ knows (4.5e-5 to 380) and are clamped"
-                 : "");
-    }
+    case ModelFormat::kSpz:
+      return spz_losses(model);
     case ModelFormat::kSog:
       return fmt::format(
           "positions are kept to 1/65536 of their range, rotations to 1/360, scales, colours and "

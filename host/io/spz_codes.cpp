@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "io/byte_reader.hpp"
 #include "io/gaussian_codes.hpp"
@@ -18,7 +19,6 @@ namespace {
 
 constexpr int kMaxShDegree = 4;
 constexpr int kMaxFractionalBits = 24;
-constexpr double kColorScale = 0.15;
 constexpr double kScaleStep = 16.0;
 constexpr double kPositionLimit = 8388607.0;  // 2^23 - 1
 constexpr std::uint32_t kRotationMask = 511;
@@ -99,7 +99,7 @@ std::uint32_t packed_rotation(const float* quaternion) {
     const double size = std::abs(xyzw[k]) * std::numbers::sqrt2 * kRotationMask;
     const bool negative = (xyzw[k] < 0.0) != (xyzw[largest] < 0.0);
     bits = bits << 10 | (negative ? 512u : 0u) |
-           std::min(static_cast<std::uint32_t>(size + 0.5), kRotationMask);
+           std::min(static_cast<std::uint32_t>(std::lround(size)), kRotationMask);
   }
   return bits;
 }
@@ -111,21 +111,20 @@ std::uint8_t packed_harmonic(float value, bool first_degree) {
   return to_byte(std::floor((code + step / 2.0) / step) * step);
 }
 
-int fractional_bits_for(const Gaussians& model, const std::filesystem::path& path) {
+double farthest_position(const Gaussians& model) {
   double largest = 0.0;
   for (const float x : model.means) largest = std::max(largest, std::abs(static_cast<double>(x)));
-  int bits = 12;
-  while (bits > 0 && std::ldexp(largest, bits) > kPositionLimit) --bits;
-  if (largest > kPositionLimit) {
-    throw DataError(fmt::format(
-        "{} cannot be written: SPZ has no position beyond {:.0f}, but one is {:.6g}: scale the "
-        "model down",
-        path.string(), kPositionLimit, largest));
-  }
-  return bits;
+  return largest;
 }
 
 }  // namespace
+
+int spz_fractional_bits(const Gaussians& model) {
+  const double largest = farthest_position(model);
+  int bits = 12;
+  while (bits > 0 && std::ldexp(largest, bits) > kPositionLimit) --bits;
+  return bits;
+}
 
 void check_spz_header(const SpzHeader& header,
                       std::uint64_t file_bytes,
@@ -143,7 +142,9 @@ void check_spz_header(const SpzHeader& header,
   if (header.fractional_bits > kMaxFractionalBits) {
     fail(fmt::format("its positions have {} bits behind the point", header.fractional_bits));
   }
-  if (header.points > file_bytes * kSpzMostShrinking / kSpzLeastBytes) {
+  const SpzSizes sizes = spz_sizes(header);
+  if (std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0}) >
+      saturating_product(file_bytes, kSpzMostShrinking)) {
     fail(fmt::format("it declares {} Gaussians, more than {} bytes can hold", header.points,
                      file_bytes));
   }
@@ -188,7 +189,7 @@ Gaussians unpack_spz(const SpzHeader& header,
     }
     float* sh = &model.sh[(3 + higher) * i];
     for (std::size_t k = 0; k < 3; ++k)
-      sh[k] = static_cast<float>((byte_at(colors, 3 * i + k) / 255.0 - 0.5) / kColorScale);
+      sh[k] = static_cast<float>((byte_at(colors, 3 * i + k) / 255.0 - 0.5) / kSpzColorScale);
     for (std::size_t k = 0; k < higher; ++k)
       sh[3 + k] = static_cast<float>((byte_at(harmonics, higher * i + k) - 128.0) / 128.0);
   }
@@ -202,9 +203,15 @@ std::array<std::vector<std::byte>, kSpzArrays> pack_spz(const Gaussians& model,
     throw DataError(fmt::format("{} cannot be written: SPZ has at most {} Gaussians, not {}",
                                 path.string(), UINT32_MAX, model.size()));
   }
+  if (const double largest = farthest_position(model); largest > kPositionLimit) {
+    throw DataError(fmt::format(
+        "{} cannot be written: SPZ has no position beyond {:.0f}, but one is {:.6g}: scale the "
+        "model down",
+        path.string(), kPositionLimit, largest));
+  }
   header.points = static_cast<std::uint32_t>(model.size());
   header.sh_degree = static_cast<std::uint8_t>(model.sh_degree);
-  header.fractional_bits = static_cast<std::uint8_t>(fractional_bits_for(model, path));
+  header.fractional_bits = static_cast<std::uint8_t>(spz_fractional_bits(model));
   std::array<std::vector<std::byte>, kSpzArrays> arrays;
   const SpzSizes sizes = spz_sizes(header);
   for (std::size_t i = 0; i < kSpzArrays; ++i) arrays[i].reserve(sizes[i]);
@@ -227,7 +234,7 @@ std::array<std::vector<std::byte>, kSpzArrays> pack_spz(const Gaussians& model,
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* sh = &model.sh[(3 + higher) * i];
     for (std::size_t k = 0; k < 3; ++k)
-      put(colors, to_byte(255.0 * (kColorScale * static_cast<double>(sh[k]) + 0.5)));
+      put(colors, to_byte(255.0 * (kSpzColorScale * static_cast<double>(sh[k]) + 0.5)));
     put_low(rotations, packed_rotation(&model.quaternions[4 * i]), 4);
     for (std::size_t k = 0; k < higher; ++k) put(harmonics, packed_harmonic(sh[3 + k], k < 9));
   }

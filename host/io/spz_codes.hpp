@@ -16,9 +16,12 @@ namespace raysplats::io {
 
 constexpr std::uint32_t kSpzMagic = 0x5053474e;  // "NGSP"
 constexpr int kSpzLastVersion = 4;
-/// No Gaussian takes fewer bytes, and neither gzip nor what SPZ uses of zstd shrinks further.
-constexpr std::uint64_t kSpzLeastBytes = 9;
-constexpr std::uint64_t kSpzMostShrinking = 1024;
+/// Bytes that one of gzip's can stand for (zlib's "deflate_technical" note); arrays of which zstd
+/// would make less hold no model.
+constexpr std::uint64_t kSpzMostShrinking = 1032;
+
+/// A byte of colour holds this share of its number above and below 1/2.
+constexpr double kSpzColorScale = 0.15;
 
 /// What the header of every version says.
 struct SpzHeader {
@@ -44,6 +47,9 @@ SpzSizes spz_sizes(const SpzHeader& header);
 Gaussians unpack_spz(const SpzHeader& header,
                      const std::array<std::span<const std::byte>, kSpzArrays>& arrays,
                      const std::filesystem::path& path);
+
+/// Bits behind the point that the positions of a model leave room for, 12 at most.
+int spz_fractional_bits(const Gaussians& model);
 
 /// Arrays of version 3 and later; fills in the header.
 std::array<std::vector<std::byte>, kSpzArrays> pack_spz(const Gaussians& model,

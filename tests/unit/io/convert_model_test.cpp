@@ -132,4 +132,15 @@ TEST_CASE("losses are named for the model at hand") {
   needles.log_scales[0] = -14;
   CHECK(contains(io::losses(io::ModelFormat::kSpz, needles), "clamped"));
   CHECK(!contains(io::losses(io::ModelFormat::kSpz, flat), "clamped"));
+  CHECK(contains(io::losses(io::ModelFormat::kSpz, flat), "1/4096"));
+  // 24 bits hold 100000 with 6 of them behind the point.
+  Gaussians far = flat;
+  far.means[4] = -100000.5f;
+  CHECK(contains(io::losses(io::ModelFormat::kSpz, far), "1/64,"));
+  Gaussians bright = trained_like(2, 1);
+  CHECK(!contains(io::losses(io::ModelFormat::kSpz, bright), "clamped"));
+  bright.sh[12] = -3.4f;
+  CHECK(contains(io::losses(io::ModelFormat::kSpz, bright), "3.33 in SH (1 of 2 Gaussians)"));
+  bright.sh[4] = bright.sh[17] = 1.5f;
+  CHECK(contains(io::losses(io::ModelFormat::kSpz, bright), "+-1 (2 of 2 Gaussians)"));
 }

@@ -185,6 +185,13 @@ TEST_CASE("SPZ: damage ends in one sentence, before memory is asked for") {
   CHECK(check_damage(version4(), "a.spz") > 100);
   CHECK(contains(error_of(version3()), "gzip"));
   CHECK(contains(error_of(gzipped(head(3, 4000000000u, 4, 12))), "more than"));
+  // Three thousand positions could be in so many bytes, but not their harmonics.
+  CHECK(contains(error_of(gzipped(head(3, 3000, 4, 12))), "more than"));
+  std::string four = version4();
+  four[8] = 100;
+  four[9] = 50;
+  four[12] = 4;
+  CHECK(contains(error_of(four), "more than"));
   CHECK(contains(error_of(gzipped(head(5, 0, 0, 12))), "version is 5"));
   CHECK(contains(error_of(gzipped(head(3, 1, 9, 12))), "degree is 9"));
   CHECK(contains(error_of(gzipped(version3() + "x")), "holds more"));
