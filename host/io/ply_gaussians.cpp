@@ -7,10 +7,12 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/atomic_file.hpp"
+#include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
 #include "io/ply_options.hpp"
@@ -30,7 +32,8 @@ struct Columns {
   std::array<std::size_t, 3> mean{}, log_scale{};
   std::array<std::size_t, 4> quaternion{};
   std::size_t opacity = 0;
-  std::vector<std::size_t> sh;  ///< coefficients x 3
+  std::optional<std::size_t> filter;  ///< of Mip-Splatting
+  std::vector<std::size_t> sh;        ///< coefficients x 3
 };
 
 int degree_of_rest(std::size_t count, const std::filesystem::path& path) {
@@ -56,6 +59,7 @@ Columns find_columns(const io::PlyFile& file, const std::filesystem::path& path)
   columns.sh.resize(3);
   for (std::size_t i = 0; i < 3; ++i) columns.sh[i] = find(fmt::format("f_dc_{}", i));
   columns.opacity = find("opacity");
+  columns.filter = file.column("filter_3D");
   for (std::size_t i = 0; i < 3; ++i) columns.log_scale[i] = find(fmt::format("scale_{}", i));
   for (std::size_t i = 0; i < 4; ++i) columns.quaternion[i] = find(fmt::format("rot_{}", i));
   if (!missing.empty()) {
@@ -78,6 +82,23 @@ Columns find_columns(const io::PlyFile& file, const std::filesystem::path& path)
                                 fmt::join(missing, ", ")));
   }
   return columns;
+}
+
+/// Widens a Gaussian by the standard deviation of Mip-Splatting's 3D smoothing filter (Yu et al.
+/// 2024, equation 9), which its trainer keeps beside scales and opacity: variances are added and
+/// the opacity falls as the volume grows. By logarithms, so that no scale is too large.
+void widen(float* log_scales, float& opacity, double filter) {
+  if (filter == 0.0) return;
+  const double log_filter = std::log(std::abs(filter));
+  double log_growth = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto before = static_cast<double>(log_scales[axis]);
+    const double after = std::max(before, log_filter) +
+                         0.5 * std::log1p(std::exp(-2.0 * std::abs(before - log_filter)));
+    log_scales[axis] = static_cast<float>(after);
+    log_growth += after - before;
+  }
+  opacity = io::logit_of(io::opacity_of(opacity) * std::exp(-log_growth), io::kFloatOpacityMargin);
 }
 
 }  // namespace
@@ -114,9 +135,17 @@ Gaussians read_ply(const std::filesystem::path& path) {
       ++without_rotation;
     }
     model.opacities[row] = number(columns.opacity);
+    if (columns.filter) {
+      widen(&model.log_scales[3 * row], model.opacities[row],
+            static_cast<double>(number(*columns.filter)));
+    }
     float* sh = &model.sh[columns.sh.size() * row];
     for (std::size_t k = 0; k < columns.sh.size(); ++k) sh[k] = number(columns.sh[k]);
   });
+  if (columns.filter) {
+    spdlog::info("{}: the 3D filter of Mip-Splatting is taken into scales and opacities",
+                 path.string());
+  }
   if (without_rotation > 0) {
     spdlog::warn("{}: {} Gaussians have a zero quaternion and are taken as not rotated",
                  path.string(), without_rotation);

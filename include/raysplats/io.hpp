@@ -39,8 +39,9 @@ void write_model(const std::filesystem::path& path,
                  const std::optional<TraceOptions>& trace = std::nullopt,
                  const std::array<double, 3>& origin = {});
 
-/// Reads a 3DGS PLY (binary of both byte orders or ASCII; SH degree 0..4; further properties are
-/// ignored) or a compressed one of PlayCanvas. Throws DataError with the byte offset for anything
+/// Reads a 3DGS PLY (binary of both byte orders or ASCII; SH degree 0..4; the 3D filter of
+/// Mip-Splatting goes into scales and opacities, further properties are ignored) or a compressed
+/// one of PlayCanvas. Throws DataError with the byte offset for anything
 /// malformed, truncated, non-finite or oversized.
 Gaussians read_ply(const std::filesystem::path& path);
 

@@ -176,6 +176,33 @@ TEST_CASE("an empty model can be written and read, and a zero quaternion means n
   CHECK(read_ply(scratch / "zero.ply").quaternions == std::vector<float>{1, 0, 0, 0});
 }
 
+TEST_CASE("the 3D filter of Mip-Splatting goes into scales and opacities") {
+  const Scratch scratch;
+  std::vector<std::string> properties = kProperties;
+  properties.emplace_back("filter_3D");
+  const auto read = [&](const std::string& row) {
+    write_bytes(scratch / "a.ply", header("ascii", 1, properties) + row + "\n");
+    return read_ply(scratch / "a.ply");
+  };
+  // Scales 3, 1 and 1e-3 with a filter of 4; opacity 0.75.
+  const std::string begin = "0 0 0 0 0 0 " + std::to_string(std::log(3.0)) + " ";
+  const Gaussians wide = read(begin + std::to_string(std::log(3.0)) + " 0 -6.907755 1 0 0 0 4");
+  CHECK(std::exp(wide.log_scales[0]) == doctest::Approx(5.0));
+  CHECK(std::exp(wide.log_scales[1]) == doctest::Approx(std::sqrt(17.0)));
+  CHECK(std::exp(wide.log_scales[2]) == doctest::Approx(4.0));
+  const double opacity = 0.75 * std::sqrt(9.0 * 1.0 * 1e-6 / (25.0 * 17.0 * 16.000001));
+  CHECK(wide.opacities[0] == doctest::Approx(std::log(opacity / (1 - opacity))).epsilon(1e-5));
+  // No filter changes nothing; scales beyond what a double's exponential holds stay finite.
+  const Gaussians same = read(begin + "0.5 -900 900 1 0 0 0 0");
+  CHECK(same.log_scales == std::vector<float>{0.5f, -900.0f, 900.0f});
+  CHECK(same.opacities[0] == doctest::Approx(std::log(3.0)));
+  const Gaussians extreme = read(begin + "0.5 -900 900 1 0 0 0 1");
+  CHECK(extreme.log_scales[1] == doctest::Approx(0.0));
+  CHECK(extreme.log_scales[2] == doctest::Approx(900.0));
+  CHECK(std::isfinite(extreme.opacities[0]));
+  CHECK(contains(data_error([&] { read(begin + "0 0 0 1 0 0 0 nan"); }), "'filter_3D'"));
+}
+
 TEST_CASE("malformed models are refused with a sentence that says what is wrong") {
   const std::string row(14 * sizeof(float), '\0');
   CHECK(contains(error_of(""), "not a PLY"));
