@@ -79,7 +79,7 @@ std::string spz_clamped(const Gaussians& model) {
 std::string spz_losses(const Gaussians& model) {
   return fmt::format(
       "positions are kept to 1/{}, scales to 3 %, opacities and colours to 8 bits{}{}",
-      1 << spz_fractional_bits(model), model.sh_degree > 0 ? ", SH to 4 or 5 bits" : "",
+      1 << spz_fractional_bits(model), model.sh_degree > 0 ? ", SH to 6 bits" : "",
       spz_clamped(model));
 }
 
