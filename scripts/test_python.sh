@@ -39,6 +39,11 @@ if ! "$environment/bin/pip" install -q 'scikit-build-core>=1.0' 'nanobind>=3.0' 
   exit 77
 fi
 
+# For tests alone, an independent reader of model files; numpy stays the one that PyTorch goes with.
+numpy=$("$environment/bin/python" -c 'import numpy; print(numpy.__version__)')
+"$environment/bin/pip" install -q 'gsply[sogs]>=0.4.6' zstandard "numpy==$numpy" ||
+  echo "SKIPPED the tests with gsply: it cannot be downloaded"
+
 begin=$SECONDS
 # The name by which CMake calls the compiler elsewhere, so that ccache knows what other builds have compiled.
 CXX=${CXX:-c++} "$environment/bin/pip" install -q --no-build-isolation --no-deps --force-reinstall ./apps/python
