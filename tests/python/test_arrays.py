@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What arrays are taken and given: views, never silent copies."""
 
+import ctypes
 import gc
 
 import numpy as np
@@ -67,6 +68,39 @@ def test_wrong_arrays_are_refused_in_one_sentence(arrays, change, error, sentenc
     with pytest.raises(error) as caught:
         rs.Gaussians(**given)
     assert sentence in str(caught.value) and "\n" not in str(caught.value)
+
+
+class Foreign:
+    """Numbers that claim by DLPack's first version to lie on an NVIDIA device."""
+
+    class Tensor(ctypes.Structure):
+        _fields_ = [
+            ("data", ctypes.c_void_p), ("device", ctypes.c_int32 * 2), ("dimensions", ctypes.c_int32),
+            ("code", ctypes.c_uint8), ("bits", ctypes.c_uint8), ("lanes", ctypes.c_uint16),
+            ("shape", ctypes.POINTER(ctypes.c_int64)), ("strides", ctypes.c_void_p), ("offset", ctypes.c_uint64),
+            ("manager", ctypes.c_void_p), ("deleter", ctypes.c_void_p),
+        ]
+
+    def __init__(self, array):
+        self.array = array
+        self.shape = (ctypes.c_int64 * array.ndim)(*array.shape)
+        self.tensor = self.Tensor(array.ctypes.data, (2, 0), array.ndim, 2, 32, 1, self.shape)
+
+    def __dlpack_device__(self):
+        return 2, 0
+
+    def __dlpack__(self, **_):
+        new = ctypes.pythonapi.PyCapsule_New
+        new.restype, new.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
+        return new(ctypes.addressof(self.tensor), b"dltensor", None)
+
+
+def test_arrays_of_other_devices_are_refused(arrays):
+    given = {k: v.astype(np.float32) for k, v in arrays.items()}
+    given["means"] = Foreign(given["means"])
+    with pytest.raises(rs.UsageError) as caught:
+        rs.Gaussians(**given)
+    assert str(caught.value) == "means lies in the memory of a device: bring it to the CPU"
 
 
 def test_read_only_arrays_are_enough(arrays):

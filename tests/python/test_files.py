@@ -23,7 +23,7 @@ def test_a_ply_comes_back_as_it_was(tmp_path, arrays):
     assert rs.TraceOptions.load(tmp_path / "plain.ply") is None
 
 
-@pytest.mark.parametrize("name", ["a.spz", "a.splat", "a.glb"])
+@pytest.mark.parametrize("name", ["a.compressed.ply", "a.spz", "a.splat", "a.sog", "a.glb"])
 def test_other_formats(tmp_path, arrays, name):
     arrays["sh"] = arrays["sh"][:, :1]
     g = as_gaussians(arrays)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """raysplats.torch against autograd through the reference in double precision."""
 
+import gc
 import inspect
+import weakref
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ import photos  # noqa: E402
 import raysplats as rs  # noqa: E402
 import raysplats.torch as rt  # noqa: E402
 import reference  # noqa: E402
+from raysplats import _rasterization  # noqa: E402
 from conftest import random_arrays  # noqa: E402
 
 QUANTILE = 11.3449
@@ -31,14 +34,45 @@ def leaves(arrays):
     return single, double
 
 
-def assert_close(name, found, expected):
-    assert found.dtype == torch.float32 and found.shape == expected.shape, name
-    scale = expected.abs().max()
-    assert scale > 1e-3, f"{name}: the test sees nothing"
-    assert (found - expected).abs().max() <= TOLERANCE * scale, name
+def assert_close(found, expected, table, column):
+    """The gradients of leaves; what they are off by goes into a column of the table."""
+    for name, leaf in found.items():
+        single, double = leaf.grad, expected[name].grad
+        assert single.dtype == torch.float32 and single.shape == double.shape, name
+        scale = double.abs().max()
+        assert scale > 1e-3, f"{name}: the test sees nothing"
+        error = ((single - double).abs().max() / scale).item()
+        table.setdefault(name, {})[column] = error
+        assert error <= TOLERANCE, name
 
 
-def test_rays_have_the_gradients_of_the_reference(renderer):
+@pytest.fixture(scope="module")
+def errors(pytestconfig):
+    """Greatest errors of gradients over the largest number of their class: the table of docs/python.md."""
+    table = {}
+    yield table
+    columns = sorted({column for row in table.values() for column in row})
+    with pytestconfig.pluginmanager.getplugin("capturemanager").global_and_fixture_disabled():
+        print("\n| gradient |", " | ".join(columns), "|")
+        print("|---|" + "---|" * len(columns))
+        for name, row in table.items():
+            print(f"| {name} |", " | ".join(f"{row[c]:.1e}" if c in row else "" for c in columns), "|")
+
+
+def test_the_reference_has_the_gradients_of_differences():
+    arrays = random_arrays(count=3, sh_degree=1)
+    arrays["origins"], arrays["directions"] = np.array([0.1, -0.2, -2.5]), np.array([0.02, 0.05, 1.1])
+    inputs = [torch.tensor(v, requires_grad=True) for v in arrays.values()]
+
+    def ray(*values):
+        given = dict(zip(arrays, values))
+        return reference.trace(torch, given, given["origins"], given["directions"], QUANTILE, peak=True)
+
+    assert ray(*inputs)[1] > 0.3
+    assert torch.autograd.gradcheck(ray, inputs)
+
+
+def test_rays_have_the_gradients_of_the_reference(renderer, errors):
     rng = np.random.default_rng(4)
     origins = rng.normal(size=(40, 3))
     origins *= 2.5 / np.linalg.norm(origins, axis=1, keepdims=True)
@@ -56,8 +90,7 @@ def test_rays_have_the_gradients_of_the_reference(renderer):
         for o, d in zip(double["origins"], double["directions"])
     ]
     loss(torch.stack([c for c, _ in rows]), torch.stack([torch.as_tensor(a) for _, a in rows])).backward()
-    for name, each in single.items():
-        assert_close(name, each.grad, double[name].grad)
+    assert_close(single, double, errors, "rays")
     assert not seen.hits.requires_grad and seen.hits.max() >= 3
 
 
@@ -73,7 +106,7 @@ def pose(parameters):
     return torch.cat([top, torch.stack([zero, zero, zero, one])[None]])
 
 
-def test_views_and_poses_have_the_gradients_of_the_reference(renderer):
+def test_views_and_poses_have_the_gradients_of_the_reference(renderer, errors):
     camera = rs.Camera(6, 5, 7.0)
     single, double = leaves({**random_arrays(sh_degree=1), "pose": np.array([0.2, -0.3, 0.1, 0.05, 2.4])})
     weights = torch.tensor(np.random.default_rng(5).normal(size=(5, 6, 4)), dtype=torch.float32)
@@ -91,8 +124,7 @@ def test_views_and_poses_have_the_gradients_of_the_reference(renderer):
     expected = torch.stack([torch.cat([c, torch.as_tensor(a).reshape(1)]) for c, a in rows]).reshape(5, 6, 4)
     (expected * weights).sum().backward()
     assert (rgba - expected).abs().max() < 2e-5
-    for name, each in single.items():
-        assert_close(name, each.grad, double[name].grad)
+    assert_close(single, double, errors, "views")
 
 
 def test_earlier_passes_are_run_again(renderer):
@@ -105,6 +137,16 @@ def test_earlier_passes_are_run_again(renderer):
     total = sum(renderer.render(camera, **single).rgba.sum() for camera in views)
     (together,) = torch.autograd.grad(total, [single["means"]])
     assert torch.allclose(together, apart[0] + apart[1], rtol=1e-5, atol=1e-4 * together.abs().max())
+
+
+def test_gradients_of_gradients_are_refused(renderer):
+    single, _ = leaves(random_arrays())
+    camera = rs.Camera(4, 4, 4.0, translation=(0, 0, 3))
+    origins, directions = torch.tensor([[0.0, 0.0, -3.0]]), torch.tensor([[0.0, 0.0, 1.0]])
+    for seen in (renderer.render(camera, **single).rgba, renderer.trace(origins, directions, **single).color):
+        (slope,) = torch.autograd.grad(seen.square().sum(), [single["means"]], create_graph=True)
+        with pytest.raises(RuntimeError, match="once_differentiable"):
+            slope.square().sum().backward()
 
 
 def test_wrong_tensors_are_refused_in_one_sentence(renderer):
@@ -158,6 +200,20 @@ def test_rasterization_gives_what_the_tracer_gives(context):
         assert scene[name].grad.abs().max() > 0, name
     with pytest.raises(KeyError, match="means2d"):
         meta["means2d"]
+
+
+def test_rasterization_keeps_few_renderers():
+    scene = gsplat_scene(views=1)
+    rt.rasterization(**scene, near_plane=0.5)
+    kept = weakref.ref(next(reversed(_rasterization._renderers.values())))
+    for near_plane in (0.51, 0.52, 0.53):
+        rt.rasterization(**scene, near_plane=near_plane)
+    rt.rasterization(**scene, near_plane=0.5)
+    assert kept() is next(reversed(_rasterization._renderers.values()))
+    for near_plane in (0.54, 0.55, 0.56, 0.57):
+        rt.rasterization(**scene, near_plane=near_plane)
+    gc.collect()
+    assert kept() is None and len(_rasterization._renderers) == _rasterization._MOST_RENDERERS
 
 
 def test_rasterization_has_depths_and_harmonics():

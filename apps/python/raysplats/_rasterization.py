@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """raysplats.torch.rasterization: gsplat's call, answered by ray tracing."""
 
+import collections
+
 import torch
 
 from . import _raysplats as rs
@@ -11,7 +13,9 @@ _MOST_OPACITY = 1 - 1e-6
 _LEAST_OPACITY = 1e-6
 _MODES = ("RGB", "D", "ED", "RGB+D", "RGB+ED")
 _CAMERA_MODELS = {"pinhole": "pinhole", "ortho": "orthographic", "fisheye": "fisheye"}
-_renderers = {}
+# Each holds a model and its pictures on the device: scripts have few sets of options at a time.
+_MOST_RENDERERS = 4
+_renderers = collections.OrderedDict()  # the one used last at the end
 
 
 class _Meta(dict):
@@ -35,7 +39,8 @@ def _option_names():
 
 
 def _renderer(options, near_plane, depth):
-    """The renderer of these options, which later calls find again; all share a context."""
+    """The renderer of these options, which later calls find again while it is among the last used; all share a
+    context."""
     from .torch import Renderer
 
     chosen = rs.TraceOptions(hit_order="peak", adaptive_radius=True)
@@ -47,6 +52,9 @@ def _renderer(options, near_plane, depth):
     if key not in _renderers:
         context = next((each.context for each in _renderers.values()), None)
         _renderers[key] = Renderer(context, chosen)
+    _renderers.move_to_end(key)
+    if len(_renderers) > _MOST_RENDERERS:
+        _renderers.popitem(last=False)
     return _renderers[key]
 
 

@@ -6,13 +6,15 @@
     rgba[..., :3].sub(photo).abs().mean().backward()
 
 Tensors are float32. Those on the CPU are read where they are; others are copied to the host and the results back.
-Gradients of depths are not computed, and the set and the order of hits count as constant (docs/model.md).
+Gradients of depths and of gradients are not computed, and the set and the order of hits count as constant
+(docs/model.md).
 """
 
 import typing
 
 import numpy as np
 import torch
+from torch.autograd.function import once_differentiable
 
 from . import _raysplats as rs
 from ._rasterization import rasterization
@@ -96,6 +98,7 @@ class _View(torch.autograd.Function):
         return (_tensor(picture.rgba, like), *others)
 
     @staticmethod
+    @once_differentiable
     def backward(ctx, gradient, *_):
         viewmat, *parameters = ctx.saved_tensors
         found = ctx.renderer._view_slopes(ctx.camera, viewmat, parameters, ctx.ticket, gradient)
@@ -119,6 +122,7 @@ class _Rays(torch.autograd.Function):
         return _tensor(traced.color, origins), _tensor(traced.alpha, origins), depth, hits
 
     @staticmethod
+    @once_differentiable
     def backward(ctx, d_color, d_alpha, *_):
         origins, directions, *parameters = ctx.saved_tensors
         found = ctx.renderer._ray_slopes(
