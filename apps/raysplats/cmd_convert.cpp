@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -42,9 +41,9 @@ void run(Options& options) {
   if (options.rotate) changes.rotate_degrees = vector_of(*options.rotate);
   if (options.translate) changes.translate = vector_of(*options.translate);
   if (options.crop_min || options.crop_max) {
-    const glm::dvec3 all(std::numeric_limits<double>::infinity());
-    changes.crop = CropBox{options.crop_min ? vector_of(*options.crop_min) : -all,
-                           options.crop_max ? vector_of(*options.crop_max) : all};
+    changes.crop.emplace();
+    if (options.crop_min) changes.crop->low = vector_of(*options.crop_min);
+    if (options.crop_max) changes.crop->high = vector_of(*options.crop_max);
   }
   const ModelSource source = find_model(options.input);
   std::optional<TraceOptions> trace = source.header;

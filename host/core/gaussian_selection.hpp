@@ -3,21 +3,16 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
 #include "raysplats/gaussians.hpp"
+#include "raysplats/model_changes.hpp"
 
 namespace raysplats {
 
 /// The Gaussians of these indices, in this order.
 Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indices);
-
-/// An axis-aligned box.
-struct CropBox {
-  glm::dvec3 low{0.0}, high{0.0};
-};
 
 /// The Gaussians whose means lie within the box, borders included.
 Gaussians within(const Gaussians& model, const CropBox& box);

@@ -24,15 +24,15 @@ struct ModelEncoding {
   int spz_version = 3;  ///< to write: 3 or 4
 };
 
-/// Reads Gaussians from a 3DGS PLY, PlayCanvas' compressed PLY, .splat, SPZ (1 to 4) or glTF with
-/// KHR_gaussian_splatting, recognised by their first bytes, .splat by its name. glTF is turned to
-/// the y down of captures. Throws DataError for anything malformed, truncated, non-finite or
-/// oversized.
+/// Reads Gaussians from a 3DGS PLY, PlayCanvas' compressed PLY and SOG, .splat, SPZ (1 to 4) or
+/// glTF with KHR_gaussian_splatting, recognised by their first bytes, .splat by its name. glTF is
+/// turned to the y down of captures. Throws DataError for anything malformed, truncated, non-finite
+/// or oversized.
 Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding = {});
 
-/// Writes atomically what the name's extension says: .ply, .compressed.ply, .splat, .spz or .glb.
-/// `trace` and `origin` as for write_ply(); other formats do not keep them. Throws UsageError for
-/// other names, DataError for numbers that are not finite and for what the format cannot hold.
+/// Writes atomically what the name's extension says: .ply, .compressed.ply, .splat, .spz, .sog or
+/// .glb. `trace` and `origin` as for write_ply(); other formats do not keep them. Throws UsageError
+/// for other names, DataError for numbers that are not finite and for what the format cannot hold.
 void write_model(const std::filesystem::path& path,
                  const Gaussians& model,
                  const ModelEncoding& encoding = {},

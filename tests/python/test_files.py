@@ -104,3 +104,24 @@ def test_pictures_by_own_functions(tmp_path):
             rs.write_image(tmp_path / "b.png", np.zeros((2, 3, 4), np.float32))
     finally:
         rs.set_image_functions(_images.read, _images.encode)
+
+
+def test_changes_are_those_of_convert(arrays):
+    arrays["means"][0] = (1, 0, 0)
+    g = as_gaussians(arrays)
+    turned = g.changed(scale=2, rotate=(0, 0, 90), translate=(0, 0, 3), sh_degree=1)
+    expected = 2 * g.means @ np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]) + (0, 0, 3)
+    assert np.abs(turned.means - expected).max() < 1e-5 and turned.sh_degree == 1
+    assert np.abs(turned.log_scales - g.log_scales - np.log(2)).max() < 1e-5
+    # Degree 1 is -y, z, -x of the direction: x goes to y, y to -x.
+    assert np.abs(turned.sh[:, 1] - g.sh[:, 3]).max() < 1e-5 and np.abs(turned.sh[:, 3] + g.sh[:, 1]).max() < 1e-5
+    assert np.abs(g.changed(up=(1, 0, 0)).means[0] - (0, -1, 0)).max() < 1e-6
+    assert np.array_equal(g.changed(crop_min=(0.9, -1, -1)).means, g.means[:1])
+    assert len(g.changed(crop_min=(-1, -1, -1), crop_max=(0.9, 1, 1))) == len(g) - 1
+    bright = 1 / (1 + np.exp(-g.opacities)) >= 0.5
+    assert np.array_equal(g.changed(min_opacity=0.5).means, g.means[bright])
+    assert len(g.changed(max_gaussians=3)) == 3 and np.array_equal(g.changed().sh, g.sh)
+    with pytest.raises(rs.UsageError, match="scale is above 0"):
+        g.changed(scale=0)
+    with pytest.raises(rs.UsageError, match="no direction"):
+        g.changed(up=(0, 0, 0))

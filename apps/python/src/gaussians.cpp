@@ -14,6 +14,7 @@
 #include "names.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "raysplats/model_changes.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -88,6 +89,34 @@ void bind_views(nb::class_<Gaussians>& type) {
           "(N, (sh_degree + 1)^2, 3), coefficients of spherical harmonics; a view.");
 }
 
+using Triple = std::array<double, 3>;
+
+glm::dvec3 vector_of(const Triple& t) { return {t[0], t[1], t[2]}; }
+
+Gaussians change(const Gaussians& self,
+                 const std::optional<double>& min_opacity,
+                 const std::optional<Triple>& up,
+                 double scale,
+                 const Triple& rotate,
+                 const Triple& translate,
+                 const std::optional<Triple>& crop_min,
+                 const std::optional<Triple>& crop_max,
+                 const std::optional<std::size_t>& max_gaussians,
+                 const std::optional<int>& sh_degree) {
+  ModelChanges changes;
+  changes.min_opacity = min_opacity;
+  if (up) changes.up = vector_of(*up);
+  changes.scale = scale;
+  changes.rotate_degrees = vector_of(rotate);
+  changes.translate = vector_of(translate);
+  if (crop_min || crop_max) changes.crop.emplace();
+  if (crop_min) changes.crop->low = vector_of(*crop_min);
+  if (crop_max) changes.crop->high = vector_of(*crop_max);
+  changes.max_gaussians = max_gaussians;
+  changes.sh_degree = sh_degree;
+  return changed(self, changes);
+}
+
 }  // namespace
 
 Gaussians gaussians_of(const FloatArray& means,
@@ -143,11 +172,20 @@ void bind_gaussians(nb::module_& module) {
           nb::arg("origin") = std::array<double, 3>{}, nb::kw_only(), nb::arg("spz_axes") = "ply",
           nb::arg("spz_version") = ModelEncoding{}.spz_version,
           nb::call_guard<nb::gil_scoped_release>(),
-          "Writes .ply, .compressed.ply, .splat, .spz or .glb. `options` and the `origin` from "
-          "which positions "
-          "count, as Dataset.origin, go into the header of a PLY.")
+          "Writes .ply, .compressed.ply, .splat, .spz, .sog or .glb. `options` and the `origin` "
+          "from which positions count, as Dataset.origin, go into the header of a PLY.")
       .def_static("load_origin", &read_ply_origin, nb::arg("path"),
                   "The origin in the header of a PLY; 0 where it says none.")
+      .def("changed", &change, nb::kw_only(), nb::arg("min_opacity") = nb::none(),
+           nb::arg("up") = nb::none(), nb::arg("scale") = 1.0, nb::arg("rotate") = Triple{},
+           nb::arg("translate") = Triple{}, nb::arg("crop_min") = nb::none(),
+           nb::arg("crop_max") = nb::none(), nb::arg("max_gaussians") = nb::none(),
+           nb::arg("sh_degree") = nb::none(), nb::call_guard<nb::gil_scoped_release>(),
+           "A copy with the changes of `raysplats convert`, in this order: fainter Gaussians than "
+           "`min_opacity` (0 to 1) are left out, the direction `up` becomes -y, then come `scale`, "
+           "`rotate` (degrees about x, then y, then z) and `translate`, harmonics included; the "
+           "box from `crop_min` to `crop_max` cuts the result, `max_gaussians` keeps those that "
+           "contribute most, and `sh_degree` drops bands or adds zeros.")
       .def("with_sh_degree", &with_sh_degree, nb::arg("degree"),
            "A copy with bands added (zero) or dropped.")
       .def_ro("sh_degree", &Gaussians::sh_degree)

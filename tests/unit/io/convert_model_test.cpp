@@ -83,7 +83,26 @@ TEST_CASE("conversion turns what is up to -y, harmonics as well") {
   const double length = std::sqrt(0.5);
   CHECK(farthest(changed(pointer, changes).means, {0, static_cast<float>(-length), 0}) < 1e-6);
   changes.up = glm::dvec3(0.0);
-  CHECK(contains(usage_error([&] { changed(model, changes); }), "--up"));
+  CHECK(contains(usage_error([&] { changed(model, changes); }), "up 0,0,0"));
+}
+
+TEST_CASE("changes out of range are refused, and half a box is half of space") {
+  Gaussians model = trained_like(2, 1);
+  model.means = {-1, 0, 0, 1, 0, 0};
+  const auto refused = [&](const auto& change) {
+    ModelChanges changes;
+    change(changes);
+    return usage_error([&] { changed(model, changes); });
+  };
+  CHECK(contains(refused([](ModelChanges& c) { c.scale = 0.0; }), "scale is above 0"));
+  CHECK(contains(refused([](ModelChanges& c) { c.scale = std::nan(""); }), "scale is above 0"));
+  CHECK(contains(refused([](ModelChanges& c) { c.min_opacity = 1.5; }), "min-opacity is 0 to 1"));
+  CHECK(contains(refused([](ModelChanges& c) { c.sh_degree = 5; }), "sh-degree is 0 to 4"));
+  CHECK(!refused([](ModelChanges& c) { c.translate.x = HUGE_VAL; }).empty());
+  ModelChanges half;
+  half.crop.emplace().low.x = 0.0;
+  REQUIRE(changed(model, half).size() == 1);
+  CHECK(changed(model, half).means[0] == 1.0f);
 }
 
 TEST_CASE("conversion keeps those that contribute most, in their order") {

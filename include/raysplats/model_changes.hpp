@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <optional>
+
+#include "raysplats/gaussians.hpp"
+
+namespace raysplats {
+
+/// An axis-aligned box; by default all space.
+struct CropBox {
+  glm::dvec3 low{-std::numeric_limits<double>::infinity()};
+  glm::dvec3 high{std::numeric_limits<double>::infinity()};
+};
+
+/// What `raysplats convert` changes of a model, in this order.
+struct ModelChanges {
+  std::optional<double> min_opacity;  ///< 0 to 1: fainter Gaussians are left out
+  std::optional<glm::dvec3> up;       ///< this direction becomes up, the -y of model files
+  double scale = 1.0;                 ///< above 0
+  glm::dvec3 rotate_degrees{0.0};     ///< about the axes x, then y, then z
+  glm::dvec3 translate{0.0};          ///< world units
+  std::optional<CropBox> crop;        ///< in the coordinates of the result, borders included
+  /// Those that contribute most to pictures from anywhere: by opacity times the area of the
+  /// ellipsoid's largest section.
+  std::optional<std::size_t> max_gaussians;
+  std::optional<int> sh_degree;  ///< 0 to 4: bands are dropped, or added as zero
+};
+
+/// The model with these changes; what is left keeps its order, and harmonics turn as well. Throws
+/// UsageError for a number out of range and for an `up` of length 0.
+Gaussians changed(const Gaussians& model, const ModelChanges& changes);
+
+}  // namespace raysplats
