@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# What CI checks beside the test suite: the Python module, processes under mpirun, the viewer in a browser, and the form of the kernels that GPUs get,
+# What CI checks beside the test suite: the Python module, the Debian packages, processes under mpirun, the viewer in a browser, and the form of the kernels that GPUs get,
 # without a GPU. Each leg ends with PASS, FAIL or SKIPPED (what it needs cannot be had here: a failed download is no failure)
 # and its seconds.
 # usage: scripts/ci.sh [BUILD]     (default: build/release, with the tests built)
@@ -74,6 +74,7 @@ intel_cpu() {
 browser() { ./scripts/test_browser.sh "$build/bin/raysplats"; }
 
 leg "Python" python_module
+leg "packages" ./scripts/test_package.sh "$build"
 leg "MPI" ./scripts/test_mpi.sh "$build"
 leg "GPU path on this OpenCL" gpu_path
 leg "Intel's OpenCL for CPUs" intel_cpu
