@@ -93,6 +93,7 @@ std::unique_ptr<view::RunView> show(Context& context,
                                     const std::array<double, 3>& origin) {
   const Mirrors mirrors = load_mirrors(options.train.mirrors, options.train.mirror_bounces, origin);
   std::vector<Camera> cameras;
+  cameras.reserve(views.size());
   for (const View& each : views) cameras.push_back(each.camera);
   view::ViewState state = view::first_look(view::extent_before(cameras), cameras, std::nullopt);
   state.name = std::filesystem::path(options.output).filename().string();

@@ -94,6 +94,7 @@ void OptionTable::choice(const std::string& name,
                          const std::vector<std::pair<std::string, E>>& names,
                          const std::string& help) {
   std::vector<std::string> labels;
+  labels.reserve(names.size());
   for (const auto& each : names) labels.push_back(each.first);
   add_choice(
       name, std::move(labels), help,

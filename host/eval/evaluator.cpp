@@ -172,6 +172,7 @@ std::vector<std::size_t> spread(const std::vector<std::size_t>& indices, std::si
 
 std::vector<std::string> names_of(const Dataset& dataset, const std::vector<std::size_t>& views) {
   std::vector<Camera> cameras;
+  cameras.reserve(views.size());
   for (const std::size_t view : views) cameras.push_back(dataset.views[view].camera);
   return frame_names(cameras);
 }

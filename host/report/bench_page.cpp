@@ -116,7 +116,7 @@ std::string bench_page(const BenchReport& report) {
   }
   if (!report.left_out.empty()) {
     body += "<p class=\"warn\">Left out, they would not have ended in time:";
-    for (const std::string& id : report.left_out) body += " " + escaped(id);
+    for (const std::string& id : report.left_out) body += fmt::format(" {}", escaped(id));
     body += "</p>\n";
   }
   return page("Benchmark of " + report.device, body);

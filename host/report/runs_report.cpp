@@ -58,6 +58,7 @@ std::string numbers_row(const std::string& what,
                         const std::function<double(const Run&)>& value,
                         bool greatest_wins = false) {
   std::vector<double> numbers;
+  numbers.reserve(runs.size());
   for (const Run& run : runs) numbers.push_back(value(run));
   const double most = *std::max_element(numbers.begin(), numbers.end());
   std::string out = fmt::format("<tr><th>{}</th>", escaped(what));
@@ -107,10 +108,12 @@ std::string charts(const std::vector<Run>& runs) {
   const auto of_evaluations = [&](const char* title, const char* label, const char* x,
                                   const char* y) {
     std::vector<Curve> curves;
+    curves.reserve(runs.size());
     for (const Run& run : runs) curves.push_back(evaluated(run.letter, run.evaluations, x, y));
     return chart(title, label, curves);
   };
   std::vector<std::map<std::string, std::vector<double>>> columns;
+  columns.reserve(runs.size());
   for (const Run& run : runs) columns.push_back(columns_of(run.folder / "metrics.csv"));
   const auto of_columns = [&](const char* title, const char* x, const char* label, const char* y) {
     std::vector<Curve> curves;

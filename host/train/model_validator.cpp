@@ -51,7 +51,7 @@ std::string ModelValidator::find_fault(const DeviceGaussians& gaussians,
          {std::pair(&gaussians[group], name),
           std::pair(&adam.first_moment(group), "first moments of " + name),
           std::pair(&adam.second_moment(group), "second moments of " + name)}) {
-      const std::string fault = find_non_finite(*values, what, width);
+      std::string fault = find_non_finite(*values, what, width);
       if (!fault.empty()) return fault;
     }
   }

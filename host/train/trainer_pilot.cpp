@@ -24,10 +24,11 @@ constexpr double kCoarseShare = 0.2;     // of the time for steps that coarse on
 constexpr double kFullShare = 0.5;       // and these together with those at full size
 constexpr int kMostPasses = 12;          // that double the count
 constexpr std::int64_t kLeastIterations = 10;
-constexpr double kShortRun = 20;     // seconds of a run that is not worth more measuring
-constexpr double kFillShare = 0.5;   // of the limit that a start takes at most
-constexpr double kTimedShare = 0.1;  // of a run, once its steps are alike, that is timed
-constexpr double kLatestEnd = 2;     // of the iterations that were planned
+constexpr double kShortRun = 20;    // seconds of a run that is not worth more measuring
+constexpr double kFillShare = 0.5;  // of the limit that a start takes at most
+constexpr std::int64_t kFewIterations = 500;
+constexpr double kTimedShare = 0.05;  // of a run, once its steps are alike, that is timed
+constexpr double kLatestEnd = 2;      // of the iterations that were planned
 
 class Timer {
  public:
@@ -37,6 +38,12 @@ class Timer {
  private:
   Stopwatch watch_;
 };
+
+// Of a run that is given so little time that steps at full size would be few.
+const std::vector<ResolutionStep>& coarse_schedule() {
+  static const std::vector<ResolutionStep> schedule{{4, 0.2}, {3, 0.5}, {2, 0.9}};
+  return schedule;
+}
 
 double mean_pixels(const std::vector<Camera>& cameras) {
   double sum = 0;
@@ -243,6 +250,11 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
         seconds, kLeastIterations, pilot.seconds + least));
   }
   options.iterations = iterations_within(left, kLeastIterations, duration);
+  if (options.iterations < kFewIterations &&
+      options.resolution_schedule == TrainOptions().resolution_schedule) {
+    options.resolution_schedule = coarse_schedule();
+    options.iterations = iterations_within(left, kLeastIterations, duration);
+  }
   options.max_gaussians = static_cast<std::int64_t>(most_gaussians(options.iterations));
   first_model.reset();  // it was made for another limit
   follow_options();

@@ -71,10 +71,10 @@ std::uint32_t id_of(const Json& json) {
 void set_pose(Camera& camera, const std::array<double, 12>& c2w) {
   glm::dmat3 axes;
   glm::dvec3 eye;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column)
-      axes[column][row] = c2w[static_cast<std::size_t>(4 * row + column)];
-    eye[row] = c2w[static_cast<std::size_t>(4 * row + 3)];
+  for (glm::length_t row = 0; row < 3; ++row) {
+    const double* values = c2w.data() + 4 * row;
+    for (glm::length_t column = 0; column < 3; ++column) axes[column][row] = values[column];
+    eye[row] = values[3];
   }
   const glm::dmat3 off = glm::transpose(axes) * axes - glm::dmat3(1.0);
   for (int column = 0; column < 3; ++column) {

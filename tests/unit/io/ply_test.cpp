@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -48,7 +49,7 @@ std::string header(const std::string& format,
                    const std::string& type = "float") {
   std::string text =
       "ply\nformat " + format + " 1.0\nelement vertex " + std::to_string(count) + "\n";
-  for (const std::string& name : properties) text += "property " + type + " " + name + "\n";
+  for (const std::string& name : properties) text += fmt::format("property {} {}\n", type, name);
   return text + "end_header\n";
 }
 
@@ -63,7 +64,7 @@ void put_big_endian(std::string& bytes, T value) {
 std::string error_of(const std::string& content) {
   const Scratch scratch;
   write_bytes(scratch / "bad.ply", content);
-  const std::string message = data_error([&] { read_ply(scratch / "bad.ply"); });
+  std::string message = data_error([&] { read_ply(scratch / "bad.ply"); });
   INFO(message);
   CHECK(contains(message, "bad.ply"));
   CHECK(message.find('\n') == std::string::npos);
@@ -249,7 +250,8 @@ TEST_CASE("malformed models are refused with a sentence that says what is wrong"
                  "not a whole number"));
   for (const float bad :
        {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
-    std::string bytes = header("binary_little_endian", 3, kProperties) + row + row + row;
+    std::string bytes = header("binary_little_endian", 3, kProperties);
+    for (int i = 0; i < 3; ++i) bytes += row;
     std::memcpy(bytes.data() + bytes.size() - row.size() + 2 * sizeof(float), &bad, sizeof(float));
     CHECK(contains(error_of(bytes), "'z' of Gaussian 2 is not finite"));
   }

@@ -110,6 +110,28 @@ TEST_CASE("a run by time names its length, and a replay of its configuration giv
   check_equal(trainer.model(), again.model());
 }
 
+TEST_CASE("a run by time of few iterations sees small photos for longer, unless told otherwise") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data";
+  make_photos(data, 256, 8, 1);
+  const auto planned = [&](const TrainOptions& options, const std::string& name) {
+    Trainer trainer(context(), load_dataset(data), options, folder.path() / name);
+    trainer.fit_time(4);
+    trainer.step();
+    trainer.save();
+    TrainOptions used;
+    read_train_config(folder.path() / name / "config.toml", used);
+    return used;
+  };
+  TrainOptions options;
+  const TrainOptions chosen = planned(options, "chosen");
+  // On a device that makes many iterations in this time nothing is to be chosen.
+  const bool kept = chosen.resolution_schedule == options.resolution_schedule;
+  CHECK((kept ? chosen.iterations >= 500 : chosen.resolution_schedule.back().until.value == 0.9));
+  options.resolution_schedule = {{2, 0.3}};
+  CHECK(planned(options, "given").resolution_schedule == options.resolution_schedule);
+}
+
 TEST_CASE("a run ends where it is told to, with the schedules of its iterations") {
   const TemporaryDirectory folder;
   const fs::path data = folder.path() / "data";
