@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "core/camera_check.hpp"
 #include "core/camera_path.hpp"
 #include "core/morton_order.hpp"
 #include "core/orbit.hpp"
@@ -31,9 +32,9 @@ namespace {
 void check(const RenderFlags& options) {
   options.frame_options();
   const std::pair<const char*, bool> of_scenes[] = {
-      {"--samples", options.samples.has_value()},
-      {"--max-bounces", options.max_bounces.has_value()},
-      {"--seed", options.seed.has_value()},
+      {"--samples", options.render.has("samples")},
+      {"--max-bounces", options.render.has("max-bounces")},
+      {"--seed", options.render.has("seed")},
       {"--frames", !options.frames.empty()}};
   for (const auto& [name, given] : of_scenes) {
     if (given) {
@@ -316,14 +317,14 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->add_option("--width", options->width,
                    "Pixels (800, or the data set's; one side alone keeps the shape)")
       ->group(orbit)
-      ->transform(whole_between(1, 65536));
+      ->transform(whole_between(1, kMaxSide));
   command->add_option("--height", options->height, "Pixels")
       ->group(orbit)
-      ->transform(whole_between(1, 65536));
+      ->transform(whole_between(1, kMaxSide));
   command
       ->add_option("--fov", options->fov, "Degrees along the smaller side (45, or the data set's)")
       ->group(orbit)
-      ->transform(between(0.1, 360));
+      ->transform(between(kLeastFov, most_fov(CameraModel::kFisheye)));
   command
       ->add_option("--elevation", options->elevation,
                    "Degrees above the centre (20, or the cameras' median)")
@@ -345,15 +346,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("X,Y,Z");
 
   const std::string scene = "Scene files (over what they say)";
-  command->add_option("--samples", options->samples, "Rays per pixel")
-      ->group(scene)
-      ->transform(whole_between(1, 65536));
-  command->add_option("--max-bounces", options->max_bounces, "Surfaces that a path may meet")
-      ->group(scene)
-      ->transform(whole_between(1, 1000));
-  command->add_option("--seed", options->seed, "Of everything that is random")
-      ->group(scene)
-      ->transform(seed());
+  add_render_flags(*command, options->render, scene);
   command
       ->add_option("--frames", options->frames,
                    "Only the frames from START up to END, which is left out; either may be empty")

@@ -18,6 +18,7 @@
 #include "base/nearest_name.hpp"
 #include "base/number_text.hpp"
 #include "base/progress.hpp"
+#include "core/camera_check.hpp"
 #include "core/option_flags.hpp"
 #include "train/train_keys.hpp"
 
@@ -158,6 +159,11 @@ void add_trace_flags(CLI::App& app, TraceSettings& settings) {
 
 void add_traversal_flag(CLI::App& app, TraceSettings& settings) {
   add_setting(app, settings, "traversal");
+}
+
+void add_render_flags(CLI::App& app, GivenRenderSettings& settings, const std::string& group) {
+  for (const char* name : {"samples", "max-bounces", "seed"})
+    add_setting(app, settings, name)->group(group);
 }
 
 std::string with_compiling(const std::string& text, double seconds) {
@@ -421,7 +427,7 @@ std::pair<int, int> parse_resolution(const std::string& text) {
   if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') {
     const auto second = std::from_chars(first.ptr + 1, end, height);
     if (second.ec == std::errc() && second.ptr == end && width > 0 && height > 0 &&
-        width <= 65536 && height <= 65536) {
+        width <= kMaxSide && height <= kMaxSide) {
       return {width, height};
     }
   }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "comm/communicator.hpp"
+#include "core/render_rows.hpp"
 #include "core/trace_rows.hpp"
 #include "device/context.hpp"
 #include "io/data_rows.hpp"
@@ -80,6 +81,9 @@ std::unique_ptr<Context> open_context(const DeviceFlags& flags, const DeviceInfo
 void add_trace_flags(CLI::App& app, TraceSettings& settings);
 /// --traversal, for commands that trace cameras by either way.
 void add_traversal_flag(CLI::App& app, TraceSettings& settings);
+
+/// Of scene files, under a heading: --samples, --max-bounces and --seed.
+void add_render_flags(CLI::App& app, GivenRenderSettings& settings, const std::string& group);
 
 /// `text`, and how long kernels were compiled where that is worth mentioning.
 std::string with_compiling(const std::string& text, double seconds);

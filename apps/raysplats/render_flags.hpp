@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 
+#include "core/render_rows.hpp"
 #include "eval/frame_writer.hpp"
 #include "options.hpp"
 
@@ -42,9 +42,7 @@ struct RenderFlags {
   std::optional<double> distance;
   std::optional<std::string> up;
   std::optional<std::string> camera_model;
-  std::optional<int> samples;
-  std::optional<int> max_bounces;
-  std::optional<std::uint64_t> seed;
+  GivenRenderSettings render;
   std::string frames;
   TraceSettings trace;
   DeviceFlags device;

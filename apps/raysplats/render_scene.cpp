@@ -187,9 +187,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   override_camera(flags, file, fps);
   file.trained = flags.trace.over(file.trace.over(file.trained));
   file.trace = {};
-  if (flags.samples) file.render.samples = *flags.samples;
-  if (flags.max_bounces) file.render.max_bounces = *flags.max_bounces;
-  if (flags.seed) file.render.seed = *flags.seed;
+  file.render = flags.render.over(file.render);
   const LoadedScene loaded = load_scene(file);
   const auto [first, last] = parse_frames(flags.frames, loaded.cameras.size());
   if (!file.camera.file.empty() && !flags.output.empty())

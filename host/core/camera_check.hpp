@@ -7,6 +7,16 @@
 
 namespace raysplats {
 
+/// Of a picture: 24 bits of a float still tell apart the sixteenths of its last pixel.
+constexpr int kMaxSide = 1 << 20;
+
+/// Fields of view that an option or a file may ask for, in degrees: from kLeastFov to most_fov().
+constexpr double kLeastFov = 0.001;
+/// 360 for kFisheye; a plane ends before 180.
+constexpr double most_fov(CameraModel model) {
+  return model == CameraModel::kFisheye ? 360.0 : 179.9;
+}
+
 /// Throws DataError, which names `what` ("the camera of a.png"), for a camera that no photo can
 /// have been taken with: one that is more than 1e9 from the origin or whose lens moves the corner
 /// of the picture to a thousand times its distance from the centre.

@@ -37,6 +37,14 @@ const OptionRow* find_row(const std::vector<OptionRow>& rows, const std::string&
   return found == rows.end() ? nullptr : &*found;
 }
 
+void check_values(const std::vector<OptionRow>& rows) {
+  for (const OptionRow& row : rows) {
+    std::string text = row.text();
+    std::erase(text, '"');
+    row.set({text});
+  }
+}
+
 template <class T>
 T option_number(const std::string& key, const std::string& text, double low, double high) {
   std::optional<T> value;
@@ -179,22 +187,23 @@ void OptionTable::words(const std::string& name, std::string& target, const std:
 
 void OptionTable::color(const std::string& name,
                         std::array<float, 3>& target,
-                        const std::string& help) {
+                        const std::string& help,
+                        double high) {
   add(
       name, help,
-      [name, &target](const Values& values) {
+      [name, &target, high](const Values& values) {
         const std::optional<std::vector<std::string>> parts = list_items(values);
         std::array<float, 3> color{};
         bool good = parts && (parts->size() == 3 || parts->size() == 1);
         for (std::size_t k = 0; good && k < color.size(); ++k) {
           const std::optional<double> value = parse_real(parts->at(parts->size() == 1 ? 0 : k));
-          good = value && *value >= 0 && *value <= 1;
+          good = value && *value >= 0 && *value <= high;
           color[k] = static_cast<float>(value.value_or(0.0));
         }
         if (!good) {
           throw UsageError(
-              fmt::format("The option '{}' is three numbers from 0 to 1, as in 1,0.5,0, not '{}'",
-                          name, fmt::join(values, " ")));
+              fmt::format("The option '{}' is three numbers from 0 to {}, as in 1,0.5,0, not '{}'",
+                          name, high, fmt::join(values, " ")));
         }
         target = color;
       },

@@ -29,6 +29,11 @@ struct OptionRow {
 
 /// The row of that name, or null.
 const OptionRow* find_row(const std::vector<OptionRow>& rows, const std::string& name);
+/// Throws UsageError for a present value that its row would refuse, as programs may set it.
+void check_values(const std::vector<OptionRow>& rows);
+
+/// Of options that are 64 bits; rounded, the type ends there.
+constexpr double kMaxSeed = 0x1p64;
 
 /// A number in the spellings of number_text.hpp. Throws UsageError that names the key and the
 /// range.
@@ -63,8 +68,11 @@ class OptionTable {
   void text(const std::string& name, std::string& target, const std::string& help);
   /// A word, or numbers in any spelling of a list, kept as "r,g,b".
   void words(const std::string& name, std::string& target, const std::string& help);
-  /// Three numbers from 0 to 1, or one for a grey.
-  void color(const std::string& name, std::array<float, 3>& target, const std::string& help);
+  /// Three numbers from 0 to `high`, or one for a grey.
+  void color(const std::string& name,
+             std::array<float, 3>& target,
+             const std::string& help,
+             double high = 1);
   /// Absolute ones are kept, so that they are found from anywhere. A path may hold what separates
   /// the items of other lists, so that one value is one path.
   void paths(const std::string& name, std::vector<std::string>& target, const std::string& help);

@@ -13,6 +13,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "core/camera_check.hpp"
 #include "core/statistics.hpp"
 #include "raysplats/error.hpp"
 
@@ -47,12 +48,11 @@ void check(const OrbitOptions& options) {
     throw UsageError(
         "An orbit has no lens with OpenCV distortion: take cameras with distortion from a file");
   }
-  const bool fisheye = options.model == CameraModel::kFisheye;
   const double fov = options.fov_degrees;
-  if (!(fov > 0.0 && (fisheye ? fov <= 360.0 : fov < 180.0))) {
+  if (!(fov >= kLeastFov && fov <= most_fov(options.model))) {
     throw UsageError(
-        fmt::format("A field of view of {} degrees makes no image: choose one above 0 and {}", fov,
-                    fisheye ? "up to 360" : "below 180"));
+        fmt::format("A field of view of {} degrees makes no image: choose one from {} to {}", fov,
+                    kLeastFov, most_fov(options.model)));
   }
   if (!(std::abs(options.elevation_degrees) < 90.0)) {
     throw UsageError(

@@ -61,11 +61,7 @@ void check_packet_width(const TraceOptions& options) {
 void check_trace_options(TraceOptions options) {
   OptionTable table;
   add_trace_rows(table, options);
-  for (const OptionRow& row : table.take()) {
-    std::string text = row.text();
-    std::erase(text, '"');
-    row.set({text});
-  }
+  check_values(table.take());
 }
 
 float stopping_transmittance(const TraceOptions& options) {

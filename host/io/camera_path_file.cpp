@@ -27,7 +27,6 @@ constexpr double kFps = 30.0;
 constexpr double kMostFps = 1000.0;
 constexpr double kMostSeconds = 86400.0;
 constexpr double kMostFrames = 1e6;
-constexpr int kMostSide = 65536;
 constexpr double kRigid = 1e-2;  // deviation from a rotation that rounding may cause
 
 /// A path as a file has it, before anybody asks for other moments.
@@ -160,7 +159,7 @@ Stored read_json(const std::filesystem::path& path) {
   Stored out;
   out.model = model_of(path, json);
   const auto side = [&](const char* key, int otherwise) {
-    return static_cast<int>(number(path, json, key, 1, kMostSide, otherwise));
+    return static_cast<int>(number(path, json, key, 1, kMaxSide, otherwise));
   };
   out.width = side("render_width", out.width);
   out.height = side("render_height", out.height);
@@ -176,13 +175,14 @@ Stored read_json(const std::filesystem::path& path) {
   const Json* keys = list("keyframes");
   if (!frames && !keys) fail(path, "has neither 'camera_path' nor 'keyframes' with entries");
   out.frames = frames != nullptr;
-  const double fov = number(path, json, "default_fov", 0.1, 179.0, 50.0);
+  const double fov =
+      number(path, json, "default_fov", kLeastFov, most_fov(CameraModel::kPinhole), 50.0);
   const double transition = number(path, json, "default_transition_sec", 0, kMostSeconds, 1.0);
   for (const Json& entry : frames ? *frames : *keys) {
     if (!entry.is_object()) fail(path, "has an entry that is no object");
     Keyframe key;
     set_pose(path, matrix_of(path, entry, frames ? "camera_to_world" : "matrix"), key);
-    key.fov = number(path, entry, "fov", 0.1, 359.0, fov);
+    key.fov = number(path, entry, "fov", kLeastFov, 359.0, fov);
     key.seconds = flag(entry, "override_transition_enabled")
                       ? number(path, entry, "override_transition_sec", 0, kMostSeconds, transition)
                       : (frames ? 1.0 : transition);
@@ -196,8 +196,8 @@ Stored read_toml(const std::filesystem::path& path) {
   const toml::table root = io::read_toml(path);
   io::TomlTable table(root, path, "the camera path");
   Stored out;
-  table.number("width", out.width, 1, kMostSide);
-  table.number("height", out.height, 1, kMostSide);
+  table.number("width", out.width, 1, kMaxSide);
+  table.number("height", out.height, 1, kMaxSide);
   table.number("fps", out.fps, 1e-3, kMostFps);
   out.seconds = table.number("seconds", 1e-3, kMostSeconds);
   table.flag("closed", out.path.closed);
@@ -214,7 +214,7 @@ Stored read_toml(const std::filesystem::path& path) {
     const glm::dvec3 up = entry.direction("up").value_or(glm::dvec3(0, -1, 0));
     if (!(glm::length(glm::cross(glm::normalize(up), target - eye)) > 1e-9))
       entry.fail("up", "is along the view: eye, target and up have to span a plane");
-    entry.number("fov", key.fov, 0.1, 179.0);
+    entry.number("fov", key.fov, kLeastFov, most_fov(CameraModel::kPinhole));
     entry.number("seconds", key.seconds, 0, kMostSeconds);
     entry.finish();
     key.eye = eye;

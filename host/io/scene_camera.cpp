@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "core/camera_check.hpp"
 #include "core/camera_model.hpp"
 #include "io/data_rows.hpp"
 #include "io/toml_table.hpp"
@@ -21,7 +22,6 @@ using Source = SceneCamera::Source;
 
 constexpr int kSide = 800;
 constexpr double kFov = 45.0;
-constexpr int kMaxSide = 65536;
 constexpr double kHuge = 1e30;
 constexpr double kMaxFrames = 1e6;
 
@@ -37,7 +37,7 @@ void read_lens(io::TomlTable& table, SceneCamera& camera) {
   if (camera.model == CameraModel::kOrthographic) {
     camera.extent = table.number("extent", 1e-9, kHuge);
   } else if (camera.model != CameraModel::kEquirectangular) {
-    camera.fov = table.number("fov", 0.1, is_wide(camera.model) ? 360.0 : 179.0);
+    camera.fov = table.number("fov", kLeastFov, most_fov(camera.model));
     camera.focal = table.number("focal", 1e-3, 1e9);
     if (camera.fov && camera.focal) {
       table.fail("focal", "'fov' and 'focal' in [camera] say the same: leave one out");
@@ -75,14 +75,8 @@ void read_orbit(io::TomlTable table, SceneCamera& camera) {
 
 // A key of [camera] that is an option of data sets.
 void read_data_row(io::TomlTable& table, const char* key, SceneCamera& camera) {
-  const std::optional<std::vector<std::string>> values = table.values(key);
-  if (!values) return;
   const std::vector<OptionRow> rows = data_rows(camera.data_options);
-  try {
-    find_row(rows, key)->set(*values);
-  } catch (const UsageError& error) {
-    table.fail(key, fmt::format("{} ([camera])", error.what()));
-  }
+  table.option(key, find_row(rows, key)->set);
 }
 
 void read_views(io::TomlTable& table, SceneCamera& camera) {
@@ -203,7 +197,7 @@ std::vector<Camera> on_orbit(const SceneCamera& camera, const SceneExtent& exten
     lens.fov = 2.0 * std::atan(0.5 * std::min(shape.width, shape.height) / *camera.focal) * 180.0 /
                std::numbers::pi;
   }
-  shape.fov_degrees = std::min(*lens.fov, 90.0);
+  shape.fov_degrees = std::clamp(*lens.fov, kLeastFov, 90.0);
   if (camera.model == CameraModel::kOrthographic && !lens.extent) lens.extent = 2.0 * around.radius;
   std::vector<Camera> cameras = orbit_cameras(around, shape);
   for (Camera& each : cameras) set_lens(each, lens);

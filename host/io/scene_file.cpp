@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "base/nearest_name.hpp"
+#include "core/render_rows.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 
@@ -21,7 +22,6 @@ using io::TomlTable;
 using Kind = Material::Kind;
 
 constexpr double kHuge = 1e30;
-constexpr double kMaxColor = 1e6;
 
 Rgb rgb(const glm::dvec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
@@ -219,30 +219,17 @@ SceneEnvironment read_environment(TomlTable& table) {
   return out;
 }
 
-ShadowSettings read_shadows(TomlTable table) {
-  ShadowSettings s;
-  table.flag("mesh-on-mesh", s.mesh_on_mesh);
-  table.flag("mesh-on-gaussians", s.mesh_on_gaussians);
-  table.flag("gaussians-on-mesh", s.gaussians_on_mesh);
-  table.flag("gaussians-on-gaussians", s.gaussians_on_gaussians);
-  table.number("strength", s.strength, 0, 1);
-  table.finish();
-  return s;
+void read_rows(TomlTable& table, const std::vector<OptionRow>& rows) {
+  for (const OptionRow& row : rows) table.option(row.name, row.set);
 }
 
 RenderSettings read_render(TomlTable& table) {
   RenderSettings r;
-  table.number("samples", r.samples, 1, 65536);
-  table.number("max-bounces", r.max_bounces, 1, 1000);
-  table.number("min-throughput", r.min_throughput, 0, 1);
-  table.seed("seed", r.seed);
-  table.vector("ambient", r.ambient, 0, kMaxColor);
-  table.flag("indirect", r.indirect);
-  table.number("light-samples", r.light_samples, 1, 1024);
-  table.number("aperture", r.aperture, 0, kHuge);
-  table.number("focus-distance", r.focus_distance, 1e-9, kHuge);
-  table.number("bias", r.bias, 0, kHuge);
-  if (auto shadows = table.table("shadows")) r.shadows = read_shadows(std::move(*shadows));
+  read_rows(table, render_rows(r));
+  if (auto shadows = table.table("shadows")) {
+    read_rows(*shadows, shadow_rows(r.shadows));
+    shadows->finish();
+  }
   table.finish();
   return r;
 }
@@ -253,28 +240,23 @@ TraceSettings read_trace(TomlTable& table) {
     table.fail("q", "'q' and 'quantile' in [trace] say the same: leave one out");
   }
   const auto read = [&](const char* key, const char* name) {
-    const std::optional<std::vector<std::string>> values = table.values(key);
-    if (!values) return;
-    try {
-      t.set(name, *values);
-    } catch (const UsageError& error) {
-      table.fail(key, fmt::format("{} ([trace])", error.what()));
-    }
+    table.option(key, [&](const std::vector<std::string>& values) { t.set(name, values); });
   };
   read("q", "quantile");
-  for (const char* name :
-       {"quantile", "min-transmittance", "max-hits", "hit-order", "adaptive-radius", "background",
-        "packet-width", "packet-shape", "memory-budget", "launch-budget-ms"}) {
+  for (const char* name : {"quantile", "min-transmittance", "max-hits", "hit-order",
+                           "adaptive-radius", "near", "traversal", "background", "packet-width",
+                           "packet-shape", "memory-budget", "launch-budget-ms"}) {
     read(name, name);
   }
-  if (table.number("near", 0, kHuge).value_or(0.0) != 0.0) {
+  const TraceOptions given = t.over({});
+  if (given.near_depth != 0) {
     table.fail(
         "near",
         "'near' in [trace] can only be 0: rays that leave a mirror have no camera that could "
         "be near");
   }
   try {
-    check_packet_width(t.over({}));
+    check_packet_width(given);
   } catch (const UsageError& error) {
     table.fail("packet-width", error.what());
   }

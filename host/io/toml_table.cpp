@@ -231,17 +231,6 @@ void TomlTable::number(std::string_view key, int& target, double low, double hig
   target = static_cast<int>(*value);
 }
 
-void TomlTable::seed(std::string_view key, std::uint64_t& target) {
-  const toml::node* node = take(key);
-  if (node == nullptr) return;
-  const std::optional<std::int64_t> value =
-      node->is_integer() ? node->value<std::int64_t>() : std::optional<std::int64_t>();
-  if (!value || *value < 0) {
-    fail(key, fmt::format("'{}' in {} has to be a whole number of at least 0", key, name_));
-  }
-  target = static_cast<std::uint64_t>(*value);
-}
-
 void TomlTable::flag(std::string_view key, bool& target) {
   const toml::node* node = take(key);
   if (node == nullptr) return;
@@ -262,16 +251,21 @@ std::optional<std::string> TomlTable::text(std::string_view key) {
   return node->value<std::string>();
 }
 
-std::optional<std::vector<std::string>> TomlTable::values(std::string_view key) {
+void TomlTable::option(std::string_view key,
+                       const std::function<void(const std::vector<std::string>&)>& set) {
   const toml::node* node = take(key);
-  if (node == nullptr) return std::nullopt;
-  std::optional<std::vector<std::string>> texts = value_texts(*node);
+  if (node == nullptr) return;
+  const std::optional<std::vector<std::string>> texts = value_texts(*node);
   if (!texts) {
     fail(key,
          fmt::format("'{}' in {} has to be a value or a list of values, not {}", key, name_,
                      node->is_array() ? "a list of lists, tables or dates" : type_name(*node)));
   }
-  return texts;
+  try {
+    set(*texts);
+  } catch (const UsageError& error) {
+    fail(key, fmt::format("{} ({})", error.what(), name_));
+  }
 }
 
 std::optional<std::vector<double>> TomlTable::numbers(std::string_view key, std::size_t count) {

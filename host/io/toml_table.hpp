@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <set>
@@ -56,11 +57,12 @@ class TomlTable {
   void number(std::string_view key, float& target, double low, double high);
   void number(std::string_view key, int& target, double low, double high);
   std::optional<double> number(std::string_view key, double low, double high);
-  void seed(std::string_view key, std::uint64_t& target);
   void flag(std::string_view key, bool& target);
   std::optional<std::string> text(std::string_view key);
-  /// A number, text or truth value, or a list of them, as texts.
-  std::optional<std::vector<std::string>> values(std::string_view key);
+  /// Hands the value of an option to `set` (OptionRow::set) if the key is there: a number, text or
+  /// truth value, or a list of them, as texts.
+  void option(std::string_view key,
+              const std::function<void(const std::vector<std::string>&)>& set);
   /// Three numbers.
   void vector(std::string_view key, std::array<float, 3>& target, double low, double high);
   std::optional<glm::dvec3> vector(std::string_view key);

@@ -26,7 +26,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr double kRigidTolerance = 1e-3;
-constexpr int kMaxSide = 1 << 20;
 
 /// One scope of keys: the file or a frame of it, with its name for errors.
 struct Scope {

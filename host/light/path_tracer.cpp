@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "core/gaussian_check.hpp"
+#include "core/render_rows.hpp"
 #include "light/path_memory.hpp"
 #include "light/surface_store.hpp"
 #include "primitives/scan.hpp"
@@ -32,19 +33,6 @@ TraceOptions without_background(TraceOptions options) {
   options.background = {0, 0, 0};
   options.sky.clear();  // the scene's environment has it
   return options;
-}
-
-void check(const RenderSettings& s) {
-  const bool sound = s.samples >= 1 && s.max_bounces >= 1 && s.min_throughput >= 0 &&
-                     s.light_samples >= 1 && s.light_samples <= 1024 && s.aperture >= 0 &&
-                     s.bias >= 0 && s.shadows.strength >= 0 && s.shadows.strength <= 1 &&
-                     (s.aperture == 0 || s.focus_distance > 0);
-  if (!sound) {
-    throw UsageError(
-        "Render settings out of range: samples, max-bounces and light-samples (to 1024) are at "
-        "least 1, aperture, bias and min-throughput not negative, the focus distance positive and "
-        "the shadows' strength in [0, 1]");
-  }
 }
 
 void check(const std::vector<Light>& lights) {
@@ -113,7 +101,7 @@ Box box_of(const Gaussians& gaussians) {
 struct PathTracer::Impl {
   Impl(Context& context_in, const Scene& scene)
       : context(context_in),
-        settings((check(scene.render), scene.render)),
+        settings((check_render_settings(scene.render), scene.render)),
         memory(memory_of(scene, context_in.device())),
         options(without_background(scene.trace)),
         gaussians(DeviceGaussians::upload(context_in, scene.gaussians, ScaleActivation::kExp)),
@@ -430,7 +418,7 @@ void PathTracer::set_sampling(int samples, std::uint64_t seed) {
   RenderSettings settings = impl_->settings;
   settings.samples = samples;
   settings.seed = seed;
-  check(settings);
+  check_render_settings(settings);
   impl_->settings = settings;
 }
 

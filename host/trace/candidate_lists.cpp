@@ -11,6 +11,7 @@
 #include <iterator>
 #include <numbers>
 
+#include "core/camera_check.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
@@ -19,7 +20,6 @@ namespace {
 // Vector loads of boxes may run past the end of a list by one vector.
 constexpr std::size_t kBoxPadding = 16;
 constexpr std::size_t kGatherGroup = 64;
-constexpr int kMaxSide = 1 << 20;
 // Tile numbers have 16 bits.
 constexpr std::size_t kMaxTiles = 65535;
 // What the sort takes; a sum that does not fit 32 bits reads as Scan::kMost, which is more.

@@ -23,7 +23,6 @@ using Values = OptionTable::Values;
 
 constexpr double kHuge = kNoBound;
 constexpr double kMaxCount = 1e15;
-constexpr double kMaxSeed = 0x1p64;  // rounded; the type ends there
 
 // A share of the run (below 1) or a whole number of iterations.
 RunShare parse_share(const std::string& key, const std::string& text, bool may_be_none) {

@@ -124,6 +124,42 @@ TEST_CASE("ranges are the same on the command line, in [trace] and in configurat
   }
 }
 
+TEST_CASE("ranges are the same on the command line, in [render] and in [camera]") {
+  const TemporaryFolder folder;
+  write_file(folder / "balls.ply", ply_file(2));
+  const auto scene = [&](const std::string& more) {
+    write_file(folder / "scene.toml", "[[model]]\nfile = \"balls.ply\"\n" + more);
+    return Words{"render", folder / "scene.toml", "-o", folder / "x", "-q"};
+  };
+  const std::string camera = "[camera]\norbit = { frames = 1 }\n";
+  struct Case {
+    std::string key, value, range;
+  };
+  for (const auto& [key, value, range] :
+       std::vector<Case>{{"samples", "65537", "from 1 to 65536"},
+                         {"samples", "0", "from 1 to 65536"},
+                         {"max-bounces", "1001", "from 1 to 1000"},
+                         {"seed", "-1", "a whole number"}}) {
+    INFO(key);
+    refuse(scene(camera) + Words{"--" + key, value}, range);
+    refuse(scene(camera + "[render]\n" + key + " = " + value + "\n"), range);
+  }
+  for (const auto& [key, value, range] : std::vector<Case>{{"width", "1048577", "1 to 1048576"},
+                                                           {"height", "1048577", "1 to 1048576"},
+                                                           {"fov", "0.0001", "0.001 to 360"}}) {
+    INFO(key);
+    refuse(kRender + Words{"--" + key, value}, range);
+    refuse(scene(camera + "model = \"fisheye\"\n" + key + " = " + value + "\n"), range);
+  }
+  // What a plane can show ends earlier, which only the lens tells.
+  write_file(folder / "model.ply", ply_file(2));
+  refuse({"render", folder / "model.ply", "-o", folder / "x", "--orbit", "1", "--fov", "179.95"},
+         "from 0.001 to 179.9");
+  refuse(scene(camera + "fov = 179.95\n"), "0.001 to 179.9");
+  refuse(scene(camera + "[trace]\nnear = -1\n"), "at least 0");
+  refuse(kRender + Words{"--near", "-1"}, "at least 0");
+}
+
 TEST_CASE("keys that another kind has are no typing errors") {
   const TemporaryFolder folder;
   write_file(folder / "balls.ply", ply_file(2));
@@ -136,9 +172,10 @@ TEST_CASE("keys that another kind has are no typing errors") {
   refuse(scene(mirror + "ior = 1.5\n"), "'ior' is for kind = \"glass\"");
   refuse(scene(mirror + "opacity = 0.5\n"), "'opacity' is for kind = \"transparent\"");
   refuse(scene("[trace]\nnear = 1\n"), "'near' in [trace] can only be 0");
-  const Outcome fine = raysplats_program(
-      scene(mirror + "color = 0.5\n[trace]\nq = 9\nnear = 0\n[environment]\ncolor = 0.25\n"
-                     "[[light]]\nkind = \"point\"\nposition = [0, 0, 9]\nintensity = 1e12\n"));
+  const Outcome fine = raysplats_program(scene(
+      mirror +
+      "color = 0.5\n[trace]\nq = 9\nnear = 0\ntraversal = \"bvh\"\n[environment]\ncolor = 0.25\n"
+      "[[light]]\nkind = \"point\"\nposition = [0, 0, 9]\nintensity = 1e12\n"));
   INFO(fine.err);
   CHECK(fine.code == 0);
 }
