@@ -98,8 +98,7 @@ std::size_t PathMemory::largest_buffer(std::size_t pixels) const {
 }
 
 void PathMemory::check(std::size_t pixels) const {
-  if (total(pixels) <= device_.global_memory / 10 * 9 &&
-      largest_buffer(pixels) <= device_.max_allocation)
+  if (total(pixels) <= usable_memory(device_) && largest_buffer(pixels) <= device_.max_allocation)
     return;
   throw ResourceError(fmt::format(
       "The scene needs about {:.0f} MiB ({:.0f} for Gaussians, {:.0f} for meshes, textures and the "

@@ -2,11 +2,17 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "raysplats/device.hpp"
 #include "raysplats/trace_options.hpp"
 
 namespace raysplats {
+
+/// What may be taken of a device's memory: the driver and other programs need some of it too.
+inline std::uint64_t usable_memory(const DeviceInfo& device) {
+  return device.global_memory / 10 * 9;
+}
 
 /// How TraceOptions::memory_budget is shared out. What is held at the same time
 /// adds up to no more than all of it: the first three by packets of camera rays, the next two by

@@ -150,7 +150,7 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
 }
 
 bool fits(const MemoryEstimate& estimate, const DeviceInfo& device) {
-  return estimate.total() <= device.global_memory / 10 * 9 &&
+  return estimate.total() <= usable_memory(device) &&
          estimate.largest_buffer <= device.max_allocation;
 }
 
