@@ -42,6 +42,13 @@ std::string name_of(const std::vector<std::pair<std::string, Value>>& names, Val
 
 std::string hit_order_name(HitOrder order) { return name_of(hit_orders(), order); }
 
+std::optional<HitOrder> hit_order_of(const std::string& name) {
+  for (const auto& [each, order] : hit_orders()) {
+    if (each == name) return order;
+  }
+  return std::nullopt;
+}
+
 std::string packet_shape_name(PacketForm form) { return name_of(packet_shapes(), form); }
 
 void check_packet_width(const TraceOptions& options) {

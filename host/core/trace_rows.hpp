@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,8 @@ void add_background_row(OptionTable& table, TraceOptions& options);
 
 /// "entry" or "peak".
 std::string hit_order_name(HitOrder order);
+/// The order of that name; none for other words.
+std::optional<HitOrder> hit_order_of(const std::string& name);
 /// "auto", "vector", "group" or "subgroup".
 std::string packet_shape_name(PacketForm form);
 /// Throws UsageError for a width that packets of that form cannot have.

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "core/gaussian_transform.hpp"
+#include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::view {
@@ -138,9 +139,8 @@ ViewRequest view_of(const Json& json, int max_side) {
   if (json.contains("near"))
     request.near_depth = static_cast<float>(number(json["near"], "near", 0.0, kFarthest));
   if (json.contains("order")) {
-    const std::string order = text(json, "order");
-    if (order != "entry" && order != "peak") refuse("asks for an unknown 'order'");
-    request.hit_order = order == "peak" ? HitOrder::kPeak : HitOrder::kEntry;
+    request.hit_order = hit_order_of(text(json, "order"));
+    if (!request.hit_order) refuse("asks for an unknown 'order'");
   }
   if (json.contains("background")) {
     const std::array<double, 3> color = numbers<3>(json, "background", 0.0, 1.0);
