@@ -12,8 +12,8 @@
 #include "bvh/box.h"
 #include "primitives/vector_lanes.h"
 
-#ifndef RS_GROUP
-#define RS_GROUP 1
+#ifndef GROUP
+#define GROUP 1
 #endif
 #ifndef RS_MAX_RUN
 #define RS_MAX_RUN 32
@@ -30,13 +30,13 @@
 // Bits per axis of a code.
 #define RS_CODE_BITS 21
 
-// Union over the work-items of a group, the same for all of them; `scratch` holds 2 RS_GROUP.
+// Union over the work-items of a group, the same for all of them; `scratch` holds 2 GROUP.
 inline RsBox group_union(RsBox own, __local float4* scratch) {
-#if RS_GROUP > 1
+#if GROUP > 1
   const uint lane = get_local_id(0);
   scratch[2 * lane] = own.lo;
   scratch[2 * lane + 1] = own.hi;
-  for (uint half_size = RS_GROUP / 2; half_size > 0; half_size /= 2) {
+  for (uint half_size = GROUP / 2; half_size > 0; half_size /= 2) {
     barrier(CLK_LOCAL_MEM_FENCE);
     if (lane < half_size) {
       RsBox other;
@@ -57,14 +57,14 @@ inline RsBox group_union(RsBox own, __local float4* scratch) {
 }
 
 // partials[g] = box of the centres of the valid boxes in group g's chunk.
-// Launch: groups of RS_GROUP work-items (1 or a power of two).
-__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void center_bounds(
+// Launch: groups of GROUP work-items (1 or a power of two).
+__kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void center_bounds(
     __global const RsAabb* boxes, __global RsAabb* partials, uint count, uint chunk) {
-  __local float4 scratch[2 * RS_GROUP];
+  __local float4 scratch[2 * GROUP];
   const uint begin = min((uint)get_group_id(0) * chunk, count);
   const uint end = min(begin + chunk, count);
   RsBox sum = box_empty();
-  for (uint i = begin + get_local_id(0); i < end; i += RS_GROUP) {
+  for (uint i = begin + get_local_id(0); i < end; i += GROUP) {
     const RsBox box = box_load(boxes, i);
     if (box_valid(box)) {
       RsBox center;
@@ -91,18 +91,18 @@ inline float longest_side(RsBox box) {
 // All lengths are halves of the true ones, which cannot overflow. grid = {origin (3), cells per
 // unit} of the window, {origin in the middle (3), cells per unit} of what is outside, the window's
 // lower and upper corner (3 and 3).
-// Launch: one group of RS_GROUP work-items, which share the partial boxes and the sample.
-__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void choose_grid(
+// Launch: one group of GROUP work-items, which share the partial boxes and the sample.
+__kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void choose_grid(
     __global const RsAabb* boxes,
     __global const RsAabb* partials,
     uint count,
     uint groups,
     __global float* grid) {
   __local uint bins[3][RS_BINS];
-  __local float4 scratch[2 * RS_GROUP];
+  __local float4 scratch[2 * GROUP];
   const uint lane = get_local_id(0);
   RsBox whole = box_empty();
-  for (uint i = lane; i < groups; i += RS_GROUP) whole = box_union(whole, box_load(partials, i));
+  for (uint i = lane; i < groups; i += GROUP) whole = box_union(whole, box_load(partials, i));
   whole = group_union(whole, scratch);
   whole.lo *= 0.5f;
   whole.hi *= 0.5f;
@@ -112,10 +112,9 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void choose_grid(
     const float longest = longest_side(window);
     const float scale = grid_scale(longest, 6);
     if (!(scale > 0.0f)) break;
-    for (uint bin = lane; bin < 3 * RS_BINS; bin += RS_GROUP)
-      bins[bin / RS_BINS][bin % RS_BINS] = 0;
+    for (uint bin = lane; bin < 3 * RS_BINS; bin += GROUP) bins[bin / RS_BINS][bin % RS_BINS] = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint i = lane; i < sample; i += RS_GROUP) {
+    for (uint i = lane; i < sample; i += GROUP) {
       const RsBox box = box_load(boxes, (size_t)((ulong)i * count / sample));
       if (!box_valid(box)) continue;
       const float4 bin = clamp((0.5f * box_center(box) - window.lo) * scale, 0.0f, RS_BINS - 1.0f);
@@ -186,26 +185,26 @@ inline ulong spread_bits(uint x) {
 }
 
 // high, low (32 bits each) = code of box i, indices[i] = i. Boxes that are not valid sort last.
-// Launch: at least ceil(count / PACKET) work-items, PACKET boxes each.
+// Launch: at least ceil(count / LANES) work-items, LANES boxes each.
 __kernel void curve_codes(__global const RsAabb* boxes,
                           __global const float* grid,
                           __global uint* high,
                           __global uint* low,
                           __global uint* indices,
                           const uint count) {
-  const uint begin = (uint)get_global_id(0) * PACKET;
+  const uint begin = (uint)get_global_id(0) * LANES;
   if (begin >= count) return;
-  const uint size = min((uint)PACKET, count - begin);
+  const uint size = min((uint)LANES, count - begin);
   const float4 fine = vload4(0, grid);
   const float4 coarse = vload4(1, grid);
   const float4 lo = (float4)(vload3(0, grid + 8), -FLT_MAX);
   const float4 hi = (float4)(vload3(0, grid + 11), FLT_MAX);
   union {
     iv v[3];
-    int s[3][PACKET];
+    int s[3][LANES];
   } cell;
-  bool valid[PACKET], inside[PACKET];
-  for (uint k = 0; k < PACKET; ++k) {
+  bool valid[LANES], inside[LANES];
+  for (uint k = 0; k < LANES; ++k) {
     const RsBox box = box_load(boxes, begin + min(k, size - 1));
     valid[k] = box_valid(box);
     const float4 center = 0.5f * box_center(box);

@@ -62,7 +62,7 @@ void sort_entries(__global const RsAabb* boxes,
 // What it costs to split the part of `blocks` blocks from position `start` to `stop`.
 float split_cost(
     __local const OrderMemory* memory, int axis, int split, int blocks, int start, int stop) {
-  const int border = start + split * PACKET;
+  const int border = start + split * LANES;
   RsBox before = box_empty(), behind = box_empty();
   for (int i = start; i < border; ++i) {
     before = box_union(before, entry_box(memory, memory->sorted[axis][i]));
@@ -79,17 +79,17 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void order_group(
   const int lane = get_local_id(0);
   const uint begin = (uint)get_group_id(0) * GROUP;
   const int size = (int)min((uint)GROUP, count - begin);
-  if (size <= PACKET) return;
+  if (size <= LANES) return;
   sort_entries(boxes, order + begin, size, &memory);
-  const int all = (size + PACKET - 1) / PACKET;
+  const int all = (size + LANES - 1) / LANES;
   if (lane == 0) memory.blocks[0] = (uchar)all;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (int first = 0;;) {
     while (first < all && memory.blocks[first] < 2) ++first;
     if (first >= all) break;
     const int blocks = memory.blocks[first];
-    const int start = first * PACKET;
-    const int stop = min(start + blocks * PACKET, size);
+    const int start = first * LANES;
+    const int stop = min(start + blocks * LANES, size);
     const int own_axis = lane / SPLITS, own_split = lane % SPLITS + 1;
     memory.cost[lane] = own_axis < 3 && own_split < blocks
                             ? split_cost(&memory, own_axis, own_split, blocks, start, stop)
@@ -103,7 +103,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void order_group(
       best = cost < best ? cost : best;
     }
     const int split = choice % SPLITS + 1;
-    const int border = start + split * PACKET;
+    const int border = start + split * LANES;
     const bool inside = lane >= start && lane < stop;
     if (inside) memory.left[memory.sorted[choice / SPLITS][lane]] = lane < border;
     barrier(CLK_LOCAL_MEM_FENCE);

@@ -6,22 +6,22 @@
 #include "bvh/lbvh_node.h"
 
 // Boxes of the `count` nodes from `source` into the lanes of the level above, which begins at
-// `target`. Launch: at least `count` rounded up to a multiple of PACKET.
+// `target`. Launch: at least `count` rounded up to a multiple of LANES.
 __kernel void merge_nodes(__global float* nodes,
                           const uint source,
                           const uint count,
                           const uint target) {
   const uint i = get_global_id(0);
-  if (i >= (count + PACKET - 1) / PACKET * PACKET) return;
+  if (i >= (count + LANES - 1) / LANES * LANES) return;
   RsBox sum = box_empty();
   if (i < count) {
-    __global const float* from = nodes + (size_t)(source + i) * (RS_NODE_VECTORS * PACKET);
-    for (int k = 0; k < PACKET; ++k, ++from) {
+    __global const float* from = nodes + (size_t)(source + i) * (RS_NODE_VECTORS * LANES);
+    for (int k = 0; k < LANES; ++k, ++from) {
       RsBox child;
-      child.lo = (float4)(from[0], from[PACKET], from[2 * PACKET], 0.0f);
-      child.hi = (float4)(from[3 * PACKET], from[4 * PACKET], from[5 * PACKET], 0.0f);
+      child.lo = (float4)(from[0], from[LANES], from[2 * LANES], 0.0f);
+      child.hi = (float4)(from[3 * LANES], from[4 * LANES], from[5 * LANES], 0.0f);
       sum = box_union(sum, child);
     }
   }
-  store_child(nodes, target + i / PACKET, i % PACKET, sum);
+  store_child(nodes, target + i / LANES, i % LANES, sum);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The tree that arbitrary rays walk, and one ray against one of its nodes. Vectors run across the
-// PACKET children of a node, not across rays: rays without coherence share no boxes. The tree is
-// implicit: things in `order`, blocks of PACKET consecutive ones, level-1 nodes over PACKET
+// LANES children of a node, not across rays: rays without coherence share no boxes. The tree is
+// implicit: things in `order`, blocks of LANES consecutive ones, level-1 nodes over LANES
 // consecutive blocks, and so on up to one root. Wide nodes as slabs per lane: Dammertz et al. 2008,
 // Wald et al. 2008.
 #ifndef RS_BVH_LBVH_NODE_H
@@ -23,7 +23,7 @@
 #else
 #define RS_INLINE
 #endif
-// A child of every level stays behind: PACKET - 1 per level, and 2^31 things have 15 levels of 4 or
+// A child of every level stays behind: LANES - 1 per level, and 2^31 things have 15 levels of 4 or
 // 7 of 16.
 #define RS_NODE_STACK 128
 
@@ -35,7 +35,7 @@
 
 typedef union {
   fv v;
-  float s[PACKET];
+  float s[LANES];
 } RayLanes;
 
 // One lane of a vector. On GPUs by choice: an array indexed by a number that is not known would lie
@@ -105,13 +105,13 @@ RS_INLINE uint ray_meets_boxes(const RayData* ray,
 
 // Writes box `lane` of a node.
 void store_child(__global float* nodes, size_t node, uint lane, RsBox box) {
-  __global float* to = nodes + node * (RS_NODE_VECTORS * PACKET) + lane;
+  __global float* to = nodes + node * (RS_NODE_VECTORS * LANES) + lane;
   to[0] = box.lo.x;
-  to[PACKET] = box.lo.y;
-  to[2 * PACKET] = box.lo.z;
-  to[3 * PACKET] = box.hi.x;
-  to[4 * PACKET] = box.hi.y;
-  to[5 * PACKET] = box.hi.z;
+  to[LANES] = box.lo.y;
+  to[2 * LANES] = box.lo.z;
+  to[3 * LANES] = box.hi.x;
+  to[4 * LANES] = box.hi.y;
+  to[5 * LANES] = box.hi.z;
 }
 
 #endif

@@ -26,7 +26,7 @@ __kernel void box_blocks(const uint count,
   const uint block = get_global_id(0);
   if (block >= padded_blocks) return;
   RsBox sum = box_empty();
-  for (uint lane = 0; lane < PACKET && (size_t)block * PACKET + lane < count; ++lane)
-    sum = box_union(sum, box_load_clean(boxes, order[(size_t)block * PACKET + lane]));
-  store_child(nodes, block / PACKET, block % PACKET, sum);
+  for (uint lane = 0; lane < LANES && (size_t)block * LANES + lane < count; ++lane)
+    sum = box_union(sum, box_load_clean(boxes, order[(size_t)block * LANES + lane]));
+  store_child(nodes, block / LANES, block % LANES, sum);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Things of GROUP consecutive positions ordered again, so that blocks of PACKET get small boxes:
-// positions g GROUP .. (g + 1) GROUP are split again and again at a multiple of PACKET, along the
+// Things of GROUP consecutive positions ordered again, so that blocks of LANES get small boxes:
+// positions g GROUP .. (g + 1) GROUP are split again and again at a multiple of LANES, along the
 // axis and at the place where area times blocks of both sides is least. Splits by the surface area
 // heuristic: Goldsmith and Salmon 1987, MacDonald and Booth 1990.
 #ifndef RS_BVH_ORDER_H
@@ -8,11 +8,11 @@
 
 #include "bvh/lbvh_node.h"
 
-// A multiple of PACKET and at most 256.
+// A multiple of LANES and at most 256.
 #ifndef GROUP
 #define GROUP 64
 #endif
-#define GROUP_BLOCKS (GROUP / PACKET)
+#define GROUP_BLOCKS (GROUP / LANES)
 
 float half_area(RsBox box) {
   const float4 e = max(box.hi - box.lo, 0.0f);

@@ -7,7 +7,7 @@ __kernel void order_groups(__global const RsAabb* boxes, __global uint* order, c
   const uint begin = (uint)get_global_id(0) * GROUP;
   if (begin >= count) return;
   const int size = (int)min((uint)GROUP, count - begin);
-  if (size <= PACKET) return;
+  if (size <= LANES) return;
   RsBox box[GROUP];
   uint index[GROUP];
   RsBox centers = box_empty();
@@ -32,15 +32,15 @@ __kernel void order_groups(__global const RsAabb* boxes, __global uint* order, c
   for (int axis = 0; axis < 3; ++axis) {
     union {
       iv v;
-      int s[PACKET];
+      int s[LANES];
     } rank;
-    for (int j = 0; j < (size + PACKET - 1) / PACKET; ++j) {
+    for (int j = 0; j < (size + LANES - 1) / LANES; ++j) {
       iv less = (iv)(0);
       const iv own = keys[axis].v[j];
       for (int i = 0; i < size; ++i) less -= RS_MASK((iv)(keys[axis].s[i]) < own);
       rank.v = less;
-      for (int k = 0; k < PACKET && j * PACKET + k < size; ++k) {
-        sorted[axis][rank.s[k]] = (uchar)(j * PACKET + k);
+      for (int k = 0; k < LANES && j * LANES + k < size; ++k) {
+        sorted[axis][rank.s[k]] = (uchar)(j * LANES + k);
       }
     }
   }
@@ -48,22 +48,22 @@ __kernel void order_groups(__global const RsAabb* boxes, __global uint* order, c
   uchar stack_first[GROUP_BLOCKS], stack_blocks[GROUP_BLOCKS];  // in blocks
   int top = 1;
   stack_first[0] = 0;
-  stack_blocks[0] = (uchar)((size + PACKET - 1) / PACKET);
+  stack_blocks[0] = (uchar)((size + LANES - 1) / LANES);
   while (top > 0) {
     --top;
     const int first = stack_first[top];
     const int blocks = stack_blocks[top];
     if (blocks < 2) continue;
-    const int start = first * PACKET;
-    const int stop = min(start + blocks * PACKET, size);
+    const int start = first * LANES;
+    const int stop = min(start + blocks * LANES, size);
     float best = INFINITY;
     int best_axis = 0, best_split = 1;
     for (int axis = 0; axis < 3; ++axis) {
       RsBox part[GROUP_BLOCKS];
       for (int b = 0; b < blocks; ++b) {
         RsBox sum = box_empty();
-        const int last = min(start + (b + 1) * PACKET, stop);
-        for (int i = start + b * PACKET; i < last; ++i) sum = box_union(sum, box[sorted[axis][i]]);
+        const int last = min(start + (b + 1) * LANES, stop);
+        for (int i = start + b * LANES; i < last; ++i) sum = box_union(sum, box[sorted[axis][i]]);
         part[b] = sum;
       }
       float behind[GROUP_BLOCKS];
@@ -83,7 +83,7 @@ __kernel void order_groups(__global const RsAabb* boxes, __global uint* order, c
         sum = box_union(sum, part[b]);
       }
     }
-    const int border = start + best_split * PACKET;
+    const int border = start + best_split * LANES;
     bool left[GROUP];
     for (int i = start; i < stop; ++i) left[sorted[best_axis][i]] = i < border;
     for (int axis = 0; axis < 3; ++axis) {

@@ -2,27 +2,27 @@
 // What a tree costs to walk, after the surface-area heuristic (Goldsmith and Salmon 1987): the
 // areas of the boxes of all nodes and blocks (sum_node_areas) and of what the tree is over
 // (sum_box_areas), each clipped to the window of the grid (curve.cl), so that a few far boxes do
-// not hide what happens among the others. Launch: groups of RS_GROUP work-items (1 or a power of
+// not hide what happens among the others. Launch: groups of GROUP work-items (1 or a power of
 // two), each group walks `chunk` consecutive nodes or boxes and writes one sum. Reads everything
 // once: bound by memory.
 #include "bvh/lbvh_node.h"
 
-#ifndef RS_GROUP
-#define RS_GROUP 1
+#ifndef GROUP
+#define GROUP 1
 #endif
 // What is summed before it is added to the sum of all: keeps float sums exact enough.
 #define RS_RUN 256
 
-// Half the area of what lies in the window, of PACKET boxes or of one; 0 for empty boxes.
+// Half the area of what lies in the window, of LANES boxes or of one; 0 for empty boxes.
 #define RS_CLIPPED_SIDE(lo, hi, axis) \
   (min((hi), 2.0f * window[11 + (axis)]) - max((lo), 2.0f * window[8 + (axis)]))
 
 // The sum over a group; the result is that of its first work-item.
 inline float group_sum(float own, __local float* scratch) {
-#if RS_GROUP > 1
+#if GROUP > 1
   const uint lane = get_local_id(0);
   scratch[lane] = own;
-  for (uint half_size = RS_GROUP / 2; half_size > 0; half_size /= 2) {
+  for (uint half_size = GROUP / 2; half_size > 0; half_size /= 2) {
     barrier(CLK_LOCAL_MEM_FENCE);
     if (lane < half_size) {
       own += scratch[lane + half_size];
@@ -54,19 +54,19 @@ float box_area(__global const RsAabb* box, __global const float* window) {
 }
 
 // `window` is the grid that choose_grid made.
-__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void sum_node_areas(
+__kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void sum_node_areas(
     __global const fv* nodes,
     __global const float* window,
     __global float* sums,
     uint count,
     uint chunk) {
-  __local float scratch[RS_GROUP];
+  __local float scratch[GROUP];
   const uint begin = min((uint)get_group_id(0) * chunk, count);
   const uint end = min(begin + chunk, count);
   float sum = 0.0f;
-  for (uint run = begin; run < end; run += RS_RUN * RS_GROUP) {
+  for (uint run = begin; run < end; run += RS_RUN * GROUP) {
     float part = 0.0f;
-    for (uint i = run + get_local_id(0); i < min(run + RS_RUN * RS_GROUP, end); i += RS_GROUP)
+    for (uint i = run + get_local_id(0); i < min(run + RS_RUN * GROUP, end); i += GROUP)
       part += node_area(nodes + (size_t)i * RS_NODE_VECTORS, window);
     sum += part;
   }
@@ -74,19 +74,19 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void sum_node_are
   if (get_local_id(0) == 0) sums[get_group_id(0)] = sum;
 }
 
-__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void sum_box_areas(
+__kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void sum_box_areas(
     __global const RsAabb* boxes,
     __global const float* window,
     __global float* sums,
     uint count,
     uint chunk) {
-  __local float scratch[RS_GROUP];
+  __local float scratch[GROUP];
   const uint begin = min((uint)get_group_id(0) * chunk, count);
   const uint end = min(begin + chunk, count);
   float sum = 0.0f;
-  for (uint run = begin; run < end; run += RS_RUN * RS_GROUP) {
+  for (uint run = begin; run < end; run += RS_RUN * GROUP) {
     float part = 0.0f;
-    for (uint i = run + get_local_id(0); i < min(run + RS_RUN * RS_GROUP, end); i += RS_GROUP)
+    for (uint i = run + get_local_id(0); i < min(run + RS_RUN * GROUP, end); i += GROUP)
       part += box_area(boxes + i, window);
     sum += part;
   }

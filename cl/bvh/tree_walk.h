@@ -2,9 +2,9 @@
 // The way of one ray through the tree of lbvh_node.h, near child first: walk_next() yields, one
 // after the other, the nodes of the first level that the ray meets, with the blocks below them that
 // it meets. What is asked of the blocks (nearest, any, all) is the caller's; it may bring t_end
-// nearer meanwhile. Cost per node: PACKET boxes at once, and the sort of the children met.
+// nearer meanwhile. Cost per node: LANES boxes at once, and the sort of the children met.
 //   TRAIL 0: a stack of children not visited yet, with their depths (RS_NODE_STACK)
-//   TRAIL 1: PACKET is 4; two bytes per level, which children are left in which order. The parent
+//   TRAIL 1: LANES is 4; two bytes per level, which children are left in which order. The parent
 //   of
 //            a node is known by its number, so nothing else is kept: 32 bytes of private memory.
 //            Children behind t_end are found to be so when they are visited.
@@ -27,7 +27,7 @@ typedef struct {
 } RayTree;
 
 #if TRAIL
-#if PACKET != 4
+#if LANES != 4
 #error "a trail has room for four children a node"
 #endif
 
@@ -82,7 +82,7 @@ RS_INLINE uint walk_next(
       if (walk->level == 1) {
         walk->children[1] = 0;
         if (bits != 0) {
-          *first_block = walk->number * PACKET;
+          *first_block = walk->number * LANES;
           return bits;
         }
       } else {
@@ -97,11 +97,11 @@ RS_INLINE uint walk_next(
         return 0;
       }
       ++walk->level;
-      walk->number /= PACKET;
+      walk->number /= LANES;
       left = walk->children[walk->level];
     }
     walk->children[walk->level] = (ushort)(left >> 4);
-    walk->number = walk->number * PACKET + (left & 15) - 1;
+    walk->number = walk->number * LANES + (left & 15) - 1;
     --walk->level;
     walk->arrived = true;
   }
@@ -152,7 +152,7 @@ RS_INLINE uint walk_next(
     uint bits = ray_meets_boxes(ray, tree->nodes + node * RS_NODE_VECTORS, t_end, &entry.v);
     if (level == 1) {
       if (bits == 0) continue;
-      *first_block = number * PACKET;
+      *first_block = number * LANES;
       return bits;
     }
     for (; bits != 0; bits &= bits - 1) {
@@ -164,7 +164,7 @@ RS_INLINE uint walk_next(
         walk->node[j] = walk->node[j - 1];
       }
       walk->entry[j] = t;
-      walk->node[j] = (number * PACKET + lane) << 4 | (level - 1);
+      walk->node[j] = (number * LANES + lane) << 4 | (level - 1);
     }
   }
   return 0;

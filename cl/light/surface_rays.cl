@@ -3,7 +3,7 @@
 // same t the one with the lowest index. light_through: the share of light that passes all triangles
 // between the ends of a ray. Launch: one work-item per `rays_per_item` neighbours (1 on GPUs; on
 // CPUs more, in groups of one, so that all rays share one piece of private memory). Cost per ray:
-// nodes and blocks met / PACKET lanes.
+// nodes and blocks met / LANES lanes.
 #include "light/triangle_block.h"
 
 // Less light than this counts as none.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One ray against a leaf block of the tree over triangles (bvh/lbvh_node.h): PACKET triangles at
+// One ray against a leaf block of the tree over triangles (bvh/lbvh_node.h): LANES triangles at
 // once. Watertight: Woop, Benthin and Wald 2013, with edge functions whose signs are right in
 // single precision by the difference of products of Kahan (Jeannerod, Louvet and Muller 2013), so
 // that neighbours always agree about a shared edge.

@@ -21,7 +21,7 @@ __kernel void triangle_bounds(__global const float* restrict corners,
   box_store(box, boxes, i);
 }
 
-// Lanes of nodes without a block become empty boxes: `padded_blocks` is a multiple of PACKET.
+// Lanes of nodes without a block become empty boxes: `padded_blocks` is a multiple of LANES.
 __kernel void fill_triangles(const uint count,
                              const uint padded_blocks,
                              __global const uint* restrict order,
@@ -32,14 +32,14 @@ __kernel void fill_triangles(const uint count,
   const uint block = get_global_id(0);
   if (block >= padded_blocks) return;
   RsBox sum = box_empty();
-  for (uint lane = 0; lane < PACKET && (size_t)block * PACKET < count; ++lane) {
-    const size_t slot = (size_t)block * PACKET + lane;
-    __global float* record = blocks + (size_t)block * (RS_TRIANGLE_VECTORS * PACKET) + lane;
+  for (uint lane = 0; lane < LANES && (size_t)block * LANES < count; ++lane) {
+    const size_t slot = (size_t)block * LANES + lane;
+    __global float* record = blocks + (size_t)block * (RS_TRIANGLE_VECTORS * LANES) + lane;
     const bool present = slot < count;
     const uint index = present ? order[slot] : 0;
     if (present) sum = box_union(sum, box_load_clean(boxes, index));
-    for (int k = 0; k < 9; ++k) record[k * PACKET] = present ? corners[9 * (size_t)index + k] : NAN;
-    record[RS_TRIANGLE_INDEX * PACKET] = as_float(present ? index : 0xffffffffu);
+    for (int k = 0; k < 9; ++k) record[k * LANES] = present ? corners[9 * (size_t)index + k] : NAN;
+    record[RS_TRIANGLE_INDEX * LANES] = as_float(present ? index : 0xffffffffu);
   }
-  store_child(nodes, block / PACKET, block % PACKET, sum);
+  store_child(nodes, block / LANES, block % LANES, sum);
 }

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exclusive prefix sum over one work-group, which stops at 2^32 - 1: rows of RS_SCAN_ROW values are
 // summed by a work-item each, then everybody adds the sums of the rows before its own. Three
-// barriers; a scan by doubling takes 2 log2(RS_GROUP). Every work-item of the group must call it;
-// RS_GROUP is a power of two and `scratch` holds RS_SCAN_WORDS words.
+// barriers; a scan by doubling takes 2 log2(GROUP). Every work-item of the group must call it;
+// GROUP is a power of two and `scratch` holds RS_SCAN_WORDS words.
 #ifndef RS_PRIMITIVES_GROUP_SCAN_H
 #define RS_PRIMITIVES_GROUP_SCAN_H
 
-#ifndef RS_GROUP
-#define RS_GROUP 1
+#ifndef GROUP
+#define GROUP 1
 #endif
 
-#if RS_GROUP > 1
-#define RS_SCAN_ROW (RS_GROUP < 16 ? RS_GROUP : 16)
-#define RS_SCAN_ROWS (RS_GROUP / RS_SCAN_ROW)
+#if GROUP > 1
+#define RS_SCAN_ROW (GROUP < 16 ? GROUP : 16)
+#define RS_SCAN_ROWS (GROUP / RS_SCAN_ROW)
 // The sum of a row lies behind it, which lets rows begin on different banks.
 #define RS_SCAN_STRIDE (RS_SCAN_ROW + 1)
 #define RS_SCAN_WORDS (RS_SCAN_ROWS * RS_SCAN_STRIDE)

@@ -4,13 +4,13 @@
 // element per pass. Between the passes key and value lie side by side (uint2): half as many places
 // are written at once, so that the lines being filled stay in the first cache.
 // The elements are the first min(live[0], most): the host may know only how many there are at most.
-// Launch: work-groups of RS_GROUP work-items (1 or a power of two), each walks a chunk of
-// consecutive elements in order, at least `least`. RS_GROUP = 1 is the CPU's form: few long
+// Launch: work-groups of GROUP work-items (1 or a power of two), each walks a chunk of
+// consecutive elements in order, at least `least`. GROUP = 1 is the CPU's form: few long
 // sequential loops with private counters. Larger groups rank a tile of RS_ROUNDS elements a
-// work-item at a time: in each round RS_GROUP neighbouring elements set their bits in a mask per
+// work-item at a time: in each round GROUP neighbouring elements set their bits in a mask per
 // digit and block of work-items, and count the bits before their own. The tile is written in the
 // order of its digits, so that neighbours mostly write to neighbouring addresses. 27 barriers for
-// 6 RS_GROUP elements, and 15 kB of local memory.
+// 6 GROUP elements, and 15 kB of local memory.
 //   RS_SOURCE_PAIRS, RS_TARGET_PAIRS   the elements come from / go to pairs; keys and values apart
 //                                      otherwise. The unused arguments may be any buffer.
 #include "primitives/group_scan.h"
@@ -52,11 +52,11 @@
 
 // Elements of a group.
 uint chunk_size(uint count, uint groups, uint least) {
-  return (max((count + groups - 1) / groups, least) + RS_GROUP - 1) / RS_GROUP * RS_GROUP;
+  return (max((count + groups - 1) / groups, least) + GROUP - 1) / GROUP * GROUP;
 }
 
 // counts[digit * groups + group] = how often the chunk of `group` has the digit.
-__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void count_digits(
+__kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void count_digits(
     RS_EITHER __global const uint* keys,
     RS_EITHER __global const uint2* pairs,
     __global uint* counts,
@@ -70,15 +70,15 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void count_digits
   const uint chunk = chunk_size(count, groups, least);
   const uint begin = min(group * chunk, count);
   const uint end = min(begin + chunk, count);
-#if RS_GROUP > 1
+#if GROUP > 1
   __local uint table[RS_DIGITS];
-  for (uint d = get_local_id(0); d < RS_DIGITS; d += RS_GROUP) table[d] = 0;
+  for (uint d = get_local_id(0); d < RS_DIGITS; d += GROUP) table[d] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint i = begin + get_local_id(0); i < end; i += RS_GROUP) {
+  for (uint i = begin + get_local_id(0); i < end; i += GROUP) {
     atomic_inc(&table[RS_DIGIT(RS_KEY(i), shift)]);
   }
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint d = get_local_id(0); d < RS_DIGITS; d += RS_GROUP) {
+  for (uint d = get_local_id(0); d < RS_DIGITS; d += GROUP) {
     counts[d * groups + group] = table[d];
   }
 #else
@@ -101,19 +101,19 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void count_digits
 #endif
 }
 
-#if RS_GROUP > RS_DIGITS
-#error "RS_GROUP is at most 256"
-#elif RS_GROUP > 1
+#if GROUP > RS_DIGITS
+#error "GROUP is at most 256"
+#elif GROUP > 1
 #define RS_ROUNDS 6
-#define RS_TILE (RS_ROUNDS * RS_GROUP)
+#define RS_TILE (RS_ROUNDS * GROUP)
 // Words that hold a bit per work-item.
-#define RS_BLOCKS ((RS_GROUP + 31) / 32)
+#define RS_BLOCKS ((GROUP + 31) / 32)
 // Digits that a work-item adds up.
-#define RS_SHARE (RS_DIGITS / RS_GROUP)
+#define RS_SHARE (RS_DIGITS / GROUP)
 
 typedef struct {
-  uint mask[RS_BLOCKS][RS_DIGITS];   // which work-items' elements have the digit
-  ushort rank[RS_ROUNDS][RS_GROUP];  // among the elements of the tile with the same digit
+  uint mask[RS_BLOCKS][RS_DIGITS];  // which work-items' elements have the digit
+  ushort rank[RS_ROUNDS][GROUP];    // among the elements of the tile with the same digit
 } RankMemory;
 
 typedef union {
@@ -163,7 +163,7 @@ void find_starts(__local uint* counts, __local uint* scratch) {
 
 // `offsets` is the scanned table of count_digits, launched with the same groups and numbers,
 // with the total behind it.
-__kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
+__kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scatter(
     RS_EITHER __global const uint* keys,
     RS_EITHER __global const uint* values,
     RS_EITHER __global const uint2* pairs,
@@ -181,16 +181,16 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
   const uint chunk = chunk_size(count, groups, least);
   const uint begin = min(group * chunk, count);
   const uint end = min(begin + chunk, count);
-#if RS_GROUP > 1
+#if GROUP > 1
   __local TileMemory tile;
   __local uint start[RS_DIGITS];  // of a digit in the tile; first, how many there are so far
   __local uint next[RS_DIGITS];   // where the group's next element of a digit goes
   __local uint scratch[RS_SCAN_WORDS];
   const uint lane = get_local_id(0);
-  for (uint d = lane; d < RS_DIGITS; d += RS_GROUP) next[d] = offsets[d * groups + group];
+  for (uint d = lane; d < RS_DIGITS; d += GROUP) next[d] = offsets[d * groups + group];
   for (uint base = begin; base < end; base += RS_TILE) {
     const uint size = min((uint)RS_TILE, end - base);
-    for (uint d = lane; d < RS_DIGITS; d += RS_GROUP) {
+    for (uint d = lane; d < RS_DIGITS; d += GROUP) {
       start[d] = 0;
       for (uint b = 0; b < RS_BLOCKS; ++b) tile.ranking.mask[b][d] = 0;
     }
@@ -199,8 +199,8 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
     // Compilers that unroll take twice the registers.
 #pragma unroll 1
     for (uint r = 0; r < RS_ROUNDS; ++r) {
-      const uint i = r * RS_GROUP + lane;
-      const uint following = i + RS_GROUP < size ? RS_KEY(base + i + RS_GROUP) : 0;
+      const uint i = r * GROUP + lane;
+      const uint following = i + GROUP < size ? RS_KEY(base + i + GROUP) : 0;
       tile.ranking.rank[r][lane] = rank_round(RS_DIGIT(key, shift), i < size, &tile.ranking, start);
       key = following;
     }
@@ -211,21 +211,21 @@ __kernel __attribute__((reqd_work_group_size(RS_GROUP, 1, 1))) void scatter(
     barrier(CLK_LOCAL_MEM_FENCE);  // the elements lie where the ranks were
 #pragma unroll
     for (uint r = 0; r < RS_ROUNDS; ++r) {
-      const uint i = r * RS_GROUP + lane;
+      const uint i = r * GROUP + lane;
       if (i < size) {
         const uint2 element = RS_ELEMENT(base + i);
         tile.elements[start[RS_DIGIT(element.x, shift)] + rank[r]] = element;
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint i = lane; i < size; i += RS_GROUP) {
+    for (uint i = lane; i < size; i += GROUP) {
       const uint2 element = tile.elements[i];
       const uint digit = RS_DIGIT(element.x, shift);
       const uint target = next[digit] + (i - start[digit]);
       RS_STORE(element, target);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint d = lane; d < RS_DIGITS; d += RS_GROUP) {
+    for (uint d = lane; d < RS_DIGITS; d += GROUP) {
       next[d] += (d + 1 < RS_DIGITS ? start[d + 1] : size) - start[d];
     }
     barrier(CLK_LOCAL_MEM_FENCE);

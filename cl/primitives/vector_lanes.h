@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors of PACKET lanes, written once for every width (1 suits GPUs). OpenCL's comparisons yield
+// Vectors of LANES lanes, written once for every width (1 suits GPUs). OpenCL's comparisons yield
 // -1 in vectors and 1 in scalars, hence RS_MASK.
 #ifndef RS_PRIMITIVES_VECTOR_LANES_H
 #define RS_PRIMITIVES_VECTOR_LANES_H
 
-#ifndef PACKET
-#define PACKET 4
+#ifndef LANES
+#define LANES 4
 #endif
 
-#if PACKET == 1
+#if LANES == 1
 typedef float fv;
 typedef int iv;
 #define RS_MASK(comparison) (-(comparison))
@@ -20,7 +20,7 @@ typedef int iv;
 #define rs_store_float(p, v) (*(p) = (v))
 #else
 #define RS_MASK(comparison) (comparison)
-#if PACKET == 2
+#if LANES == 2
 typedef float2 fv;
 typedef int2 iv;
 #define RS_LANE_INDEX ((iv)(0, 1))
@@ -28,7 +28,7 @@ typedef int2 iv;
 #define rs_as_int(v) as_int2(v)
 #define rs_as_float(v) as_float2(v)
 #define rs_to_float(v) convert_float2(v)
-#elif PACKET == 4
+#elif LANES == 4
 typedef float4 fv;
 typedef int4 iv;
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3))
@@ -36,7 +36,7 @@ typedef int4 iv;
 #define rs_as_int(v) as_int4(v)
 #define rs_as_float(v) as_float4(v)
 #define rs_to_float(v) convert_float4(v)
-#elif PACKET == 8
+#elif LANES == 8
 typedef float8 fv;
 typedef int8 iv;
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7))
@@ -44,7 +44,7 @@ typedef int8 iv;
 #define rs_as_int(v) as_int8(v)
 #define rs_as_float(v) as_float8(v)
 #define rs_to_float(v) convert_float8(v)
-#elif PACKET == 16
+#elif LANES == 16
 typedef float16 fv;
 typedef int16 iv;
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
@@ -55,7 +55,7 @@ typedef int16 iv;
 #endif
 #endif
 
-#if PACKET > 1
+#if LANES > 1
 // Some implementations take vload apart into scalars; a vector type of float's alignment stays one
 // load.
 typedef fv rs_unaligned __attribute__((aligned(4)));
@@ -67,7 +67,7 @@ typedef iv rs_int_unaligned __attribute__((aligned(4)));
 // all() become one branch per pair of lanes in some compilers; a reduction becomes one test.
 // Only where the compiler makes machine code of a CPU itself: what reads its intermediate code
 // elsewhere need not know reductions.
-#if PACKET > 1 && defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__))
+#if LANES > 1 && defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__))
 #if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_and)
 #define RS_REDUCTIONS 1
 #endif
@@ -82,26 +82,26 @@ typedef iv rs_int_unaligned __attribute__((aligned(4)));
 
 // One bit per lane whose mask is set, lane 0 lowest. OpenCL C has no word for what x86 does in one
 // instruction; the plain form gives the same.
-#if PACKET == 16 && defined(__AVX512DQ__) && defined(__clang__)
+#if LANES == 16 && defined(__AVX512DQ__) && defined(__clang__)
 #define rs_lane_bits(mask) ((uint)__builtin_ia32_cvtd2mask512(mask))
-#elif PACKET == 8 && defined(__AVX__) && defined(__clang__)
+#elif LANES == 8 && defined(__AVX__) && defined(__clang__)
 #define rs_lane_bits(mask) ((uint)__builtin_ia32_movmskps256(as_float8(mask)))
-#elif PACKET == 4 && defined(__SSE__) && defined(__clang__)
+#elif LANES == 4 && defined(__SSE__) && defined(__clang__)
 #define rs_lane_bits(mask) ((uint)__builtin_ia32_movmskps(as_float4(mask)))
-#elif PACKET == 1
+#elif LANES == 1
 #define rs_lane_bits(mask) ((uint)((mask)&1))
 #else
 uint rs_lane_bits(iv mask) {
   const iv bit = mask & ((iv)(1) << RS_LANE_INDEX);
-#if PACKET == 16
+#if LANES == 16
   const int8 b8 = bit.lo | bit.hi;
   const int4 b4 = b8.lo | b8.hi;
-#elif PACKET == 8
+#elif LANES == 8
   const int4 b4 = bit.lo | bit.hi;
-#elif PACKET == 4
+#elif LANES == 4
   const int4 b4 = bit;
 #endif
-#if PACKET == 2
+#if LANES == 2
   return bit.x | bit.y;
 #else
   const int2 b2 = b4.lo | b4.hi;
@@ -113,12 +113,12 @@ uint rs_lane_bits(iv mask) {
 uint rs_lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 
 // Writes first + i for every lane i whose bit is set, in order, and returns their number. May write
-// up to PACKET values in all.
+// up to LANES values in all.
 uint rs_append_lanes(uint* to, const uint first, uint bits) {
-#if PACKET == 1
+#if LANES == 1
   *to = first;
   return bits;
-#elif PACKET == 16 && defined(__AVX512F__) && defined(__clang__)
+#elif LANES == 16 && defined(__AVX512F__) && defined(__clang__)
   const int16 lanes = RS_LANE_INDEX + (int)first;
   *(rs_int_unaligned*)to = __builtin_ia32_compresssi512_mask(lanes, lanes, (ushort)bits);
   return popcount(bits);
@@ -130,20 +130,20 @@ uint rs_append_lanes(uint* to, const uint first, uint bits) {
 }
 
 // Sum, least and greatest value over the lanes.
-#if PACKET == 1
+#if LANES == 1
 float rs_lane_sum(fv v) { return v; }
 float rs_lane_min(fv v) { return v; }
 float rs_lane_max(fv v) { return v; }
-#elif PACKET == 2
+#elif LANES == 2
 float rs_lane_sum(fv v) { return v.x + v.y; }
 float rs_lane_min(fv v) { return fmin(v.x, v.y); }
 float rs_lane_max(fv v) { return fmax(v.x, v.y); }
 #else
-#if PACKET == 16
+#if LANES == 16
 #define RS_FOLD(v, op)                  \
   const float8 v8 = op((v).lo, (v).hi); \
   const float4 v4 = op(v8.lo, v8.hi);
-#elif PACKET == 8
+#elif LANES == 8
 #define RS_FOLD(v, op) const float4 v4 = op((v).lo, (v).hi);
 #else
 #define RS_FOLD(v, op) const float4 v4 = (v);

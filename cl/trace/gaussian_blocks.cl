@@ -38,7 +38,7 @@ void whitening_triangle(const float* R, const float* scale, float radius, float*
   out[5] = unit / sqrt(zz);
 }
 
-// Launch: one work-item per block, `padded_blocks` (a multiple of PACKET) at least: lanes of nodes
+// Launch: one work-item per block, `padded_blocks` (a multiple of LANES) at least: lanes of nodes
 // without a block become empty boxes. Level 1 begins at node 0.
 __kernel void fill_blocks(const uint count,
                           const uint padded_blocks,
@@ -52,8 +52,8 @@ __kernel void fill_blocks(const uint count,
   const uint block = get_global_id(0);
   if (block >= padded_blocks) return;
   // The parameters lie anywhere: all are on their way before the first is used.
-  for (uint lane = 0; lane < PACKET && (size_t)block * PACKET + lane < count; ++lane) {
-    const size_t index = order[(size_t)block * PACKET + lane];
+  for (uint lane = 0; lane < LANES && (size_t)block * LANES + lane < count; ++lane) {
+    const size_t index = order[(size_t)block * LANES + lane];
     RS_PREFETCH_READ(boxes + index);
     RS_PREFETCH_READ(quaternions + 4 * index);
     RS_PREFETCH_READ(scales + 3 * index);
@@ -63,8 +63,8 @@ __kernel void fill_blocks(const uint count,
     (void)index;
   }
   RsBox sum = box_empty();
-  for (uint lane = 0; lane < PACKET && (size_t)block * PACKET < count; ++lane) {
-    const size_t slot = (size_t)block * PACKET + lane;
+  for (uint lane = 0; lane < LANES && (size_t)block * LANES < count; ++lane) {
+    const size_t slot = (size_t)block * LANES + lane;
     float v[RS_BLOCK_COLOR];
     for (int k = 0; k < RS_BLOCK_COLOR; ++k) v[k] = NAN;
     float3 color = (float3)(0.0f);
@@ -99,9 +99,9 @@ __kernel void fill_blocks(const uint count,
       color = 0.5f + RS_SH0 * vload3(0, sh + (size_t)index * 3 * sh_coefficients);
       color = fmin(fmax(color, (float3)(0.0f)), (float3)(RS_MAX_COLOR));
     }
-    __global float* record = blocks + (size_t)block * (RS_BLOCK_VECTORS * PACKET);
-    for (int k = 0; k < RS_BLOCK_COLOR; ++k) record[k * PACKET + lane] = v[k];
-    vstore4((float4)(color, 0.0f), lane, record + RS_BLOCK_COLOR * PACKET);
+    __global float* record = blocks + (size_t)block * (RS_BLOCK_VECTORS * LANES);
+    for (int k = 0; k < RS_BLOCK_COLOR; ++k) record[k * LANES + lane] = v[k];
+    vstore4((float4)(color, 0.0f), lane, record + RS_BLOCK_COLOR * LANES);
   }
-  store_child(nodes, block / PACKET, block % PACKET, sum);
+  store_child(nodes, block / LANES, block % LANES, sum);
 }

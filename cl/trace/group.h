@@ -11,11 +11,14 @@
 #ifndef RS_TRACE_GROUP_H
 #define RS_TRACE_GROUP_H
 
-#if PACKET != 1
+#ifndef LANES
+#define LANES 1
+#endif
+#include "trace/packet.h"
+
+#if LANES != 1
 #error "Packets of work-items hold one ray per work-item"
 #endif
-
-#include "trace/packet.h"
 
 #ifndef GROUP
 #define GROUP 32

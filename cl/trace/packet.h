@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The unit of tracing: PACKET camera rays (a small block of pixels) in one vector.
+// The unit of tracing: PACKET camera rays (a small block of pixels), one for each lane of a vector.
 #ifndef RS_TRACE_PACKET_H
 #define RS_TRACE_PACKET_H
 
 #include "primitives/vector_lanes.h"
 #include "shared/layout.h"
+
+#define PACKET LANES
 
 // Pixels of a packet and the place of every lane among them.
 #if PACKET == 1

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One ray against a leaf block of the tree over Gaussians (bvh/lbvh_node.h): PACKET Gaussians at
+// One ray against a leaf block of the tree over Gaussians (bvh/lbvh_node.h): LANES Gaussians at
 // once.
 #ifndef RS_TRACE_RAY_BLOCK_H
 #define RS_TRACE_RAY_BLOCK_H

@@ -82,10 +82,9 @@ RS_INLINE float4 hit_color(const RayScene* scene,
   const uint slot = pending_slot(pending, k);
   float3 v = ray->d;
   if (scene->color_from_origin) {
-    __global const float* mean =
-        (__global const float*)(blocks + slot / PACKET * RS_BLOCK_VECTORS) + RS_GAUSSIAN_MEAN * PACKET +
-        slot % PACKET;
-    v = (float3)(mean[0], mean[PACKET], mean[2 * PACKET]) - ray->o;
+    __global const float* mean = (__global const float*)(blocks + slot / LANES * RS_BLOCK_VECTORS) +
+                                 RS_GAUSSIAN_MEAN * LANES + slot % LANES;
+    v = (float3)(mean[0], mean[LANES], mean[2 * LANES]) - ray->o;
   }
   const float3 n = v * rsqrt(fmax(dot(v, v), 1e-38f));
   float basis[RS_COLOR_FUNCTIONS];
@@ -121,10 +120,9 @@ RS_INLINE float4 hit_color(const RayScene* scene,
   float own_basis[25];
   const float* basis = ray_basis;
   if (scene->color_from_origin) {
-    __global const float* mean =
-        (__global const float*)(blocks + slot / PACKET * RS_BLOCK_VECTORS) + RS_GAUSSIAN_MEAN * PACKET +
-        slot % PACKET;
-    const float3 v = (float3)(mean[0], mean[PACKET], mean[2 * PACKET]) - ray->o;
+    __global const float* mean = (__global const float*)(blocks + slot / LANES * RS_BLOCK_VECTORS) +
+                                 RS_GAUSSIAN_MEAN * LANES + slot % LANES;
+    const float3 v = (float3)(mean[0], mean[LANES], mean[2 * LANES]) - ray->o;
     const float3 n = v * rsqrt(fmax(dot(v, v), 1e-30f));
     rs_sh_basis(degree, n.x, n.y, n.z, own_basis);
     basis = own_basis;

@@ -18,7 +18,7 @@ typedef struct {
 #if !PEAK_ORDER
   float peak[KEPT][GROUP];
 #endif
-  uint slot[KEPT][GROUP];  // block times PACKET plus lane
+  uint slot[KEPT][GROUP];  // block times LANES plus lane
 } HitMemory;
 
 // Of one ray.
@@ -45,13 +45,13 @@ RS_INLINE float pending_peak(const Pending* p, const int k) {
 // Of hit k from the nearest.
 RS_INLINE uint pending_index(__global const fv* blocks, const Pending* p, const int k) {
   const uint slot = pending_slot(p, k);
-  return block_index(blocks + (size_t)(slot / PACKET) * RS_BLOCK_VECTORS, slot % PACKET);
+  return block_index(blocks + (size_t)(slot / LANES) * RS_BLOCK_VECTORS, slot % LANES);
 }
 
 // Its colour of SH degree 0.
 RS_INLINE float4 pending_color(__global const fv* blocks, const Pending* p, const int k) {
   const uint slot = pending_slot(p, k);
-  return block_color(blocks + (size_t)(slot / PACKET) * RS_BLOCK_VECTORS, slot % PACKET);
+  return block_color(blocks + (size_t)(slot / LANES) * RS_BLOCK_VECTORS, slot % LANES);
 }
 
 // Puts a hit where it belongs among those kept, the farthest of which falls out where there are

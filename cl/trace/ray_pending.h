@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 // Hits of one ray that are not blended yet, in no order. They are noted as the products of a
-// meeting and evaluated PACKET at a time later: a block holds about one hit, too few for vectors.
-// Order by ranks: every key is compared with all others, PACKET at a time, O(n^2 / PACKET) without
+// meeting and evaluated LANES at a time later: a block holds about one hit, too few for vectors.
+// Order by ranks: every key is compared with all others, LANES at a time, O(n^2 / LANES) without
 // a branch. Equal keys are ordered by the index of the Gaussian.
 #ifndef RS_TRACE_RAY_PENDING_H
 #define RS_TRACE_RAY_PENDING_H
 
 #include "trace/ray_block.h"
 
-// Room for hits, a multiple of PACKET and at least 4 * PACKET.
+// Room for hits, a multiple of LANES and at least 4 * LANES.
 #ifndef PENDING
 #define PENDING 64
 #endif
 // Vectors of an evaluation begin anywhere and reach over the last entry.
-#define RS_PENDING_ROOM (PENDING + PACKET)
+#define RS_PENDING_ROOM (PENDING + LANES)
 
 typedef union {
-  fv v[RS_PENDING_ROOM / PACKET];
+  fv v[RS_PENDING_ROOM / LANES];
   float s[RS_PENDING_ROOM];
 } PendingFloats;
 
 typedef union {
-  iv v[PENDING / PACKET];
+  iv v[PENDING / LANES];
   int s[PENDING];
 } PendingInts;
 
@@ -35,7 +35,7 @@ typedef struct {
 #if ADAPTIVE_RADIUS
   float half_quantile[RS_PENDING_ROOM];
 #endif
-  uint slot[PENDING];  // block times PACKET plus lane
+  uint slot[PENDING];  // block times LANES plus lane
   uint index[PENDING];
   // Of degree 0, read when the hit is found, so that blending never waits for memory.
   float4 color[PENDING];
@@ -91,7 +91,7 @@ float pending_evaluate(Pending* pending,
                        float half_quantile,
                        float remaining) {
   int to = pending->evaluated;
-  for (int i = pending->evaluated; i < pending->size; i += PACKET) {
+  for (int i = pending->evaluated; i < pending->size; i += LANES) {
     const fv cross2 = RS_PENDING_LOAD(pending->key.s, i);
     const fv direction2 = RS_PENDING_LOAD(pending->alpha, i);
     const fv along = RS_PENDING_LOAD(pending->peak, i);
@@ -116,7 +116,7 @@ float pending_evaluate(Pending* pending,
     RS_PENDING_STORE(pending->key.s, i, key);
     RS_PENDING_STORE(pending->alpha, i, alpha);
     RS_PENDING_STORE(pending->peak, i, peak);
-    const int count = min(PACKET, pending->size - i);
+    const int count = min(LANES, pending->size - i);
     const uint all = 0xffffffffu >> (32 - count);
     const uint bits = rs_lane_bits(good) & all;
     if (bits == all && to == i && !range->ties) {
@@ -147,8 +147,8 @@ iv pending_ranks(const float* keys, int size, fv own) {
 // order[r] = entry with the r-th smallest (key, index). All entries must be evaluated.
 void pending_sort(Pending* pending) {
   const int size = pending->size;
-  const int vectors = (size + PACKET - 1) / PACKET;
-  for (int i = size; i < vectors * PACKET; ++i) pending->key.s[i] = INFINITY;
+  const int vectors = (size + LANES - 1) / LANES;
+  for (int i = size; i < vectors * LANES; ++i) pending->key.s[i] = INFINITY;
   PendingInts rank;
   for (int j = 0; j < vectors; ++j) {
     rank.v[j] = pending_ranks(pending->key.s, size, pending->key.v[j]);

@@ -53,7 +53,7 @@ RS_INLINE void walk_ray(
         __global const fv* block = blocks + (size_t)number_of_block * RS_BLOCK_VECTORS;
         BlockMeeting meeting;
 #pragma unroll 1
-        for (uint lane = 0; lane < PACKET; ++lane) {
+        for (uint lane = 0; lane < LANES; ++lane) {
           if (!ray_meets_block(ray, scene->near, block, lane, &meeting)) continue;
           const float cross2 = meeting.cross2.v, direction2 = meeting.direction2.v;
           const float along = meeting.along.v;
@@ -77,8 +77,7 @@ RS_INLINE void walk_ray(
 #endif
           const float alpha =
               block_opacity(block, lane) * rs_exp((fv)(-exponent * cross2 * reciprocal)).x;
-          pending_insert(blocks, &pending, key, alpha, peak, number_of_block * PACKET + lane,
-                         index);
+          pending_insert(blocks, &pending, key, alpha, peak, number_of_block * LANES + lane, index);
           const bool ends = pending.remaining < scene->min_transmittance &&
                             pending_end(&pending, scene->min_transmittance, state->transmittance);
           if (ends || pending.size == KEPT) end = pending_key(&pending, pending.size - 1);
@@ -150,15 +149,15 @@ RS_INLINE void walk_ray(
         for (uint hits = ray_meets_block(ray, scene->near, block, 0, &meeting); hits != 0;
              hits &= hits - 1) {
           const uint lane = rs_lowest_bit(hits);
-          pending_append(&pending, &meeting, block, number_of_block * PACKET + lane, lane);
+          pending_append(&pending, &meeting, block, number_of_block * LANES + lane, lane);
           prefetch_color(scene, pending.index[pending.size - 1]);
           hopeful *= 1.0f - block_opacity(block, lane);
         }
         const int room = scene->max_hits - state->hits;
-        if (!(hopeful < scene->min_transmittance) && pending.size <= min(room, PENDING - PACKET))
+        if (!(hopeful < scene->min_transmittance) && pending.size <= min(room, PENDING - LANES))
           continue;
         remaining = hopeful = pending_evaluate(&pending, &range, half_quantile, remaining);
-        const bool full = pending.size > PENDING - PACKET;
+        const bool full = pending.size > PENDING - LANES;
         const bool enough = remaining < scene->min_transmittance || pending.size > room;
         if (!full && !(enough && 4 * (pending.size - sorted) > pending.size)) continue;
         const int end = sort_to_end(scene, state, &pending, &remaining);
@@ -172,7 +171,7 @@ RS_INLINE void walk_ray(
             if (pending.key.s[pending.order[count]] > key) break;
           }
         }
-        if (count <= PENDING - PACKET) {
+        if (count <= PENDING - LANES) {
           if (end > 0) pending_cut(&pending, range.end);
         } else {
           const float bound = RS_BOUND_SLACK * walk_bound(&walk);

@@ -2,7 +2,7 @@
 // Arbitrary rays: any origins and directions, each with its own [t_min, t_max].
 // Launch of trace_rays: one work-item per `rays_per_item` neighbours (1 on GPUs; on CPUs more, in
 // groups of one, so that all rays share one piece of private memory). Cost per ray: nodes and
-// blocks met / PACKET lanes, plus hits^2 / PACKET for the order (ray_walk.h).
+// blocks met / LANES lanes, plus hits^2 / LANES for the order (ray_walk.h).
 #include "trace/ray_color.h"
 
 #ifndef LEADING

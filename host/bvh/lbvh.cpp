@@ -77,11 +77,11 @@ std::size_t Lbvh::order_group() const {
 Kernel Lbvh::kernel(std::string_view program, const char* name) const {
   // Only what a program reads: every other set of definitions is compiled again.
   BuildOptions build;
-  build.define("PACKET", lanes_);
+  build.define("LANES", lanes_);
   if (program == kOrder || program == kGroupOrder) {
     build.define("GROUP", order_group());
   } else if (program != kTree) {
-    build.define("RS_GROUP", shape_.group_size);
+    build.define("GROUP", shape_.group_size);
   }
   return context_->kernel(std::string(program), name, build);
 }

@@ -57,7 +57,7 @@ void TriangleTracer::build(std::span<const Mesh> meshes) {
   corners_.ensure(*context_, corners.size(), "triangles");
   corners_.upload(corners);
   boxes_.ensure(*context_, count, "triangle boxes");
-  const BuildOptions build = BuildOptions().define("PACKET", tree_.lanes());
+  const BuildOptions build = BuildOptions().define("LANES", tree_.lanes());
   if (count > 0) {
     context_->kernel("light/triangle_blocks.cl", "triangle_bounds", build)
         .launch(Range::linear(count, kGroup), corners_, u32(count), boxes_);

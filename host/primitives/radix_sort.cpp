@@ -23,7 +23,7 @@ RadixSort::RadixSort(Context& context, const ChunkShape& shape)
   for (const bool from_pairs : {false, true}) {
     for (const bool to_pairs : {false, true}) {
       const BuildOptions options = BuildOptions()
-                                       .define("RS_GROUP", shape.group_size)
+                                       .define("GROUP", shape.group_size)
                                        .define("RS_SOURCE_PAIRS", from_pairs ? 1 : 0)
                                        .define("RS_TARGET_PAIRS", to_pairs ? 1 : 0);
       scatter_[from_pairs][to_pairs] = context.kernel(kProgram, "scatter", options);

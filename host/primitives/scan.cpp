@@ -16,7 +16,7 @@ constexpr std::size_t kMaxCount = std::size_t{1} << 31;
 Scan::Scan(Context& context) : Scan(context, ChunkShape::for_device(context.device())) {}
 
 Scan::Scan(Context& context, const ChunkShape& shape) : context_(&context), shape_(shape) {
-  const BuildOptions options = BuildOptions().define("RS_GROUP", shape.group_size);
+  const BuildOptions options = BuildOptions().define("GROUP", shape.group_size);
   sum_chunks_ = context.kernel(kProgram, "sum_chunks", options);
   scan_values_ = context.kernel(kProgram, "scan_values", options);
 }

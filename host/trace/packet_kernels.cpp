@@ -17,7 +17,7 @@ PacketKernels::PacketKernels(Context& context, const TraceOptions& options)
 
 BuildOptions PacketKernels::build(int lens_kind) const {
   BuildOptions build;
-  build.define("PACKET", shape_.grouped ? 1 : shape_.lanes)
+  build.define("LANES", shape_.grouped ? 1 : shape_.lanes)
       .define("TILE", shape_.tile)
       .define("CHUNK", HitStreams::kChunkRows)
       .define("LENS", lens_kind);

@@ -45,7 +45,7 @@ RayNear RayNear::of(const Camera& camera, float near_depth) {
 }
 
 BuildOptions tree_walk_build(const DeviceInfo& device, int lanes) {
-  return BuildOptions().define("PACKET", lanes).define("TRAIL", keeps_trail(device, lanes) ? 1 : 0);
+  return BuildOptions().define("LANES", lanes).define("TRAIL", keeps_trail(device, lanes) ? 1 : 0);
 }
 
 BuildOptions ray_walk_build(const DeviceInfo& device,
@@ -89,7 +89,7 @@ bool RayOrder::compute(const Lbvh& tree, const Buffer<Ray>& rays, std::size_t co
   if (count < kOrderedRays || tree.levels() == 0) return false;
   indices_.ensure(*context_, count, "ray order");
   keys_.ensure(*context_, count, "ray keys");
-  context_->kernel("trace/ray_order.cl", "ray_keys", BuildOptions().define("PACKET", tree.lanes()))
+  context_->kernel("trace/ray_order.cl", "ray_keys", BuildOptions().define("LANES", tree.lanes()))
       .launch(Range::linear(count, kGroup), rays, static_cast<std::uint32_t>(count), tree.nodes(),
               tree.scene_node(), keys_, indices_);
   sort_.sort(keys_, indices_, count);

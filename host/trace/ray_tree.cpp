@@ -65,7 +65,7 @@ void RayTree::compute_boxes(const DeviceGaussians& gaussians) {
 void RayTree::fill(const DeviceGaussians& gaussians) {
   if (gaussians.count == 0) return;
   BuildOptions build;
-  build.define("PACKET", tree_.lanes())
+  build.define("LANES", tree_.lanes())
       .define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options_.adaptive_radius ? 1 : 0);
   const std::size_t padded = tree_.padded_blocks();

@@ -9,7 +9,7 @@ COMPILER = ["-cl-mad-enable"]
 
 # packet_shape.cpp and camera_tracer.cpp: a packet per work-group, or one ray per work-item, in tiles of 16. SUBGROUP 1 is what
 # a device with subgroups is tried with, 2 what it is asked for by name.
-CAMERA = dict(PACKET=1, TILE=16, CHUNK=16, LENS=0)
+CAMERA = dict(LANES=1, TILE=16, CHUNK=16, LENS=0)
 GROUP_CAMERA = dict(CAMERA, GROUP=32)
 GROUP_FORWARD = dict(GROUP_CAMERA, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 FORWARD = dict(CAMERA, BLOCK=1, PENDING=48, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
@@ -22,13 +22,13 @@ ATOMIC = dict(PRIVATE_COPIES=0, EXACT_SUMS=0, FLOAT_ATOMICS=1)
 SWAP = dict(ATOMIC, FLOAT_ATOMICS=0)
 EXACT = dict(SWAP, EXACT_SUMS=1)
 # ray_launch.cpp, ray_backward.cpp.
-WALK = dict(PACKET=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
+WALK = dict(LANES=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
 RAY_BACKWARD = dict(WALK, RAY_SLOPES=0)
 RAY_GRADIENTS = dict(SIGMOID_SCALE=0, VECTOR=1, GROUP=64)
 # image_loss.cpp: groups, or what devices get whose groups are smaller.
 LOSS = dict(VECTOR=1, TILE=16, ROWS=1, PIXEL_L2=0)
 # chunk_shape.cpp.
-GROUP = dict(RS_GROUP=256)
+CHUNKS = dict(GROUP=256)
 
 # Name, file below cl/, definitions.
 PROGRAMS = [
@@ -75,24 +75,24 @@ PROGRAMS = [
     ("rays", "trace/rays.cl", WALK),
     ("rays entry", "trace/rays.cl", dict(WALK, PEAK_ORDER=0, ADAPTIVE_RADIUS=0)),
     ("rays leading", "trace/rays.cl", dict(WALK, LEADING=1)),
-    ("ray order", "trace/ray_order.cl", dict(PACKET=4)),
+    ("ray order", "trace/ray_order.cl", dict(LANES=4)),
     ("ray backward atomic", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC)),
     ("ray backward swap", "trace/ray_backward.cl", dict(RAY_BACKWARD, **SWAP)),
     ("ray backward exact", "trace/ray_backward.cl", dict(RAY_BACKWARD, **EXACT)),
     ("ray slopes", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC, RAY_SLOPES=1)),
     ("ray records", "trace/ray_gradients.cl", RAY_GRADIENTS),
     ("ray gradients", "trace/ray_gradients.cl", dict(RAY_GRADIENTS, SH_DEGREE=3, SH_COEFFICIENTS=16)),
-    ("gaussian blocks", "trace/gaussian_blocks.cl", dict(PACKET=4, SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
+    ("gaussian blocks", "trace/gaussian_blocks.cl", dict(LANES=4, SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
     ("bounds", "bvh/gaussian_bounds.cl", dict(SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
-    ("curve", "bvh/curve.cl", dict(GROUP, PACKET=4)),
-    ("tree", "bvh/lbvh.cl", dict(PACKET=4)),
-    ("tree order", "bvh/group_order.cl", dict(PACKET=4, GROUP=64)),
-    ("tree cost", "bvh/tree_cost.cl", dict(GROUP, PACKET=4)),
-    ("sort arrays", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=0)),
-    ("sort to pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=1)),
-    ("sort pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=1)),
-    ("sort from pairs", "primitives/radix_sort.cl", dict(GROUP, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=0)),
-    ("scan", "primitives/scan.cl", GROUP),
+    ("curve", "bvh/curve.cl", dict(CHUNKS, LANES=4)),
+    ("tree", "bvh/lbvh.cl", dict(LANES=4)),
+    ("tree order", "bvh/group_order.cl", dict(LANES=4, GROUP=64)),
+    ("tree cost", "bvh/tree_cost.cl", dict(CHUNKS, LANES=4)),
+    ("sort arrays", "primitives/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=0)),
+    ("sort to pairs", "primitives/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=1)),
+    ("sort pairs", "primitives/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=1)),
+    ("sort from pairs", "primitives/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=0)),
+    ("scan", "primitives/scan.cl", CHUNKS),
     ("loss group", "train/group_loss.cl", dict(PIXEL_L2=0, SSIM_GRADIENT=1)),
     ("loss prepare", "train/loss_prepare.cl", LOSS),
     ("loss ssim", "train/loss_ssim.cl", dict(LOSS, SSIM_GRADIENT=1)),
@@ -112,8 +112,8 @@ PROGRAMS = [
     ("validate", "train/validate.cl", {}),
     ("waves", "light/waves.cl", {}),
     ("mirror paths", "light/mirror_paths.cl", {}),
-    ("surface rays", "light/surface_rays.cl", dict(PACKET=4, TRAIL=1)),
-    ("triangle blocks", "light/triangle_blocks.cl", dict(PACKET=4)),
+    ("surface rays", "light/surface_rays.cl", dict(LANES=4, TRAIL=1)),
+    ("triangle blocks", "light/triangle_blocks.cl", dict(LANES=4)),
     ("ceilings", "bench/ceilings.cl", dict(CHAINS=8)),
 ]
 

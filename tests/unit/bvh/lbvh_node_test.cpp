@@ -32,7 +32,7 @@ std::vector<std::uint32_t> meet_node(Context& context,
     node[k * lanes] = k < 3 ? -1.0f : 1.0f;
   }
   BuildOptions build;
-  build.define("PACKET", lanes);
+  build.define("LANES", lanes);
   if (exact) build.define("RS_EXACT_SLABS", 1);
   Buffer<RawRay> device_rays(context, rays.size(), "rays");
   device_rays.upload(rays);

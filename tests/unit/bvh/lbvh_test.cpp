@@ -71,7 +71,7 @@ class Tree {
     if (boxes.empty()) return;
     const std::size_t padded = lbvh_.padded_blocks();
     context_
-        ->kernel("bvh/node_probe.cl", "box_blocks", BuildOptions().define("PACKET", lbvh_.lanes()))
+        ->kernel("bvh/node_probe.cl", "box_blocks", BuildOptions().define("LANES", lbvh_.lanes()))
         .launch(Range::linear(padded, 1), static_cast<std::uint32_t>(boxes.size()),
                 static_cast<std::uint32_t>(padded), lbvh_.slots(), uploaded(*context_, boxes),
                 lbvh_.nodes());
@@ -423,7 +423,7 @@ TEST_CASE("groups are ordered alike by one work-item and by many [small]") {
       std::vector<std::uint32_t> order(count);
       std::iota(order.rbegin(), order.rend(), 0u);
       BuildOptions build;
-      build.define("PACKET", packet).define("GROUP", 64);
+      build.define("LANES", packet).define("GROUP", 64);
       std::vector<std::vector<std::uint32_t>> results;
       for (const bool many : {false, true}) {
         Buffer<std::uint32_t> device_order(context, count, "order");

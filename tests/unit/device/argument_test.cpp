@@ -122,7 +122,7 @@ TEST_CASE("arguments: no kernel takes more than can be read") {
   for (const auto& [path, source] : kernel_sources()) {
     if (path.size() < 3 || path.compare(path.size() - 3, 3, ".cl") != 0) continue;
     BuildOptions build;
-    if (path.find("group_") != std::string::npos) build.define("PACKET", 1).define("GROUP", 32);
+    if (path.find("group_") != std::string::npos) build.define("LANES", 1).define("GROUP", 32);
     for (const std::string& name : kernel_names(path)) {
       CAPTURE(name);
       const std::size_t count = context.kernel(path, name, build).argument_count();
