@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The order of the modules in docs/architecture.md, read off the includes.
+// The order of the modules in docs/architecture.md, read off the includes of sources, kernels and
+// tests.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -69,7 +70,8 @@ std::vector<std::string> includes_of(const fs::path& file) {
 }
 
 bool is_source(const fs::path& file) {
-  return file.extension() == ".hpp" || file.extension() == ".cpp";
+  const std::string end = file.extension().string();
+  return end == ".hpp" || end == ".cpp" || end == ".h" || end == ".cl";
 }
 
 std::vector<fs::path> sources(const fs::path& folder) {
@@ -81,68 +83,126 @@ std::vector<fs::path> sources(const fs::path& folder) {
   return files;
 }
 
-/// One sentence for every include of a tree that points upwards or out of the public headers.
-std::vector<std::string> faults(const fs::path& root) {
-  std::vector<std::string> out;
-  const auto complain = [&](const fs::path& file, const std::string& include, const char* what) {
-    out.push_back(file.lexically_relative(root).generic_string() + " includes " + include + ", " +
-                  what);
-  };
-  for (const fs::path& file : sources(root / "host")) {
-    const std::string module = (*file.lexically_relative(root / "host").begin()).string();
-    if (!kBelow.contains(module)) {
-      complain(file, module, "a module that no order is known of");
-      continue;
-    }
-    const Names reach = reach_of(module);
-    for (const std::string& include : includes_of(file)) {
-      const std::size_t slash = include.find('/');
-      std::string target = include.substr(0, slash);
-      if (slash == std::string::npos || target == "shared") continue;
-      if (target == "raysplats") {
-        const auto face = kFaces.find(fs::path(include).stem().string());
-        if (face == kFaces.end()) {
-          complain(file, include, "a public header that no module is known of");
-          continue;
-        }
-        target = face->second;
+/// The folder of `room` that a file lies in; of those right there, the file.
+std::string folder_of(const fs::path& file, const fs::path& room) {
+  return (*file.lexically_relative(room).begin()).string();
+}
+
+/// Collects one sentence for every include of a tree that points upwards or to what is private.
+class Layers {
+ public:
+  explicit Layers(const fs::path& root) : root_(root) {
+    read_host();
+    read_public_headers();
+    read_kernels();
+    read_unit_tests();
+    read_apps();
+  }
+  const std::vector<std::string>& faults() const { return faults_; }
+
+ private:
+  void complain(const fs::path& file, const std::string& include, const char* what) {
+    faults_.push_back(file.lexically_relative(root_).generic_string() + " includes " + include +
+                      ", " + what);
+  }
+
+  bool is_known(const fs::path& file, const std::string& module) {
+    if (!kBelow.contains(module)) complain(file, module, "a module that no order is known of");
+    return kBelow.contains(module);
+  }
+
+  void check(const fs::path& file, const std::string& include, const Names& reach) {
+    const std::size_t slash = include.find('/');
+    if (slash == std::string::npos) return;
+    std::string target = include.substr(0, slash);
+    if (target == "raysplats") {
+      const auto face = kFaces.find(fs::path(include).stem().string());
+      if (face == kFaces.end()) {
+        complain(file, include, "a public header that no module is known of");
+        return;
       }
-      if (!reach.contains(target)) complain(file, include, "which is above it");
+      target = face->second;
+    }
+    if (!reach.contains(target)) complain(file, include, "which is above it");
+  }
+
+  void read_host() {
+    for (const fs::path& file : sources(root_ / "host")) {
+      const std::string module = folder_of(file, root_ / "host");
+      if (!is_known(file, module)) continue;
+      Names reach = reach_of(module);
+      reach.insert("shared");
+      for (const std::string& include : includes_of(file)) check(file, include, reach);
+      if (module != "device") keep_from_opencl(file);
     }
   }
-  for (const fs::path& file : sources(root / "include/raysplats")) {
-    const auto own = kFaces.find(file.stem().string());
-    if (own == kFaces.end()) {
-      complain(file, "nothing yet", "but no module is known of it");
-      continue;
-    }
-    for (const std::string& include : includes_of(file)) {
-      if (!include.starts_with("raysplats/")) {
-        complain(file, include, "which is private");
+
+  void read_public_headers() {
+    for (const fs::path& file : sources(root_ / "include/raysplats")) {
+      const auto own = kFaces.find(file.stem().string());
+      if (own == kFaces.end()) {
+        complain(file, "nothing yet", "but no module is known of it");
         continue;
       }
-      const auto face = kFaces.find(fs::path(include).stem().string());
-      if (face == kFaces.end() || !reach_of(own->second).contains(face->second))
-        complain(file, include, "which is above it");
+      for (const std::string& include : includes_of(file)) {
+        if (include.starts_with("raysplats/")) {
+          check(file, include, reach_of(own->second));
+        } else {
+          complain(file, include, "which is private");
+        }
+      }
     }
   }
-  // What the device alone may know.
-  for (const fs::path& file : sources(root / "host")) {
-    const std::string module = (*file.lexically_relative(root / "host").begin()).string();
+
+  /// Kernels lie in the folders of the modules that launch them.
+  void read_kernels() {
+    for (const fs::path& file : sources(root_ / "cl")) {
+      const std::string folder = folder_of(file, root_ / "cl");
+      const bool shared = folder == "shared";
+      if (!shared && !is_known(file, folder)) continue;
+      Names reach = shared ? Names() : reach_of(folder);
+      reach.insert("shared");
+      for (const std::string& include : includes_of(file)) check(file, include, reach);
+    }
+  }
+
+  /// Tests of a module know the reference and make data sets besides; "unit" is what tests share.
+  void read_unit_tests() {
+    const fs::path room = root_ / "tests/unit";
+    for (const fs::path& file : sources(room)) {
+      if (file.parent_path() == room || !is_known(file, folder_of(file, room))) continue;
+      Names reach = reach_of(folder_of(file, room));
+      reach.merge(Names{"reference", "synth", "shared", "unit"});
+      for (const std::string& include : includes_of(file)) check(file, include, reach);
+    }
+  }
+
+  /// Nothing is above programs; examples see what an installed package has.
+  void read_apps() {
+    for (const fs::path& file : sources(root_ / "apps")) {
+      keep_from_opencl(file);
+      if (folder_of(file, root_ / "apps") != "examples") continue;
+      for (const std::string& include : includes_of(file))
+        complain(file, include, "which is private");
+    }
+  }
+
+  void keep_from_opencl(const fs::path& file) {
     for (const std::string& include : includes_of(file)) {
-      if (include == "device/cl.hpp" && module != "device")
-        complain(file, include, "which is for host/device alone");
+      if (include == "device/cl.hpp") complain(file, include, "which is for host/device alone");
     }
   }
-  return out;
-}
+
+  fs::path root_;
+  std::vector<std::string> faults_;
+};
 
 /// A tree of two files with an include each.
 class Tree {
  public:
   Tree(const std::string& file, const std::string& include)
       : root_(fs::temp_directory_path() / ("raysplats_layering_" + std::to_string(counter_++))) {
-    for (const char* folder : {"host/base", "include/raysplats"})
+    for (const char* folder : {"host", "include/raysplats", "cl", "tests/unit", "apps"})
       fs::create_directories(root_ / folder);
     fs::create_directories((root_ / file).parent_path());
     std::ofstream(root_ / file) << "#include <vector>\n#include \"" << include << "\"\n";
@@ -153,7 +213,7 @@ class Tree {
   }
   Tree(const Tree&) = delete;
   Tree& operator=(const Tree&) = delete;
-  std::vector<std::string> faults() const { return ::faults(root_); }
+  std::vector<std::string> faults() const { return Layers(root_).faults(); }
 
  private:
   static inline int counter_ = 0;
@@ -165,7 +225,9 @@ class Tree {
 TEST_CASE("dependencies point one way, and public headers include public headers") {
   const fs::path root = RAYSPLATS_SOURCE_DIR;
   REQUIRE(sources(root / "host").size() > 100);
-  for (const std::string& fault : faults(root)) FAIL_CHECK(fault);
+  REQUIRE(sources(root / "cl").size() > 80);
+  REQUIRE(sources(root / "tests/unit").size() > 150);
+  for (const std::string& fault : Layers(root).faults()) FAIL_CHECK(fault);
 }
 
 TEST_CASE("an arrow upwards and a private header in a public one are found") {
@@ -180,4 +242,15 @@ TEST_CASE("an arrow upwards and a private header in a public one are found") {
   CHECK(Tree("include/raysplats/context.hpp", "device/cl.hpp").faults().size() == 1);
   CHECK(Tree("include/raysplats/camera.hpp", "raysplats/model.hpp").faults().size() == 1);
   CHECK(Tree("include/raysplats/unheard_of.hpp", "raysplats/error.hpp").faults().size() == 1);
+  CHECK(Tree("cl/trace/a.cl", "bvh/box.h").faults().empty());
+  CHECK(Tree("cl/trace/a.cl", "shared/sh.h").faults().empty());
+  CHECK(Tree("cl/bvh/a.cl", "trace/packet.h").faults().size() == 1);
+  CHECK(Tree("cl/shared/a.h", "bvh/box.h").faults().size() == 1);
+  CHECK(Tree("cl/new/a.cl", "shared/sh.h").faults().size() == 1);
+  CHECK(Tree("tests/unit/trace/a_test.cpp", "bvh/lbvh.hpp").faults().empty());
+  CHECK(Tree("tests/unit/trace/a_test.cpp", "reference/tracer.hpp").faults().empty());
+  CHECK(Tree("tests/unit/trace/a_test.cpp", "train/adam.hpp").faults().size() == 1);
+  CHECK(Tree("apps/raysplats/a.cpp", "train/adam.hpp").faults().empty());
+  CHECK(Tree("apps/raysplats/a.cpp", "device/cl.hpp").faults().size() == 1);
+  CHECK(Tree("apps/examples/a.cpp", "train/adam.hpp").faults().size() == 1);
 }
