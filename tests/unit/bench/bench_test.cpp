@@ -10,6 +10,7 @@
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
 #include "unit/bench/report_fixture.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -53,7 +54,7 @@ TEST_CASE("bench: ids follow scenes, sizes and the filter") {
 }
 
 TEST_CASE("bench: every row has a time, work and a share of the limits") {
-  Context context(select_device(""), timed_options());
+  Context context(test_device(), timed_options());
   const BenchOptions options = tiny_bench(2);
   const BenchReport report = run_bench(context, options);
   CHECK(report.device == context.device().name);
@@ -75,7 +76,7 @@ TEST_CASE("bench: every row has a time, work and a share of the limits") {
 }
 
 TEST_CASE("bench: a model and a filter") {
-  Context context(select_device(""), timed_options());
+  Context context(test_device(), timed_options());
   BenchOptions options = tiny_bench(2);
   options.filter = "forward|rays/";
   const BenchModel model{"my model", bench_scene("surface", 500, 3, 1), bench_camera(32, 48)};
@@ -92,7 +93,7 @@ TEST_CASE("bench: a model and a filter") {
 }
 
 TEST_CASE("operations: launches go to their stages and failures come out") {
-  Context context(select_device(""), timed_options());
+  Context context(test_device(), timed_options());
   Buffer<std::uint32_t> layout(context, 256, "layout");
   Kernel kernel = context.kernel("primitives/layout_probe.cl", "layout_probe");
   int prepared = 0, reset = 0, run = 0;

@@ -14,12 +14,12 @@
 #include "bench/kernel_folders.hpp"
 #include "raysplats/error.hpp"
 #include "unit/bench/report_fixture.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
 TEST_CASE("a device's report holds its self-test, every size that fits the time, and its speeds") {
-  Context context(select_device(""), timed_options());
+  Context context(test_device(), timed_options());
   BenchOptions options = tiny_bench(1);
   options.filter = "^(adam|view)/";
   const DeviceReport report = make_device_report(context, options);
@@ -73,7 +73,7 @@ TEST_CASE("two folders of kernels are compared by what they compute, then by tim
   BenchOptions options = tiny_bench(1);
   options.filter = "^adam/";
   options.repeat = 3;
-  const DeviceInfo device = select_device("");
+  const DeviceInfo device = test_device();
   const KernelComparison same =
       compare_kernels(device, timed_options(), own.string(), changed.string(), options);
   CHECK(same.equal());

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "raysplats/error.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 

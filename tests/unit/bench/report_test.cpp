@@ -11,7 +11,7 @@
 
 #include "raysplats/error.hpp"
 #include "unit/bench/report_fixture.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 

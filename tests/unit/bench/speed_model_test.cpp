@@ -15,6 +15,7 @@
 #include "synth/bench_scenes.hpp"
 #include "trace/camera_tracer.hpp"
 #include "unit/bench/report_fixture.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -94,7 +95,7 @@ TEST_CASE("the model's registers and local memory are those of the compilers' ba
 }
 
 TEST_CASE("kernels that count their work find the same hits and change no pixel") {
-  Context context(select_device(""), timed_options());
+  Context context(test_device(), timed_options());
   const BenchOptions options = tiny_bench(1);
   const BenchModel model{"random", bench_scene("random", 1000, 1, 0),
                          bench_camera(options.width, options.height), true};

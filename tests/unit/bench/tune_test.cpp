@@ -9,6 +9,7 @@
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
 #include "trace/camera_tracer.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -76,7 +77,7 @@ TEST_CASE("tune: measures the axes and leaves the winner in the context") {
   ContextOptions timed;
   timed.profile = timed.keep_launches = true;
   timed.tuning = false;
-  Context context(select_device(""), timed);
+  Context context(test_device(), timed);
   TuneOptions options;
   options.size = 200;
   options.width = options.height = 32;
@@ -103,7 +104,7 @@ TEST_CASE("tune: measures the axes and leaves the winner in the context") {
 TEST_CASE("tune: the picture and the gradients do not depend on the tuning") {
   ContextOptions plain;
   plain.tuning = false;
-  Context context(select_device(""), plain);
+  Context context(test_device(), plain);
   const DeviceGaussians gaussians =
       DeviceGaussians::upload(context, bench_scene("clustered", 2000, 5), ScaleActivation::kExp);
   const Camera camera = bench_camera(70, 50);

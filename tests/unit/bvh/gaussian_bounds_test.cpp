@@ -10,6 +10,7 @@
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -91,7 +92,7 @@ bool is_empty(const RsAabb& box) {
 }  // namespace
 
 TEST_CASE("gaussian bounds: contain the ellipsoid and are tight") {
-  Context context(select_device(""));
+  Context context(test_device());
   const Parameters p(2001);
   for (const bool sigmoid : {false, true}) {
     for (const bool adaptive : {false, true}) {
@@ -123,7 +124,7 @@ TEST_CASE("gaussian bounds: contain the ellipsoid and are tight") {
 }
 
 TEST_CASE("gaussian bounds: values that are not finite give empty boxes [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
   Parameters p(16);
@@ -145,7 +146,7 @@ TEST_CASE("gaussian bounds: values that are not finite give empty boxes [small] 
 }
 
 TEST_CASE("gaussian bounds: extreme lengths of quaternions and scales [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   Parameters p(4);
   for (std::size_t a = 0; a < 4; ++a) {
     p.quaternions[4 * 0 + a] *= 1e-30f;
@@ -169,7 +170,7 @@ TEST_CASE("gaussian bounds: extreme lengths of quaternions and scales [small] [t
 }
 
 TEST_CASE("gaussian bounds: buffers that are too short are refused") {
-  Context context(select_device(""));
+  Context context(test_device());
   GaussianBounds bounds(context, false, false);
   Buffer<float> three(context, 3, "three");
   Buffer<float> four(context, 4, "four");

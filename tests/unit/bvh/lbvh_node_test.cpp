@@ -9,6 +9,7 @@
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "device/kernel.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -48,7 +49,7 @@ std::vector<std::uint32_t> meet_node(Context& context,
 }  // namespace
 
 TEST_CASE("a missing child is met by no ray, whatever its numbers") {
-  Context context(select_device(""));
+  Context context(test_device());
   const RawRay sound{0.1f, 0.2f, -4.0f, 0.0f, 0.0f, 0.0f, 1.0f, kInfinity};
   std::vector<RawRay> rays{sound};
   for (const float value : {std::numeric_limits<float>::quiet_NaN(), kInfinity, -kInfinity,

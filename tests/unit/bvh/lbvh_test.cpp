@@ -16,6 +16,7 @@
 #include "base/rng.hpp"
 #include "bvh/lbvh_validate.hpp"
 #include "raysplats/error.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -24,11 +25,6 @@ namespace {
 using Boxes = std::vector<RsAabb>;
 
 const ChunkShape kShapes[] = {{1, 1, 1}, {3, 1, 16}, {8, 64, 64}};
-
-Context device_context() {
-  const char* device = std::getenv("RAYSPLATS_DEVICE");
-  return Context(select_device(device == nullptr ? "" : device));
-}
 
 RsAabb box_at(double x, double y, double z, double hx, double hy, double hz) {
   const double c[3] = {x, y, z};
@@ -174,7 +170,7 @@ TEST_CASE("lbvh: the curve goes from cell to neighbouring cell through all of th
 }
 
 TEST_CASE("lbvh: every size, width and division of the work") {
-  Context context = device_context();
+  Context context = make_test_context();
   for (const int lanes : {4, 8, 16}) {
     for (const ChunkShape& shape : kShapes) {
       if (lanes != 8 && shape.groups != 3) continue;
@@ -190,14 +186,14 @@ TEST_CASE("lbvh: every size, width and division of the work") {
 }
 
 TEST_CASE("lbvh: the device's own shape [small] [tiny]") {
-  Context context = device_context();
+  Context context = make_test_context();
   Tree tree(context, 0, ChunkShape::for_device(context.device()));
   check_tree(tree, random_boxes(700, 0.1, 3));
   check_tree(tree, clumps(70, 2, 1e5));
 }
 
 TEST_CASE("lbvh: coincident, aligned and clustered centres") {
-  Context context = device_context();
+  Context context = make_test_context();
   for (const ChunkShape& shape : kShapes) {
     CAPTURE(shape.groups);
     CAPTURE(shape.group_size);
@@ -225,7 +221,7 @@ TEST_CASE("lbvh: coincident, aligned and clustered centres") {
 }
 
 TEST_CASE("lbvh: empty, non-finite, huge and tiny boxes") {
-  Context context = device_context();
+  Context context = make_test_context();
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
   Boxes boxes = random_boxes(300, 0.1, 21);
@@ -255,7 +251,7 @@ TEST_CASE("lbvh: empty, non-finite, huge and tiny boxes") {
 }
 
 TEST_CASE("lbvh: a few boxes far away cost rays at most half as many visits again") {
-  Context context = device_context();
+  Context context = make_test_context();
   for (const int lanes : {4, 16}) {
     Tree tree(context, lanes, ChunkShape::for_device(context.device()));
     const std::size_t count = 20000;
@@ -281,7 +277,7 @@ TEST_CASE("lbvh: a few boxes far away cost rays at most half as many visits agai
 }
 
 TEST_CASE("lbvh: a refit has the boxes of a rebuild and keeps the order") {
-  Context context = device_context();
+  Context context = make_test_context();
   for (const ChunkShape& shape : kShapes) {
     CAPTURE(shape.groups);
     CAPTURE(shape.group_size);
@@ -305,7 +301,7 @@ TEST_CASE("lbvh: a refit has the boxes of a rebuild and keeps the order") {
 }
 
 TEST_CASE("lbvh: cost equals the sum over the nodes and tells an outdated order [small]") {
-  Context context = device_context();
+  Context context = make_test_context();
   for (const ChunkShape& shape : {ChunkShape{3, 1, 16}, ChunkShape{2, 16, 16}}) {
     Tree tree(context, 8, shape);
     CHECK(tree.cost({}) == 0);
@@ -327,7 +323,7 @@ TEST_CASE("lbvh: cost equals the sum over the nodes and tells an outdated order 
 }
 
 TEST_CASE("lbvh: the cost sees what happens among boxes when others are far away") {
-  Context context = device_context();
+  Context context = make_test_context();
   Tree tree(context, 8, ChunkShape::for_device(context.device()));
   const Boxes boxes = clumps(20000, 20, 1e6);
   tree.build(boxes);
@@ -347,7 +343,7 @@ TEST_CASE("lbvh: the cost sees what happens among boxes when others are far away
 }
 
 TEST_CASE("lbvh: sizes that do not fit are refused") {
-  Context context = device_context();
+  Context context = make_test_context();
   Tree tree(context, 4, ChunkShape::for_device(context.device()));
   const Boxes boxes = random_boxes(10, 0.1, 1);
   CHECK_THROWS_AS(tree.lbvh().order(uploaded(context, boxes), 11), UsageError);
@@ -356,7 +352,7 @@ TEST_CASE("lbvh: sizes that do not fit are refused") {
 }
 
 TEST_CASE("lbvh validation: a fault of each kind is found") {
-  Context context = device_context();
+  Context context = make_test_context();
   Tree tree(context, 4, ChunkShape::for_device(context.device()));
   Boxes boxes = random_boxes(1000, 0.1, 1);
   tree.build(boxes);
@@ -409,7 +405,7 @@ TEST_CASE("lbvh validation: a fault of each kind is found") {
 }
 
 TEST_CASE("groups are ordered alike by one work-item and by many [small]") {
-  Context context = device_context();
+  Context context = make_test_context();
   for (const std::size_t count : {1u, 5u, 63u, 64u, 65u, 130u, 1000u}) {
     for (const int packet : {4, 8, 16}) {
       CAPTURE(count);

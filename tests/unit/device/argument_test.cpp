@@ -13,7 +13,7 @@
 #include "device/context.hpp"
 #include "device/kernel_sources.hpp"
 #include "raysplats/error.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -51,7 +51,7 @@ struct Sorts {
   SortsFolder folder;
   ScopedVariable kernels{"RAYSPLATS_KERNEL_DIR", folder.path().string()};
   ScopedVariable checked{"RAYSPLATS_CHECK_ARGUMENTS", "1"};
-  Context context{select_device(""), uncached()};
+  Context context{test_device(), uncached()};
   Kernel kernel = context.kernel("sorts.cl", "sorts");
   Buffer<float> vectors{context, 8, "vectors"};
   Buffer<std::int32_t> integers{context, 8, "integers"};
@@ -117,7 +117,7 @@ TEST_CASE("arguments: launches are compared with what the kernel declares") {
 }
 
 TEST_CASE("arguments: no kernel takes more than can be read") {
-  Context context(select_device(""));
+  Context context(test_device());
   std::size_t most = 0, kernels = 0;
   for (const auto& [path, source] : kernel_sources()) {
     if (path.size() < 3 || path.compare(path.size() - 3, 3, ".cl") != 0) continue;

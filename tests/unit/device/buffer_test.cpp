@@ -10,11 +10,12 @@
 
 #include "device/context.hpp"
 #include "raysplats/error.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
 TEST_CASE("buffer: content survives the way to the device and back") {
-  Context context(select_device(""));
+  Context context(test_device());
   Buffer<float> a(context, 5, "a");
   a.upload(std::vector<float>{1, 2, 3, 4, 5});
   a.upload(std::vector<float>{9, 8}, 2);
@@ -30,7 +31,7 @@ TEST_CASE("buffer: content survives the way to the device and back") {
 }
 
 TEST_CASE("buffer: empty and growing buffers") {
-  Context context(select_device(""));
+  Context context(test_device());
   Buffer<std::uint32_t> buffer(context, 0, "none");
   CHECK(buffer.size() == 0);
   CHECK(buffer.download().empty());
@@ -45,7 +46,7 @@ TEST_CASE("buffer: empty and growing buffers") {
 }
 
 TEST_CASE("buffer: memory is counted while it lives") {
-  Context context(select_device(""));
+  Context context(test_device());
   CHECK(context.allocated_bytes() == 0);
   {
     Buffer<std::uint32_t> a(context, 1000, "a");
@@ -64,13 +65,13 @@ TEST_CASE("buffer: cannot be copied by accident, and may outlive its context") {
   CHECK_FALSE(std::is_copy_constructible_v<Buffer<float>>);
   CHECK_FALSE(std::is_copy_assignable_v<Buffer<float>>);
   CHECK(std::is_nothrow_move_constructible_v<Buffer<float>>);
-  auto context = std::make_unique<Context>(select_device(""));
+  auto context = std::make_unique<Context>(test_device());
   Buffer<float> buffer(*context, 10, "late");
   context.reset();
 }
 
 TEST_CASE("buffer: sizes over the device's limit are refused with the label") {
-  Context context(select_device(""));
+  Context context(test_device());
   const std::size_t limit = context.device().max_allocation;
   for (const std::size_t size : {limit / 4 + 1, std::numeric_limits<std::size_t>::max() / 4,
                                  std::numeric_limits<std::size_t>::max() / 2 + 3}) {
@@ -86,7 +87,7 @@ TEST_CASE("buffer: sizes over the device's limit are refused with the label") {
 }
 
 TEST_CASE("buffer: accesses outside are errors, not crashes") {
-  Context context(select_device(""));
+  Context context(test_device());
   Buffer<float> buffer(context, 4, "small");
   CHECK_THROWS_AS(buffer.read(4), DeviceError);
   CHECK_THROWS_AS(buffer.upload(std::vector<float>(5)), DeviceError);

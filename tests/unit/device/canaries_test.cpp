@@ -11,7 +11,7 @@
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "raysplats/error.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -27,7 +27,7 @@ struct Fixture {
   ScopedVariable kernels{"RAYSPLATS_KERNEL_DIR", folder.path().string()};
   ScopedVariable canaries{"RAYSPLATS_CANARY", "1"};
   Context context;
-  Fixture() : context(select_device(""), options(folder)) {}
+  Fixture() : context(test_device(), options(folder)) {}
 
   static ContextOptions options(const TemporaryDirectory& folder) {
     folder.write("stray.cl", kStray);
@@ -82,7 +82,7 @@ TEST_CASE("canaries: memory that nobody has written is NaN") {
 
 TEST_CASE("canaries: the variable is 0 or 1") {
   const ScopedVariable on("RAYSPLATS_CANARY", "yes");
-  CHECK_THROWS_AS(Context(select_device("")), UsageError);
+  CHECK_THROWS_AS(Context(test_device()), UsageError);
   const ScopedVariable off("RAYSPLATS_CANARY", "0");
   CHECK(Canaries::from_environment() == nullptr);
 }

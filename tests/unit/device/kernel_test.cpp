@@ -15,7 +15,7 @@
 #include "device/context_impl.hpp"
 #include "device/profiler.hpp"
 #include "raysplats/error.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -98,7 +98,7 @@ TEST_CASE("kernel: a compile error shows file, line and the compiler's message")
   folder.write(
       "broken.cl",
       "#include \"good.h\"\n__kernel void f(__global int* a) {\n  a[0] = undeclared_name;\n}\n");
-  Context context(select_device(""), uncached());
+  Context context(test_device(), uncached());
   const std::string message = device_error([&] { context.kernel("broken.cl", "f"); });
   CHECK(contains(message, "broken.cl:3"));
   CHECK(contains(message, "undeclared_name"));
@@ -110,7 +110,7 @@ TEST_CASE("kernel: launches with defines, values and rounded ranges") {
   const ScopedVariable variable("RAYSPLATS_KERNEL_DIR", folder.path().string());
   folder.write("scale.cl", kScale);
   folder.write("shared/compat.h", "");
-  Context context(select_device(""), uncached());
+  Context context(test_device(), uncached());
   Buffer<std::int32_t> data(context, 10, "data");
   const std::vector<std::int32_t> input{0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
   data.upload(input);
@@ -130,7 +130,7 @@ TEST_CASE("kernel: wrong launches are refused with the kernel's name") {
   const ScopedVariable variable("RAYSPLATS_KERNEL_DIR", folder.path().string());
   folder.write("scale.cl", kScale);
   folder.write("shared/compat.h", "");
-  Context context(select_device(""), uncached());
+  Context context(test_device(), uncached());
   CHECK(contains(device_error([&] { context.kernel("scale.cl", "no_such_kernel"); }),
                  "no_such_kernel"));
   Kernel kernel = context.kernel("scale.cl", "scale");
@@ -170,7 +170,7 @@ TEST_CASE("range: sizes round up to whole groups") {
 TEST_CASE("profiler: launches are counted and the table has them") {
   ContextOptions options;
   options.profile = true;
-  Context context(select_device(""), options);
+  Context context(test_device(), options);
   Buffer<std::uint32_t> layout(context, 256, "layout");
   Kernel kernel = context.kernel("primitives/layout_probe.cl", "layout_probe");
   for (int i = 0; i < 3; ++i) kernel.launch(Range{}, layout);
@@ -212,7 +212,7 @@ TEST_CASE("compilers that warn are not heard") {
                "  turn(a, b, 8);\n"
                "  for (int i = 0; i < 4; ++i) data[i] = b[i];\n"
                "}\n");
-  Context context(select_device(""), uncached());
+  Context context(test_device(), uncached());
   const auto build = [&](int run) {
     // Drivers have caches of their own: every run of the test has another source.
     const auto now = std::chrono::system_clock::now().time_since_epoch().count();

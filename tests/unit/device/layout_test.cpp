@@ -8,6 +8,7 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -15,7 +16,7 @@ TEST_CASE("shared records: sizes and offsets agree between the compilers") {
 #define RS_SIZE_OF(type) sizeof(type),
 #define RS_OFFSET_OF(type, field) offsetof(type, field),
   const std::vector<std::size_t> expected{RS_RECORDS(RS_SIZE_OF, RS_OFFSET_OF)};
-  Context context(select_device(""));
+  Context context(test_device());
   Buffer<std::uint32_t> layout(context, 256, "layout");
   layout.clear();
   context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, layout);

@@ -14,7 +14,7 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;
@@ -52,7 +52,7 @@ std::uint32_t probe(const fs::path& cache,
   ContextOptions options;
   options.cache_directory = cache.string();
   options.compiling = compiling;
-  Context context(select_device(""), options);
+  Context context(test_device(), options);
   Buffer<std::uint32_t> layout(context, 256, "layout");
   context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, layout);
   return layout.read(0);
@@ -150,7 +150,7 @@ TEST_CASE("program cache: a driver that keeps kernels itself is not asked for bi
   const ScopedVariable keeps("POCL_KERNEL_CACHE", "1");
   const ScopedVariable plain("RAYSPLATS_CHECK_ARGUMENTS", "0");
   const bool pocl =
-      select_device("").platform.find("Portable Computing Language") != std::string::npos;
+      test_device().platform.find("Portable Computing Language") != std::string::npos;
   std::size_t compiled = 0;
   const auto count = [&](std::size_t number, const std::string&) { compiled = number; };
   CHECK(probe(folder.path(), count) > 1);

@@ -13,7 +13,7 @@
 
 #include "device/context.hpp"
 #include "raysplats/error.hpp"
-#include "temporary_directory.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -140,7 +140,7 @@ TEST_CASE("tuning: a directory that cannot be made is a DataError") {
 
 TEST_CASE("tuning: a context has that of its device unless told otherwise") {
   const TemporaryDirectory folder;
-  const DeviceInfo chosen = select_device("");
+  const DeviceInfo chosen = test_device();
   CHECK_FALSE(chosen.tuning);
   ContextOptions options;
   options.cache_directory = folder.path().string();
@@ -157,7 +157,7 @@ TEST_CASE("tuning: a context has that of its device unless told otherwise") {
 TEST_CASE("launches are kept on request, with their programs") {
   ContextOptions options;
   options.profile = options.keep_launches = true;
-  Context context(select_device(""), options);
+  Context context(test_device(), options);
   Buffer<std::uint32_t> a(context, 256, "a"), b(context, 256, "b");
   CHECK(context.take_launches().empty());
   context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, a);

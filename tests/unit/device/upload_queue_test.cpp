@@ -8,6 +8,7 @@
 
 #include "base/rng.hpp"
 #include "device/buffer.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -23,7 +24,7 @@ std::vector<std::uint32_t> random_words(std::size_t size, std::uint64_t stream) 
 }  // namespace
 
 TEST_CASE("uploads beside what runs: every command finds what was uploaded before it [small]") {
-  Context context(select_device(""));
+  Context context(test_device());
   UploadQueue uploads(context);
   constexpr std::size_t kRounds = 12, kMost = 5000;
   std::array<Buffer<std::uint32_t>, 2> targets;
@@ -51,7 +52,7 @@ TEST_CASE("uploads beside what runs: every command finds what was uploaded befor
 }
 
 TEST_CASE("uploads of nothing do nothing, and a queue may go before its buffers [small]") {
-  Context context(select_device(""));
+  Context context(test_device());
   Buffer<std::uint32_t> target(context, 4, "target");
   target.fill(7);
   {

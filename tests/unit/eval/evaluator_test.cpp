@@ -2,7 +2,6 @@
 #include "raysplats/evaluation.hpp"
 
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "eval/metrics.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "unit/temporary_directory.hpp"
 
 namespace raysplats {
 namespace {
@@ -25,11 +25,8 @@ constexpr int kHeight = 18;
 // A folder with two test photos and one training photo; the right half of each is transparent.
 class Scene {
  public:
-  Scene()
-      : folder_(std::filesystem::temp_directory_path() /
-                ("raysplats_eval_" + std::to_string(::getpid()))) {
-    std::filesystem::create_directories(folder_);
-    dataset.root = folder_;
+  Scene() {
+    dataset.root = folder_.path();
     for (int i = 0; i < 3; ++i) {
       Image photo(kWidth, kHeight, 4);
       for (int y = 0; y < kHeight; ++y) {
@@ -54,10 +51,6 @@ class Scene {
       dataset.views.push_back(view);
     }
   }
-  ~Scene() {
-    std::error_code error;
-    std::filesystem::remove_all(folder_, error);
-  }
   std::filesystem::path path(const char* name) const { return folder_ / name; }
   const View& view(const std::string& name) const {
     return *std::find_if(dataset.views.begin(), dataset.views.end(),
@@ -67,7 +60,7 @@ class Scene {
   Dataset dataset;
 
  private:
-  std::filesystem::path folder_;
+  TemporaryDirectory folder_;
 };
 
 constexpr std::array<float, 3> kBackground{1.0f, 0.5f, 0.0f};

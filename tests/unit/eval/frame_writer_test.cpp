@@ -3,7 +3,6 @@
 
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -13,18 +12,12 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "trace/camera_tracer.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct TemporaryFolder {
-  fs::path path =
-      fs::temp_directory_path() / ("raysplats_frame_writer_" + std::to_string(::getpid()));
-  TemporaryFolder() { fs::create_directories(path); }
-  ~TemporaryFolder() { fs::remove_all(path); }
-};
 
 std::vector<std::string> names_of(const std::vector<std::string>& images) {
   std::vector<Camera> cameras(images.size());
@@ -86,8 +79,8 @@ TEST_CASE("the depth preview is white near, black far and where nothing is") {
 }
 
 TEST_CASE("depth, hits and capped rays of a blurred frame are those of all its moments") {
-  const TemporaryFolder folder;
-  Context context(select_device(""));
+  const TemporaryDirectory folder;
+  Context context(test_device());
   TraceOptions trace;
   trace.depth = true;
   trace.max_hits = 1;
@@ -103,15 +96,15 @@ TEST_CASE("depth, hits and capped rays of a blurred frame are those of all its m
   options.format = FrameFormat::kExr;
   options.depth = options.hits = true;
   options.shutter = 1.0;
-  const FrameReport sharp = write_frames(tracer, model, cameras, folder.path, options);
-  const fs::path first = folder.path / "frame_0000.exr";
+  const FrameReport sharp = write_frames(tracer, model, cameras, folder.path(), options);
+  const fs::path first = folder.path() / "frame_0000.exr";
   const std::vector<float> z = exr_channel(first, "Z"), hits = exr_channel(first, "hits");
   REQUIRE(z[5 * 17 + 8] > 3.0f);
   REQUIRE(sharp.capped_rays > 0);
   cameras.push_back(cameras.back());
   // Moments at 0 and half of the way, where nothing is seen any more.
   options.shutter_samples = 2;
-  const FrameReport blurred = write_frames(tracer, model, cameras, folder.path, options);
+  const FrameReport blurred = write_frames(tracer, model, cameras, folder.path(), options);
   const std::vector<float> mean = exr_channel(first, "Z"), half = exr_channel(first, "hits");
   for (std::size_t i = 0; i < z.size(); ++i) {
     CHECK(mean[i] == doctest::Approx(z[i]).epsilon(1e-5));
@@ -121,8 +114,8 @@ TEST_CASE("depth, hits and capped rays of a blurred frame are those of all its m
 }
 
 TEST_CASE("frames hold what the tracer saw") {
-  const TemporaryFolder folder;
-  Context context(select_device(""));
+  const TemporaryDirectory folder;
+  Context context(test_device());
   TraceOptions trace;
   trace.background = {0.0f, 0.0f, 1.0f};
   trace.depth = true;
@@ -139,7 +132,7 @@ TEST_CASE("frames hold what the tracer saw") {
   options.supersample = 2;
   std::size_t heard = 0;
   const FrameReport report =
-      write_frames(tracer, model, cameras, folder.path, options, [&](std::size_t done) {
+      write_frames(tracer, model, cameras, folder.path(), options, [&](std::size_t done) {
         heard = done;
         return true;
       });
@@ -148,7 +141,7 @@ TEST_CASE("frames hold what the tracer saw") {
   CHECK(report.rays == 4u * 33u * 21u);
   CHECK(report.capped_rays == 0);
 
-  const std::vector<float> z = exr_channel(folder.path / "ball.exr", "Z");
+  const std::vector<float> z = exr_channel(folder.path() / "ball.exr", "Z");
   CHECK(z[10 * 33 + 16] == doctest::Approx(4.0f).epsilon(0.01));
   CHECK(z[10 * 33 + 24] == doctest::Approx(8.0f).epsilon(0.01));
   CHECK(z[0] == 0.0f);
@@ -162,8 +155,8 @@ TEST_CASE("frames hold what the tracer saw") {
   packets.forward(gaussians, downscaled(camera, 0.5));
   const Image expected = box_average(packets.download_image(), 2);
   options.depth = false;
-  write_frames(tracer, model, cameras, folder.path, options);
-  const Image exr = read_image(folder.path / "ball.exr");
+  write_frames(tracer, model, cameras, folder.path(), options);
+  const Image exr = read_image(folder.path() / "ball.exr");
   REQUIRE(exr.channels == 4);
   double worst = 0.0;
   for (std::size_t i = 0; i < exr.data.size(); ++i) {
@@ -177,8 +170,8 @@ TEST_CASE("frames hold what the tracer saw") {
 
   // Proportional to light: what is 0.5 on the screen is a fifth of the light of 1.
   options.linear_exr = true;
-  write_frames(tracer, model, cameras, folder.path, options);
-  const Image linear = read_image(folder.path / "ball.exr");
+  write_frames(tracer, model, cameras, folder.path(), options);
+  const Image linear = read_image(folder.path() / "ball.exr");
   worst = 0.0;
   for (std::size_t i = 0; i < linear.data.size(); ++i) {
     const double v = expected.data[i];
@@ -190,12 +183,12 @@ TEST_CASE("frames hold what the tracer saw") {
 
   options.format = FrameFormat::kPng;
   options.depth = true;
-  write_frames(tracer, model, cameras, folder.path, options);
-  const Image png = read_image(folder.path / "ball.png");
+  write_frames(tracer, model, cameras, folder.path(), options);
+  const Image png = read_image(folder.path() / "ball.png");
   REQUIRE(png.channels == 3);
   CHECK(png.at(16, 10, 0) == doctest::Approx(exr.at(16, 10, 0)).epsilon(0.01));
   CHECK(png.at(0, 0, 2) == 1.0f);
-  const Image depth = read_image(folder.path / "ball_depth.png");
+  const Image depth = read_image(folder.path() / "ball_depth.png");
   CHECK(depth.channels == 1);
   CHECK(depth.at(16, 10, 0) > 0.9f);
   CHECK(depth.at(24, 10, 0) < 0.1f);
@@ -209,13 +202,13 @@ TEST_CASE("frames hold what the tracer saw") {
   panorama.height = 32;
   options.format = FrameFormat::kExr;
   options.supersample = 1;
-  write_frames(tracer, model, std::vector<Camera>{panorama}, folder.path, options);
-  const std::vector<float> around = exr_channel(folder.path / "panorama.exr", "Z");
+  write_frames(tracer, model, std::vector<Camera>{panorama}, folder.path(), options);
+  const std::vector<float> around = exr_channel(folder.path() / "panorama.exr", "Z");
   CHECK(around[16 * 64 + 32] == doctest::Approx(4.0f).epsilon(0.02));
   CHECK(around[16 * 64] == 0.0f);
 
   options.supersample = 0;
-  CHECK_THROWS_AS(write_frames(tracer, model, cameras, folder.path, options), UsageError);
+  CHECK_THROWS_AS(write_frames(tracer, model, cameras, folder.path(), options), UsageError);
 }
 
 TEST_CASE("normals and numbers of hits have colours of their own") {
@@ -236,8 +229,8 @@ TEST_CASE("normals and numbers of hits have colours of their own") {
 }
 
 TEST_CASE("frames hold normals and numbers of hits where they are asked for") {
-  const TemporaryFolder folder;
-  Context context(select_device(""));
+  const TemporaryDirectory folder;
+  Context context(test_device());
   TraceOptions trace;
   trace.depth = true;
   Tracer tracer(context, trace);
@@ -251,21 +244,21 @@ TEST_CASE("frames hold normals and numbers of hits where they are asked for") {
   options.format = FrameFormat::kExr;
   options.normals = options.hits = true;
   options.supersample = 2;
-  write_frames(tracer, model, std::vector<Camera>{camera}, folder.path, options);
+  write_frames(tracer, model, std::vector<Camera>{camera}, folder.path(), options);
   const std::size_t middle = 10 * 33 + 16;
-  const std::vector<float> z = exr_channel(folder.path / "ball.exr", "N.Z");
+  const std::vector<float> z = exr_channel(folder.path() / "ball.exr", "N.Z");
   CHECK(z[middle] == doctest::Approx(-1.0f).epsilon(0.001));
   CHECK(z[0] == 0.0f);
-  CHECK(exr_channel(folder.path / "ball.exr", "N.X")[middle] == doctest::Approx(0.0f));
-  CHECK(exr_channel(folder.path / "ball.exr", "hits")[middle] == 1.0f);
-  CHECK(exr_channel(folder.path / "ball.exr", "hits")[0] == 0.0f);
+  CHECK(exr_channel(folder.path() / "ball.exr", "N.X")[middle] == doctest::Approx(0.0f));
+  CHECK(exr_channel(folder.path() / "ball.exr", "hits")[middle] == 1.0f);
+  CHECK(exr_channel(folder.path() / "ball.exr", "hits")[0] == 0.0f);
   options.format = FrameFormat::kPng;
-  write_frames(tracer, model, std::vector<Camera>{camera}, folder.path, options);
-  const Image normals = read_image(folder.path / "ball_normals.png");
+  write_frames(tracer, model, std::vector<Camera>{camera}, folder.path(), options);
+  const Image normals = read_image(folder.path() / "ball_normals.png");
   CHECK(normals.at(16, 10, 2) == doctest::Approx(1.0f).epsilon(0.01));
   CHECK(normals.at(16, 10, 0) == doctest::Approx(0.5f).epsilon(0.01));
   // At the edge rays meet the further ball as well.
-  CHECK(read_image(folder.path / "ball_hits.png").at(16, 10, 0) ==
+  CHECK(read_image(folder.path() / "ball_hits.png").at(16, 10, 0) ==
         doctest::Approx(0.5).epsilon(0.01));
-  CHECK_FALSE(fs::exists(folder.path / "ball_depth.png"));
+  CHECK_FALSE(fs::exists(folder.path() / "ball_depth.png"));
 }

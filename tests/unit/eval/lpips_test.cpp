@@ -8,6 +8,7 @@
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "unit/temporary_directory.hpp"
 
 namespace raysplats {
 namespace {
@@ -84,11 +85,10 @@ TEST_CASE("lpips: runs a network on images of several sizes") {
 TEST_CASE("lpips: a missing or broken network is refused") {
   if (!Lpips::available()) return;
   CHECK_THROWS_AS(Lpips{"/nonexistent/network.onnx"}, DataError);
-  const std::filesystem::path broken =
-      std::filesystem::temp_directory_path() / "raysplats_broken.onnx";
+  const TemporaryDirectory folder;
+  const std::filesystem::path broken = folder / "broken.onnx";
   std::ofstream(broken) << "this is no network";
   CHECK_THROWS_AS(Lpips{broken}, DataError);
-  std::filesystem::remove(broken);
 }
 
 }  // namespace raysplats

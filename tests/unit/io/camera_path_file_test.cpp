@@ -12,6 +12,7 @@
 
 #include "base/atomic_file.hpp"
 #include "raysplats/error.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 using nlohmann::json;
@@ -20,19 +21,13 @@ namespace {
 
 class Folder {
  public:
-  Folder()
-      : path_(std::filesystem::temp_directory_path() /
-              ("raysplats_camera_path_" + std::to_string(::getpid()))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
   std::filesystem::path write(const std::string& name, const std::string& text) const {
-    write_text_file(path_ / name, text);
-    return path_ / name;
+    write_text_file(folder_ / name, text);
+    return folder_ / name;
   }
 
  private:
-  std::filesystem::path path_;
+  TemporaryDirectory folder_;
 };
 
 /// OpenGL axes at x, 2, 3, looking along -z of the world.

@@ -14,17 +14,12 @@
 #include "io/byte_reader.hpp"
 #include "io/ray_file.hpp"
 #include "raysplats/error.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct Scratch {
-  fs::path path = fs::temp_directory_path() / ("raysplats_npy_" + std::to_string(::getpid()));
-  Scratch() { fs::create_directories(path); }
-  ~Scratch() { fs::remove_all(path); }
-};
 
 template <class T>
 std::string raw(const std::vector<T>& values) {
@@ -99,8 +94,8 @@ std::map<std::string, std::string> unzip(const std::string& zip) {
 }  // namespace
 
 TEST_CASE("arrays of both widths, every version and any rank are read") {
-  const Scratch scratch;
-  const fs::path path = scratch.path / "a.npy";
+  const TemporaryDirectory scratch;
+  const fs::path path = scratch.path() / "a.npy";
   const auto read = [&](const std::string& bytes) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
     return io::read_npy(path);
@@ -126,8 +121,8 @@ TEST_CASE("arrays of both widths, every version and any rank are read") {
 }
 
 TEST_CASE("arrays that are not what they should be are refused in one sentence") {
-  const Scratch scratch;
-  const fs::path path = scratch.path / "a.npy";
+  const TemporaryDirectory scratch;
+  const fs::path path = scratch.path() / "a.npy";
   const std::string data = raw(std::vector<float>(12));
   const auto refused = [&](const std::string& bytes) { return why_refused(path, bytes); };
   CHECK(refused(npy(header("<f4", "False", "(2, 6)"), data)).empty());
@@ -155,12 +150,12 @@ TEST_CASE("arrays that are not what they should be are refused in one sentence")
         std::string::npos);
   CHECK(why_refused(path, npy(header("<f4", "False", "(12,)"), data), true).find("(12)") !=
         std::string::npos);
-  CHECK_THROWS_AS(io::read_npy(scratch.path / "none.npy"), DataError);
+  CHECK_THROWS_AS(io::read_npy(scratch.path() / "none.npy"), DataError);
 }
 
 TEST_CASE("rays are read with and without ends, and results keep their shape") {
-  const Scratch scratch;
-  const fs::path path = scratch.path / "rays.npy";
+  const TemporaryDirectory scratch;
+  const fs::path path = scratch.path() / "rays.npy";
   std::vector<float> numbers;
   for (int i = 0; i < 16; ++i) numbers.push_back(static_cast<float>(i));
   std::ofstream(path, std::ios::binary) << npy(header("<f4", "False", "(2, 1, 8)"), raw(numbers));
@@ -182,13 +177,13 @@ TEST_CASE("rays are read with and without ends, and results keep their shape") {
   std::vector<RayResult> results(2);
   results[0] = {{0.1f, 0.2f, 0.3f}, 0.4f, 5, 6, 7, 0};
   results[1] = {{1.1f, 1.2f, 1.3f}, 1.4f, 15, 16, 17, 1};
-  const fs::path written = scratch.path / "results.npz";
+  const fs::path written = scratch.path() / "results.npz";
   io::write_ray_results(written, list.shape, results);
   const std::vector<std::byte> bytes = io::read_file(written);
   const auto files = unzip({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   CHECK(files.size() == 5);
   const auto array = [&](const std::string& name) {
-    const fs::path member = scratch.path / "member.npy";
+    const fs::path member = scratch.path() / "member.npy";
     std::ofstream(member, std::ios::binary | std::ios::trunc) << files.at(name + ".npy");
     return io::read_npy(member);
   };

@@ -18,7 +18,7 @@ namespace {
 /// What a program with OpenCL of its own has, on the device of the tests.
 struct Own {
   explicit Own(cl_command_queue_properties properties = 0) {
-    const DeviceInfo info = select_device("");
+    const DeviceInfo info = test_device();
     for (const PlatformDevice& entry : platform_devices()) {
       if (entry.info.index == info.index) device = entry.device;
     }

@@ -495,8 +495,7 @@ TEST_CASE("Gaussians that coincide blend in the order of their indices, however 
 TEST_CASE("launches of light keep to a budget of time and give the same picture") {
   ContextOptions watched;
   watched.profile = watched.keep_launches = true;
-  const char* selector = std::getenv("RAYSPLATS_DEVICE");
-  Context context(select_device(selector == nullptr ? "" : selector), watched);
+  Context context(test_device(), watched);
   Scene scene = cloud_scene(1);
   add_mesh(scene, ball({0.2, 0.1, 0}, 0.7, 8, 0, true), white(Material::Kind::kMirror));
   add_floor(scene);

@@ -9,6 +9,7 @@
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -56,7 +57,7 @@ void check_sort(
 }  // namespace
 
 TEST_CASE("radix sort: random keys of many sizes") {
-  Context context(select_device(""));
+  Context context(test_device());
   RadixSort sorter(context);
   for (const std::size_t count : {1u, 2u, 3u, 255u, 256u, 1001u, 4096u, 4097u, 70001u, 300007u}) {
     check_sort(context, sorter, random_keys(count, 1ull << 32, count), count);
@@ -64,7 +65,7 @@ TEST_CASE("radix sort: random keys of many sizes") {
 }
 
 TEST_CASE("radix sort: sorted, reversed, equal and few distinct keys") {
-  Context context(select_device(""));
+  Context context(test_device());
   RadixSort sorter(context);
   const std::size_t count = 50001;
   Words keys(count);
@@ -78,7 +79,7 @@ TEST_CASE("radix sort: sorted, reversed, equal and few distinct keys") {
 }
 
 TEST_CASE("radix sort: part of a buffer and part of the bits") {
-  Context context(select_device(""));
+  Context context(test_device());
   RadixSort sorter(context);
   const Words keys = random_keys(20000, 1ull << 32, 9);
   for (const std::size_t count : {0u, 1u, 2u, 777u, 19999u})
@@ -88,7 +89,7 @@ TEST_CASE("radix sort: part of a buffer and part of the bits") {
 }
 
 TEST_CASE("radix sort: every division of the work gives the same result") {
-  Context context(select_device(""));
+  Context context(test_device());
   for (const std::size_t size : {1u, 64u, 256u}) {
     for (const std::size_t groups : {1u, 2u, 3u, 8u, 100u}) {
       CAPTURE(size);
@@ -104,7 +105,7 @@ TEST_CASE("radix sort: every division of the work gives the same result") {
 
 // Groups of 256 take tiles of 1536 elements: sizes around both, equal keys, and a million.
 TEST_CASE("radix sort: groups of work-items at the ends of their tiles and chunks") {
-  Context context(select_device(""));
+  Context context(test_device());
   for (const std::size_t least : {1u, 1024u, 5000u}) {
     CAPTURE(least);
     RadixSort sorter(context, ChunkShape{13, 256, least});
@@ -122,7 +123,7 @@ TEST_CASE("radix sort: groups of work-items at the ends of their tiles and chunk
 }
 
 TEST_CASE("radix sort: one to four passes, some with one digit, in both forms [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   for (const std::size_t size : {1u, 16u}) {
     CAPTURE(size);
     RadixSort sorter(context, ChunkShape{3, size, 1});
@@ -137,7 +138,7 @@ TEST_CASE("radix sort: one to four passes, some with one digit, in both forms [s
 }
 
 TEST_CASE("radix sort: wrong sizes are refused") {
-  Context context(select_device(""));
+  Context context(test_device());
   RadixSort sorter(context);
   Buffer<std::uint32_t> ten(context, 10, "ten");
   Buffer<std::uint32_t> nine(context, 9, "nine");
@@ -146,7 +147,7 @@ TEST_CASE("radix sort: wrong sizes are refused") {
 }
 
 TEST_CASE("radix sort: as many pairs as only the device knows") {
-  Context context(select_device(""));
+  Context context(test_device());
   constexpr std::size_t kMost = 20000;
   const Words keys = random_keys(kMost, std::uint64_t{1} << 32, 19);
   Buffer<std::uint32_t> live(context, 1, "live");

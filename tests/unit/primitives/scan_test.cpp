@@ -8,6 +8,7 @@
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -34,7 +35,7 @@ void check_scan(Context& context, Scan& scan, std::size_t count, std::uint64_t s
 }  // namespace
 
 TEST_CASE("scan: the device's own shape") {
-  Context context(select_device(""));
+  Context context(test_device());
   Scan scan(context);
   for (const std::size_t count : {0u, 1u, 2u, 3u, 255u, 256u, 257u, 4095u, 4097u, 100001u}) {
     check_scan(context, scan, count, count);
@@ -42,7 +43,7 @@ TEST_CASE("scan: the device's own shape") {
 }
 
 TEST_CASE("scan: every shape gives the same sums") {
-  Context context(select_device(""));
+  Context context(test_device());
   for (const std::size_t size : {1u, 2u, 64u, 256u}) {
     for (const std::size_t groups : {1u, 2u, 3u, 7u, 300u}) {
       CAPTURE(size);
@@ -55,7 +56,7 @@ TEST_CASE("scan: every shape gives the same sums") {
 }
 
 TEST_CASE("scan: few elements in both forms [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   for (const std::size_t size : {1u, 16u}) {
     for (const std::size_t groups : {1u, 3u}) {
       CAPTURE(size);
@@ -67,7 +68,7 @@ TEST_CASE("scan: few elements in both forms [small] [tiny]") {
 }
 
 TEST_CASE("scan: sums past 32 bits stop at the largest number in every shape [small]") {
-  Context context(select_device(""));
+  Context context(test_device());
   for (const std::size_t size : {1u, 2u, 16u}) {
     for (const std::size_t groups : {1u, 3u, 300u}) {
       CAPTURE(size);
@@ -87,7 +88,7 @@ TEST_CASE("scan: sums past 32 bits stop at the largest number in every shape [sm
 }
 
 TEST_CASE("scan: a buffer without room for the total is refused") {
-  Context context(select_device(""));
+  Context context(test_device());
   Scan scan(context);
   Buffer<std::uint32_t> buffer(context, 10, "scan test");
   CHECK_THROWS_AS(scan.exclusive(buffer, 10), UsageError);

@@ -17,6 +17,7 @@
 #include "report/figures.hpp"
 #include "report/html.hpp"
 #include "report/run_report.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;
@@ -60,9 +61,7 @@ std::string fault(const std::string& text) {
 /// A run with two evaluations, the second below the first, of views with an awkward name.
 class Run {
  public:
-  explicit Run(const std::string& name = "")
-      : path_(fs::temp_directory_path() /
-              ("raysplats_report_" + std::to_string(::getpid()) + name)) {
+  explicit Run(const std::string& name = "run") : path_(folder_ / name) {
     const fs::path eval = path_ / "eval/iteration_200";
     fs::create_directories(eval);
     write("metrics.csv",
@@ -81,15 +80,13 @@ class Run {
     for (const char* name : {"good.png", "a<b>&.png"})
       write_image(eval / name, Image(12, 4, 3, 0.5f));
   }
-  ~Run() { fs::remove_all(path_); }
-  Run(const Run&) = delete;
-  Run& operator=(const Run&) = delete;
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(path_ / name, std::ios::binary) << text;
   }
   const fs::path& path() const { return path_; }
 
  private:
+  TemporaryDirectory folder_;
   fs::path path_;
 };
 

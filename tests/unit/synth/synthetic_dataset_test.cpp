@@ -2,7 +2,6 @@
 #include "synth/synthetic_dataset.hpp"
 
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,30 +18,12 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// A folder of this process that goes away with the object.
-class Scratch {
- public:
-  explicit Scratch(const std::string& name)
-      : path_(fs::temp_directory_path() /
-              ("raysplats_synth_" + std::to_string(::getpid()) + "_" + name)) {
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 std::string bytes_of(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -76,7 +57,7 @@ const SyntheticOptions kSmall{.size = 32, .train_views = 4, .test_views = 2, .se
 }  // namespace
 
 TEST_CASE("equal options give equal bytes and another seed another data set") {
-  const Scratch first("first"), second("second"), other("other");
+  const TemporaryDirectory first("first"), second("second"), other("other");
   generate_dataset(first.path(), kSmall);
   generate_dataset(second.path(), kSmall);
   SyntheticOptions seeded = kSmall;
@@ -94,7 +75,7 @@ TEST_CASE("equal options give equal bytes and another seed another data set") {
 }
 
 TEST_CASE("the transforms follow the Blender format and the cameras look at the origin") {
-  const Scratch folder("format");
+  const TemporaryDirectory folder;
   generate_dataset(folder.path(), {.size = 8, .train_views = 24, .test_views = 5, .seed = 3});
   std::vector<glm::dvec3> train, test;
   for (const std::string split : {"train", "test"}) {
@@ -128,7 +109,7 @@ TEST_CASE("the transforms follow the Blender format and the cameras look at the 
 }
 
 TEST_CASE("images are RGBA with a transparent surround, an opaque centre and soft edges") {
-  const Scratch folder("alpha");
+  const TemporaryDirectory folder;
   generate_dataset(folder.path(), {.size = 64, .train_views = 2, .test_views = 1, .seed = 0});
   for (const char* name : {"train/r_0.png", "train/r_1.png", "test/r_0.png"}) {
     INFO(name);
@@ -155,7 +136,7 @@ TEST_CASE("images are RGBA with a transparent surround, an opaque centre and sof
 }
 
 TEST_CASE("options outside their range are usage errors and write nothing") {
-  const Scratch folder("usage");
+  const TemporaryDirectory folder;
   const fs::path target = folder.path() / "set";
   CHECK_THROWS_AS(generate_dataset(target, {.size = 7}), UsageError);
   CHECK_THROWS_AS(generate_dataset(target, {.size = 5000}), UsageError);
@@ -166,7 +147,7 @@ TEST_CASE("options outside their range are usage errors and write nothing") {
 }
 
 TEST_CASE("a folder that cannot be written is a data error") {
-  const Scratch folder("unwritable");
+  const TemporaryDirectory folder;
   std::ofstream(folder.path() / "file") << "in the way";
   CHECK_THROWS_AS(generate_dataset(folder.path() / "file", kSmall), DataError);
   CHECK_THROWS_AS(generate_dataset(folder.path() / "file" / "below", kSmall), DataError);
@@ -183,7 +164,7 @@ TEST_CASE("captures with a backdrop are opaque nerfstudio data sets, each of its
   options.train_views = 5;
   options.test_views = 2;
   const auto pictures = [&](SyntheticScene scene, const char* name) {
-    const Scratch scratch(name);
+    const TemporaryDirectory scratch(name);
     options.scene = scene;
     generate_dataset(scratch.path() / "data", options);
     const std::string first = bytes_of(scratch.path() / "data/transforms.json");

@@ -4,7 +4,6 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
@@ -469,8 +468,7 @@ TEST_CASE("gradients of rays are the same to the bit but for atomics, exact ones
 TEST_CASE("launches of rays keep to a budget of time and give the same bits") {
   ContextOptions watched;
   watched.profile = watched.keep_launches = true;
-  const char* selector = std::getenv("RAYSPLATS_DEVICE");
-  Context context(select_device(selector == nullptr ? "" : selector), watched);
+  Context context(test_device(), watched);
   const Gaussians model = reference::random_scene(500, 82, 1);
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   const std::vector<Ray> rays = random_rays(6000, 32);

@@ -4,21 +4,20 @@
 #include <doctest/doctest.h>
 
 #include <bit>
-#include <cstdlib>
 #include <string>
 
 #include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "reference/scenes.hpp"
 #include "trace/ray_tree_validate.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
 namespace {
 
 struct Fixture {
-  Context context{select_device(
-      std::getenv("RAYSPLATS_DEVICE") == nullptr ? "" : std::getenv("RAYSPLATS_DEVICE"))};
+  Context context{test_device()};
   Gaussians model = reference::random_scene(700, 4, 1);
   TraceOptions options;
 

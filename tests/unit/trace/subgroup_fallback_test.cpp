@@ -12,7 +12,7 @@
 
 #include "raysplats/error.hpp"
 #include "trace_fixture.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 

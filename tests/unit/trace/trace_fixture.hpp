@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -18,16 +17,9 @@
 #include "reference/scenes.hpp"
 #include "reference/tracer.hpp"
 #include "trace/camera_tracer.hpp"
+#include "unit/fixture.hpp"
 
 namespace raysplats {
-
-/// The device the tests run on: RAYSPLATS_DEVICE, or the default.
-inline DeviceInfo test_device() {
-  const char* selector = std::getenv("RAYSPLATS_DEVICE");
-  return select_device(selector == nullptr ? "" : selector);
-}
-
-inline Context make_test_context() { return Context(test_device()); }
 
 /// What a packet of rays may be.
 struct Packet {

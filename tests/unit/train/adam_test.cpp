@@ -10,13 +10,14 @@
 
 #include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "unit/fixture.hpp"
 
 namespace raysplats {
 namespace {
 
 Context& context() {
   // Not static: at the end of the program it has to go before what a driver keeps per thread.
-  thread_local Context instance(select_device(""));
+  thread_local Context instance(test_device());
   return instance;
 }
 

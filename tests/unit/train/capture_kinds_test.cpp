@@ -9,7 +9,7 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/trainer.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -27,7 +27,7 @@ struct Kind {
 
 TEST_CASE("every kind of capture reaches its floor with the defaults") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   for (const Kind& kind :
        {Kind{"still-life", SyntheticScene::kStillLife, 29.5},
         Kind{"forward", SyntheticScene::kForward, 33.0}, Kind{"room", SyntheticScene::kRoom, 26.5},

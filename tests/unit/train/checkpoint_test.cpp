@@ -2,7 +2,6 @@
 #include "train/checkpoint.hpp"
 
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -12,20 +11,11 @@
 
 #include "base/atomic_file.hpp"
 #include "raysplats/error.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 
 namespace {
-
-struct TemporaryFolder {
-  std::filesystem::path path = std::filesystem::temp_directory_path() /
-                               ("raysplats_checkpoint_test_" + std::to_string(::getpid()));
-  TemporaryFolder() {
-    std::filesystem::remove_all(path);
-    std::filesystem::create_directories(path);
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
-};
 
 Checkpoint sample(std::int64_t iteration) {
   Checkpoint c;
@@ -55,8 +45,8 @@ std::string read_file(const std::filesystem::path& path) {
 }  // namespace
 
 TEST_CASE("a checkpoint comes back bit for bit") {
-  const TemporaryFolder folder;
-  const auto path = checkpoint_path(folder.path, 7000);
+  const TemporaryDirectory folder;
+  const auto path = checkpoint_path(folder.path(), 7000);
   CHECK(path.filename() == "step_000007000.rsck");
   const Checkpoint c = sample(7000);
   write_checkpoint(path, c);
@@ -83,8 +73,8 @@ TEST_CASE("a checkpoint comes back bit for bit") {
 }
 
 TEST_CASE("every truncation and every flipped bit is noticed") {
-  const TemporaryFolder folder;
-  const auto path = folder.path / "c.rsck";
+  const TemporaryDirectory folder;
+  const auto path = folder.path() / "c.rsck";
   Checkpoint c = sample(1);
   c.sections["sh"].resize(4);
   write_checkpoint(path, c);
@@ -113,26 +103,26 @@ TEST_CASE("every truncation and every flipped bit is noticed") {
 }
 
 TEST_CASE("the newest valid checkpoint is found and old ones go") {
-  const TemporaryFolder folder;
-  CHECK_THROWS_AS(load_latest_checkpoint(folder.path), DataError);
+  const TemporaryDirectory folder;
+  CHECK_THROWS_AS(load_latest_checkpoint(folder.path()), DataError);
   for (const std::int64_t iteration : {100, 200, 1000}) {
-    write_checkpoint(checkpoint_path(folder.path, iteration), sample(iteration));
+    write_checkpoint(checkpoint_path(folder.path(), iteration), sample(iteration));
   }
-  CHECK(load_latest_checkpoint(folder.path).iteration == 1000);
-  CHECK(load_latest_checkpoint(checkpoint_path(folder.path, 100)).iteration == 100);
-  std::string bad = read_file(checkpoint_path(folder.path, 1000));
+  CHECK(load_latest_checkpoint(folder.path()).iteration == 1000);
+  CHECK(load_latest_checkpoint(checkpoint_path(folder.path(), 100)).iteration == 100);
+  std::string bad = read_file(checkpoint_path(folder.path(), 1000));
   bad.back() = static_cast<char>(bad.back() + 1);
-  write_text_file(checkpoint_path(folder.path, 1000), bad);
-  CHECK(load_latest_checkpoint(folder.path).iteration == 200);
-  remove_old_checkpoints(folder.path, 2, 1000);
-  CHECK(list_checkpoints(folder.path).size() == 2);
-  CHECK(!std::filesystem::exists(checkpoint_path(folder.path, 100)));
-  remove_old_checkpoints(folder.path, 5, 1000);
-  CHECK(list_checkpoints(folder.path).size() == 2);
+  write_text_file(checkpoint_path(folder.path(), 1000), bad);
+  CHECK(load_latest_checkpoint(folder.path()).iteration == 200);
+  remove_old_checkpoints(folder.path(), 2, 1000);
+  CHECK(list_checkpoints(folder.path()).size() == 2);
+  CHECK(!std::filesystem::exists(checkpoint_path(folder.path(), 100)));
+  remove_old_checkpoints(folder.path(), 5, 1000);
+  CHECK(list_checkpoints(folder.path()).size() == 2);
   // What lies beyond a run takes no place of its own.
-  write_checkpoint(checkpoint_path(folder.path, 300), sample(300));
-  remove_old_checkpoints(folder.path, 1, 300);
-  CHECK(std::filesystem::exists(checkpoint_path(folder.path, 300)));
-  CHECK(std::filesystem::exists(checkpoint_path(folder.path, 1000)));
-  CHECK(!std::filesystem::exists(checkpoint_path(folder.path, 200)));
+  write_checkpoint(checkpoint_path(folder.path(), 300), sample(300));
+  remove_old_checkpoints(folder.path(), 1, 300);
+  CHECK(std::filesystem::exists(checkpoint_path(folder.path(), 300)));
+  CHECK(std::filesystem::exists(checkpoint_path(folder.path(), 1000)));
+  CHECK(!std::filesystem::exists(checkpoint_path(folder.path(), 200)));
 }

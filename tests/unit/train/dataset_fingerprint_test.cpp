@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "unit/device/temporary_directory.hpp"
+#include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
 

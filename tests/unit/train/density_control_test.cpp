@@ -11,6 +11,7 @@
 #include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -67,7 +68,7 @@ void accumulate(Context& context,
 }  // namespace
 
 TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   const Gaussians model = model_of({0.01, 0.01, 0.01}, {0.5, 0.5, 0.5});
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   for (const DensifySignal signal : {DensifySignal::kScreen, DensifySignal::kAbsolute}) {
@@ -85,7 +86,7 @@ TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [
 }
 
 TEST_CASE("the signal step is how far the mean has moved over the extent [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   const Gaussians model = model_of({0.01, 0.01, 0.01}, {0.5, 0.5, 0.5});
   DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   TrainOptions options = rules();
@@ -144,7 +145,7 @@ TEST_CASE("sizes are the longest axis or the norm of all three [small] [tiny]") 
 }
 
 TEST_CASE("clone, split and prune follow the thresholds [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
     // 0 kept, 1 cloned, 2 split, 3 transparent, 4 too large, 5 never seen.
     const Gaussians model =
@@ -194,7 +195,7 @@ TEST_CASE("clone, split and prune follow the thresholds [small] [tiny]") {
 }
 
 TEST_CASE("children are drawn from their parent's distribution, reproducibly") {
-  Context context(select_device(""));
+  Context context(test_device());
   // One Gaussian shape many times over at the origin: the children's whitened offsets must be
   // standard normal.
   constexpr std::size_t kCount = 4000;
@@ -282,7 +283,7 @@ TEST_CASE("under the cap the strongest candidates win [small] [tiny]") {
 }
 
 TEST_CASE("Gaussians that are not finite are removed and an empty result is an error") {
-  Context context(select_device(""));
+  Context context(test_device());
   Gaussians model = model_of({0.05, 0.05}, {0.5, 0.5});
   model.means[1] = std::numeric_limits<float>::quiet_NaN();
   DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
@@ -311,7 +312,7 @@ TEST_CASE("Gaussians that are not finite are removed and an empty result is an e
 }
 
 TEST_CASE("opacity reset lowers and never raises [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   DeviceGaussians gaussians = DeviceGaussians::upload(
       context, model_of({0.1, 0.1, 0.1}, {0.9, 0.005, 0.3}), ScaleActivation::kExp);
   TrainOptions options = rules();
@@ -362,7 +363,7 @@ TEST_CASE("a budget removes what is transparent or unseen and halves the highest
 }
 
 TEST_CASE("the budget's count follows its curve to the limit and stays there [small]") {
-  Context context(select_device(""));
+  Context context(test_device());
   constexpr std::size_t kCount = 100;
   TrainOptions options;
   options.iterations = 1000;
@@ -389,7 +390,7 @@ TEST_CASE("the budget's count follows its curve to the limit and stays there [sm
 }
 
 TEST_CASE("growth that has one pass alone reaches the limit in it [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   TrainOptions options;
   options.iterations = 100;
   options.densify_from = options.densify_until = 50;
@@ -404,7 +405,7 @@ TEST_CASE("growth that has one pass alone reaches the limit in it [small] [tiny]
 }
 
 TEST_CASE("halves lie side by side along the longest axis, fainter and smaller [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   TrainOptions options;
   options.iterations = 100;
   options.densify_from = 10;
@@ -451,7 +452,7 @@ TEST_CASE("halves lie side by side along the longest axis, fainter and smaller [
 
 TEST_CASE(
     "fading takes the same off every opacity but leaves what is faint already [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   TrainOptions options;
   options.iterations = 100;
   options.densify_from = 10;

@@ -24,7 +24,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -170,7 +170,7 @@ double depth_error(Context& context,
 
 TEST_CASE("maps and points halve the error of depth of six photos") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   TrainOptions options = short_training(400);
   options.max_gaussians = 2500;
   Dataset plain = capture(folder.path() / "data");

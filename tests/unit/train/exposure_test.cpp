@@ -12,6 +12,7 @@
 #include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -23,7 +24,7 @@ constexpr std::size_t kPixels = kWidth * kHeight;
 constexpr std::size_t kViews = 5;
 
 Context& context() {
-  static Context device{select_device("")};
+  static Context device{test_device()};
   return device;
 }
 

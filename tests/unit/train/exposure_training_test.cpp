@@ -14,7 +14,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -57,7 +57,7 @@ double corrected(Context& context, const Dataset& dataset, const fs::path& run, 
 
 TEST_CASE("planted gains cost nothing when every photo has a colour of its own") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   const fs::path data = folder.path() / "data";
   make_photos(data, kSize, kViews, 5);
   const Dataset plain = capture(data, folder.path() / "plain", false);
@@ -87,7 +87,7 @@ TEST_CASE("planted gains cost nothing when every photo has a colour of its own")
 
 TEST_CASE("a resumed run goes on with the photos' colours, bit for bit") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   const fs::path data = folder.path() / "data";
   make_photos(data, 24, 6, 2);
   const Dataset gains = capture(data, folder.path() / "gains", true);

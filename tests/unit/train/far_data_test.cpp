@@ -10,7 +10,7 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/trainer.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -36,7 +36,7 @@ void move_data(const fs::path& folder, const std::array<double, 3>& by) {
 
 TEST_CASE("a scene far from the origin of its files trains as it would at home") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   const auto train = [&](const char* name, const DatasetOptions& data) {
     TrainOptions options = short_training(300);
     options.data = data;

@@ -21,7 +21,7 @@
 #include "raysplats/trainer.hpp"
 #include "reference/gaussian.hpp"
 #include "reference/scenes.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -95,7 +95,7 @@ TEST_CASE("round Gaussians turn their flat side to the nearest camera") {
 
 TEST_CASE("flat Gaussians stay flat, and cost at most half a decibel before a wall") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   const fs::path data = folder.path() / "data";
   make_photos(data, 48, 20, 4, SyntheticScene::kForward);
   TrainOptions options = short_training(400);

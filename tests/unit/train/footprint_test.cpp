@@ -15,7 +15,7 @@
 #include "raysplats/device.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/checkpoint.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -56,7 +56,7 @@ double least_pixel(const std::vector<Camera>& cameras, const glm::dvec3& world) 
 }  // namespace
 
 TEST_CASE("scales are raised to a share of the smallest pixel and left alone above it [small]") {
-  Context context(select_device(""));
+  Context context(test_device());
   constexpr std::size_t kCount = 200;
   Buffer<std::uint32_t> open(context, 1, "guard");
   open.clear();
@@ -97,7 +97,7 @@ TEST_CASE("scales are raised to a share of the smallest pixel and left alone abo
 }
 
 TEST_CASE("a marked step, a share of 0 and NaN leave scales as they are [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   Gaussians before;
   before.resize(2);
   before.log_scales = {-20, -20, -20, std::numeric_limits<float>::quiet_NaN(), -20, -20};
@@ -125,7 +125,7 @@ TEST_CASE("a run finds the least sizes anew where density control has ended") {
   const TemporaryDirectory folder;
   const std::filesystem::path data = folder.path() / "data", run = folder.path() / "run";
   make_photos(data, 32, 6, 1);
-  Context context(select_device(""));
+  Context context(test_device());
   TrainOptions options = short_training(130);
   options.densify_every = 40;
   options.densify_until = 0;
@@ -155,7 +155,7 @@ TEST_CASE("a run finds the least sizes anew where density control has ended") {
 }
 
 TEST_CASE("scales keep to fixed limits, with a footprint and without [small] [tiny]") {
-  Context context(select_device(""));
+  Context context(test_device());
   const std::vector<Camera> cameras = cameras_of(CameraModel::kPinhole);
   Buffer<std::uint32_t> guard(context, 1, "guard");
   for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {

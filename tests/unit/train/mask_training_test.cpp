@@ -10,7 +10,7 @@
 #include "raysplats/device.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -55,7 +55,7 @@ double trained_psnr(Context& context, const fs::path& data, const fs::path& run)
 
 TEST_CASE("a moving box under masks costs next to nothing, and much without them") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   const fs::path data = folder.path() / "data";
   make_photos(data, kSize, kViews, 5);
   const double clean = trained_psnr(context, data, folder.path() / "clean");

@@ -13,6 +13,7 @@
 #include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "train/density_control.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -24,7 +25,7 @@ constexpr double kExtent = 4;
 double sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 
 Context& context() {
-  static Context instance(select_device(""));
+  static Context instance(test_device());
   return instance;
 }
 

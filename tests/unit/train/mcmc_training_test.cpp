@@ -15,7 +15,7 @@
 #include "raysplats/model.hpp"
 #include "raysplats/tracer.hpp"
 #include "raysplats/trainer.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 namespace {
 
 Context& context() {
-  static Context instance(select_device(""));
+  static Context instance(test_device());
   return instance;
 }
 

@@ -3,20 +3,19 @@
 
 #include <doctest/doctest.h>
 
-#include <cstdlib>
 #include <limits>
 #include <vector>
 
 #include "raysplats/device.hpp"
 #include "reference/scenes.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
 namespace {
 
 struct Fixture {
-  Context context{select_device(
-      std::getenv("RAYSPLATS_DEVICE") == nullptr ? "" : std::getenv("RAYSPLATS_DEVICE"))};
+  Context context{test_device()};
   Gaussians model = reference::random_scene(70, 4, 1);
   Adam adam{context, {}};
   ModelValidator validator{context, {}};

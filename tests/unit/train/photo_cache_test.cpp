@@ -14,6 +14,7 @@
 
 #include "base/rng.hpp"
 #include "raysplats/io.hpp"
+#include "unit/fixture.hpp"
 #include "unit/io/scratch.hpp"
 
 using namespace raysplats;
@@ -72,7 +73,7 @@ std::array<double, 5> reduced_pixel(const io::Photo& photo, int width, int heigh
 
 TEST_CASE("a photo on the device is the file's, at its own size to the bit [small]") {
   const Scratch scratch;
-  Context context(select_device(""));
+  Context context(test_device());
   for (const char* type : {".png", ".exr"}) {
     const std::vector<View> views = make_views(scratch, 2, type);
     PhotoCache cache(context, views, 100 * kBytes, 2);
@@ -87,7 +88,7 @@ TEST_CASE("a photo on the device is the file's, at its own size to the bit [smal
 
 TEST_CASE("a reduced photo is the average over areas, of unrounded sums") {
   const Scratch scratch;
-  Context context(select_device(""));
+  Context context(test_device());
   Image mask(kWidth, kHeight, 1, 1.0f);
   for (std::size_t i = 0; i < mask.pixels(); i += 5) mask.data[i] = i % 2 == 0 ? 0.0f : 0.4f;
   write_image(scratch / "mask.png", mask);
@@ -131,7 +132,7 @@ TEST_CASE("a reduced photo is the average over areas, of unrounded sums") {
 
 TEST_CASE("a photo stays on the device within the budget, and the rest are read again") {
   const Scratch scratch;
-  Context context(select_device(""));
+  Context context(test_device());
   const std::vector<View> views = make_views(scratch, 4, ".png");
   std::vector<std::vector<std::uint32_t>> expected;
   for (const View& view : views) expected.push_back(io::load_photo(view).words);

@@ -14,7 +14,7 @@
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/pose_refinement.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -59,7 +59,7 @@ double median(std::vector<double> values) {
 
 TEST_CASE("disturbed poses of photos come back, and the model with them") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   make_photos(folder.path() / "data", 80, 36, 6, SyntheticScene::kStillLife);
   const Dataset clean = load_dataset(folder.path() / "data");
   Dataset moved = clean;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -14,6 +13,7 @@
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/mirror_meshes.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -39,18 +39,14 @@ Gaussians coloured_cloud(std::size_t count, double reach, std::uint64_t seed) {
 
 // Photos of a few coloured Gaussians, in a folder that goes with the object.
 struct Photos {
-  std::filesystem::path folder;
-  Context context{select_device("")};
+  TemporaryDirectory folder;
+  Context context{test_device()};
   Dataset dataset;
 
-  explicit Photos(const std::string& name)
-      : folder(std::filesystem::temp_directory_path() /
-               ("raysplats_ray_training_" + name + std::to_string(::getpid()))) {
-    std::filesystem::remove_all(folder);
+  Photos() {
     std::filesystem::create_directories(folder / "images");
-    dataset.root = folder;
+    dataset.root = folder.path();
   }
-  ~Photos() { std::filesystem::remove_all(folder); }
 
   void take(const Gaussians& truth, const std::vector<Camera>& cameras, const Mirrors& mirrors) {
     const DeviceGaussians gaussians =
@@ -119,7 +115,7 @@ TEST_CASE("training through a distorted camera reaches nearly what a pinhole rea
   for (const CameraModel model :
        {CameraModel::kPinhole, CameraModel::kFisheye, CameraModel::kOpenCv}) {
     CAPTURE(static_cast<int>(model));
-    Photos photos("lens");
+    Photos photos;
     photos.take(truth, ring(model), {});
     const TrainOptions options = small_options(150);
     const double before = photos.train(small_options(1), "start");
@@ -133,7 +129,7 @@ TEST_CASE("training through a distorted camera reaches nearly what a pinhole rea
 }
 
 TEST_CASE("what photos show in a known mirror alone is learnt through it") {
-  Photos photos("mirror");
+  Photos photos;
   // The cameras look at the mirror, the wall x = 2; the Gaussians are behind them.
   const std::filesystem::path mesh = photos.folder / "mirror.obj";
   write_text_file(mesh,
@@ -166,7 +162,7 @@ TEST_CASE("what photos show in a known mirror alone is learnt through it") {
 }
 
 TEST_CASE("mirrors that cannot be read are refused") {
-  Photos photos("refused");
+  Photos photos;
   photos.take(coloured_cloud(5, 0.5, 14), ring(CameraModel::kPinhole), {});
   TrainOptions options = small_options(1);
   options.mirrors = {(photos.folder / "none.obj").string()};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/run_folder.hpp"
+#include "unit/temporary_directory.hpp"
 
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -35,18 +35,15 @@ TEST_CASE("a run that ends below its best evaluation is told, unless that saw ot
 }
 
 TEST_CASE("rows of an older metrics.csv stay when its run goes on") {
-  const std::filesystem::path folder = std::filesystem::temp_directory_path() /
-                                       ("raysplats_run_folder_" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
+  const TemporaryDirectory folder;
   // Without the two columns that came later; the third row was cut off.
   std::ofstream(folder / "metrics.csv") << "iteration,seconds,loss,psnr,gaussians,it_per_s\n10,1.5,"
                                            "0.5,12,100,7\n20,3,0.4,13,100,7\n30,4";
-  RunFolder run(folder);
+  RunFolder run(folder.path());
   run.begin_metrics(30);
   std::ifstream stream(folder / "metrics.csv");
   const std::string text(std::istreambuf_iterator<char>(stream), {});
   CHECK(text ==
         "iteration,seconds,loss,psnr,gaussians,it_per_s,candidates,hits\n10,1.5,0.5,12,100,7,0,0\n"
         "20,3,0.4,13,100,7,0,0\n");
-  std::filesystem::remove_all(folder);
 }

@@ -11,7 +11,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/train_config.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 namespace {
 
 Context& context() {
-  static Context instance(select_device(""));
+  static Context instance(test_device());
   return instance;
 }
 

@@ -17,7 +17,7 @@
 #include "train/model_source.hpp"
 #include "train/sky_adam.hpp"
 #include "train/train_config.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -49,7 +49,7 @@ Trained trained(Context& context,
 
 TEST_CASE(
     "steps of a sky are Adam's in double precision, and none where the guard says so [small]") {
-  Context context{select_device("")};
+  Context context{test_device()};
   constexpr std::size_t kNumbers = 12;
   SkyAdam adam(context, kNumbers);
   Buffer<float> gradient(context, kNumbers, "gradient"), sky(context, kNumbers, "sky");
@@ -81,7 +81,7 @@ TEST_CASE(
 
 TEST_CASE("a sky pays outdoors, and its run can be looked at, moved and resumed bit for bit") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   make_photos(folder.path() / "data", 40, 12, 3, SyntheticScene::kOutdoor);
   const Dataset dataset = load_dataset(folder.path() / "data");
   TrainOptions plain = short_training(200);
@@ -131,7 +131,7 @@ TEST_CASE("options that exclude a sky are refused") {
   options.mirrors = {"/mirror.obj"};
   CHECK_THROWS_AS(validate(options), UsageError);
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   make_photos(folder.path() / "data", 16, 3, 1);
   CHECK_THROWS_AS(
       Trainer(context, load_dataset(folder.path() / "data"), under_sky(10), folder.path() / "run"),

@@ -11,6 +11,7 @@
 #include "train/adam.hpp"
 #include "train/density_control.hpp"
 #include "train/image_loss.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -21,7 +22,7 @@ constexpr std::size_t kPixels = kSide * kSide;
 
 // A guard with the loss that it watches.
 struct Fixture {
-  Context context{select_device("")};
+  Context context{test_device()};
   ImageLoss loss{context, PixelLoss::kL1, 0.2f};
   StepGuard guard{context};
   Buffer<float> image{context, 4 * kPixels, "image"};
@@ -107,7 +108,7 @@ TEST_CASE("counts go on from where they were") {
 }
 
 TEST_CASE("a marked step changes neither parameters nor moments nor statistics") {
-  Context context(select_device(""));
+  Context context(test_device());
   Gaussians model;
   model.resize(130);
   DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -16,6 +15,7 @@
 #include "raysplats/tracer.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/checkpoint.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -23,16 +23,13 @@ namespace {
 
 // A few coloured balls photographed from ten places, in a folder that goes with the object.
 struct Photos {
-  std::filesystem::path folder;
-  Context context{select_device("")};
+  TemporaryDirectory folder;
+  Context context{test_device()};
   Dataset dataset;
 
-  Photos()
-      : folder(std::filesystem::temp_directory_path() /
-               ("raysplats_trainer_api_" + std::to_string(::getpid()))) {
-    std::filesystem::remove_all(folder);
+  Photos() {
     std::filesystem::create_directories(folder / "images");
-    dataset.root = folder;
+    dataset.root = folder.path();
     CounterRng rng(21, 3);
     Gaussians truth;
     truth.resize(40);
@@ -61,7 +58,6 @@ struct Photos {
       dataset.views.push_back(view);
     }
   }
-  ~Photos() { std::filesystem::remove_all(folder); }
 };
 
 TrainOptions small_options() {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -10,6 +9,7 @@
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
 #include "short_training.hpp"
+#include "unit/fixture.hpp"
 
 using namespace raysplats;
 
@@ -17,13 +17,8 @@ namespace {
 
 // Generated photos in a folder that goes with the object.
 struct Photos {
-  std::filesystem::path folder;
-  Photos()
-      : folder(std::filesystem::temp_directory_path() /
-               ("raysplats_trainer_pace_" + std::to_string(::getpid()))) {
-    make_photos(folder / "data", 48, 6, 1);
-  }
-  ~Photos() { std::filesystem::remove_all(folder); }
+  TemporaryDirectory folder;
+  Photos() { make_photos(folder / "data", 48, 6, 1); }
 };
 
 // Without density control and with a report at the end alone.
@@ -39,7 +34,7 @@ TrainOptions quiet_training() {
 
 Gaussians trained(const Photos& photos, const TrainOptions& options, const char* fault, int at) {
   ::setenv(fault, std::to_string(at).c_str(), 1);
-  Context context(select_device(""));
+  Context context(test_device());
   ::unsetenv(fault);
   Trainer trainer(context, load_dataset((photos.folder / "data").string()), options,
                   photos.folder / "run", true);
@@ -52,7 +47,7 @@ Gaussians trained(const Photos& photos, const TrainOptions& options, const char*
 
 TEST_CASE("between reports and density passes the host never waits for the device to run dry") {
   const Photos photos;
-  Context context(select_device(""));
+  Context context(test_device());
   TrainOptions options = quiet_training();
   options.iterations = 240;
   for (const double budget : {-1.0, 1000.0}) {

@@ -2,7 +2,6 @@
 #include "raysplats/trainer.hpp"
 
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -20,6 +19,7 @@
 #include "train/checkpoint.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/train_config.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -31,13 +31,11 @@ constexpr int kHeight = 32;
 
 // Photos of a few coloured Gaussians from a ring of cameras, in a folder that goes with the object.
 struct Scene {
-  std::filesystem::path folder = std::filesystem::temp_directory_path() /
-                                 ("raysplats_trainer_test_" + std::to_string(::getpid()));
-  Context context{select_device("")};
+  TemporaryDirectory folder;
+  Context context{test_device()};
   Dataset dataset;
 
   Scene() {
-    std::filesystem::remove_all(folder);
     std::filesystem::create_directories(folder / "images");
     CounterRng rng(11, 3);
     Gaussians truth;
@@ -72,9 +70,8 @@ struct Scene {
       write_image(view.image_path, rgb);
       dataset.views.push_back(view);
     }
-    dataset.root = folder;
+    dataset.root = folder.path();
   }
-  ~Scene() { std::filesystem::remove_all(folder); }
 };
 
 TrainOptions small_options() {

@@ -17,7 +17,7 @@
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/schedule.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -29,7 +29,7 @@ constexpr int kSize = 32;
 constexpr int kTrainViews = 8;
 
 Context& context() {
-  static Context instance(select_device(""));
+  static Context instance(test_device());
   return instance;
 }
 

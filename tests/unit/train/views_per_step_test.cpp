@@ -12,7 +12,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/gradient_tree.hpp"
-#include "unit/device/temporary_directory.hpp"
+#include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -86,7 +86,7 @@ TrainOptions steps_of(int views, int iterations) {
 }  // namespace
 
 TEST_CASE("gradients of a step's views are added in a fixed tree, bit for bit [small]") {
-  Context context{select_device("")};
+  Context context{test_device()};
   GradientTree tree(context);
   StepGradients sum;
   for (const std::size_t views : {1u, 2u, 3u, 4u, 5u, 7u, 8u, 11u}) {
@@ -112,7 +112,7 @@ TEST_CASE("gradients of a step's views are added in a fixed tree, bit for bit [s
 
 TEST_CASE("a step of several views goes down the sum of their single gradients") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   const Dataset dataset = photos_in(folder.path() / "data");
   // Adam without memory and with an epsilon far above the gradients is plain descent; its steps are
   // so small that a second one meets the gradient that the first would have met.
@@ -150,7 +150,7 @@ TEST_CASE("a step of several views goes down the sum of their single gradients")
 
 TEST_CASE("runs of several views a step are the same every time and resume bit for bit") {
   const TemporaryDirectory folder;
-  Context context{select_device("")};
+  Context context{test_device()};
   const Dataset dataset = photos_in(folder.path() / "data");
   for (const bool extras : {false, true}) {
     CAPTURE(extras);
