@@ -19,6 +19,7 @@
 #include "raysplats/error.hpp"
 #include "tiny_run.hpp"
 #include "train/checkpoint.hpp"
+#include "unit/fixture.hpp"
 
 namespace {
 
@@ -224,7 +225,7 @@ TEST_CASE("eight processes fill one kernel cache at once") {
         try {
           raysplats::ContextOptions options;
           options.cache_directory = folder / "cache";
-          raysplats::Context context(raysplats::select_device(""), options);
+          raysplats::Context context(raysplats::test_device(), options);
           raysplats::Scan scan(context);
           raysplats::Buffer<std::uint32_t> values(context, 4, "values");
           values.upload(std::array<std::uint32_t, 4>{5, 6, 7, 0});

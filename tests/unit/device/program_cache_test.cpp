@@ -149,8 +149,7 @@ TEST_CASE("program cache: a driver that keeps kernels itself is not asked for bi
   const TemporaryDirectory folder;
   const ScopedVariable keeps("POCL_KERNEL_CACHE", "1");
   const ScopedVariable plain("RAYSPLATS_CHECK_ARGUMENTS", "0");
-  const bool pocl =
-      test_device().platform.find("Portable Computing Language") != std::string::npos;
+  const bool pocl = test_device().platform.find("Portable Computing Language") != std::string::npos;
   std::size_t compiled = 0;
   const auto count = [&](std::size_t number, const std::string&) { compiled = number; };
   CHECK(probe(folder.path(), count) > 1);

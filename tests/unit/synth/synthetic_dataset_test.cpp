@@ -57,7 +57,7 @@ const SyntheticOptions kSmall{.size = 32, .train_views = 4, .test_views = 2, .se
 }  // namespace
 
 TEST_CASE("equal options give equal bytes and another seed another data set") {
-  const TemporaryDirectory first("first"), second("second"), other("other");
+  const TemporaryDirectory first, second, other;
   generate_dataset(first.path(), kSmall);
   generate_dataset(second.path(), kSmall);
   SyntheticOptions seeded = kSmall;
@@ -163,8 +163,8 @@ TEST_CASE("captures with a backdrop are opaque nerfstudio data sets, each of its
   options.size = 24;
   options.train_views = 5;
   options.test_views = 2;
-  const auto pictures = [&](SyntheticScene scene, const char* name) {
-    const TemporaryDirectory scratch(name);
+  const auto pictures = [&](SyntheticScene scene) {
+    const TemporaryDirectory scratch;
     options.scene = scene;
     generate_dataset(scratch.path() / "data", options);
     const std::string first = bytes_of(scratch.path() / "data/transforms.json");
@@ -189,9 +189,9 @@ TEST_CASE("captures with a backdrop are opaque nerfstudio data sets, each of its
     }
     return images;
   };
-  const auto forward = pictures(SyntheticScene::kForward, "forward");
-  const auto room = pictures(SyntheticScene::kRoom, "room");
-  const auto outdoor = pictures(SyntheticScene::kOutdoor, "outdoor");
+  const auto forward = pictures(SyntheticScene::kForward);
+  const auto room = pictures(SyntheticScene::kRoom);
+  const auto outdoor = pictures(SyntheticScene::kOutdoor);
   CHECK(forward[0].data != room[0].data);
   CHECK(room[0].data != outdoor[0].data);
   // Above the horizon is sky: more blue than red in the top row, whatever the camera's place.
