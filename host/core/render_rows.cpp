@@ -3,7 +3,8 @@
 
 namespace raysplats {
 
-void add_render_rows(OptionTable& t, RenderSettings& s) {
+std::vector<OptionRow> render_rows(RenderSettings& s) {
+  OptionTable t;
   t.number("samples", s.samples, 1, 65536, "rays per pixel");
   t.number("max-bounces", s.max_bounces, 1, 1000, "surfaces that a path may meet");
   t.number("min-throughput", s.min_throughput, 0, 1,
@@ -18,33 +19,22 @@ void add_render_rows(OptionTable& t, RenderSettings& s) {
   t.number("focus-distance", s.focus_distance, 1e-9, kNoBound, "depth of what is sharp");
   t.number("bias", s.bias, 0, kNoBound,
            "start of shadow rays from Gaussians; 0 = 1/1000 of the scene's size");
+  return t.take();
 }
 
-void add_shadow_rows(OptionTable& t, ShadowSettings& s) {
+std::vector<OptionRow> shadow_rows(ShadowSettings& s) {
+  OptionTable t;
   t.flag("mesh-on-mesh", s.mesh_on_mesh, "meshes shade meshes");
   t.flag("mesh-on-gaussians", s.mesh_on_gaussians, "meshes shade Gaussians");
   t.flag("gaussians-on-mesh", s.gaussians_on_mesh, "Gaussians shade meshes");
   t.flag("gaussians-on-gaussians", s.gaussians_on_gaussians, "Gaussians shade Gaussians");
   t.number("strength", s.strength, 0, 1, "darkness where no light comes");
+  return t.take();
 }
 
 void check_render_settings(RenderSettings settings) {
-  OptionTable table;
-  add_render_rows(table, settings);
-  add_shadow_rows(table, settings.shadows);
-  check_values(table.take());
-}
-
-std::vector<OptionRow> render_rows(RenderSettings& settings) {
-  OptionTable table;
-  add_render_rows(table, settings);
-  return table.take();
-}
-
-std::vector<OptionRow> shadow_rows(ShadowSettings& settings) {
-  OptionTable table;
-  add_shadow_rows(table, settings);
-  return table.take();
+  check_values(render_rows(settings));
+  check_values(shadow_rows(settings.shadows));
 }
 
 }  // namespace raysplats

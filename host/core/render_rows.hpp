@@ -12,18 +12,14 @@ namespace raysplats {
 /// The brightest of lights, emission and surroundings.
 constexpr double kMaxColor = 1e6;
 
-/// How PathTracer draws, shadows aside: the same in [render] of scene files, on the command line
-/// and as programs set it.
-void add_render_rows(OptionTable& table, RenderSettings& settings);
+/// How PathTracer draws, bound to `settings`: the same in [render] of scene files, on the command
+/// line and as programs set it.
+std::vector<OptionRow> render_rows(RenderSettings& settings);
 /// [render.shadows].
-void add_shadow_rows(OptionTable& table, ShadowSettings& settings);
+std::vector<OptionRow> shadow_rows(ShadowSettings& settings);
 
 /// Throws UsageError for a value that its row would refuse, as programs may set it.
 void check_render_settings(RenderSettings settings);
-
-/// These rows, bound to `settings`.
-std::vector<OptionRow> render_rows(RenderSettings& settings);
-std::vector<OptionRow> shadow_rows(ShadowSettings& settings);
 
 /// Settings that a user gave, to go over those of a scene.
 using GivenRenderSettings = GivenOptions<RenderSettings, render_rows>;

@@ -82,7 +82,7 @@ TEST_CASE("canaries: memory that nobody has written is NaN") {
 
 TEST_CASE("canaries: the variable is 0 or 1") {
   const ScopedVariable on("RAYSPLATS_CANARY", "yes");
-  CHECK_THROWS_AS(Context(test_device()), UsageError);
+  CHECK_THROWS_AS(Context{test_device()}, UsageError);
   const ScopedVariable off("RAYSPLATS_CANARY", "0");
   CHECK(Canaries::from_environment() == nullptr);
 }
