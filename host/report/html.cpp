@@ -14,7 +14,7 @@ constexpr const char* kStyle = R"(
 body{max-width:1000px;margin:24px auto;padding:0 16px;color:var(--text);font:15px/1.5 system-ui,sans-serif}
 h1{font-size:22px}h2{font-size:17px;margin-top:28px;border-top:1px solid var(--line);padding-top:10px}
 .warn{color:var(--warn)}.charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(380px,100%),1fr));gap:12px}
-svg{width:100%;height:auto}svg text{fill:currentColor;font-size:11px}svg .title{font-size:13px;font-weight:600}
+svg{width:100%;height:auto;overflow:visible}svg text{fill:currentColor;font-size:11px}svg .title{font-size:13px;font-weight:600}
 svg line{stroke:var(--line)}polyline{fill:none;stroke-width:1.6}
 polyline.c0{stroke:var(--c0)}circle.c0,svg text.c0{fill:var(--c0)}th.c0{color:var(--c0)}polyline.c1{stroke:var(--c1)}circle.c1,svg text.c1{fill:var(--c1)}th.c1{color:var(--c1)}
 polyline.c2{stroke:var(--c2)}circle.c2,svg text.c2{fill:var(--c2)}th.c2{color:var(--c2)}polyline.c3{stroke:var(--c3)}circle.c3,svg text.c3{fill:var(--c3)}th.c3{color:var(--c3)}

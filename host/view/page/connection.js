@@ -14,7 +14,7 @@ export class Connection {
   #dirty = false;
   #timer = 0;
 
-  // `view()` gives what is to be seen now; `on` has picture(header, blob), text(message),
+  // `view()` gives what is to be seen now; `on` has picture(header, blob), a promise, text(message),
   // open(), lost() and answers(), which finds out whether there is somebody to come back to.
   constructor(view, on) {
     this.view = view;
@@ -61,10 +61,13 @@ export class Connection {
       iteration: words.getUint32(24, true),
       milliseconds: words.getFloat32(28, true),
     };
-    if (this.#waiting && header.id >= this.#waiting.id) this.#waiting = null;
     const type = header.png ? 'image/png' : 'image/jpeg';
-    this.on.picture(header, new Blob([new Uint8Array(data, HEADER)], { type }));
-    if (this.#dirty) this.#ask();
+    const shown = this.on.picture(header, new Blob([new Uint8Array(data, HEADER)], { type }));
+    // It is on its way until it is seen: a page that is slow to decode asks for no second one.
+    shown.finally(() => {
+      if (this.#waiting && header.id >= this.#waiting.id) this.#waiting = null;
+      if (this.#dirty && !this.#waiting) this.#ask();
+    });
   }
 
   send(message) {
