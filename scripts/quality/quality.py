@@ -56,7 +56,7 @@ def scenes(args):
     if wanted - names:
         sys.exit(f"quality.sh: no scene is called {', '.join(sorted(wanted - names))}; there are {', '.join(sorted(names))}")
     for scene in known:
-        if wanted and scene["name"] not in wanted:
+        if (wanted and scene["name"] not in wanted) or (args.screen and "screen" not in scene):
             continue
         if (args.data / scene["path"]).is_dir():
             yield scene
@@ -70,8 +70,10 @@ def train(args, scene, seed, setting="", options=()):
     run = args.output / (f"{scene['name']}-{seed}" + (f"-{setting.replace(' ', '_')}" if setting else ""))
     if not finished(run):
         slowness = [] if args.screen else [machine_slowness(args)]
-        done = run_training(args, args.data / scene["path"], run, size["iterations"],
-                            ["--seed", seed, "--downscale", size["downscale"], *args.extra, *options])
+        # A run by time gets as long as it would take the machine of the floors.
+        length = ["--time", f"{size['time'] * (slowness[0] or 1):.3g}s"] if "time" in size else ["-n", size["iterations"]]
+        done = run_training(args, args.data / scene["path"], run,
+                            [*length, "--seed", seed, "--downscale", size["downscale"], *args.extra, *options])
         if not done:
             return None
         slowness += [] if args.screen else [machine_slowness(args)]
@@ -85,9 +87,9 @@ def finished(run):
     return metrics.exists() and json.loads(metrics.read_text()).get("complete")
 
 
-def run_training(args, data, run, iterations, options):
+def run_training(args, data, run, options):
     """Runs `raysplats train`; says why where it fails."""
-    command = [args.raysplats, "train", data, "-o", run, "--overwrite", "-q", "-n", iterations, "--checkpoint-every", 0]
+    command = [args.raysplats, "train", data, "-o", run, "--overwrite", "-q", "--checkpoint-every", 0]
     command += ["--device", args.device] if args.device else []
     done = subprocess.run([str(part) for part in command + list(options)], capture_output=True, text=True)
     if done.returncode != 0:
@@ -98,8 +100,8 @@ def run_training(args, data, run, iterations, options):
 def machine_slowness(args):
     """How many times as long as on the machine of the floors an iteration takes now; None without the fox."""
     data, run = args.data / YARDSTICK["path"], args.output / "yardstick"
-    if not data.is_dir() or not run_training(args, data, run, YARDSTICK["iterations"],
-                                             ["--max-gaussians", 4 * YARDSTICK["gaussians"], "--densify-until", 0,
+    if not data.is_dir() or not run_training(args, data, run,
+                                             ["-n", YARDSTICK["iterations"], "--max-gaussians", 4 * YARDSTICK["gaussians"], "--densify-until", 0,
                                               "--resolution-schedule", ""]):
         return None
     rows = logged(run)[-10:]
