@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Opens `raysplats view` and reports in a real Chromium without a screen and uses them: tests/view/browser_test.py.
+# Opens `raysplats view` and reports in a real Chromium without a screen and uses them: tests/view/browser_test.py and
+# tests/report/browser_test.py.
 # usage: scripts/test_browser.sh [PROGRAM] [SCREENSHOTS]     (default: build/release/bin/raysplats, no screenshots)
 # Installs Debian's chromium, chromium-driver and python3-selenium when they are missing and root may. Ends with 77 and
 # a line "SKIPPED why" where they cannot be had.
@@ -29,4 +30,8 @@ if ! have; then
   have || skip "chromium, chromedriver or selenium do not start"
 fi
 [[ -x $program ]] || { echo "$program is missing: build it with scripts/setup.sh" >&2; exit 1; }
-"$python" "$root/tests/view/browser_test.py" "$program" ${2:+"$2"}
+failed=0
+for part in view report; do
+  "$python" "$root/tests/$part/browser_test.py" "$program" ${2:+"$2"} || failed=1
+done
+exit $failed

@@ -1,48 +1,29 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The viewer's page and the reports in Chromium, as a person uses them.
+"""The viewer's page in Chromium, as a person uses it.
 usage: browser_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
 import base64
 import http.server
 import json
 import math
 import os
-import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-import unittest
 
-from selenium import webdriver
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-sys.path[:0] = [HERE, os.path.join(HERE, "../report")]
-from awkward_run import HOSTILE, write_run  # noqa: E402
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from browser import BrowserCase, main  # noqa: E402
 from program import Viewer, psnr, write_model  # noqa: E402
 
-PROGRAM = ""
-FOLDER = None
 PATIENCE = 120  # seconds; kernels may have to be compiled first
-
-
-def browser():
-    options = Options()
-    options.binary_location = shutil.which("chromium")
-    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu",
-                     "--window-size=1000,640"):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    return webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
 
 
 class Elsewhere(http.server.BaseHTTPRequestHandler):
@@ -58,30 +39,12 @@ class Elsewhere(http.server.BaseHTTPRequestHandler):
         pass
 
 
-class BrowserCase(unittest.TestCase):
-    def open_browser(self):
-        self.page = browser()
-        self.addCleanup(self.page.quit)
-
-    def screenshot(self, name):
-        if FOLDER:
-            os.makedirs(FOLDER, exist_ok=True)
-            self.page.save_screenshot(os.path.join(FOLDER, f"{name}.png"))
-
-    def console(self):
-        return [entry for entry in self.page.get_log("browser") if entry["level"] == "SEVERE"]
-
-    def prefer(self, scheme, media=""):
-        self.page.execute_cdp_cmd("Emulation.setEmulatedMedia", {
-            "media": media, "features": [{"name": "prefers-color-scheme", "value": scheme}]})
-
-
 class PageCase(BrowserCase):
     command = "view"
 
     def setUp(self):
         self.arguments_given = self.arguments()
-        self.viewer = Viewer(PROGRAM, self.arguments_given, self.command)
+        self.viewer = Viewer(self.program, self.arguments_given, self.command)
         self.addCleanup(self.viewer.folder.cleanup)
         self.addCleanup(self.viewer.stop)
         self.open_browser()
@@ -157,7 +120,7 @@ class ViewTest(PageCase):
             json.dump({"w": width, "h": height, "fl_x": focal, "fl_y": focal, "cx": width / 2,
                        "cy": height / 2, "frames": [{"file_path": "page.png",
                                                      "transform_matrix": rows + [[0, 0, 0, 1]]}]}, file)
-        subprocess.run([PROGRAM, "render", self.viewer.model, "--cameras",
+        subprocess.run([self.program, "render", self.viewer.model, "--cameras",
                         os.path.join(folder, "one.json"), "-o", os.path.join(folder, "out"),
                         "--supersample", "4", "-q"], check=True, stdout=subprocess.DEVNULL)
         shown = os.path.join(folder, "shown.png")
@@ -242,7 +205,7 @@ class ViewTest(PageCase):
         folder = self.viewer.folder.name
         with open(os.path.join(folder, "path.json"), "w") as file:
             file.write(text)
-        subprocess.run([PROGRAM, "render", self.viewer.model, "--path", os.path.join(folder, "path.json"),
+        subprocess.run([self.program, "render", self.viewer.model, "--path", os.path.join(folder, "path.json"),
                         "-o", os.path.join(folder, "frames"), "--video", os.path.join(folder, "path.apng"), "-q"],
                        check=True, stdout=subprocess.DEVNULL)
         self.assertEqual(len(os.listdir(os.path.join(folder, "frames"))), 3)
@@ -364,7 +327,7 @@ class ViewTest(PageCase):
         for name, content in files.items():
             with open(os.path.join(folder, name), "w") as file:
                 file.write(content)
-            subprocess.run([PROGRAM, "render", self.viewer.model, "--path", os.path.join(folder, name), "-o",
+            subprocess.run([self.program, "render", self.viewer.model, "--path", os.path.join(folder, name), "-o",
                             os.path.join(folder, name[0]), "-q"], check=True, stdout=subprocess.DEVNULL)
         names = sorted(os.listdir(os.path.join(folder, "a")))
         self.assertEqual(len(names), 8)
@@ -494,7 +457,7 @@ class ViewTest(PageCase):
 
     def restart(self, arguments):
         self.viewer.stop()
-        self.viewer = Viewer(PROGRAM, arguments, port=self.viewer.address.port)
+        self.viewer = Viewer(self.program, arguments, port=self.viewer.address.port)
         self.addCleanup(self.viewer.folder.cleanup)
         self.addCleanup(self.viewer.stop)
         self.wait("the sentence", lambda: "open the address that it has printed" in self.banner())
@@ -530,7 +493,7 @@ class PhotoTest(PageCase):
     def arguments(self):
         folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
         photos = os.path.join(folder, "photos")
-        subprocess.run([PROGRAM, "generate", photos, "--size", "64", "--train-views", "3", "--test-views", "2",
+        subprocess.run([self.program, "generate", photos, "--size", "64", "--train-views", "3", "--test-views", "2",
                         "-q"], check=True, stdout=subprocess.DEVNULL)
         model = os.path.join(folder, "model.ply")
         write_model(model)
@@ -621,7 +584,7 @@ class PhotoTest(PageCase):
         self.assertLess(abs(low[0] + 0.4), 0.1)
         self.assertLess(abs(high[1] - 0.6), 0.1)
         out = os.path.join(self.viewer.folder.name, "part.ply")
-        told = subprocess.run([PROGRAM, "convert", self.arguments_given[0], "-o", out, *option],
+        told = subprocess.run([self.program, "convert", self.arguments_given[0], "-o", out, *option],
                               capture_output=True, text=True, check=True).stdout
         self.assertRegex(told, r"^\d+ of 103 Gaussians")
         self.assertEqual(self.console(), [])
@@ -634,7 +597,7 @@ class TrainTest(PageCase):
     def arguments(self):
         folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
         photos = os.path.join(folder, "photos")
-        subprocess.run([PROGRAM, "generate", photos, "--size", "96", "--train-views", "16", "--test-views", "2",
+        subprocess.run([self.program, "generate", photos, "--size", "96", "--train-views", "16", "--test-views", "2",
                         "-q"], check=True, stdout=subprocess.DEVNULL)
         self.run_folder = os.path.join(folder, "run")
         return [photos, "-o", self.run_folder, "--view", "-n", "1500", "--eval-at", "200,400", "--eval-renders", "0"]
@@ -674,71 +637,5 @@ class TrainTest(PageCase):
         self.screenshot("trained")
 
 
-class ReportTest(BrowserCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="raysplats_report_")
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-        self.open_browser()
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
-    def make(self, *arguments):
-        subprocess.run([PROGRAM, *arguments, "-q"], check=True, stdout=subprocess.DEVNULL)
-
-    def look(self, file, name):
-        """Opens a page in all its dresses: nothing is asked for but the page, nothing sticks out."""
-        url = pathlib.Path(file).as_uri()
-        for dress, scheme, media, width in (("light", "light", "", 1000), ("dark", "dark", "", 1000),
-                                            ("narrow", "light", "", 420), ("print", "dark", "print", 718)):
-            self.prefer(scheme, media)
-            self.page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-                "width": width, "height": 800, "deviceScaleFactor": 1, "mobile": False})
-            self.page.get(url)
-            size = self.page.execute_script(
-                "const e = document.documentElement; return [e.scrollWidth, e.scrollHeight]")
-            self.assertLessEqual(size[0], width, dress)
-            self.page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
-                "width": width, "height": size[1], "deviceScaleFactor": 1, "mobile": False})
-            for image in self.page.find_elements(By.TAG_NAME, "img"):
-                self.assertGreater(image.get_property("naturalWidth"), 0)
-            ground, ink = self.page.execute_script(
-                "const style = getComputedStyle(document.body);"
-                "return [style.backgroundColor, style.color].map(c => Number(c.match(/\\d+/)));")
-            if dress == "dark":
-                self.assertLess(ground, 60)
-                self.assertGreater(ink, 200)
-            else:
-                self.assertLess(ink, 60)
-            self.screenshot(f"report_{name}_{dress}")
-        asked = [json.loads(entry["message"])["message"] for entry in self.page.get_log("performance")]
-        urls = {event["params"]["request"]["url"] for event in asked if event["method"] == "Network.requestWillBeSent"}
-        self.assertEqual({each for each in urls if not each.startswith("data:")}, {url})
-        self.assertEqual(self.console(), [])
-
-    def test_a_run(self):
-        self.make("generate", self.path("data"), "--size", "96", "--train-views", "12", "--test-views", "6")
-        run = self.path("run")
-        self.make("train", self.path("data"), "-o", run, "-n", "120", "--exposure", "--profile")
-        self.look(os.path.join(run, "report.html"), "run")
-        headings = [each.text for each in self.page.find_elements(By.TAG_NAME, "h2")]
-        for heading in ("Curves", "Held-out views", "Cameras", "Model", "Exposure", "Kernels"):
-            self.assertIn(heading, headings)
-        self.assertEqual(len(self.page.find_elements(By.TAG_NAME, "figure")), 3)
-
-    def test_awkward_runs(self):
-        runs = [self.path(f"run_{i}_<b>&'") for i in range(2)]
-        for i, run in enumerate(runs):
-            write_run(run, i)
-        for name, given in (("awkward", runs[:1]), ("several", runs)):
-            file = self.path(f"{name}.html")
-            self.make("report", *given, "-o", file)
-            self.look(file, name)
-            self.assertIn(HOSTILE, self.page.find_element(By.TAG_NAME, "body").text)
-
-
 if __name__ == "__main__":
-    PROGRAM = os.path.abspath(sys.argv.pop(1))
-    FOLDER = sys.argv.pop(1) if len(sys.argv) > 1 else None
-    unittest.main(verbosity=2)
+    main()
