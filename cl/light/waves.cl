@@ -53,8 +53,8 @@ __kernel void rays_to_surfaces(const uint count,
 }
 
 // What the others meet, from a picture of the Gaussians alone: planar colour and alpha of `pixels`
-// pixels. It has no depths: they are asked for by lights on Gaussians and in glass, and a camera
-// stands in none.
+// pixels. Its depths are asked for by lights on Gaussians (depths_of_picture), and in glass, in
+// which no camera stands.
 __kernel void results_of_picture(const uint count,
                                  const uint first_pixel,
                                  const uint pixels,
@@ -66,6 +66,24 @@ __kernel void results_of_picture(const uint count,
   __global const float* at = picture + first_pixel + i;
   const size_t plane = pixels;
   results[i] = (float8)(at[0], at[plane], at[2 * plane], at[3 * plane], 0.0f, 0.0f, 0.0f, 0.0f);
+}
+
+// Their depths along the rays, from planes that count them along `axis`, or along the rays where it
+// is zero.
+__kernel void depths_of_picture(const uint count,
+                                const uint first_pixel,
+                                const uint pixels,
+                                const float4 axis,
+                                __global const float* restrict depth,
+                                __global const RsSurface* restrict surfaces,
+                                __global const float8* restrict rays,
+                                __global float8* restrict results) {
+  const uint i = get_global_id(0);
+  if (i >= count || surfaces[i].material >= 0) return;
+  const float cosine = any(axis != 0.0f) ? dot(axis.xyz, rays[i].s456) : 1.0f;
+  __global const float* at = depth + first_pixel + i;
+  results[i].RS_RESULT_EXPECTED = at[0] / cosine;
+  results[i].RS_RESULT_MEDIAN = at[pixels] / cosine;
 }
 
 // vertices: as for surface_point(). materials_of: one per triangle.
@@ -501,8 +519,9 @@ __kernel void gather_paths(const uint count,
 }
 
 // The first path of every pixel adds what all paths of the pixel gained to sums (rgb, share that
-// left the scene).
+// left the scene), of which the batch's begin at `first`.
 __kernel void accumulate(const uint count,
+                         const uint first,
                          __global const RsPath* restrict paths,
                          __global const float4* restrict gained,
                          __global float4* restrict sums) {
@@ -510,9 +529,9 @@ __kernel void accumulate(const uint count,
   if (i >= count) return;
   const uint pixel = paths[i].pixel;
   if (i > 0 && paths[i - 1].pixel == pixel) return;
-  float4 sum = sums[pixel];
+  float4 sum = sums[first + pixel];
   for (uint k = i; k < count && paths[k].pixel == pixel; ++k) sum += gained[k];
-  sums[pixel] = sum;
+  sums[first + pixel] = sum;
 }
 
 // partials[g] = sum of chunk g of the tallies. Launch: one work-item per chunk.

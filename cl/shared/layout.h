@@ -64,7 +64,7 @@ RS_STATIC_ASSERT_SIZE(RsFootprintView, 80);
 #define RS_FOOTPRINT_DISTANCE 1  // grows with distance, seen all around: fisheye, panorama
 #define RS_FOOTPRINT_CONSTANT 2  // the same everywhere: orthographic
 
-// Camera of any model with a lens, and the sample that is taken of each pixel.
+// Camera of any model with a lens, and the sample that is taken of it.
 typedef struct {
   rs_float rotation[9];  // world to camera, row-major
   rs_float center[3];    // world
@@ -75,11 +75,10 @@ typedef struct {
   rs_float aperture;     // radius of the lens, 0 = none
   rs_float focus_distance;
   rs_int width, height;
-  rs_uint jitter;  // 0: the ray goes through the centres of pixel and lens
   rs_uint sample;
   rs_uint seed_lo, seed_hi;
 } RsLensCamera;
-RS_STATIC_ASSERT_SIZE(RsLensCamera, 128);
+RS_STATIC_ASSERT_SIZE(RsLensCamera, 124);
 
 // A tile of a picture taken through a lens, seen by the pinhole of one face of a cube around the
 // camera (cl/trace/lens_tiles.cl).

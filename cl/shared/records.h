@@ -28,7 +28,7 @@
     FIELD(RsLensCamera, k3) FIELD(RsLensCamera, k4) FIELD(RsLensCamera, p1) \
     FIELD(RsLensCamera, p2) FIELD(RsLensCamera, limit) FIELD(RsLensCamera, image_limit) \
     FIELD(RsLensCamera, aperture) FIELD(RsLensCamera, focus_distance) FIELD(RsLensCamera, width) \
-    FIELD(RsLensCamera, height) FIELD(RsLensCamera, jitter) FIELD(RsLensCamera, sample) \
+    FIELD(RsLensCamera, height) FIELD(RsLensCamera, sample) \
     FIELD(RsLensCamera, seed_lo) FIELD(RsLensCamera, seed_hi) \
   RECORD(RsLensTile) FIELD(RsLensTile, x0) FIELD(RsLensTile, y0) FIELD(RsLensTile, x1) \
     FIELD(RsLensTile, y1) FIELD(RsLensTile, face) FIELD(RsLensTile, cosine) \

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays of a camera's pixels, row by row, for every camera model (lens.h), with jitter and a thin
-// lens. Launch of camera_rays: one work-item per ray, any group size. A pixel that sees nothing
+// Rays through the centres of a camera's pixels, row by row, for every camera model (lens.h), with a
+// thin lens. Launch of camera_rays: one work-item per ray, any group size. A pixel that sees nothing
 // gets an empty ray (t_max < 0). Cost: a few dozen operations; models with distortion iterate.
 #include "shared/random.h"
 #include "trace/lens.h"
@@ -14,12 +14,7 @@ __kernel void camera_rays(const RsLensCamera camera,
   const uint pixel = first_pixel + (uint)id;
   const uint row = pixel / (uint)camera.width;
   const uint column = pixel - row * (uint)camera.width;
-  float2 at = (float2)(0.5f);
-  RsRandom4 random = {0.5f, 0.5f, 0.0f, 0.0f};
-  if (camera.jitter) {
-    random = rs_random4(camera.seed_lo, camera.seed_hi, pixel, camera.sample, 0);
-    at = (float2)(random.x, random.y);
-  }
+  const float2 at = (float2)(0.5f);
   // In camera axes.
   float3 origin = (float3)(0.0f);
   float3 direction = (float3)(0.0f, 0.0f, 1.0f);
@@ -31,14 +26,16 @@ __kernel void camera_rays(const RsLensCamera camera,
 #endif
 
 #if CAMERA_MODEL != RS_CAMERA_ORTHOGRAPHIC
-  if (camera.jitter && camera.aperture > 0.0f) {
+  if (camera.aperture > 0.0f) {
+    const RsRandom4 random =
+        rs_random4(camera.seed_lo, camera.seed_hi, pixel, camera.sample, 0);
 #if CAMERA_MODEL == RS_CAMERA_PINHOLE || CAMERA_MODEL == RS_CAMERA_OPENCV
     const float3 focus = direction * (camera.focus_distance / direction.z);
 #else
     const float3 focus = direction * (camera.focus_distance * rsqrt(dot(direction, direction)));
 #endif
-    const float radius = camera.aperture * sqrt(random.z);
-    origin = (float3)(radius * cospi(2.0f * random.w), radius * sinpi(2.0f * random.w), 0.0f);
+    const float radius = camera.aperture * sqrt(random.x);
+    origin = (float3)(radius * cospi(2.0f * random.y), radius * sinpi(2.0f * random.y), 0.0f);
     direction = focus - origin;
   }
 #endif

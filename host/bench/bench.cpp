@@ -76,6 +76,7 @@ const std::vector<BenchRowInfo>& bench_rows() {
       {"surfaces-large", "rays", "camera rays to a closed body of --triangles"},
       {"surfaces-random", "rays", "incoherent rays to the large body"},
       {"light", "rays", "one image by the tracer of light, without a mesh"},
+      {"light-samples", "rays", "the same with 4 samples a pixel"},
       {"light-mesh-small", "rays", "with the small body, diffuse, and no lights"},
       {"light-mesh-large", "rays", "with the large body, diffuse, and no lights"},
       {"light-mirror", "rays", "with the small body as a mirror: mirrored rays too"},

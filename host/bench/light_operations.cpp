@@ -54,8 +54,12 @@ BenchOperation SceneBench::Impl::surfaces(const char* row,
             }}}};
 }
 
-void SceneBench::Impl::make_light_tracer(std::size_t triangles, Material::Kind kind, bool lights) {
+void SceneBench::Impl::make_light_tracer(std::size_t triangles,
+                                         Material::Kind kind,
+                                         bool lights,
+                                         int samples) {
   Scene scene;
+  scene.render.samples = samples;
   scene.gaussians = model.gaussians;
   scene.trace = options.trace;
   Material material;
@@ -75,12 +79,10 @@ void SceneBench::Impl::make_light_tracer(std::size_t triangles, Material::Kind k
   light_tracer = std::make_unique<PathTracer>(context, scene);
 }
 
-BenchOperation SceneBench::Impl::light(const char* row,
-                                       std::size_t triangles,
-                                       Material::Kind kind,
-                                       bool lights) {
+BenchOperation SceneBench::Impl::light(
+    const char* row, std::size_t triangles, Material::Kind kind, bool lights, int samples) {
   const auto statistics = std::make_shared<PathTracer::Statistics>();
-  return {[=, this] { make_light_tracer(triangles, kind, lights); },
+  return {[=, this] { make_light_tracer(triangles, kind, lights, samples); },
           {},
           [=, this] {
             light_tracer->render(model.camera);

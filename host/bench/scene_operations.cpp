@@ -263,6 +263,7 @@ std::vector<BenchOperation> SceneBench::operations() {
           self.surfaces("surfaces-large", large, true),
           self.surfaces("surfaces-random", large, false),
           self.light("light", 0, Kind::kDiffuse, false),
+          self.light("light-samples", 0, Kind::kDiffuse, false, 4),
           self.light("light-mesh-small", small, Kind::kDiffuse, false),
           self.light("light-mesh-large", large, Kind::kDiffuse, false),
           self.light("light-mirror", small, Kind::kMirror, false),

@@ -50,7 +50,7 @@ struct SceneBench::Impl {
   Middle middle() const;
   /// A closed body of about `triangles` triangles in the middle of the model.
   Mesh body(std::size_t triangles) const;
-  void make_light_tracer(std::size_t triangles, Material::Kind kind, bool lights);
+  void make_light_tracer(std::size_t triangles, Material::Kind kind, bool lights, int samples);
   void make_triangles(std::size_t triangles, bool camera_rays);
 
   BenchOperation bounds();
@@ -69,7 +69,8 @@ struct SceneBench::Impl {
   BenchOperation iteration();
   BenchOperation surfaces(const char* row, std::size_t triangles, bool camera_rays);
   /// One image by PathTracer; no body for 0 triangles.
-  BenchOperation light(const char* row, std::size_t triangles, Material::Kind kind, bool lights);
+  BenchOperation light(
+      const char* row, std::size_t triangles, Material::Kind kind, bool lights, int samples = 1);
 
   BenchWork bounds_work() const;
   BenchWork order_work() const;

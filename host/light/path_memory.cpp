@@ -35,8 +35,8 @@ constexpr std::size_t kPathBytes = 3 * (sizeof(Ray) + sizeof(RsPath)) + sizeof(R
 constexpr std::size_t kShadowBytes =
     sizeof(Ray) + sizeof(std::int32_t) + kFloat + sizeof(RayResult);
 constexpr std::size_t kPixelBytes = 4 * kFloat;
-// Picture of packets, transmittances and the place of a pixel behind a lens.
-constexpr std::size_t kPacketPixelBytes = 13 * kFloat;
+// Picture of packets with depths, transmittances and the place of a pixel behind a lens, sums.
+constexpr std::size_t kPacketPixelBytes = 16 * kFloat + kPixelBytes;
 
 constexpr std::size_t kVertexBytes = RS_TRIANGLE_FLOATS * kFloat;  // of the corners of a triangle
 
@@ -71,11 +71,9 @@ PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
       3 * kFloat * static_cast<std::size_t>(sh_coefficients(scene.gaussians.sh_degree));
   const std::size_t block = kFloat * RayTree::block_floats(scene.trace.adaptive_radius);
   gaussians_ = count * (11 * kFloat + sh + sizeof(RsAabb) + block + Lbvh::bytes_per_box(lanes_));
-  if (scene.render.samples == 1) {
-    packets_ = count * (sizeof(RsLine) + sizeof(RsViewBounds) + sizeof(RsAabb) + 4) +
-               MemoryShares(scene.trace, device).tile_lists();
-    packet_pixel_ = kPacketPixelBytes;
-  }
+  packets_ = count * (sizeof(RsLine) + sizeof(RsViewBounds) + sizeof(RsAabb) + 4) +
+             MemoryShares(scene.trace, device).tile_lists();
+  set_render(scene.render);
   std::size_t texels = 0;
   for (const Image& texture : scene.textures) texels += kFloat * texture.data.size();
   const std::size_t environment =
@@ -88,13 +86,33 @@ PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
   set_meshes(triangles);
 }
 
+void PathMemory::set_render(const RenderSettings& settings) {
+  one_point_ = settings.samples == 1 || settings.aperture == 0.0f;
+}
+
+bool PathMemory::packets(std::size_t pixels) const {
+  return one_point_ && pixels > 0 && pixels * kPixelBytes <= device_.max_allocation &&
+         gaussians() + surfaces() + rays(pixels) + packet_bytes(pixels) <= usable_memory(device_);
+}
+
+std::size_t PathMemory::rays(std::size_t pixels) const { return std::min(pixels, batch_) * pixel_; }
+
+std::size_t PathMemory::packet_bytes(std::size_t pixels) const {
+  return packets_ + pixels * kPacketPixelBytes;
+}
+
+std::size_t PathMemory::paths(std::size_t pixels) const {
+  return rays(pixels) + (packets(pixels) ? packet_bytes(pixels) : 0);
+}
+
 void PathMemory::set_meshes(std::size_t triangles) {
   meshes_ = mesh_bytes(triangles, lanes_);
   largest_mesh_ = triangles * kVertexBytes;
 }
 
 std::size_t PathMemory::largest_buffer(std::size_t pixels) const {
-  return std::max({largest_, largest_mesh_, std::min(pixels, batch_) * pixel_largest_});
+  return std::max({largest_, largest_mesh_, std::min(pixels, batch_) * pixel_largest_,
+                   packets(pixels) ? pixels * kPixelBytes : std::size_t{0}});
 }
 
 void PathMemory::check(std::size_t pixels) const {

@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <optional>
+#include <span>
 
 #include "core/gaussian_check.hpp"
+#include "core/pixel_places.hpp"
 #include "core/render_rows.hpp"
 #include "light/path_memory.hpp"
 #include "light/surface_store.hpp"
@@ -90,6 +94,13 @@ class Unwatched {
   CameraTracer& packets_;
 };
 
+// What a watch ends a picture with.
+struct Stopped {};
+
+std::size_t pixels_of(const Camera& camera) {
+  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+}
+
 Box box_of(const Gaussians& gaussians) {
   Box box;
   box.add(gaussians.means);
@@ -106,7 +117,6 @@ struct PathTracer::Impl {
         options(without_background(scene.trace)),
         gaussians(DeviceGaussians::upload(context_in, scene.gaussians, ScaleActivation::kExp)),
         tracer(context_in, options),
-        packets(context_in, options),
         surfaces(context_in, scene),
         lights(scene.lights),
         camera_rays(context_in),
@@ -117,18 +127,20 @@ struct PathTracer::Impl {
   }
 
   void choose_bias(const std::vector<Mesh>& meshes);
+  void render(const Camera& camera, const std::function<bool(double)>& within, Image& out);
 
   Kernel kernel(const char* name) { return context.kernel(kProgram, name); }
   RsWave wave_record(std::uint32_t sample, std::size_t first_pixel) const;
   void trace_sample(const Camera& camera,
                     std::uint32_t sample,
                     std::size_t first,
-                    std::size_t count);
-  std::size_t trace_wave(const RsWave& wave, std::size_t count);
+                    std::size_t count,
+                    std::size_t first_sum);
+  std::size_t trace_wave(const RsWave& wave, std::size_t count, std::size_t first_sum);
   bool light_on_gaussians();
   bool by_packets(const Camera& camera);
-  bool trace_packets(const Camera& camera, const std::function<bool(double)>& within);
-  void take_packets(std::size_t first_pixel, std::size_t count);
+  void trace_packets(const Camera& camera, const std::function<void()>& watch);
+  void take_packets(const RsWave& wave, std::size_t count);
   void gather_light(const RsWave& wave, std::size_t count, bool from_gaussians);
   // RS_LIT_ARGUMENTS of cl/light/waves.cl.
   auto lit_arguments() const {
@@ -142,9 +154,10 @@ struct PathTracer::Impl {
   TraceOptions options;
   DeviceGaussians gaussians;
   RayTracer tracer;
-  CameraTracer packets;
-  bool packets_updated = false;
+  std::optional<CameraTracer> packets;  // once they are wanted
+  bool packet_depth = false;
   std::size_t packet_pixels = 0;  // of the picture that they have traced; 0 = none
+  std::array<float, 4> packet_axis{};
   SurfaceStore surfaces;
   std::vector<Light> lights;
   CameraRays camera_rays;
@@ -196,12 +209,12 @@ RsWave PathTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pix
 void PathTracer::Impl::trace_sample(const Camera& camera,
                                     std::uint32_t sample,
                                     std::size_t first,
-                                    std::size_t count) {
+                                    std::size_t count,
+                                    std::size_t first_sum) {
   Lens lens;
   lens.sample = sample;
-  lens.jitter = settings.samples > 1;
   lens.seed = settings.seed;
-  lens.aperture = settings.aperture;
+  lens.aperture = settings.samples > 1 ? settings.aperture : 0.0f;
   lens.focus_distance = settings.focus_distance;
   camera_rays.generate(camera, lens, first, count, rays);
   paths.ensure(context, count, "paths");
@@ -211,12 +224,14 @@ void PathTracer::Impl::trace_sample(const Camera& camera,
   RsWave wave = wave_record(sample, first);
   statistics.camera_rays += count;
   for (std::size_t live = count; live > 0; ++wave.bounce) {
-    live = trace_wave(wave, live);
+    live = trace_wave(wave, live, first_sum);
     statistics.continued_rays += live;
   }
 }
 
-std::size_t PathTracer::Impl::trace_wave(const RsWave& wave, std::size_t count) {
+std::size_t PathTracer::Impl::trace_wave(const RsWave& wave,
+                                         std::size_t count,
+                                         std::size_t first_sum) {
   const Range each = Range::linear(count, kGroup);
   hits.ensure(context, count, "surface hits");
   met.ensure(context, count, "surfaces");
@@ -235,7 +250,7 @@ std::size_t PathTracer::Impl::trace_wave(const RsWave& wave, std::size_t count) 
               surfaces.materials(), surfaces.textures(), surfaces.texels(), paths, rays,
               from_origin, met);
   if (wave.bounce == 0 && packet_pixels > 0) {
-    take_packets(wave.first_pixel, count);
+    take_packets(wave, count);
   } else {
     tracer.trace(gaussians, rays, from_origin, count, results);
   }
@@ -247,7 +262,7 @@ std::size_t PathTracer::Impl::trace_wave(const RsWave& wave, std::size_t count) 
                            surfaces.environment_picture(), paths, rays, results, met,
                            gaussian_light, surface_light, gained, offsets, next_paths, next_rays,
                            tallies);
-  kernel("accumulate").launch(each, u32(count), paths, gained, sums);
+  kernel("accumulate").launch(each, u32(count), u32(first_sum), paths, gained, sums);
   add_tallies(count);
   scan.exclusive(offsets, count);
   const std::size_t live = offsets.read(count);
@@ -266,37 +281,35 @@ bool PathTracer::Impl::light_on_gaussians() {
   return wanted && shadows.strength > 0 && gaussians.count > 0 && !lights.empty();
 }
 
-// Rays through the middles of the pixels of a camera with a centre share what they meet; lights on
-// Gaussians need depths along rays.
+// Rays of one sample that leave the centre of a camera share what they meet. Lights on Gaussians
+// need depths along rays, and Gaussians that shade others the leading one of every ray.
 bool PathTracer::Impl::by_packets(const Camera& camera) {
-  return settings.samples == 1 && gaussians.count > 0 && !light_on_gaussians() &&
-         !walks_tree(options, context.device()) && packets.traces(camera);
+  if (!memory.packets(pixels_of(camera)) || gaussians.count == 0 ||
+      walks_tree(options, context.device()))
+    return false;
+  const bool lit = light_on_gaussians();
+  if (lit && settings.shadows.gaussians_on_gaussians) return false;
+  if (!packets || packet_depth != lit) {
+    TraceOptions with_depth = options;
+    with_depth.depth = packet_depth = lit;
+    packets.emplace(context, with_depth);
+    packets->update(gaussians);
+  }
+  return packets->traces(camera);
 }
 
-// The picture of the Gaussians alone; false when `within` stopped it.
-bool PathTracer::Impl::trace_packets(const Camera& camera,
-                                     const std::function<bool(double)>& within) {
-  struct Stopped {};
-  if (!packets_updated) packets.update(gaussians);
-  packets_updated = true;
-  const Unwatched afterwards(packets);
-  if (within) {
-    packets.set_watch([&within](double) {
-      if (!within(0.0)) throw Stopped();
-    });
-  }
-  try {
-    packets.forward(gaussians, camera);
-  } catch (const Stopped&) {
-    return false;
-  }
-  statistics.capped_rays += packets.statistics().capped_rays;
-  packet_pixels = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-  return true;
+// The picture of the Gaussians alone.
+void PathTracer::Impl::trace_packets(const Camera& camera, const std::function<void()>& watch) {
+  const Unwatched afterwards(*packets);
+  if (watch) packets->set_watch([&watch](double) { watch(); });
+  packets->forward(gaussians, camera);
+  statistics.capped_rays += packets->statistics().capped_rays;
+  packet_pixels = pixels_of(camera);
+  packet_axis = depth_axis(camera);
 }
 
 // Camera rays that meet no surface from the packets' picture, the others ray by ray.
-void PathTracer::Impl::take_packets(std::size_t first_pixel, std::size_t count) {
+void PathTracer::Impl::take_packets(const RsWave& wave, std::size_t count) {
   const Range each = Range::linear(count, kGroup);
   results.ensure(context, count, "ray results");
   if (surfaces.triangles().size() > 0) {
@@ -305,8 +318,13 @@ void PathTracer::Impl::take_packets(std::size_t first_pixel, std::size_t count) 
     tracer.trace(gaussians, shadow_rays, from_origin, count, results);
   }
   kernel("results_of_picture")
-      .launch(each, u32(count), u32(first_pixel), u32(packet_pixels), packets.image(), met,
+      .launch(each, u32(count), wave.first_pixel, u32(packet_pixels), packets->image(), met,
               results);
+  if (packet_depth) {
+    kernel("depths_of_picture")
+        .launch(each, u32(count), wave.first_pixel, u32(packet_pixels), packet_axis,
+                packets->depth(), met, rays, results);
+  }
 }
 
 void PathTracer::Impl::gather_light(const RsWave& wave, std::size_t count, bool from_gaussians) {
@@ -382,35 +400,60 @@ void PathTracer::set_meshes(const std::vector<Mesh>& meshes) {
 }
 
 Image PathTracer::render(const Camera& camera, const std::function<bool(double)>& within) {
-  Impl& self = *impl_;
-  const auto turn = self.context.lock();
+  const auto turn = impl_->context.lock();
   require_pixels(camera);
-  self.statistics = {};
   Image out(camera.width, camera.height, 4);
-  self.memory.check(out.pixels());
-  self.packet_pixels = 0;
-  if (self.by_packets(camera) && !self.trace_packets(camera, within)) return Image();
-  const std::size_t batch = self.memory.batch();
-  const auto samples = static_cast<float>(self.settings.samples);
-  for (std::size_t first = 0; first < out.pixels(); first += batch) {
-    const std::size_t count = std::min(batch, out.pixels() - first);
-    self.sums.ensure(self.context, count, "pixel sums");
-    self.sums.clear(count);
-    for (int sample = 0; sample < self.settings.samples; ++sample) {
-      self.trace_sample(camera, static_cast<std::uint32_t>(sample), first, count);
-      const double share = (static_cast<double>(first) +
-                            static_cast<double>(count) * (sample + 1) / self.settings.samples) /
-                           static_cast<double>(out.pixels());
-      if (within && !within(share)) return Image();
-    }
-    const std::vector<std::array<float, 4>> sums = self.sums.download();
-    for (std::size_t i = 0; i < count; ++i) {
-      float* pixel = out.data.data() + 4 * (first + i);
-      for (std::size_t c = 0; c < 3; ++c) pixel[c] = sums[i][c] / samples;
-      pixel[3] = 1.0f - sums[i][3] / samples;
-    }
+  impl_->memory.check(out.pixels());
+  try {
+    impl_->render(camera, within, out);
+  } catch (const Stopped&) {
+    return Image();
   }
   return out;
+}
+
+// Packets trace a sample of the whole picture at once; without them a batch of pixels gets all its
+// samples before the next one.
+void PathTracer::Impl::render(const Camera& camera,
+                              const std::function<bool(double)>& within,
+                              Image& out) {
+  const std::size_t batch = memory.batch();
+  const auto samples = static_cast<std::size_t>(settings.samples);
+  const std::size_t part = by_packets(camera) ? out.pixels() : std::min(batch, out.pixels());
+  statistics = {};
+  std::size_t done = 0;  // rays
+  std::function<void()> watch;
+  if (within) {
+    watch = [&] {
+      const double share = static_cast<double>(done) / static_cast<double>(samples * out.pixels());
+      if (!within(share)) throw Stopped();
+    };
+  }
+  for (std::size_t begin = 0; begin < out.pixels(); begin += part) {
+    const std::size_t end = std::min(begin + part, out.pixels());
+    sums.ensure(context, part, "pixel sums");
+    sums.clear(end - begin);
+    for (std::size_t sample = 0; sample < samples; ++sample) {
+      const Camera view = moved_in_pixels(camera, pixel_place(sample, samples, settings.seed));
+      packet_pixels = 0;
+      if (part == out.pixels() && by_packets(view)) trace_packets(view, watch);
+      for (std::size_t first = begin; first < end; first += batch) {
+        const std::size_t count = std::min(batch, end - first);
+        trace_sample(view, u32(sample), first, count, first - begin);
+        done += count;
+        if (watch) watch();
+      }
+    }
+    std::vector<std::array<float, 4>> gathered(end - begin);
+    sums.download(std::span<std::array<float, 4>>(gathered));
+    const auto divisor = static_cast<float>(samples);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::array<float, 4>& sum = gathered[i - begin];
+      float* pixel = out.data.data() + 4 * i;
+      for (std::size_t c = 0; c < 3; ++c) pixel[c] = sum[c] / divisor;
+      pixel[3] = 1.0f - sum[3] / divisor;
+    }
+  }
 }
 
 void PathTracer::set_sampling(int samples, std::uint64_t seed) {
@@ -420,6 +463,7 @@ void PathTracer::set_sampling(int samples, std::uint64_t seed) {
   settings.seed = seed;
   check_render_settings(settings);
   impl_->settings = settings;
+  impl_->memory.set_render(settings);
 }
 
 const Context& PathTracer::context() const { return impl_->context; }

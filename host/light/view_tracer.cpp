@@ -63,16 +63,6 @@ std::size_t pixels_of(const Camera& camera) {
   return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
 }
 
-// What the depth of a picture is counted along; zero for along every ray.
-std::array<float, 4> depth_axis(const Camera& camera) {
-  if (camera.model != CameraModel::kPinhole && camera.model != CameraModel::kOpenCv) return {};
-  std::array<float, 4> axis{};
-  for (int k = 0; k < 3; ++k) {
-    axis[static_cast<std::size_t>(k)] = static_cast<float>(camera.rotation[k][2]);
-  }
-  return axis;
-}
-
 std::uint64_t count_of(const Buffer<std::uint32_t>& counter) {
   const std::vector<std::uint32_t> words = counter.download();
   return std::uint64_t{words[1]} << 32 | words[0];

@@ -62,7 +62,6 @@ RsLensCamera lens_camera(const Camera& camera, const Lens& lens) {
   out.focus_distance = lens.focus_distance;
   out.width = camera.width;
   out.height = camera.height;
-  out.jitter = lens.jitter ? 1 : 0;
   out.sample = lens.sample;
   out.seed_lo = static_cast<std::uint32_t>(lens.seed);
   out.seed_hi = static_cast<std::uint32_t>(lens.seed >> 32);
@@ -88,6 +87,15 @@ void require_pixels(const Camera& camera) {
 ColorDirection color_direction(const Camera& camera) {
   return camera.model == CameraModel::kOrthographic ? ColorDirection::kRay
                                                     : ColorDirection::kFromOrigin;
+}
+
+std::array<float, 4> depth_axis(const Camera& camera) {
+  if (camera.model != CameraModel::kPinhole && camera.model != CameraModel::kOpenCv) return {};
+  std::array<float, 4> axis{};
+  for (int k = 0; k < 3; ++k) {
+    axis[static_cast<std::size_t>(k)] = static_cast<float>(camera.rotation[k][2]);
+  }
+  return axis;
 }
 
 void CameraRays::generate(const Camera& camera,

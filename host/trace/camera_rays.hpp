@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -12,12 +13,12 @@
 
 namespace raysplats {
 
-/// Which of the rays through a pixel is made.
+/// Where rays through the centre of a pixel pass the lens.
 struct Lens {
   std::uint32_t sample = 0;  ///< number of the sample: another one has other random numbers
-  bool jitter = false;       ///< uniform over pixel and lens; false = their centres
   std::uint64_t seed = 0;
-  float aperture = 0;        ///< radius of the lens, world units; orthographic cameras have none
+  float aperture = 0;  ///< radius of the lens, world units; rays are uniform over it, 0 = they
+                       ///< pass its centre, as those of orthographic cameras do
   float focus_distance = 1;  ///< depth of what is sharp: along z for kPinhole and kOpenCv, else
                              ///< along the ray
 };
@@ -34,9 +35,12 @@ void require_pixels(const Camera& camera);
 /// ray where there is none.
 ColorDirection color_direction(const Camera& camera);
 
+/// World direction along which the depths of a picture count; zero where they do along every ray.
+std::array<float, 4> depth_axis(const Camera& camera);
+
 /// Makes rays of pixels on the device, for every camera model (core/camera_model.hpp has the same
 /// in double precision). Random numbers are functions of (seed, pixel, sample): dimensions 0 and 1
-/// place the ray in its pixel, 2 and 3 on the lens (cl/shared/random.h).
+/// place the ray on the lens (cl/shared/random.h).
 class CameraRays {
  public:
   explicit CameraRays(Context& context) : context_(context) {}

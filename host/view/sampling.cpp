@@ -2,10 +2,9 @@
 #include "view/sampling.hpp"
 
 #include <algorithm>
-#include <glm/geometric.hpp>
-#include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
+#include <utility>
 
+#include "core/pixel_places.hpp"
 #include "eval/frame_writer.hpp"
 
 namespace raysplats::view {
@@ -37,18 +36,8 @@ Image opaque(const Image& picture) {
 
 Camera jittered(Camera camera, std::uint64_t sample) {
   if (sample == 0) return camera;
-  const glm::dvec3 step = glm::dvec3(halton(sample, 2), halton(sample, 3), halton(sample, 5)) - 0.5;
-  if (camera.model == CameraModel::kEquirectangular) {
-    // A panorama has no centre to shift. It is turned by what a pixel of its height sees.
-    const double angle = std::numbers::pi / camera.height * glm::length(step);
-    const glm::dmat3 turn(glm::rotate(glm::dmat4(1.0), angle, glm::normalize(step)));
-    camera.rotation = turn * camera.rotation;
-    camera.translation = turn * camera.translation;
-  } else {
-    camera.cx += step.x;
-    camera.cy += step.y;
-  }
-  return camera;
+  return moved_in_pixels(std::move(camera),
+                         glm::dvec3(halton(sample, 2), halton(sample, 3), halton(sample, 5)) - 0.5);
 }
 
 Image alpha_picture(const Image& rgba) {

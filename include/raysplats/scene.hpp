@@ -88,7 +88,7 @@ struct ShadowSettings {
 };
 
 struct RenderSettings {
-  int samples = 1;                 ///< rays per pixel; above 1 they are jittered over the pixel
+  int samples = 1;                 ///< rays per pixel; above 1 they are spread over it
   int max_bounces = 8;             ///< surfaces that a path may meet
   float min_throughput = 0.0005f;  ///< a path that carries less ends; no pixel loses more by it
   std::uint64_t seed = 0;

@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "core/camera_model.hpp"
+#include "core/pixel_places.hpp"
 #include "shared/random.h"
 #include "trace_fixture.hpp"
 
@@ -192,7 +193,7 @@ bool nearly_same(const Ray& a, const Ray& b) {
 TEST_CASE("camera rays do not depend on how pixels are split") {
   Context context = make_test_context();
   const Camera camera = posed(CameraModel::kFisheye, 90, 61, 30, 31);
-  const Lens lens{3, true, 0x123456789abcdefull, 0.1f, 2.0f};
+  const Lens lens{3, 0x123456789abcdefull, 0.1f, 2.0f};
   const std::vector<Ray> whole = make_rays(context, camera, lens);
   CameraRays generator(context);
   Buffer<Ray> part(context, 1000, "rays");
@@ -210,45 +211,61 @@ TEST_CASE("camera rays do not depend on how pixels are split") {
                     whole.size() * sizeof(Ray)) == 0);
 }
 
-TEST_CASE("camera rays: jitter is uniform over the pixel and follows seed and sample") {
+TEST_CASE("camera rays: a moved camera's go through the places in the pixels [small]") {
   Context context = make_test_context();
-  const Camera camera = posed(CameraModel::kOpenCv, 200, 150, 180, 180, {-0.05, 0.01, 0, 0, 0, 0});
-  Lens lens{5, true, 0xfeedf00d12345678ull, 0.0f, 1.0f};
-  const std::vector<Ray> rays = make_rays(context, camera, lens);
-  double sum_x = 0, sum_y = 0, worst = 0;
-  std::size_t outside = 0;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const RsRandom4 u = rs_random4(0x12345678u, 0xfeedf00du, static_cast<rs_uint>(i), 5, 0);
-    const double px = static_cast<double>(i % 200) + static_cast<double>(u.x);
-    const double py = static_cast<double>(i / 200) + static_cast<double>(u.y);
-    worst = std::max(worst, pixel_error(camera, rays[i], px, py));
-    const auto seen = project(camera, origin_of(rays[i]) + direction_of(rays[i]));
-    REQUIRE(seen);
-    const double x = seen->x - static_cast<double>(i % 200);
-    const double y = seen->y - static_cast<double>(i / 200);
-    CHECK(std::abs(x - 0.5) < 0.502);
-    CHECK(std::abs(y - 0.5) < 0.502);
-    sum_x += x;
-    sum_y += y;
+  for (const Camera& camera : cameras()) {
+    if (camera.model == CameraModel::kEquirectangular) continue;
+    CAPTURE(static_cast<int>(camera.model));
+    const glm::dvec3 place(0.31, -0.42, 0.1);
+    const std::vector<Ray> rays = make_rays(context, moved_in_pixels(camera, place));
+    double worst = 0;
+    std::size_t seen = 0;
+    const auto width = static_cast<std::size_t>(camera.width);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (!(rays[i].t_max > 0)) continue;
+      ++seen;
+      const std::size_t column = i % width, row = i / width;
+      worst =
+          std::max(worst, pixel_error(camera, rays[i], static_cast<double>(column) + 0.5 + place.x,
+                                      static_cast<double>(row) + 0.5 + place.y));
+    }
+    CHECK(seen > 1000);
+    CHECK(worst < 0.005);
   }
-  CHECK(worst < 0.005);
-  CHECK(outside == 0);
-  // The mean's deviation is 0.29 / sqrt(30000) = 0.0017.
-  CHECK(sum_x / 30000 == doctest::Approx(0.5).epsilon(0.015));
-  CHECK(sum_y / 30000 == doctest::Approx(0.5).epsilon(0.015));
-  const auto differs = [&](const Lens& other) {
-    const std::vector<Ray> found = make_rays(context, camera, other);
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < found.size(); ++i)
-      count += found[i].direction[0] != rays[i].direction[0] ? 1 : 0;
-    return count;
-  };
-  CHECK(differs(lens) == 0);
-  lens.sample = 6;
-  CHECK(differs(lens) > 29000);
-  lens.sample = 5;
-  lens.seed ^= 1ull << 40;
-  CHECK(differs(lens) > 29000);
+}
+
+TEST_CASE("places in a pixel are stratified, centred for seed 0 and uniform over seeds [small]") {
+  CHECK(pixel_place(0, 1, 0) == glm::dvec3(0.0));
+  CHECK(pixel_place(0, 1, 7) == glm::dvec3(0.0));
+  for (const std::uint64_t samples : {2, 3, 4, 7, 12, 16, 64, 1000}) {
+    CAPTURE(samples);
+    for (const std::uint64_t seed : {std::uint64_t{0}, std::uint64_t{1}, ~std::uint64_t{0}}) {
+      std::array<std::vector<bool>, 3> taken;
+      taken.fill(std::vector<bool>(samples));
+      glm::dvec3 sum(0.0);
+      for (std::uint64_t sample = 0; sample < samples; ++sample) {
+        const glm::dvec3 place = pixel_place(sample, samples, seed);
+        sum += place;
+        for (int k = 0; k < 3; ++k) {
+          REQUIRE(std::abs(place[k]) <= 0.5);
+          taken[static_cast<std::size_t>(k)][static_cast<std::size_t>(
+              std::floor((place[k] + 0.5) * static_cast<double>(samples)))] = true;
+        }
+      }
+      for (const auto& parts : taken)
+        CHECK(std::find(parts.begin(), parts.end(), false) == parts.end());
+      if (seed == 0) CHECK(glm::length(sum) < 1e-9 * static_cast<double>(samples));
+    }
+  }
+  // Strips have a quarter of the places each; within them the deviation is 55 at most.
+  std::array<double, 16> bins{};
+  for (std::uint64_t seed = 1; seed <= 6400; ++seed) {
+    for (std::uint64_t sample = 0; sample < 4; ++sample) {
+      const glm::dvec3 place = pixel_place(sample, 4, seed) + 0.5;
+      bins[static_cast<std::size_t>(place.x * 4) * 4 + static_cast<std::size_t>(place.y * 4)] += 1;
+    }
+  }
+  for (const double count : bins) CHECK(std::abs(count - 1600) < 220);
 }
 
 TEST_CASE("camera rays: those of a lens meet in the point in focus") {
@@ -256,8 +273,8 @@ TEST_CASE("camera rays: those of a lens meet in the point in focus") {
   for (Camera camera : cameras()) {
     CAPTURE(static_cast<int>(camera.model));
     const float aperture = 0.2f;
-    const Lens sharp{2, true, 77, 0.0f, 1.0f};
-    const Lens open{2, true, 77, aperture, 2.5f};
+    const Lens sharp{2, 77, 0.0f, 1.0f};
+    const Lens open{2, 77, aperture, 2.5f};
     const std::vector<Ray> through_center = make_rays(context, camera, sharp);
     const std::vector<Ray> rays = make_rays(context, camera, open);
     const bool perspective =
@@ -295,11 +312,16 @@ TEST_CASE("camera rays: those of a lens meet in the point in focus") {
     // Uniform over a disc: the mean square is half of the radius', the mean zero.
     CHECK(square / static_cast<double>(count) == doctest::Approx(0.02).epsilon(0.02));
     CHECK(glm::length(mean) / static_cast<double>(count) < 0.002);
-    // Without jitter the lens is a pinhole.
-    Lens centered = open;
-    centered.jitter = false;
-    CHECK(std::memcmp(make_rays(context, camera, centered).data(),
-                      make_rays(context, camera).data(), rays.size() * sizeof(Ray)) == 0);
+    const auto differs = [&](const Lens& other) {
+      const std::vector<Ray> found = make_rays(context, camera, other);
+      std::size_t different = 0;
+      for (std::size_t i = 0; i < found.size(); ++i)
+        different += found[i].origin[0] != rays[i].origin[0] ? 1 : 0;
+      return different;
+    };
+    CHECK(differs(open) == 0);
+    CHECK(differs({3, 77, aperture, 2.5f}) > count * 9 / 10);
+    CHECK(differs({2, 77 ^ std::uint64_t{1} << 40, aperture, 2.5f}) > count * 9 / 10);
   }
 }
 
