@@ -6,7 +6,9 @@ if(RAYSPLATS_WERROR)
   list(APPEND RAYSPLATS_WARNINGS -Werror)
 endif()
 
+# How our own targets are compiled. They alone see what is private (host, cl): whoever links the library has include/raysplats.
 function(raysplats_compile_options target)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/host ${PROJECT_SOURCE_DIR}/cl)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_compile_options(${target} PRIVATE ${RAYSPLATS_WARNINGS})
   if(RAYSPLATS_SANITIZE)
@@ -23,22 +25,11 @@ function(raysplats_module name)
   endif()
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/host/${name}/*.cpp)
   set(target raysplats_${name})
-  if(NOT sources)
-    add_library(${target} INTERFACE)
-    set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
-    target_include_directories(
-      ${target} INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/host>
-                          $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/cl>)
-    target_link_libraries(${target} INTERFACE ${ARG_DEPENDS})
-    return()
-  endif()
   add_library(${target} STATIC ${sources})
   set_target_properties(${target} PROPERTIES LINKER_LANGUAGE CXX EXPORT_NAME ${name}
                                              POSITION_INDEPENDENT_CODE ON)
-  target_include_directories(
-    ${target}
-    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
-           $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/host> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/cl>)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+                                              $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_definitions(${target} PRIVATE RAYSPLATS_VERSION="${PROJECT_VERSION}")
   target_link_libraries(${target} PUBLIC ${ARG_DEPENDS})
   raysplats_compile_options(${target})

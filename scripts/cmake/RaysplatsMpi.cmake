@@ -19,7 +19,7 @@ message(STATUS "MPI ${MPI_CXX_VERSION}: ${MPI_CXX_LIBRARIES}")
 set(RAYSPLATS_HAVE_MPI TRUE)
 add_library(raysplats_mpi MODULE ${PROJECT_SOURCE_DIR}/host/mpi/mpi_transport.cpp)
 set_target_properties(raysplats_mpi PROPERTIES OUTPUT_NAME raysplats-mpi)
-target_include_directories(raysplats_mpi PRIVATE ${PROJECT_SOURCE_DIR}/include ${PROJECT_SOURCE_DIR}/host)
+target_include_directories(raysplats_mpi PRIVATE ${PROJECT_SOURCE_DIR}/include)
 target_compile_definitions(raysplats_mpi PRIVATE RAYSPLATS_VERSION="${PROJECT_VERSION}")
 target_link_libraries(raysplats_mpi PRIVATE fmt::fmt MPI::MPI_CXX)
 # Not the C++ interface, which has left the standard.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The order of the modules in docs/architecture.md, read off the includes of sources, kernels and
-// tests.
+// tests; and what is private stays private.
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -12,6 +12,9 @@
 #include <vector>
 
 namespace fs = std::filesystem;
+
+// Of consumer.cpp: the headers that whoever links the library can include.
+extern const char* const kConsumerSees;
 
 namespace {
 
@@ -229,6 +232,10 @@ TEST_CASE("dependencies point one way, and public headers include public headers
   REQUIRE(sources(root / "tests/unit").size() > 150);
   const Layers layers(root);
   for (const std::string& fault : layers.faults()) FAIL_CHECK(fault);
+}
+
+TEST_CASE("who links the library sees its public headers alone") {
+  CHECK(std::string(kConsumerSees) == "public");
 }
 
 TEST_CASE("an arrow upwards and a private header in a public one are found") {
