@@ -8,21 +8,12 @@
 #define RS_BVH_LBVH_NODE_H
 
 #include "bvh/box.h"
+#include "bvh/ray.h"
 #include "primitives/vector_lanes.h"
 #include "shared/tree_layout.h"
 
 // A node: lo.x lo.y lo.z hi.x hi.y hi.z of its children, one vector each (RS_NODE_VECTORS). Missing
 // children are empty boxes (lo > hi).
-#ifndef TRAIL
-#define TRAIL 0  // of tree_walk.h
-#endif
-// What is not inlined passes its structures through private memory, which lies far away on GPUs.
-// (RS_CALLS: Oclgrind does not know what LLVM leaves of structures that are returned inline.)
-#if TRAIL && !defined(RS_CALLS)
-#define RS_INLINE __attribute__((always_inline))
-#else
-#define RS_INLINE
-#endif
 // A child of every level stays behind: LANES - 1 per level, and 2^31 things have 15 levels of 4 or
 // 7 of 16.
 #define RS_NODE_STACK 128
@@ -58,12 +49,13 @@ typedef struct {
 
 // A ray whose numbers, or their squares, are not finite meets nothing. NaN would meet every box,
 // and those of children that do not exist.
-RS_INLINE RayData ray_data(float8 ray) {
+RS_INLINE RayData ray_data(const Ray ray) {
   RayData out;
-  const bool sound = dot(ray.s012, ray.s012) + dot(ray.s456, ray.s456) <= FLT_MAX;
-  out.o = sound ? ray.s012 : (float3)(0.0f, 0.0f, 0.0f);
-  out.d = sound ? ray.s456 : (float3)(0.0f, 0.0f, 1.0f);
-  out.t_min = sound ? fmax(ray.s3, 0.0f) : INFINITY;
+  const float squares = dot(ray.origin, ray.origin) + dot(ray.direction, ray.direction);
+  const bool sound = squares <= FLT_MAX;
+  out.o = sound ? ray.origin : (float3)(0.0f, 0.0f, 0.0f);
+  out.d = sound ? ray.direction : (float3)(0.0f, 0.0f, 1.0f);
+  out.t_min = sound ? fmax(ray.t_min, 0.0f) : INFINITY;
   // Finite, so that an origin on a slab of a zero component gives about 0 and never NaN.
   out.inverse = clamp(1.0f / out.d, -1e24f, 1e24f);
   // Finite too: missing children reach to infinity, and the difference would be NaN.

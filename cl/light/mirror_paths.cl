@@ -6,6 +6,7 @@
 // Gaussians in front of its end and B, beta of what is behind: tint times the continued ray's,
 // black and 1 behind a mirror that is the last one allowed, the background and 0 where there is
 // none. Launch: one work-item per ray or pixel, any group size, O(1) each.
+#include "bvh/ray.h"
 #include "light/shading.h"
 #include "primitives/counter.h"
 
@@ -16,12 +17,12 @@ bool goes_on(__global const uint* starts, uint i) { return starts[i + 1] != star
 __kernel void end_at_mirrors(const uint count,
                              const int last_level,
                              __global const RsSurfaceHit* restrict hits,
-                             __global float8* restrict rays,
+                             __global RsRay* restrict rays,
                              __global uint* restrict starts) {
   const uint i = get_global_id(0);
   if (i >= count) return;
   const bool met = hits[i].triangle >= 0;
-  if (met) rays[i].s7 = hits[i].t;
+  if (met) rays[i].t_max = hits[i].t;
   starts[i] = met && !last_level;
 }
 
@@ -30,19 +31,20 @@ __kernel void reflect_rays(const uint count,
                            __global const RsSurfaceHit* restrict hits,
                            __global const uint* restrict starts,
                            __global const float* restrict vertices,
-                           __global const float8* restrict rays,
-                           __global float8* restrict next_rays,
+                           __global const RsRay* restrict rays,
+                           __global RsRay* restrict next_rays,
                            __global RsPath* restrict next_paths) {
   const uint i = get_global_id(0);
   if (i >= count || !goes_on(starts, i)) return;
   const RsSurfaceHit hit = hits[i];
-  const float3 d = rays[i].s456;
+  const float3 d = load_ray(rays, i).direction;
   const SurfacePoint point = surface_point(vertices, &hit, d);
   float3 direction = reflected(d, point.shading);
   if (dot(direction, point.normal) <= 0.0f) direction = reflected(d, point.normal);
   const float3 start = start_off_surface(point.position, point.normal, direction, point.offset);
   const uint to = starts[i];
-  next_rays[to] = (float8)(start, 0.0f, direction, FLT_MAX);
+  const Ray next = {start, direction, 0.0f, FLT_MAX};
+  store_ray(next, next_rays, to);
   next_paths[to].skip = hit.triangle;
 }
 
@@ -73,8 +75,8 @@ Behind behind_of(const uint i,
   return out;
 }
 
-// results: eight words a ray: first C and A, last whether it stopped at the cap on hits, which
-// `capped` counts. seen: V, alpha.
+// results: C and A, and whether the ray stopped at the cap on hits, which `capped` counts. seen: V,
+// alpha.
 __kernel void gather_light(const uint count,
                            const int mirrors,
                            const float4 background,
@@ -83,17 +85,17 @@ __kernel void gather_light(const uint count,
                            __global const uint* restrict materials_of,
                            __global const RsMaterial* restrict materials,
                            __global const float4* restrict next_seen,
-                           __global const float8* restrict results,
+                           __global const RsRayResult* restrict results,
                            __global float4* restrict seen,
                            volatile __global uint* restrict capped) {
   const uint i = get_global_id(0);
   if (i >= count) return;
   const Behind behind =
       behind_of(i, mirrors, background, hits, starts, materials_of, materials, next_seen);
-  const float8 result = results[i];
-  const float passed = 1.0f - result.s3;
-  seen[i] = (float4)(result.s012 + passed * behind.color, 1.0f - passed * (1.0f - behind.alpha));
-  if (as_uint(result.s7) != 0) rs_count(capped, 1);
+  const RayResult result = load_result(results, i);
+  const float passed = 1.0f - result.alpha;
+  seen[i] = (float4)(result.color + passed * behind.color, 1.0f - passed * (1.0f - behind.alpha));
+  if (result.capped != 0) rs_count(capped, 1);
 }
 
 // gradients: of V and alpha; they become those of C and A. next_gradients: of the continued rays.
@@ -105,7 +107,7 @@ __kernel void spread_gradients(const uint count,
                                __global const uint* restrict materials_of,
                                __global const RsMaterial* restrict materials,
                                __global const float4* restrict next_seen,
-                               __global const float8* restrict results,
+                               __global const RsRayResult* restrict results,
                                __global float4* restrict gradients,
                                __global float4* restrict next_gradients) {
   const uint i = get_global_id(0);
@@ -113,7 +115,7 @@ __kernel void spread_gradients(const uint count,
   const Behind behind =
       behind_of(i, mirrors, background, hits, starts, materials_of, materials, next_seen);
   const float4 g = gradients[i];
-  const float passed = 1.0f - results[i].s3;
+  const float passed = 1.0f - results[i].alpha;
   gradients[i].w = g.w * (1.0f - behind.alpha) - dot(g.xyz, behind.color);
   if (behind.continued) {
     next_gradients[starts[i]] = passed * (float4)(g.xyz * behind.tint, g.w);
@@ -135,22 +137,22 @@ __kernel void store_picture(const uint count,
   image[3 * (size_t)pixels + first + i] = value.w;
 }
 
-// Depths and hits of the same rays as planes; results: as rays.cl makes them. Rays have unit
+// Depths and hits of the same rays as planes; Rays have unit
 // length: `axis` is what depth is counted along, or zero for along the ray.
 __kernel void store_depth(const uint count,
                           const uint first,
                           const uint pixels,
                           const float4 axis,
-                          __global const float8* restrict rays,
-                          __global const float8* restrict results,
+                          __global const RsRay* restrict rays,
+                          __global const RsRayResult* restrict results,
                           __global float* restrict depth) {
   const uint i = get_global_id(0);
   if (i >= count) return;
-  const float cosine = any(axis != 0.0f) ? dot(axis.xyz, rays[i].s456) : 1.0f;
-  const float8 result = results[i];
-  depth[first + i] = cosine * result.s4;
-  depth[(size_t)pixels + first + i] = cosine * result.s5;
-  depth[2 * (size_t)pixels + first + i] = (float)as_uint(result.s6);
+  const float cosine = any(axis != 0.0f) ? dot(axis.xyz, load_ray(rays, i).direction) : 1.0f;
+  const RayResult result = load_result(results, i);
+  depth[first + i] = cosine * result.expected_depth;
+  depth[(size_t)pixels + first + i] = cosine * result.median_depth;
+  depth[2 * (size_t)pixels + first + i] = (float)result.hits;
 }
 
 // The other way round.

@@ -9,11 +9,11 @@
 // Less light than this counts as none.
 #define RS_DARK 1e-4f
 
-// rays: origin, t_min, direction, t_max. skip: triangle that ray i does not meet, read with a
+// skip: triangle that ray i does not meet, read with a
 // stride of `skip_stride` words; 0 = none is skipped.
-#define RS_SURFACE_RAY_ARGUMENTS                                               \
-  const uint ray_count, const uint rays_per_item, RS_TREE_ARGUMENTS,           \
-      __global const float8 *restrict rays, __global const int *restrict skip, \
+#define RS_SURFACE_RAY_ARGUMENTS                                              \
+  const uint ray_count, const uint rays_per_item, RS_TREE_ARGUMENTS,          \
+      __global const RsRay *restrict rays, __global const int *restrict skip, \
       const uint skip_stride
 
 // Hits lie in (t_min, t_max].
@@ -22,12 +22,12 @@ __kernel void nearest_surface(RS_SURFACE_RAY_ARGUMENTS, __global RsSurfaceHit* r
   const uint last = min(first + rays_per_item, ray_count);
   const RayTree tree = {levels, level_begin, nodes, blocks};
   for (uint id = first; id < last; ++id) {
-    const float8 raw = rays[id];
+    const Ray raw = load_ray(rays, id);
     const RayData ray = ray_data(raw);
     const ShearedRay sheared = sheared_ray(&ray);
     const int skipped = skip_stride > 0 ? skip[(size_t)id * skip_stride] : -1;
     RsSurfaceHit best;
-    best.t = raw.s7;
+    best.t = raw.t_max;
     best.u = best.v = 0.0f;
     best.triangle = -1;
     TreeWalk walk;
@@ -66,7 +66,7 @@ __kernel void light_through(RS_SURFACE_RAY_ARGUMENTS,
   const uint last = min(first + rays_per_item, ray_count);
   const RayTree tree = {levels, level_begin, nodes, blocks};
   for (uint id = first; id < last; ++id) {
-    const float8 raw = rays[id];
+    const Ray raw = load_ray(rays, id);
     const RayData ray = ray_data(raw);
     const ShearedRay sheared = sheared_ray(&ray);
     const int skipped = skip_stride > 0 ? skip[(size_t)id * skip_stride] : -1;
@@ -74,13 +74,14 @@ __kernel void light_through(RS_SURFACE_RAY_ARGUMENTS,
     TreeWalk walk;
     walk_begin(&walk, &tree, ray.t_min);
     uint bits, first_block;
-    while (light > RS_DARK && (bits = walk_next(&walk, &tree, &ray, raw.s7, &first_block)) != 0) {
+    while (light > RS_DARK &&
+           (bits = walk_next(&walk, &tree, &ray, raw.t_max, &first_block)) != 0) {
       for (; bits != 0; bits &= bits - 1) {
         __global const fv* block =
             blocks + (size_t)(first_block + rs_lowest_bit(bits)) * RS_TRIANGLE_VECTORS;
         TriangleMeeting meeting;
-        for (uint met = ray_meets_triangles(&sheared, block, ray.t_min, raw.s7, &meeting); met != 0;
-             met &= met - 1) {
+        for (uint met = ray_meets_triangles(&sheared, block, ray.t_min, raw.t_max, &meeting);
+             met != 0; met &= met - 1) {
           const int triangle = triangle_index(block, rs_lowest_bit(met));
           if (triangle != skipped) light *= 1.0f - shadow[triangle];
         }

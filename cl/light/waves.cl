@@ -13,18 +13,13 @@
 // Paths of a pixel are neighbours in every wave, so that one work-item can add them in their order:
 // no atomics, the same picture every time. Launch: one work-item per path.
 // Wavefront path tracing: Laine, Karras and Aila 2013.
+#include "bvh/ray.h"
 #include "light/shading.h"
-
-// Records of eight words as RayTracer defines them.
-#define RS_RESULT_ALPHA s3
-#define RS_RESULT_EXPECTED s4
-#define RS_RESULT_MEDIAN s5
-#define RS_RESULT_LEADING s6
 
 // direct: 1 when the rays leave the camera's centre.
 __kernel void begin_paths(const uint count,
                           const int direct,
-                          __global const float8* restrict rays,
+                          __global const RsRay* restrict rays,
                           __global RsPath* restrict paths) {
   const uint i = get_global_id(0);
   if (i >= count) return;
@@ -32,7 +27,7 @@ __kernel void begin_paths(const uint count,
   path.skip = -1;
   path.pixel = i;
   path.begin = 0.0f;
-  path.blind = rays[i].s7 < 0.0f;
+  path.blind = rays[i].t_max < 0.0f;
   for (int k = 0; k < 3; ++k) path.throughput[k] = 1.0f;
   path.media[0] = path.media[1] = 0;
   path.splits = path.lineage = 0;
@@ -43,13 +38,13 @@ __kernel void begin_paths(const uint count,
 // The rays of a camera that end on a surface; those that meet none are empty (t_max < t_min).
 __kernel void rays_to_surfaces(const uint count,
                                __global const RsSurface* restrict surfaces,
-                               __global const float8* restrict rays,
-                               __global float8* restrict ending) {
+                               __global const RsRay* restrict rays,
+                               __global RsRay* restrict ending) {
   const uint i = get_global_id(0);
   if (i >= count) return;
-  float8 ray = rays[i];
-  if (surfaces[i].material < 0) ray.s7 = -1.0f;
-  ending[i] = ray;
+  Ray ray = load_ray(rays, i);
+  if (surfaces[i].material < 0) ray.t_max = -1.0f;
+  store_ray(ray, ending, i);
 }
 
 // What the others meet, from a picture of the Gaussians alone: planar colour and alpha of `pixels`
@@ -60,12 +55,14 @@ __kernel void results_of_picture(const uint count,
                                  const uint pixels,
                                  __global const float* restrict picture,
                                  __global const RsSurface* restrict surfaces,
-                                 __global float8* restrict results) {
+                                 __global RsRayResult* restrict results) {
   const uint i = get_global_id(0);
   if (i >= count || surfaces[i].material >= 0) return;
   __global const float* at = picture + first_pixel + i;
   const size_t plane = pixels;
-  results[i] = (float8)(at[0], at[plane], at[2 * plane], at[3 * plane], 0.0f, 0.0f, 0.0f, 0.0f);
+  const float3 color = (float3)(at[0], at[plane], at[2 * plane]);
+  const RayResult result = {color, at[3 * plane], 0.0f, 0.0f, 0, 0};
+  store_result(result, results, i);
 }
 
 // Their depths along the rays, from planes that count them along `axis`, or along the rays where it
@@ -76,14 +73,16 @@ __kernel void depths_of_picture(const uint count,
                                 const float4 axis,
                                 __global const float* restrict depth,
                                 __global const RsSurface* restrict surfaces,
-                                __global const float8* restrict rays,
-                                __global float8* restrict results) {
+                                __global const RsRay* restrict rays,
+                                __global RsRayResult* restrict results) {
   const uint i = get_global_id(0);
   if (i >= count || surfaces[i].material >= 0) return;
-  const float cosine = any(axis != 0.0f) ? dot(axis.xyz, rays[i].s456) : 1.0f;
+  const float cosine = any(axis != 0.0f) ? dot(axis.xyz, load_ray(rays, i).direction) : 1.0f;
   __global const float* at = depth + first_pixel + i;
-  results[i].RS_RESULT_EXPECTED = at[0] / cosine;
-  results[i].RS_RESULT_MEDIAN = at[pixels] / cosine;
+  RayResult result = load_result(results, i);
+  result.expected_depth = at[0] / cosine;
+  result.median_depth = at[pixels] / cosine;
+  store_result(result, results, i);
 }
 
 // vertices: as for surface_point(). materials_of: one per triangle.
@@ -95,16 +94,16 @@ __kernel void load_surfaces(const uint count,
                             __global const RsTexture* restrict textures,
                             __global const float* restrict texels,
                             __global const RsPath* restrict paths,
-                            __global float8* restrict rays,
+                            __global RsRay* restrict rays,
                             __global uint* restrict from_origin,
                             __global RsSurface* restrict surfaces) {
   const uint i = get_global_id(0);
   if (i >= count) return;
   const RsSurfaceHit hit = hits[i];
-  float8 ray = rays[i];
-  ray.s3 = paths[i].begin;
-  ray.s7 = paths[i].blind ? -1.0f : (hit.triangle < 0 ? FLT_MAX : hit.t);
-  rays[i] = ray;
+  Ray ray = load_ray(rays, i);
+  ray.t_min = paths[i].begin;
+  ray.t_max = paths[i].blind ? -1.0f : (hit.triangle < 0 ? FLT_MAX : hit.t);
+  store_ray(ray, rays, i);
   from_origin[i] = (uint)paths[i].direct;
   RsSurface s;
   s.t = hit.t;
@@ -114,7 +113,7 @@ __kernel void load_surfaces(const uint count,
   s.offset = 0.0f;
   for (int k = 0; k < 3; ++k) s.position[k] = s.shading[k] = s.normal[k] = s.color[k] = 0.0f;
   if (hit.triangle >= 0 && !paths[i].blind) {
-    const SurfacePoint point = surface_point(vertices, &hit, ray.s456);
+    const SurfacePoint point = surface_point(vertices, &hit, ray.direction);
     s.entering = point.entering;
     s.offset = point.offset;
     s.material = (int)materials_of[hit.triangle];
@@ -151,10 +150,14 @@ float3 light_at(__global const RsLight* light, float3 p, float3* direction, floa
 }
 
 // Depth at which a ray's Gaussians stand for shadows and absorption.
-float gaussian_depth(float8 result, float begin, float end) {
-  const float depth =
-      result.RS_RESULT_ALPHA > 0.5f ? result.RS_RESULT_MEDIAN : result.RS_RESULT_EXPECTED;
-  return clamp(depth, begin, end);
+float gaussian_depth(const RayResult result, const Ray ray) {
+  const float depth = result.alpha > 0.5f ? result.median_depth : result.expected_depth;
+  return clamp(depth, ray.t_min, ray.t_max);
+}
+
+// The place there.
+float3 gaussian_place(const RayResult result, const Ray ray) {
+  return ray.origin + gaussian_depth(result, ray) * ray.direction;
 }
 
 // How far a Gaussian reaches from its centre towards a unit direction.
@@ -173,7 +176,7 @@ float reach_of_gaussian(__global const float* restrict quaternions,
 // What a light shines on: the rays that met Gaussians and surfaces, and what they met.
 #define RS_LIT_ARGUMENTS                                                                  \
   __global const RsLight *restrict lights, __global const RsMaterial *restrict materials, \
-      __global const float8 *restrict rays, __global const float8 *restrict results,      \
+      __global const RsRay *restrict rays, __global const RsRayResult *restrict results,  \
       __global const RsSurface *restrict surfaces
 
 // Rays from what a path meets to sample `light_sample` of light `number`: from its surface
@@ -190,23 +193,20 @@ __kernel void shadow_rays(const uint count,
                           __global const float* restrict log_scales,
                           const float quantile,
                           __global const RsPath* restrict paths,
-                          __global float8* restrict out,
+                          __global RsRay* restrict out,
                           __global int* restrict skip) {
   const uint i = get_global_id(0);
   if (i >= count) return;
   const int gaussians = target > 0 ? 1 : 0;
-  float8 ray = (float8)(0.0f);
-  ray.s5 = 1.0f;
-  ray.s7 = -1.0f;
+  Ray ray = {(float3)(0.0f), (float3)(0.0f, 1.0f, 0.0f), 0.0f, -1.0f};
   int skipped = -1;
   float3 p = (float3)(0.0f), direction;
   float distance, begin = 0.0f;
   bool wanted = false;
   if (gaussians) {
-    const float8 result = results[i];
-    const float8 own = rays[i];
-    if (result.RS_RESULT_ALPHA > 1e-3f) {
-      p = own.s012 + gaussian_depth(result, own.s3, own.s7) * own.s456;
+    const RayResult result = load_result(results, i);
+    if (result.alpha > 1e-3f) {
+      p = gaussian_place(result, load_ray(rays, i));
       begin = wave.bias;
       wanted = max3(light_at(lights + number, p, &direction, &distance)) > 0.0f;
     }
@@ -244,12 +244,15 @@ __kernel void shadow_rays(const uint count,
       direction = v / fmax(distance, 1e-20f);
     }
     if (target == 2) {
-      begin = fmax(begin, reach_of_gaussian(quaternions, log_scales, quantile,
-                                            as_uint(results[i].RS_RESULT_LEADING), direction));
+      begin = fmax(
+          begin, reach_of_gaussian(quaternions, log_scales, quantile, results[i].hits, direction));
     }
-    ray = (float8)(p, begin, direction, distance);
+    ray.origin = p;
+    ray.direction = direction;
+    ray.t_min = begin;
+    ray.t_max = distance;
   }
-  out[i] = ray;
+  store_ray(ray, out, i);
   skip[i] = skipped;
 }
 
@@ -265,22 +268,21 @@ __kernel void add_light(const uint count,
                         const int use_triangles,
                         const int use_gaussians,
                         RS_LIT_ARGUMENTS,
-                        __global const float8* restrict shadow,
+                        __global const RsRay* restrict shadow,
                         __global const float* restrict passes,
-                        __global const float8* restrict blocked,
+                        __global const RsRayResult* restrict blocked,
                         __global float4* restrict gaussian_light,
                         __global float8* restrict surface_light) {
   const uint i = get_global_id(0);
-  if (i >= count || shadow[i].s7 < 0.0f) return;
+  if (i >= count || shadow[i].t_max < 0.0f) return;
   float visible = 1.0f;
   if (use_triangles) visible *= passes[i];
-  if (use_gaussians) visible *= 1.0f - blocked[i].RS_RESULT_ALPHA;
+  if (use_gaussians) visible *= 1.0f - blocked[i].alpha;
   visible = 1.0f - wave.strength * (1.0f - visible);
   float3 direction;
   float distance;
   if (gaussians) {
-    const float8 own = rays[i];
-    const float3 p = own.s012 + gaussian_depth(results[i], own.s3, own.s7) * own.s456;
+    const float3 p = gaussian_place(load_result(results, i), load_ray(rays, i));
     const float weight = share * max3(light_at(lights + number, p, &direction, &distance));
     gaussian_light[i] += (float4)(weight * visible, weight, 1.0f, 0.0f);
     return;
@@ -289,7 +291,7 @@ __kernel void add_light(const uint count,
   const float3 e =
       visible * share * light_at(lights + number, load3(s.position), &direction, &distance);
   const float3 n = load3(s.shading);
-  const float3 half_vector = normalize(direction - rays[i].s456);
+  const float3 half_vector = normalize(direction - load_ray(rays, i).direction);
   const float lobe =
       pow(fmax(dot(n, half_vector), 0.0f), lobe_exponent(materials[s.material].roughness));
   const float3 diffuse = e * fmax(dot(n, direction), 0.0f);
@@ -300,18 +302,18 @@ __kernel void add_light(const uint count,
 // A path behind a surface, with the ray it takes.
 typedef struct {
   RsPath path;
-  float8 ray;
+  Ray ray;
 } Continuation;
 
 // On in the same direction: the ray keeps its origin and looks behind the surface.
-Continuation straight_on(const RsPath* path, float8 ray, const RsSurface* s, float3 throughput) {
+Continuation straight_on(const RsPath* path, Ray ray, const RsSurface* s, float3 throughput) {
   Continuation out;
   out.path = *path;
   out.path.begin = as_float(as_uint(s->t) + 1u);
   out.path.skip = s->triangle;
   vstore3(throughput, 0, out.path.throughput);
-  ray.s3 = s->t;
-  ray.s7 = FLT_MAX;
+  ray.t_min = s->t;
+  ray.t_max = FLT_MAX;
   out.ray = ray;
   return out;
 }
@@ -330,13 +332,14 @@ Continuation new_direction(const RsPath* path,
   const float3 d = normalize(direction), from = load3(s->position);
   const bool back = dot(d, normal) >= 0.0f;  // to where it came from
   const float3 p = back ? start_off_surface(from, normal, d, s->offset) : from - s->offset * normal;
-  out.ray = (float8)(p, 0.0f, d, FLT_MAX);
+  const Ray ray = {p, d, 0.0f, FLT_MAX};
+  out.ray = ray;
   return out;
 }
 
 // Both rays of a glass surface, or the one that is left of them; returns how many.
 int pass_glass(const RsPath* path,
-               float8 ray,
+               Ray ray,
                const RsSurface* s,
                float3 throughput,
                __global const RsMaterial* materials,
@@ -360,7 +363,7 @@ int pass_glass(const RsPath* path,
     out[0] = straight_on(&inside, ray, s, throughput * color);
     return 1;
   }
-  const float3 d = ray.s456, normal = load3(s->normal);
+  const float3 d = ray.direction, normal = load3(s->normal);
   const float ratio = before_ior / after_ior;
   float3 n = load3(s->shading);
   float cosine = -dot(d, n), cosine_out = 0.0f, F = 1.0f;
@@ -406,15 +409,15 @@ __kernel void advance(const uint count,
                       __global const RsEnvironment* restrict environment,
                       __global const float* restrict picture,
                       __global const RsPath* restrict paths,
-                      __global const float8* restrict rays,
-                      __global const float8* restrict results,
+                      __global const RsRay* restrict rays,
+                      __global const RsRayResult* restrict results,
                       __global const RsSurface* restrict surfaces,
                       __global const float4* restrict gaussian_light,
                       __global const float8* restrict surface_light,
                       __global float4* restrict gained,
                       __global uint* restrict counts,
                       __global RsPath* restrict next_paths,
-                      __global float8* restrict next_rays,
+                      __global RsRay* restrict next_rays,
                       __global uint4* restrict tallies) {
   const uint i = get_global_id(0);
   if (i >= count) return;
@@ -425,27 +428,27 @@ __kernel void advance(const uint count,
     gained[i] = (float4)(0.0f, 0.0f, 0.0f, 1.0f);
     return;
   }
-  const float8 ray = rays[i];
-  const float8 result = results[i];
+  const Ray ray = load_ray(rays, i);
+  const RayResult result = load_result(results, i);
   const RsSurface s = surfaces[i];
   const float4 light = gaussian_light[i];
   const float8 direct = surface_light[i];
-  uint4 tally = (uint4)((uint)light.z + (uint)direct.s3, as_uint(result.s7), 0, 0);
+  uint4 tally = (uint4)((uint)light.z + (uint)direct.s3, result.capped, 0, 0);
   float3 throughput = load3(path.throughput);
   float3 to_gaussians = throughput;
   if (path.media[0] & 0xffffu) {
     const float3 sigma = vload3(0, materials[(path.media[0] & 0xffffu) - 1].absorption);
-    const float depth = gaussian_depth(result, ray.s3, ray.s7);
+    const float depth = gaussian_depth(result, ray);
     // Nothing is left after an infinite way, but clear glass stays clear.
-    const float3 way = fmin((float3)(ray.s7 - ray.s3), (float3)(1e30f));
-    to_gaussians *= exp(-sigma * (depth - ray.s3));
+    const float3 way = fmin((float3)(ray.t_max - ray.t_min), (float3)(1e30f));
+    to_gaussians *= exp(-sigma * (depth - ray.t_min));
     throughput *= exp(-sigma * way);
   }
   const float shade = light.y > 0.0f ? light.x / light.y : 1.0f;
-  float3 sum = to_gaussians * shade * result.s012;
-  throughput *= 1.0f - result.RS_RESULT_ALPHA;
+  float3 sum = to_gaussians * shade * result.color;
+  throughput *= 1.0f - result.alpha;
   if (s.material < 0) {
-    sum += throughput * environment_color(environment, picture, ray.s456);
+    sum += throughput * environment_color(environment, picture, ray.direction);
     gained[i] = (float4)(sum, (throughput.x + throughput.y + throughput.z) / 3.0f);
     tallies[i] = tally;
     return;
@@ -479,8 +482,8 @@ __kernel void advance(const uint count,
     if (material->roughness > 0.0f && wave.samples > 1) {
       facet = ggx_normal(n, material->roughness, random.x, random.y);
     }
-    float3 direction = reflected(ray.s456, facet);
-    if (dot(direction, normal) <= 0.0f) direction = reflected(ray.s456, normal);
+    float3 direction = reflected(ray.direction, facet);
+    if (dot(direction, normal) <= 0.0f) direction = reflected(ray.direction, normal);
     on[0] = new_direction(&path, &s, throughput * color, direction);
     ways = 1;
   } else if (kind == RS_GLASS) {
@@ -494,7 +497,7 @@ __kernel void advance(const uint count,
       continue;
     }
     next_paths[2 * (size_t)i + kept] = on[k].path;
-    next_rays[2 * (size_t)i + kept] = on[k].ray;
+    store_ray(on[k].ray, next_rays, 2 * (size_t)i + kept);
     ++kept;
   }
   counts[i] = kept;
@@ -506,15 +509,15 @@ __kernel void advance(const uint count,
 __kernel void gather_paths(const uint count,
                            __global const uint* restrict offsets,
                            __global const RsPath* restrict next_paths,
-                           __global const float8* restrict next_rays,
+                           __global const RsRay* restrict next_rays,
                            __global RsPath* restrict paths,
-                           __global float8* restrict rays) {
+                           __global RsRay* restrict rays) {
   const uint i = get_global_id(0);
   if (i >= count) return;
   const uint first = offsets[i], last = offsets[i + 1];
   for (uint k = first; k < last; ++k) {
     paths[k] = next_paths[2 * (size_t)i + (k - first)];
-    rays[k] = next_rays[2 * (size_t)i + (k - first)];
+    store_ray(load_ray(next_rays, 2 * (size_t)i + (k - first)), rays, k);
   }
 }
 

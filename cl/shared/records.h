@@ -6,12 +6,18 @@
 
 #include "shared/layout.h"
 #include "shared/light_layout.h"
+#include "shared/ray_layout.h"
 #include "shared/trace_layout.h"
 #include "shared/train_layout.h"
 
 // clang-format off
 #define RS_RECORDS(RECORD, FIELD) \
   RECORD(RsAabb) FIELD(RsAabb, lo) FIELD(RsAabb, hi) \
+  RECORD(RsRay) FIELD(RsRay, origin) FIELD(RsRay, t_min) FIELD(RsRay, direction) \
+    FIELD(RsRay, t_max) \
+  RECORD(RsRayResult) FIELD(RsRayResult, color) FIELD(RsRayResult, alpha) \
+    FIELD(RsRayResult, expected_depth) FIELD(RsRayResult, median_depth) FIELD(RsRayResult, hits) \
+    FIELD(RsRayResult, capped) \
   RECORD(RsLine) FIELD(RsLine, v) \
   RECORD(RsViewBounds) FIELD(RsViewBounds, x0) FIELD(RsViewBounds, y0) FIELD(RsViewBounds, x1) \
     FIELD(RsViewBounds, y1) FIELD(RsViewBounds, depth) FIELD(RsViewBounds, quantile) \

@@ -4,6 +4,7 @@
 #ifndef RS_TRACE_ARGUMENTS_H
 #define RS_TRACE_ARGUMENTS_H
 
+#include "shared/ray_layout.h"
 #include "shared/trace_layout.h"
 
 // Parameters of all Gaussians, Gaussian-major; scales before their activation, opacities as logits.
@@ -38,9 +39,8 @@
   __global access float *restrict transmittances, __global access uint2 *restrict stream_ends, \
       __global access uint2 *restrict pool, __global access float *restrict pool_transmittance
 
-// Rays of eight floats (origin, t_min, direction, t_max) and the order in which they are taken,
-// read when `ordered`.
+// Rays and the order in which they are taken, read when `ordered`.
 #define RS_RAY_ARGUMENTS \
-  __global const float8 *restrict rays, const int ordered, __global const uint *restrict ray_order
+  __global const RsRay *restrict rays, const int ordered, __global const uint *restrict ray_order
 
 #endif

@@ -2,13 +2,14 @@
 // Rays through the centres of a camera's pixels, row by row, for every camera model (lens.h), with a
 // thin lens. Launch of camera_rays: one work-item per ray, any group size. A pixel that sees nothing
 // gets an empty ray (t_max < 0). Cost: a few dozen operations; models with distortion iterate.
+#include "bvh/ray.h"
 #include "shared/random.h"
 #include "trace/lens.h"
 
 __kernel void camera_rays(const RsLensCamera camera,
                           const uint first_pixel,
                           const uint count,
-                          __global float8* restrict rays) {
+                          __global RsRay* restrict rays) {
   const size_t id = get_global_id(0);
   if (id >= count) return;
   const uint pixel = first_pixel + (uint)id;
@@ -47,5 +48,6 @@ __kernel void camera_rays(const RsLensCamera camera,
   const float3 o = (float3)(camera.center[0], camera.center[1], camera.center[2]) +
                    origin.x * right + origin.y * down;
   const float3 d = direction.x * right + direction.y * down + direction.z * forward;
-  rays[id] = (float8)(o, 0.0f, d / sqrt(dot(d, d)), valid ? FLT_MAX : -1.0f);
+  const Ray ray = {o, d / sqrt(dot(d, d)), 0.0f, valid ? FLT_MAX : -1.0f};
+  store_ray(ray, rays, id);
 }

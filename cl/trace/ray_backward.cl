@@ -246,7 +246,7 @@ RS_RAY_KERNEL __kernel void ray_backward(const uint first,
                                          __global const float* restrict sh,
                                          const RsRayWalk walk_argument,
                                          RS_RAY_ARGUMENTS,
-                                         __global const float8* restrict results,
+                                         __global const RsRayResult* restrict results,
                                          __global const float4* restrict gradients,
                                          __global const float* restrict records,
                                          const RsRaySums ray_sums,
@@ -279,16 +279,16 @@ RS_RAY_KERNEL __kernel void ray_backward(const uint first,
     for (size_t position = begin; position < end; ++position) {
       const size_t id = ordered ? ray_order[position] : position;
       const float4 gradient = gradients[id];
-      const float8 result = results[id];
-      const int hits = as_int(result.s6);
+      const RayResult result = load_result(results, id);
+      const int hits = (int)result.hits;
       if (hits == 0 || !any(gradient != 0.0f)) continue;
-      const float8 raw = rays[id];
+      const Ray raw = load_ray(rays, id);
       RayData ray = ray_data(raw);
       float basis[RS_RAY_FUNCTIONS];
       basis_along_ray(&scene, &ray, basis);
       state.gradient = gradient;
       state.sky = dot(background, gradient.xyz);
-      state.total = dot(result.s012, gradient.xyz) + result.s3 * gradient.w;
+      state.total = dot(result.color, gradient.xyz) + result.alpha * gradient.w;
       state.total_hits = hits;
       state.transmittance = 1.0f;
       state.hits = 0;
@@ -299,7 +299,7 @@ RS_RAY_KERNEL __kernel void ray_backward(const uint first,
 #if RAY_SLOPES
       state.by_origin = state.by_direction = (float3)(0.0f);
 #endif
-      walk_ray(&scene, raw.s7, basis, &ray, &state);
+      walk_ray(&scene, raw.t_max, basis, &ray, &state);
 #if RAY_SLOPES
       slopes[id] = (float8)(state.by_origin, 0.0f, state.by_direction, 0.0f);
 #endif

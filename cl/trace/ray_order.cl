@@ -18,7 +18,7 @@ uint point_key(float3 p, float3 lo, float3 scale) {
 
 // keys[i] for ray i, indices[i] = i. The scene's box is lane 0 of node `scene`. Rays that miss it
 // come last.
-__kernel void ray_keys(__global const float8* restrict rays,
+__kernel void ray_keys(__global const RsRay* restrict rays,
                        const uint count,
                        __global const float* restrict nodes,
                        const uint scene,
@@ -26,7 +26,7 @@ __kernel void ray_keys(__global const float8* restrict rays,
                        __global uint* restrict indices) {
   const uint i = get_global_id(0);
   if (i >= count) return;
-  const float8 raw = rays[i];
+  const Ray raw = load_ray(rays, i);
   const RayData ray = ray_data(raw);
   __global const float* box = nodes + (size_t)scene * (RS_NODE_VECTORS * LANES);
   const float3 lo = (float3)(box[0], box[LANES], box[2 * LANES]);
@@ -34,7 +34,7 @@ __kernel void ray_keys(__global const float8* restrict rays,
   const float3 a = (lo - ray.o) * ray.inverse, b = (hi - ray.o) * ray.inverse;
   const float3 near = fmin(a, b), far = fmax(a, b);
   const float enter = fmax(fmax(near.x, near.y), fmax(near.z, ray.t_min));
-  const float leave = fmin(fmin(far.x, far.y), fmin(far.z, raw.s7));
+  const float leave = fmin(fmin(far.x, far.y), fmin(far.z, raw.t_max));
   const float3 scale = 32.0f / fmax(hi - lo, 1e-30f);
   uint key = 1u << 30;
   if (enter <= leave) {

@@ -63,9 +63,8 @@ RS_INLINE void blend_hits(const RayScene* scene,
 
 #include "trace/ray_walk.h"
 
-// results: 8 words each (colour, alpha, expected depth, median depth, hits, capped); with LEADING
-// the word of the hits is the Gaussian that leads them: of the median depth, or the one that shows
-// most where there is none.
+// With LEADING the hits of a result are the Gaussian that leads them: of the median depth, or the
+// one that shows most where there is none.
 // from_origin: of every ray, read where the launch's color_from_origin is 2.
 RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
                                        const uint rays_per_item,
@@ -74,7 +73,7 @@ RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
                                        const RsRayWalk walk_argument,
                                        RS_RAY_ARGUMENTS,
                                        __global const uint* restrict from_origin,
-                                       __global float8* restrict results) {
+                                       __global RsRayResult* restrict results) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
   const RsRayWalk walk = walk_argument;
@@ -86,7 +85,7 @@ RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
 #endif
   for (uint position = first; position < last; ++position) {
     const size_t id = ordered ? ray_order[position] : position;
-    const float8 raw = rays[id];
+    const Ray raw = load_ray(rays, id);
     RayData ray = ray_data(raw);
     if (walk.color_from_origin == 2) scene.color_from_origin = (int)from_origin[id];
     float basis[25];
@@ -99,7 +98,7 @@ RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
 #if COUNT_WORK
     state.nodes = state.blocks = 0;
 #endif
-    walk_ray(&scene, raw.s7, basis, &ray, &state);
+    walk_ray(&scene, raw.t_max, basis, &ray, &state);
     const float3 color = state.color.xyz + state.transmittance * background;
     const float weight = 1.0f - state.transmittance;
 #if COUNT_WORK
@@ -114,7 +113,7 @@ RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
 #else
     const uint count = (uint)state.hits;
 #endif
-    results[id] = (float8)(color, weight, depth, state.median, as_float(count),
-                           as_float((uint)(state.capped ? 1 : 0)));
+    const RayResult result = {color, weight, depth, state.median, count, state.capped ? 1 : 0};
+    store_result(result, results, id);
   }
 }

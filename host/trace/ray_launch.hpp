@@ -12,10 +12,10 @@
 #include "primitives/radix_sort.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/device.hpp"
-#include "raysplats/rays.hpp"
 #include "raysplats/trace_options.hpp"
 #include "shared/trace_layout.h"
 #include "trace/device_gaussians.hpp"
+#include "trace/ray_records.hpp"
 
 namespace raysplats {
 

@@ -20,8 +20,6 @@ constexpr std::size_t kRayBytes = sizeof(Ray) + sizeof(RayResult);
 // On CPUs a work-item traces several rays one after the other: OpenCL implementations there give
 // every work-item of a group its own private memory, which would not stay in the cache.
 constexpr std::size_t kCpuRaysPerItem = 64;
-static_assert(sizeof(Ray) == 32 && sizeof(RayResult) == 32,
-              "kernels read and write eight words a ray");
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 

@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "device/kernel.hpp"
+#include "shared/ray_layout.h"
 #include "unit/fixture.hpp"
 
 using namespace raysplats;
@@ -18,12 +20,12 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kLargest = std::numeric_limits<float>::max();
 
-/// Origin, t_min, direction, t_max.
-using RawRay = std::array<float, 8>;
+/// An RsRay.
+using RayNumbers = std::array<float, 8>;
 
 /// Which children of a node each ray meets: child 0 is the cube [-1, 1], the others are missing.
 std::vector<std::uint32_t> meet_node(Context& context,
-                                     const std::vector<RawRay>& rays,
+                                     const std::vector<RsRay>& rays,
                                      std::size_t lanes,
                                      bool exact) {
   std::vector<float> node(6 * lanes, kLargest);
@@ -35,7 +37,7 @@ std::vector<std::uint32_t> meet_node(Context& context,
   BuildOptions build;
   build.define("LANES", lanes);
   if (exact) build.define("RS_EXACT_SLABS", 1);
-  Buffer<RawRay> device_rays(context, rays.size(), "rays");
+  Buffer<RsRay> device_rays(context, rays.size(), "rays");
   device_rays.upload(rays);
   Buffer<float> device_node(context, node.size(), "node");
   device_node.upload(node);
@@ -50,15 +52,16 @@ std::vector<std::uint32_t> meet_node(Context& context,
 
 TEST_CASE("a missing child is met by no ray, whatever its numbers") {
   Context context(test_device());
-  const RawRay sound{0.1f, 0.2f, -4.0f, 0.0f, 0.0f, 0.0f, 1.0f, kInfinity};
-  std::vector<RawRay> rays{sound};
+  const RayNumbers sound{0.1f, 0.2f, -4.0f, 0.0f, 0.0f, 0.0f, 1.0f, kInfinity};
+  std::vector<RsRay> rays{std::bit_cast<RsRay>(sound)};
   for (const float value : {std::numeric_limits<float>::quiet_NaN(), kInfinity, -kInfinity,
                             kLargest, -1e38f, 1e20f, -1e16f, 1e-38f, 0.0f}) {
     for (std::size_t k = 0; k < 8; ++k) {
-      rays.push_back(sound);
-      rays.back()[k] = value;
+      RayNumbers numbers = sound;
+      numbers[k] = value;
+      rays.push_back(std::bit_cast<RsRay>(numbers));
     }
-    rays.push_back({value, value, value, 0.0f, value, value, value, kInfinity});
+    rays.push_back({{value, value, value}, 0.0f, {value, value, value}, kInfinity});
   }
   for (const std::size_t lanes : {4, 8, 16}) {
     for (const bool exact : {false, true}) {
