@@ -123,6 +123,9 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
 #if !POSE
   (void)pose;
 #endif
+#if SH_DEGREE == 0
+  (void)sh;
+#endif
   __local StagedRows staged;
   const RsCamera camera = camera_argument;
   const uint lane = get_local_id(0);

@@ -131,11 +131,13 @@ void screen_statistics(const ViewGaussian* g,
   const gv zero = (gv)(0.0f);
   const gi counts = touched & (kind == RS_LINE_PROJECTIVE);
 #if ANGULAR
+  (void)screen_y;
   const gv x0 = g->m[0] / g->m[2], y0 = g->m[1] / g->m[2];
   const gv across = x0 * v[0] + y0 * v[1];
   const gv slope =
       screen_x * sqrt((1.0f + x0 * x0 + y0 * y0) * (v[0] * v[0] + v[1] * v[1] + across * across));
 #else
+  (void)g;
   const gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
 #endif
   out[0] = counts ? slope : zero;

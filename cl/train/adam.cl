@@ -90,6 +90,7 @@ __kernel void choose_steps(const __global float* means,
 // own.
 lanes step_rates(int phase, const RsAdam* adam) {
 #if WIDTH <= 4
+  (void)phase;
   return (lanes)(adam->rate);
 #else
   lane_mask place = phase + RS_LANE_IDS;
