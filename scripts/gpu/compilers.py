@@ -12,6 +12,8 @@ import machine_code
 from packages import CLANG, LIBRARIES
 
 AMD_LIBRARIES = "/amdgcn/bitcode"
+# Of the device libraries, which are older than clang's own.
+AMD_CODE_OBJECT = "-mcode-object-version=5"
 
 
 class CompileError(Exception):
@@ -39,20 +41,20 @@ def _number(pattern, text):
 def prepare_amd(root, target):
     """Debian 12's device libraries end before RDNA 3; the one file that a processor needs holds its number alone."""
     library = f"{root}/{LIBRARIES}{AMD_LIBRARIES}/oclc_isa_version_{target[3:]}.bc"
-    if os.path.exists(library):
+    if os.path.exists(library) and not os.path.exists(f"{library}.cl"):
         return
     number = int(target[3:-2]) * 1000 + int(target[-2], 16) * 100 + int(target[-1], 16)
     source = f"{library}.cl"
     with open(source, "w", encoding="utf-8") as file:
         file.write(f'__attribute__((visibility("protected"))) const __constant int __oclc_ISA_version = {number};\n')
-    _clang("amd", root, ["-cl-std=CL2.0", "--target=amdgcn-amd-amdhsa", "-nogpulib", "-emit-llvm", "-c", "-o", library, source])
+    _clang("amd", root, ["-cl-std=CL2.0", "--target=amdgcn-amd-amdhsa", AMD_CODE_OBJECT, "-nogpulib", "-emit-llvm", "-c", "-o", library, source])
 
 
 def amd(root, target, flags, source, stem):
     assembly = stem + ".s"
     libraries = f"{root}/{LIBRARIES}{AMD_LIBRARIES}"
-    # Clang 22 is newer than these libraries: their code object is 5, and it no longer links the switch for denormals.
-    older = ["-mcode-object-version=5", "-Xclang", "-mlink-builtin-bitcode", "-Xclang", f"{libraries}/oclc_daz_opt_off.bc"]
+    # Clang 22 no longer links the switch for denormals.
+    older = [AMD_CODE_OBJECT, "-Xclang", "-mlink-builtin-bitcode", "-Xclang", f"{libraries}/oclc_daz_opt_off.bc"]
     _clang("amd", root, [*flags, "--target=amdgcn-amd-amdhsa", f"-mcpu={target}", f"--rocm-device-lib-path={libraries}", *older,
                          "-O3", "-S", "-w", "-o", assembly, source])
     with open(assembly, encoding="utf-8") as file:
