@@ -14,6 +14,8 @@
 namespace raysplats {
 namespace {
 
+constexpr const char* kNoTime = "it would not have ended in time";
+
 std::uint64_t peak_process_bytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -39,7 +41,9 @@ void measure(Context& context,
     for (std::size_t k = 0; k < operations[i].stages.size(); ++k) {
       const BenchStage& stage = operations[i].stages[k];
       if (samples[i][k].seconds.empty()) {
-        report.left_out.push_back(id_of(stage.name, model.name, size));
+        const std::string& lacking = samples[i][k].lacking;
+        report.left_out.push_back(
+            {id_of(stage.name, model.name, size), lacking.empty() ? kNoTime : lacking});
       } else {
         report.rows.push_back(row_of(stage, samples[i][k], model.name, size));
       }
@@ -81,7 +85,13 @@ const std::vector<BenchRowInfo>& bench_rows() {
       {"light-mesh-large", "rays", "with the large body, diffuse, and no lights"},
       {"light-mirror", "rays", "with the small body as a mirror: mirrored rays too"},
       {"light-glass", "rays", "with the small body of glass: all its rays too"},
-      {"light-shadows", "rays", "with the small body and a light: shadow rays of both too"}};
+      {"light-shadows", "rays", "with the small body and a light: shadow rays of both too"},
+      {"forward-vector", "rays", "camera rays in packets that are vectors, hits kept"},
+      {"backward-vector", "rays", "their hit streams to gradient lines"},
+      {"forward-group", "rays", "the same in packets that are work-groups"},
+      {"backward-group", "rays", "their hit streams to gradient lines"},
+      {"forward-subgroup", "rays", "the same in packets that are subgroups, where there are any"},
+      {"backward-subgroup", "rays", "their hit streams to gradient lines"}};
   return rows;
 }
 

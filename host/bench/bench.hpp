@@ -37,7 +37,7 @@ struct BenchOptions {
   std::size_t rays = 65536;           ///< arbitrary rays, at most
   std::size_t triangles = 1'000'000;  ///< of the larger body; the smaller has a tenth
   std::uint64_t seed = 1;
-  /// Nothing more is begun after this moment; rows that were not begun are named in left_out.
+  /// Nothing more is begun after this moment.
   std::optional<std::chrono::steady_clock::time_point> deadline;
   TraceOptions trace;
 };

@@ -143,7 +143,8 @@ DeviceReport make_device_report(Context& context,
                                                        static_cast<double>(size_before);
         if (clock.seconds() + expected > most_seconds) {
           report.left_out.push_back(
-              fmt::format("{}, {} Gaussians, {}x{}", scene, size, width, height));
+              fmt::format("{}, {} Gaussians, {}x{}: it would not have ended in time", scene, size,
+                          width, height));
           continue;
         }
         BenchOptions one = options;
@@ -157,8 +158,8 @@ DeviceReport make_device_report(Context& context,
                            std::chrono::duration<double>(most_seconds - clock.seconds()));
         const Clock run(context);
         report.runs.push_back(run_bench(context, one));
-        for (const std::string& id : report.runs.back().left_out)
-          report.left_out.push_back(fmt::format("{}, {}x{}", id, width, height));
+        for (const std::string& line : left_out_lines(report.runs.back()))
+          report.left_out.push_back(fmt::format("{}x{}, {}", width, height, line));
         before = run.measuring();
         size_before = size;
         add_speeds(report.runs.back(), width, height, report);
@@ -185,8 +186,7 @@ std::string device_report_text(const DeviceReport& report) {
   for (const DeviceReport::Model& model : report.models) out += model_text(report, model);
   out += "\n" + speed_lines("frames/s", report.frames);
   out += speed_lines("training iterations/s", report.iterations);
-  for (const std::string& what : report.left_out)
-    out += fmt::format("left out, it would not have ended in time: {}\n", what);
+  for (const std::string& what : report.left_out) out += fmt::format("left out: {}\n", what);
   out += fmt::format("{:.0f} s, {:.0f} s of them for compiling kernels; self-test {}\n",
                      report.seconds, report.compile_seconds, report.passed() ? "passed" : "FAILED");
   return out;

@@ -38,7 +38,7 @@ struct DeviceReport {
   std::vector<Speed> frames;          ///< of rows `view`
   std::vector<Speed> iterations;      ///< of rows `iteration`
   std::vector<Model> models;          ///< of the runs at options' resolution
-  std::vector<std::string> left_out;  ///< what would not have ended in time
+  std::vector<std::string> left_out;  ///< what, and why
   double compile_seconds = 0;
   double seconds = 0;  ///< of the whole
 

@@ -126,6 +126,7 @@ struct Side {
   void add_rows(const BenchModel& model, BenchReport& report) const {
     for (std::size_t i = 0; i < operations.size(); ++i) {
       for (std::size_t k = 0; k < operations[i].stages.size(); ++k) {
+        if (samples[i][k].seconds.empty()) continue;  // the device does not have it
         report.rows.push_back(
             row_of(operations[i].stages[k], samples[i][k], model.name, model.gaussians.size()));
       }

@@ -8,6 +8,8 @@
 #include <chrono>
 #include <exception>
 
+#include "raysplats/error.hpp"
+
 namespace raysplats {
 namespace {
 
@@ -79,6 +81,7 @@ std::vector<std::vector<StageSamples>> run_operations(Context& context,
                                                       double min_seconds,
                                                       const std::function<bool()>& out_of_time) {
   std::exception_ptr failure;
+  std::vector<std::string> lacking(operations.size());
   std::vector<bool> warm(operations.size(), false);
   for (std::size_t n = 0; n < operations.size(); ++n) {
     const auto body = [&, n](benchmark::State& state) {
@@ -94,8 +97,19 @@ std::vector<std::vector<StageSamples>> run_operations(Context& context,
           state.SkipWithError("out of time");
           return;
         }
+        if (!lacking[n].empty()) {
+          state.SkipWithError("the device does not have it");
+          return;
+        }
         if (!warm[n]) {
-          if (operation.prepare) operation.prepare();
+          try {
+            if (operation.prepare) operation.prepare();
+          } catch (const DeviceError& error) {
+            if (!operation.optional) throw;
+            lacking[n] = error.what();
+            state.SkipWithError("the device does not have it");
+            return;
+          }
           run_once(context, operation, sums);
           sums.assign(sums.size(), 0.0);
           warm[n] = true;
@@ -126,6 +140,9 @@ std::vector<std::vector<StageSamples>> run_operations(Context& context,
   benchmark::RunSpecifiedBenchmarks(&collector, "all");
   benchmark::ClearRegisteredBenchmarks();
   if (failure) std::rethrow_exception(failure);
+  for (std::size_t n = 0; n < operations.size(); ++n) {
+    for (StageSamples& stage : collector.samples[n]) stage.lacking = lacking[n];
+  }
   return collector.samples;
 }
 

@@ -30,18 +30,20 @@ struct BenchOperation {
   std::function<void()> reset;    ///< before every run, untimed; may be empty
   std::function<void()> run;
   std::vector<BenchStage> stages;
+  bool optional = false;  ///< what the device does not have leaves it out
 };
 
 struct StageSamples {
   std::vector<double> seconds;  ///< one per repetition, by the stage's clock
   std::vector<double> wall;     ///< of the whole operation
+  std::string lacking;          ///< why the device left it out, where it did
 };
 
 /// Runs every operation: once to warm up, then `repeat` times as often as Google Benchmark finds
 /// necessary for `min_seconds` each. No repetition begins once `out_of_time()` says so; an
 /// operation that never began has no samples. The result is parallel to operations and their
 /// stages. Needs a context with keep_launches. What an operation throws ends the run and is thrown
-/// on.
+/// on, but for the device's refusal of one that is optional.
 std::vector<std::vector<StageSamples>> run_operations(
     Context& context,
     const std::vector<BenchOperation>& operations,

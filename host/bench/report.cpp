@@ -32,6 +32,17 @@ BenchShare share_of(const BenchRow& row, const Ceilings& ceilings) {
   return share;
 }
 
+std::vector<std::string> left_out_lines(const BenchReport& report) {
+  std::map<std::string, std::string> ids;
+  for (const BenchReport::LeftOut& row : report.left_out) {
+    std::string& line = ids[row.reason];
+    line += (line.empty() ? "" : " ") + row.id;
+  }
+  std::vector<std::string> out;
+  for (const auto& [reason, line] : ids) out.push_back(line + ": " + reason);
+  return out;
+}
+
 std::string bench_table(const BenchReport& report) {
   std::string out = fmt::format("{} ({}, driver {}), raysplats {}\n", report.device,
                                 report.platform, report.driver, report.version);
@@ -53,6 +64,7 @@ std::string bench_table(const BenchReport& report) {
         row.work.items.size() > 1 ? format_rate(row, 1) : "", 1e-9 * row.work.bytes / seconds,
         percent(share.copy), 1e-9 * row.work.flops / seconds, percent(share.fma));
   }
+  for (const std::string& line : left_out_lines(report)) out += fmt::format("left out: {}\n", line);
   out += fmt::format("peak memory: process {:.1f} MiB, device buffers {:.1f} MiB\n",
                      mebibytes(report.peak_process_bytes), mebibytes(report.peak_device_bytes));
   return out;

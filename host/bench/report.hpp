@@ -63,8 +63,15 @@ struct BenchReport {
   std::uint64_t peak_process_bytes = 0;
   std::uint64_t peak_device_bytes = 0;  ///< in buffers
   std::vector<BenchRow> rows;
-  std::vector<std::string> left_out;  ///< ids of rows that were not begun before the deadline
+  struct LeftOut {
+    std::string id;  ///< of the row
+    std::string reason;
+  };
+  std::vector<LeftOut> left_out;
 };
+
+/// "ids: reason" for every reason why rows were left out.
+std::vector<std::string> left_out_lines(const BenchReport& report);
 
 /// Fixed-width text, with the ceilings above and the memory below the rows.
 std::string bench_table(const BenchReport& report);

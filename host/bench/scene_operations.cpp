@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/rng.hpp"
 #include "bench/scene_state.hpp"
+#include "core/trace_rows.hpp"
 #include "primitives/work.h"
 #include "trace/work.h"
 
@@ -90,9 +91,10 @@ BenchOperation SceneBench::Impl::view() {
            {"forward",
             {"trace/forward.cl", "trace/group_forward.cl"},
             false,
-            [this] { return forward_work(); }},
+            [this] { return forward_work(view_statistics); }},
            {"view", {}, false, [this] {
-              return together(forward_work(), together(prepare_work(), lists_work()));
+              return together(forward_work(view_statistics),
+                              together(prepare_work(), lists_work()));
             }}}};
 }
 
@@ -117,10 +119,42 @@ BenchOperation SceneBench::Impl::backward() {
           {{"backward",
             {"trace/backward.cl", "trace/group_backward.cl", ":(fill)"},
             false,
-            [this] { return backward_work(); }},
+            [this] { return backward_work(kept_statistics); }},
            {"finalize", {"trace/finalize_gradients.cl", "trace/group_finalize.cl"}, false, [this] {
               return finalize_work();
             }}}};
+}
+
+BenchOperation SceneBench::Impl::packets(PacketForm form) {
+  const std::string shape = packet_shape_name(form);
+  return {[this, form] {
+            make_loss();
+            TraceOptions trace = options.trace;
+            trace.packet_form = form;
+            if (options.trace.packet_form != form) trace.packet_width = 0;
+            shaped_tracer.reset();
+            shaped_tracer = std::make_unique<CameraTracer>(context, trace);
+            shaped_tracer->update(gaussians());
+            shaped_tracer->forward(gaussians(), model.camera, true);
+            shaped_statistics = shaped_tracer->statistics();
+            image_loss->evaluate(picture, {photo}, false, {0, 0, 0}, model.camera.width,
+                                 model.camera.height, image_gradient);
+            shaped_tracer->backward(gaussians(), image_gradient, gradients);
+          },
+          {},
+          [this] {
+            shaped_tracer->forward(gaussians(), model.camera, true);
+            shaped_tracer->backward(gaussians(), image_gradient, gradients);
+          },
+          {{"forward-" + shape,
+            {"trace/forward.cl", "trace/group_forward.cl"},
+            false,
+            [this] { return forward_work(shaped_statistics); }},
+           {"backward-" + shape,
+            {"trace/backward.cl", "trace/group_backward.cl", ":(fill)"},
+            false,
+            [this] { return backward_work(shaped_statistics); }}},
+          true};
 }
 
 BenchOperation SceneBench::Impl::rays() {
@@ -268,7 +302,10 @@ std::vector<BenchOperation> SceneBench::operations() {
           self.light("light-mesh-large", large, Kind::kDiffuse, false),
           self.light("light-mirror", small, Kind::kMirror, false),
           self.light("light-glass", small, Kind::kGlass, false),
-          self.light("light-shadows", small, Kind::kDiffuse, true)};
+          self.light("light-shadows", small, Kind::kDiffuse, true),
+          self.packets(PacketForm::kVector),
+          self.packets(PacketForm::kGroup),
+          self.packets(PacketForm::kSubgroup)};
 }
 
 }  // namespace raysplats

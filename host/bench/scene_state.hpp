@@ -60,6 +60,8 @@ struct SceneBench::Impl {
   BenchOperation view();
   BenchOperation view_by_bvh();
   BenchOperation backward();
+  /// Both passes in one shape of packets, which need not be the device's own.
+  BenchOperation packets(PacketForm form);
   BenchOperation iteration_by_bvh();
   BenchOperation rays();
   BenchOperation loss();
@@ -77,8 +79,8 @@ struct SceneBench::Impl {
   BenchWork nodes_work() const;
   BenchWork prepare_work() const;
   BenchWork lists_work() const;
-  BenchWork forward_work() const;
-  BenchWork backward_work() const;
+  BenchWork forward_work(const CameraTracer::Statistics& seen) const;
+  BenchWork backward_work(const CameraTracer::Statistics& kept) const;
   BenchWork finalize_work() const;
   BenchWork rays_work() const;
   BenchWork loss_value_work() const;
@@ -101,6 +103,8 @@ struct SceneBench::Impl {
   std::uint64_t traced_revision = 0;  // of the Gaussians at its last update()
   std::unique_ptr<ViewTracer> tree_view_tracer;
   CameraTracer::Statistics view_statistics, kept_statistics;
+  std::unique_ptr<CameraTracer> shaped_tracer;  // one at a time: each keeps its own hits
+  CameraTracer::Statistics shaped_statistics;
   std::unique_ptr<RayTracer> ray_tracer;
   std::vector<Ray> ray_list;
   std::vector<RayResult> ray_results;

@@ -56,21 +56,20 @@ BenchWork SceneBench::Impl::lists_work() const {
           RS_WORK_LIST_GAUSSIAN_FLOPS * gaussians_count() + RS_WORK_LIST_FLOPS * candidates};
 }
 
-BenchWork SceneBench::Impl::forward_work() const {
-  const auto hits = static_cast<double>(view_statistics.hits);
-  const auto candidates = static_cast<double>(view_statistics.candidates);
+BenchWork SceneBench::Impl::forward_work(const CameraTracer::Statistics& seen) const {
+  const auto hits = static_cast<double>(seen.hits);
+  const auto candidates = static_cast<double>(seen.candidates);
   const bool entry = options.trace.hit_order == HitOrder::kEntry;
   return {{{"rays", pixels()}, {"hits", hits}},
           RS_WORK_FORWARD_CANDIDATE_BYTES * candidates + RS_WORK_FORWARD_PIXEL_BYTES * pixels(),
           (RS_WORK_FORWARD_FLOPS + (entry ? RS_WORK_ENTRY_FLOPS : 0)) * hits};
 }
 
-BenchWork SceneBench::Impl::backward_work() const {
-  const auto hits = static_cast<double>(kept_statistics.hits);
+BenchWork SceneBench::Impl::backward_work(const CameraTracer::Statistics& kept) const {
+  const auto hits = static_cast<double>(kept.hits);
   return {{{"rays", pixels()}, {"hits", hits}},
           RS_WORK_BACKWARD_GAUSSIAN_BYTES * gaussians_count() +
-              RS_WORK_BACKWARD_PIXEL_BYTES * pixels() +
-              static_cast<double>(kept_statistics.stream_bytes),
+              RS_WORK_BACKWARD_PIXEL_BYTES * pixels() + static_cast<double>(kept.stream_bytes),
           RS_WORK_BACKWARD_FLOPS * hits};
 }
 
@@ -127,8 +126,9 @@ BenchWork SceneBench::Impl::densify_work() const {
 BenchWork SceneBench::Impl::iteration_work() const {
   BenchWork work{{{"iterations", 1.0}, {"rays", pixels()}}, 0, 0};
   for (const BenchWork& part :
-       {bounds_work(), prepare_work(), lists_work(), forward_work(), loss_value_work(),
-        loss_gradient_work(), backward_work(), finalize_work(), statistics_work(), adam_work()}) {
+       {bounds_work(), prepare_work(), lists_work(), forward_work(view_statistics),
+        loss_value_work(), loss_gradient_work(), backward_work(kept_statistics), finalize_work(),
+        statistics_work(), adam_work()}) {
     work = together(work, part);
   }
   return work;

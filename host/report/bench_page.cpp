@@ -114,11 +114,8 @@ std::string bench_page(const BenchReport& report) {
       body += rows_of(report, scene, size);
     }
   }
-  if (!report.left_out.empty()) {
-    body += "<p class=\"warn\">Left out, they would not have ended in time:";
-    for (const std::string& id : report.left_out) body += fmt::format(" {}", escaped(id));
-    body += "</p>\n";
-  }
+  for (const std::string& line : left_out_lines(report))
+    body += fmt::format("<p class=\"warn\">Left out: {}</p>\n", escaped(line));
   return page("Benchmark of " + report.device, body);
 }
 

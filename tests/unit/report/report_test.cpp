@@ -364,7 +364,7 @@ TEST_CASE("a benchmark becomes a page with all rows, bars and, of several sizes,
     row.work = {{{"rays", 64000}, {"hits", 1e6}}, 250.0 * static_cast<double>(size), 0};
     bench.rows.push_back(row);
   }
-  bench.left_out = {"view/a<b>/1000000"};
+  bench.left_out = {{"view/a<b>/1000000", "no time"}};
   const std::string page = bench_page(bench);
   CHECK(fault(page) == "");
   CHECK(has(page, "a card &lt;1&gt; &amp; co"));
@@ -373,7 +373,7 @@ TEST_CASE("a benchmark becomes a page with all rows, bars and, of several sizes,
   CHECK(has(page, "25.0 %"));
   CHECK(has(page, "An image by tiles: log10"));
   CHECK(!has(page, "Training: log10"));
-  CHECK(has(page, "view/a&lt;b&gt;/1000000"));
+  CHECK(has(page, "view/a&lt;b&gt;/1000000: no time"));
   CHECK(!has(page, "<script"));
   bench.rows.pop_back();
   CHECK(!has(bench_page(bench), "log10"));
