@@ -9,6 +9,7 @@
 
 #include "base/output_directory.hpp"
 #include "core/morton_order.hpp"
+#include "eval/bands.hpp"
 #include "eval/output_check.hpp"
 #include "frame_progress.hpp"
 #include "options.hpp"
@@ -63,10 +64,20 @@ void run(const Options& options, const GlobalOptions& global) {
     FrameProgress progress("evaluating", views, ranks, global.quiet);
     std::uint64_t rays = 0;
     std::uint64_t capped = 0;
+    // As frames are: rows of every view where there are fewer than ranks.
+    const bool together = views < static_cast<std::size_t>(ranks.size());
+    if (together) {
+      tracer.set_share(static_cast<std::size_t>(ranks.rank()),
+                       static_cast<std::size_t>(ranks.size()));
+    }
     const auto render = [&](const Camera& camera) {
       Image image = tracer.render(on_device, camera, false,
                                   [&](double share) { return progress.within(share); });
-      rays += image.pixels();
+      if (together) {
+        if (ranks.any(image.data.empty())) return Image();
+        collect_rows(ranks, tracer.rows(), image);
+      }
+      if (!together || ranks.leads()) rays += image.pixels();
       capped += tracer.capped_rays();
       return image;
     };
@@ -74,6 +85,7 @@ void run(const Options& options, const GlobalOptions& global) {
     evaluation.lpips = lpips.get();
     evaluation.done = [&](std::size_t done) { return progress.done(done); };
     evaluation.ranks = &ranks;
+    evaluation.together = together;
     const EvaluationReport report =
         evaluate(render, dataset, split, trace.background, options.output, evaluation);
     capped = sum_over(ranks, capped);

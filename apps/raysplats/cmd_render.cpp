@@ -193,7 +193,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
     const Model on_device(context, model);
     Tracer tracer(context, trace, mirrors_of(source));
-    const FrameOptions share = share_of(ranks, output.options(), cameras.size(), true);
+    const FrameOptions share = share_of(ranks, output.options(), cameras.size());
     output.begin();
     spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(),
                  cameras.size());

@@ -197,7 +197,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   share_work(flags.device, global,
              [&, first = first, last = last](Communicator& ranks, Context& context) {
                PathTracer tracer(context, loaded.scene);
-               const FrameOptions share = share_of(ranks, output.options(), last - first, false);
+               const FrameOptions share = share_of(ranks, output.options(), last - first);
                output.begin();
                spdlog::info("{}: {} Gaussians, {} meshes, {} lights, {} frames", flags.model,
                             loaded.scene.gaussians.size(), loaded.scene.meshes.size(),

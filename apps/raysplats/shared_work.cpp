@@ -71,13 +71,13 @@ void share_work(const DeviceFlags& flags,
   });
 }
 
-FrameOptions share_of(Communicator& ranks, FrameOptions options, std::size_t frames, bool bands) {
+FrameOptions share_of(Communicator& ranks, FrameOptions options, std::size_t frames) {
   if (ranks.size() > 1 && options.video != nullptr) {
     throw UsageError(
         "--video is written by one rank, frame after frame: leave out mpirun and the list of "
         "--device, or write the frames alone");
   }
-  if (bands && frames < static_cast<std::size_t>(ranks.size())) {
+  if (frames < static_cast<std::size_t>(ranks.size())) {
     options.bands = &ranks;
     return options;
   }

@@ -25,10 +25,10 @@ void share_work(const DeviceFlags& flags,
                 const GlobalOptions& global,
                 const std::function<void(Communicator&, Context&)>& work);
 
-/// The same options for what a rank draws of `frames` frames: some of them, or with `bands`, where
-/// there are fewer than ranks, its rows of all. Throws UsageError for a video that several ranks
+/// The same options for what a rank draws of `frames` frames: some of them, or where there
+/// are fewer than ranks, its rows of all. Throws UsageError for a video that several ranks
 /// would write.
-FrameOptions share_of(Communicator& ranks, FrameOptions options, std::size_t frames, bool bands);
+FrameOptions share_of(Communicator& ranks, FrameOptions options, std::size_t frames);
 
 /// All ranks: the sum and the largest of a number of each.
 std::uint64_t sum_over(Communicator& ranks, std::uint64_t mine);

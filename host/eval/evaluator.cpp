@@ -228,7 +228,13 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
 
   Communicator alone;
   Communicator& ranks = options.ranks != nullptr ? *options.ranks : alone;
+  const bool compares = !options.together || ranks.leads();
+  // None where it was stopped, and of pictures that another rank compares.
   const auto compare_view = [&](std::size_t i) -> std::optional<Comparison> {
+    if (!compares) {
+      render(dataset.views[views[i]].camera);
+      return std::nullopt;
+    }
     const ViewPicture picture = load_view_picture(dataset.views[views[i]]);
     const Image& rgba = picture.rgba;
     const Image traced = render(dataset.views[views[i]].camera);
@@ -249,15 +255,17 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   const bool all_shown = pictures >= views.size();
   std::vector<MeasuredView> measured;
   bool stopped = false;
-  const auto rank = static_cast<std::size_t>(ranks.rank());
-  const auto step = static_cast<std::size_t>(ranks.size());
+  const std::size_t rank = options.together ? 0 : static_cast<std::size_t>(ranks.rank());
+  const std::size_t step = options.together ? 1 : static_cast<std::size_t>(ranks.size());
   for (std::size_t i = rank; i < views.size() && !stopped; i += step) {
     const std::optional<Comparison> pair = compare_view(i);
-    stopped = !pair;
-    if (stopped) break;
-    measured.push_back(measure(i, *pair, options.lpips));
-    if (all_shown && pair->valid > 0) write_picture(i, *pair);
-    stopped = options.done && !options.done(measured.size());
+    stopped = compares && !pair;
+    if (pair) {
+      measured.push_back(measure(i, *pair, options.lpips));
+      if (all_shown && pair->valid > 0) write_picture(i, *pair);
+      stopped = options.done && !options.done(measured.size());
+    }
+    if (options.together) stopped = ranks.any(stopped);
   }
   stopped = ranks.any(stopped);
 
@@ -267,8 +275,8 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   for (const std::size_t i : shown) {
     if (all_shown || i % step != rank) continue;
     const std::optional<Comparison> pair = compare_view(i);
-    if (!pair) break;
-    write_picture(i, *pair);
+    if (compares && !pair) break;
+    if (pair) write_picture(i, *pair);
   }
 
   EvaluationReport report;

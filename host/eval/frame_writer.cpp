@@ -14,6 +14,7 @@
 
 #include "comm/communicator.hpp"
 #include "core/camera_path.hpp"
+#include "eval/bands.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -99,25 +100,6 @@ void add(Image& sum, Image image) {
   for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += image.data[i];
 }
 
-// Brings the rows that each rank has drawn to the one that leads.
-void collect(Communicator& ranks, const std::array<int, 2>& rows, Image& image) {
-  if (ranks.size() == 1) return;
-  const auto of_rows = [&image](const std::array<int, 2>& r) {
-    const auto row =
-        static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.channels);
-    return std::as_writable_bytes(std::span(image.data)
-                                      .subspan(row * static_cast<std::size_t>(r[0]),
-                                               row * static_cast<std::size_t>(r[1] - r[0])));
-  };
-  const std::vector<std::array<int, 2>> all = ranks.all(rows);
-  std::vector<Outgoing> out;
-  std::vector<Incoming> in;
-  if (!ranks.leads()) out.push_back({0, of_rows(rows)});
-  for (int rank = 1; ranks.leads() && rank < ranks.size(); ++rank)
-    in.push_back({rank, of_rows(all[static_cast<std::size_t>(rank)])});
-  ranks.exchange(out, in);
-}
-
 Exposed exposed(Tracer& tracer,
                 const Model& model,
                 std::span<const Camera> cameras,
@@ -133,10 +115,10 @@ Exposed exposed(Tracer& tracer,
         tracer.render(model, downscaled(camera, 1.0 / options.supersample), false,
                       [&](double share) { return !within || within((k + share) / moments); });
     if (ranks.any(moment.data.empty())) return {};
-    collect(ranks, tracer.rows(), moment);
+    collect_rows(ranks, tracer.rows(), moment);
     if (options.depth || options.hits) {
       Image depth = tracer.depth();
-      collect(ranks, tracer.rows(), depth);
+      collect_rows(ranks, tracer.rows(), depth);
       if (options.depth) add(out.depth, weighted_depth(depth, moment));
       if (options.hits) add(out.hits, hits_of(depth));
     }

@@ -45,8 +45,9 @@ struct FrameOptions {
   bool closed = false;         ///< the frame after the last one is the first
   /// Only every stride-th frame from this one on: what is left to a rank that shares the frames.
   std::size_t offset = 0, stride = 1;
-  /// Of the library itself; its type is not installed. With it every rank calls write_frames(), all
-  /// draw every frame together, a band of rows each, and the rank that leads writes it.
+  /// Of the library itself; its type is not installed. With it every rank calls write_frames() or
+  /// write_scene_frames(), all draw every frame together, a band of rows each, and the rank that
+  /// leads writes it.
   Communicator* bands = nullptr;
 };
 

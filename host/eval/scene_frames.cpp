@@ -5,6 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "comm/communicator.hpp"
+#include "eval/bands.hpp"
+
 namespace raysplats {
 namespace {
 
@@ -28,20 +31,28 @@ SceneReport write_scene_frames(PathTracer& tracer,
                                const std::function<bool(double)>& within) {
   const std::vector<std::string> names = frame_names(scene.cameras);
   SceneReport report;
+  Communicator alone;
+  Communicator& ranks = options.bands != nullptr ? *options.bands : alone;
+  tracer.set_share(static_cast<std::size_t>(ranks.rank()), static_cast<std::size_t>(ranks.size()));
   for (std::size_t i = first + options.offset; i < last; i += options.stride) {
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
     if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<int>(i)));
-    const Image rgba = tracer.render(scene.cameras[i], within);
+    Image rgba = tracer.render(scene.cameras[i], within);
     report.trace_seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
         (tracer.context().build_seconds() - built);
     add(report.rays, tracer.statistics());
-    if (rgba.pixels() == 0) break;
-    write_frame(folder / names[i], rgba, {}, {}, options);
-    ++report.frames;
-    if (done && !done(report.frames)) break;
+    if (ranks.any(rgba.pixels() == 0)) break;
+    collect_rows(ranks, tracer.rows(), rgba);
+    // What follows is left to the one that leads.
+    if (ranks.leads()) {
+      write_frame(folder / names[i], rgba, {}, {}, options);
+      ++report.frames;
+    }
+    if (ranks.any(done && !done(report.frames))) break;
   }
+  tracer.set_share(0, 1);
   return report;
 }
 

@@ -14,6 +14,7 @@
 #include "core/gaussian_check.hpp"
 #include "core/pixel_places.hpp"
 #include "core/render_rows.hpp"
+#include "core/row_share.hpp"
 #include "light/path_memory.hpp"
 #include "light/surface_store.hpp"
 #include "primitives/scan.hpp"
@@ -158,6 +159,8 @@ struct PathTracer::Impl {
   bool packet_depth = false;
   std::size_t packet_pixels = 0;  // of the picture that they have traced; 0 = none
   std::array<float, 4> packet_axis{};
+  std::size_t part = 0, parts = 1;  // set_share()
+  std::array<int, 2> rows{};        // of the last picture, that were drawn
   SurfaceStore surfaces;
   std::vector<Light> lights;
   CameraRays camera_rays;
@@ -412,31 +415,39 @@ Image PathTracer::render(const Camera& camera, const std::function<bool(double)>
   return out;
 }
 
-// Packets trace a sample of the whole picture at once; without them a batch of pixels gets all its
+// Packets trace a sample of all its rows at once; without them a batch of pixels gets all its
 // samples before the next one.
 void PathTracer::Impl::render(const Camera& camera,
                               const std::function<bool(double)>& within,
                               Image& out) {
+  const bool at_once = by_packets(camera);
+  if (at_once) packets->set_share(part, parts);
+  // Packets draw whole tiles.
+  rows = at_once ? packets->shared_rows(camera.height) : share_of_rows(camera.height, part, parts);
+  const auto width = static_cast<std::size_t>(camera.width);
+  const std::size_t top = width * static_cast<std::size_t>(rows[0]);
+  const std::size_t bottom = width * static_cast<std::size_t>(rows[1]);
   const std::size_t batch = memory.batch();
+  const std::size_t step = at_once ? bottom - top : std::min(batch, bottom - top);
   const auto samples = static_cast<std::size_t>(settings.samples);
-  const std::size_t part = by_packets(camera) ? out.pixels() : std::min(batch, out.pixels());
   statistics = {};
   std::size_t done = 0;  // rays
   std::function<void()> watch;
   if (within) {
     watch = [&] {
-      const double share = static_cast<double>(done) / static_cast<double>(samples * out.pixels());
+      const double share =
+          static_cast<double>(done) / static_cast<double>(samples * (bottom - top));
       if (!within(share)) throw Stopped();
     };
   }
-  for (std::size_t begin = 0; begin < out.pixels(); begin += part) {
-    const std::size_t end = std::min(begin + part, out.pixels());
-    sums.ensure(context, part, "pixel sums");
+  for (std::size_t begin = top; begin < bottom; begin += step) {
+    const std::size_t end = std::min(begin + step, bottom);
+    sums.ensure(context, step, "pixel sums");
     sums.clear(end - begin);
     for (std::size_t sample = 0; sample < samples; ++sample) {
       const Camera view = moved_in_pixels(camera, pixel_place(sample, samples, settings.seed));
       packet_pixels = 0;
-      if (part == out.pixels() && by_packets(view)) trace_packets(view, watch);
+      if (at_once && by_packets(view)) trace_packets(view, watch);
       for (std::size_t first = begin; first < end; first += batch) {
         const std::size_t count = std::min(batch, end - first);
         trace_sample(view, u32(sample), first, count, first - begin);
@@ -454,6 +465,17 @@ void PathTracer::Impl::render(const Camera& camera,
       pixel[3] = 1.0f - sum[3] / divisor;
     }
   }
+}
+
+void PathTracer::set_share(std::size_t part, std::size_t parts) {
+  const auto turn = impl_->context.lock();
+  impl_->part = part;
+  impl_->parts = parts;
+}
+
+std::array<int, 2> PathTracer::rows() const {
+  const auto turn = impl_->context.lock();
+  return impl_->rows;
 }
 
 void PathTracer::set_sampling(int samples, std::uint64_t seed) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/planes.hpp"
+#include "core/row_share.hpp"
 #include "light/mirror_paths.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_rays.hpp"
@@ -127,12 +128,7 @@ struct ViewTracer::Impl {
   }
   Kernel kernel(const char* name) { return context.kernel("light/mirror_paths.cl", name); }
   // Of a picture that is traced ray by ray.
-  std::array<int, 2> ray_rows() const {
-    const auto row = [this](std::size_t p) {
-      return static_cast<int>(static_cast<std::size_t>(camera.height) * p / parts);
-    };
-    return {row(part), row(part + 1)};
-  }
+  std::array<int, 2> ray_rows() const { return share_of_rows(camera.height, part, parts); }
   void trace_batch(const DeviceGaussians& gaussians,
                    std::size_t first,
                    std::size_t count,

@@ -100,12 +100,15 @@ void CameraTracer::set_share(std::size_t part, std::size_t parts) {
 
 std::array<int, 2> CameraTracer::rows() const {
   const Impl& self = *impl_;
-  if (self.hits_kept) return {0, self.camera.height};
-  const TileWindow window = self.share();
-  const auto pixel_row = [&](std::int32_t row) {
-    return std::min(row * self.packet().tile, static_cast<int>(self.camera.height));
-  };
-  return {pixel_row(window.row), pixel_row(window.row + window.rows)};
+  return self.hits_kept ? std::array<int, 2>{0, self.camera.height}
+                        : shared_rows(self.camera.height);
+}
+
+std::array<int, 2> CameraTracer::shared_rows(int height) const {
+  const Impl& self = *impl_;
+  const auto [first, last] = self.tile_share(height);
+  const int tile = self.packet().tile;
+  return {std::min(first * tile, height), std::min(last * tile, height)};
 }
 
 const Buffer<std::uint32_t>& CameraTracer::overflow() const { return impl_->overflow; }

@@ -58,6 +58,8 @@ class CameraTracer {
   void set_share(std::size_t part, std::size_t parts);
   /// First and last (exclusive) row of pixels that the last forward() has traced.
   std::array<int, 2> rows() const;
+  /// Those of a picture of that height without keep_hits.
+  std::array<int, 2> shared_rows(int height) const;
   /// Not 0 in its word once a view with ViewSizes::kAhead had too little room: that view and those
   /// after it show the background alone and have no gradients, until clear_overflow().
   const Buffer<std::uint32_t>& overflow() const;

@@ -10,6 +10,7 @@
 #include <functional>
 #include <vector>
 
+#include "core/row_share.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/candidate_lists.hpp"
 #include "trace/gradient_sums.hpp"
@@ -53,13 +54,12 @@ struct CameraTracer::Impl {
 
   TileWindow whole() const { return tile_window(0, lists.tile_rows()); }
   // The rows of tiles of set_share().
-  TileWindow share() const {
-    const std::size_t first = tile_rows() * part / parts;
-    return tile_window(static_cast<std::uint32_t>(first),
-                       static_cast<std::uint32_t>(tile_rows() * (part + 1) / parts - first));
+  std::array<int, 2> tile_share(int height) const {
+    return share_of_rows((height + packet().tile - 1) / packet().tile, part, parts);
   }
-  std::size_t tile_rows() const {
-    return static_cast<std::size_t>((camera.height + packet().tile - 1) / packet().tile);
+  TileWindow share() const {
+    const auto [first, last] = tile_share(camera.height);
+    return tile_window(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last - first));
   }
   TileWindow tile_window(std::uint32_t row, std::uint32_t rows) const {
     return {0, static_cast<std::int32_t>(row), static_cast<std::int32_t>(lists.tiles_x()),

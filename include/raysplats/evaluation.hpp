@@ -57,6 +57,9 @@ struct EvaluationOptions {
   /// Of the library itself; its type is not installed. With it every rank calls evaluate() and
   /// compares its share of the views; all get the whole report.
   Communicator* ranks = nullptr;
+  /// With them: every rank renders every view, and what `render` yields is a picture for the rank
+  /// that leads alone, which compares it. It is empty for all or none.
+  bool together = false;
 };
 
 /// The names of the pictures that evaluate() writes of all views of a split, without extension.

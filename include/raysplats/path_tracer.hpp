@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -52,6 +54,12 @@ class PathTracer {
   /// Throws UsageError for a camera without pixels or with a number that is not finite,
   /// ResourceError when its paths would not fit the device beside the scene.
   Image render(const Camera& camera, const std::function<bool(double share)>& within = {});
+
+  /// Of the library itself: from the next render() on, draw part `part` of `parts` equal ones of
+  /// the picture's rows, and leave the others' pixels 0; the rows, first and last (exclusive), of
+  /// the last picture.
+  void set_share(std::size_t part, std::size_t parts);
+  std::array<int, 2> rows() const;
 
   Statistics statistics() const;
   const Context& context() const;

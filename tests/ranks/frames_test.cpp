@@ -101,6 +101,62 @@ TEST_CASE("ranks draw bands of a frame where there are fewer frames than ranks")
   }
 }
 
+TEST_CASE("ranks draw bands of a scene with meshes where there are fewer frames than ranks") {
+  const Orbit orbit;
+  write_file(orbit.folder / "floor.obj",
+             "v -2 1 -2\nv 2 1 -2\nv 2 1 2\nv -2 1 2\nf 1 2 3\nf 1 3 4\n");
+  const std::string scene =
+      "[[model]]\nfile = \"model.ply\"\n"
+      "[[mesh]]\nfile = \"floor.obj\"\nmaterial = \"chrome\"\nmove = [0.2, 0, 0]\n"
+      "[[material]]\nname = \"chrome\"\nkind = \"mirror\"\n"
+      "[[light]]\nkind = \"sphere\"\nposition = [1, -3, -2]\nradius = 0.3\n"
+      "[camera]\nposition = [0.5, -1, -6]\ntarget = [0, 0, 0]\nwidth = 70\nheight = 50\n"
+      "[animation]\nframes = 2\n";
+  // In packets, and ray by ray with shadows and several samples.
+  const std::vector<std::string> ways{"[render.shadows]\nstrength = 0\n",
+                                      "[render]\nsamples = 3\n"};
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    CAPTURE(i);
+    const std::string file = orbit.folder / ("scene " + std::to_string(i) + ".toml");
+    write_file(file, scene + ways[i]);
+    const auto command = [&](const std::string& out) {
+      return Words{"render", file, "-o", orbit.folder / out, "-q"};
+    };
+    const std::string one = "one " + std::to_string(i);
+    const Outcome alone = raysplats_program(command(one));
+    INFO(alone.err);
+    REQUIRE(alone.code == 0);
+    REQUIRE(files_of(orbit.folder / one).size() == 2);
+    for (const std::string devices : {"0,0,0", "0,0,0,0,0,0,0"}) {
+      CAPTURE(devices);
+      const std::string out = std::to_string(i) + " of " + devices;
+      const Outcome shared = raysplats_program(command(out) + Words{"--device", devices});
+      INFO(shared.err);
+      REQUIRE(shared.code == 0);
+      CHECK(has(shared.out, "2 frames in"));
+      CHECK(files_of(orbit.folder / out) == files_of(orbit.folder / one));
+    }
+  }
+}
+
+TEST_CASE("ranks draw bands of an evaluated view where there are fewer views than ranks") {
+  const Orbit orbit;
+  const auto command = [&](const std::string& out) {
+    return Words{"eval", orbit.model, "--data", tiny_data(), "-o", orbit.folder / out, "-q"};
+  };
+  const Outcome one = raysplats_program(command("one"));
+  INFO(one.err);
+  REQUIRE(one.code == 0);
+  for (const std::string devices : {"0,0", "0,0,0,0,0"}) {
+    CAPTURE(devices);
+    const Outcome shared = raysplats_program(command(devices) + Words{"--device", devices});
+    INFO(shared.err);
+    REQUIRE(shared.code == 0);
+    CHECK(shared.out == one.out);
+    CHECK(files_of(orbit.folder / devices) == files_of(orbit.folder / "one"));
+  }
+}
+
 TEST_CASE("a video is for one rank") {
   const Orbit orbit;
   const Outcome outcome =
