@@ -16,9 +16,8 @@ def arguments():
     parser = argparse.ArgumentParser(
         prog="scripts/figures.sh",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Measures the program as it stands and writes every table and plot of docs/benchmarks.md,\n"
-        "docs/gpu.md, docs/performance.md and docs/reliability.md: what stands between <!-- figures: NAME --> and\n"
-        "<!-- end of figures --> is replaced, and plots go to docs/images. Run it on an idle machine, in one go.\n"
+        description="Measures the program as it stands and writes the tables and plots of docs/: what stands between\n"
+        "<!-- figures: NAME --> and <!-- end of figures --> is replaced, and plots go to docs/images. Run it on an idle machine, in one go.\n"
         "Results stay in OUT/NAME; a part that fails is named, leaves its table as it is, and the others go on\n"
         "(exit status 1). The parts, with minutes on two idle cores:\n\n"
         + "\n".join(f"  {part.name:12} {part.minutes:4.1f}  {part.about}" for part in parts.PARTS)

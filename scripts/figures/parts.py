@@ -219,34 +219,21 @@ def growth(run):
     return text
 
 
-def ablation(run, data, options, values, train):
-    chosen = [word for value in values for word in ("--values", value)]
-    run.call(ROOT / "scripts/ablation.sh", run.capture(data), run.folder / "results", "--raysplats", run.raysplats, *options,
-             *chosen, "--", *train)
+def limits(run):
+    fox = run.capture("colmap/fox_undistorted")
+    train = ["--downscale", run.size("2", "8"), "--max-gaussians", "30000", "--resolution-schedule", "[]"]
+    axes = run.size("max-hits,min-transmittance,quantile", "max-hits")
+    options = ["--iterations", run.size("250", "5"), "--axes", axes]
+    values = ["--values", "max-hits=8,16,32,64,512", "--values", "min-transmittance=0.1,0.03,0.01,0.001,0.0001",
+              "--values", "quantile=2.366,4.108,6.2514,11.3449,16.266"]
+    run.call(ROOT / "scripts/ablation.sh", fox, run.folder / "results", "--raysplats", run.raysplats, *options, *values,
+             "--", *train)
     with (run.folder / "results/ablation.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["status"] == "ok"]
     lines = [[f"`{row['axis']}`", row["value"], f"{float(row['psnr']):.2f}", f"{float(row['ssim']):.4f}",
               number(float(row["train_seconds"]))] for row in rows]
-    words = shown(*options, *chosen, "--", *train).replace(f"{ROOT}/", "")
-    return (f"`scripts/ablation.sh DATA/{data} OUT {words}`.\n\n"
+    return (f"`scripts/ablation.sh DATA/colmap/fox_undistorted OUT {shown(*options, *values)} -- {shown(*train)}`.\n\n"
             + table(["option", "value", "held-out PSNR, dB", "SSIM", "seconds of training"], lines))
-
-
-def limits(run):
-    axes = run.size("max-hits,min-transmittance,quantile", "max-hits")
-    return ablation(run, "colmap/fox_undistorted", ["--iterations", run.size("250", "5"), "--axes", axes],
-                    ["max-hits=8,16,32,64,512", "min-transmittance=0.1,0.03,0.01,0.001,0.0001",
-                     "quantile=2.366,4.108,6.2514,11.3449,16.266"],
-                    ["--downscale", run.size("2", "8"), "--max-gaussians", "30000", "--resolution-schedule", "[]"])
-
-
-def figure7(run):
-    axes = run.size("max-hits,min-transmittance,quantile", "max-hits")
-    return ablation(run, "nerf_synthetic/lego", ["--iterations", run.size("1000", "5"), "--axes", axes],
-                    ["max-hits=8,16,32,64,128", "min-transmittance=0.3,0.1,0.03,0.01,0.001",
-                     "quantile=2.366,4,6.2514,11.3449,16.266"],
-                    ["--config", ROOT / "configs/paper.toml", "--traversal", "tiles", "--downscale", run.size("2", "8"),
-                     "--densify-from", "50", "--densify-until", "400", "--densify-every", "50", "--lr-decay", "0.0041589"])
 
 
 def lenses(run):
@@ -268,10 +255,10 @@ def lenses(run):
 
 
 def start(run):
-    model = run.folder / "run/model.ply"
-    quick_start = run.folder / "data"
-    run.call(run.raysplats, "-q", "generate", quick_start)
-    run.call(run.raysplats, "-q", "train", quick_start, "-o", model.parent, "-n", run.size(300, 20))
+    photos, trained = run.folder / "data", run.folder / "run"
+    run.call(run.raysplats, "-q", "generate", photos)
+    run.call(run.raysplats, "-q", "train", photos, "-o", trained, "-n", run.size(300, 20))
+    model = next(trained.glob("point_cloud/*/point_cloud.ply"))
     commands = {"`raysplats --version`": ["--version"], "`raysplats info MODEL.ply`": ["info", model],
                 "`raysplats info DATASET`, 100 photos of 400x400": ["info", run.capture("nerf_synthetic/lego")]}
     lines = []
@@ -283,27 +270,6 @@ def start(run):
             times.append(1e3 * (time.perf_counter() - begin))
         lines.append([name, number(statistics.median(times)), number(min(times))])
     return "Processes started one after the other, with warm files.\n\n" + table(["command", "ms, median", "least"], lines)
-
-
-def paper_options(run, traversal):
-    return ["--config", ROOT / "configs/paper.toml", "--downscale", run.size(2, 8), "-n", run.size(6000, 10),
-            "--densify-from", 50, "--densify-until", 2000, "--densify-every", 50, "--lr-decay", 0.00069315,
-            "--traversal", traversal]
-
-
-def paper(run):
-    lines = []
-    for about, data in (("lego, 200x200", "nerf_synthetic/lego"), ("fox, 135x240", "colmap/fox_undistorted")):
-        for traversal in ("bvh", "tiles"):
-            folder = run.folder / f"{pathlib.Path(data).name}_{traversal}"
-            run.call(run.raysplats, "-q", "train", run.capture(data), "-o", folder, *paper_options(run, traversal))
-            found = json.loads((folder / "metrics.json").read_text())
-            lines.append([about, f"`{traversal}`", f"{found['psnr']:.2f}", f"{found['ssim']:.4f}",
-                          found["gaussians"], number(found["training_seconds"])])
-    options = [word if word != ROOT / "configs/paper.toml" else "configs/paper.toml"
-               for word in paper_options(run, "bvh|tiles")]
-    return (f"`raysplats train DATA -o RUN {shown(*options)}`.\n\n"
-            + table(["data", "traversal", "held-out PSNR, dB", "SSIM", "Gaussians", "seconds of training"], lines))
 
 
 def printed(command, text):
@@ -345,8 +311,6 @@ PARTS = [
     Part("light", 1.0, "paths, meshes, mirrors, glass and shadows (bench)", light),
     Part("lenses", 2.0, "training through a fisheye beside a pinhole", lenses),
     Part("start", 0.5, "start of the program", start),
-    Part("paper", 90.0, "the paper's mode by the tree and by tiles, 6000 iterations", paper),
-    Part("figure7", 25.0, "figure 7 of the paper in its mode (ablation.sh)", figure7),
     Part("growth", 4.0, "time and memory by Gaussians and pixels (growth.sh)", growth),
     Part("limits", 3.0, "what limits on hits cost in quality (ablation.sh)", limits),
     Part("spread", 1.0, "spread of runs with and without exact sums (spread.sh)", spread),
