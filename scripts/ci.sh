@@ -68,7 +68,7 @@ vendor() {
 }
 
 intel_cpu() {
-  ./scripts/implementations.sh --only intel,intel-gpu --build "$build" -R '^(primitives|bvh|trace|train)$' --cases "$gpu_cases"
+  ./scripts/implementations.sh --only intel,intel-gpu --build "$build" -R '^(parallel|bvh|trace|train)$' --cases "$gpu_cases"
 }
 
 browser() { ./scripts/test_browser.sh "$build/bin/raysplats"; }

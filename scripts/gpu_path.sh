@@ -3,7 +3,7 @@
 # Runs unit tests in the form that GPUs get (packets as work-groups, shared gradient sums, bounded launches) on
 # whatever OpenCL implementation is at hand: a small preloaded library makes every device say that it is a GPU.
 # usage: scripts/gpu_path.sh [-R REGEX] [--cases GLOBS] [--but GLOBS] [--as-it-is] [--build BUILD] [--cache DIR]
-#   -R REGEX       test programs, as ctest names them (default: ^(trace|train)$; others: primitives, bvh, light, bench)
+#   -R REGEX       test programs, as ctest names them (default: ^(trace|train)$; others: parallel, bvh, light, bench)
 #   --cases GLOBS  test cases, comma-separated globs (default: all)
 #   --but GLOBS    but for these
 #   --as-it-is     devices say what they are: the same programs without the library, to compare

@@ -5,7 +5,7 @@
 # folder of its own; nothing is installed. An implementation that cannot be had is SKIPPED with the reason.
 # usage: scripts/implementations.sh [--only NAMES] [-R REGEX] [--cases GLOBS] [--with-known] [--build BUILD] [--cache DIR]
 #   --only NAMES   comma-separated: pocl, pocl-gpu, intel, intel-gpu, rusticl, rusticl-gpu (default: all)
-#   -R REGEX       test programs, as ctest names them (default: ^(device|primitives|bvh|trace|train)$)
+#   -R REGEX       test programs, as ctest names them (default: ^(device|parallel|bvh|trace|train)$)
 #   --cases GLOBS  test cases, comma-separated globs (default: all); known defects of an implementation are left out, and named
 #   --with-known   run those too
 #   --build BUILD  build folder with the test programs (default: build/release)
@@ -21,7 +21,7 @@ say() { printf '== %s\n' "$*"; }
 usage='scripts/implementations.sh [--only NAMES] [-R REGEX] [--cases GLOBS] [--with-known] [--build BUILD] [--cache DIR]'
 all=(pocl pocl-gpu intel intel-gpu rusticl rusticl-gpu)
 wanted=("${all[@]}")
-pattern='^(device|primitives|bvh|trace|train)$'
+pattern='^(device|parallel|bvh|trace|train)$'
 known=out
 cases='*'
 build=$PWD/build/release

@@ -10,10 +10,10 @@
 #include <thread>
 #include <vector>
 
-#include "core/morton_order.hpp"
 #include "embree_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/morton_order.hpp"
 #include "side_by_side.hpp"
 
 namespace raysplats::peer {

@@ -7,7 +7,6 @@
 #include <memory>
 #include <tuple>
 
-#include "base/atomic_file.hpp"
 #include "bench/bench.hpp"
 #include "bench/compare.hpp"
 #include "bench/device_report.hpp"
@@ -17,8 +16,9 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "report/bench_page.hpp"
+#include "run/model_source.hpp"
 #include "synth/bench_scenes.hpp"
-#include "train/model_source.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/atomic_file.hpp"
-#include "base/output_directory.hpp"
 #include "completion.hpp"
 #include "options.hpp"
+#include "util/atomic_file.hpp"
+#include "util/output_directory.hpp"
 
 namespace raysplats::cli {
 namespace {

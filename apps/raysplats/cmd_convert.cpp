@@ -8,7 +8,7 @@
 #include "io/convert_model.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
-#include "train/model_source.hpp"
+#include "run/model_source.hpp"
 
 namespace raysplats::cli {
 namespace {

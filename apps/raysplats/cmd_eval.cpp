@@ -7,10 +7,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/output_directory.hpp"
-#include "core/morton_order.hpp"
-#include "eval/bands.hpp"
-#include "eval/output_check.hpp"
 #include "frame_progress.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
@@ -18,9 +14,13 @@
 #include "raysplats/io.hpp"
 #include "raysplats/model.hpp"
 #include "raysplats/tracer.hpp"
+#include "render/bands.hpp"
+#include "render/output_check.hpp"
+#include "run/model_source.hpp"
+#include "scene/morton_order.hpp"
 #include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
-#include "train/model_source.hpp"
+#include "util/output_directory.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -15,8 +15,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/model_summary.hpp"
-#include "core/trace_rows.hpp"
 #include "info_files.hpp"
 #include "io/mesh_file.hpp"
 #include "io/model_formats.hpp"
@@ -26,7 +24,9 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render_flags.hpp"
-#include "train/model_source.hpp"
+#include "run/model_source.hpp"
+#include "scene/model_summary.hpp"
+#include "scene/trace_rows.hpp"
 
 namespace raysplats::cli {
 namespace {

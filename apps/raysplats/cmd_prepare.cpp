@@ -8,10 +8,10 @@
 #include <optional>
 #include <string>
 
-#include "base/interrupt.hpp"
-#include "base/progress.hpp"
 #include "options.hpp"
 #include "prepare/prepare.hpp"
+#include "util/interrupt.hpp"
+#include "util/progress.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -8,23 +8,23 @@
 #include <cstdio>
 #include <memory>
 
-#include "core/camera_check.hpp"
-#include "core/camera_path.hpp"
-#include "core/morton_order.hpp"
-#include "core/orbit.hpp"
-#include "eval/frame_writer.hpp"
-#include "eval/output_check.hpp"
 #include "frame_progress.hpp"
 #include "io/data_origin.hpp"
 #include "io/scene_camera.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "render/frame_writer.hpp"
+#include "render/output_check.hpp"
 #include "render_flags.hpp"
 #include "render_output.hpp"
+#include "run/model_source.hpp"
+#include "scene/camera_check.hpp"
+#include "scene/camera_path.hpp"
+#include "scene/morton_order.hpp"
+#include "scene/orbit.hpp"
 #include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
-#include "train/model_source.hpp"
 
 namespace raysplats::cli {
 namespace {

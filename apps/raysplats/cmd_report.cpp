@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "base/atomic_file.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "report/run_report.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats::cli {
 namespace {

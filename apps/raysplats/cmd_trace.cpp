@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "core/morton_order.hpp"
 #include "io/ray_file.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/tracer.hpp"
-#include "train/model_source.hpp"
+#include "run/model_source.hpp"
+#include "scene/morton_order.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -7,15 +7,15 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/progress.hpp"
-#include "eval/output_check.hpp"
 #include "options.hpp"
 #include "raysplats/trainer.hpp"
+#include "render/output_check.hpp"
 #include "report/run_report.hpp"
+#include "run/train_config.hpp"
 #include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/quality_preset.hpp"
-#include "train/train_config.hpp"
+#include "util/progress.hpp"
 #include "view/photos.hpp"
 #include "view/run_view.hpp"
 #include "view/view_state.hpp"

@@ -10,18 +10,18 @@
 #include <string>
 #include <vector>
 
-#include "base/interrupt.hpp"
-#include "core/morton_order.hpp"
-#include "core/orbit.hpp"
-#include "core/trace_rows.hpp"
 #include "io/data_origin.hpp"
 #include "io/scene_loader.hpp"
 #include "options.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/model.hpp"
 #include "render_flags.hpp"
+#include "run/model_source.hpp"
+#include "scene/morton_order.hpp"
+#include "scene/orbit.hpp"
+#include "scene/trace_rows.hpp"
 #include "train/mirror_meshes.hpp"
-#include "train/model_source.hpp"
+#include "util/interrupt.hpp"
 #include "view/dropped_meshes.hpp"
 #include "view/photos.hpp"
 #include "view/view_state.hpp"

@@ -8,10 +8,10 @@
 #include <cstdio>
 #include <string>
 
-#include "base/interrupt.hpp"
-#include "base/progress.hpp"
 #include "comm/communicator.hpp"
 #include "raysplats/error.hpp"
+#include "util/interrupt.hpp"
+#include "util/progress.hpp"
 
 namespace raysplats {
 

@@ -20,8 +20,8 @@
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "train/checkpoint.hpp"
-#include "train/train_config.hpp"
+#include "run/checkpoint.hpp"
+#include "run/train_config.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -14,12 +14,12 @@
 #include <utility>
 #include <vector>
 
-#include "base/memory_limit.hpp"
-#include "base/standard_streams.hpp"
 #include "help.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "shared_work.hpp"
+#include "util/memory_limit.hpp"
+#include "util/standard_streams.hpp"
 
 namespace {
 

@@ -15,12 +15,12 @@
 #include <string_view>
 #include <utility>
 
-#include "base/nearest_name.hpp"
-#include "base/number_text.hpp"
-#include "base/progress.hpp"
-#include "core/camera_check.hpp"
-#include "core/option_flags.hpp"
-#include "train/train_keys.hpp"
+#include "run/train_keys.hpp"
+#include "scene/camera_check.hpp"
+#include "scene/option_flags.hpp"
+#include "util/nearest_name.hpp"
+#include "util/number_text.hpp"
+#include "util/progress.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "comm/communicator.hpp"
-#include "core/render_rows.hpp"
-#include "core/trace_rows.hpp"
 #include "device/context.hpp"
 #include "io/data_rows.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trace_options.hpp"
+#include "scene/render_rows.hpp"
+#include "scene/trace_rows.hpp"
 
 namespace raysplats::cli {
 

@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "core/render_rows.hpp"
-#include "eval/frame_writer.hpp"
 #include "options.hpp"
+#include "render/frame_writer.hpp"
+#include "scene/render_rows.hpp"
 
 namespace raysplats::cli {
 

@@ -5,9 +5,9 @@
 
 #include <filesystem>
 
-#include "base/output_directory.hpp"
-#include "eval/output_check.hpp"
 #include "raysplats/error.hpp"
+#include "render/output_check.hpp"
+#include "util/output_directory.hpp"
 
 namespace raysplats::cli {
 namespace {

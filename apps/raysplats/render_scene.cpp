@@ -7,16 +7,16 @@
 #include <filesystem>
 #include <memory>
 
-#include "eval/output_check.hpp"
-#include "eval/scene_frames.hpp"
 #include "frame_progress.hpp"
 #include "io/scene_loader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/path_tracer.hpp"
+#include "render/output_check.hpp"
+#include "render/scene_frames.hpp"
 #include "render_flags.hpp"
 #include "render_output.hpp"
+#include "run/model_source.hpp"
 #include "shared_work.hpp"
-#include "train/model_source.hpp"
 
 namespace raysplats::cli {
 namespace {

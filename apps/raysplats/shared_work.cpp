@@ -12,10 +12,10 @@
 #include <thread>
 #include <vector>
 
-#include "base/interrupt.hpp"
 #include "comm/launcher.hpp"
 #include "comm/thread_ranks.hpp"
 #include "device/device_list.hpp"
+#include "util/interrupt.hpp"
 
 namespace raysplats::cli {
 namespace {

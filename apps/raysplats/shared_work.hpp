@@ -6,8 +6,8 @@
 #include <string>
 
 #include "comm/communicator.hpp"
-#include "eval/frame_writer.hpp"
 #include "options.hpp"
+#include "render/frame_writer.hpp"
 
 namespace raysplats::cli {
 

@@ -10,7 +10,7 @@
 // others (bit 63) on a coarse grid around the middle of the window: their first split is by
 // octants, so that few of their nodes cover the window.
 #include "bvh/box.h"
-#include "primitives/vector_lanes.h"
+#include "parallel/vector_lanes.h"
 
 #ifndef GROUP
 #define GROUP 1

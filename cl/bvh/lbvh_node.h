@@ -9,7 +9,7 @@
 
 #include "bvh/box.h"
 #include "bvh/ray.h"
-#include "primitives/vector_lanes.h"
+#include "parallel/vector_lanes.h"
 #include "shared/tree_layout.h"
 
 // A node: lo.x lo.y lo.z hi.x hi.y hi.z of its children, one vector each (RS_NODE_VECTORS). Missing

@@ -13,7 +13,7 @@
 
 #include "bvh/lbvh_node.h"
 
-// Builds with COUNT_WORK 1 count the nodes that they test (trace/rays.cl).
+// Builds with COUNT_WORK 1 count the nodes that they test (trace/ray_tracer.cl).
 #ifndef COUNT_WORK
 #define COUNT_WORK 0
 #endif

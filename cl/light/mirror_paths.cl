@@ -8,7 +8,7 @@
 // none. Launch: one work-item per ray or pixel, any group size, O(1) each.
 #include "bvh/ray.h"
 #include "light/shading.h"
-#include "primitives/counter.h"
+#include "parallel/counter.h"
 
 // Whether the mirror at `hit` is left again.
 bool goes_on(__global const uint* starts, uint i) { return starts[i + 1] != starts[i]; }

@@ -19,7 +19,7 @@ typedef struct {
   rs_float alpha;
   rs_float expected_depth;
   rs_float median_depth;
-  rs_uint hits;  // or, of builds with LEADING, the Gaussian that leads them (trace/rays.cl)
+  rs_uint hits;  // or, of builds with LEADING, the Gaussian that leads them (trace/ray_tracer.cl)
   rs_uint capped;
 } RsRayResult;
 RS_STATIC_ASSERT_SIZE(RsRayResult, 32);

@@ -10,7 +10,7 @@
 #define KEEP_HITS 0
 #endif
 
-#include "primitives/counter.h"
+#include "parallel/counter.h"
 #include "trace/arguments.h"
 #include "trace/group.h"
 #include "trace/group_passes.h"

@@ -7,8 +7,8 @@
 #ifndef RS_TRACE_LINE_SUM_H
 #define RS_TRACE_LINE_SUM_H
 
-#include "primitives/float_add.h"
-#include "primitives/prefetch.h"
+#include "parallel/float_add.h"
+#include "parallel/prefetch.h"
 #include "trace/exact_sum.h"
 
 #ifndef PRIVATE_COPIES

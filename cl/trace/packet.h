@@ -3,7 +3,7 @@
 #ifndef RS_TRACE_PACKET_H
 #define RS_TRACE_PACKET_H
 
-#include "primitives/vector_lanes.h"
+#include "parallel/vector_lanes.h"
 #include "shared/layout.h"
 
 #define PACKET LANES

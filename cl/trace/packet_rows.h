@@ -9,7 +9,7 @@
 #ifndef RS_TRACE_PACKET_ROWS_H
 #define RS_TRACE_PACKET_ROWS_H
 
-#include "primitives/prefetch.h"
+#include "parallel/prefetch.h"
 #include "trace/candidates.h"
 #include "trace/hit_stream.h"
 #include "trace/packet_state.h"

@@ -3,7 +3,7 @@
 #ifndef RS_TRACE_RAY_COLOR_H
 #define RS_TRACE_RAY_COLOR_H
 
-#include "primitives/prefetch.h"
+#include "parallel/prefetch.h"
 #include "shared/color.h"
 #include "shared/layout.h"
 #include "shared/sh.h"

@@ -12,7 +12,7 @@
 // the list, which is what the exact order of rays rests on. A window is a rectangle of tiles: first
 // column, first row, columns, rows; its tiles are numbered row by row. live[0] candidates are
 // listed: as many as were counted, or none (view_sizes.cl).
-#include "primitives/prefetch.h"
+#include "parallel/prefetch.h"
 #include "shared/layout.h"
 #include "trace/gaussian_lanes.h"
 

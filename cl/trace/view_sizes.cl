@@ -5,7 +5,7 @@
 //   admit_candidates   live[0] = candidates that are listed: all of the view's or, without room,
 //                      none. One work-item.
 //   check_streams      forgets all hits when their chunks had no room. One work-item per packet.
-#include "primitives/counter.h"
+#include "parallel/counter.h"
 #include "trace/view_sizes.h"
 
 // offsets[count] is the number of candidates.

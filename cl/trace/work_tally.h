@@ -12,7 +12,7 @@
 #endif
 
 #if COUNT_WORK
-#include "primitives/counter.h"
+#include "parallel/counter.h"
 
 #define RS_TALLY(owner, what, number) ((owner)->tally[what] += (uint)(number))
 

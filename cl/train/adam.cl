@@ -4,7 +4,7 @@
 //
 // A Gaussian with a gradient that is not finite keeps its parameters and moments and is counted;
 // with visible_only so does, uncounted, one that no ray met (screen[3 i + 2] == 0). A guard word
-// that is not 0 turns the whole step off (train/guard.cl).
+// that is not 0 turns the whole step off (train/step_guard.cl).
 #include "shared/train_layout.h"
 #include "train/lanes.h"
 

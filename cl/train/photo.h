@@ -5,7 +5,7 @@
 //   2  r | g << 16, then b | a << 16, of 65535
 //   4  r, g, b, a as floats in [0, 1]
 // Alpha is straight. Where some pixels count less than others a plane of weights follows: floats in
-// [0, 1] behind floats, else words of 255. Made by io::load_photo() and train/photo_reduce.cl.
+// [0, 1] behind floats, else words of 255. Made by io::load_photo() and train/photo_cache.cl.
 #ifndef RS_TRAIN_PHOTO_H
 #define RS_TRAIN_PHOTO_H
 

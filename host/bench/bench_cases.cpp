@@ -8,9 +8,9 @@
 #include <chrono>
 #include <regex>
 
-#include "core/trace_rows.hpp"
 #include "device/tuning.hpp"
 #include "raysplats/error.hpp"
+#include "scene/trace_rows.hpp"
 #include "synth/bench_scenes.hpp"
 #include "trace/memory_shares.hpp"
 

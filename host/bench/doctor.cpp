@@ -9,9 +9,9 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
-#include "base/memory_limit.hpp"
 #include "device/context.hpp"
 #include "device/device_json.hpp"
+#include "util/memory_limit.hpp"
 
 namespace raysplats {
 namespace {

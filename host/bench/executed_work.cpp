@@ -9,7 +9,7 @@
 
 #include <algorithm>
 
-#include "primitives/work.h"
+#include "parallel/work.h"
 #include "raysplats/error.hpp"
 #include "trace/work.h"
 #include "train/work.h"

@@ -12,13 +12,13 @@
 #include <limits>
 #include <utility>
 
-#include "base/rng.hpp"
 #include "bench/bench_cases.hpp"
 #include "bench/scene_bench.hpp"
 #include "light/view_tracer.hpp"
 #include "trace/ray_tracer.hpp"
 #include "train/adam.hpp"
 #include "train/image_loss.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

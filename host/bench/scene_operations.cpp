@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/rng.hpp"
 #include "bench/scene_state.hpp"
-#include "core/trace_rows.hpp"
-#include "primitives/work.h"
+#include "parallel/work.h"
+#include "scene/trace_rows.hpp"
 #include "trace/work.h"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {
@@ -53,13 +53,10 @@ BenchOperation SceneBench::Impl::build() {
           {},
           [this] { ray_tracer->update(gaussians()); },
           {{"order",
-            {"bvh/curve.cl", "bvh/order_groups.cl", "bvh/group_order.cl", "primitives/"},
+            {"bvh/curve.cl", "bvh/order_groups.cl", "bvh/group_order.cl", "parallel/"},
             false,
             [this] { return order_work(); }},
-           {"nodes",
-            {"trace/gaussian_blocks.cl", "bvh/lbvh.cl"},
-            false,
-            [this] { return nodes_work(); }},
+           {"nodes", {"trace/ray_tree.cl", "bvh/lbvh.cl"}, false, [this] { return nodes_work(); }},
            {"build", {}, false, [this] {
               return together(order_work(), together(bounds_work(), nodes_work()));
             }}}};
@@ -85,11 +82,11 @@ BenchOperation SceneBench::Impl::view() {
           [this] { tracer().forward(gaussians(), model.camera); },
           {{"prepare-view", {"trace/prepare_view.cl"}, false, [this] { return prepare_work(); }},
            {"tile-lists",
-            {"trace/tile_lists.cl", "trace/view_sizes.cl:admit", "primitives/"},
+            {"trace/tile_lists.cl", "trace/view_sizes.cl:admit", "parallel/"},
             false,
             [this] { return lists_work(); }},
            {"forward",
-            {"trace/forward.cl", "trace/group_forward.cl"},
+            {"trace/camera_forward.cl", "trace/group_forward.cl"},
             false,
             [this] { return forward_work(view_statistics); }},
            {"view", {}, false, [this] {
@@ -117,7 +114,7 @@ BenchOperation SceneBench::Impl::backward() {
           {},
           [this] { tracer().backward(gaussians(), image_gradient, gradients); },
           {{"backward",
-            {"trace/backward.cl", "trace/group_backward.cl", ":(fill)"},
+            {"trace/camera_backward.cl", "trace/group_backward.cl", ":(fill)"},
             false,
             [this] { return backward_work(kept_statistics); }},
            {"finalize", {"trace/finalize_gradients.cl", "trace/group_finalize.cl"}, false, [this] {
@@ -147,11 +144,11 @@ BenchOperation SceneBench::Impl::packets(PacketForm form) {
             shaped_tracer->backward(gaussians(), image_gradient, gradients);
           },
           {{"forward-" + shape,
-            {"trace/forward.cl", "trace/group_forward.cl"},
+            {"trace/camera_forward.cl", "trace/group_forward.cl"},
             false,
             [this] { return forward_work(shaped_statistics); }},
            {"backward-" + shape,
-            {"trace/backward.cl", "trace/group_backward.cl", ":(fill)"},
+            {"trace/camera_backward.cl", "trace/group_backward.cl", ":(fill)"},
             false,
             [this] { return backward_work(shaped_statistics); }}},
           true};

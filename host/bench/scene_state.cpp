@@ -6,10 +6,10 @@
 #include <cmath>
 #include <utility>
 
-#include "base/rng.hpp"
-#include "core/morton_order.hpp"
-#include "core/statistics.hpp"
+#include "scene/morton_order.hpp"
+#include "scene/statistics.hpp"
 #include "synth/bench_scenes.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

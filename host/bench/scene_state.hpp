@@ -11,7 +11,7 @@
 #include "bvh/gaussian_bounds.hpp"
 #include "light/triangle_tracer.hpp"
 #include "light/view_tracer.hpp"
-#include "primitives/radix_sort.hpp"
+#include "parallel/radix_sort.hpp"
 #include "raysplats/path_tracer.hpp"
 #include "raysplats/scene.hpp"
 #include "trace/camera_tracer.hpp"

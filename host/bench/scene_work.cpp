@@ -3,7 +3,7 @@
 
 #include "bench/scene_state.hpp"
 #include "bvh/work.h"
-#include "primitives/work.h"
+#include "parallel/work.h"
 #include "trace/packet_shape.hpp"
 #include "trace/work.h"
 #include "train/work.h"

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstdint>
 
-#include "base/rng.hpp"
 #include "light/view_tracer.hpp"
 #include "reference/gradients.hpp"
 #include "reference/scenes.hpp"
 #include "reference/tracer.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

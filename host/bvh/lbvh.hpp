@@ -9,8 +9,8 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
-#include "primitives/chunk_shape.hpp"
-#include "primitives/radix_sort.hpp"
+#include "parallel/chunk_shape.hpp"
+#include "parallel/radix_sort.hpp"
 #include "shared/layout.h"
 
 namespace raysplats {

@@ -12,13 +12,13 @@
 #include <string_view>
 #include <utility>
 
-#include "base/memory_limit.hpp"
 #include "device/context_impl.hpp"
 #include "device/driver_trouble.hpp"
 #include "device/platform.hpp"
 #include "device/program_cache.hpp"
 #include "device/tuning.hpp"
 #include "raysplats/error.hpp"
+#include "util/memory_limit.hpp"
 
 namespace raysplats {
 namespace {

@@ -11,9 +11,9 @@
 #include <fstream>
 #include <vector>
 
-#include "base/memory_limit.hpp"
 #include "device/cl.hpp"
 #include "raysplats/error.hpp"
+#include "util/memory_limit.hpp"
 
 namespace raysplats {
 namespace {

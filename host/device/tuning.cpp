@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
-#include "base/atomic_file.hpp"
 #include "device/program_cache.hpp"
 #include "raysplats/error.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats {
 namespace {

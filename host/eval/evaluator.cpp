@@ -10,14 +10,14 @@
 #include <optional>
 #include <set>
 
-#include "base/atomic_file.hpp"
 #include "comm/communicator.hpp"
-#include "core/sharpness.hpp"
 #include "eval/error_map.hpp"
-#include "eval/frame_writer.hpp"
 #include "eval/metrics.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "render/frame_writer.hpp"
+#include "scene/sharpness.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats {
 namespace {

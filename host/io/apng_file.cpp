@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "base/atomic_file.hpp"
 #include "io/video_file.hpp"
 #include "io/video_frame.hpp"
 #include "raysplats/error.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats {
 namespace {

@@ -10,12 +10,12 @@
 #include <glm/matrix.hpp>
 #include <utility>
 
-#include "core/camera_check.hpp"
-#include "core/gaussian_transform.hpp"
 #include "io/json_file.hpp"
 #include "io/scene_camera.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_check.hpp"
+#include "scene/gaussian_transform.hpp"
 
 namespace raysplats {
 namespace {

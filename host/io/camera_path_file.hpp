@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/camera_path.hpp"
 #include "raysplats/camera.hpp"
+#include "scene/camera_path.hpp"
 
 namespace raysplats {
 

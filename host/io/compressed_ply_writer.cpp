@@ -12,10 +12,10 @@
 #include <string_view>
 #include <vector>
 
-#include "base/atomic_file.hpp"
-#include "core/morton_order.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"
+#include "scene/morton_order.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats::io {
 namespace {

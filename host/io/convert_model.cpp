@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "core/gaussian_transform.hpp"
-#include "core/model_changes.hpp"
 #include "io/model_file.hpp"
 #include "raysplats/error.hpp"
+#include "scene/gaussian_transform.hpp"
+#include "scene/model_changes.hpp"
 
 namespace raysplats {
 Conversion convert_model(const std::filesystem::path& input,

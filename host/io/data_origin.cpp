@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
-#include "core/statistics.hpp"
+#include "scene/statistics.hpp"
 
 namespace raysplats::io {
 namespace {

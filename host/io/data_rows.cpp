@@ -6,8 +6,8 @@
 
 #include <array>
 
-#include "base/number_text.hpp"
 #include "raysplats/error.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats {
 namespace {

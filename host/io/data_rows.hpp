@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "core/given_options.hpp"
-#include "core/option_table.hpp"
 #include "raysplats/dataset.hpp"
+#include "scene/given_options.hpp"
+#include "scene/option_table.hpp"
 
 namespace raysplats {
 

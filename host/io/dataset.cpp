@@ -13,7 +13,6 @@
 #include <span>
 #include <string>
 
-#include "core/camera_check.hpp"
 #include "io/colmap_model.hpp"
 #include "io/data_origin.hpp"
 #include "io/image_file.hpp"
@@ -22,6 +21,7 @@
 #include "io/transforms.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/camera_check.hpp"
 
 namespace raysplats {
 namespace {

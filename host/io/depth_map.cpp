@@ -15,10 +15,10 @@
 #include <utility>
 #include <variant>
 
-#include "core/camera_model.hpp"
 #include "io/image_file.hpp"
 #include "io/npy_file.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
 
 namespace raysplats::io {
 namespace {

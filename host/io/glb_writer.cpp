@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "base/atomic_file.hpp"
-#include "core/gaussian_transform.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/model_formats.hpp"
 #include "raysplats/error.hpp"
+#include "scene/gaussian_transform.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "core/gaussian_transform.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/gltf_model.hpp"
 #include "io/gltf_nodes.hpp"
 #include "io/model_formats.hpp"
 #include "raysplats/error.hpp"
+#include "scene/gaussian_transform.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
-#include "base/memory_limit.hpp"
 #include "raysplats/error.hpp"
+#include "util/memory_limit.hpp"
 
 namespace raysplats::io {
 

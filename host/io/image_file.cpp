@@ -12,13 +12,13 @@
 #include <string>
 #include <string_view>
 
-#include "base/atomic_file.hpp"
 #include "io/byte_reader.hpp"
 #include "io/image_codec.hpp"
 #include "io/image_header.hpp"
 #include "io/image_limits.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats {
 namespace {

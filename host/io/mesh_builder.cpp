@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
-#include "core/polygon.hpp"
 #include "raysplats/error.hpp"
+#include "scene/polygon.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <string>
 
-#include "core/mesh.hpp"
 #include "io/byte_reader.hpp"
 #include "raysplats/error.hpp"
+#include "scene/mesh.hpp"
 
 namespace raysplats::io {
 namespace {

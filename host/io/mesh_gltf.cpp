@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "core/mesh.hpp"
 #include "io/gltf_materials.hpp"
 #include "io/gltf_model.hpp"
 #include "io/gltf_nodes.hpp"
 #include "io/mesh_builder.hpp"
 #include "io/mesh_file.hpp"
+#include "scene/mesh.hpp"
 
 namespace raysplats::io {
 namespace {

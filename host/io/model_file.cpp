@@ -14,13 +14,13 @@
 #include <string_view>
 #include <vector>
 
-#include "core/gaussian_check.hpp"
-#include "core/gaussian_transform.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/model_formats.hpp"
 #include "io/sog_file.hpp"
 #include "io/spz_codes.hpp"
 #include "raysplats/error.hpp"
+#include "scene/gaussian_check.hpp"
+#include "scene/gaussian_transform.hpp"
 
 namespace raysplats {
 namespace io {

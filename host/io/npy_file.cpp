@@ -12,9 +12,9 @@
 #include <optional>
 #include <string_view>
 
-#include "base/atomic_file.hpp"
 #include "io/byte_reader.hpp"
 #include "raysplats/error.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "core/camera_model.hpp"
+#include "scene/camera_model.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
-#include "base/atomic_file.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
 #include "io/ply_options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats {
 namespace {

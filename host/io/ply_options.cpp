@@ -11,9 +11,9 @@
 #include <functional>
 #include <string_view>
 
-#include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/trace_rows.hpp"
 
 namespace raysplats {
 namespace {

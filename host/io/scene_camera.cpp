@@ -8,12 +8,12 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "core/camera_check.hpp"
-#include "core/camera_model.hpp"
 #include "io/data_rows.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/camera_check.hpp"
+#include "scene/camera_model.hpp"
 
 namespace raysplats {
 namespace {

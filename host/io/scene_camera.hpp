@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/orbit.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/dataset.hpp"
+#include "scene/orbit.hpp"
 
 namespace raysplats {
 

@@ -10,10 +10,10 @@
 #include <initializer_list>
 #include <tuple>
 
-#include "base/nearest_name.hpp"
-#include "core/render_rows.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
+#include "scene/render_rows.hpp"
+#include "util/nearest_name.hpp"
 
 namespace raysplats {
 namespace {

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/trace_rows.hpp"
 #include "io/scene_camera.hpp"
 #include "raysplats/scene.hpp"
 #include "raysplats/trace_options.hpp"
+#include "scene/trace_rows.hpp"
 
 namespace raysplats {
 

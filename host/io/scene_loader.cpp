@@ -11,14 +11,14 @@
 #include <limits>
 #include <map>
 
-#include "base/nearest_name.hpp"
-#include "core/gaussian_transform.hpp"
-#include "core/mesh.hpp"
-#include "core/morton_order.hpp"
-#include "core/orbit.hpp"
 #include "io/mesh_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/gaussian_transform.hpp"
+#include "scene/mesh.hpp"
+#include "scene/morton_order.hpp"
+#include "scene/orbit.hpp"
+#include "util/nearest_name.hpp"
 
 namespace raysplats {
 namespace {

@@ -12,15 +12,15 @@
 #include <utility>
 #include <vector>
 
-#include "base/atomic_file.hpp"
-#include "core/morton_order.hpp"
-#include "core/quantization.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"
 #include "io/sog_file.hpp"
 #include "io/webp_texture.hpp"
 #include "io/zip_archive.hpp"
 #include "raysplats/error.hpp"
+#include "scene/morton_order.hpp"
+#include "scene/quantization.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats::io {
 namespace {

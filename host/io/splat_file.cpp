@@ -8,11 +8,11 @@
 #include <numeric>
 #include <vector>
 
-#include "base/atomic_file.hpp"
 #include "io/byte_reader.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"
 #include "raysplats/error.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats::io {
 namespace {

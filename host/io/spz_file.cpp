@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "base/atomic_file.hpp"
 #include "io/byte_reader.hpp"
 #include "io/compression.hpp"
 #include "io/model_formats.hpp"
 #include "io/spz_codes.hpp"
 #include "raysplats/error.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -9,10 +9,10 @@
 #include <limits>
 #include <stdexcept>
 
-#include "base/nearest_name.hpp"
-#include "base/number_text.hpp"
 #include "io/byte_reader.hpp"
 #include "raysplats/error.hpp"
+#include "util/nearest_name.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -11,12 +11,12 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
-#include "base/atomic_file.hpp"
-#include "core/camera_check.hpp"
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/camera_check.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats {
 namespace io {

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "base/atomic_file.hpp"
-#include "base/program.hpp"
 #include "io/gif_moments.hpp"
 #include "io/image_codec.hpp"
 #include "io/video_frame.hpp"
 #include "raysplats/error.hpp"
+#include "util/atomic_file.hpp"
+#include "util/program.hpp"
 
 namespace raysplats {
 namespace {

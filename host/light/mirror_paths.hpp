@@ -10,7 +10,7 @@
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "light/surface_store.hpp"
-#include "primitives/scan.hpp"
+#include "parallel/scan.hpp"
 #include "raysplats/mirrors.hpp"
 #include "trace/ray_backward.hpp"
 #include "trace/ray_tracer.hpp"
@@ -29,7 +29,7 @@ class MirrorPaths {
   Buffer<Ray>& rays() { return levels_[0].rays; }
   /// Traces the first `count` of rays(). `direction` is that of colours before the first mirror;
   /// behind it they follow the ray. `capped`, a 64-bit count in two words
-  /// (cl/primitives/counter.h), grows by the rays that stopped because of max_hits.
+  /// (cl/parallel/counter.h), grows by the rays that stopped because of max_hits.
   void trace(const DeviceGaussians& gaussians,
              std::size_t count,
              ColorDirection direction,

@@ -40,7 +40,7 @@ void copy(Context& context, const Buffer<float>& from, Buffer<float>& to, const 
 
 NormalPictures::NormalPictures(Context& context, const TraceOptions& options)
     : context_(context),
-      kernel_(context.kernel("trace/normals.cl", "gaussian_normals")),
+      kernel_(context.kernel("light/normal_pictures.cl", "gaussian_normals")),
       views_(context, normal_options(options)) {}
 
 void NormalPictures::follow(const DeviceGaussians& gaussians) {

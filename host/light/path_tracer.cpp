@@ -11,14 +11,14 @@
 #include <optional>
 #include <span>
 
-#include "core/gaussian_check.hpp"
-#include "core/pixel_places.hpp"
-#include "core/render_rows.hpp"
-#include "core/row_share.hpp"
 #include "light/path_memory.hpp"
 #include "light/surface_store.hpp"
-#include "primitives/scan.hpp"
+#include "parallel/scan.hpp"
 #include "raysplats/error.hpp"
+#include "scene/gaussian_check.hpp"
+#include "scene/pixel_places.hpp"
+#include "scene/render_rows.hpp"
+#include "scene/row_share.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/model_impl.hpp"
@@ -28,7 +28,7 @@
 namespace raysplats {
 namespace {
 
-constexpr const char* kProgram = "light/waves.cl";
+constexpr const char* kProgram = "light/path_tracer.cl";
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kTallyChunk = 1024;
 
@@ -143,7 +143,7 @@ struct PathTracer::Impl {
   void trace_packets(const Camera& camera, const std::function<void()>& watch);
   void take_packets(const RsWave& wave, std::size_t count);
   void gather_light(const RsWave& wave, std::size_t count, bool from_gaussians);
-  // RS_LIT_ARGUMENTS of cl/light/waves.cl.
+  // RS_LIT_ARGUMENTS of cl/light/path_tracer.cl.
   auto lit_arguments() const {
     return argument_pack(surfaces.lights(), surfaces.materials(), rays, results, met);
   }

@@ -9,12 +9,12 @@
 #include <optional>
 #include <utility>
 
-#include "core/planes.hpp"
 #include "device/foreign_opencl.hpp"
 #include "light/normal_pictures.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/opencl.hpp"
+#include "scene/planes.hpp"
 #include "trace/memory_shares.hpp"
 #include "trace/model_impl.hpp"
 #include "trace/ray_backward.hpp"

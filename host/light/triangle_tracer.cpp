@@ -82,7 +82,7 @@ void TriangleTracer::launch_rays(const char* kernel,
   const bool cpu = context_->device().type == DeviceType::kCpu;
   const std::size_t each = cpu ? kCpuRaysPerItem : 1;
   launch_in_bands(*context_, budget_,
-                  context_->kernel("light/surface_rays.cl", kernel,
+                  context_->kernel("light/triangle_tracer.cl", kernel,
                                    tree_walk_build(context_->device(), tree_.lanes())),
                   (count + each - 1) / each, cpu ? 1 : kGroup, u32(count), u32(each),
                   tree_.arguments(blocks_), arguments...);

@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/planes.hpp"
-#include "core/row_share.hpp"
 #include "light/mirror_paths.hpp"
 #include "raysplats/error.hpp"
+#include "scene/planes.hpp"
+#include "scene/row_share.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/memory_shares.hpp"
 #include "trace/ray_backward.hpp"

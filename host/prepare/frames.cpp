@@ -8,11 +8,11 @@
 #include <cctype>
 #include <charconv>
 
-#include "base/number_text.hpp"
-#include "base/program.hpp"
-#include "core/sharpness.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/sharpness.hpp"
+#include "util/number_text.hpp"
+#include "util/program.hpp"
 
 namespace raysplats {
 namespace {

@@ -10,11 +10,11 @@
 #include <set>
 #include <string_view>
 
-#include "base/atomic_file.hpp"
-#include "base/program.hpp"
 #include "io/colmap_model.hpp"
 #include "prepare/frames.hpp"
 #include "raysplats/error.hpp"
+#include "util/atomic_file.hpp"
+#include "util/program.hpp"
 
 namespace raysplats {
 namespace {

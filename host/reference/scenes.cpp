@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "base/rng.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats::reference {
 

@@ -9,9 +9,9 @@
 #include <optional>
 #include <sstream>
 
-#include "base/number_text.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats::report {
 namespace {

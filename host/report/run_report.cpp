@@ -11,8 +11,6 @@
 #include <string_view>
 #include <vector>
 
-#include "base/atomic_file.hpp"
-#include "base/number_text.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/io.hpp"
 #include "report/camera_map.hpp"
@@ -20,7 +18,9 @@
 #include "report/html.hpp"
 #include "report/run_files.hpp"
 #include "report/run_warnings.hpp"
-#include "train/train_config.hpp"
+#include "run/train_config.hpp"
+#include "util/atomic_file.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats {
 namespace {

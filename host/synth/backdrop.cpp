@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/rng.hpp"
 #include "synth/noise.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats::synth {
 namespace {

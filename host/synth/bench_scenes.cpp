@@ -10,9 +10,9 @@
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "synth/shapes.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 

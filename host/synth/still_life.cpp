@@ -6,9 +6,9 @@
 #include <numbers>
 #include <utility>
 
-#include "base/rng.hpp"
 #include "synth/noise.hpp"
 #include "synth/scene.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats::synth {
 

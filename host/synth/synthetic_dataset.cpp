@@ -17,14 +17,14 @@
 #include <utility>
 #include <vector>
 
-#include "base/atomic_file.hpp"
-#include "base/output_directory.hpp"
-#include "base/rng.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "synth/backdrop.hpp"
 #include "synth/scene.hpp"
+#include "util/atomic_file.hpp"
+#include "util/output_directory.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
-#include "core/trace_rows.hpp"
 #include "device/fault_injection.hpp"
+#include "scene/trace_rows.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer_impl.hpp"
 

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
 #include "shared/layout.h"
 
 namespace raysplats {

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "bvh/gaussian_bounds.hpp"
-#include "core/planes.hpp"
-#include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
+#include "scene/planes.hpp"
+#include "scene/trace_rows.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer_impl.hpp"
 

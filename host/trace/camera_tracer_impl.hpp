@@ -10,7 +10,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/row_share.hpp"
+#include "scene/row_share.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/candidate_lists.hpp"
 #include "trace/gradient_sums.hpp"

@@ -11,8 +11,8 @@
 #include <iterator>
 #include <numbers>
 
-#include "core/camera_check.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_check.hpp"
 
 namespace raysplats {
 namespace {

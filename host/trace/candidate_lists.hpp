@@ -7,8 +7,8 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
-#include "primitives/radix_sort.hpp"
-#include "primitives/scan.hpp"
+#include "parallel/radix_sort.hpp"
+#include "parallel/scan.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/trace_options.hpp"
 #include "shared/layout.h"

@@ -74,7 +74,7 @@ float GradientSums::limit(std::size_t addends) {
 
 void GradientSums::round() {
   if (!is_exact()) return;
-  context_->kernel("trace/exact_lines.cl", "round_exact_lines")
+  context_->kernel("trace/gradient_sums.cl", "round_exact_lines")
       .launch(Range::linear(count_, kRoundGroup), static_cast<std::uint32_t>(count_),
               BufferAs<std::uint32_t>{exact_.raw()}, lines_);
   tidy_exact_ = count_;

@@ -29,12 +29,12 @@ Kernel PacketKernels::forward(const BuildOptions& build) {
   if (shape_.grouped) return group_kernel("trace/group_forward.cl", "trace_forward_group", build);
   BuildOptions own = build;
   own.define("BLOCK", shape_.block).define("PENDING", shape_.pending);
-  return context_.kernel("trace/forward.cl", "trace_forward", own);
+  return context_.kernel("trace/camera_forward.cl", "trace_forward", own);
 }
 
 Kernel PacketKernels::backward(const BuildOptions& build) {
   if (shape_.grouped) return group_kernel("trace/group_backward.cl", "trace_backward_group", build);
-  return context_.kernel("trace/backward.cl", "trace_backward", build);
+  return context_.kernel("trace/camera_backward.cl", "trace_backward", build);
 }
 
 // With subgroups, where the packet has them. Only the compiled kernel tells how large they are; a

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/trace_rows.hpp"
+#include "scene/trace_rows.hpp"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
@@ -89,7 +89,7 @@ bool RayOrder::compute(const Lbvh& tree, const Buffer<Ray>& rays, std::size_t co
   if (count < kOrderedRays || tree.levels() == 0) return false;
   indices_.ensure(*context_, count, "ray order");
   keys_.ensure(*context_, count, "ray keys");
-  context_->kernel("trace/ray_order.cl", "ray_keys", BuildOptions().define("LANES", tree.lanes()))
+  context_->kernel("trace/ray_launch.cl", "ray_keys", BuildOptions().define("LANES", tree.lanes()))
       .launch(Range::linear(count, kGroup), rays, static_cast<std::uint32_t>(count), tree.nodes(),
               tree.scene_node(), keys_, indices_);
   sort_.sort(keys_, indices_, count);

@@ -9,7 +9,7 @@
 #include "device/buffer.hpp"
 #include "device/build_options.hpp"
 #include "device/context.hpp"
-#include "primitives/radix_sort.hpp"
+#include "parallel/radix_sort.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/trace_options.hpp"

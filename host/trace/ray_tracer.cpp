@@ -126,7 +126,7 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   if (self.counts_work) build.define("COUNT_WORK", 1);
   build.define("LEADING", color_mode == kFlagPerRay ? 1 : 0);
   launch_in_bands(
-      self.context, self.budget, self.context.kernel("trace/rays.cl", "trace_rays", build),
+      self.context, self.budget, self.context.kernel("trace/ray_tracer.cl", "trace_rays", build),
       (count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup, u32(count), u32(rays_per_item),
       self.tree.arguments(), gaussians.sh, ray_walk(options, self.near, gaussians, color_mode),
       self.order.arguments(rays, ordered), from_origin, results);

@@ -69,7 +69,7 @@ void RayTree::fill(const DeviceGaussians& gaussians) {
       .define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options_.adaptive_radius ? 1 : 0);
   const std::size_t padded = tree_.padded_blocks();
-  context_->kernel("trace/gaussian_blocks.cl", "fill_blocks", build)
+  context_->kernel("trace/ray_tree.cl", "fill_blocks", build)
       .launch(Range::linear(padded, kGroup), u32(gaussians.count), u32(padded), tree_.slots(),
               boxes_, gaussians.arguments(), sh_coefficients(gaussians.sh_degree),
               options_.quantile, blocks_, tree_.nodes());

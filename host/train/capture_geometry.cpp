@@ -9,7 +9,7 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
-#include "core/statistics.hpp"
+#include "scene/statistics.hpp"
 
 namespace raysplats {
 namespace {

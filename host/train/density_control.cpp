@@ -7,14 +7,14 @@
 #include <cmath>
 #include <utility>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "train/mcmc.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {
 
-constexpr char kProgram[] = "train/densify.cl";
+constexpr char kProgram[] = "train/density_control.cl";
 constexpr std::size_t kGroup = 64;
 constexpr std::uint64_t kSplitStream = 0x73706c6974;
 constexpr std::uint64_t kMoveStream = 0x6d6f7665;

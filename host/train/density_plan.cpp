@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/morton_order.hpp"
+#include "scene/morton_order.hpp"
 
 namespace raysplats {
 namespace {

@@ -13,7 +13,7 @@
 
 namespace raysplats {
 
-/// What becomes of a Gaussian in the new set; cl/train/densify.cl names the same values.
+/// What becomes of a Gaussian in the new set; cl/train/density_control.cl names the same values.
 enum class DensityRole : std::uint32_t {
   kKeep = 0,
   kClone = 1,

@@ -23,7 +23,7 @@ DepthSupervision::DepthSupervision(Context& context,
                                    double unit)
     : context_(context),
       weight_(weight),
-      slopes_(context.kernel("train/depth_loss.cl", "depth_slopes")),
+      slopes_(context.kernel("train/depth_supervision.cl", "depth_slopes")),
       targets_(views.size()) {
   std::size_t with_maps = 0, with_points = 0;
   for (const std::size_t index : views) {

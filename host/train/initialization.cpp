@@ -12,14 +12,14 @@
 #include <numeric>
 #include <optional>
 
-#include "base/rng.hpp"
-#include "core/gaussian_selection.hpp"
 #include "io/model_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/gaussian_selection.hpp"
 #include "shared/sh.h"
 #include "train/photo_start.hpp"
 #include "train/point_check.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

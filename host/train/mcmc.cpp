@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/mcmc.hpp"
 
-#include "base/rng.hpp"
 #include "train/schedule.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "raysplats/mirrors.hpp"
-#include "train/model_source.hpp"
+#include "run/model_source.hpp"
 
 namespace raysplats {
 

@@ -21,7 +21,7 @@ constexpr std::size_t kGpuChunk = 4;
 ModelValidator::ModelValidator(Context& context, const TraceOptions& options)
     : context_(context),
       chunk_(context.device().type == DeviceType::kCpu ? kCpuChunk : kGpuChunk),
-      kernel_(context.kernel("train/validate.cl", "find_non_finite")),
+      kernel_(context.kernel("train/model_validator.cl", "find_non_finite")),
       tree_(context, options, 0),
       found_(context, 2, "validation") {}
 

@@ -26,7 +26,7 @@ PhotoCache::PhotoCache(Context& context,
     : context_(context),
       budget_(budget),
       entries_(views.size()),
-      reduce_(context.kernel("train/photo_reduce.cl", "reduce_photo")),
+      reduce_(context.kernel("train/photo_cache.cl", "reduce_photo")),
       loader_(views, ahead * largest_photo(views)) {
   if (context.device().type != DeviceType::kCpu) uploads_.emplace(context);
 }

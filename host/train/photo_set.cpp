@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "core/camera_model.hpp"
+#include "scene/camera_model.hpp"
 
 namespace raysplats {
 namespace {

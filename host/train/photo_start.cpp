@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include "base/rng.hpp"
-#include "core/camera_model.hpp"
-#include "core/statistics.hpp"
+#include "scene/camera_model.hpp"
+#include "scene/statistics.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

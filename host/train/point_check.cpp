@@ -8,7 +8,7 @@
 #include <glm/vec4.hpp>
 #include <vector>
 
-#include "core/camera_model.hpp"
+#include "scene/camera_model.hpp"
 
 namespace raysplats {
 namespace {

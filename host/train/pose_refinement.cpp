@@ -10,9 +10,9 @@
 #include <optional>
 #include <utility>
 
-#include "core/orbit.hpp"
-#include "core/statistics.hpp"
 #include "raysplats/error.hpp"
+#include "scene/orbit.hpp"
+#include "scene/statistics.hpp"
 
 namespace raysplats {
 namespace {

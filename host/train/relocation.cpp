@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/rng.hpp"
-#include "core/morton_order.hpp"
+#include "scene/morton_order.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

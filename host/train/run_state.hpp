@@ -3,9 +3,9 @@
 
 #include "device/context.hpp"
 #include "raysplats/train_options.hpp"
+#include "run/checkpoint.hpp"
 #include "trace/device_gaussians.hpp"
 #include "train/adam.hpp"
-#include "train/checkpoint.hpp"
 #include "train/density_control.hpp"
 
 namespace raysplats {

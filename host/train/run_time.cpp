@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/statistics.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/gaussians.hpp"
+#include "scene/statistics.hpp"
 #include "train/schedule.hpp"
 
 namespace raysplats {

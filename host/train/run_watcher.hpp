@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "raysplats/trainer.hpp"
-#include "train/run_folder.hpp"
+#include "run/run_folder.hpp"
 
 namespace raysplats {
 

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "base/rng.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {
@@ -19,12 +19,6 @@ constexpr double kValidationShare = 0.9;  // of the run; then validation views a
 constexpr int kValidations = 9;
 
 }  // namespace
-
-std::int64_t RunShare::of(std::int64_t iterations) const {
-  if (value <= 0) return 0;
-  if (value >= 1) return static_cast<std::int64_t>(value);
-  return std::max<std::int64_t>(1, std::llround(value * static_cast<double>(iterations)));
-}
 
 double learning_rate(const LearningRate& rate,
                      const TrainOptions& options,

@@ -17,7 +17,7 @@ constexpr float kEpsilon = 1e-15f;
 }  // namespace
 
 SkyAdam::SkyAdam(Context& context, std::size_t numbers)
-    : step_(context.kernel("train/sky.cl", "sky_step")) {
+    : step_(context.kernel("train/sky_adam.cl", "sky_step")) {
   for (Buffer<float>* buffer : {&first_, &second_, &steps_}) {
     *buffer = Buffer<float>(context, numbers, "optimiser of the sky");
     buffer->clear();

@@ -9,7 +9,7 @@
 namespace raysplats {
 namespace {
 
-constexpr char kProgram[] = "train/guard.cl";
+constexpr char kProgram[] = "train/step_guard.cl";
 constexpr std::size_t kItems = 64;
 
 }  // namespace

@@ -7,11 +7,11 @@
 #include <utility>
 
 #include "raysplats/error.hpp"
-#include "train/dataset_fingerprint.hpp"
+#include "run/dataset_fingerprint.hpp"
+#include "run/train_config.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/step_options.hpp"
-#include "train/train_config.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {

@@ -4,10 +4,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/atomic_file.hpp"
 #include "raysplats/io.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats {
 

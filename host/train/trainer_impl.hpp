@@ -12,15 +12,14 @@
 #include <string>
 #include <vector>
 
-#include "base/file_lock.hpp"
-#include "base/progress.hpp"
 #include "comm/communicator.hpp"
 #include "device/read_back.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
+#include "run/checkpoint.hpp"
+#include "run/run_folder.hpp"
 #include "train/adam.hpp"
-#include "train/checkpoint.hpp"
 #include "train/density_control.hpp"
 #include "train/depth_supervision.hpp"
 #include "train/exposure.hpp"
@@ -34,13 +33,14 @@
 #include "train/photo_set.hpp"
 #include "train/pose_refinement.hpp"
 #include "train/psnr_rise.hpp"
-#include "train/run_folder.hpp"
 #include "train/run_time.hpp"
 #include "train/run_watcher.hpp"
 #include "train/schedule.hpp"
 #include "train/sky_adam.hpp"
 #include "train/step_guard.hpp"
 #include "train/stopwatch.hpp"
+#include "util/file_lock.hpp"
+#include "util/progress.hpp"
 
 namespace raysplats {
 

@@ -6,9 +6,9 @@
 #include <limits>
 #include <new>
 
-#include "base/interrupt.hpp"
 #include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/interrupt.hpp"
 
 namespace raysplats {
 namespace {

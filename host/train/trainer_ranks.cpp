@@ -10,8 +10,8 @@
 #include <string>
 
 #include "raysplats/error.hpp"
+#include "run/train_config.hpp"
 #include "shared/train_layout.h"
-#include "train/train_config.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {

@@ -4,8 +4,8 @@
 
 #include <system_error>
 
+#include "run/train_config.hpp"
 #include "train/run_state.hpp"
-#include "train/train_config.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {

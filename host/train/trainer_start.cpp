@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
-#include "core/gaussian_selection.hpp"
-#include "core/morton_order.hpp"
+#include "run/train_config.hpp"
+#include "scene/gaussian_selection.hpp"
+#include "scene/morton_order.hpp"
 #include "train/flat_start.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
-#include "train/train_config.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {

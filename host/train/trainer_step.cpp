@@ -3,8 +3,8 @@
 
 #include <cmath>
 
+#include "run/train_config.hpp"
 #include "train/step_options.hpp"
-#include "train/train_config.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {

@@ -13,9 +13,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "core/mesh.hpp"
 #include "io/scene_file.hpp"
 #include "raysplats/error.hpp"
+#include "scene/mesh.hpp"
 
 namespace raysplats::view {
 namespace {

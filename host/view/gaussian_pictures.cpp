@@ -5,8 +5,8 @@
 #include <glm/matrix.hpp>
 #include <utility>
 
-#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
 #include "view/sampling.hpp"
 
 namespace raysplats::view {

@@ -5,8 +5,8 @@
 
 #include <optional>
 
-#include "core/orbit.hpp"
 #include "raysplats/error.hpp"
+#include "scene/orbit.hpp"
 #include "view/view_state.hpp"
 
 namespace raysplats::view {

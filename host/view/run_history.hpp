@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "train/run_folder.hpp"
+#include "run/run_folder.hpp"
 
 namespace raysplats::view {
 

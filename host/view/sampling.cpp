@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/pixel_places.hpp"
-#include "eval/frame_writer.hpp"
+#include "render/frame_writer.hpp"
+#include "scene/pixel_places.hpp"
 
 namespace raysplats::view {
 namespace {

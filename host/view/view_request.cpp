@@ -11,9 +11,9 @@
 #include <numbers>
 #include <string>
 
-#include "core/gaussian_transform.hpp"
-#include "core/trace_rows.hpp"
 #include "raysplats/error.hpp"
+#include "scene/gaussian_transform.hpp"
+#include "scene/trace_rows.hpp"
 
 namespace raysplats::view {
 namespace {

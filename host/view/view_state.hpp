@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
-#include "core/orbit.hpp"
 #include "raysplats/camera.hpp"
+#include "scene/orbit.hpp"
 
 namespace raysplats::view {
 

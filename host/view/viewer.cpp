@@ -21,8 +21,8 @@
 #include <utility>
 #include <variant>
 
-#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
 #include "view/mesh_uploads.hpp"
 #include "view/pace.hpp"
 #include "view/page.hpp"

@@ -11,6 +11,7 @@
 
 #include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
+#include "raysplats/evaluation_row.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/train_options.hpp"
 
@@ -19,18 +20,6 @@ namespace raysplats {
 class Communicator;
 struct DeviceGaussians;
 class RunWatcher;
-
-/// Mean over the test views at one iteration.
-struct EvaluationRow {
-  std::int64_t iteration = 0;
-  double training_seconds = 0;
-  double psnr = 0;  ///< decibels
-  double ssim = 0;
-  std::size_t views = 0;
-  std::size_t gaussians = 0;
-  double psnr_corrected = 0;       ///< as EvaluationMetrics::psnr_corrected
-  std::optional<double> psnr_all;  ///< as EvaluationMetrics::psnr_all
-};
 
 struct TrainSummary {
   std::int64_t iterations = 0;

@@ -18,15 +18,17 @@ if(RAYSPLATS_HAVE_MPI)
 endif()
 install(
   TARGETS raysplats
-          raysplats_base
+          raysplats_util
           raysplats_comm
-          raysplats_core
+          raysplats_scene
           raysplats_device
-          raysplats_primitives
+          raysplats_parallel
           raysplats_bvh
           raysplats_trace
           raysplats_light
           raysplats_io
+          raysplats_run
+          raysplats_render
           raysplats_eval
           raysplats_train
           ${images_archive}

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A checkpoint. The first byte asks for right checksums, so that damage gets past them and meets
 // the checks behind.
-#include "train/checkpoint.hpp"
+#include "run/checkpoint.hpp"
 
 #include <xxhash.h>
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "fuzz/fuzz_target.hpp"
-#include "train/train_config.hpp"
+#include "run/train_config.hpp"
 
 namespace raysplats::fuzz {
 namespace {

@@ -16,8 +16,8 @@
 #include "bench/report.hpp"
 #include "io/zip_archive.hpp"
 #include "raysplats/io.hpp"
-#include "train/checkpoint.hpp"
-#include "train/train_config.hpp"
+#include "run/checkpoint.hpp"
+#include "run/train_config.hpp"
 
 using namespace raysplats;
 

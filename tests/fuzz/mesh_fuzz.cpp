@@ -6,9 +6,9 @@
 #include <span>
 #include <string>
 
-#include "core/mesh.hpp"
 #include "fuzz/fuzz_target.hpp"
 #include "io/mesh_file.hpp"
+#include "scene/mesh.hpp"
 
 namespace raysplats::fuzz {
 namespace {

@@ -12,8 +12,8 @@
 #include <thread>
 
 #include "ranks.hpp"
+#include "run/checkpoint.hpp"
 #include "tiny_run.hpp"
-#include "train/checkpoint.hpp"
 
 namespace {
 

@@ -2,8 +2,8 @@
 #include <filesystem>
 #include <string>
 
-#include "base/atomic_file.hpp"
 #include "tiny_run.hpp"
+#include "util/atomic_file.hpp"
 
 using namespace raysplats;
 

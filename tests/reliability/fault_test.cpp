@@ -5,8 +5,8 @@
 #include <string>
 
 #include "raysplats/error.hpp"
+#include "run/checkpoint.hpp"
 #include "tiny_run.hpp"
-#include "train/checkpoint.hpp"
 
 namespace {
 

@@ -14,11 +14,11 @@
 #include <vector>
 
 #include "device/context.hpp"
-#include "primitives/scan.hpp"
+#include "parallel/scan.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
+#include "run/checkpoint.hpp"
 #include "tiny_run.hpp"
-#include "train/checkpoint.hpp"
 #include "unit/fixture.hpp"
 
 namespace {

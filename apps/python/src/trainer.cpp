@@ -14,13 +14,13 @@
 #include <string>
 #include <vector>
 
-#include "base/nearest_name.hpp"
 #include "bindings.hpp"
 #include "context.hpp"
 #include "raysplats/error.hpp"
+#include "run/train_config.hpp"
+#include "run/train_keys.hpp"
 #include "signals.hpp"
-#include "train/train_config.hpp"
-#include "train/train_keys.hpp"
+#include "util/nearest_name.hpp"
 
 namespace raysplats::python {
 namespace {

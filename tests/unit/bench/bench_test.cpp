@@ -102,7 +102,7 @@ TEST_CASE("bench: a model and a filter") {
 TEST_CASE("operations: launches go to their stages and failures come out") {
   Context context(test_device(), timed_options());
   Buffer<std::uint32_t> layout(context, 256, "layout");
-  Kernel kernel = context.kernel("primitives/layout_probe.cl", "layout_probe");
+  Kernel kernel = context.kernel("parallel/layout_probe.cl", "layout_probe");
   int prepared = 0, reset = 0, run = 0;
   const BenchOperation operation{[&] { ++prepared; },
                                  [&] { ++reset; },
@@ -112,9 +112,9 @@ TEST_CASE("operations: launches go to their stages and failures come out") {
                                    layout.clear();
                                  },
                                  {{"all", {}, false, {}},
-                                  {"probe", {"primitives/layout_probe.cl:lay"}, false, {}},
+                                  {"probe", {"parallel/layout_probe.cl:lay"}, false, {}},
                                   {"fill", {":(fill)"}, false, {}},
-                                  {"none", {"primitives/scan.cl"}, false, {}},
+                                  {"none", {"parallel/scan.cl"}, false, {}},
                                   {"host", {}, true, {}}}};
   const auto samples = run_operations(context, {operation}, 3, 1e-4);
   REQUIRE(samples.size() == 1);

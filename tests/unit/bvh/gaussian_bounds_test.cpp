@@ -8,9 +8,9 @@
 #include <limits>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

@@ -13,10 +13,10 @@
 #include <set>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "bvh/lbvh_validate.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

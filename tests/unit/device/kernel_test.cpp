@@ -87,7 +87,7 @@ TEST_CASE("kernel source: includes are resolved once, from a folder when it is n
 }
 
 TEST_CASE("kernel source: the built-in files, and a name that is none") {
-  CHECK(contains(resolve_kernel_source("primitives/layout_probe.cl"), "RsAabb"));
+  CHECK(contains(resolve_kernel_source("parallel/layout_probe.cl"), "RsAabb"));
   CHECK(contains(device_error([] { resolve_kernel_source("no/such.cl"); }), "no/such.cl"));
 }
 
@@ -172,7 +172,7 @@ TEST_CASE("profiler: launches are counted and the table has them") {
   options.profile = true;
   Context context(test_device(), options);
   Buffer<std::uint32_t> layout(context, 256, "layout");
-  Kernel kernel = context.kernel("primitives/layout_probe.cl", "layout_probe");
+  Kernel kernel = context.kernel("parallel/layout_probe.cl", "layout_probe");
   for (int i = 0; i < 3; ++i) kernel.launch(Range{}, layout);
   const std::vector<Profiler::Row> rows = context.profiler().rows();
   REQUIRE(rows.size() == 1);

@@ -19,7 +19,7 @@ TEST_CASE("shared records: sizes and offsets agree between the compilers") {
   Context context(test_device());
   Buffer<std::uint32_t> layout(context, 256, "layout");
   layout.clear();
-  context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, layout);
+  context.kernel("parallel/layout_probe.cl", "layout_probe").launch(Range{}, layout);
   const std::vector<std::uint32_t> found = layout.download();
   REQUIRE(expected.size() < layout.size());
   REQUIRE(found[0] == expected.size() + 1);

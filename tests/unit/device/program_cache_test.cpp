@@ -54,7 +54,7 @@ std::uint32_t probe(const fs::path& cache,
   options.compiling = compiling;
   Context context(test_device(), options);
   Buffer<std::uint32_t> layout(context, 256, "layout");
-  context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, layout);
+  context.kernel("parallel/layout_probe.cl", "layout_probe").launch(Range{}, layout);
   return layout.read(0);
 }
 

@@ -160,12 +160,12 @@ TEST_CASE("launches are kept on request, with their programs") {
   Context context(test_device(), options);
   Buffer<std::uint32_t> a(context, 256, "a"), b(context, 256, "b");
   CHECK(context.take_launches().empty());
-  context.kernel("primitives/layout_probe.cl", "layout_probe").launch(Range{}, a);
+  context.kernel("parallel/layout_probe.cl", "layout_probe").launch(Range{}, a);
   b.clear();
   b.copy_from(a, 256);
   const std::vector<LaunchTime> launches = context.take_launches();
   REQUIRE(launches.size() == 3);
-  CHECK(launches[0].program == "primitives/layout_probe.cl");
+  CHECK(launches[0].program == "parallel/layout_probe.cl");
   CHECK(launches[0].kernel == "layout_probe");
   CHECK(launches[0].seconds > 0);
   CHECK(launches[1].program.empty());

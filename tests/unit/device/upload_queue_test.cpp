@@ -6,9 +6,9 @@
 #include <array>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "device/buffer.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

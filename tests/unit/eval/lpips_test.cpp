@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "unit/temporary_directory.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

@@ -10,9 +10,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "base/atomic_file.hpp"
 #include "raysplats/error.hpp"
 #include "unit/temporary_directory.hpp"
+#include "util/atomic_file.hpp"
 
 using namespace raysplats;
 using nlohmann::json;

@@ -6,10 +6,10 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
-#include "base/rng.hpp"
 #include "data_sets.hpp"
 #include "io/colmap_model.hpp"
 #include "raysplats/dataset.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "core/morton_order.hpp"
 #include "model_bytes.hpp"
+#include "scene/morton_order.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

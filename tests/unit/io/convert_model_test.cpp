@@ -4,9 +4,9 @@
 #include <cmath>
 #include <string>
 
-#include "core/gaussian_transform.hpp"
 #include "io/model_file.hpp"
 #include "model_bytes.hpp"
+#include "scene/gaussian_transform.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

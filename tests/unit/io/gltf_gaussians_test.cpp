@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "core/gaussian_transform.hpp"
 #include "gltf_fixture.hpp"
 #include "io/mesh_file.hpp"
 #include "io/model_formats.hpp"
 #include "model_bytes.hpp"
+#include "scene/gaussian_transform.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "core/mesh.hpp"
+#include "scene/mesh.hpp"
 #include "scratch.hpp"
 
 using namespace raysplats;

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats::test {
 

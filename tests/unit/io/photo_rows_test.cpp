@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <numbers>
 
-#include "base/rng.hpp"
-#include "core/camera_model.hpp"
 #include "raysplats/dataset.hpp"
+#include "scene/camera_model.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "io/image_file.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

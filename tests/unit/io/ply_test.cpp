@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "io/ply_points.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/camera_model.hpp"
 #include "raysplats/io.hpp"
+#include "scene/camera_model.hpp"
 #include "scratch.hpp"
 
 using namespace raysplats;

@@ -5,11 +5,11 @@
 #include <utility>
 #include <vector>
 
-#include "core/morton_order.hpp"
 #include "deflated_zip.hpp"
 #include "io/webp_texture.hpp"
 #include "io/zip_archive.hpp"
 #include "model_bytes.hpp"
+#include "scene/morton_order.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

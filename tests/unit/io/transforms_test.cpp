@@ -6,10 +6,10 @@
 #include <glm/matrix.hpp>
 #include <string>
 
-#include "base/rng.hpp"
 #include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -7,9 +7,9 @@
 #include <thread>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

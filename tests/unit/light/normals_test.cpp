@@ -4,9 +4,9 @@
 #include <limits>
 #include <string>
 
-#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/tracer.hpp"
+#include "scene/camera_model.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;

@@ -8,10 +8,10 @@
 #include <memory>
 #include <stdexcept>
 
-#include "base/rng.hpp"
 #include "light/view_tracer.hpp"
 #include "light_fixture.hpp"
 #include "trace/camera_tracer.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using reference::ball;

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "core/camera_model.hpp"
-#include "core/gaussian_transform.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/path_tracer.hpp"
 #include "raysplats/tracer.hpp"
 #include "reference/sky.hpp"
+#include "scene/camera_model.hpp"
+#include "scene/gaussian_transform.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;

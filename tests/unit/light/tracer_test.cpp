@@ -9,8 +9,8 @@
 #include <string>
 #include <thread>
 
-#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;

@@ -11,11 +11,11 @@
 #include <thread>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "reference/light_scenes.hpp"
 #include "reference/triangles.hpp"
 #include "unit/trace/trace_fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using reference::Triangle;

@@ -9,9 +9,9 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "reference/scenes.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::reference;

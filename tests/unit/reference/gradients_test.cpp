@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "reference/scenes.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::reference;

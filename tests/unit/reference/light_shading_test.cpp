@@ -6,9 +6,9 @@
 #include <numbers>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "reference/light.hpp"
 #include "reference/light_scenes.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::reference;

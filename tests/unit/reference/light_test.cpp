@@ -8,10 +8,10 @@
 #include <limits>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "reference/light_scenes.hpp"
 #include "reference/scenes.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::reference;

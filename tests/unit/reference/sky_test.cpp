@@ -6,7 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "base/rng.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::reference;

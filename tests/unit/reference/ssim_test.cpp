@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::reference;

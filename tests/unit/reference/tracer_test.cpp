@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "reference/scenes.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::reference;

@@ -9,8 +9,8 @@
 #include <memory>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "synth/noise.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::synth;

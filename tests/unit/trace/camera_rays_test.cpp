@@ -12,8 +12,8 @@
 #include <limits>
 #include <numbers>
 
-#include "core/camera_model.hpp"
-#include "core/pixel_places.hpp"
+#include "scene/camera_model.hpp"
+#include "scene/pixel_places.hpp"
 #include "shared/random.h"
 #include "trace_fixture.hpp"
 

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/camera_model.hpp"
+#include "scene/camera_model.hpp"
 #include "trace_fixture.hpp"
 
 using namespace raysplats;

@@ -63,7 +63,7 @@ float exact_sum(Context& context, const std::vector<float>& values, float limit 
   const auto count = static_cast<std::uint32_t>(values.size());
   context.kernel("trace/exact_probe.cl", "add_exactly")
       .launch(Range::linear(values.size(), 1), count, input, limit, words);
-  context.kernel("trace/exact_lines.cl", "round_exact_lines")
+  context.kernel("trace/gradient_sums.cl", "round_exact_lines")
       .launch(Range::linear(1, 1), 1u, words, line);
   for (const std::uint32_t word : words.download()) CHECK(word == RS_EXACT_BIAS);
   const std::vector<float> sums = line.download();

@@ -6,8 +6,8 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <string>
 
-#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/lens_tiles.hpp"
 #include "trace/ray_backward.hpp"

@@ -6,11 +6,11 @@
 #include <bit>
 #include <string>
 
-#include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "reference/scenes.hpp"
 #include "trace/ray_tree_validate.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

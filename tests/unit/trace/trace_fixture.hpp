@@ -9,15 +9,15 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.hpp"
-#include "core/trace_rows.hpp"
 #include "device/context.hpp"
 #include "raysplats/device.hpp"
 #include "reference/gradients.hpp"
 #include "reference/scenes.hpp"
 #include "reference/tracer.hpp"
+#include "scene/trace_rows.hpp"
 #include "trace/camera_tracer.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 

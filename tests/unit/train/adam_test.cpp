@@ -8,9 +8,9 @@
 #include <limits>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

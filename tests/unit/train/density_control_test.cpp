@@ -8,10 +8,10 @@
 #include <limits>
 #include <set>
 
-#include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

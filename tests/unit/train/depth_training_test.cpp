@@ -14,8 +14,6 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.hpp"
-#include "core/camera_model.hpp"
 #include "io/depth_map.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/context.hpp"
@@ -24,8 +22,10 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
+#include "scene/camera_model.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;

@@ -9,10 +9,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

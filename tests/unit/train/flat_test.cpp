@@ -12,7 +12,6 @@
 #include <glm/matrix.hpp>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
@@ -23,6 +22,7 @@
 #include "reference/scenes.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;

@@ -9,14 +9,14 @@
 #include <numbers>
 #include <vector>
 
-#include "base/rng.hpp"
-#include "core/camera_model.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/trainer.hpp"
-#include "train/checkpoint.hpp"
+#include "run/checkpoint.hpp"
+#include "scene/camera_model.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "reference/ssim.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {

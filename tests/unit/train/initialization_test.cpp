@@ -8,9 +8,9 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
 #include "test_photos.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -10,10 +10,10 @@
 #include <glm/matrix.hpp>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "train/density_control.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/io.hpp"
 #include "unit/fixture.hpp"
 #include "unit/io/scratch.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -11,7 +11,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/camera_model.hpp"
+#include "scene/camera_model.hpp"
 #include "test_photos.hpp"
 #include "train/initialization.hpp"
 

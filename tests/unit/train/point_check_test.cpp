@@ -3,10 +3,10 @@
 
 #include <doctest/doctest.h>
 
-#include "base/rng.hpp"
-#include "core/camera_model.hpp"
+#include "scene/camera_model.hpp"
 #include "test_photos.hpp"
 #include "train/initialization.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -10,8 +10,8 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
-#include "base/rng.hpp"
 #include "raysplats/error.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

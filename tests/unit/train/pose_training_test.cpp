@@ -7,7 +7,6 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "base/rng.hpp"
 #include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
@@ -16,6 +15,7 @@
 #include "train/pose_refinement.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

@@ -5,8 +5,6 @@
 #include <filesystem>
 #include <string>
 
-#include "base/atomic_file.hpp"
-#include "base/rng.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
@@ -14,6 +12,8 @@
 #include "raysplats/trainer.hpp"
 #include "train/mirror_meshes.hpp"
 #include "unit/fixture.hpp"
+#include "util/atomic_file.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

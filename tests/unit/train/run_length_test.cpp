@@ -10,7 +10,7 @@
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
-#include "train/train_config.hpp"
+#include "run/train_config.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 

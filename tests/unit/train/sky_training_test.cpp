@@ -14,9 +14,9 @@
 #include "raysplats/model.hpp"
 #include "raysplats/tracer.hpp"
 #include "raysplats/trainer.hpp"
-#include "train/model_source.hpp"
+#include "run/model_source.hpp"
+#include "run/train_config.hpp"
 #include "train/sky_adam.hpp"
-#include "train/train_config.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/camera_model.hpp"
+#include "scene/camera_model.hpp"
 #include "train/photo_set.hpp"
 
 namespace raysplats::test {

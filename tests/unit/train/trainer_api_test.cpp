@@ -8,14 +8,14 @@
 #include <thread>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "device/context.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/tracer.hpp"
 #include "raysplats/trainer.hpp"
-#include "train/checkpoint.hpp"
+#include "run/checkpoint.hpp"
 #include "unit/fixture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

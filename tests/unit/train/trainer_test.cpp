@@ -11,16 +11,16 @@
 #include <string>
 #include <thread>
 
-#include "base/rng.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "run/checkpoint.hpp"
+#include "run/train_config.hpp"
 #include "trace/camera_tracer.hpp"
-#include "train/checkpoint.hpp"
 #include "train/memory_estimate.hpp"
-#include "train/train_config.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "base/rng.hpp"
 #include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
@@ -19,6 +18,7 @@
 #include "train/schedule.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "base/rng.hpp"
 #include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
@@ -14,6 +13,7 @@
 #include "train/gradient_tree.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/camera_model.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
 
 using namespace raysplats;
 using namespace raysplats::view;

@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/frame_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <span>
+
+#include "comm/communicator.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "render/bands.hpp"
+#include "scene/camera_path.hpp"
+
+namespace raysplats {
+namespace {
+
+// The inverse of the sRGB curve; numbers below 0 keep their sign, those above 1 follow the curve.
+float linear_from_display(float value) {
+  const float size = std::abs(value);
+  const float linear = size <= 0.04045f ? size / 12.92f : std::pow((size + 0.055f) / 1.055f, 2.4f);
+  return std::copysign(linear, value);
+}
+
+constexpr int kMaxSupersample = 16;
+constexpr float kLeastNormal = 1e-5f;
+
+/// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
+std::string joined(const std::filesystem::path& name) {
+  std::string out;
+  for (const std::filesystem::path& part : name.parent_path().relative_path()) {
+    if (part != "." && part != ".." && !part.empty()) out += part.string() + "_";
+  }
+  return out + name.stem().string();
+}
+
+Image with_channels(const Image& image, int channels) {
+  Image out(image.width, image.height, channels);
+  const auto from = static_cast<std::size_t>(image.channels);
+  const auto to = static_cast<std::size_t>(channels);
+  for (std::size_t i = 0; i < image.pixels(); ++i) {
+    for (std::size_t c = 0; c < std::min(from, to); ++c)
+      out.data[i * to + c] = image.data[i * from + c];
+  }
+  return out;
+}
+
+/// Expected depth times alpha, and alpha: samples that met nothing carry no depth, so blocks and
+/// moments average by alpha.
+Image weighted_depth(const Image& depth, const Image& rgba) {
+  Image weighted(depth.width, depth.height, 2);
+  for (std::size_t i = 0; i < depth.pixels(); ++i) {
+    const float alpha = rgba.data[4 * i + 3];
+    const float z = depth.data[i * static_cast<std::size_t>(depth.channels)];
+    weighted.data[2 * i] = alpha * z;
+    weighted.data[2 * i + 1] = alpha;
+  }
+  return weighted;
+}
+
+/// Expected depth at the size of the frame, from weighted_depth().
+Image average_depth(const Image& weighted, int factor) {
+  const Image mean = box_average(weighted, factor);
+  Image out(mean.width, mean.height, 1);
+  for (std::size_t i = 0; i < mean.pixels(); ++i) {
+    const float alpha = mean.data[2 * i + 1];
+    out.data[i] = alpha > 0.0f ? mean.data[2 * i] / alpha : 0.0f;
+  }
+  return out;
+}
+
+/// The camera `share` of the way from a frame to the next one.
+Camera later(std::span<const Camera> cameras, std::size_t frame, double share, bool closed) {
+  const Camera& now = cameras[frame];
+  if (share == 0.0 || cameras.size() < 2) return now;
+  if (frame + 1 < cameras.size()) return between(now, cameras[frame + 1], share);
+  if (closed) return between(now, cameras.front(), share);
+  return between(cameras[frame - 1], now, 1.0 + share);
+}
+
+/// A frame at its number of rays per pixel, means of the moments at which the shutter is open.
+struct Exposed {
+  Image rgba;   ///< empty when it was stopped
+  Image depth;  ///< weighted_depth(), where options ask
+  Image hits;   ///< where options ask
+  std::uint64_t capped_rays = 0;
+};
+
+void add(Image& sum, Image image) {
+  if (sum.data.empty()) {
+    sum = std::move(image);
+    return;
+  }
+  for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += image.data[i];
+}
+
+Exposed exposed(Tracer& tracer,
+                const Model& model,
+                std::span<const Camera> cameras,
+                std::size_t frame,
+                const FrameOptions& options,
+                Communicator& ranks,
+                const std::function<bool(double)>& within) {
+  const int moments = options.shutter_samples;
+  Exposed out;
+  for (int k = 0; k < moments; ++k) {
+    const Camera camera = later(cameras, frame, options.shutter * k / moments, options.closed);
+    Image moment =
+        tracer.render(model, downscaled(camera, 1.0 / options.supersample), false,
+                      [&](double share) { return !within || within((k + share) / moments); });
+    if (ranks.any(moment.data.empty())) return {};
+    collect_rows(ranks, tracer.rows(), moment);
+    if (options.depth || options.hits) {
+      Image depth = tracer.depth();
+      collect_rows(ranks, tracer.rows(), depth);
+      if (options.depth) add(out.depth, weighted_depth(depth, moment));
+      if (options.hits) add(out.hits, hits_of(depth));
+    }
+    add(out.rgba, std::move(moment));
+    out.capped_rays += tracer.capped_rays();
+  }
+  const float scale = 1.0f / static_cast<float>(moments);
+  for (Image* image : {&out.rgba, &out.depth, &out.hits}) {
+    for (float& value : image->data) value *= scale;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string file_extension(FrameFormat format) {
+  switch (format) {
+    case FrameFormat::kExr:
+      return ".exr";
+    case FrameFormat::kJpg:
+      return ".jpg";
+    case FrameFormat::kPng:
+      break;
+  }
+  return ".png";
+}
+
+std::vector<std::string> frame_names(std::span<const Camera> cameras) {
+  std::vector<std::string> names(cameras.size());
+  std::map<std::string, std::size_t> stems;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    names[i] = std::filesystem::path(cameras[i].name).stem().string();
+    if (names[i].empty()) names[i] = fmt::format("frame_{:04d}", i);
+    ++stems[names[i]];
+  }
+  std::set<std::string> used;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    std::string name = names[i];
+    if (stems[name] > 1) {
+      name = joined(cameras[i].name);
+      if (name.empty()) name = names[i];
+    }
+    std::string unique = name;
+    for (int n = 2; !used.insert(unique).second; ++n) unique = fmt::format("{}_{}", name, n);
+    names[i] = unique;
+  }
+  return names;
+}
+
+Image box_average(const Image& image, int factor) {
+  if (factor == 1) return image;
+  Image out(image.width / factor, image.height / factor, image.channels);
+  const float scale = 1.0f / static_cast<float>(factor * factor);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      for (int c = 0; c < out.channels; ++c) {
+        float sum = 0.0f;
+        for (int v = 0; v < factor; ++v) {
+          for (int u = 0; u < factor; ++u) sum += image.at(x * factor + u, y * factor + v, c);
+        }
+        out.at(x, y, c) = sum * scale;
+      }
+    }
+  }
+  return out;
+}
+
+Image depth_preview(const Image& depth, const Image& rgba) {
+  const auto covered = [&](std::size_t i) { return rgba.data[4 * i + 3] >= 0.5f; };
+  float low = std::numeric_limits<float>::infinity();
+  float high = -low;
+  for (std::size_t i = 0; i < depth.pixels(); ++i) {
+    if (!covered(i)) continue;
+    low = std::min(low, depth.data[i]);
+    high = std::max(high, depth.data[i]);
+  }
+  Image out(depth.width, depth.height, 1);
+  for (std::size_t i = 0; i < depth.pixels(); ++i) {
+    if (covered(i)) out.data[i] = high > low ? (high - depth.data[i]) / (high - low) : 1.0f;
+  }
+  return out;
+}
+
+Image hits_of(const Image& depth) {
+  Image out(depth.width, depth.height, 1);
+  for (std::size_t i = 0; i < out.pixels(); ++i) out.data[i] = depth.data[3 * i + 2];
+  return out;
+}
+
+Image unit_normals(Image sums) {
+  for (std::size_t i = 0; i < sums.pixels(); ++i) {
+    float* n = &sums.data[3 * i];
+    const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    // Less is what rounding leaves of nothing.
+    const float scale = length > kLeastNormal ? 1.0f / length : 0.0f;
+    for (std::size_t c = 0; c < 3; ++c) n[c] *= scale;
+  }
+  return sums;
+}
+
+Image normals_preview(const Image& normals, const Image& rgba, const Camera& camera) {
+  Image out(normals.width, normals.height, 3);
+  for (std::size_t i = 0; i < normals.pixels(); ++i) {
+    if (rgba.data[4 * i + 3] < 0.5f) continue;
+    const float* n = &normals.data[3 * i];
+    const glm::dvec3 seen = camera.rotation * glm::dvec3(n[0], n[1], n[2]);
+    // The camera's y points down and its z away.
+    const double axes[] = {seen.x, -seen.y, -seen.z};
+    for (std::size_t c = 0; c < 3; ++c)
+      out.data[3 * i + c] = static_cast<float>(0.5 + 0.5 * axes[c]);
+  }
+  return out;
+}
+
+Image hits_preview(const Image& hits) {
+  Image out = hits;
+  float most = 1.0f;
+  for (const float count : hits.data) most = std::max(most, count);
+  for (float& count : out.data) count /= most;
+  return out;
+}
+
+void write_frame(const std::filesystem::path& stem,
+                 const Image& rgba,
+                 const Camera& camera,
+                 const FrameLayers& layers,
+                 const FrameOptions& options) {
+  if (options.video) options.video->add(rgba);
+  if (!options.files) return;
+  const auto file = [&](const char* suffix, const std::filesystem::path& type) {
+    std::filesystem::path path = stem;
+    path += suffix;
+    path += type;
+    return path;
+  };
+  if (options.format == FrameFormat::kExr) {
+    std::vector<std::string> names;
+    std::vector<const Image*> more;
+    const auto add = [&](bool wanted, const Image& layer, const std::vector<std::string>& of) {
+      if (!wanted) return;
+      more.push_back(&layer);
+      names.insert(names.end(), of.begin(), of.end());
+    };
+    add(options.depth, layers.depth, {"Z"});
+    add(options.normals, layers.normals, {"N.X", "N.Y", "N.Z"});
+    add(options.hits, layers.hits, {"hits"});
+    const std::size_t count = 4 + names.size();
+    Image channels = with_channels(rgba, static_cast<int>(count));
+    for (std::size_t i = 0; i < channels.pixels(); ++i) {
+      float* pixel = &channels.data[count * i];
+      for (std::size_t c = 0; c < 3 && options.linear_exr; ++c)
+        pixel[c] = linear_from_display(pixel[c]);
+      pixel += 4;
+      for (const Image* layer : more) {
+        const auto width = static_cast<std::size_t>(layer->channels);
+        pixel = std::copy_n(&layer->data[width * i], width, pixel);
+      }
+    }
+    write_image(file("", file_extension(options.format)), channels, names,
+                options.linear_exr ? ColorSpace::kLinear : ColorSpace::kDisplay);
+    return;
+  }
+  write_image(file("", file_extension(options.format)), with_channels(rgba, 3));
+  if (options.depth) write_image(file("_depth", ".png"), depth_preview(layers.depth, rgba));
+  if (options.normals)
+    write_image(file("_normals", ".png"), normals_preview(layers.normals, rgba, camera));
+  if (options.hits) write_image(file("_hits", ".png"), hits_preview(layers.hits));
+}
+
+FrameReport write_frames(Tracer& tracer,
+                         const Model& model,
+                         std::span<const Camera> cameras,
+                         const std::filesystem::path& folder,
+                         const FrameOptions& options,
+                         const std::function<bool(std::size_t)>& done,
+                         const std::function<bool(double)>& within) {
+  if (options.supersample < 1 || options.supersample > kMaxSupersample) {
+    throw UsageError(fmt::format("--supersample {} is out of range: use 1 to {}",
+                                 options.supersample, kMaxSupersample));
+  }
+  if (options.shutter_samples < 1 || !(options.shutter > 0.0 && options.shutter <= 1.0)) {
+    throw UsageError(fmt::format(
+        "--shutter-samples {} over --shutter {} are no motion blur: use 1 or more, over 0 to 1",
+        options.shutter_samples, options.shutter));
+  }
+  const std::vector<std::string> names = frame_names(cameras);
+  FrameReport report;
+  Communicator alone;
+  Communicator& ranks = options.bands != nullptr ? *options.bands : alone;
+  tracer.set_share(static_cast<std::size_t>(ranks.rank()), static_cast<std::size_t>(ranks.size()));
+  for (std::size_t i = options.offset; i < cameras.size(); i += options.stride) {
+    const double built = tracer.context().build_seconds();
+    const auto start = std::chrono::steady_clock::now();
+    const Exposed samples = exposed(tracer, model, cameras, i, options, ranks, within);
+    if (samples.rgba.data.empty()) break;
+    FrameLayers layers;
+    if (options.depth) layers.depth = average_depth(samples.depth, options.supersample);
+    if (options.hits) layers.hits = box_average(samples.hits, options.supersample);
+    report.trace_seconds +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
+        (tracer.context().build_seconds() - built);
+    report.capped_rays += samples.capped_rays;
+    // What follows is left to the one that leads.
+    if (!ranks.leads()) {
+      if (ranks.any(done && !done(report.frames))) break;
+      continue;
+    }
+    report.rays += samples.rgba.pixels() * static_cast<std::uint64_t>(options.shutter_samples);
+    if (options.normals) {
+      const double last = options.shutter * (options.shutter_samples - 1) / options.shutter_samples;
+      const Image sums = tracer.normals(
+          model, downscaled(later(cameras, i, last, options.closed), 1.0 / options.supersample),
+          within);
+      if (sums.data.empty()) {
+        ranks.any(true);
+        break;
+      }
+      layers.normals = unit_normals(box_average(sums, options.supersample));
+    }
+    write_frame(folder / names[i], box_average(samples.rgba, options.supersample), cameras[i],
+                layers, options);
+    ++report.frames;
+    if (ranks.any(done && !done(report.frames))) break;
+  }
+  tracer.set_share(0, 1);
+  return report;
+}
+
+}  // namespace raysplats

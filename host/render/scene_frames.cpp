@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/scene_frames.hpp"
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "comm/communicator.hpp"
+#include "render/bands.hpp"
+
+namespace raysplats {
+namespace {
+
+void add(PathTracer::Statistics& sum, const PathTracer::Statistics& frame) {
+  sum.camera_rays += frame.camera_rays;
+  sum.continued_rays += frame.continued_rays;
+  sum.shadow_rays += frame.shadow_rays;
+  sum.capped_rays += frame.capped_rays;
+  sum.ended_by_bounces += frame.ended_by_bounces;
+}
+
+}  // namespace
+
+SceneReport write_scene_frames(PathTracer& tracer,
+                               const LoadedScene& scene,
+                               std::size_t first,
+                               std::size_t last,
+                               const std::filesystem::path& folder,
+                               const FrameOptions& options,
+                               const std::function<bool(std::size_t)>& done,
+                               const std::function<bool(double)>& within) {
+  const std::vector<std::string> names = frame_names(scene.cameras);
+  SceneReport report;
+  Communicator alone;
+  Communicator& ranks = options.bands != nullptr ? *options.bands : alone;
+  tracer.set_share(static_cast<std::size_t>(ranks.rank()), static_cast<std::size_t>(ranks.size()));
+  for (std::size_t i = first + options.offset; i < last; i += options.stride) {
+    const double built = tracer.context().build_seconds();
+    const auto start = std::chrono::steady_clock::now();
+    if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<int>(i)));
+    Image rgba = tracer.render(scene.cameras[i], within);
+    report.trace_seconds +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
+        (tracer.context().build_seconds() - built);
+    add(report.rays, tracer.statistics());
+    if (ranks.any(rgba.pixels() == 0)) break;
+    collect_rows(ranks, tracer.rows(), rgba);
+    // What follows is left to the one that leads.
+    if (ranks.leads()) {
+      write_frame(folder / names[i], rgba, {}, {}, options);
+      ++report.frames;
+    }
+    if (ranks.any(done && !done(report.frames))) break;
+  }
+  tracer.set_share(0, 1);
+  return report;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run/model_source.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <charconv>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "io/model_file.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "run/train_config.hpp"
+#include "scene/gaussian_transform.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::string_view kIterationPrefix = "iteration_";
+
+std::optional<std::int64_t> iteration_of(const std::filesystem::path& folder) {
+  const std::string name = folder.filename().string();
+  if (!name.starts_with(kIterationPrefix)) return std::nullopt;
+  std::int64_t value = 0;
+  const char* end = name.data() + name.size();
+  const auto [next, error] = std::from_chars(name.data() + kIterationPrefix.size(), end, value);
+  return error == std::errc() && next == end && value >= 0 ? std::optional(value) : std::nullopt;
+}
+
+std::filesystem::path config_of(const std::filesystem::path& run) { return run / "config.toml"; }
+
+void read_options(ModelSource& source, const std::filesystem::path& run) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(config_of(run), error)) return;
+  source.trained.emplace();
+  read_train_config(config_of(run), *source.trained);
+}
+
+void read_header(ModelSource& source) {
+  if (io::model_format(source.file) == io::ModelFormat::kPly) {
+    const std::optional<TraceOptions> said = read_ply_options(source.file);
+    if (said) source.sky = said->sky;
+    if (!source.trained) source.header = said;
+  }
+  source.origin = io::model_origin(source.file);
+}
+
+// The sky of a run, which its PLY names.
+SkyLight trained_sky(const ModelSource& source) {
+  if (source.sky.empty()) {
+    spdlog::warn(
+        "the sky of the run is not in the header of {}, where the run wrote it: black is shown in "
+        "its place",
+        source.file.string());
+  }
+  return source.sky;
+}
+
+}  // namespace
+
+bool is_run_folder(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(config_of(path), error) ||
+         std::filesystem::is_directory(path / "point_cloud", error);
+}
+
+ModelSource find_model(const std::filesystem::path& path) {
+  std::error_code error;
+  ModelSource source;
+  if (!std::filesystem::exists(path, error)) {
+    throw DataError(fmt::format("The model {} does not exist: check the path", path.string()));
+  }
+  if (!std::filesystem::is_directory(path, error)) {
+    source.file = path;
+    const std::filesystem::path folder =
+        std::filesystem::absolute(path, error).lexically_normal().parent_path();
+    source.iteration = iteration_of(folder);
+    if (source.iteration && folder.parent_path().filename() == "point_cloud") {
+      read_options(source, folder.parent_path().parent_path());
+    }
+    read_header(source);
+    return source;
+  }
+  for (std::filesystem::directory_iterator entry(path / "point_cloud", error), end;
+       !error && entry != end; entry.increment(error)) {
+    const std::optional<std::int64_t> iteration = iteration_of(entry->path());
+    const std::filesystem::path ply = entry->path() / "point_cloud.ply";
+    std::error_code ignored;
+    if (!iteration || (source.iteration && *iteration <= *source.iteration)) continue;
+    if (!std::filesystem::is_regular_file(ply, ignored)) continue;
+    source.iteration = iteration;
+    source.file = ply;
+  }
+  if (!source.iteration) {
+    throw DataError(
+        fmt::format("The folder {} holds no point_cloud/iteration_N/point_cloud.ply: name a run "
+                    "that has saved a model, or a PLY",
+                    path.string()));
+  }
+  read_options(source, path);
+  read_header(source);
+  return source;
+}
+
+DatasetOptions dataset_options(const ModelSource& source) {
+  DatasetOptions out = source.trained ? source.trained->data : DatasetOptions();
+  out.origin = source.origin;
+  return out;
+}
+
+TraceOptions trace_options(const ModelSource& source, bool cut_out) {
+  if (!source.trained && source.header) return *source.header;
+  if (!source.trained) {
+    spdlog::info(
+        "{} does not say how it is traced: hits are taken in peak order, as rasterisers do",
+        source.file.string());
+    return peak_order();
+  }
+  TraceOptions out = source.trained->trace;
+  out.background = background_color(*source.trained, cut_out);
+  if (source.trained->background == "sky") out.sky = trained_sky(source);
+  return out;
+}
+
+void find_models(SceneFile& scene) {
+  std::optional<ModelSource> first;  // that tells, or else of all
+  glm::dmat4 first_transform(1.0);
+  for (SceneModel& model : scene.models) {
+    const ModelSource source = find_model(model.file);
+    model.file = source.file;
+    const bool tells = source.trained || source.header;
+    const bool told = first && (first->trained || first->header);
+    if (first && (!tells || told)) continue;
+    first = source;
+    first_transform = model.transform;
+  }
+  if (!first) return;
+  scene.trained = trace_options(*first, false);
+  scene.trained.sky = transformed(scene.trained.sky, first_transform);
+}
+
+}  // namespace raysplats

@@ -1,0 +1,343 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run/run_folder.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "io/data_origin.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "run/train_config.hpp"
+#include "util/atomic_file.hpp"
+#include "util/output_directory.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr char kCsvHeader[] = "iteration,seconds,loss,psnr,gaussians,it_per_s,candidates,hits\n";
+
+std::ptrdiff_t columns(std::string_view row) { return std::count(row.begin(), row.end(), ','); }
+
+/// A row of metrics.csv below `header` with all the columns of today: those that came later are 0.
+/// Nothing for one that was cut off, as by a power failure.
+std::string with_all_columns(const std::string& row, const std::string& header) {
+  const bool known = std::string_view(kCsvHeader).starts_with(header);
+  if (!known || columns(row) != columns(header) || row.ends_with(',')) return "";
+  std::string out = row;
+  for (std::ptrdiff_t i = columns(header); i < columns(kCsvHeader); ++i) out += ",0";
+  return out + "\n";
+}
+
+nlohmann::json to_json(const EvaluationRow& row) {
+  nlohmann::json json{{"iteration", row.iteration},
+                      {"training_seconds", row.training_seconds},
+                      {"psnr", row.psnr},
+                      {"ssim", row.ssim},
+                      {"views", row.views},
+                      {"gaussians", row.gaussians},
+                      {"psnr_corrected", row.psnr_corrected}};
+  if (row.psnr_all) json["psnr_all"] = *row.psnr_all;
+  return json;
+}
+
+EvaluationRow evaluation_from_json(const nlohmann::json& json) {
+  EvaluationRow row;
+  json.at("iteration").get_to(row.iteration);
+  json.at("training_seconds").get_to(row.training_seconds);
+  json.at("psnr").get_to(row.psnr);
+  json.at("ssim").get_to(row.ssim);
+  json.at("views").get_to(row.views);
+  json.at("gaussians").get_to(row.gaussians);
+  row.psnr_corrected = json.value("psnr_corrected", 0.0);  // runs of older versions have none
+  if (json.contains("psnr_all")) row.psnr_all = json.at("psnr_all").get<double>();
+  return row;
+}
+
+constexpr std::array<const char*, 7> kReports{
+    "config.toml",    "cameras.json",         "metrics.csv", "metrics.json",
+    "exposures.json", "cameras_refined.json", "report.html"};
+
+std::string iteration_name(std::int64_t iteration) {
+  return fmt::format("iteration_{}", iteration);
+}
+
+std::filesystem::path model_file(const std::filesystem::path& run, std::int64_t iteration) {
+  return run / "point_cloud" / iteration_name(iteration) / "point_cloud.ply";
+}
+
+// N of a file or folder called PREFIX N SUFFIX.
+std::optional<std::int64_t> number_in(std::string_view name,
+                                      std::string_view prefix,
+                                      std::string_view suffix) {
+  if (name.size() <= prefix.size() + suffix.size() || !name.starts_with(prefix) ||
+      !name.ends_with(suffix)) {
+    return std::nullopt;
+  }
+  name.remove_prefix(prefix.size());
+  name.remove_suffix(suffix.size());
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), value);
+  return error == std::errc() && end == name.data() + name.size() ? std::optional(value)
+                                                                  : std::nullopt;
+}
+
+// The entries of a folder that are called so, with their numbers.
+std::vector<std::pair<std::int64_t, std::filesystem::path>> numbered(
+    const std::filesystem::path& folder, std::string_view prefix, std::string_view suffix) {
+  std::vector<std::pair<std::int64_t, std::filesystem::path>> out;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    const auto number = number_in(entry.path().filename().string(), prefix, suffix);
+    if (number) out.emplace_back(*number, entry.path());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+void remove_file(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::remove(path, error);
+  if (error) {
+    throw DataError(fmt::format("{} cannot be removed: {}", path.string(), error.message()));
+  }
+}
+
+// A folder goes when nothing else is in it.
+void remove_if_empty(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (std::filesystem::is_empty(folder, error) && !error) remove_file(folder);
+}
+
+}  // namespace
+
+RunFolder::RunFolder(std::filesystem::path path, bool writes)
+    : path_(std::move(path)), writes_(writes) {
+  if (writes_) make_output_directory(path_);
+}
+
+FileLock RunFolder::lock() const {
+  FileLock lock(path_ / ".lock");
+  const std::size_t stale = remove_stale_temporaries(path_);
+  if (stale > 0) spdlog::info("{} temporary files of a run that was killed are removed", stale);
+  return lock;
+}
+
+std::filesystem::path RunFolder::evaluation_folder(std::int64_t iteration) const {
+  return path_ / "eval" / iteration_name(iteration);
+}
+
+void RunFolder::write_config(const TrainOptions& options) const {
+  if (!writes_) return;
+  write_text_file(path_ / "config.toml", to_toml(options));
+}
+
+void RunFolder::write_cameras(std::span<const Camera> cameras) const {
+  if (!writes_) return;
+  nlohmann::json list = nlohmann::json::array();
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const Camera& camera = cameras[i];
+    const glm::dvec3 center = camera.center();
+    nlohmann::json rotation = nlohmann::json::array();
+    // Row r, column c of camera-to-world; glm's m[column][row] of the inverse, which is the
+    // transpose.
+    for (int r = 0; r < 3; ++r) {
+      rotation.push_back({camera.rotation[r][0], camera.rotation[r][1], camera.rotation[r][2]});
+    }
+    list.push_back({{"id", i},
+                    {"img_name", camera.name},
+                    {"width", camera.width},
+                    {"height", camera.height},
+                    {"position", {center.x, center.y, center.z}},
+                    {"rotation", rotation},
+                    {"fy", camera.fy},
+                    {"fx", camera.fx}});
+  }
+  write_text_file(path_ / "cameras.json", list.dump() + "\n");
+}
+
+void RunFolder::write_exposures(std::span<const Camera> cameras,
+                                std::span<const float> deltas) const {
+  if (!writes_) return;
+  nlohmann::json json = nlohmann::json::object();
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    nlohmann::json rows = nlohmann::json::array();
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float* row = deltas.data() + 12 * i + 4 * c;
+      nlohmann::json values = {row[0], row[1], row[2], row[3]};
+      values[c] = 1.0f + row[c];
+      rows.push_back(std::move(values));
+    }
+    json[cameras[i].name] = std::move(rows);
+  }
+  write_text_file(path_ / "exposures.json", json.dump(1) + "\n");
+}
+
+void RunFolder::write_refined_cameras(std::vector<Camera> cameras,
+                                      const std::array<double, 3>& origin) const {
+  if (!writes_) return;
+  for (Camera& camera : cameras)
+    io::move_origin(camera, -glm::dvec3(origin[0], origin[1], origin[2]));
+  raysplats::write_cameras(path_ / "cameras_refined.json", cameras);
+}
+
+void RunFolder::write_model(const Gaussians& model,
+                            const TraceOptions& trace,
+                            std::int64_t iteration,
+                            const std::array<double, 3>& origin) const {
+  if (!writes_) return;
+  write_ply(model_file(path_, iteration), model, trace, origin);
+}
+
+bool RunFolder::has_model(std::int64_t iteration) const {
+  std::error_code error;
+  return std::filesystem::exists(model_file(path_, iteration), error);
+}
+
+void RunFolder::remove_model(std::int64_t iteration) const {
+  if (!writes_) return;
+  if (!has_model(iteration)) return;
+  const std::filesystem::path file = model_file(path_, iteration);
+  remove_file(file);
+  remove_if_empty(file.parent_path());
+}
+
+void RunFolder::remove_after(std::int64_t iteration) const {
+  if (!writes_) return;
+  for (const auto& [number, file] : numbered(path_ / "checkpoints", "step_", ".rsck")) {
+    if (number > iteration) remove_file(file);
+  }
+  for (const auto& [number, folder] : numbered(path_ / "point_cloud", "iteration_", "")) {
+    if (number > iteration) remove_model(number);
+  }
+  for (const auto& [number, folder] : numbered(path_ / "eval", "iteration_", "")) {
+    if (number <= iteration) continue;
+    std::vector<std::filesystem::path> pictures;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      if (entry.path().extension() == ".png") pictures.push_back(entry.path());
+    }
+    for (const std::filesystem::path& picture : pictures) remove_file(picture);
+    remove_file(folder / "metrics.json");
+    remove_if_empty(folder);
+  }
+  if (iteration > 0) return;
+  for (const char* report : kReports) remove_file(path_ / report);
+}
+
+void RunFolder::begin_metrics(std::int64_t iteration) {
+  evaluations_.clear();
+  validations_.clear();
+  std::string csv = kCsvHeader;
+  if (iteration > 0) {
+    std::ifstream rows(path_ / "metrics.csv");
+    std::string header;
+    std::getline(rows, header);
+    std::string line;
+    while (std::getline(rows, line)) {
+      const long long recorded = std::strtoll(line.c_str(), nullptr, 10);
+      if (recorded > 0 && recorded <= iteration) csv += with_all_columns(line, header);
+    }
+    std::ifstream metrics(path_ / "metrics.json");
+    try {
+      const nlohmann::json old = nlohmann::json::parse(metrics);
+      for (const nlohmann::json& entry : old.at("evaluations")) {
+        const EvaluationRow row = evaluation_from_json(entry);
+        if (row.iteration <= iteration) evaluations_.push_back(row);
+      }
+      for (const nlohmann::json& entry : old.value("validations", nlohmann::json::array())) {
+        const EvaluationRow row = evaluation_from_json(entry);
+        if (row.iteration <= iteration) validations_.push_back(row);
+      }
+    } catch (const nlohmann::json::exception&) {
+      // Reports of an earlier run that cannot be read are no reason not to train.
+    }
+  }
+  if (writes_) write_text_file(path_ / "metrics.csv", csv);
+}
+
+void RunFolder::append(const TrainRow& row) {
+  if (!writes_) return;
+  std::ofstream stream(path_ / "metrics.csv", std::ios::app);
+  stream << fmt::format("{},{:.3f},{:.7g},{:.4f},{},{:.3f},{},{}\n", row.iteration, row.seconds,
+                        row.loss, row.psnr, row.gaussians, row.iterations_per_second,
+                        row.candidates, row.hits);
+  stream.flush();
+  if (!stream.good()) {
+    throw DataError(fmt::format("{} cannot be written: {}", (path_ / "metrics.csv").string(),
+                                std::strerror(errno)));
+  }
+}
+
+void RunFolder::record(const EvaluationRow& row) { evaluations_.push_back(row); }
+
+void RunFolder::write_metrics(const nlohmann::json& summary) const {
+  if (!writes_) return;
+  nlohmann::json json = summary;
+  json["evaluations"] = nlohmann::json::array();
+  for (const EvaluationRow& row : evaluations_) json["evaluations"].push_back(to_json(row));
+  if (!validations_.empty()) {
+    json["validations"] = nlohmann::json::array();
+    for (const EvaluationRow& row : validations_) json["validations"].push_back(to_json(row));
+  }
+  json["note"] = "training_seconds exclude evaluation and compiling kernels";
+  write_text_file(path_ / "metrics.json", json.dump(2) + "\n");
+}
+
+void check_no_run(const std::filesystem::path& folder) {
+  std::int64_t newest = -1;
+  for (const auto& [number, path] : numbered(folder / "checkpoints", "step_", ".rsck")) {
+    newest = std::max(newest, number);
+  }
+  for (const auto& [number, path] : numbered(folder / "point_cloud", "iteration_", "")) {
+    newest = std::max(newest, number);
+  }
+  const auto exists = [&](const char* name) {
+    std::error_code error;
+    return std::filesystem::exists(folder / name, error);
+  };
+  if (newest < 0 && std::none_of(kReports.begin(), kReports.end(), exists)) return;
+  throw UsageError(fmt::format(
+      "The folder {} holds another run ({}): go on with it by --resume latest, choose another "
+      "folder, or replace it by --overwrite",
+      folder.string(), newest < 0 ? "without a checkpoint" : fmt::format("iteration {}", newest)));
+}
+
+std::optional<EvaluationRow> better_before(std::span<const EvaluationRow> evaluations,
+                                           double margin) {
+  std::optional<EvaluationRow> best;
+  for (const EvaluationRow& row : evaluations) {
+    if (row.views == evaluations.back().views && (!best || row.psnr > best->psnr)) best = row;
+  }
+  if (best && best->psnr <= evaluations.back().psnr + margin) best.reset();
+  return best;
+}
+
+double recorded_seconds(const std::filesystem::path& run_folder, std::int64_t iteration) {
+  std::ifstream rows(run_folder / "metrics.csv");
+  std::string line;
+  std::getline(rows, line);
+  double seconds = 0;
+  while (std::getline(rows, line)) {
+    char* end = nullptr;
+    const long long recorded = std::strtoll(line.c_str(), &end, 10);
+    if (recorded <= 0 || recorded > iteration || *end != ',') continue;
+    const double value = std::strtod(end + 1, nullptr);
+    if (value >= 0 && std::isfinite(value)) seconds = value;
+  }
+  return seconds;
+}
+
+}  // namespace raysplats

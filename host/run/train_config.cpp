@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run/train_config.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <string_view>
+#include <utility>
+
+#include "io/toml_table.hpp"
+#include "raysplats/error.hpp"
+#include "run/train_keys.hpp"
+#include "scene/option_flags.hpp"
+#include "scene/trace_rows.hpp"
+#include "util/nearest_name.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kCommentWidth = 110;
+
+// The first line of what to_toml() writes.
+constexpr std::string_view kRunMark = "# ---- Run ----\n";
+
+// A file that a run wrote, in the dialect of older versions: strings without escapes and seeds
+// beyond the integers of TOML.
+std::string modern(std::string text) {
+  std::string out;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size() - 1) + 1;
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    constexpr std::string_view kSeed = "seed = ";
+    constexpr std::size_t kMostDigits = 18;
+    if (line.starts_with(kSeed)) {
+      const std::size_t digits = line.find_first_not_of("0123456789", kSeed.size());
+      const std::size_t last = std::min(digits, line.size());
+      if (last - kSeed.size() > kMostDigits) {
+        out += fmt::format("{}\"{}\"{}", kSeed, line.substr(kSeed.size(), last - kSeed.size()),
+                           line.substr(last));
+        begin = end;
+        continue;
+      }
+    }
+    const bool bare = !line.starts_with('#') && line.find('\'') == std::string_view::npos;
+    for (const char c : line) {
+      if (c == '\\' && bare) out += c;
+      out += c;
+    }
+    begin = end;
+  }
+  return out;
+}
+
+std::string file_text(const std::filesystem::path& path) {
+  try {
+    return io::read_toml_text(path);
+  } catch (const DataError& error) {
+    throw UsageError(fmt::format("The configuration file cannot be read: {}", error.what()));
+  }
+}
+
+std::string dashed(std::string_view key) {
+  std::string out(key);
+  std::replace(out.begin(), out.end(), '_', '-');
+  return out;
+}
+
+std::vector<std::string> names_of(const std::vector<OptionRow>& keys) {
+  std::vector<std::string> names;
+  names.reserve(keys.size());
+  for (const OptionRow& key : keys) names.push_back(key.name);
+  return names;
+}
+
+// Sets every key of a table for which `skip` is false; `prefix` is how the file calls the table.
+void read_keys(const toml::table& table,
+               const std::string& prefix,
+               const std::filesystem::path& path,
+               const std::vector<OptionRow>& keys,
+               std::set<std::string>& seen,
+               const std::function<bool(const std::string&)>& skip) {
+  for (const auto& [written, node] : table) {
+    const std::string name = dashed(written.str());
+    const auto fail = [&, &node = node](const std::string& message) {
+      throw UsageError(
+          fmt::format("{}, line {}: {}", path.string(), node.source().begin.line, message));
+    };
+    if (prefix.empty() && name == "train" && node.is_table()) {
+      read_keys(*node.as_table(), "train.", path, keys, seen, skip);
+      continue;
+    }
+    const auto key = std::find_if(keys.begin(), keys.end(), [&](const OptionRow& candidate) {
+      return candidate.name == name;
+    });
+    if (key == keys.end() && (node.is_table() || node.is_array_of_tables())) {
+      fail(fmt::format(
+          "the table [{}{}] is unknown: keys stand at the top of the file or below [train]", prefix,
+          written.str()));
+    }
+    if (key == keys.end() && take_retired_key(name)) continue;
+    if (key == keys.end()) {
+      fail(fmt::format("unknown key '{}{}': did you mean '{}'?", prefix, written.str(),
+                       nearest_name(name, names_of(keys))));
+    }
+    if (!seen.insert(name).second) fail(fmt::format("'{}' is there twice: leave one out", name));
+    const std::optional<std::vector<std::string>> values = io::value_texts(node);
+    if (!values) {
+      fail(fmt::format(
+          "'{}' takes no {}", name,
+          node.is_array() ? "list of lists, tables or dates" : io::type_name(node).substr(2)));
+    }
+    if (skip(name)) continue;
+    try {
+      key->set(*values);
+    } catch (const UsageError& error) {
+      fail(error.what());
+    }
+  }
+}
+
+// Returns the names of all keys that are there.
+std::set<std::string> read_text(std::string text,
+                                const std::filesystem::path& path,
+                                TrainOptions& options,
+                                const std::function<bool(const std::string&)>& skip) {
+  const toml::table root =
+      io::parse_toml(text.starts_with(kRunMark) ? modern(std::move(text)) : text, path);
+  std::set<std::string> seen;
+  read_keys(root, "", path, train_keys(options), seen, skip);
+  return seen;
+}
+
+// The text in lines of comment.
+std::string comment(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    std::size_t length = text.size();
+    if (length > kCommentWidth) length = text.rfind(' ', kCommentWidth);
+    out += fmt::format("# {}\n", text.substr(0, length));
+    text.remove_prefix(std::min(text.size(), length + 1));
+  }
+  return out;
+}
+
+// A value of TOML as a word for a shell.
+std::string shell_text(std::string text) {
+  if (text == "[]") return text;
+  std::erase_if(text, [](char c) { return c == '"' || c == '[' || c == ']' || c == ' '; });
+  return text;
+}
+
+}  // namespace
+
+void add_train_options(CLI::App& app, TrainOptions& options) {
+  for (const OptionRow& key : train_keys(options)) {
+    const char* names = key.name == "iterations" ? "-n" : key.name == "mirrors" ? "--mirror" : "";
+    CLI::Option* option = add_row(app, key, key.set, names);
+    option->default_str(shell_text(key.text()))->group(key.section);
+  }
+  for (const RetiredKey& key : retired_train_keys()) {
+    app.add_option_function<std::vector<std::string>>(
+           "--" + key.name, [name = key.name](const auto&) { take_retired_key(name); })
+        ->expected(1)
+        ->group("");
+  }
+  app.add_option("--config", "configuration file (TOML); options on the command line go before it")
+      ->expected(1)
+      ->group("Run");
+  app.parse_complete_callback([&app, &options] {
+    const CLI::Option* config = app.get_option("--config");
+    if (config->count() > 0) apply_config_file(app, options, config->as<std::string>());
+    validate(options);
+  });
+}
+
+void apply_config_file(CLI::App& app, TrainOptions& options, const std::filesystem::path& path) {
+  read_text(file_text(path), path, options,
+            [&app](const std::string& key) { return app.get_option("--" + key)->count() > 0; });
+}
+
+void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesystem::path& path) {
+  const auto given = [&app](const std::string& key) {
+    return app.get_option("--" + key)->count() > 0;
+  };
+  const std::set<std::string> found = read_text(file_text(path), path, options, given);
+  if (found.count("origin") == 0 && !given("origin")) options.data.origin.emplace();
+  if (found.count("strategy") > 0) return;
+  // The run is older than these keys: it goes on as it began.
+  if (!given("strategy")) options.strategy = DensityStrategy::kAdc;
+  if (!given("footprint")) options.footprint = 0;
+}
+
+void read_train_config(const std::filesystem::path& path, TrainOptions& options) {
+  read_text(file_text(path), path, options, [](const std::string&) { return false; });
+  validate(options);
+}
+
+TrainOptions parse_train_config(const std::string& text) {
+  TrainOptions options;
+  read_text(text, "the checkpoint's configuration", options,
+            [](const std::string&) { return false; });
+  return options;
+}
+
+std::string to_toml(const TrainOptions& options) {
+  TrainOptions copy = options;
+  std::string out;
+  std::string section;
+  for (const OptionRow& key : train_keys(copy)) {
+    if (key.section != section) {
+      section = key.section;
+      out += fmt::format("{}# ---- {} ----\n", out.empty() ? "" : "\n", section);
+    }
+    out += fmt::format("{}{} = {}\n", comment(key.help), key.name, key.text());
+  }
+  return out;
+}
+
+void validate(const TrainOptions& options) {
+  check_packet_width(options.trace);
+  const auto& sizes = options.resolution_schedule;
+  const auto earlier = [&options](const ResolutionStep& a, const ResolutionStep& b) {
+    return a.until.of(options.iterations) < b.until.of(options.iterations);
+  };
+  if (!std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
+    throw UsageError("The iterations of 'resolution-schedule' have to ascend");
+  }
+  for (const LearningRate& rate :
+       {options.position_lr, options.rotation_lr, options.scale_lr, options.opacity_lr,
+        options.sh_lr, options.sh_rest_lr, options.sky_lr, options.pose_lr}) {
+    if ((rate.initial > 0) != (rate.final_value > 0)) {
+      throw UsageError(
+          "A learning rate and its final value are both 0 (the group stays as it is) or both above "
+          "0");
+    }
+  }
+  if (options.max_gaussians > 0 && options.init_count > options.max_gaussians) {
+    throw UsageError(
+        fmt::format("The start of 'init-count' = {} Gaussians is above 'max-gaussians' = {}: lower "
+                    "the one or raise the other",
+                    options.init_count, options.max_gaussians));
+  }
+  if (options.patience > 0 && options.validate_views == 0) {
+    throw UsageError(
+        "The option 'patience' counts validations, but there are none: set 'validate-views'");
+  }
+  const GradientSum sum = options.trace.gradient_sum;
+  if (options.trace.deterministic && (sum == GradientSum::kAtomic || sum == GradientSum::kSwap)) {
+    throw UsageError(fmt::format(
+        "The options 'deterministic' and 'gradient-sum' = {} contradict each other, because such "
+        "sums depend on the scheduling: use 'gradient-sum' = auto or leave 'deterministic' off",
+        sum == GradientSum::kAtomic ? "atomic" : "swap"));
+  }
+  if (options.scale_max > 0 && options.scale_min > options.scale_max) {
+    throw UsageError(fmt::format("The option 'scale-min' = {} is above 'scale-max' = {}",
+                                 options.scale_min, options.scale_max));
+  }
+  if (options.poses && !options.mirrors.empty()) {
+    throw UsageError(
+        "The option 'poses' cannot be used with 'mirrors': behind a mirror the gradient of a pose "
+        "is not known");
+  }
+  if (options.flat && options.scale_activation != ScaleActivation::kExp) {
+    throw UsageError(
+        "The option 'flat' needs 'scale-activation' = exp, whose numbers are the logarithms of "
+        "sizes");
+  }
+  if (options.depth_weight > 0 && !options.mirrors.empty()) {
+    throw UsageError(
+        "The option 'depth-weight' cannot be used with 'mirrors': what is seen in them has no "
+        "single depth");
+  }
+  if (options.background == "sky" && !options.mirrors.empty()) {
+    throw UsageError(
+        "The option 'background' = sky cannot be used with 'mirrors', which show one colour "
+        "behind everything");
+  }
+  if (options.background == "sky" && options.poses) {
+    throw UsageError(
+        "The options 'background' = sky and 'poses' cannot be used together: the gradient of a "
+        "pose is not known where there is a sky");
+  }
+  if (options.background != "random") background_color(options, false);
+}
+
+std::array<float, 3> background_color(const TrainOptions& options, bool cut_out) {
+  const std::string& text = options.background;
+  if (text == "auto" || text == "random" || text == "sky") {
+    const float value = cut_out ? 1.0f : 0.0f;
+    return {value, value, value};
+  }
+  std::array<float, 3> color{};
+  std::istringstream stream(text);
+  char comma[2] = {};
+  stream >> color[0] >> comma[0] >> color[1] >> comma[1] >> color[2];
+  const bool in_range =
+      std::all_of(color.begin(), color.end(), [](float c) { return c >= 0.0f && c <= 1.0f; });
+  if (stream.fail() || !(stream >> std::ws).eof() || comma[0] != ',' || comma[1] != ',' ||
+      !in_range) {
+    throw UsageError(fmt::format(
+        "The option 'background' is auto, random, sky or three numbers from 0 to 1 such as "
+        "1,1,1, not '{}'",
+        text));
+  }
+  return color;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/gaussian_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+void check_array(const char* name, const std::vector<float>& values, std::size_t expected) {
+  if (values.size() != expected) {
+    throw UsageError(fmt::format(
+        "The Gaussians have {} numbers of {} where {} are needed: give every array its size",
+        values.size(), name, expected));
+  }
+  const auto bad =
+      std::find_if(values.begin(), values.end(), [](float value) { return !std::isfinite(value); });
+  if (bad != values.end()) {
+    throw DataError(fmt::format("Number {} of the Gaussians' {} is not finite: remove or mend it",
+                                bad - values.begin(), name));
+  }
+}
+
+}  // namespace
+
+void check_gaussians(const Gaussians& gaussians) {
+  if (gaussians.sh_degree < 0 || gaussians.sh_degree > 4) {
+    throw UsageError(
+        fmt::format("The Gaussians have SH degree {}: 0 to 4 are possible", gaussians.sh_degree));
+  }
+  const std::size_t n = gaussians.size();
+  check_array("means", gaussians.means, 3 * n);
+  check_array("quaternions", gaussians.quaternions, 4 * n);
+  check_array("log_scales", gaussians.log_scales, 3 * n);
+  check_array("opacities", gaussians.opacities, n);
+  check_array("sh", gaussians.sh,
+              3 * n * static_cast<std::size_t>(sh_coefficients(gaussians.sh_degree)));
+}
+
+}  // namespace raysplats

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/model_changes.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/trigonometric.hpp>
+#include <numbers>
+
+#include "raysplats/error.hpp"
+#include "scene/gaussian_selection.hpp"
+#include "scene/gaussian_transform.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr int kMaxShDegree = 4;
+
+/// The shortest turn of `up` to -y.
+glm::dmat4 uprighting(const glm::dvec3& up) {
+  const double length = glm::length(up);
+  if (!(length > 0.0) || !std::isfinite(length))
+    throw UsageError("up 0,0,0 is no direction: say which one is to be up");
+  const glm::dvec3 goal(0.0, -1.0, 0.0);
+  const glm::dvec3 from = up / length;
+  const glm::dvec3 axis = glm::cross(from, goal);
+  const double sine = glm::length(axis);
+  const double cosine = glm::dot(from, goal);
+  // Half a turn goes about x: left and right change places with no other axis than front and back.
+  if (sine < 1e-9) {
+    return cosine > 0.0 ? glm::dmat4(1.0)
+                        : glm::rotate(glm::dmat4(1.0), std::numbers::pi, glm::dvec3(1, 0, 0));
+  }
+  return glm::rotate(glm::dmat4(1.0), std::atan2(sine, cosine), axis / sine);
+}
+
+}  // namespace
+
+glm::dmat4 movement(const ModelChanges& changes) {
+  if (!(changes.scale > 0.0))
+    throw UsageError(fmt::format("scale is above 0, not {}", changes.scale));
+  glm::dmat4 map = glm::translate(glm::dmat4(1.0), changes.translate);
+  map = glm::rotate(map, glm::radians(changes.rotate_degrees.z), glm::dvec3(0, 0, 1));
+  map = glm::rotate(map, glm::radians(changes.rotate_degrees.y), glm::dvec3(0, 1, 0));
+  map = glm::rotate(map, glm::radians(changes.rotate_degrees.x), glm::dvec3(1, 0, 0));
+  map = glm::scale(map, glm::dvec3(changes.scale));
+  return changes.up ? map * uprighting(*changes.up) : map;
+}
+
+Gaussians changed(const Gaussians& model, const ModelChanges& changes) {
+  if (changes.min_opacity && !(*changes.min_opacity >= 0.0 && *changes.min_opacity <= 1.0))
+    throw UsageError(fmt::format("min-opacity is 0 to 1, not {}", *changes.min_opacity));
+  if (changes.sh_degree && (*changes.sh_degree < 0 || *changes.sh_degree > kMaxShDegree))
+    throw UsageError(fmt::format("sh-degree is 0 to {}, not {}", kMaxShDegree, *changes.sh_degree));
+  Gaussians out = changes.min_opacity ? with_opacity(model, *changes.min_opacity) : model;
+  const glm::dmat4 map = movement(changes);
+  if (map != glm::dmat4(1.0)) out = transformed(out, map);
+  if (changes.crop) out = within(out, *changes.crop);
+  if (changes.max_gaussians) out = most_contributing(out, *changes.max_gaussians);
+  if (changes.sh_degree) out = with_sh_degree(out, *changes.sh_degree);
+  return out;
+}
+
+}  // namespace raysplats

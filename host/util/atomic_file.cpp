@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "util/atomic_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <random>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+// The name of a file is durable only once its folder is synced; a folder that cannot be opened is
+// no error.
+void sync_folder(const std::filesystem::path& folder) {
+  const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory < 0) return;
+  ::fsync(directory);
+  ::close(directory);
+}
+
+// .NAME.NUMBER.tmp or .NAME.NUMBER.tmp.EXTENSION, as AtomicFile makes them.
+bool is_temporary_name(const std::string& name) {
+  const std::size_t mark = name.rfind(".tmp");
+  if (mark == std::string::npos || name.front() != '.') return false;
+  if (mark + 4 != name.size() && name[mark + 4] != '.') return false;
+  const std::size_t dot = name.rfind('.', mark - 1);
+  if (dot == std::string::npos || dot == 0 || dot + 1 == mark) return false;
+  return name.find_first_not_of("0123456789", dot + 1) == mark;
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)) {
+  const std::filesystem::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
+  std::error_code error;
+  for (std::filesystem::path above = folder;
+       !above.empty() && above.has_relative_path() && !std::filesystem::exists(above, error);) {
+    above = above.has_parent_path() ? above.parent_path() : ".";
+    synced_folders_.push_back(above);
+  }
+  synced_folders_.insert(synced_folders_.begin(), folder);
+  std::filesystem::create_directories(folder, error);
+  // By chance: processes on several machines that share the folder may have one number.
+  std::random_device chance;
+  do {
+    temporary_ = folder / fmt::format(".{}.{}.tmp{}", target_.stem().string(), chance(),
+                                      target_.extension().string());
+    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  } while (descriptor_ < 0 && errno == EEXIST);
+  if (descriptor_ < 0) fail("be created");
+}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  if (!committed_) ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::fail(const char* action) const {
+  throw DataError(fmt::format("{} cannot {}: {}", target_.string(), action, std::strerror(errno)));
+}
+
+void AtomicFile::write(const void* data, std::size_t bytes) {
+  const char* next = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t written = ::write(descriptor_, next, bytes);
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      fail("be written");
+    }
+    next += written;
+    bytes -= static_cast<std::size_t>(written);
+  }
+}
+
+void AtomicFile::commit() {
+  if (::fsync(descriptor_) != 0) fail("be synced");
+  const int descriptor = descriptor_;
+  descriptor_ = -1;
+  if (::close(descriptor) != 0) fail("be closed");
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("be renamed into place");
+  committed_ = true;
+  for (const std::filesystem::path& folder : synced_folders_) sync_folder(folder);
+}
+
+std::size_t remove_stale_temporaries(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> stale;
+  for (std::filesystem::recursive_directory_iterator entry(folder, error), end;
+       !error && entry != end; entry.increment(error)) {
+    std::error_code status;
+    if (entry->is_regular_file(status) && is_temporary_name(entry->path().filename().string()))
+      stale.push_back(entry->path());
+  }
+  std::size_t removed = 0;
+  for (const std::filesystem::path& path : stale) {
+    if (std::filesystem::remove(path, error)) ++removed;
+  }
+  return removed;
+}
+
+void write_text_file(const std::filesystem::path& path, std::string_view text) {
+  AtomicFile file(path);
+  file.write(text);
+  file.commit();
+}
+
+}  // namespace raysplats

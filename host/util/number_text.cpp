@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "util/number_text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <type_traits>
+
+namespace raysplats {
+namespace {
+
+constexpr std::string_view kDigits = "0123456789";
+constexpr std::string_view kSpaces = " \t\r\n";
+
+/// Without the underscores between digits and without a leading plus, which from_chars does not
+/// take; "" where an underscore stands elsewhere.
+std::string plain(std::string_view text) {
+  std::string out;
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '_') {
+      out += text[i];
+      continue;
+    }
+    const auto digit = [&](std::size_t at) {
+      return at < text.size() && kDigits.find(text[at]) != std::string_view::npos;
+    };
+    if (i == 0 || !digit(i - 1) || !digit(i + 1)) return "";
+  }
+  return out;
+}
+
+template <class T>
+std::optional<T> parse_all(const std::string& text) {
+  T value{};
+  const char* end = text.data() + text.size();
+  const auto [next, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || next != end) return std::nullopt;
+  return value;
+}
+
+template <class T>
+std::optional<T> parse_integer(std::string_view text) {
+  const std::string digits = plain(text);
+  if (const std::optional<T> value = parse_all<T>(digits)) return value;
+  constexpr double kExact = 9007199254740992.0;  // 2^53: larger ones are not what was written
+  const std::optional<double> real = parse_real(text);
+  if (!real || *real != std::floor(*real) || std::abs(*real) > kExact) return std::nullopt;
+  if (std::is_unsigned_v<T> && *real < 0) return std::nullopt;
+  return static_cast<T>(*real);
+}
+
+/// Digits with what numbers have beside them, a letter for thousands or millions, and pairs 4:0.1.
+bool looks_like_number(std::string_view text) {
+  if (text.find_first_not_of("0123456789.:+-eE_kM") != std::string_view::npos) return false;
+  const std::size_t first = text.find_first_not_of("+-.");
+  return first <= 2 && first < text.size() && kDigits.find(text[first]) != std::string_view::npos;
+}
+
+}  // namespace
+
+std::string number_words(bool whole, double low, double high) {
+  const char* kind = whole ? "a whole number" : "a number";
+  if (high >= kNoBound) {
+    return low <= -kNoBound ? kind : fmt::format("{} of at least {}", kind, low);
+  }
+  return fmt::format("{} from {} to {}", kind, low, high);
+}
+
+std::optional<double> parse_real(std::string_view text) {
+  const std::optional<double> value = parse_all<double>(plain(text));
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
+std::optional<std::int64_t> parse_whole(std::string_view text) {
+  return parse_integer<std::int64_t>(text);
+}
+
+std::optional<std::uint64_t> parse_natural(std::string_view text) {
+  return parse_integer<std::uint64_t>(text);
+}
+
+std::optional<std::vector<std::string>> list_items(const std::vector<std::string>& values) {
+  std::vector<std::string> items;
+  bool open = false;
+  bool separated = true;  // nothing that a comma could follow
+  for (std::string_view text : values) {
+    // What -h prints after an option begins with "=" in some shells' completions and habits.
+    if (!text.empty() && text.front() == '=') text.remove_prefix(1);
+    std::size_t i = 0;
+    while (i < text.size()) {
+      const char c = text[i];
+      if (kSpaces.find(c) != std::string_view::npos) {
+        ++i;
+      } else if (c == '[' || c == ']') {
+        if (open == (c == '[')) return std::nullopt;
+        open = !open;
+        separated = c == '[';
+        ++i;
+      } else if (c == ',') {
+        if (separated) return std::nullopt;
+        separated = true;
+        ++i;
+      } else {
+        std::size_t end = std::min(text.find_first_of(" \t\r\n,[]", i), text.size());
+        if (c == '"' || c == '\'') {
+          end = text.find(c, i + 1);
+          if (end == std::string_view::npos) return std::nullopt;
+          items.emplace_back(text.substr(i + 1, end - i - 1));
+          ++end;
+        } else {
+          items.emplace_back(text.substr(i, end - i));
+        }
+        separated = false;
+        i = end;
+      }
+    }
+  }
+  if (open) return std::nullopt;
+  return items;
+}
+
+bool is_number_list_part(std::string_view word) {
+  if (word.empty()) return false;
+  while (!word.empty()) {
+    const std::size_t end = std::min(word.find_first_of("[],= "), word.size());
+    if (end > 0 && !looks_like_number(word.substr(0, end))) return false;
+    word.remove_prefix(std::min(end + 1, word.size()));
+  }
+  return true;
+}
+
+}  // namespace raysplats

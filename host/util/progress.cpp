@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "util/progress.hpp"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace raysplats {
+namespace {
+
+constexpr double kDrawSeconds = 0.1;   // between redraws of the bar
+constexpr double kLineSeconds = 10.0;  // between plain lines
+constexpr double kRateSeconds = 1.0;   // between updates of the rate
+constexpr double kRateMemory = 20.0;   // seconds that the rate averages over
+
+int terminal_width(std::FILE* stream) {
+  winsize size{};
+  if (::ioctl(::fileno(stream), TIOCGWINSZ, &size) == 0 && size.ws_col > 0) return size.ws_col;
+  return 80;
+}
+
+}  // namespace
+
+std::string format_duration(double seconds) {
+  const auto total = static_cast<long long>(std::llround(std::max(0.0, seconds)));
+  if (total >= 3600)
+    return fmt::format("{}:{:02}:{:02}", total / 3600, total / 60 % 60, total % 60);
+  return fmt::format("{}:{:02}", total / 60, total % 60);
+}
+
+Progress::Progress(std::string label, std::int64_t total, std::int64_t done, std::FILE* stream)
+    : label_(std::move(label)),
+      total_(total),
+      done_(done),
+      stream_(stream),
+      terminal_(stream != nullptr && ::isatty(::fileno(stream)) == 1),
+      rate_done_(done),
+      start_(std::chrono::steady_clock::now()) {}
+
+Progress::~Progress() {
+  if (stream_ != nullptr && terminal_ && drawn_ && !finished_ && !suspended_)
+    std::fputc('\n', stream_);
+}
+
+double Progress::clock() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+void Progress::update(std::int64_t done, const std::string& fields) {
+  done_ = done;
+  fields_ = fields;
+  const double now = clock();
+  const double elapsed = now - rate_time_;
+  if (elapsed >= kRateSeconds || (rate_ == 0 && elapsed > 0 && done_ > rate_done_)) {
+    const double recent = static_cast<double>(done_ - rate_done_) / elapsed;
+    const double weight = rate_ > 0 ? 1.0 - std::exp(-elapsed / kRateMemory) : 1.0;
+    rate_ += weight * (recent - rate_);
+    rate_time_ = now;
+    rate_done_ = done_;
+  }
+  if (now - last_draw_ >= (terminal_ ? kDrawSeconds : kLineSeconds)) draw(false);
+}
+
+void Progress::finish() {
+  if (finished_) return;
+  // A plain line for this state may have been printed already.
+  if (terminal_ || drawn_done_ != done_) draw(true);
+  finished_ = true;
+}
+
+void Progress::suspend() {
+  if (suspended_) return;
+  suspended_ = true;
+  suspended_at_ = std::chrono::steady_clock::now();
+  if (stream_ != nullptr && terminal_ && drawn_) {
+    std::fputs("\r\x1b[K", stream_);
+    std::fflush(stream_);
+  }
+}
+
+void Progress::resume() {
+  if (!suspended_) return;
+  suspended_ = false;
+  start_ += std::chrono::steady_clock::now() - suspended_at_;
+}
+
+std::string Progress::line(int width) const {
+  const bool known = total_ != kUnknown;
+  const double share =
+      total_ > 0 ? std::clamp(static_cast<double>(done_) / static_cast<double>(total_), 0.0, 1.0)
+                 : 1.0;
+  std::string text = known ? fmt::format("{}/{}", done_, total_) : std::to_string(done_);
+  if (!fields_.empty()) text += ", " + fields_;
+  if (rate_ > 0 && known) {
+    text += fmt::format(", {:.{}f} it/s, {} left", rate_, rate_ < 10 ? 2 : 1,
+                        format_duration(static_cast<double>(total_ - done_) / rate_));
+  }
+  const int room = std::clamp(width - static_cast<int>(label_.size() + text.size()) - 5, 0, 30);
+  if (room < 5)
+    return fmt::format("{} {}", label_, text)
+        .substr(0, static_cast<std::size_t>(std::max(width, 1)));
+  if (!known) {
+    constexpr int kBlock = 3;
+    const int turn = 2 * (room - kBlock);
+    const int at = static_cast<int>(done_ % turn);
+    const int before = std::min(at, turn - at);
+    return fmt::format("{} [{:<{}}==={:<{}}] {}", label_, "", before, "", room - kBlock - before,
+                       text);
+  }
+  const int filled = static_cast<int>(share * room);
+  return fmt::format("{} [{:=<{}}{:<{}}] {}", label_, "", filled, "", room - filled, text);
+}
+
+void Progress::draw(bool last) {
+  if (stream_ == nullptr) return;
+  // One column of a terminal stays free: a full line would wrap.
+  const std::string text =
+      terminal_ ? fmt::format("\r\x1b[K{}{}", line(terminal_width(stream_) - 1), last ? "\n" : "")
+                : fmt::format("{}\n", line(200).substr(0, 200));
+  // A log that is full is no reason to stop what it tells of.
+  std::fputs(text.c_str(), stream_);
+  std::fflush(stream_);
+  drawn_ = true;
+  drawn_done_ = done_;
+  last_draw_ = clock();
+}
+
+}  // namespace raysplats

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "util/atomic_file.hpp"
+
+#include <doctest/doctest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "raysplats/error.hpp"
+
+using namespace raysplats;
+namespace fs = std::filesystem;
+
+namespace {
+
+class Folder {
+ public:
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "raysplats_base_XXXXXX").string();
+    REQUIRE(::mkdtemp(name.data()) != nullptr);
+    path_ = name;
+  }
+  ~Folder() {
+    std::error_code error;
+    fs::permissions(path_, fs::perms::owner_all, error);
+    fs::remove_all(path_, error);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  fs::path operator/(const char* name) const { return path_ / name; }
+  const fs::path& path() const { return path_; }
+  std::ptrdiff_t entries() const {
+    return std::distance(fs::directory_iterator(path_), fs::directory_iterator());
+  }
+
+ private:
+  fs::path path_;
+};
+
+std::string read_all(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+// what() of the DataError that `action` throws; "" when it throws none.
+template <class Action>
+std::string data_error(const Action& action) {
+  try {
+    action();
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("atomic file: the target changes at commit and not before") {
+  const Folder folder;
+  const fs::path target = folder / "model.ply";
+  write_text_file(target, "old");
+  {
+    AtomicFile file(target);
+    file.write("new ");
+    file.write("text");
+    CHECK(read_all(target) == "old");
+    CHECK(file.temporary().extension() == ".ply");
+    CHECK(file.temporary().parent_path() == folder.path());
+    file.commit();
+    CHECK(read_all(target) == "new text");
+  }
+  CHECK(read_all(target) == "new text");
+  CHECK(folder.entries() == 1);
+}
+
+TEST_CASE("atomic file: two writers of one file have temporary files of their own") {
+  // Processes on machines that share the folder may have one number.
+  const Folder folder;
+  const fs::path target = folder / "model.ply";
+  AtomicFile first(target);
+  AtomicFile second(target);
+  CHECK(first.temporary() != second.temporary());
+  first.write("first");
+  second.write("the second");
+  second.commit();
+  CHECK(read_all(target) == "the second");
+  first.commit();
+  CHECK(read_all(target) == "first");
+  AtomicFile left(target);
+  CHECK(remove_stale_temporaries(folder.path()) == 1);
+}
+
+TEST_CASE("atomic file: without commit nothing remains") {
+  const Folder folder;
+  const fs::path target = folder / "out.txt";
+  {
+    AtomicFile file(target);
+    file.write("half");
+    CHECK(folder.entries() == 1);
+  }
+  CHECK(folder.entries() == 0);
+  write_text_file(target, "old");
+  {
+    AtomicFile file(target);
+    file.write("half");
+  }
+  CHECK(read_all(target) == "old");
+  CHECK(folder.entries() == 1);
+}
+
+TEST_CASE("atomic file: a library may write the temporary file itself") {
+  const Folder folder;
+  AtomicFile file(folder / "image.png");
+  std::ofstream(file.temporary(), std::ios::binary) << "pixels";
+  file.commit();
+  CHECK(read_all(folder / "image.png") == "pixels");
+}
+
+TEST_CASE("atomic file: folders are made, bytes are kept as they are") {
+  const Folder folder;
+  const std::string bytes("a\0b\r\n\xff", 6);
+  write_text_file(folder / "x/y/z.bin", bytes);
+  CHECK(read_all(folder / "x/y/z.bin") == bytes);
+  write_text_file(folder / "empty", "");
+  CHECK(fs::file_size(folder / "empty") == 0);
+}
+
+TEST_CASE("atomic file: a folder that cannot be written names the path and the reason") {
+  const Folder folder;
+  write_text_file(folder / "file", "text");
+  const std::string below_file =
+      data_error([&] { write_text_file(folder / "file/below.txt", "x"); });
+  CHECK(below_file.find("below.txt") != std::string::npos);
+  CHECK(below_file.find("Not a directory") != std::string::npos);
+  const std::string over_folder = data_error([&] {
+    fs::create_directory(folder / "sub");
+    write_text_file(folder / "sub/inner", "x");
+    write_text_file(folder / "sub", "x");
+  });
+  CHECK(over_folder.find("directory") != std::string::npos);
+  CHECK(read_all(folder / "sub/inner") == "x");
+  if (::geteuid() != 0) {  // root may write anywhere
+    fs::permissions(folder.path(), fs::perms::owner_read | fs::perms::owner_exec);
+    const std::string denied = data_error([&] { write_text_file(folder / "new.txt", "x"); });
+    CHECK(denied.find("Permission denied") != std::string::npos);
+  }
+}
+
+TEST_CASE("atomic file: a full disk keeps the old file and leaves no temporary one") {
+  const Folder folder;
+  const fs::path target = folder / "model.ply";
+  write_text_file(target, "old");
+  // A limit on the size of files in a child process stands for a full disk.
+  const pid_t child = ::fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{1000, 1000};
+    int status = 1;
+    if (::setrlimit(RLIMIT_FSIZE, &limit) == 0) {
+      const std::string message =
+          data_error([&] { write_text_file(target, std::string(5000, 'x')); });
+      status =
+          message.find("model.ply cannot be written: File too large") != std::string::npos ? 0 : 2;
+    }
+    ::_exit(status);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  CHECK(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 0);
+  CHECK(read_all(target) == "old");
+  CHECK(folder.entries() == 1);
+}

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "util/progress.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+
+#include "util/interrupt.hpp"
+
+using namespace raysplats;
+
+TEST_CASE("durations read as a clock") {
+  CHECK(format_duration(0) == "0:00");
+  CHECK(format_duration(65.4) == "1:05");
+  CHECK(format_duration(7384) == "2:03:04");
+  CHECK(format_duration(-3) == "0:00");
+}
+
+TEST_CASE("the progress line fits its width and shows the state") {
+  Progress progress("Training", 200, 0, nullptr);
+  progress.update(50, "loss 0.5");
+  for (const int width : {1, 10, 40, 80, 200})
+    CHECK(progress.line(width).size() <= static_cast<std::size_t>(width));
+  const std::string line = progress.line(120);
+  CHECK(line.find("50/200") != std::string::npos);
+  CHECK(line.find("loss 0.5") != std::string::npos);
+  CHECK(line.find("left") != std::string::npos);
+  CHECK(progress.rate() > 0);
+  Progress open("Compiling", Progress::kUnknown, 0, nullptr);
+  for (int i = 1; i < 100; ++i) {
+    open.update(i, "a.cl");
+    const std::string bar = open.line(60);
+    CHECK(bar.size() <= 60);
+    CHECK(bar.find("===") != std::string::npos);
+    CHECK(bar.find("] " + std::to_string(i) + ", a.cl") != std::string::npos);
+    CHECK(bar.find("left") == std::string::npos);
+  }
+  Progress nothing("Empty", 0, 0, nullptr);
+  CHECK(nothing.line(80).find("0/0") != std::string::npos);
+}
+
+TEST_CASE("a stream that is no terminal gets plain lines without control characters") {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
+  REQUIRE(file);
+  {
+    Progress progress("Work", 10, 0, file.get());
+    for (int i = 1; i <= 10; ++i) progress.update(i, "");
+    progress.suspend();
+    progress.resume();
+    progress.finish();
+    progress.finish();
+  }
+  std::rewind(file.get());
+  std::string text(1000, '\0');
+  text.resize(std::fread(text.data(), 1, text.size(), file.get()));
+  CHECK(text.find('\r') == std::string::npos);
+  CHECK(text.find('\x1b') == std::string::npos);
+  CHECK(text.find("10/10") != std::string::npos);
+  CHECK(std::count(text.begin(), text.end(), '\n') == 2);  // the first state and the last
+}
+
+TEST_CASE("an interrupt is noted while a guard lives") {
+  {
+    const InterruptGuard guard;
+    CHECK(!guard.requested());
+    std::raise(SIGINT);
+    CHECK(guard.requested());
+  }
+  const InterruptGuard fresh;
+  CHECK(!fresh.requested());
+  std::raise(SIGTERM);
+  CHECK(fresh.requested());
+}
