@@ -9,7 +9,6 @@
 //   for a quaternion of length 0. O(1) each.
 #include "shared/sh.h"
 
-
 __kernel void gaussian_normals(__global const float* restrict means,
                                __global const float* restrict quaternions,
                                __global const float* restrict scales,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors of LANES lanes, written once for every width (1 suits GPUs). OpenCL's comparisons yield
-// -1 in vectors and 1 in scalars, hence RS_MASK.
+// Vectors of LANES lanes, written once for every width (1 suits GPUs): floats, integers and words.
+// OpenCL's comparisons yield -1 in vectors and 1 in scalars, hence RS_MASK; rs_pick is a ternary
+// that takes both.
 #ifndef RS_PRIMITIVES_VECTOR_LANES_H
 #define RS_PRIMITIVES_VECTOR_LANES_H
 
@@ -11,57 +12,68 @@
 #if LANES == 1
 typedef float fv;
 typedef int iv;
+typedef uint uv;
 #define RS_MASK(comparison) (-(comparison))
 #define RS_LANE_INDEX (0)
-#define rs_load_float(p) (*(p))
 #define rs_as_int(v) as_int(v)
 #define rs_as_float(v) as_float(v)
 #define rs_to_float(v) ((float)(v))
-#define rs_store_float(p, v) (*(p) = (v))
+#define rs_to_int(v) ((int)(v))
 #else
 #define RS_MASK(comparison) (comparison)
 #if LANES == 2
 typedef float2 fv;
 typedef int2 iv;
+typedef uint2 uv;
 #define RS_LANE_INDEX ((iv)(0, 1))
-#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int2(v)
 #define rs_as_float(v) as_float2(v)
 #define rs_to_float(v) convert_float2(v)
+#define rs_to_int(v) convert_int2(v)
 #elif LANES == 4
 typedef float4 fv;
 typedef int4 iv;
+typedef uint4 uv;
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3))
-#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int4(v)
 #define rs_as_float(v) as_float4(v)
 #define rs_to_float(v) convert_float4(v)
+#define rs_to_int(v) convert_int4(v)
 #elif LANES == 8
 typedef float8 fv;
 typedef int8 iv;
+typedef uint8 uv;
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7))
-#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int8(v)
 #define rs_as_float(v) as_float8(v)
 #define rs_to_float(v) convert_float8(v)
+#define rs_to_int(v) convert_int8(v)
 #elif LANES == 16
 typedef float16 fv;
 typedef int16 iv;
+typedef uint16 uv;
 #define RS_LANE_INDEX ((iv)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
-#define rs_load_float(p) (*(__global const rs_unaligned*)(p))
 #define rs_as_int(v) as_int16(v)
 #define rs_as_float(v) as_float16(v)
 #define rs_to_float(v) convert_float16(v)
+#define rs_to_int(v) convert_int16(v)
 #endif
 #endif
 
-#if LANES > 1
-// Some implementations take vload apart into scalars; a vector type of float's alignment stays one
-// load.
+// Loads and stores at any multiple of 4 bytes. vloadN and vstoreN mean the same, but some
+// implementations take them apart; an access through a type of smaller alignment stays one
+// instruction.
 typedef fv rs_unaligned __attribute__((aligned(4)));
 typedef iv rs_int_unaligned __attribute__((aligned(4)));
-#define rs_store_float(p, v) (*(__global rs_unaligned*)(p) = (v))
-#endif
+typedef uv rs_uint_unaligned __attribute__((aligned(4)));
+#define rs_load(p) (*(__global const rs_unaligned*)(p))
+#define rs_load_words(p) (*(__global const rs_uint_unaligned*)(p))
+#define rs_store(v, p) (*(__global rs_unaligned*)(p) = (v))
+#define rs_load_private(p) (*(const rs_unaligned*)(p))
+#define rs_load_private_words(p) (*(const rs_uint_unaligned*)(p))
+#define rs_store_private(v, p) (*(rs_unaligned*)(p) = (v))
+
+#define rs_pick(condition, yes, no) ((condition) ? (fv)(yes) : (fv)(no))
 
 // Masks hold 0 or -1 in every lane. rs_any, rs_all: whether any, or every lane is set. any() and
 // all() become one branch per pair of lanes in some compilers; a reduction becomes one test.
@@ -78,6 +90,13 @@ typedef iv rs_int_unaligned __attribute__((aligned(4)));
 #else
 #define rs_any(mask) any(mask)
 #define rs_all(mask) all(mask)
+#endif
+// Whether a comparison, as it is, holds in any lane: for passes that ask once per vector, where a
+// reduction is no faster.
+#if LANES == 1
+#define rs_any_of(condition) ((condition) != 0)
+#else
+#define rs_any_of(condition) any(condition)
 #endif
 
 // One bit per lane whose mask is set, lane 0 lowest. OpenCL C has no word for what x86 does in one

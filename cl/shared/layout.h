@@ -99,6 +99,12 @@ typedef struct {
 } RsLensFaces;
 RS_STATIC_ASSERT_SIZE(RsLensFaces, 216);
 
+// How the rays of a camera with a centre get to their places in the image plane, and what its
+// depths and near limits are: the build constant LENS.
+#define RS_LENS_PINHOLE 0  // by the grid of a pinhole; depths along z
+#define RS_LENS_AXIAL 1    // read from a buffer that lens_tiles.cl made; depths along z
+#define RS_LENS_AROUND 2   // the same of one that looks around: distances along its rays
+
 #define RS_CAMERA_PINHOLE 0
 #define RS_CAMERA_OPENCV 1
 #define RS_CAMERA_FISHEYE 2

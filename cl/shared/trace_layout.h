@@ -39,7 +39,7 @@ RS_STATIC_ASSERT_SIZE(RsFinalize, 16);
 
 // What all rays of a launch share.
 typedef struct {
-  rs_float near[4];  // axis and depth from the origin that means have to reach, for NEAR_PLANE
+  rs_float near[4];  // axis and depth from the origin that means have to reach, for NEAR_LIMIT
   rs_float background[3];
   rs_float quantile;
   rs_float min_transmittance;

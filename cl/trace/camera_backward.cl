@@ -166,7 +166,7 @@ void packet_backward(const RsCamera* camera,
       while (rows.size > 0 && rows.oldest[rows.head] > number) {
         behind += close_row(&rows, &p, T, T_last, background, lines, sums);
       }
-      const fv before = rs_load_float(pool_transmittance + (first + n) * PACKET);
+      const fv before = rs_load(pool_transmittance + (first + n) * PACKET);
       if (!rs_any(RS_MASK(before > 0.0f))) continue;
       const uint2 row = pool[first + n];
       __global const float* v = lines[row.x >> 1].v;

@@ -63,10 +63,10 @@ void block_candidates_init(BlockCandidates* b,
 void block_candidates_read(BlockCandidates* b, const uint packet) {
   const uint base = b->read[packet];
   __global const float* boxes = b->boxes + base;
-  const fv x0 = rs_load_float(boxes);
-  const fv y0 = rs_load_float(boxes + b->stride);
-  const fv x1 = rs_load_float(boxes + 2 * b->stride);
-  const fv y1 = rs_load_float(boxes + 3 * b->stride);
+  const fv x0 = rs_load(boxes);
+  const fv y0 = rs_load(boxes + b->stride);
+  const fv x1 = rs_load(boxes + 2 * b->stride);
+  const fv y1 = rs_load(boxes + 3 * b->stride);
   const uint inside =
       b->end - base < PACKET ? (1u << (b->end - base)) - 1u : (2u << (PACKET - 1)) - 1u;
   for (uint q = packet; q < RS_BLOCK_PACKETS; ++q) {

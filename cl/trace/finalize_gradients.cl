@@ -2,8 +2,8 @@
 // finalize_gradients: carries the gradients of Gaussians' lines on to their parameters
 // (view_gradient.h), once per Gaussian and view after all rays are summed. Sums the private copies
 // of the line gradients in a fixed order, leaves the sum in the first copy and zeros in the others.
-// One work-item per VECTOR Gaussians from number `begin` on, any local size; end - begin is a
-// multiple of VECTOR. With POSE, per-Gaussian contributions to the camera's gradient are written
+// One work-item per LANES Gaussians from number `begin` on, any local size; end - begin is a
+// multiple of LANES. With POSE, per-Gaussian contributions to the camera's gradient are written
 // too, 6 floats each. On GPUs: group_finalize.cl.
 #include "trace/arguments.h"
 #include "trace/view_gradient.h"
@@ -16,31 +16,31 @@
 #define ACCUMULATE 0
 #endif
 
-// Sums the copies of the line gradients of VECTOR Gaussians into columns; true in lanes that a ray
+// Sums the copies of the line gradients of LANES Gaussians into columns; true in lanes that a ray
 // touched.
-gi sum_copies(__global float* gradients, const size_t copy_floats, const uint copies, gv* v) {
-  gv touched = 0;
-  for (uint c = 0; c < 16; c += VECTOR) {
-    gv rows[VECTOR];
+iv sum_copies(__global float* gradients, const size_t copy_floats, const uint copies, fv* v) {
+  fv touched = 0;
+  for (uint c = 0; c < 16; c += LANES) {
+    fv rows[LANES];
 #pragma unroll
-    for (uint i = 0; i < VECTOR; ++i) rows[i] = *(__global const gv*)(gradients + 16 * i + c);
-    gv any_lane = 0;  // of single copies: their sum may cancel
+    for (uint i = 0; i < LANES; ++i) rows[i] = *(__global const fv*)(gradients + 16 * i + c);
+    fv any_lane = 0;  // of single copies: their sum may cancel
     for (uint copy = 1; copy < copies; ++copy) {
       __global const float* p = gradients + copy * copy_floats + c;
 #pragma unroll
-      for (uint i = 0; i < VECTOR; ++i) {
-        const gv part = *(__global const gv*)(p + 16 * i);
+      for (uint i = 0; i < LANES; ++i) {
+        const fv part = *(__global const fv*)(p + 16 * i);
         rows[i] += part;
         any_lane += fabs(part);
       }
     }
-    if (RS_ANY_GAUSSIAN(any_lane != 0.0f)) {
+    if (rs_any_of(any_lane != 0.0f)) {
 #pragma unroll
-      for (uint i = 0; i < VECTOR; ++i) *(__global gv*)(gradients + 16 * i + c) = rows[i];
+      for (uint i = 0; i < LANES; ++i) *(__global fv*)(gradients + 16 * i + c) = rows[i];
       for (uint copy = 1; copy < copies; ++copy) {
         __global float* p = gradients + copy * copy_floats + c;
 #pragma unroll
-        for (uint i = 0; i < VECTOR; ++i) *(__global gv*)(p + 16 * i) = (gv)(0.0f);
+        for (uint i = 0; i < LANES; ++i) *(__global fv*)(p + 16 * i) = (fv)(0.0f);
       }
     }
     transpose(rows, v + c);
@@ -50,12 +50,12 @@ gi sum_copies(__global float* gradients, const size_t copy_floats, const uint co
 }
 
 #if ACCUMULATE
-// The values of VECTOR Gaussians as they lie in memory, and adding them to what has been written.
-void load_rows(__global const float* p, const uint stride, gv* rows) {
-  for (uint k = 0; k < stride; ++k) rows[k] = *(__global const gv_unaligned*)(p + k * VECTOR);
+// The values of LANES Gaussians as they lie in memory, and adding them to what has been written.
+void load_rows(__global const float* p, const uint stride, fv* rows) {
+  for (uint k = 0; k < stride; ++k) rows[k] = *(__global const rs_unaligned*)(p + k * LANES);
 }
-void add_rows(__global float* p, const uint stride, const gv* rows) {
-  for (uint k = 0; k < stride; ++k) *(__global gv_unaligned*)(p + k * VECTOR) += rows[k];
+void add_rows(__global float* p, const uint stride, const fv* rows) {
+  for (uint k = 0; k < stride; ++k) *(__global rs_unaligned*)(p + k * LANES) += rows[k];
 }
 #endif
 
@@ -75,19 +75,19 @@ __kernel void finalize_gradients(const uint begin,
 #if SH_DEGREE == 0
   (void)sh;
 #endif
-  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  const size_t i = begin + get_global_id(0) * (size_t)LANES;
   if (i >= end) return;
   const RsCamera camera = camera_argument;
-  gv box[8];
+  fv box[8];
   load_records8((__global const float*)(bounds + i), box);
-  const gi kind = RS_AS_INT(box[6]);
-  gv v[16];
-  gi touched = kind != RS_LINE_HIDDEN;
-  if (RS_ANY_GAUSSIAN(touched)) {
+  const iv kind = rs_as_int(box[6]);
+  fv v[16];
+  iv touched = kind != RS_LINE_HIDDEN;
+  if (rs_any_of(touched)) {
     touched =
         sum_copies(line_gradients + 16 * i, (size_t)finalize.gaussians * 16, finalize.copies, v);
   }
-  if (!RS_ANY_GAUSSIAN(touched)) {
+  if (!rs_any_of(touched)) {
 #if ACCUMULATE
     return;
 #endif
@@ -105,21 +105,21 @@ __kernel void finalize_gradients(const uint begin,
 
   ViewGaussian g;
   load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
-  gv line[16];
+  fv line[16];
   load_columns(lines[i].v, 16, 16, line);
   ViewGradient view;
 #if DEPTH_GRADIENT
-  const gv depth = take_depth_gradient(line, touched, kind, v);
+  const fv depth = take_depth_gradient(line, touched, kind, v);
 #endif
   line_gradient(&g, v, touched, kind, &view);
 #if DEPTH_GRADIENT
   view.m[2] += depth;
 #endif
-  gv seen[3];
+  fv seen[3];
   screen_statistics(&g, v, touched, kind, finalize.screen_x, finalize.screen_y, seen);
 #if ACCUMULATE
-  gv before[3], old_means[3], old_quaternions[4], old_scales[3], old_opacities[1];
-  gv old_sh[3 * SH_COEFFICIENTS];
+  fv before[3], old_means[3], old_quaternions[4], old_scales[3], old_opacities[1];
+  fv old_sh[3 * SH_COEFFICIENTS];
   load_columns3(screen + 3 * i, before);
   load_rows(g_means + 3 * i, 3, old_means);
   load_rows(g_quaternions + 4 * i, 4, old_quaternions);
@@ -136,10 +136,10 @@ __kernel void finalize_gradients(const uint begin,
   colour_gradient(g.offset, line, v, touched, &colour);
   ParameterGradient out;
   for (int j = 0; j < 3; ++j) out.mean[j] = 0;
-  gv c[3 * SH_COEFFICIENTS];
+  fv c[3 * SH_COEFFICIENTS];
 #if SH_DEGREE > 0
   load_columns(sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS, 3 * RS_SH_FUNCTIONS, c);
-  gv along[RS_SH_FUNCTIONS];
+  fv along[RS_SH_FUNCTIONS];
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
     along[k] = c[3 * k] * colour.slope[0] + c[3 * k + 1] * colour.slope[1] +
                c[3 * k + 2] * colour.slope[2];
@@ -148,10 +148,10 @@ __kernel void finalize_gradients(const uint begin,
 #endif
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
     for (int j = 0; j < 3; ++j) {
-      c[3 * k + j] = touched ? colour.basis[k] * colour.slope[j] : (gv)(0.0f);
+      c[3 * k + j] = touched ? colour.basis[k] * colour.slope[j] : (fv)(0.0f);
     }
   }
-  for (int k = 3 * RS_SH_FUNCTIONS; k < 3 * SH_COEFFICIENTS; ++k) c[k] = (gv)(0.0f);
+  for (int k = 3 * RS_SH_FUNCTIONS; k < 3 * SH_COEFFICIENTS; ++k) c[k] = (fv)(0.0f);
   store_columns(c, 3 * SH_COEFFICIENTS, g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
 
   parameter_gradient(&g, &view, v[12], touched, &camera, &out);
@@ -160,7 +160,7 @@ __kernel void finalize_gradients(const uint begin,
   store_columns3(out.scale[0], out.scale[1], out.scale[2], g_scales + 3 * i);
   store_column(out.opacity, g_opacities + i, 1);
 #if POSE
-  gv moves[6];
+  fv moves[6];
   pose_gradient(&g, &view, out.mean, touched, moves);
   for (int j = 0; j < 6; ++j) store_column(moves[j], pose + 6 * i + j, 6);
 #endif

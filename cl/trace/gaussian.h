@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gaussians from their trained parameters, one per lane: activations, rotation, effective quantile.
+// Gaussians from their trained parameters: activations, rotation, effective quantile. One per lane,
+// or with ONE_GAUSSIAN one alone, whatever else has LANES.
 #ifndef RS_TRACE_GAUSSIAN_H
 #define RS_TRACE_GAUSSIAN_H
 
 #include "shared/alpha.h"
 #include "trace/gaussian_lanes.h"
+
+#ifdef ONE_GAUSSIAN
+typedef float gv;
+#else
+typedef fv gv;
+#endif
 
 #define RS_ACTIVATED gv
 #include "shared/activation.h"
@@ -17,7 +24,8 @@
 gv effective_quantile(float quantile, gv opacity) {
   (void)opacity;
 #if ADAPTIVE_RADIUS
-  return smaller(2.0f * log(opacity / RS_MIN_ALPHA), (gv)(quantile));
+  const gv own = 2.0f * log(opacity / RS_MIN_ALPHA);
+  return own < quantile ? own : (gv)(quantile);
 #else
   return (gv)(quantile);
 #endif
@@ -36,7 +44,7 @@ void rotation_matrix(gv r, gv x, gv y, gv z, gv* R) {
   R[8] = 1.0f - 2.0f * (x * x + y * y);
 }
 
-#if VECTOR == 1
+#ifdef ONE_GAUSSIAN
 void rotation_of(float4 q, float* R) { rotation_matrix(q.x, q.y, q.z, q.w, R); }
 #endif
 

@@ -1,97 +1,60 @@
 // SPDX-License-Identifier: Apache-2.0
-// VECTOR Gaussians per work-item, one in each lane of a vector, written once for every width (1
-// suits GPUs). Conditions are plain comparisons: they yield -1 in vectors and 1 in scalars, which
-// `?:`, `&`, `|` and `!` take alike.
-// Buffers keep the values of one Gaussian together. A column is one value of VECTOR consecutive
+// LANES Gaussians per work-item, one in each lane of a vector. Conditions are plain comparisons:
+// they yield -1 in vectors and 1 in scalars, which `?:`, `&`, `|` and `!` take alike.
+// Buffers keep the values of one Gaussian together. A column is one value of LANES consecutive
 // Gaussians; `stride` counts the floats from one Gaussian to the next.
 #ifndef RS_TRACE_GAUSSIAN_LANES_H
 #define RS_TRACE_GAUSSIAN_LANES_H
 
-#ifndef VECTOR
-#define VECTOR 1
-#endif
+#include "parallel/vector_lanes.h"
 
-#if VECTOR == 1
-typedef float gv;
-typedef int gi;
-typedef gv gv_unaligned;
-typedef gi gi_unaligned;
-#define RS_ANY_GAUSSIAN(mask) ((mask) != 0)
-#define RS_AS_FLOAT(v) as_float(v)
-#define RS_AS_INT(v) as_int(v)
-#define RS_TO_FLOAT(v) ((float)(v))
-#define RS_TO_INT(v) ((int)(v))
+#if LANES == 1
 #define RS_COLUMN(type, p, s) ((p)[0 * (s)])
-#else
-#if VECTOR == 4
-typedef float4 gv;
-typedef int4 gi;
-#define RS_AS_FLOAT(v) as_float4(v)
-#define RS_AS_INT(v) as_int4(v)
-#define RS_TO_FLOAT(v) convert_float4(v)
-#define RS_TO_INT(v) convert_int4(v)
+#elif LANES == 4
 #define RS_COLUMN(type, p, s) ((type)((p)[0], (p)[s], (p)[2 * (s)], (p)[3 * (s)]))
-#elif VECTOR == 8
-typedef float8 gv;
-typedef int8 gi;
-#define RS_AS_FLOAT(v) as_float8(v)
-#define RS_AS_INT(v) as_int8(v)
-#define RS_TO_FLOAT(v) convert_float8(v)
-#define RS_TO_INT(v) convert_int8(v)
+#elif LANES == 8
 #define RS_COLUMN(type, p, s)                                                                   \
   ((type)((p)[0], (p)[s], (p)[2 * (s)], (p)[3 * (s)], (p)[4 * (s)], (p)[5 * (s)], (p)[6 * (s)], \
           (p)[7 * (s)]))
-#elif VECTOR == 16
-typedef float16 gv;
-typedef int16 gi;
-#define RS_AS_FLOAT(v) as_float16(v)
-#define RS_AS_INT(v) as_int16(v)
-#define RS_TO_FLOAT(v) convert_float16(v)
-#define RS_TO_INT(v) convert_int16(v)
+#elif LANES == 16
 #define RS_COLUMN(type, p, s)                                                                    \
   ((type)((p)[0], (p)[s], (p)[2 * (s)], (p)[3 * (s)], (p)[4 * (s)], (p)[5 * (s)], (p)[6 * (s)],  \
           (p)[7 * (s)], (p)[8 * (s)], (p)[9 * (s)], (p)[10 * (s)], (p)[11 * (s)], (p)[12 * (s)], \
           (p)[13 * (s)], (p)[14 * (s)], (p)[15 * (s)]))
 #else
-#error "VECTOR is 1, 4, 8 or 16"
-#endif
-// Some implementations take vload apart into scalars; a vector type of float's alignment stays one
-// load.
-typedef gv gv_unaligned __attribute__((aligned(4)));
-typedef gi gi_unaligned __attribute__((aligned(4)));
-#define RS_ANY_GAUSSIAN(mask) any(mask)
+#error "Gaussians are taken by 1, 4, 8 or 16"
 #endif
 
 // Maximum and minimum as one instruction: b where a is not a number.
-gv larger(gv a, gv b) { return a > b ? a : b; }
-gv smaller(gv a, gv b) { return a < b ? a : b; }
+fv larger(fv a, fv b) { return a > b ? a : b; }
+fv smaller(fv a, fv b) { return a < b ? a : b; }
 
 // Lanes one by one.
 typedef union {
-  gv v;
-  float s[VECTOR];
+  fv v;
+  float s[LANES];
 } FloatLanes;
 typedef union {
-  gi v;
-  int s[VECTOR];
+  iv v;
+  int s[LANES];
 } IntLanes;
 
-gv load_column(__global const float* p, const uint stride) { return RS_COLUMN(gv, p, stride); }
+fv load_column(__global const float* p, const uint stride) { return RS_COLUMN(fv, p, stride); }
 
-void store_column(gv value, __global float* p, const uint stride) {
+void store_column(fv value, __global float* p, const uint stride) {
   FloatLanes lanes;
   lanes.v = value;
 #pragma unroll
-  for (uint i = 0; i < VECTOR; ++i) p[i * stride] = lanes.s[i];
+  for (uint i = 0; i < LANES; ++i) p[i * stride] = lanes.s[i];
 }
 
-#if VECTOR > 1
+#if LANES > 1
 // Perfect shuffle of the rows i and i + rows / 2: rotates the bits of (row, lane) by one to the
 // left.
-void shuffle_rows(const gv* from, gv* to, const int rows) {
+void shuffle_rows(const fv* from, fv* to, const int rows) {
 #pragma unroll
   for (int i = 0; i < rows / 2; ++i) {
-    gv a, b;
+    fv a, b;
     a.even = from[i].lo;
     a.odd = from[i + rows / 2].lo;
     b.even = from[i].hi;
@@ -102,146 +65,146 @@ void shuffle_rows(const gv* from, gv* to, const int rows) {
 }
 #endif
 
-// Rows become columns: after log2(VECTOR) rotations row and lane have changed places.
-void transpose(const gv* from, gv* to) {
-#if VECTOR == 1
+// Rows become columns: after log2(LANES) rotations row and lane have changed places.
+void transpose(const fv* from, fv* to) {
+#if LANES == 1
   to[0] = from[0];
 #else
-  gv part[VECTOR];
-#if VECTOR == 8
-  shuffle_rows(from, to, VECTOR);
-  shuffle_rows(to, part, VECTOR);
+  fv part[LANES];
+#if LANES == 8
+  shuffle_rows(from, to, LANES);
+  shuffle_rows(to, part, LANES);
 #else
-  shuffle_rows(from, part, VECTOR);
+  shuffle_rows(from, part, LANES);
 #endif
-#if VECTOR == 16
-  gv other[VECTOR];
-  shuffle_rows(part, other, VECTOR);
-  shuffle_rows(other, part, VECTOR);
+#if LANES == 16
+  fv other[LANES];
+  shuffle_rows(part, other, LANES);
+  shuffle_rows(other, part, LANES);
 #endif
-  shuffle_rows(part, to, VECTOR);
+  shuffle_rows(part, to, LANES);
 #endif
 }
 
-// Three and four values of VECTOR Gaussians side by side, by shuffles of whole vectors: columns
+// Three and four values of LANES Gaussians side by side, by shuffles of whole vectors: columns
 // loaded one by one become gathers.
-void load_columns3(__global const float* p, gv* columns) {
-#if VECTOR == 1
+void load_columns3(__global const float* p, fv* columns) {
+#if LANES == 1
   for (int j = 0; j < 3; ++j) columns[j] = p[j];
 #else
-  const gv a = ((__global const gv_unaligned*)p)[0];
-  const gv b = ((__global const gv_unaligned*)p)[1];
-  const gv c = ((__global const gv_unaligned*)p)[2];
-#if VECTOR == 4
-  columns[0] = (gv)(a.s03, b.s2, c.s1);
-  columns[1] = (gv)(a.s1, b.s03, c.s2);
-  columns[2] = (gv)(a.s2, b.s1, c.s03);
-#elif VECTOR == 8
-  columns[0] = (gv)(a.s036, b.s147, c.s25);
-  columns[1] = (gv)(a.s147, b.s25, c.s036);
-  columns[2] = (gv)(a.s25, b.s036, c.s147);
+  const fv a = ((__global const rs_unaligned*)p)[0];
+  const fv b = ((__global const rs_unaligned*)p)[1];
+  const fv c = ((__global const rs_unaligned*)p)[2];
+#if LANES == 4
+  columns[0] = (fv)(a.s03, b.s2, c.s1);
+  columns[1] = (fv)(a.s1, b.s03, c.s2);
+  columns[2] = (fv)(a.s2, b.s1, c.s03);
+#elif LANES == 8
+  columns[0] = (fv)(a.s036, b.s147, c.s25);
+  columns[1] = (fv)(a.s147, b.s25, c.s036);
+  columns[2] = (fv)(a.s25, b.s036, c.s147);
 #else
-  columns[0] = (gv)(a.s0369, a.scf, b.s258b, b.se, c.s147a, c.sd);
-  columns[1] = (gv)(a.s147a, a.sd, b.s0369, b.scf, c.s258b, c.se);
-  columns[2] = (gv)(a.s258b, a.se, b.s147a, b.sd, c.s0369, c.scf);
+  columns[0] = (fv)(a.s0369, a.scf, b.s258b, b.se, c.s147a, c.sd);
+  columns[1] = (fv)(a.s147a, a.sd, b.s0369, b.scf, c.s258b, c.se);
+  columns[2] = (fv)(a.s258b, a.se, b.s147a, b.sd, c.s0369, c.scf);
 #endif
 #endif
 }
 
-void store_columns3(const gv x, const gv y, const gv z, __global float* p) {
-#if VECTOR == 1
+void store_columns3(const fv x, const fv y, const fv z, __global float* p) {
+#if LANES == 1
   p[0] = x;
   p[1] = y;
   p[2] = z;
 #else
-  __global gv_unaligned* rows = (__global gv_unaligned*)p;
-#if VECTOR == 4
-  rows[0] = (gv)(x.s0, y.s0, z.s0, x.s1);
-  rows[1] = (gv)(y.s1, z.s1, x.s2, y.s2);
-  rows[2] = (gv)(z.s2, x.s3, y.s3, z.s3);
-#elif VECTOR == 8
-  rows[0] = (gv)(x.s0, y.s0, z.s0, x.s1, y.s1, z.s1, x.s2, y.s2);
-  rows[1] = (gv)(z.s2, x.s3, y.s3, z.s3, x.s4, y.s4, z.s4, x.s5);
-  rows[2] = (gv)(y.s5, z.s5, x.s6, y.s6, z.s6, x.s7, y.s7, z.s7);
+  __global rs_unaligned* rows = (__global rs_unaligned*)p;
+#if LANES == 4
+  rows[0] = (fv)(x.s0, y.s0, z.s0, x.s1);
+  rows[1] = (fv)(y.s1, z.s1, x.s2, y.s2);
+  rows[2] = (fv)(z.s2, x.s3, y.s3, z.s3);
+#elif LANES == 8
+  rows[0] = (fv)(x.s0, y.s0, z.s0, x.s1, y.s1, z.s1, x.s2, y.s2);
+  rows[1] = (fv)(z.s2, x.s3, y.s3, z.s3, x.s4, y.s4, z.s4, x.s5);
+  rows[2] = (fv)(y.s5, z.s5, x.s6, y.s6, z.s6, x.s7, y.s7, z.s7);
 #else
-  rows[0] = (gv)(x.s0, y.s0, z.s0, x.s1, y.s1, z.s1, x.s2, y.s2, z.s2, x.s3, y.s3, z.s3, x.s4, y.s4,
+  rows[0] = (fv)(x.s0, y.s0, z.s0, x.s1, y.s1, z.s1, x.s2, y.s2, z.s2, x.s3, y.s3, z.s3, x.s4, y.s4,
                  z.s4, x.s5);
-  rows[1] = (gv)(y.s5, z.s5, x.s6, y.s6, z.s6, x.s7, y.s7, z.s7, x.s8, y.s8, z.s8, x.s9, y.s9, z.s9,
+  rows[1] = (fv)(y.s5, z.s5, x.s6, y.s6, z.s6, x.s7, y.s7, z.s7, x.s8, y.s8, z.s8, x.s9, y.s9, z.s9,
                  x.sa, y.sa);
-  rows[2] = (gv)(z.sa, x.sb, y.sb, z.sb, x.sc, y.sc, z.sc, x.sd, y.sd, z.sd, x.se, y.se, z.se, x.sf,
+  rows[2] = (fv)(z.sa, x.sb, y.sb, z.sb, x.sc, y.sc, z.sc, x.sd, y.sd, z.sd, x.se, y.se, z.se, x.sf,
                  y.sf, z.sf);
 #endif
 #endif
 }
 
-void load_columns4(__global const float* p, gv* columns) {
-#if VECTOR == 1
+void load_columns4(__global const float* p, fv* columns) {
+#if LANES == 1
   for (int j = 0; j < 4; ++j) columns[j] = p[j];
 #else
   // Even and odd lanes apart, twice: the bits of (Gaussian, value) rotate to the right.
-  gv even[4];
+  fv even[4];
 #pragma unroll
   for (int k = 0; k < 2; ++k) {
-    const gv a = ((__global const gv_unaligned*)p)[2 * k];
-    const gv b = ((__global const gv_unaligned*)p)[2 * k + 1];
-    even[k] = (gv)(a.even, b.even);
-    even[k + 2] = (gv)(a.odd, b.odd);
+    const fv a = ((__global const rs_unaligned*)p)[2 * k];
+    const fv b = ((__global const rs_unaligned*)p)[2 * k + 1];
+    even[k] = (fv)(a.even, b.even);
+    even[k + 2] = (fv)(a.odd, b.odd);
   }
 #pragma unroll
   for (int k = 0; k < 2; ++k) {
-    columns[k] = (gv)(even[2 * k].even, even[2 * k + 1].even);
-    columns[k + 2] = (gv)(even[2 * k].odd, even[2 * k + 1].odd);
+    columns[k] = (fv)(even[2 * k].even, even[2 * k + 1].even);
+    columns[k + 2] = (fv)(even[2 * k].odd, even[2 * k + 1].odd);
   }
 #endif
 }
 
-void store_columns4(const gv* columns, __global float* p) {
-#if VECTOR == 1
+void store_columns4(const fv* columns, __global float* p) {
+#if LANES == 1
   for (int j = 0; j < 4; ++j) p[j] = columns[j];
 #else
-  gv part[4], rows[4];
+  fv part[4], rows[4];
   shuffle_rows(columns, part, 4);
   shuffle_rows(part, rows, 4);
 #pragma unroll
-  for (int k = 0; k < 4; ++k) ((__global gv_unaligned*)p)[k] = rows[k];
+  for (int k = 0; k < 4; ++k) ((__global rs_unaligned*)p)[k] = rows[k];
 #endif
 }
 
 // The first `count` columns.
-void load_columns(__global const float* p, const uint stride, const uint count, gv* columns) {
+void load_columns(__global const float* p, const uint stride, const uint count, fv* columns) {
   if (stride == 3 && count == 3) {
     load_columns3(p, columns);
     return;
   }
   uint c = 0;
-  for (; c + VECTOR <= count; c += VECTOR) {
-    gv rows[VECTOR];
+  for (; c + LANES <= count; c += LANES) {
+    fv rows[LANES];
 #pragma unroll
-    for (uint i = 0; i < VECTOR; ++i) rows[i] = *(__global const gv_unaligned*)(p + i * stride + c);
+    for (uint i = 0; i < LANES; ++i) rows[i] = *(__global const rs_unaligned*)(p + i * stride + c);
     transpose(rows, columns + c);
   }
   for (; c < count; ++c) columns[c] = load_column(p + c, stride);
 }
 
-void store_columns(const gv* columns, const uint count, __global float* p, const uint stride) {
+void store_columns(const fv* columns, const uint count, __global float* p, const uint stride) {
   if (stride == 3 && count == 3) {
     store_columns3(columns[0], columns[1], columns[2], p);
     return;
   }
   uint c = 0;
-  for (; c + VECTOR <= count; c += VECTOR) {
-    gv rows[VECTOR];
+  for (; c + LANES <= count; c += LANES) {
+    fv rows[LANES];
     transpose(columns + c, rows);
 #pragma unroll
-    for (uint i = 0; i < VECTOR; ++i) *(__global gv_unaligned*)(p + i * stride + c) = rows[i];
+    for (uint i = 0; i < LANES; ++i) *(__global rs_unaligned*)(p + i * stride + c) = rows[i];
   }
   for (; c < count; ++c) store_column(columns[c], p + c, stride);
 }
 
-// VECTOR records of eight floats side by side: the bits of (record, field) change places by
+// LANES records of eight floats side by side: the bits of (record, field) change places by
 // rotations, as in transpose().
-void load_records8(__global const float* p, gv* columns) {
-#if VECTOR == 1
+void load_records8(__global const float* p, fv* columns) {
+#if LANES == 1
   // Records lie at multiples of their 32 bytes.
   const float4 low = ((__global const float4*)p)[0], high = ((__global const float4*)p)[1];
   columns[0] = low.x;
@@ -253,17 +216,17 @@ void load_records8(__global const float* p, gv* columns) {
   columns[6] = high.z;
   columns[7] = high.w;
 #else
-  gv part[8];
+  fv part[8];
 #pragma unroll
-  for (int k = 0; k < 8; ++k) columns[k] = ((__global const gv_unaligned*)p)[k];
+  for (int k = 0; k < 8; ++k) columns[k] = ((__global const rs_unaligned*)p)[k];
   shuffle_rows(columns, part, 8);
-#if VECTOR == 8
-  gv other[8];
+#if LANES == 8
+  fv other[8];
   shuffle_rows(part, other, 8);
   shuffle_rows(other, columns, 8);
 #else
   shuffle_rows(part, columns, 8);
-#if VECTOR == 16
+#if LANES == 16
   shuffle_rows(columns, part, 8);
   shuffle_rows(part, columns, 8);
 #endif
@@ -271,22 +234,22 @@ void load_records8(__global const float* p, gv* columns) {
 #endif
 }
 
-void store_records8(const gv* columns, __global float* p) {
-#if VECTOR == 1
+void store_records8(const fv* columns, __global float* p) {
+#if LANES == 1
   for (int k = 0; k < 8; ++k) p[k] = columns[k];
 #else
-  gv part[8], other[8];
+  fv part[8], other[8];
   shuffle_rows(columns, part, 8);
   shuffle_rows(part, other, 8);
   shuffle_rows(other, part, 8);
 #pragma unroll
-  for (int k = 0; k < 8; ++k) ((__global gv_unaligned*)p)[k] = part[k];
+  for (int k = 0; k < 8; ++k) ((__global rs_unaligned*)p)[k] = part[k];
 #endif
 }
 
-// Zeros all values of VECTOR Gaussians.
+// Zeros all values of LANES Gaussians.
 void clear_columns(__global float* p, const uint stride) {
-  for (uint k = 0; k < stride; ++k) *(__global gv_unaligned*)(p + k * VECTOR) = (gv)(0.0f);
+  for (uint k = 0; k < stride; ++k) *(__global rs_unaligned*)(p + k * LANES) = (fv)(0.0f);
 }
 
 #endif

@@ -5,7 +5,7 @@
 // the colour's share of the mean, the SH coefficients, then the rest with the line's gradient read
 // again; what the rest needs last waits in local memory meanwhile.
 // Launch: groups of GROUP work-items for the Gaussians from number `begin` to `end`.
-#define VECTOR 1
+#define LANES 1
 #ifndef GROUP
 #define GROUP 64
 #endif
@@ -131,7 +131,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   const uint lane = get_local_id(0);
   const size_t first = begin + get_group_id(0) * GROUP;
   const bool exists = first + lane < end;
-  const gi kind = exists ? bounds[first + lane].kind : RS_LINE_HIDDEN;
+  const iv kind = exists ? bounds[first + lane].kind : RS_LINE_HIDDEN;
   __local float* row = staged.rows[lane];
   staged.present[lane] = kind != RS_LINE_HIDDEN;
   for (int k = 0; k < 16; ++k) row[k] = 0.0f;
@@ -139,7 +139,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
                &staged);
   float sum = 0.0f;
   for (int k = 0; k < 16; ++k) sum += fabs(row[k]);
-  const gi touched = sum != 0.0f;
+  const iv touched = sum != 0.0f;
   // Who is not touched reads what a neighbour reads, and stores zeros or nothing.
   const size_t i = touched ? first + lane : first;
   const uint stored = ACCUMULATE ? touched : exists;

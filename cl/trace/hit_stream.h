@@ -64,7 +64,7 @@ uint stream_push(HitStream* stream, uint reference, uint window) {
 }
 
 void stream_set(HitStream* stream, uint row, fv transmittance) {
-  if (row != RS_NO_ROW) rs_store_float(stream->transmittance + (size_t)row * PACKET, transmittance);
+  if (row != RS_NO_ROW) rs_store(transmittance, stream->transmittance + (size_t)row * PACKET);
 }
 
 // Takes everything back but the chunks.

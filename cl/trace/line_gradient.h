@@ -46,7 +46,7 @@ void load_pixels(Pixels* p,
   p->gA = rs_load_pixels(image_gradient + 3 * plane, width, height, px, py);
 #if DEPTH_GRADIENT
   p->gS = rs_load_pixels(depth_gradient, width, height, px, py);
-#if LENS == 2
+#if LENS == RS_LENS_AROUND
   p->gS *= sqrt(1.0f + p->X * p->X + p->Y * p->Y);  // depths lie along the rays
 #endif
 #else
@@ -65,7 +65,7 @@ fv rs_projected(const Pixels* p, __global const float* v, const PacketMeeting* m
 #endif
 }
 
-#if LENS == 2
+#if LENS == RS_LENS_AROUND
 // Length of a gradient with respect to the angle in which the mean at (x, y) is seen, from that
 // with respect to its tangent coordinates.
 fv rs_angular_length(const float x, const float y, const fv gx, const fv gy) {
@@ -99,7 +99,7 @@ void line_gradient_projective(
   g[0] -= gE * v[7];
   g[1] -= gE * v[8];
 #endif
-#if LENS == 2
+#if LENS == RS_LENS_AROUND
   g[2] = rs_angular_length(v[0], v[1], g[0], g[1]) * p->screen_x;
 #else
   g[2] =

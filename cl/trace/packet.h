@@ -73,11 +73,8 @@ fv rs_load_pixels(__global const float* plane, int width, int height, int x, int
 #endif
 }
 
-// How rays get to their places in the image plane. 0: the grid of a pinhole. The others read them
-// from a buffer that lens_tiles.cl made, 1 for a lens whose depths lie along its axis, 2 for one
-// that looks around and has depths along its rays.
 #ifndef LENS
-#define LENS 0
+#define LENS RS_LENS_PINHOLE
 #endif
 
 // Tangent coordinates of the packet whose first pixel is (x, y), and the lanes that see something.

@@ -88,7 +88,7 @@ void packet_store(const PacketState* p,
   rs_store_pixels(image + 3 * plane, width, height, px, py, 1.0f - p->T);
 #if WITH_DEPTH
   const fv weight = 1.0f - p->T;
-#if LENS == 2
+#if LENS == RS_LENS_AROUND
   const fv length = sqrt(1.0f + p->X * p->X + p->Y * p->Y);
 #else
   const fv length = (fv)(1.0f);

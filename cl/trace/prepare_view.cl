@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // prepare_view: everything that tracing one camera view reads of one Gaussian, in one pass: the
 // 64-byte line (camera line or general form, docs/model.md) and the record that culls it (box of
-// the exact outline, least depth). One work-item per VECTOR Gaussians from number `begin` on; end -
-// begin is a multiple of VECTOR. Work-groups of any size, of GROUP where that is not 0. Lines of
+// the exact outline, least depth). One work-item per LANES Gaussians from number `begin` on; end -
+// begin is a multiple of LANES. Work-groups of any size, of GROUP where that is not 0. Lines of
 // hidden Gaussians are undefined.
 #include "shared/color.h"
 #include "trace/arguments.h"
@@ -13,29 +13,28 @@
 #define PEAK_ORDER 0
 #endif
 
-// What near_depth counts: depth along z, or the distance of the mean.
-#ifndef NEAR_DISTANCE
-#define NEAR_DISTANCE 0
+#ifndef LENS
+#define LENS RS_LENS_PINHOLE
 #endif
 
 // Slack for float rounding in the closed-form outline, in units of the tangent coordinate.
 #define RS_OUTLINE_SLACK 2e-6f
 
-void write_projective(const ViewGaussian* g, gv* v) {
-  const gv mx = g->m[0], my = g->m[1], mz = g->m[2];
-  const gv iz = 1.0f / mz;
-  gv a = 0, b = 0, c = 0, d0 = 0, ex = 0, ey = 0, c00 = 0, c01 = 0, c11 = 0;
+void write_projective(const ViewGaussian* g, fv* v) {
+  const fv mx = g->m[0], my = g->m[1], mz = g->m[2];
+  const fv iz = 1.0f / mz;
+  fv a = 0, b = 0, c = 0, d0 = 0, ex = 0, ey = 0, c00 = 0, c01 = 0, c11 = 0;
   for (int k = 0; k < 3; ++k) {
-    const gv rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
+    const fv rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
     // o' x M_j by the cofactor identity (Ma) x (Mb) = det(M) M^-T (a x b): no cancellation.
-    const gv P = g->w[(k + 1) % 3] * g->w[(k + 2) % 3];
-    const gv A = (ry * mz - rz * my) * P;
-    const gv B = (rz * mx - rx * mz) * P;
+    const fv P = g->w[(k + 1) % 3] * g->w[(k + 2) % 3];
+    const fv A = (ry * mz - rz * my) * P;
+    const fv B = (rz * mx - rx * mz) * P;
     a += A * A;
     b += A * B;
     c += B * B;
-    const gv w = g->w[k];
-    const gv q = (rx * mx + ry * my + rz * mz) * w;
+    const fv w = g->w[k];
+    const fv q = (rx * mx + ry * my + rz * mz) * w;
     d0 += q * q;
     ex += q * rx * w;
     ey += q * ry * w;
@@ -58,9 +57,9 @@ void write_projective(const ViewGaussian* g, gv* v) {
 }
 
 // In place of the projective form in the lanes where `general` holds.
-void write_general(const ViewGaussian* g, const gi general, gv* v) {
+void write_general(const ViewGaussian* g, const iv general, fv* v) {
   for (int k = 0; k < 3; ++k) {
-    gv o = 0;
+    fv o = 0;
     for (int j = 0; j < 3; ++j) {
       v[3 * k + j] = general ? g->axis[3 * k + j] * g->w[k] : v[3 * k + j];
       o -= g->axis[3 * k + j] * g->m[j];
@@ -72,20 +71,20 @@ void write_general(const ViewGaussian* g, const gi general, gv* v) {
 // Interval of X = x/z (axis 0) or Y = y/z (axis 1) that the ellipsoid covers; it must lie in front
 // of the camera plane. The planes through the camera that touch it: xi^2 (m_z^2 - Q S_zz) + 2 xi Q
 // q - Q p = 0 about x0.
-void outline_interval(const ViewGaussian* g, const int axis, const gv Q, gv* lo, gv* hi) {
-  const gv x0 = g->m[axis] / g->m[2];
-  gv p = 0, q = 0, szz = 0;
+void outline_interval(const ViewGaussian* g, const int axis, const fv Q, fv* lo, fv* hi) {
+  const fv x0 = g->m[axis] / g->m[2];
+  fv p = 0, q = 0, szz = 0;
   for (int k = 0; k < 3; ++k) {
-    const gv s2 = g->scale[k] * g->scale[k];
-    const gv rz = g->axis[3 * k + 2];
-    const gv n = g->axis[3 * k + axis] - x0 * rz;
+    const fv s2 = g->scale[k] * g->scale[k];
+    const fv rz = g->axis[3 * k + 2];
+    const fv n = g->axis[3 * k + axis] - x0 * rz;
     p += s2 * n * n;
     q += s2 * n * rz;
     szz += s2 * rz * rz;
   }
-  const gv lead = g->m[2] * g->m[2] - Q * szz;
-  const gv root = sqrt(Q * Q * q * q + lead * Q * p);
-  const gv slack = RS_OUTLINE_SLACK * (1.0f + fabs(x0)) + 1e-4f * root / lead;
+  const fv lead = g->m[2] * g->m[2] - Q * szz;
+  const fv root = sqrt(Q * Q * q * q + lead * Q * p);
+  const fv slack = RS_OUTLINE_SLACK * (1.0f + fabs(x0)) + 1e-4f * root / lead;
   *lo = x0 + (-Q * q - root) / lead - slack;
   *hi = x0 + (-Q * q + root) / lead + slack;
 }
@@ -94,11 +93,11 @@ void outline_interval(const ViewGaussian* g, const int axis, const gv Q, gv* lo,
 // coordinates about the mean, peaks lie on the sphere over [mean, camera] (Thales), so their part
 // along the direction to the camera is in [0, Q / |o'|]; depth falls by m_z / |o'| per unit of it,
 // and by the root of what is left of S_zz per unit across.
-gv least_peak(const ViewGaussian* g, const gv Q, const gv szz, const gv whitened) {
-  const gv along2 = g->m[2] * g->m[2] / whitened;
-  const gv across2 = larger(szz - along2, (gv)(0.0f)) + 1e-5f * szz;
-  const gv relative = Q / whitened;
-  const gv nearer = larger(g->m[2], (gv)(0.0f)) * smaller(relative, sqrt(relative));
+fv least_peak(const ViewGaussian* g, const fv Q, const fv szz, const fv whitened) {
+  const fv along2 = g->m[2] * g->m[2] / whitened;
+  const fv across2 = larger(szz - along2, (fv)(0.0f)) + 1e-5f * szz;
+  const fv relative = Q / whitened;
+  const fv nearer = larger(g->m[2], (fv)(0.0f)) * smaller(relative, sqrt(relative));
   return g->m[2] - nearer - sqrt(Q * across2);
 }
 
@@ -138,23 +137,23 @@ void write_colour(const ViewGaussian* g,
   for (int j = 0; j < 3; ++j) colour[j] = fmin(fmax(sum[j], 0.0f), RS_MAX_COLOR);
 }
 #else
-void write_colour(const ViewGaussian* g, __global const float* sh, gv* colour) {
-  const gv* d = g->offset;
-  const gv inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
-  gv basis[RS_SH_FUNCTIONS];
+void write_colour(const ViewGaussian* g, __global const float* sh, fv* colour) {
+  const fv* d = g->offset;
+  const fv inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (fv)(1e-30f)));
+  fv basis[RS_SH_FUNCTIONS];
   rs_sh_basis(SH_DEGREE, d[0] * inverse, d[1] * inverse, d[2] * inverse, basis);
-  gv c[3 * RS_SH_FUNCTIONS];
+  fv c[3 * RS_SH_FUNCTIONS];
   load_columns(sh, 3 * SH_COEFFICIENTS, 3 * RS_SH_FUNCTIONS, c);
-  gv r = 0.5f, green = 0.5f, b = 0.5f;
+  fv r = 0.5f, green = 0.5f, b = 0.5f;
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
     r += basis[k] * c[3 * k];
     green += basis[k] * c[3 * k + 1];
     b += basis[k] * c[3 * k + 2];
   }
-  const gv most = (gv)(RS_MAX_COLOR);
-  colour[0] = smaller(larger(r, (gv)(0.0f)), most);
-  colour[1] = smaller(larger(green, (gv)(0.0f)), most);
-  colour[2] = smaller(larger(b, (gv)(0.0f)), most);
+  const fv most = (fv)(RS_MAX_COLOR);
+  colour[0] = smaller(larger(r, (fv)(0.0f)), most);
+  colour[1] = smaller(larger(green, (fv)(0.0f)), most);
+  colour[2] = smaller(larger(b, (fv)(0.0f)), most);
 }
 #endif
 
@@ -177,55 +176,55 @@ prepare_view(const uint begin,
   const bool exists = first + lane < end;
   const size_t i = exists ? first + lane : first;
 #else
-  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  const size_t i = begin + get_global_id(0) * (size_t)LANES;
   if (i >= end) return;
 #endif
   const RsCamera camera = camera_argument;
   ViewGaussian g;
-  const gi finite = load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
-  const gv Q = effective_quantile(quantile, g.opacity);
-  gv szz = 0, whitened = 0;
+  const iv finite = load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
+  const fv Q = effective_quantile(quantile, g.opacity);
+  fv szz = 0, whitened = 0;
   for (int k = 0; k < 3; ++k) {
-    const gv along = g.axis[3 * k + 2] * g.scale[k];
+    const fv along = g.axis[3 * k + 2] * g.scale[k];
     szz += along * along;
-    const gv o =
+    const fv o =
         (g.axis[3 * k] * g.m[0] + g.axis[3 * k + 1] * g.m[1] + g.axis[3 * k + 2] * g.m[2]) * g.w[k];
     whitened += o * o;
   }
-  const gv reach = sqrt(larger(Q, (gv)(0.0f)) * szz) * 1.00001f;
-#if NEAR_DISTANCE
-  const gi far_enough =
+  const fv reach = sqrt(larger(Q, (fv)(0.0f)) * szz) * 1.00001f;
+#if LENS == RS_LENS_AROUND
+  const iv far_enough =
       g.m[0] * g.m[0] + g.m[1] * g.m[1] + g.m[2] * g.m[2] >= camera.near_depth * camera.near_depth;
 #else
-  const gi far_enough = g.m[2] >= (camera.near_depth > 0.0f ? camera.near_depth : -INFINITY);
+  const iv far_enough = g.m[2] >= (camera.near_depth > 0.0f ? camera.near_depth : -INFINITY);
 #endif
-  gi visible = finite & (Q > 0.0f) & (g.opacity > 0.0f) & (g.m[2] + reach > 0.0f) & far_enough;
-  gv least = g.m[2] - reach;
+  iv visible = finite & (Q > 0.0f) & (g.opacity > 0.0f) & (g.m[2] + reach > 0.0f) & far_enough;
+  fv least = g.m[2] - reach;
 #if PEAK_ORDER
   least = larger(least_peak(&g, Q, szz, whitened), least);
 #else
   visible = visible & (whitened > Q);  // an origin inside misses
 #endif
   // What reaches through the camera plane may have an unbounded outline.
-  const gi ahead = g.m[2] > reach * 1.0001f;
-  gv x0, x1, y0, y1;
+  const iv ahead = g.m[2] > reach * 1.0001f;
+  fv x0, x1, y0, y1;
   outline_interval(&g, 0, Q, &x0, &x1);
   outline_interval(&g, 1, Q, &y0, &y1);
   visible = visible &
             (!ahead | ((x0 <= window.z) & (x1 >= window.x) & (y0 <= window.w) & (y1 >= window.y)));
-  const gi projective = is_projective(&g);
-  const gi kind = projective ? (gi)(RS_LINE_PROJECTIVE) : (gi)(RS_LINE_GENERAL);
+  const iv projective = is_projective(&g);
+  const iv kind = projective ? (iv)(RS_LINE_PROJECTIVE) : (iv)(RS_LINE_GENERAL);
 
-  const gv infinite = (gv)(INFINITY);
-  gv box[8];
+  const fv infinite = (fv)(INFINITY);
+  fv box[8];
   box[0] = ahead ? x0 : -infinite;
   box[1] = ahead ? y0 : -infinite;
   box[2] = ahead ? x1 : infinite;
   box[3] = ahead ? y1 : infinite;
-  box[4] = larger(least * 0.99999f, (gv)(0.0f));
+  box[4] = larger(least * 0.99999f, (fv)(0.0f));
   box[5] = Q;
-  box[6] = RS_AS_FLOAT(visible ? kind : (gi)(RS_LINE_HIDDEN));
-  box[7] = (gv)(0.0f);
+  box[6] = rs_as_float(visible ? kind : (iv)(RS_LINE_HIDDEN));
+  box[7] = (fv)(0.0f);
 #if GROUP
   for (int k = 0; k < 8; ++k) staged.rows[lane][k] = box[k];
   staged.present[lane] = exists;
@@ -233,12 +232,12 @@ prepare_view(const uint begin,
   staged.present[lane] = exists && visible;
 #else
   store_records8(box, (__global float*)(bounds + i));
-  if (!RS_ANY_GAUSSIAN(visible)) return;
+  if (!rs_any_of(visible)) return;
 #endif
 
-  gv v[16];
+  fv v[16];
   write_projective(&g, v);
-  if (RS_ANY_GAUSSIAN(visible & !projective)) write_general(&g, !projective, v);
+  if (rs_any_of(visible & !projective)) write_general(&g, !projective, v);
   v[12] = g.opacity;
 #if GROUP
   write_colour(&g, sh + first * 3 * SH_COEFFICIENTS, &staged, v + 13);

@@ -14,10 +14,13 @@
 #ifndef PEAK_ORDER
 #define PEAK_ORDER 0
 #endif
-// Gaussians whose means are too near are not met: 1 by their depth along an axis, 2 by their
-// distance.
-#ifndef NEAR_PLANE
-#define NEAR_PLANE 0
+// Gaussians whose means are too near are not met: by their distance with RS_LENS_AROUND, else by
+// their depth along an axis.
+#ifndef NEAR_LIMIT
+#define NEAR_LIMIT 0
+#endif
+#ifndef LENS
+#define LENS RS_LENS_PINHOLE
 #endif
 
 // A block, all that its Gaussians need while they are traced in one place: the upper triangles
@@ -64,7 +67,7 @@ typedef struct {
 
 // Gaussians whose ellipsoids the ray's line meets, without those that it cannot hit because of its
 // origin; one bit each; with TRAIL 1 or 0 for the one in `lane`. near: axis and depth from the
-// origin that means have to reach, for NEAR_PLANE. cross2 / direction2 is the squared distance of
+// origin that means have to reach, for NEAR_LIMIT. cross2 / direction2 is the squared distance of
 // the line: no division.
 RS_INLINE uint ray_meets_block(const RayData* ray,
                                const float4 near,
@@ -85,10 +88,10 @@ RS_INLINE uint ray_meets_block(const RayData* ray,
   const bv dd = dx * dx + dy * dy + dz * dz;
   const bv cx = oy * dz - oz * dy, cy = oz * dx - ox * dz, cz = ox * dy - oy * dx;
   const bv cc = cx * cx + cy * cy + cz * cz;
-#if NEAR_PLANE == 1
+#if NEAR_LIMIT && LENS != RS_LENS_AROUND
   const bi inside =
       RS_BLOCK_MASK(cc <= dd) & RS_BLOCK_MASK(-(near.x * x + near.y * y + near.z * z) >= near.w);
-#elif NEAR_PLANE == 2
+#elif NEAR_LIMIT
   const bi inside =
       RS_BLOCK_MASK(cc <= dd) & RS_BLOCK_MASK(x * x + y * y + z * z >= near.w * near.w);
 #else

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Before and after ray_backward, one work-item per VECTOR Gaussians from number `begin` on, any
-// local size; end - begin is a multiple of VECTOR. O(1) per Gaussian.
+// Before and after ray_backward, one work-item per LANES Gaussians from number `begin` on, any
+// local size; end - begin is a multiple of LANES. O(1) per Gaussian.
 //   ray_gradient_records  what a hit's gradient needs of a Gaussian, 16 floats: the rows of
 //                         M = S^-1 R^T (9), the mean (3), zeros
 //   finish_ray_gradients  adds the private copies of the sums (ray_sums.h) in a fixed order, leaves
@@ -17,10 +17,10 @@
 #endif
 
 typedef struct {
-  gv q[4];  // unit quaternion
-  gv q_norm;
-  gv scale[3];  // standard deviations, floored as those that rays are traced with
-  gv raw_scale[3];
+  fv q[4];  // unit quaternion
+  fv q_norm;
+  fv scale[3];  // standard deviations, floored as those that rays are traced with
+  fv raw_scale[3];
 } RayGaussian;
 
 void load_ray_gaussian(const size_t i,
@@ -30,13 +30,13 @@ void load_ray_gaussian(const size_t i,
   load_columns4(quaternions + 4 * i, g->q);
   g->q_norm = sqrt(g->q[0] * g->q[0] + g->q[1] * g->q[1] + g->q[2] * g->q[2] + g->q[3] * g->q[3]);
   for (int j = 0; j < 4; ++j) g->q[j] = g->q[j] / g->q_norm;
-  gv longest = 0;
+  fv longest = 0;
   load_columns3(scales + 3 * i, g->raw_scale);
   for (int k = 0; k < 3; ++k) {
     g->raw_scale[k] = rs_scale_of(g->raw_scale[k]);
     longest = larger(g->raw_scale[k], longest);
   }
-  const gv floor_scale = larger(longest * 1e-7f, (gv)(1e-12f));
+  const fv floor_scale = larger(longest * 1e-7f, (fv)(1e-12f));
   for (int k = 0; k < 3; ++k) g->scale[k] = larger(g->raw_scale[k], floor_scale);
 }
 
@@ -46,11 +46,11 @@ __kernel void ray_gradient_records(const uint begin,
                                    __global const float* restrict quaternions,
                                    __global const float* restrict scales,
                                    __global float* restrict records) {
-  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  const size_t i = begin + get_global_id(0) * (size_t)LANES;
   if (i >= end) return;
   RayGaussian g;
   load_ray_gaussian(i, quaternions, scales, &g);
-  gv R[9], record[16];
+  fv R[9], record[16];
   load_columns3(means + 3 * i, record + 9);
   rotation_matrix(g.q[0], g.q[1], g.q[2], g.q[3], R);
   for (int k = 0; k < 3; ++k) {
@@ -60,20 +60,20 @@ __kernel void ray_gradient_records(const uint begin,
   store_columns(record, 16, records + 16 * i, 16);
 }
 
-// Sums of VECTOR Gaussians as columns; true in lanes that a ray touched.
-gi load_sums(__global float* sums, const size_t copy_floats, const uint copies, gv* v) {
-  // VECTOR Gaussians lie side by side.
+// Sums of LANES Gaussians as columns; true in lanes that a ray touched.
+iv load_sums(__global float* sums, const size_t copy_floats, const uint copies, fv* v) {
+  // LANES Gaussians lie side by side.
   for (uint copy = 1; copy < copies; ++copy) {
     __global float* p = sums + copy * copy_floats;
-    for (uint k = 0; k < RS_RAY_SUMS * VECTOR; k += VECTOR) {
-      const gv part = *(__global const gv_unaligned*)(p + k);
-      if (!RS_ANY_GAUSSIAN(part != 0.0f)) continue;
-      *(__global gv_unaligned*)(sums + k) += part;
-      *(__global gv_unaligned*)(p + k) = (gv)(0.0f);
+    for (uint k = 0; k < RS_RAY_SUMS * LANES; k += LANES) {
+      const fv part = *(__global const rs_unaligned*)(p + k);
+      if (!rs_any_of(part != 0.0f)) continue;
+      *(__global rs_unaligned*)(sums + k) += part;
+      *(__global rs_unaligned*)(p + k) = (fv)(0.0f);
     }
   }
   load_columns(sums, RS_RAY_SUMS, RS_RAY_SUMS, v);
-  gv touched = 0;
+  fv touched = 0;
   for (int k = 0; k < RS_RAY_SUMS; ++k) touched += fabs(v[k]);
   return touched != 0.0f;
 }
@@ -90,12 +90,12 @@ __kernel void finish_ray_gradients(const uint begin,
                                    __global const float* restrict scales,
                                    __global const float* restrict opacities,
                                    RS_GRADIENT_ARGUMENTS) {
-  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  const size_t i = begin + get_global_id(0) * (size_t)LANES;
   if (i >= end) return;
-  gv v[RS_RAY_SUMS];
-  const gi touched =
+  fv v[RS_RAY_SUMS];
+  const iv touched =
       load_sums(sums + i * RS_RAY_SUMS, (size_t)ray_sums.gaussians * RS_RAY_SUMS, copies, v);
-  if (!RS_ANY_GAUSSIAN(touched)) {
+  if (!rs_any_of(touched)) {
     clear_columns(g_means + 3 * i, 3);
     clear_columns(g_quaternions + 4 * i, 4);
     clear_columns(g_scales + 3 * i, 3);
@@ -106,33 +106,33 @@ __kernel void finish_ray_gradients(const uint begin,
   }
 
   // Lanes that nothing touched may hold anything; they are cleared last.
-  const gv zero = (gv)(0.0f);
+  const fv zero = (fv)(0.0f);
   RayGaussian g;
   load_ray_gaussian(i, quaternions, scales, &g);
-  gv record[16];
+  fv record[16];
   load_columns(records + 16 * i, 16, 16, record);
 
-  gv mean[3];
+  fv mean[3];
   for (int j = 0; j < 3; ++j) {
     mean[j] = -(record[j] * v[0] + record[3 + j] * v[1] + record[6 + j] * v[2]);
   }
   const RsRaySums shares = ray_sums;
-  gv length2 = 0, along = 0, distance2 = 0;
+  fv length2 = 0, along = 0, distance2 = 0;
   for (int k = 0; k < 3; ++k) {
     const float* row = shares.screen + 3 * k;
-    const gv part = row[0] * mean[0] + row[1] * mean[1] + row[2] * mean[2];
+    const fv part = row[0] * mean[0] + row[1] * mean[1] + row[2] * mean[2];
     length2 += part * part;
-    const gv offset = record[9 + k] - shares.screen[9 + k];
+    const fv offset = record[9 + k] - shares.screen[9 + k];
     along += shares.screen[13 + k] * offset;
     distance2 += offset * offset;
   }
-  gv distance = 1.0f;
+  fv distance = 1.0f;
   if (shares.screen[12] == 0.0f) distance = sqrt(distance2);
   if (shares.screen[12] == 1.0f) distance = larger(along, zero);
   store_columns3(touched ? sqrt(length2) * distance : zero, touched ? v[10] * distance : zero,
-                 touched ? (gv)(1.0f) : zero, screen + 3 * i);
+                 touched ? (fv)(1.0f) : zero, screen + 3 * i);
 
-  gv c[3 * SH_COEFFICIENTS];
+  fv c[3 * SH_COEFFICIENTS];
 #if SH_DEGREE == 0
   for (int j = 0; j < 3; ++j) c[j] = touched ? RS_SH0 * v[11 + j] : zero;
 #else
@@ -150,25 +150,25 @@ __kernel void finish_ray_gradients(const uint begin,
 
   // delta^2 = x^T R S^-2 R^T x. With G = sum of g v v^T: d(log S_k) receives -2 G_kk; a rotation
   // R exp([w]x) receives 2 G_ij (S_j / S_i - S_i / S_j) about the third axis.
-  gv turn[3], gs[3];
+  fv turn[3], gs[3];
   for (int k = 0; k < 3; ++k) {
-    const gv diagonal = k == 0 ? v[3] : k == 1 ? v[6] : v[8];
-    const gi moves = touched & (g.raw_scale[k] >= g.scale[k]);
-    const gv value = -2.0f * diagonal * rs_scale_log_slope(g.scale[k]);
+    const fv diagonal = k == 0 ? v[3] : k == 1 ? v[6] : v[8];
+    const iv moves = touched & (g.raw_scale[k] >= g.scale[k]);
+    const fv value = -2.0f * diagonal * rs_scale_log_slope(g.scale[k]);
     gs[k] = moves ? value : zero;
-    const gv mixed = k == 0 ? v[7] : k == 1 ? v[5] : v[4];
-    const gv a = g.scale[(k + 1) % 3], b = g.scale[(k + 2) % 3];
+    const fv mixed = k == 0 ? v[7] : k == 1 ? v[5] : v[4];
+    const fv a = g.scale[(k + 1) % 3], b = g.scale[(k + 2) % 3];
     turn[k] = 2.0f * mixed * (b / a - a / b);
   }
   store_columns3(gs[0], gs[1], gs[2], g_scales + 3 * i);
   // q exp(w / 2) turns R by w.
-  gv gq[4];
+  fv gq[4];
   gq[0] = -(g.q[1] * turn[0] + g.q[2] * turn[1] + g.q[3] * turn[2]);
   gq[1] = g.q[0] * turn[0] + g.q[2] * turn[2] - g.q[3] * turn[1];
   gq[2] = g.q[0] * turn[1] + g.q[3] * turn[0] - g.q[1] * turn[2];
   gq[3] = g.q[0] * turn[2] + g.q[1] * turn[1] - g.q[2] * turn[0];
   for (int j = 0; j < 4; ++j) gq[j] = touched ? 2.0f * gq[j] / g.q_norm : zero;
   store_columns4(gq, g_quaternions + 4 * i);
-  const gv opacity = rs_sigmoid(load_column(opacities + i, 1));
+  const fv opacity = rs_sigmoid(load_column(opacities + i, 1));
   store_column(touched ? v[9] * (1.0f - opacity) : zero, g_opacities + i, 1);
 }

@@ -6,6 +6,7 @@
 #include "shared/color.h"
 #include "shared/sh.h"
 #include "trace/arguments.h"
+#define ONE_GAUSSIAN
 #include "trace/gaussian.h"
 #include "trace/ray_block.h"
 

@@ -5,8 +5,8 @@
 //                      form, written at offsets[i]
 //   gather_candidates  list records in sorted order, first candidate per tile   global: candidates,
 //                      or more
-// The first two take VECTOR Gaussians per work-item from number `begin` on, any local size; end -
-// begin is a multiple of VECTOR. Cost is O(Gaussians + candidates). An outline that the camera
+// The first two take LANES Gaussians per work-item from number `begin` on, any local size; end -
+// begin is a multiple of LANES. Cost is O(Gaussians + candidates). An outline that the camera
 // plane makes unbounded is replaced by the box of the ellipsoid against the planes of the tile.
 // Quantised depths order the list and are a lower bound of the depth of this and every later hit of
 // the list, which is what the exact order of rays rests on. A window is a rectangle of tiles: first
@@ -25,7 +25,7 @@
 // 0: the tiles of a pinhole, a regular grid in tangent coordinates. 1: those of a lens, each with a
 // box around its rays on one face of a cube (lens_tiles.cl); a launch fills the tiles of one face.
 #ifndef LENS
-#define LENS 0
+#define LENS RS_LENS_PINHOLE
 #endif
 
 // Pixel centres count as this much wider, for rounding.
@@ -44,22 +44,22 @@ typedef struct {
   IntLanes x0, y0, x1, y1;  // first and last tile of the outline's box
 } TileRanges;
 
-gi round_down(const gv v) {
-  const gi whole = RS_TO_INT(v);
-  return whole - (RS_TO_FLOAT(whole) > v ? (gi)(1) : (gi)(0));
+iv round_down(const fv v) {
+  const iv whole = rs_to_int(v);
+  return whole - (rs_to_float(whole) > v ? (iv)(1) : (iv)(0));
 }
 
 // First tile whose last pixel centre is at or behind `pixel`; last tile whose first is before it.
-gi first_tile(const gv pixel) {
+iv first_tile(const fv pixel) {
   return -round_down(-(pixel + 0.5f - RS_TILE_SLACK) * (1.0f / TILE)) - 1;
 }
-gi last_tile(const gv pixel) { return round_down((pixel - 0.5f + RS_TILE_SLACK) * (1.0f / TILE)); }
+iv last_tile(const fv pixel) { return round_down((pixel - 0.5f + RS_TILE_SLACK) * (1.0f / TILE)); }
 
-gi lesser(const gi a, const int b) { return a < b ? a : (gi)(b); }
-gi greater(const gi a, const int b) { return a > b ? a : (gi)(b); }
+iv lesser(const iv a, const int b) { return a < b ? a : (iv)(b); }
+iv greater(const iv a, const int b) { return a > b ? a : (iv)(b); }
 // Pixels far outside would overflow integers; the largest picture has 2^20 a side.
-gv within_reach(const gv pixel) {
-  return smaller(larger(pixel, (gv)(-2097152.0f)), (gv)(2097152.0f));
+fv within_reach(const fv pixel) {
+  return smaller(larger(pixel, (fv)(-2097152.0f)), (fv)(2097152.0f));
 }
 
 #if LENS
@@ -71,41 +71,41 @@ typedef struct {
 } LensTiles;
 
 // Lanes whose outline's box meets a box (x0, y0, x1, y1).
-gi outline_meets(const gv* b, const float4 box) {
+iv outline_meets(const fv* b, const float4 box) {
   return (b[RS_BOUNDS_X0] <= box.z) & (b[RS_BOUNDS_X1] >= box.x) & (b[RS_BOUNDS_Y0] <= box.w) &
          (b[RS_BOUNDS_Y1] >= box.y);
 }
 
-gi tile_ranges(const gv* b, const LensTiles* lens, const int4 window, TileRanges* range) {
-  range->x0.v = range->y0.v = (gi)(0x7fffffff);
-  range->x1.v = range->y1.v = (gi)(-1);
+iv tile_ranges(const fv* b, const LensTiles* lens, const int4 window, TileRanges* range) {
+  range->x0.v = range->y0.v = (iv)(0x7fffffff);
+  range->x1.v = range->y1.v = (iv)(-1);
   for (int y = window.y; y < min(window.y + window.w, lens->tile_rows); ++y) {
-    const gi meets = outline_meets(b, lens->spans[y]);
-    range->y0.v = (meets & (range->y0.v > y)) ? (gi)(y) : range->y0.v;
-    range->y1.v = meets ? (gi)(y) : range->y1.v;
+    const iv meets = outline_meets(b, lens->spans[y]);
+    range->y0.v = (meets & (range->y0.v > y)) ? (iv)(y) : range->y0.v;
+    range->y1.v = meets ? (iv)(y) : range->y1.v;
   }
   for (int x = window.x; x < min(window.x + window.z, lens->tiles_x); ++x) {
-    const gi meets = outline_meets(b, lens->spans[lens->tile_rows + x]);
-    range->x0.v = (meets & (range->x0.v > x)) ? (gi)(x) : range->x0.v;
-    range->x1.v = meets ? (gi)(x) : range->x1.v;
+    const iv meets = outline_meets(b, lens->spans[lens->tile_rows + x]);
+    range->x0.v = (meets & (range->x0.v > x)) ? (iv)(x) : range->x0.v;
+    range->x1.v = meets ? (iv)(x) : range->x1.v;
   }
-  return (RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_HIDDEN) | (range->x1.v < range->x0.v) |
+  return (rs_as_int(b[RS_BOUNDS_KIND]) == RS_LINE_HIDDEN) | (range->x1.v < range->x0.v) |
          (range->y1.v < range->y0.v);
 }
 #else
 // Of Gaussians with bounds b, in the window. Returns the lanes with an empty range.
-gi tile_ranges(const gv* b, const RsCamera* camera, const int4 window, TileRanges* range) {
-  const gv x0 = within_reach(b[RS_BOUNDS_X0] * camera->fx + camera->cx);
-  const gv x1 = within_reach(b[RS_BOUNDS_X1] * camera->fx + camera->cx);
-  const gv y0 = within_reach(b[RS_BOUNDS_Y0] * camera->fy + camera->cy);
-  const gv y1 = within_reach(b[RS_BOUNDS_Y1] * camera->fy + camera->cy);
+iv tile_ranges(const fv* b, const RsCamera* camera, const int4 window, TileRanges* range) {
+  const fv x0 = within_reach(b[RS_BOUNDS_X0] * camera->fx + camera->cx);
+  const fv x1 = within_reach(b[RS_BOUNDS_X1] * camera->fx + camera->cx);
+  const fv y0 = within_reach(b[RS_BOUNDS_Y0] * camera->fy + camera->cy);
+  const fv y1 = within_reach(b[RS_BOUNDS_Y1] * camera->fy + camera->cy);
   range->x0.v = greater(first_tile(x0), window.x);
   range->y0.v = greater(first_tile(y0), window.y);
   range->x1.v =
       lesser(last_tile(x1), min(window.x + window.z, (camera->width + TILE - 1) / TILE) - 1);
   range->y1.v =
       lesser(last_tile(y1), min(window.y + window.w, (camera->height + TILE - 1) / TILE) - 1);
-  const gi kind = RS_AS_INT(b[RS_BOUNDS_KIND]);
+  const iv kind = rs_as_int(b[RS_BOUNDS_KIND]);
   return (kind == RS_LINE_HIDDEN) | (x0 > camera->width - 0.5f + RS_TILE_SLACK) |
          (y0 > camera->height - 0.5f + RS_TILE_SLACK) | (range->x1.v < range->x0.v) |
          (range->y1.v < range->y0.v);
@@ -171,19 +171,19 @@ __kernel void count_tiles(const uint begin,
                           const int face,
                           __global const RsLensTile* restrict tiles,
                           __global const float4* restrict spans) {
-  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  const size_t i = begin + get_global_id(0) * (size_t)LANES;
   if (i >= end) return;
   const RsCamera camera = camera_argument;
   const LensTiles lens = {tiles, spans, face, (camera.width + TILE - 1) / TILE,
                           (camera.height + TILE - 1) / TILE};
   FloatLanes outline[8];
-  gv b[8];
+  fv b[8];
   load_records8((__global const float*)(bounds + i), b);
   for (int k = 0; k < 4; ++k) outline[k].v = b[k];
   TileRanges range;
   IntLanes empty;
   empty.v = tile_ranges(b, &lens, window, &range);
-  for (int lane = 0; lane < VECTOR; ++lane) {
+  for (int lane = 0; lane < LANES; ++lane) {
     uint found = 0;
     if (empty.s[lane] == 0) {
       for (int y = range.y0.s[lane]; y <= range.y1.s[lane]; ++y) {
@@ -214,25 +214,25 @@ __kernel void count_tiles(const uint begin,
                           const RsCamera camera_argument,
                           const int4 window,
                           __global uint* restrict counts) {
-  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
+  const size_t i = begin + get_global_id(0) * (size_t)LANES;
   if (i >= end) return;
   const RsCamera camera = camera_argument;
-  gv b[8];
+  fv b[8];
   load_records8((__global const float*)(bounds + i), b);
   TileRanges range;
-  const gi empty = tile_ranges(b, &camera, window, &range);
+  const iv empty = tile_ranges(b, &camera, window, &range);
   IntLanes found;
   found.v = (range.x1.v - range.x0.v + 1) * (range.y1.v - range.y0.v + 1);
-  found.v = empty ? (gi)(0) : found.v;
-  const gi unbounded = b[RS_BOUNDS_X0] == -INFINITY;
-  if (RS_ANY_GAUSSIAN(unbounded & !empty)) {
+  found.v = empty ? (iv)(0) : found.v;
+  const iv unbounded = b[RS_BOUNDS_X0] == -INFINITY;
+  if (rs_any_of(unbounded & !empty)) {
     IntLanes mask;
     mask.v = unbounded & !empty;
-    for (int lane = 0; lane < VECTOR; ++lane) {
+    for (int lane = 0; lane < LANES; ++lane) {
       if (mask.s[lane] != 0) found.s[lane] = tiles_of_box(&range, lane, &camera, boxes + i + lane);
     }
   }
-  *(__global gi_unaligned*)(counts + i) = found.v;
+  *(__global rs_int_unaligned*)(counts + i) = found.v;
 }
 
 #endif
@@ -241,8 +241,8 @@ __kernel void count_tiles(const uint begin,
 #define RS_DEPTH_BITS 12
 #define RS_DEPTH_FIRST ((127 - 10) << (23 - RS_DEPTH_BITS))
 
-gi depth_key(const gv depth) {
-  return lesser(greater((RS_AS_INT(depth) >> RS_DEPTH_BITS) - RS_DEPTH_FIRST, 0), 65535);
+iv depth_key(const fv depth) {
+  return lesser(greater((rs_as_int(depth) >> RS_DEPTH_BITS) - RS_DEPTH_FIRST, 0), 65535);
 }
 
 float depth_bound(const uint key) {
@@ -251,27 +251,27 @@ float depth_bound(const uint key) {
 
 // What the least depth of Gaussians in a tile needs of their lines.
 typedef struct {
-  gv mean_x, mean_y;
-  gv along, slope_x, slope_y;  // <o', d'> at the mean, and its slopes
-  gv most_x, most_y;           // what a slope adds at the end of the outline
-  gv limit;                    // of that product with the point of a hit
-  gv depth;                    // no hit is nearer
+  fv mean_x, mean_y;
+  fv along, slope_x, slope_y;  // <o', d'> at the mean, and its slopes
+  fv most_x, most_y;           // what a slope adds at the end of the outline
+  fv limit;                    // of that product with the point of a hit
+  fv depth;                    // no hit is nearer
 } DepthPlanes;
 
 // Lower bound of the depth of all hits of one Gaussian in a tile: of its own least depth, and of
 // the plane <o', x'> = limit in whitened space, beyond which all its hits lie: limit is Q in peak
 // order (Thales: peaks lie on the sphere over mean and camera), sqrt(Q) |o'| for near roots. The
 // depth of the plane is a ratio of linear functions of the ray, so its least value is at a corner.
-void depth_planes(const gv* b, __global const RsLine* lines, DepthPlanes* planes) {
-  gv v[16];
-  load_columns(lines->v, 16, VECTOR == 1 ? 9 : 16, v);
-  const gv origin2 = v[6] * v[2] * v[2];
+void depth_planes(const fv* b, __global const RsLine* lines, DepthPlanes* planes) {
+  fv v[16];
+  load_columns(lines->v, 16, LANES == 1 ? 9 : 16, v);
+  const fv origin2 = v[6] * v[2] * v[2];
 #if PEAK_ORDER
-  const gv limit = b[RS_BOUNDS_QUANTILE];
+  const fv limit = b[RS_BOUNDS_QUANTILE];
 #else
-  const gv limit = sqrt(b[RS_BOUNDS_QUANTILE] * origin2);
+  const fv limit = sqrt(b[RS_BOUNDS_QUANTILE] * origin2);
 #endif
-  const gi projective = RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_PROJECTIVE;
+  const iv projective = rs_as_int(b[RS_BOUNDS_KIND]) == RS_LINE_PROJECTIVE;
   planes->mean_x = v[0];
   planes->mean_y = v[1];
   planes->along = v[6];
@@ -279,13 +279,13 @@ void depth_planes(const gv* b, __global const RsLine* lines, DepthPlanes* planes
   planes->slope_y = v[8];
   planes->most_x = v[7] * ((v[7] > 0.0f ? b[RS_BOUNDS_X1] : b[RS_BOUNDS_X0]) - v[0]);
   planes->most_y = v[8] * ((v[8] > 0.0f ? b[RS_BOUNDS_Y1] : b[RS_BOUNDS_Y0]) - v[1]);
-  planes->limit = projective ? (origin2 - limit) / v[2] * 0.9999f : (gv)(0.0f);
+  planes->limit = projective ? (origin2 - limit) / v[2] * 0.9999f : (fv)(0.0f);
   planes->depth = b[RS_BOUNDS_DEPTH];
 }
 
 // What a slope adds up to the farther edge of a tile, the product at most at the outline's end.
-gv most_along(const gv slope, const gv low, const gv high, const gv mean, const gv most) {
-  const gv edge = slope > 0.0f ? high : low;
+fv most_along(const fv slope, const fv low, const fv high, const fv mean, const fv most) {
+  const fv edge = slope > 0.0f ? high : low;
   return smaller(slope * (edge - mean), most);
 }
 
@@ -306,10 +306,10 @@ __kernel void fill_tiles(const uint begin,
                          __global const uint* restrict live,
                          __global uint* restrict keys,
                          __global uint* restrict values) {
-  const size_t i = begin + get_global_id(0) * (size_t)VECTOR;
-  if (i >= end || live[0] == 0 || offsets[i] == offsets[i + VECTOR]) return;
+  const size_t i = begin + get_global_id(0) * (size_t)LANES;
+  if (i >= end || live[0] == 0 || offsets[i] == offsets[i + LANES]) return;
   const RsCamera camera = camera_argument;
-  gv b[8];
+  fv b[8];
   load_records8((__global const float*)(bounds + i), b);
   TileRanges range;
 #if LENS
@@ -317,9 +317,9 @@ __kernel void fill_tiles(const uint begin,
   const LensTiles lens = {tiles, spans, face, tiles_x, (camera.height + TILE - 1) / TILE};
   FloatLanes outline[8];
   for (int k = 0; k < 4; ++k) outline[k].v = b[k];
-  const gi empty = tile_ranges(b, &lens, window, &range);
+  const iv empty = tile_ranges(b, &lens, window, &range);
 #else
-  const gi empty = tile_ranges(b, &camera, window, &range);
+  const iv empty = tile_ranges(b, &camera, window, &range);
   const float size_x = TILE / camera.fx, size_y = TILE / camera.fy;
   const float centre_x = camera.cx / camera.fx, centre_y = camera.cy / camera.fy;
   IntLanes unbounded;
@@ -328,17 +328,17 @@ __kernel void fill_tiles(const uint begin,
   DepthPlanes planes;
   depth_planes(b, lines + i, &planes);
   IntLanes general;
-  general.v = RS_AS_INT(b[RS_BOUNDS_KIND]) == RS_LINE_GENERAL;
-  const gv zero = (gv)(0.0f);
-  uint cursor[VECTOR];
-  for (int lane = 0; lane < VECTOR; ++lane) cursor[lane] = offsets[i + lane];
+  general.v = rs_as_int(b[RS_BOUNDS_KIND]) == RS_LINE_GENERAL;
+  const fv zero = (fv)(0.0f);
+  uint cursor[LANES];
+  for (int lane = 0; lane < LANES; ++lane) cursor[lane] = offsets[i + lane];
   IntLanes x, y, key, left;
   x.v = range.x0.v;
   y.v = range.y0.v;
-  for (left.v = !empty; RS_ANY_GAUSSIAN(left.v); left.v = left.v & (y.v <= range.y1.v)) {
+  for (left.v = !empty; rs_any_of(left.v); left.v = left.v & (y.v <= range.y1.v)) {
 #if LENS
     FloatLanes edge[4];
-    for (int lane = 0; lane < VECTOR; ++lane) {
+    for (int lane = 0; lane < LANES; ++lane) {
       edge[0].s[lane] = edge[1].s[lane] = edge[2].s[lane] = edge[3].s[lane] = 0.0f;
       if (left.s[lane] == 0) continue;
       const RsLensTile tile = tiles[y.s[lane] * tiles_x + x.s[lane]];
@@ -347,20 +347,20 @@ __kernel void fill_tiles(const uint begin,
       edge[2].s[lane] = tile.x1;
       edge[3].s[lane] = tile.y1;
     }
-    const gv low_x = edge[0].v, low_y = edge[1].v, high_x = edge[2].v, high_y = edge[3].v;
+    const fv low_x = edge[0].v, low_y = edge[1].v, high_x = edge[2].v, high_y = edge[3].v;
 #else
-    const gv low_x = RS_TO_FLOAT(x.v) * size_x - centre_x;
-    const gv low_y = RS_TO_FLOAT(y.v) * size_y - centre_y;
-    const gv high_x = (RS_TO_FLOAT(x.v) + 1.0f) * size_x - centre_x;
-    const gv high_y = (RS_TO_FLOAT(y.v) + 1.0f) * size_y - centre_y;
+    const fv low_x = rs_to_float(x.v) * size_x - centre_x;
+    const fv low_y = rs_to_float(y.v) * size_y - centre_y;
+    const fv high_x = (rs_to_float(x.v) + 1.0f) * size_x - centre_x;
+    const fv high_y = (rs_to_float(y.v) + 1.0f) * size_y - centre_y;
 #endif
-    const gv along = planes.along +
+    const fv along = planes.along +
                      most_along(planes.slope_y, low_y, high_y, planes.mean_y, planes.most_y) +
                      most_along(planes.slope_x, low_x, high_x, planes.mean_x, planes.most_x);
-    const gv plane = ((along > 0.0f) & (planes.limit > 0.0f)) ? planes.limit / along : zero;
+    const fv plane = ((along > 0.0f) & (planes.limit > 0.0f)) ? planes.limit / along : zero;
     key.v = ((y.v - window.y) * window.z + (x.v - window.x)) << 16 |
             depth_key(larger(plane, planes.depth));
-    for (int lane = 0; lane < VECTOR; ++lane) {
+    for (int lane = 0; lane < LANES; ++lane) {
       if (left.s[lane] == 0) continue;
 #if LENS
       if (!lens_tile_meets(&lens, x.s[lane], y.s[lane], outline, lane, &camera, boxes + i + lane))
@@ -374,7 +374,7 @@ __kernel void fill_tiles(const uint begin,
       keys[to] = key.s[lane];
       values[to] = (uint)(i + lane) << 1 | (general.s[lane] != 0);
     }
-    const gi turn = x.v >= range.x1.v;
+    const iv turn = x.v >= range.x1.v;
     x.v = turn ? range.x0.v : x.v + 1;
     y.v = turn ? y.v + 1 : y.v;
   }

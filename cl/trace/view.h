@@ -16,7 +16,7 @@
 #define SH_COEFFICIENTS ((SH_DEGREE + 1) * (SH_DEGREE + 1))
 #endif
 #define RS_SH_FUNCTIONS ((SH_DEGREE + 1) * (SH_DEGREE + 1))
-#define RS_SH_REAL gv
+#define RS_SH_REAL fv
 #include "shared/sh.h"
 
 // Beyond this slope of the mean's direction the projective form loses digits to cancellation; the
@@ -27,25 +27,25 @@
 #define RS_MIN_RELATIVE_SCALE 1e-7f
 
 typedef struct {
-  gv m[3];       // mean, camera axes
-  gv offset[3];  // mean minus camera centre, world axes
-  gv axis[9];    // columns r_k of the rotation in camera axes, axis[3 k + j]
-  gv scale[3];   // standard deviations, floored
-  gv w[3];       // 1 / scale
-  gv raw_scale[3];
-  gv q[4];  // unit quaternion
-  gv q_norm;
-  gv opacity;
+  fv m[3];       // mean, camera axes
+  fv offset[3];  // mean minus camera centre, world axes
+  fv axis[9];    // columns r_k of the rotation in camera axes, axis[3 k + j]
+  fv scale[3];   // standard deviations, floored
+  fv w[3];       // 1 / scale
+  fv raw_scale[3];
+  fv q[4];  // unit quaternion
+  fv q_norm;
+  fv opacity;
 } ViewGaussian;
 
 // Means minus camera centre of the Gaussians from number i on.
-void load_offset(const size_t i, __global const float* means, const RsCamera* camera, gv* offset) {
+void load_offset(const size_t i, __global const float* means, const RsCamera* camera, fv* offset) {
   load_columns3(means + 3 * i, offset);
   for (int j = 0; j < 3; ++j) offset[j] -= camera->center[j];
 }
 
 // Loads the Gaussians from number i on; false in lanes where a parameter is not finite.
-gi load_view_gaussian(const size_t i,
+iv load_view_gaussian(const size_t i,
                       __global const float* means,
                       __global const float* quaternions,
                       __global const float* scales,
@@ -60,16 +60,16 @@ gi load_view_gaussian(const size_t i,
   load_columns4(quaternions + 4 * i, g->q);
   g->q_norm = sqrt(g->q[0] * g->q[0] + g->q[1] * g->q[1] + g->q[2] * g->q[2] + g->q[3] * g->q[3]);
   for (int j = 0; j < 4; ++j) g->q[j] = g->q[j] / g->q_norm;
-  gv R[9];
+  fv R[9];
   rotation_matrix(g->q[0], g->q[1], g->q[2], g->q[3], R);
   for (int k = 0; k < 3; ++k) {
     for (int j = 0; j < 3; ++j) {
       g->axis[3 * k + j] = V[3 * j] * R[k] + V[3 * j + 1] * R[3 + k] + V[3 * j + 2] * R[6 + k];
     }
   }
-  const gv distance = sqrt(g->m[0] * g->m[0] + g->m[1] * g->m[1] + g->m[2] * g->m[2]);
-  const gv floor_scale = larger(RS_MIN_RELATIVE_SCALE * distance, (gv)(1e-12f));
-  gv sum = distance + g->q_norm;
+  const fv distance = sqrt(g->m[0] * g->m[0] + g->m[1] * g->m[1] + g->m[2] * g->m[2]);
+  const fv floor_scale = larger(RS_MIN_RELATIVE_SCALE * distance, (fv)(1e-12f));
+  fv sum = distance + g->q_norm;
   load_columns3(scales + 3 * i, g->raw_scale);
   for (int k = 0; k < 3; ++k) {
     g->raw_scale[k] = rs_scale_of(g->raw_scale[k]);
@@ -81,8 +81,8 @@ gi load_view_gaussian(const size_t i,
   return (fabs(sum + g->opacity) <= FLT_MAX) & (g->q_norm > 0.0f);
 }
 
-gi is_projective(const ViewGaussian* g) {
-  const gv reach = RS_MAX_SLOPE * g->m[2];
+iv is_projective(const ViewGaussian* g) {
+  const fv reach = RS_MAX_SLOPE * g->m[2];
   return (g->m[2] > 0.0f) & (fabs(g->m[0]) <= reach) & (fabs(g->m[1]) <= reach);
 }
 

@@ -8,9 +8,9 @@
 
 #include "trace/view.h"
 
-// The screen gradient counts the angle in which the mean is seen (LENS 2 of packet.h).
-#ifndef ANGULAR
-#define ANGULAR 0
+// The screen gradient of RS_LENS_AROUND counts the angle in which the mean is seen.
+#ifndef LENS
+#define LENS RS_LENS_PINHOLE
 #endif
 
 // The lines' gradients have that of m_z in the slot of D0 (line_gradient.h).
@@ -19,17 +19,17 @@
 #endif
 
 typedef struct {
-  gv m[3];
-  gv axis[9];
-  gv w[3];
+  fv m[3];
+  fv axis[9];
+  fv w[3];
 } ViewGradient;
 
-void projective_gradient(const ViewGaussian* g, const gv* v, ViewGradient* out) {
-  const gv mx = g->m[0], my = g->m[1], mz = g->m[2];
-  const gv iz = 1.0f / mz;
-  const gv x0 = mx * iz, y0 = my * iz;
-  gv ex = 0, ey = 0, d0 = 0;
-  gv P[3], gP[3];
+void projective_gradient(const ViewGaussian* g, const fv* v, ViewGradient* out) {
+  const fv mx = g->m[0], my = g->m[1], mz = g->m[2];
+  const fv iz = 1.0f / mz;
+  const fv x0 = mx * iz, y0 = my * iz;
+  fv ex = 0, ey = 0, d0 = 0;
+  fv P[3], gP[3];
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     P[k] = g->w[(k + 1) % 3] * g->w[(k + 2) % 3];
@@ -37,20 +37,20 @@ void projective_gradient(const ViewGaussian* g, const gv* v, ViewGradient* out) 
   }
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-    const gv rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
-    const gv w = g->w[k];
-    const gv A = ry * mz - rz * my;
-    const gv B = rz * mx - rx * mz;
-    const gv gA = P[k] * P[k] * (2.0f * v[3] * A + v[4] * B);
-    const gv gB = P[k] * P[k] * (2.0f * v[5] * B + v[4] * A);
+    const fv rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
+    const fv w = g->w[k];
+    const fv A = ry * mz - rz * my;
+    const fv B = rz * mx - rx * mz;
+    const fv gA = P[k] * P[k] * (2.0f * v[3] * A + v[4] * B);
+    const fv gB = P[k] * P[k] * (2.0f * v[5] * B + v[4] * A);
     gP[k] = 2.0f * P[k] * (v[3] * A * A + v[4] * A * B + v[5] * B * B);
-    const gv along = rx * mx + ry * my + rz * mz;
-    const gv q = along * w;
+    const fv along = rx * mx + ry * my + rz * mz;
+    const fv q = along * w;
     d0 += q * q;
     ex += q * rx * w;
     ey += q * ry * w;
-    const gv ge = v[7] * rx + v[8] * ry;
-    const gv gq = 2.0f * v[6] * q * iz * iz + ge * w * iz;
+    const fv ge = v[7] * rx + v[8] * ry;
+    const fv gq = 2.0f * v[6] * q * iz * iz + ge * w * iz;
     out->w[k] =
         ge * q * iz + 2.0f * w * (v[9] * rx * rx + v[10] * rx * ry + v[11] * ry * ry) + gq * along;
     out->axis[3 * k] =
@@ -75,16 +75,16 @@ void projective_gradient(const ViewGaussian* g, const gv* v, ViewGradient* out) 
 }
 
 // In place of the projective gradient in the lanes where `general` holds.
-void general_gradient(const ViewGaussian* g, const gv* v, const gi general, ViewGradient* out) {
-  gv m[3] = {0, 0, 0};
+void general_gradient(const ViewGaussian* g, const fv* v, const iv general, ViewGradient* out) {
+  fv m[3] = {0, 0, 0};
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-    const gv w = g->w[k];
-    const gv go = v[9 + k];
-    gv along = 0, gw = 0;
+    const fv w = g->w[k];
+    const fv go = v[9 + k];
+    fv along = 0, gw = 0;
 #pragma unroll
     for (int j = 0; j < 3; ++j) {
-      const gv r = g->axis[3 * k + j];
+      const fv r = g->axis[3 * k + j];
       along += r * g->m[j];
       gw += v[3 * k + j] * r;
       out->axis[3 * k + j] = general ? (v[3 * k + j] - go * g->m[j]) * w : out->axis[3 * k + j];
@@ -98,23 +98,23 @@ void general_gradient(const ViewGaussian* g, const gv* v, const gi general, View
 
 // Of a line with gradient v.
 void line_gradient(
-    const ViewGaussian* g, const gv* v, const gi touched, const gi kind, ViewGradient* out) {
+    const ViewGaussian* g, const fv* v, const iv touched, const iv kind, ViewGradient* out) {
   projective_gradient(g, v, out);
-  const gi general = kind == RS_LINE_GENERAL;
-  if (RS_ANY_GAUSSIAN(touched & general)) general_gradient(g, v, general, out);
+  const iv general = kind == RS_LINE_GENERAL;
+  if (rs_any_of(touched & general)) general_gradient(g, v, general, out);
 }
 
 #if DEPTH_GRADIENT
 // Takes the gradient of m_z out of that of a projective line, v[6], and puts that of D0 there: N
 // and D are of first degree in v[3..5] and v[6..11], and squared distance and depth of degree 0 in
 // them all, so that the products of numbers and gradients add up to 0 (Euler).
-gv take_depth_gradient(const gv* line, const gi touched, const gi kind, gv* v) {
-  gv sum = 0;
+fv take_depth_gradient(const fv* line, const iv touched, const iv kind, fv* v) {
+  fv sum = 0;
   for (int k = 3; k < 12; ++k) {
     if (k != 6) sum += line[k] * v[k];
   }
-  const gi counts = touched & (kind == RS_LINE_PROJECTIVE);
-  const gv depth = counts ? v[6] : (gv)(0.0f);
+  const iv counts = touched & (kind == RS_LINE_PROJECTIVE);
+  const fv depth = counts ? v[6] : (fv)(0.0f);
   v[6] = counts ? -sum / line[6] : v[6];
   return depth;
 }
@@ -122,49 +122,49 @@ gv take_depth_gradient(const gv* line, const gi touched, const gi kind, gv* v) {
 
 // What density control reads: screen gradient, the sum of its absolute values, 1 where a ray met.
 void screen_statistics(const ViewGaussian* g,
-                       const gv* v,
-                       const gi touched,
-                       const gi kind,
+                       const fv* v,
+                       const iv touched,
+                       const iv kind,
                        const float screen_x,
                        const float screen_y,
-                       gv* out) {
-  const gv zero = (gv)(0.0f);
-  const gi counts = touched & (kind == RS_LINE_PROJECTIVE);
-#if ANGULAR
+                       fv* out) {
+  const fv zero = (fv)(0.0f);
+  const iv counts = touched & (kind == RS_LINE_PROJECTIVE);
+#if LENS == RS_LENS_AROUND
   (void)screen_y;
-  const gv x0 = g->m[0] / g->m[2], y0 = g->m[1] / g->m[2];
-  const gv across = x0 * v[0] + y0 * v[1];
-  const gv slope =
+  const fv x0 = g->m[0] / g->m[2], y0 = g->m[1] / g->m[2];
+  const fv across = x0 * v[0] + y0 * v[1];
+  const fv slope =
       screen_x * sqrt((1.0f + x0 * x0 + y0 * y0) * (v[0] * v[0] + v[1] * v[1] + across * across));
 #else
   (void)g;
-  const gv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
+  const fv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
 #endif
   out[0] = counts ? slope : zero;
   out[1] = counts ? v[2] : zero;
-  out[2] = touched ? (gv)(1.0f) : zero;
+  out[2] = touched ? (fv)(1.0f) : zero;
 }
 
 // What the colour of a Gaussian depends on: its direction n = (m - c) / |m - c| and max(0, .),
 // which passes nothing where it clamps.
 typedef struct {
-  gv n[3];
-  gv inverse;  // 1 / |m - c|
-  gv basis[RS_SH_FUNCTIONS];
-  gv slope[3];  // of R, G, B before they are clamped
+  fv n[3];
+  fv inverse;  // 1 / |m - c|
+  fv basis[RS_SH_FUNCTIONS];
+  fv slope[3];  // of R, G, B before they are clamped
 } ColourGradient;
 
 // From out->n = m - c.
 void colour_direction(ColourGradient* out) {
-  gv* d = out->n;
-  out->inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (gv)(1e-30f)));
+  fv* d = out->n;
+  out->inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (fv)(1e-30f)));
 #pragma unroll
   for (int j = 0; j < 3; ++j) d[j] = d[j] * out->inverse;
 }
 
 void colour_gradient(
-    const gv* offset, const gv* line, const gv* v, const gi touched, ColourGradient* out) {
-  const gv zero = (gv)(0.0f);
+    const fv* offset, const fv* line, const fv* v, const iv touched, ColourGradient* out) {
+  const fv zero = (fv)(0.0f);
 #pragma unroll
   for (int j = 0; j < 3; ++j) out->n[j] = offset[j];
   colour_direction(out);
@@ -177,34 +177,34 @@ void colour_gradient(
 
 // The share of the mean's gradient that comes from the colour; `along` holds per function the
 // product of its coefficients with the slope.
-void direction_gradient(const ColourGradient* colour, const gv* along, gv* mean) {
-  const gv* n = colour->n;
-  gv gn[3];
+void direction_gradient(const ColourGradient* colour, const fv* along, fv* mean) {
+  const fv* n = colour->n;
+  fv gn[3];
   rs_sh_gradient(SH_DEGREE, n[0], n[1], n[2], along, gn);
-  const gv radial = gn[0] * n[0] + gn[1] * n[1] + gn[2] * n[2];
+  const fv radial = gn[0] * n[0] + gn[1] * n[1] + gn[2] * n[2];
 #pragma unroll
   for (int j = 0; j < 3; ++j) mean[j] = (gn[j] - radial * n[j]) * colour->inverse;
 }
 
 typedef struct {
-  gv mean[3];  // holds the share of the colour before
-  gv quaternion[4];
-  gv scale[3];
-  gv opacity;
+  fv mean[3];  // holds the share of the colour before
+  fv quaternion[4];
+  fv scale[3];
+  fv opacity;
 } ParameterGradient;
 
 void parameter_gradient(const ViewGaussian* g,
                         const ViewGradient* view,
-                        const gv opacity,
-                        const gi touched,
+                        const fv opacity,
+                        const iv touched,
                         const RsCamera* camera,
                         ParameterGradient* out) {
-  const gv zero = (gv)(0.0f);
+  const fv zero = (fv)(0.0f);
   const float* V = camera->rotation;
-  gv gR[9];
+  fv gR[9];
 #pragma unroll
   for (int j = 0; j < 3; ++j) {
-    const gv mean = V[j] * view->m[0] + V[3 + j] * view->m[1] + V[6 + j] * view->m[2];
+    const fv mean = V[j] * view->m[0] + V[3 + j] * view->m[1] + V[6 + j] * view->m[2];
     out->mean[j] = touched ? mean + out->mean[j] : zero;
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
@@ -212,18 +212,18 @@ void parameter_gradient(const ViewGaussian* g,
                       V[6 + j] * view->axis[3 * k + 2];
     }
   }
-  gv gq[4];
+  fv gq[4];
   rotation_gradient(g->q, gR, gq);
-  const gv along = gq[0] * g->q[0] + gq[1] * g->q[1] + gq[2] * g->q[2] + gq[3] * g->q[3];
+  const fv along = gq[0] * g->q[0] + gq[1] * g->q[1] + gq[2] * g->q[2] + gq[3] * g->q[3];
 #pragma unroll
   for (int j = 0; j < 4; ++j) {
-    const gv value = (gq[j] - g->q[j] * along) / g->q_norm;
+    const fv value = (gq[j] - g->q[j] * along) / g->q_norm;
     out->quaternion[j] = touched ? value : zero;
   }
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-    const gi moves = touched & (g->raw_scale[k] >= g->scale[k]);
-    const gv value = -view->w[k] * g->w[k] * rs_scale_log_slope(g->scale[k]);
+    const iv moves = touched & (g->raw_scale[k] >= g->scale[k]);
+    const fv value = -view->w[k] * g->w[k] * rs_scale_log_slope(g->scale[k]);
     out->scale[k] = moves ? value : zero;
   }
   out->opacity = touched ? opacity * g->opacity * (1.0f - g->opacity) : zero;
@@ -232,15 +232,15 @@ void parameter_gradient(const ViewGaussian* g,
 // Contribution to the camera's gradient: centre in world axes, left rotation vector in camera axes.
 // The mean enters only through m - c, so the centre takes the opposite of its gradient.
 void pose_gradient(
-    const ViewGaussian* g, const ViewGradient* view, const gv* mean, const gi touched, gv* out) {
-  gv rotation[3];
+    const ViewGaussian* g, const ViewGradient* view, const fv* mean, const iv touched, fv* out) {
+  fv rotation[3];
   rotation[0] = g->m[1] * view->m[2] - g->m[2] * view->m[1];
   rotation[1] = g->m[2] * view->m[0] - g->m[0] * view->m[2];
   rotation[2] = g->m[0] * view->m[1] - g->m[1] * view->m[0];
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-    const gv* r = g->axis + 3 * k;
-    const gv* gr = view->axis + 3 * k;
+    const fv* r = g->axis + 3 * k;
+    const fv* gr = view->axis + 3 * k;
     rotation[0] += r[1] * gr[2] - r[2] * gr[1];
     rotation[1] += r[2] * gr[0] - r[0] * gr[2];
     rotation[2] += r[0] * gr[1] - r[1] * gr[0];
@@ -248,7 +248,7 @@ void pose_gradient(
 #pragma unroll
   for (int j = 0; j < 3; ++j) {
     out[j] = -mean[j];
-    out[3 + j] = touched ? rotation[j] : (gv)(0.0f);
+    out[3 + j] = touched ? rotation[j] : (fv)(0.0f);
   }
 }
 

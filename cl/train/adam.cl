@@ -5,8 +5,8 @@
 // A Gaussian with a gradient that is not finite keeps its parameters and moments and is counted;
 // with visible_only so does, uncounted, one that no ray met (screen[3 i + 2] == 0). A guard word
 // that is not 0 turns the whole step off (train/step_guard.cl).
+#include "parallel/vector_lanes.h"
 #include "shared/train_layout.h"
-#include "train/lanes.h"
 
 // Gaussians of a work-group of choose_steps.
 #ifndef BLOCK
@@ -22,7 +22,7 @@
 #define WIDTH 1
 #endif
 #ifndef SPAN
-#define SPAN VECTOR
+#define SPAN LANES
 #endif
 
 // Exponent of infinity and NaN. Compilers may take zero times anything for zero, so numbers that
@@ -35,16 +35,16 @@ void mark_poisoned(
     const __global float* gradient, size_t first, size_t last, size_t width, __local uint* bad) {
   const __global uint* words = (const __global uint*)gradient;
   const size_t begin = first * width, end = last * width;
-  lane_words most = (lane_words)(0u);
+  uv most = (uv)(0u);
   uint rest = 0;
-  size_t i = begin + get_local_id(0) * VECTOR;
-  for (; i + VECTOR <= end; i += GROUP * VECTOR) {
+  size_t i = begin + get_local_id(0) * LANES;
+  for (; i + LANES <= end; i += GROUP * LANES) {
     most = max(most, rs_load_words(words + i) & RS_EXPONENT);
   }
   for (; i < end; ++i) rest = max(rest, words[i] & RS_EXPONENT);
-  if (rest != RS_EXPONENT && !rs_any_lane(most == RS_EXPONENT)) return;
-  for (i = begin + get_local_id(0) * VECTOR; i < end; i += GROUP * VECTOR) {
-    for (size_t k = i; k < min(i + VECTOR, end); ++k) {
+  if (rest != RS_EXPONENT && !rs_any_of(most == RS_EXPONENT)) return;
+  for (i = begin + get_local_id(0) * LANES; i < end; i += GROUP * LANES) {
+    for (size_t k = i; k < min(i + LANES, end); ++k) {
       if ((words[k] & RS_EXPONENT) == RS_EXPONENT) atomic_or(bad + (k / width - first), 1u);
     }
   }
@@ -88,13 +88,13 @@ __kernel void choose_steps(const __global float* means,
 
 // The learning rates of the floats from `phase` of a Gaussian on: of SH the first three have their
 // own.
-lanes step_rates(int phase, const RsAdam* adam) {
+fv step_rates(int phase, const RsAdam* adam) {
 #if WIDTH <= 4
   (void)phase;
-  return (lanes)(adam->rate);
+  return (fv)(adam->rate);
 #else
-  lane_mask place = phase + RS_LANE_IDS;
-  for (int k = 0; k < (VECTOR + WIDTH - 2) / WIDTH; ++k) {
+  iv place = phase + RS_LANE_INDEX;
+  for (int k = 0; k < (LANES + WIDTH - 2) / WIDTH; ++k) {
     place = place >= WIDTH ? place - WIDTH : place;
   }
   return rs_pick(place < 3, adam->rate, adam->rest_rate);
@@ -124,10 +124,10 @@ void adam_run(__global float* parameter,
               const RsAdam* adam) {
   int phase = (int)(begin % WIDTH);
   size_t i = begin;
-  for (; i + VECTOR <= end; i += VECTOR) {
-    const lanes rates = step_rates(phase, adam);
-    RS_ADAM_UPDATE(lanes, rs_load, rs_store, rs_pick, rates);
-    phase = (phase + VECTOR) % WIDTH;
+  for (; i + LANES <= end; i += LANES) {
+    const fv rates = step_rates(phase, adam);
+    RS_ADAM_UPDATE(fv, rs_load, rs_store, rs_pick, rates);
+    phase = (phase + LANES) % WIDTH;
   }
   for (; i < end; ++i) {
     const float rate = WIDTH <= 4 || phase < 3 ? adam->rate : adam->rest_rate;

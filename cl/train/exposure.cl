@@ -17,7 +17,7 @@
 //   at least `damping`; then the mean over the photos is taken off. Does nothing where the guard's
 //   word is not 0, nothing of the photo counts, or a sum is not finite.
 // Complexity: pixels + blocks + photos.
-#define VECTOR 1
+#define LANES 1
 #include "train/photo.h"
 
 #ifndef BLOCK

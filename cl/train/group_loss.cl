@@ -11,7 +11,7 @@
 //   slopes    per channel planes E, F, G as large as the image
 // Per pixel and channel 2.6 pixels of image and photo are fetched, and as many of each plane of
 // slopes: 26^2 for 16^2.
-#define VECTOR 1
+#define LANES 1
 #include "train/loss_pixel.h"
 #include "train/photo.h"
 #include "train/ssim.h"

@@ -4,26 +4,26 @@
 #ifndef RS_TRAIN_LOSS_PIXEL_H
 #define RS_TRAIN_LOSS_PIXEL_H
 
-#include "train/lanes.h"
+#include "parallel/vector_lanes.h"
 
 #ifndef PIXEL_L2
 #define PIXEL_L2 0
 #endif
 
 typedef struct {
-  lanes pixel, square, weight;  // sums of m rho(x - y), m (clamp(x) - y)^2, m
+  fv pixel, square, weight;  // sums of m rho(x - y), m (clamp(x) - y)^2, m
 } LossSums;
 
 // Adds a pixel of one channel; returns m (x - y).
-lanes rs_add_pixel(lanes x, lanes y, lanes mask, LossSums* sums) {
-  const lanes difference = x - y;
-  const lanes masked = mask * difference;
+fv rs_add_pixel(fv x, fv y, fv mask, LossSums* sums) {
+  const fv difference = x - y;
+  const fv masked = mask * difference;
 #if PIXEL_L2
   sums->pixel += masked * difference;
 #else
   sums->pixel += fabs(masked);
 #endif
-  lanes shown = rs_pick(x > 1.0f, 1.0f, x);
+  fv shown = rs_pick(x > 1.0f, 1.0f, x);
   shown = rs_pick(shown < 0.0f, 0.0f, shown);
   sums->square += mask * (shown - y) * (shown - y);
   sums->weight += mask;
@@ -31,7 +31,7 @@ lanes rs_add_pixel(lanes x, lanes y, lanes mask, LossSums* sums) {
 }
 
 // scale m rho'(x - y), from v = m (x - y).
-lanes rs_pixel_slope(lanes v, lanes mask, float scale) {
+fv rs_pixel_slope(fv v, fv mask, float scale) {
 #if PIXEL_L2
   return 2.0f * scale * v;
 #else

@@ -14,9 +14,8 @@
 #include "train/photo.h"
 #include "train/ssim_window.h"
 
-void store_pair(
-    lanes x, lanes y, lanes mask, __global float* u, __global float* v, LossSums* sums) {
-  const lanes masked = rs_add_pixel(x, y, mask, sums);
+void store_pair(fv x, fv y, fv mask, __global float* u, __global float* v, LossSums* sums) {
+  const fv masked = rs_add_pixel(x, y, mask, sums);
   rs_store(masked + 2.0f * y, u);
   rs_store(masked, v);
 }
@@ -44,31 +43,31 @@ __kernel void prepare_pair(const __global float* image,
   const int bottom = min(top + ROWS, height);
   const int pixels = width * height;
 
-  LossSums sums = {(lanes)(0.0f), (lanes)(0.0f), (lanes)(0.0f)};
+  LossSums sums = {(fv)(0.0f), (fv)(0.0f), (fv)(0.0f)};
   for (int row = top; row < bottom; ++row) {
-    for (int column = first; column < last; column += VECTOR) {
+    for (int column = first; column < last; column += LANES) {
       const int in = row * width + column;
-      const int count = min(last - column, VECTOR);
-      lanes x[3];
-      lanes valid = (lanes)(1.0f);
-      if (count == VECTOR) {
+      const int count = min(last - column, LANES);
+      fv x[3];
+      fv valid = (fv)(1.0f);
+      if (count == LANES) {
         for (int c = 0; c < 3; ++c) x[c] = rs_load(image + c * pixels + in);
       } else {
         // The last columns: lanes beyond the image are x = y = m = 0.
-        float tail[4][VECTOR];
-        for (int i = 0; i < VECTOR; ++i) {
+        float tail[4][LANES];
+        for (int i = 0; i < LANES; ++i) {
           for (int c = 0; c < 3; ++c) tail[c][i] = i < count ? image[c * pixels + in + i] : 0.0f;
           tail[3][i] = i < count ? 1.0f : 0.0f;
         }
         for (int c = 0; c < 3; ++c) x[c] = rs_load_private(tail[c]);
         valid = rs_load_private(tail[3]);
       }
-      lanes y[3];
+      fv y[3];
       for (int c = 0; c < 3; ++c) y[c] = rs_photo_channel(photo, planes, pixels, in, count, c);
-      const lanes alpha = rs_photo_channel(photo, planes, pixels, in, count, 3);
-      lanes mask = alpha;
+      const fv alpha = rs_photo_channel(photo, planes, pixels, in, count, 3);
+      fv mask = alpha;
       if (composite) {
-        const lanes rest = valid - alpha;
+        const fv rest = valid - alpha;
         y[0] = y[0] * alpha + red * rest;
         y[1] = y[1] * alpha + green * rest;
         y[2] = y[2] * alpha + blue * rest;
@@ -81,6 +80,5 @@ __kernel void prepare_pair(const __global float* image,
     }
   }
   partials[tile_y * tiles_x + tile_x] =
-      (float4)(rs_lanes_sum(sums.pixel), rs_lanes_sum(sums.square), rs_lanes_sum(sums.weight),
-               0.0f);
+      (float4)(rs_lane_sum(sums.pixel), rs_lane_sum(sums.square), rs_lane_sum(sums.weight), 0.0f);
 }

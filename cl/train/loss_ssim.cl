@@ -35,30 +35,30 @@ __kernel void ssim_slopes(const __global float* pair,
   if (first >= width || top >= height || channel >= 3) return;
   const int last = min(first + TILE, width);
   const int bottom = min(top + ROWS, height);
-  const int span = (last - first + VECTOR - 1) / VECTOR * VECTOR + 2 * HALO;
+  const int span = (last - first + LANES - 1) / LANES * LANES + 2 * HALO;
 
   float mean_u[TILE_SPAN], mean_v[TILE_SPAN], square_u[TILE_SPAN], square_v[TILE_SPAN];
-  lanes sum = (lanes)(0.0f);
+  fv sum = (fv)(0.0f);
   for (int row = top; row < bottom; ++row) {
     const __global float* u = pair + channel * plane + RS_PADDED(row, stride) + first - HALO;
     const __global float* v = u + 3 * plane;
-    for (int i = 0; i < span; i += VECTOR) {
+    for (int i = 0; i < span; i += LANES) {
       const __global float* pu = u + i;
       const __global float* pv = v + i;
-      lanes a = rs_load(pu);
-      lanes b = rs_load(pv);
-      lanes mu = W0 * a, mv = W0 * b;
-      lanes qu = mu * a, qv = mv * b;
-#define RS_TAP(k, weight)                     \
-  {                                           \
-    a = rs_load(pu - k * stride);             \
-    b = rs_load(pv - k * stride);             \
-    const lanes c = rs_load(pu + k * stride); \
-    const lanes d = rs_load(pv + k * stride); \
-    mu += weight * (a + c);                   \
-    mv += weight * (b + d);                   \
-    qu += weight * (a * a + c * c);           \
-    qv += weight * (b * b + d * d);           \
+      fv a = rs_load(pu);
+      fv b = rs_load(pv);
+      fv mu = W0 * a, mv = W0 * b;
+      fv qu = mu * a, qv = mv * b;
+#define RS_TAP(k, weight)                  \
+  {                                        \
+    a = rs_load(pu - k * stride);          \
+    b = rs_load(pv - k * stride);          \
+    const fv c = rs_load(pu + k * stride); \
+    const fv d = rs_load(pv + k * stride); \
+    mu += weight * (a + c);                \
+    mv += weight * (b + d);                \
+    qu += weight * (a * a + c * c);        \
+    qv += weight * (b * b + d * d);        \
   }
       RS_TAP(1, W1)
       RS_TAP(2, W2)
@@ -72,11 +72,11 @@ __kernel void ssim_slopes(const __global float* pair,
       rs_store_private(qv, square_v + i);
     }
     __global float* out = slopes + 3 * channel * plane + RS_PADDED(row, stride) + first;
-    for (int i = 0; first + i < last; i += VECTOR) {
+    for (int i = 0; first + i < last; i += LANES) {
       const Ssim ssim =
           rs_ssim(rs_window_row(mean_u + HALO + i), rs_window_row(mean_v + HALO + i),
                   rs_window_row(square_u + HALO + i), rs_window_row(square_v + HALO + i));
-      const lane_mask inside = first + i + RS_LANE_IDS < last;
+      const iv inside = first + i + RS_LANE_INDEX < last;
       sum += rs_pick(inside, ssim.value, 0.0f);
 #if SSIM_GRADIENT
       rs_store(rs_pick(inside, ssim.e, 0.0f), out + i);
@@ -85,7 +85,7 @@ __kernel void ssim_slopes(const __global float* pair,
 #endif
     }
   }
-  partials[(channel * tiles_y + tile_y) * tiles_x + tile_x] = rs_lanes_sum(sum);
+  partials[(channel * tiles_y + tile_y) * tiles_x + tile_x] = rs_lane_sum(sum);
 }
 
 // gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B; the A plane is
@@ -110,31 +110,31 @@ __kernel void loss_gradient(const __global float* pair,
   if (first >= width || top >= height || channel >= 3) return;
   const int last = min(first + TILE, width);
   const int bottom = min(top + ROWS, height);
-  const int span = (last - first + VECTOR - 1) / VECTOR * VECTOR + 2 * HALO;
+  const int span = (last - first + LANES - 1) / LANES * LANES + 2 * HALO;
   const int pixels = width * height;
 
   float e[TILE_SPAN], f[TILE_SPAN], g[TILE_SPAN];
   for (int row = top; row < bottom; ++row) {
 #if SSIM_GRADIENT
     const __global float* in = slopes + 3 * channel * plane + RS_PADDED(row, stride) + first - HALO;
-    for (int i = 0; i < span; i += VECTOR) {
+    for (int i = 0; i < span; i += LANES) {
       rs_store_private(rs_window_column(in + i, stride), e + i);
       rs_store_private(rs_window_column(in + plane + i, stride), f + i);
       rs_store_private(rs_window_column(in + 2 * plane + i, stride), g + i);
     }
 #endif
-    for (int i = 0; first + i < last; i += VECTOR) {
+    for (int i = 0; first + i < last; i += LANES) {
       const __global float* center = pair + channel * plane + RS_PADDED(row, stride) + first + i;
-      const lanes v = rs_load(center + 3 * plane);
+      const fv v = rs_load(center + 3 * plane);
       const int column = first + i;
       const int pixel = row * width + column;
-      const bool whole = column + VECTOR <= last;
-      lanes mask = (lanes)(1.0f);
+      const bool whole = column + LANES <= last;
+      fv mask = (fv)(1.0f);
       if (masked == 1) mask = rs_photo_channel(photo, planes, pixels, pixel, last - column, 3);
       if (masked == 2) mask = rs_photo_weight(photo, planes, pixels, pixel, last - column);
-      lanes result = rs_pixel_slope(v, mask, pixel_scale);
+      fv result = rs_pixel_slope(v, mask, pixel_scale);
 #if SSIM_GRADIENT
-      const lanes u = rs_load(center);
+      const fv u = rs_load(center);
       result += ssim_scale * mask *
                 (rs_window_row(e + HALO + i) + u * rs_window_row(f + HALO + i) +
                  v * rs_window_row(g + HALO + i));
@@ -143,9 +143,9 @@ __kernel void loss_gradient(const __global float* pair,
       __global float* alpha = gradient + 3 * pixels + pixel;
       if (whole) {
         rs_store(result, out);
-        if (channel == 0) rs_store((lanes)(0.0f), alpha);
+        if (channel == 0) rs_store((fv)(0.0f), alpha);
       } else {
-        float tail[VECTOR];
+        float tail[LANES];
         rs_store_private(result, tail);
         for (int k = 0; column + k < last; ++k) {
           out[k] = tail[k];

@@ -9,34 +9,34 @@
 #ifndef RS_TRAIN_PHOTO_H
 #define RS_TRAIN_PHOTO_H
 
-#include "train/lanes.h"
+#include "parallel/vector_lanes.h"
 
-// The first `count` of VECTOR words, zeros behind them.
-__attribute__((always_inline)) lane_words rs_photo_words(const __global uint* words, int count) {
-  if (count >= VECTOR) return rs_load_words(words);
-  uint tail[VECTOR];
-  for (int i = 0; i < VECTOR; ++i) tail[i] = i < count ? words[i] : 0;
+// The first `count` of LANES words, zeros behind them.
+__attribute__((always_inline)) uv rs_photo_words(const __global uint* words, int count) {
+  if (count >= LANES) return rs_load_words(words);
+  uint tail[LANES];
+  for (int i = 0; i < LANES; ++i) tail[i] = i < count ? words[i] : 0;
   return rs_load_private_words(tail);
 }
 
 // A channel (0 to 3: r, g, b, a) of `count` pixels from pixel `at` on; 0 in the lanes behind them.
-__attribute__((always_inline)) lanes rs_photo_channel(
+__attribute__((always_inline)) fv rs_photo_channel(
     const __global uint* photo, int planes, int pixels, int at, int count, int channel) {
   if (planes == 1) {
-    const lane_words words = rs_photo_words(photo + at, count);
+    const uv words = rs_photo_words(photo + at, count);
     return rs_to_float((words >> (8 * channel)) & 255u) * (1.0f / 255.0f);
   }
   if (planes == 2) {
-    const lane_words words = rs_photo_words(photo + channel / 2 * pixels + at, count);
+    const uv words = rs_photo_words(photo + channel / 2 * pixels + at, count);
     return rs_to_float((words >> (16 * (channel % 2))) & 65535u) * (1.0f / 65535.0f);
   }
   return rs_as_float(rs_photo_words(photo + channel * pixels + at, count));
 }
 
 // How much they count, from the plane of weights.
-__attribute__((always_inline)) lanes rs_photo_weight(
+__attribute__((always_inline)) fv rs_photo_weight(
     const __global uint* photo, int planes, int pixels, int at, int count) {
-  const lane_words words = rs_photo_words(photo + planes * pixels + at, count);
+  const uv words = rs_photo_words(photo + planes * pixels + at, count);
   return planes == 4 ? rs_as_float(words) : rs_to_float(words) * (1.0f / 255.0f);
 }
 

@@ -5,7 +5,7 @@
 // reduce_photo: one work-item per target pixel. photo, out: as train/photo.h says, out with 4
 // planes; `weighted`: both have a plane of weights. Pixels without any coverage are 0.
 // Complexity: source pixels.
-#define VECTOR 1
+#define LANES 1
 #include "train/photo.h"
 
 // The share of pixel `source` of `sources` along an axis in pixel `target` of `targets`, in whole

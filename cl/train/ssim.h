@@ -9,32 +9,32 @@
 #ifndef RS_TRAIN_SSIM_H
 #define RS_TRAIN_SSIM_H
 
-#include "train/lanes.h"
+#include "parallel/vector_lanes.h"
 
 #define C1 0.0001f
 #define C2 0.0009f
 
 typedef struct {
-  lanes value, e, f, g;
+  fv value, e, f, g;
 } Ssim;
 
 // From the windowed means of u, v, u^2 and v^2.
-Ssim rs_ssim(lanes mu, lanes mv, lanes square_u, lanes square_v) {
-  const lanes a = mu * mu;
-  const lanes b = mv * mv;
-  const lanes p = square_u - a;
-  const lanes q = square_v - b;
-  const lanes bottom1 = a + b + 2.0f * C1;
-  const lanes bottom2 = p + q + 2.0f * C2;
-  const lanes inverse = 1.0f / (bottom1 * bottom2);
-  const lanes inverse1 = inverse * bottom2;
-  const lanes inverse2 = inverse * bottom1;
-  const lanes ratio1 = (a - b + 2.0f * C1) * inverse1;
-  const lanes ratio2 = (p - q + 2.0f * C2) * inverse2;
-  const lanes slope_p = 2.0f * q * ratio1 * inverse2 * inverse2;
-  const lanes slope_q = -ratio1 * (1.0f + ratio2) * inverse2;
-  const lanes slope_a = 2.0f * b * ratio2 * inverse1 * inverse1 - slope_p;
-  const lanes slope_b = -ratio2 * (1.0f + ratio1) * inverse1 - slope_q;
+Ssim rs_ssim(fv mu, fv mv, fv square_u, fv square_v) {
+  const fv a = mu * mu;
+  const fv b = mv * mv;
+  const fv p = square_u - a;
+  const fv q = square_v - b;
+  const fv bottom1 = a + b + 2.0f * C1;
+  const fv bottom2 = p + q + 2.0f * C2;
+  const fv inverse = 1.0f / (bottom1 * bottom2);
+  const fv inverse1 = inverse * bottom2;
+  const fv inverse2 = inverse * bottom1;
+  const fv ratio1 = (a - b + 2.0f * C1) * inverse1;
+  const fv ratio2 = (p - q + 2.0f * C2) * inverse2;
+  const fv slope_p = 2.0f * q * ratio1 * inverse2 * inverse2;
+  const fv slope_q = -ratio1 * (1.0f + ratio2) * inverse2;
+  const fv slope_a = 2.0f * b * ratio2 * inverse1 * inverse1 - slope_p;
+  const fv slope_b = -ratio2 * (1.0f + ratio1) * inverse1 - slope_q;
   Ssim out;
   out.value = ratio1 * ratio2;
   out.e = 2.0f * (mu * slope_a + mv * slope_b);

@@ -5,7 +5,7 @@
 #ifndef RS_TRAIN_SSIM_WINDOW_H
 #define RS_TRAIN_SSIM_WINDOW_H
 
-#include "train/lanes.h"
+#include "parallel/vector_lanes.h"
 
 #ifndef TILE
 #define TILE 32
@@ -17,7 +17,7 @@
 #define RADIUS 5
 #define PAD 16
 // Columns left and right of a tile that its windows reach, in whole vectors.
-#define HALO ((RADIUS + VECTOR - 1) / VECTOR * VECTOR)
+#define HALO ((RADIUS + LANES - 1) / LANES * LANES)
 #define TILE_SPAN (TILE + 2 * HALO)
 
 #define W0 0.2660117249f
@@ -31,7 +31,7 @@
 #define RS_PADDED(row, stride) (((row) + RADIUS) * (stride) + PAD)
 
 // One output of the window along a row of private memory, from its 11 neighbours.
-lanes rs_window_row(const float* p) {
+fv rs_window_row(const float* p) {
   return W0 * rs_load_private(p) + W1 * (rs_load_private(p - 1) + rs_load_private(p + 1)) +
          W2 * (rs_load_private(p - 2) + rs_load_private(p + 2)) +
          W3 * (rs_load_private(p - 3) + rs_load_private(p + 3)) +
@@ -40,7 +40,7 @@ lanes rs_window_row(const float* p) {
 }
 
 // The same along a column of a plane.
-lanes rs_window_column(const __global float* p, int stride) {
+fv rs_window_column(const __global float* p, int stride) {
   return W0 * rs_load(p) + W1 * (rs_load(p - stride) + rs_load(p + stride)) +
          W2 * (rs_load(p - 2 * stride) + rs_load(p + 2 * stride)) +
          W3 * (rs_load(p - 3 * stride) + rs_load(p + 3 * stride)) +

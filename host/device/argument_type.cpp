@@ -15,7 +15,7 @@ namespace raysplats {
 namespace {
 
 // Numbers and their size as a kernel declares them; 0 bytes where the build decides the lanes (fv,
-// iv of vector_lanes.h, gv, gi of gaussian_lanes.h).
+// iv of vector_lanes.h).
 struct Declared {
   ArgumentNumbers numbers = ArgumentNumbers::kWords;
   std::size_t bytes = 0;
@@ -26,8 +26,7 @@ std::optional<Declared> declared(const std::string& name) {
   static const std::map<std::string, Declared> known{
       {"float", {ArgumentNumbers::kFloat, 4}}, {"int", {ArgumentNumbers::kInt, 4}},
       {"uint", {ArgumentNumbers::kUint, 4}},   {"unsigned int", {ArgumentNumbers::kUint, 4}},
-      {"fv", {ArgumentNumbers::kFloat, 0}},    {"gv", {ArgumentNumbers::kFloat, 0}},
-      {"iv", {ArgumentNumbers::kInt, 0}},      {"gi", {ArgumentNumbers::kInt, 0}},
+      {"fv", {ArgumentNumbers::kFloat, 0}},    {"iv", {ArgumentNumbers::kInt, 0}},
       {"uchar", {ArgumentNumbers::kWords, 1}}, {"ulong", {ArgumentNumbers::kWords, 8}}};
   if (name.compare(0, 2, "Rs") == 0) return Declared{ArgumentNumbers::kRecord, 0};
   const std::size_t digits = std::min(name.find_first_of("0123456789"), name.size());

@@ -129,7 +129,7 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
       .define("POSE", with_pose ? 1 : 0)
       .define("ACCUMULATE", accumulate ? 1 : 0)
       .define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0)
-      .define("ANGULAR", lens_kind == 2 ? 1 : 0)
+      .define("LENS", lens_kind)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
   const bool cpu = context.device().type == DeviceType::kCpu;

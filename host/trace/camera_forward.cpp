@@ -33,7 +33,8 @@ void CameraTracer::Impl::trace_ahead(const DeviceGaussians& gaussians) {
 void CameraTracer::Impl::set_face(const DeviceGaussians& gaussians, int number) {
   face = number;
   camera = device_camera(view, options.near_depth, number);
-  lists.prepare(gaussians, camera, {lens_kind, number, lens_kind > 0 ? &lens : nullptr}, options);
+  lists.prepare(gaussians, camera,
+                {lens_kind, number, lens_kind != RS_LENS_PINHOLE ? &lens : nullptr}, options);
 }
 
 void CameraTracer::Impl::trace_faces(const DeviceGaussians& gaussians, bool keep) {

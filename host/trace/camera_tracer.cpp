@@ -49,7 +49,7 @@ CameraTracer::Impl::Impl(Context& context_in, const TraceOptions& options_in)
 }
 
 const std::vector<int>& CameraTracer::Impl::faces() const {
-  return lens_kind > 0 ? lens.faces() : kFront;
+  return lens_kind != RS_LENS_PINHOLE ? lens.faces() : kFront;
 }
 
 CameraTracer::Statistics CameraTracer::Impl::count_statistics() const {
@@ -177,7 +177,7 @@ void CameraTracer::forward(const DeviceGaussians& gaussians,
 bool CameraTracer::traces(const Camera& camera) {
   if (camera.model == CameraModel::kOrthographic) return false;
   require_pixels(camera);
-  return lens_kind(camera) == 0 || impl_->lens.prepare(camera);
+  return lens_kind(camera) == RS_LENS_PINHOLE || impl_->lens.prepare(camera);
 }
 
 CameraTracer::Statistics CameraTracer::statistics() const {

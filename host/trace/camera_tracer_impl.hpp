@@ -69,7 +69,7 @@ struct CameraTracer::Impl {
   const PacketShape& packet() const { return kernels.shape(); }
   // RS_VIEW_ARGUMENTS of cl/trace/arguments.h.
   auto view_arguments() const {
-    const bool bent = lens_kind > 0;
+    const bool bent = lens_kind != RS_LENS_PINHOLE;
     return argument_pack(camera, face, bent ? lens.tiles() : no_tiles,
                          bent ? lens.tangents() : no_tangents);
   }
@@ -101,7 +101,7 @@ struct CameraTracer::Impl {
   std::function<void(double)> watch;
   std::size_t watched_tiles = 0;  // of this forward() that are done
   Camera view;                    // of the last forward()
-  int lens_kind = 0;
+  int lens_kind = RS_LENS_PINHOLE;
   int face = 0;
   RsCamera camera{};                      // of the face that is being traced
   std::array<Kernel, 2> forward_kernels;  // without and with kept hits

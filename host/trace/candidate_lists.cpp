@@ -49,8 +49,8 @@ void check_camera(const Camera& camera, const RsCamera& converted) {
 }  // namespace
 
 int lens_kind(const Camera& camera) {
-  if (camera.model == CameraModel::kPinhole) return 0;
-  return camera.model == CameraModel::kOpenCv ? 1 : 2;
+  if (camera.model == CameraModel::kPinhole) return RS_LENS_PINHOLE;
+  return camera.model == CameraModel::kOpenCv ? RS_LENS_AXIAL : RS_LENS_AROUND;
 }
 
 RsCamera device_camera(const Camera& camera, float near_depth, int face) {
@@ -121,14 +121,12 @@ void CandidateLists::require_prepare_kernel(const DeviceGaussians& gaussians,
   build.define("SIGMOID_SCALE", sigmoid ? 1 : 0)
       .define("PEAK_ORDER", peak ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
-      .define("NEAR_DISTANCE", face.lens == 2 ? 1 : 0)
+      .define("LENS", face.lens)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", coefficients);
   prepare_kernel_ = GaussianKernel(*context_, "trace/prepare_view.cl", "prepare_view", build);
   BuildOptions lists;
-  lists.define("TILE", tile_size_)
-      .define("PEAK_ORDER", peak ? 1 : 0)
-      .define("LENS", face.lens > 0 ? 1 : 0);
+  lists.define("TILE", tile_size_).define("PEAK_ORDER", peak ? 1 : 0).define("LENS", face.lens);
   count_kernel_ = GaussianKernel(*context_, "trace/tile_lists.cl", "count_tiles", lists);
   fill_kernel_ = GaussianKernel(*context_, "trace/tile_lists.cl", "fill_tiles", lists);
   prepared_variant_ = variant;

@@ -22,8 +22,7 @@ namespace raysplats {
 /// UsageError for orthographic cameras, whose rays share no origin.
 RsCamera device_camera(const Camera& camera, float near_depth, int face = 0);
 
-/// What LENS of cl/trace/packet.h is for a camera: 0 for pinholes, 1 for lenses whose depths and
-/// near plane lie along z, 2 for those that look around and count distances.
+/// What the build constant LENS (RS_LENS_PINHOLE and others) is for a camera.
 int lens_kind(const Camera& camera);
 
 /// A rectangle of tiles, as kernels take it.
@@ -42,7 +41,7 @@ struct TileWindow {
 
 /// Which pinhole the lists of a view are for.
 struct ViewFace {
-  int lens = 0;  ///< lens_kind()
+  int lens = RS_LENS_PINHOLE;  ///< lens_kind()
   int face = 0;
   const LensTiles* tiles = nullptr;  ///< of a lens
 };

@@ -28,7 +28,7 @@ GaussianKernel::GaussianKernel(Context& context,
       width_(gaussians_per_item(context.device())),
       group_(context.device().type == DeviceType::kCpu ? kCpuGroup : kGpuGroup) {
   BuildOptions wide = build;
-  wide.define("VECTOR", width_);
+  wide.define("LANES", width_);
   // Rows of the group's Gaussians go through local memory (cl/trace/staged_rows.h).
   if (context.device().type != DeviceType::kCpu) wide.define("GROUP", group_);
   wide_ = context.kernel(file, name, wide);
@@ -38,7 +38,7 @@ Kernel& GaussianKernel::single() {
   if (width_ == 1) return wide_;
   if (!single_) {
     BuildOptions build = build_;
-    single_ = context_->kernel(file_, name_, build.define("VECTOR", 1));
+    single_ = context_->kernel(file_, name_, build.define("LANES", 1));
   }
   return single_;
 }

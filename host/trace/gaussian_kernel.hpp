@@ -11,7 +11,7 @@
 
 namespace raysplats {
 
-/// A kernel of VECTOR Gaussians per work-item (cl/trace/gaussian_lanes.h): vectors as wide as the
+/// A kernel of LANES Gaussians per work-item (cl/trace/gaussian_lanes.h): vectors as wide as the
 /// device's on CPUs, single Gaussians elsewhere. Its first arguments are the numbers of the first
 /// Gaussian and of the one behind the last.
 class GaussianKernel {

@@ -36,7 +36,8 @@ RayNear RayNear::of(const Camera& camera, float near_depth) {
   if (!(near_depth > 0.0f)) return out;
   const bool around =
       camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular;
-  out.kind = around ? 2 : 1;
+  out.limited = true;
+  if (around) out.lens = RS_LENS_AROUND;
   for (int k = 0; k < 3; ++k) {
     out.plane[static_cast<std::size_t>(k)] = static_cast<float>(camera.rotation[k][2]);
   }
@@ -54,7 +55,8 @@ BuildOptions ray_walk_build(const DeviceInfo& device,
                             int lanes,
                             int sh_degree) {
   BuildOptions build = tree_walk_build(device, lanes);
-  build.define("NEAR_PLANE", near.kind)
+  build.define("NEAR_LIMIT", near.limited ? 1 : 0)
+      .define("LENS", near.lens)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
       .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
   if (keeps_trail(device, lanes)) {

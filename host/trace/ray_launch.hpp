@@ -13,6 +13,7 @@
 #include "raysplats/camera.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/trace_options.hpp"
+#include "shared/layout.h"
 #include "shared/trace_layout.h"
 #include "trace/device_gaussians.hpp"
 #include "trace/ray_records.hpp"
@@ -25,7 +26,8 @@ bool walks_tree(const TraceOptions& options, const DeviceInfo& device);
 /// Gaussians whose means are too near to a ray's origin are not met: what TraceOptions::near_depth
 /// is for the rays of a camera.
 struct RayNear {
-  int kind = 0;                  ///< NEAR_PLANE of cl/trace/ray_block.h
+  bool limited = false;          ///< NEAR_LIMIT of cl/trace/ray_block.h
+  int lens = RS_LENS_PINHOLE;    ///< LENS there: what is limited is depth or distance
   std::array<float, 4> plane{};  ///< axis and depth
 
   /// Depth along the axis of a camera that looks forward, distance for one that looks around.

@@ -38,7 +38,7 @@ Adam::Adam(Context& context, const AdamOptions& options, int vector)
         options.beta1, options.beta2, options.epsilon));
   }
   BuildOptions build;
-  build.define("VECTOR", lanes_).define("BLOCK", kBlock).define("GROUP", cpu_ ? 1 : kGroup);
+  build.define("LANES", lanes_).define("BLOCK", kBlock).define("GROUP", cpu_ ? 1 : kGroup);
   choose_kernel_ = context.kernel(kProgram, "choose_steps", build);
   remap_kernel_ = context.kernel(kProgram, "remap_rows", build);
   skipped_.clear();
@@ -49,7 +49,7 @@ Adam::Adam(Context& context, const AdamOptions& options, int vector)
 Kernel Adam::step_kernel(ParameterGroup group) const {
   const std::size_t width = group_width(group, sh_degree_);
   BuildOptions build;
-  build.define("VECTOR", lanes_)
+  build.define("LANES", lanes_)
       .define("WIDTH", width)
       .define("SPAN", cpu_ ? kBlock * width : static_cast<std::size_t>(lanes_));
   return context_.kernel(kProgram, "adam_step", build);

@@ -69,7 +69,7 @@ struct ImageLoss::Impl {
     BuildOptions build;
     build.define("PIXEL_L2", pixel_loss == PixelLoss::kL2 ? 1 : 0);
     if (!grouped) {
-      build.define("VECTOR", lane_count(owner.device(), vector))
+      build.define("LANES", lane_count(owner.device(), vector))
           .define("TILE", tile)
           .define("ROWS", rows);
       prepare = owner.kernel("train/loss_prepare.cl", "prepare_pair", build);

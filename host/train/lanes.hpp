@@ -5,8 +5,8 @@
 
 namespace raysplats {
 
-/// The define VECTOR of cl/train/lanes.h: `requested`, or what suits the device when that is 0.
-/// Throws UsageError for a width without kernels.
+/// The define LANES of kernels that take several pixels or numbers at once: `requested`, or what
+/// suits the device when that is 0. Throws UsageError for a width without kernels.
 int lane_count(const DeviceInfo& device, int requested);
 
 }  // namespace raysplats

@@ -14,19 +14,19 @@ GROUP_CAMERA = dict(CAMERA, GROUP=32)
 GROUP_FORWARD = dict(GROUP_CAMERA, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 FORWARD = dict(CAMERA, BLOCK=1, PENDING=48, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 # candidate_lists.cpp, gaussian_kernel.cpp.
-VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, NEAR_DISTANCE=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1, GROUP=64)
-LISTS = dict(TILE=16, PEAK_ORDER=1, LENS=0, VECTOR=1, GROUP=64)
-FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, ANGULAR=0, SH_DEGREE=3, SH_COEFFICIENTS=16, VECTOR=1, GROUP=64)
+VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, LENS=0, SH_DEGREE=3, SH_COEFFICIENTS=16, LANES=1, GROUP=64)
+LISTS = dict(TILE=16, PEAK_ORDER=1, LENS=0, LANES=1, GROUP=64)
+FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, LENS=0, SH_DEGREE=3, SH_COEFFICIENTS=16, LANES=1, GROUP=64)
 # gradient_sums.cpp.
 ATOMIC = dict(PRIVATE_COPIES=0, EXACT_SUMS=0, FLOAT_ATOMICS=1)
 SWAP = dict(ATOMIC, FLOAT_ATOMICS=0)
 EXACT = dict(SWAP, EXACT_SUMS=1)
 # ray_launch.cpp, ray_backward.cpp.
-WALK = dict(LANES=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_PLANE=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
+WALK = dict(LANES=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_LIMIT=0, LENS=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
 RAY_BACKWARD = dict(WALK, RAY_SLOPES=0)
-RAY_GRADIENTS = dict(SIGMOID_SCALE=0, VECTOR=1, GROUP=64)
+RAY_GRADIENTS = dict(SIGMOID_SCALE=0, LANES=1, GROUP=64)
 # image_loss.cpp: groups, or what devices get whose groups are smaller.
-LOSS = dict(VECTOR=1, TILE=16, ROWS=1, PIXEL_L2=0)
+LOSS = dict(LANES=1, TILE=16, ROWS=1, PIXEL_L2=0)
 # chunk_shape.cpp.
 CHUNKS = dict(GROUP=256)
 
@@ -98,8 +98,8 @@ PROGRAMS = [
     ("loss ssim", "train/loss_ssim.cl", dict(LOSS, SSIM_GRADIENT=1)),
     ("photo reduce", "train/photo_cache.cl", {}),
     ("loss reduce", "train/loss_reduce.cl", {}),
-    ("adam sh3", "train/adam.cl", dict(VECTOR=1, BLOCK=256, GROUP=64, WIDTH=48, SPAN=1)),
-    ("adam means", "train/adam.cl", dict(VECTOR=1, BLOCK=256, GROUP=64, WIDTH=3, SPAN=1)),
+    ("adam sh3", "train/adam.cl", dict(LANES=1, BLOCK=256, GROUP=64, WIDTH=48, SPAN=1)),
+    ("adam means", "train/adam.cl", dict(LANES=1, BLOCK=256, GROUP=64, WIDTH=3, SPAN=1)),
     ("densify", "train/density_control.cl", dict(SH_COEFFICIENTS=16, SIGMOID_SCALE=0)),
     ("footprint", "train/footprint.cl", dict(SIGMOID_SCALE=0)),
     ("mcmc", "train/mcmc.cl", dict(SIGMOID_SCALE=0)),
