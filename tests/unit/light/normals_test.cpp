@@ -2,6 +2,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <stdexcept>
 #include <string>
 
 #include "raysplats/error.hpp"
@@ -128,6 +129,27 @@ TEST_CASE("normals follow the model and leave the last picture alone") {
   CHECK(one.data != two.data);
   CHECK(tracer.normals(first, camera).data == one.data);
   CHECK(tracer.normals(first, camera, [](double) { return true; }).data == one.data);
+}
+
+TEST_CASE("what a watch of normals throws comes out, and the last picture stays [small]") {
+  Context context = make_test_context();
+  const Camera camera = reference::cube_camera(16, 12);
+  const Model model(context, reference::random_scene(40, 7, 1));
+  Tracer tracer(context);
+  const Image expected = tracer.normals(model, camera);
+  tracer.render(model, camera, true);
+  int calls = 0;
+  CHECK_THROWS_AS(tracer.normals(model, camera,
+                                 [&](double) -> bool {
+                                   ++calls;
+                                   throw std::out_of_range("of the watch");
+                                 }),
+                  std::out_of_range);
+  CHECK(calls == 1);
+  CHECK_NOTHROW(tracer.backward(model, Image(16, 12, 4, 1.0f)));
+  CHECK(tracer.normals(model, camera).data == expected.data);
+  CHECK(calls == 1);
+  CHECK(tracer.normals(model, camera, [](double) { return false; }).data.empty());
 }
 
 TEST_CASE("normals with mirrors are refused") {

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raysplats/path_tracer.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 #include <memory>
 #include <stdexcept>
+#include <thread>
+#include <vector>
 
 #include "light/view_tracer.hpp"
 #include "light_fixture.hpp"
@@ -392,6 +397,49 @@ TEST_CASE("what a watch throws comes out, and nothing calls it afterwards [small
   const Image picture = tracer.render(kCamera);
   CHECK(calls == 1);
   CHECK(picture.data == PathTracer(context, cloud_scene(2)).render(kCamera).data);
+}
+
+TEST_CASE("threads that share a path tracer take turns") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene(1);
+  add_floor(scene);
+  scene.lights = {lamp()};
+  PathTracer tracer(context, scene);
+  // Pictures of two sizes and kinds of camera, so that one's buffers and packets are not the
+  // other's.
+  std::array<Camera, 2> cameras{kCamera, cube_camera(15, 11)};
+  cameras[1].model = CameraModel::kFisheye;
+  std::array<Image, 2> expected;
+  std::array<std::uint64_t, 2> rays{};
+  for (std::size_t id = 0; id < 2; ++id) {
+    expected[id] = tracer.render(cameras[id]);
+    rays[id] = tracer.statistics().camera_rays;
+  }
+  REQUIRE(rays[0] != rays[1]);
+  std::array<int, 2> wrong{};
+  std::vector<std::thread> threads;
+  for (std::size_t id = 0; id < 2; ++id) {
+    threads.emplace_back([&, id] {
+      for (int round = 0; round < 8; ++round) {
+        // What two calls do together is held together by the context's lock.
+        const auto turn = context.lock();
+        wrong[id] += tracer.render(cameras[id]).data == expected[id].data ? 0 : 1;
+        wrong[id] += tracer.statistics().camera_rays == rays[id] ? 0 : 1;
+      }
+      for (int round = 0; round < 8; ++round) {
+        const bool watched = round % 2 == 0;
+        std::function<bool(double)> watch;
+        if (watched) watch = [](double) { return true; };
+        wrong[id] += tracer.render(cameras[id], watch).data == expected[id].data ? 0 : 1;
+      }
+      // A picture that one thread gives up is nothing to the other.
+      wrong[id] += tracer.render(cameras[id], [](double) { return false; }).data.empty() ? 0 : 1;
+      wrong[id] += tracer.render(cameras[id]).data == expected[id].data ? 0 : 1;
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  CHECK(wrong[0] == 0);
+  CHECK(wrong[1] == 0);
 }
 
 TEST_CASE("transparent surfaces") {

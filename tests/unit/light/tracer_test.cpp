@@ -3,9 +3,12 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <memory>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -335,6 +338,45 @@ TEST_CASE("a picture can be stopped while it is drawn") {
     CHECK(whole.data == tracer.render(model, camera).data);
     CHECK(tracer.render(model, camera, false, [](double) { return false; }).data.empty());
     CHECK_THROWS_AS(tracer.depth(), UsageError);
+  }
+}
+
+TEST_CASE("what a watch throws comes out, and leaves the tracer without a picture [small]") {
+  Context context = make_test_context();
+  const Model model(context, reference::random_scene(60, 43, 0));
+  const Camera camera = reference::cube_camera(24, 18);
+  Camera parallel = camera;
+  parallel.model = CameraModel::kOrthographic;
+  parallel.fx = parallel.fy = 9.0;
+  for (const Traversal traversal : {Traversal::kTiles, Traversal::kBvh}) {
+    TraceOptions options;
+    options.traversal = traversal;
+    options.depth = true;
+    Tracer tracer(context, options);
+    for (const Camera& view : {camera, parallel}) {
+      if (view.model == CameraModel::kOrthographic && traversal == Traversal::kTiles) continue;
+      const Image expected = tracer.render(model, view, true);
+      int calls = 0;
+      {
+        const auto owned = std::make_unique<int>(0);
+        CHECK_THROWS_AS(tracer.render(model, view, true,
+                                      [&, number = owned.get()](double) -> bool {
+                                        *number = ++calls;
+                                        throw std::out_of_range("of the watch");
+                                      }),
+                        std::out_of_range);
+      }
+      CHECK(calls == 1);
+      CHECK_THROWS_AS(tracer.depth(), UsageError);
+      CHECK_THROWS_AS(tracer.backward(model, Image(24, 18, 4)), UsageError);
+      // An error of the library's own is not taken for a picture that was stopped.
+      CHECK_THROWS_AS(tracer.render(model, view, false,
+                                    [](double) -> bool { throw DataError("of the watch"); }),
+                      DataError);
+      CHECK(tracer.render(model, view, true).data == expected.data);
+      CHECK(calls == 1);
+      CHECK_NOTHROW(tracer.backward(model, Image(24, 18, 4)));
+    }
   }
 }
 
