@@ -16,6 +16,7 @@
 #include "images/network.hpp"
 #include "io/image_codec.hpp"
 #include "io/image_limits.hpp"
+#include "io/images_interface.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
@@ -183,6 +184,8 @@ class OiioCodec : public ImageCodec {
 }  // namespace raysplats::io
 
 extern "C" const char* raysplats_images_version() { return RAYSPLATS_VERSION; }
+
+extern "C" std::uint64_t raysplats_images_interface() { return raysplats::io::kImagesInterface; }
 
 extern "C" const raysplats::io::ImageCodec* raysplats_images_codec() {
   static const raysplats::io::OiioCodec codec;

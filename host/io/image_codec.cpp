@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "io/images_interface.hpp"
 #include "raysplats/error.hpp"
 #include "util/memory_limit.hpp"
 
@@ -47,25 +48,30 @@ constexpr const char* kLibrary = "libraysplats-images.so";
 [[noreturn]] void fail(const std::string& what) {
   throw Error(ErrorCode::kRuntime,
               fmt::format("Pictures cannot be read or written: {}{}; set RAYSPLATS_IMAGES to the "
-                          "path of {} of version {}",
+                          "path of the {} that was built with this program, version {}",
                           what, memory_limit_remark(), kLibrary, RAYSPLATS_VERSION));
 }
 
 // Found along the run path of the program, as any library of it; it stays loaded to the end.
 const ImageCodec* load() {
   const char* chosen = std::getenv("RAYSPLATS_IMAGES");
-  void* library = ::dlopen(chosen != nullptr ? chosen : kLibrary, RTLD_NOW | RTLD_LOCAL);
+  const char* name = chosen != nullptr ? chosen : kLibrary;
+  void* library = ::dlopen(name, RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) fail(::dlerror());
   const auto version = reinterpret_cast<decltype(&raysplats_images_version)>(
       ::dlsym(library, "raysplats_images_version"));
+  const auto interface = reinterpret_cast<decltype(&raysplats_images_interface)>(
+      ::dlsym(library, "raysplats_images_interface"));
   const auto codec = reinterpret_cast<decltype(&raysplats_images_codec)>(
       ::dlsym(library, "raysplats_images_codec"));
   if (version == nullptr || codec == nullptr) {
-    fail(fmt::format("{} is not the library of this program",
-                     chosen != nullptr ? chosen : kLibrary));
+    fail(fmt::format("{} is not the library of this program", name));
   }
   if (std::string_view(version()) != RAYSPLATS_VERSION) {
-    fail(fmt::format("{} is of version {}", chosen != nullptr ? chosen : kLibrary, version()));
+    fail(fmt::format("{} is of version {}", name, version()));
+  }
+  if (interface == nullptr || interface() != kImagesInterface) {
+    fail(fmt::format("{} has another interface than this program", name));
   }
   return codec();
 }

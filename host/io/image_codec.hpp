@@ -105,12 +105,14 @@ class ImageCodec {
       const std::filesystem::path& path) const = 0;
 };
 
-/// The codec, loaded by the first call. Throws Error(kRuntime) when the library is not there or is
-/// of another version.
+/// The codec, loaded by the first call. Throws Error(kRuntime) when the library is not there, is of
+/// another version or has another interface.
 const ImageCodec& image_codec();
 
 }  // namespace raysplats::io
 
-/// What raysplats-images exports: the version that it was built with, and the codec.
+/// What raysplats-images exports: the version that it was built with, its interface
+/// (io/images_interface.hpp), and the codec.
 extern "C" const char* raysplats_images_version();
+extern "C" std::uint64_t raysplats_images_interface();
 extern "C" const raysplats::io::ImageCodec* raysplats_images_codec();
