@@ -301,6 +301,22 @@ def forecast(run):
     return printed(f"raysplats bench --forecast {shown(*options)}", text)
 
 
+def needles(run):
+    tests = run.raysplats.parent / "test_trace"
+    if not tests.exists():
+        raise Failure(f"{tests} is not there: build the tests")
+    case = "needles and sheets*"
+    text = run.call(tests, f"--test-case={case}")
+    found = re.search(r"needles and sheets: (\d+) of (\d+) pixels excused, mean (\S+), maximum (\S+)", text)
+    if not found:
+        raise Failure(f"{tests} tells no figures of needles")
+    excused, pixels = int(found[1]), int(found[2])
+    return (f"`build/release/bin/test_trace --test-case='{case}'`:\n\n"
+            + table(["pixels", "excused", "share (bound)", "mean error of all (bound)", "largest of the others (bound)"],
+                    [[pixels, excused, f"{100 * excused / pixels:.1f} % (5 %)", f"{float(found[3]):.1e} (1e-5)",
+                      f"{float(found[4]):.1e} (1e-3)"]]))
+
+
 PARTS = [
     Part("kernels", 2.0, "every stage against the machine's limits (bench)", kernels),
     Part("iteration", 0.5, "kernels of a training iteration on the fox (train --profile)", iteration),
@@ -313,6 +329,7 @@ PARTS = [
     Part("start", 0.5, "start of the program", start),
     Part("growth", 4.0, "time and memory by Gaussians and pixels (growth.sh)", growth),
     Part("limits", 3.0, "what limits on hits cost in quality (ablation.sh)", limits),
+    Part("needles", 0.5, "pixels of needles that rounding may decide otherwise (a case of test_trace)", needles),
     Part("spread", 1.0, "spread of runs with and without exact sums (spread.sh)", spread),
     Part("kills", 1.5, "runs killed at random moments (kill_loop.sh)", kills),
     Part("price", 1.0, "gradients added in each way (price.sh)", price),
