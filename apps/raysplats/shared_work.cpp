@@ -102,11 +102,11 @@ std::string traffic_of(const Communicator& ranks,
   const auto each = static_cast<double>(things);
   return fmt::format(
       "rank {} of {}, for each {}: {:.0f} bytes out, {:.0f} bytes in, {:.1f} messages out, {:.3f} "
-      "ms among ranks\n",
+      "ms among ranks and {:.3f} ms beside other work\n",
       ranks.rank(), ranks.size(), name, static_cast<double>(now.sent - before.sent) / each,
       static_cast<double>(now.received - before.received) / each,
       static_cast<double>(now.messages - before.messages) / each,
-      1e3 * (now.seconds - before.seconds) / each);
+      1e3 * (now.seconds - before.seconds) / each, 1e3 * (now.hidden - before.hidden) / each);
 }
 
 int fail_together(Communicator& processes, const Error& error) {

@@ -19,15 +19,26 @@ std::span<const std::byte> bytes_of(const std::string& text) {
 Communicator::Communicator(std::shared_ptr<Transport> transport)
     : transport_(std::move(transport)) {}
 
-void Communicator::exchange(std::span<const Outgoing> out, std::span<const Incoming> in) {
+void Communicator::exchange(std::span<const Outgoing> out,
+                            std::span<const Incoming> in,
+                            Wait wait) {
   if (!transport_ || (out.empty() && in.empty())) return;
   const auto begin = std::chrono::steady_clock::now();
-  transport_->exchange(out, in);
+  transport_->exchange(out, in, wait);
   traffic_.seconds +=
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   traffic_.messages += out.size();
   for (const Outgoing& message : out) traffic_.sent += message.bytes.size();
   for (const Incoming& message : in) traffic_.received += message.bytes.size();
+}
+
+void Communicator::give_up() {
+  if (transport_) transport_->give_up();
+}
+
+void Communicator::hide(double seconds) {
+  traffic_.seconds -= seconds;
+  traffic_.hidden += seconds;
 }
 
 void Communicator::abort(ErrorCode code) {

@@ -23,7 +23,8 @@ class Communicator {
     std::uint64_t sent = 0;  ///< bytes
     std::uint64_t received = 0;
     std::uint64_t messages = 0;  ///< sent
-    double seconds = 0;          ///< within exchange()
+    double seconds = 0;          ///< within exchange(), while nothing else was done
+    double hidden = 0;           ///< the others there
   };
 
   /// One rank alone.
@@ -37,7 +38,12 @@ class Communicator {
   bool leads() const { return rank() == 0; }
 
   /// As Transport, and counted.
-  void exchange(std::span<const Outgoing> out, std::span<const Incoming> in);
+  void exchange(std::span<const Outgoing> out,
+                std::span<const Incoming> in,
+                Wait wait = Wait::kSpinning);
+  void give_up();
+  /// So many of the seconds within exchange() passed beside other work of this rank.
+  void hide(double seconds);
   [[noreturn]] void abort(ErrorCode code);
 
   /// All ranks: the bytes of `root` become those of all.

@@ -48,6 +48,11 @@ class PairwiseSum {
   }
 
   const std::vector<Part>& parts() const { return parts_; }
+  Part take_last() {
+    Part last = std::move(parts_.back());
+    parts_.pop_back();
+    return last;
+  }
   std::vector<Part> take() { return std::exchange(parts_, {}); }
 
  private:

@@ -2,10 +2,9 @@
 #include "comm/slot_sum.hpp"
 
 #include <algorithm>
-#include <utility>
-#include <vector>
+#include <chrono>
 
-#include "comm/pairwise.hpp"
+#include "raysplats/error.hpp"
 
 namespace raysplats {
 namespace {
@@ -24,64 +23,143 @@ std::vector<PairwiseNode> pairwise_nodes(std::size_t first, std::size_t last) {
   return nodes;
 }
 
-void sum_slots(Communicator& ranks,
-               std::size_t slots,
-               std::span<const std::span<const float>> parts,
-               std::span<float> total,
-               std::vector<float>& room) {
-  const int self = ranks.rank(), count = ranks.size();
-  const auto piece = [&](int rank) { return RankShare::of(total.size(), rank, count); };
-  const auto nodes_of = [&](int rank) {
-    const RankShare share = RankShare::of(slots, rank, count);
-    return pairwise_nodes(share.first, share.last);
-  };
-  const RankShare own = piece(self);
+std::vector<PairwiseNode> SlotSum::nodes(std::size_t slots, int rank, int ranks) {
+  const RankShare share = RankShare::of(slots, rank, ranks);
+  std::vector<PairwiseNode> nodes = pairwise_nodes(share.first, share.last);
+  if (nodes.size() != 1 || nodes.front().level == 0) return nodes;
+  const PairwiseNode left{share.first, nodes.front().level - 1};
+  return {left, {left.end(), left.level}};
+}
 
-  // Rows of this rank's piece, those of rank 0 first.
-  std::vector<std::pair<PairwiseNode, std::span<float>>> rows;
-  std::vector<Outgoing> out;
-  std::vector<Incoming> in;
-  std::size_t needed = 0;
-  for (int rank = 0; rank < count; ++rank) needed += nodes_of(rank).size() * own.size();
-  if (room.size() < needed) room.resize(needed);
-  for (int rank = 0, row = 0; rank < count; ++rank) {
-    for (std::size_t k = 0; const PairwiseNode& node : nodes_of(rank)) {
-      const std::span<float> here(room.data() + static_cast<std::size_t>(row++) * own.size(),
-                                  own.size());
-      rows.emplace_back(node, here);
-      if (rank == self) {
-        std::ranges::copy(parts[k].subspan(own.first, own.size()), here.begin());
-      } else {
-        in.push_back({rank, std::as_writable_bytes(here)});
-      }
-      ++k;
+// Where the rank fails while rows are on their way, the others may never send theirs.
+SlotSum::~SlotSum() {
+  if (!under_way_.valid()) return;
+  ranks_->give_up();
+  under_way_.wait();
+}
+
+void SlotSum::begin(Communicator& ranks, std::size_t slots, std::size_t numbers) {
+  ranks_ = &ranks;
+  numbers_ = numbers;
+  sent_ = 0;
+  beside_ = 0;
+  const std::size_t part = part_of(ranks.rank()).size();
+  out_.resize(static_cast<std::size_t>(ranks.size()));
+  in_.resize(static_cast<std::size_t>(ranks.size()));
+  begin_of_.clear();
+  std::size_t count = 0;
+  for (int rank = 0; rank < ranks.size(); ++rank) {
+    begin_of_.push_back(count);
+    for (const PairwiseNode& node : nodes(slots, rank, ranks.size())) {
+      if (rows_.size() == count) rows_.emplace_back();
+      rows_[count].node = node;
+      rows_[count++].numbers.resize(part);
     }
-    if (rank == self) continue;
-    const RankShare theirs = piece(rank);
-    for (const std::span<const float> part : parts)
-      out.push_back({rank, std::as_bytes(part.subspan(theirs.first, theirs.size()))});
   }
-  ranks.exchange(out, in);
+  begin_of_.push_back(count);
+  rows_.resize(count);
+}
 
+void SlotSum::send(std::span<const float> row, std::function<void()> arrive) {
+  if (++sent_ == rounds_of(ranks_->rank())) {
+    last_ = {row, std::move(arrive)};
+    return;
+  }
+  under_way_ =
+      std::async(std::launch::async, [this, row, round = sent_ - 1, arrive = std::move(arrive),
+                                      before = std::move(under_way_)]() mutable {
+        if (before.valid()) before.get();
+        arrive();
+        const double seconds = ranks_->traffic().seconds;
+        exchange_round(round, row, Wait::kResting);
+        beside_ += ranks_->traffic().seconds - seconds;
+      });
+}
+
+void SlotSum::settle() {
+  // While it is made, the others are on their way.
+  if (last_.second) last_.second();
+  if (under_way_.valid()) {
+    const auto begin = std::chrono::steady_clock::now();
+    under_way_.get();
+    const double waited =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    ranks_->hide(std::max(0.0, beside_ - waited));
+  }
+  const std::size_t own = rounds_of(ranks_->rank());
+  std::size_t most = 0;
+  for (int rank = 0; rank < ranks_->size(); ++rank) most = std::max(most, rounds_of(rank));
+  for (std::size_t round = own > 0 ? own - 1 : 0; round < most; ++round)
+    exchange_round(round, last_.first, Wait::kSpinning);
+  last_ = {};
+}
+
+// The rows of a round: those of the ranks that have so many.
+void SlotSum::exchange_round(std::size_t round, std::span<const float> own, Wait wait) {
+  const int self = ranks_->rank();
+  const bool sends = round < rounds_of(self);
+  const RankShare here = part_of(self);
+  std::vector<Packed> to, from;
+  for (int rank = 0; rank < ranks_->size(); ++rank) {
+    if (rank == self) continue;
+    if (sends) {
+      const RankShare theirs = part_of(rank);
+      to.emplace_back(rank, &out_[static_cast<std::size_t>(rank)]);
+      to.back().second->pack(own.subspan(theirs.first, theirs.size()));
+    }
+    if (round < rounds_of(rank)) {
+      from.emplace_back(rank, &in_[static_cast<std::size_t>(rank)]);
+      from.back().second->expect(here.size());
+    }
+  }
+  exchange_packed(to, from, wait);
+  for (const auto& [rank, packed] : from) packed->unpack(row_of(rank, round).numbers);
+  if (sends)
+    std::ranges::copy(own.subspan(here.first, here.size()), row_of(self, round).numbers.begin());
+}
+
+// First which blocks there are, from which follows how many numbers. When the first have come,
+// the others are ready too.
+void SlotSum::exchange_packed(const std::vector<Packed>& to,
+                              const std::vector<Packed>& from,
+                              Wait wait) {
+  const auto exchange = [&](Wait how, const auto& bytes_of) {
+    std::vector<Outgoing> out;
+    std::vector<Incoming> in;
+    out.reserve(to.size());
+    in.reserve(from.size());
+    for (const auto& [rank, packed] : to) out.push_back({rank, bytes_of(*packed)});
+    for (const auto& [rank, packed] : from) in.push_back({rank, bytes_of(*packed)});
+    ranks_->exchange(out, in, how);
+  };
+  exchange(wait, [](SparseRow& row) { return std::as_writable_bytes(row.marks()); });
+  for (const auto& [rank, packed] : from) packed->expect_numbers();
+  exchange(Wait::kSpinning, [](SparseRow& row) { return std::as_writable_bytes(row.numbers()); });
+}
+
+void SlotSum::finish(std::span<float> total) {
   PairwiseSum<std::span<float>> sum;
-  for (const auto& [node, row] : rows) sum.push(node, row, add);
+  for (Row& row : rows_) sum.push(row.node, row.numbers, add);
   sum.finish(add);
+  const int self = ranks_->rank();
+  const RankShare own = part_of(self);
   const std::span<float> mine = total.subspan(own.first, own.size());
-  if (sum.parts().empty()) {
-    std::ranges::fill(mine, 0.0f);
-  } else {
-    std::ranges::copy(sum.parts().front().second, mine.begin());
-  }
+  std::ranges::copy(sum.parts().front().second, mine.begin());
 
-  out.clear();
-  in.clear();
-  for (int rank = 0; rank < count; ++rank) {
+  SparseRow& sums = out_[static_cast<std::size_t>(self)];
+  sums.pack(mine);
+  std::vector<Packed> to, from;
+  for (int rank = 0; rank < ranks_->size(); ++rank) {
     if (rank == self) continue;
-    const RankShare theirs = piece(rank);
-    out.push_back({rank, std::as_bytes(mine)});
-    in.push_back({rank, std::as_writable_bytes(total.subspan(theirs.first, theirs.size()))});
+    to.emplace_back(rank, &sums);
+    from.emplace_back(rank, &in_[static_cast<std::size_t>(rank)]);
+    from.back().second->expect(part_of(rank).size());
   }
-  ranks.exchange(out, in);
+  exchange_packed(to, from, Wait::kSpinning);
+  for (const auto& [rank, packed] : from) {
+    const RankShare theirs = part_of(rank);
+    packed->unpack(total.subspan(theirs.first, theirs.size()));
+  }
 }
 
 }  // namespace raysplats

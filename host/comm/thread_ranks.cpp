@@ -31,7 +31,8 @@ struct Group {
         copying(static_cast<std::size_t>(ranks)) {}
 
   std::deque<Message>& box(int from, int to) {
-    return boxes[static_cast<std::size_t>(from * size + to)];
+    return boxes[static_cast<std::size_t>(from) * static_cast<std::size_t>(size) +
+                 static_cast<std::size_t>(to)];
   }
   void fail(int rank) {
     const std::lock_guard lock(mutex);
@@ -54,7 +55,9 @@ class ThreadTransport : public Transport {
   int size() const override { return group_.size; }
   int local_rank() const override { return rank_; }
 
-  void exchange(std::span<const Outgoing> out, std::span<const Incoming> in) override {
+  void exchange(std::span<const Outgoing> out,
+                std::span<const Incoming> in,
+                Wait /*wait*/) override {
     std::unique_lock lock(group_.mutex);
     std::size_t open = out.size();
     const Withdrawal withdrawal{*this, lock};
@@ -83,6 +86,8 @@ class ThreadTransport : public Transport {
     }
     wait(lock, [&] { return open == 0; });
   }
+
+  void give_up() override { group_.fail(rank_); }
 
   [[noreturn]] void abort(int /*code*/) override {
     group_.fail(rank_);

@@ -19,6 +19,10 @@ struct Incoming {
   std::span<std::byte> bytes;
 };
 
+/// How a rank waits for messages: at once awake when they come, or leaving its core to others, for
+/// those that may come late.
+enum class Wait { kSpinning, kResting };
+
 /// A rank that the others wait for has ended.
 struct RankLost : DeviceError {
   RankLost(const std::string& message, int lost_rank) : DeviceError(message), rank(lost_rank) {}
@@ -26,7 +30,7 @@ struct RankLost : DeviceError {
 };
 
 /// How the ranks that share some work reach each other. Everything else that they do together is
-/// made of exchange() (Communicator). Used by one thread of the rank.
+/// made of exchange() (Communicator). Used by one thread of the rank at a time.
 class Transport {
  public:
   virtual ~Transport() = default;
@@ -36,7 +40,9 @@ class Transport {
   virtual int local_rank() const = 0;
   /// Sends and receives all of these messages; blocks. What two ranks send each other arrives in
   /// order; the sizes have to agree. Throws RankLost.
-  virtual void exchange(std::span<const Outgoing> out, std::span<const Incoming> in) = 0;
+  virtual void exchange(std::span<const Outgoing> out, std::span<const Incoming> in, Wait wait) = 0;
+  /// From any thread: this rank has failed, and an exchange() of it throws an Error soon.
+  virtual void give_up() = 0;
   /// Ends all ranks; `code` is the exit status of a process.
   [[noreturn]] virtual void abort(int code) = 0;
 };

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
@@ -23,10 +24,12 @@ namespace {
 
 constexpr int kTag = 16;
 // Messages go in pieces: MPI counts with an int, and a piece that has come tells that more will.
-constexpr std::size_t kPiece = std::size_t{4} << 20;
+// They are small enough for one to come while a wait is busy, where memory is slow.
+constexpr std::size_t kPiece = std::size_t{1} << 20;
 // After so long without a piece a wait leaves the core to others between its looks.
 constexpr auto kBusy = std::chrono::milliseconds(10);
 constexpr int kPauseMs = 1;
+constexpr auto kRest = std::chrono::microseconds(100);  // between looks of Wait::kResting
 constexpr auto kAbort = std::chrono::seconds(2);
 constexpr auto kLastWords = std::chrono::milliseconds(100);  // that an ended process may have sent
 
@@ -53,11 +56,11 @@ class MpiTransport : public Transport {
  public:
   MpiTransport() {
     int provided = 0;
-    check("MPI_Init_thread", MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided));
-    if (provided < MPI_THREAD_FUNNELED) {
+    check("MPI_Init_thread", MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &provided));
+    if (provided < MPI_THREAD_SERIALIZED) {
       throw Error(ErrorCode::kRuntime,
-                  "This MPI allows no threads, which OpenCL drivers have: use one that was built "
-                  "with them");
+                  "This MPI lets one thread alone send messages: use one that was built with "
+                  "support of threads");
     }
     MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
@@ -82,7 +85,7 @@ class MpiTransport : public Transport {
   int size() const override { return size_; }
   int local_rank() const override { return local_rank_; }
 
-  void exchange(std::span<const Outgoing> out, std::span<const Incoming> in) override {
+  void exchange(std::span<const Outgoing> out, std::span<const Incoming> in, Wait how) override {
     std::vector<MPI_Request> requests;
     const auto pieces = [&](std::size_t bytes, const auto& send) {
       for (std::size_t at = 0; at < bytes; at += kPiece) {
@@ -102,8 +105,9 @@ class MpiTransport : public Transport {
                                      MPI_COMM_WORLD, &request));
       });
     }
-    wait(requests);
+    wait(requests, how);
   }
+  void give_up() override { given_up_ = true; }
 
   // A launcher that is ending the ranks already may leave MPI_Abort waiting.
   [[noreturn]] void abort(int code) override {
@@ -137,7 +141,7 @@ class MpiTransport : public Transport {
     }
   }
 
-  void wait(std::vector<MPI_Request>& requests) {
+  void wait(std::vector<MPI_Request>& requests, Wait how) {
     using Clock = std::chrono::steady_clock;
     std::vector<int> which(requests.size());
     Clock::time_point news = Clock::now();
@@ -149,12 +153,15 @@ class MpiTransport : public Transport {
       if (done == MPI_UNDEFINED) return;  // nothing is open
       const Clock::time_point now = Clock::now();
       if (done > 0) news = now;
-      if (now - news < kBusy) {
+      if (given_up_) throw Error(ErrorCode::kRuntime, "This rank has failed: see what it says");
+      const bool rests = how == Wait::kResting;
+      if (!rests && now - news < kBusy) {
         ::sched_yield();
         continue;
       }
+      if (rests) std::this_thread::sleep_for(kRest);
       // A pause for others' sake, which the end of a process cuts short.
-      if (::poll(processes_.data(), processes_.size(), kPauseMs) <= 0) continue;
+      if (::poll(processes_.data(), processes_.size(), rests ? 0 : kPauseMs) <= 0) continue;
       if (!ended) ended = now;
       if (now - *ended > kLastWords) throw_lost();
       ::usleep(1000);
@@ -170,6 +177,7 @@ class MpiTransport : public Transport {
   }
 
   int rank_ = 0, size_ = 1, local_rank_ = 0;
+  std::atomic<bool> given_up_ = false;
   std::vector<pollfd> processes_;  // of ranks_
   std::vector<int> ranks_;
 };

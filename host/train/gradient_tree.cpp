@@ -4,7 +4,7 @@
 #include <span>
 #include <utility>
 
-#include "comm/slot_sum.hpp"
+#include "device/row_download.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
@@ -36,51 +36,56 @@ void GradientTree::join(StepGradients& left, StepGradients& right) {
   spare_.push_back(std::move(right));
 }
 
-void GradientTree::clear() {
+void GradientTree::begin(Communicator& ranks, std::size_t slots) {
   for (auto& part : sum_.take()) spare_.push_back(std::move(part.second));
+  ranks_ = &ranks;
+  slots_ = slots;
+  wanted_ = ranks.size() > 1 ? SlotSum::nodes(slots, ranks.rank(), ranks.size())
+                             : std::vector<PairwiseNode>();
+  sent_ = 0;
 }
 
 void GradientTree::add(std::size_t slot, StepGradients& gradients) {
   sum_.push({slot, 0}, std::exchange(gradients, {}),
             [this](StepGradients& left, StepGradients& right) { join(left, right); });
+  if (sent_ < wanted_.size() && sum_.parts().back().first == wanted_[sent_]) send();
   if (spare_.empty()) return;
   gradients = std::move(spare_.back());
   spare_.pop_back();
 }
 
+// The sum of a node, whose buffers are spare then: what is enqueued later comes after the copy.
+void GradientTree::send() {
+  StepGradients sum = sum_.take_last().second;
+  std::vector<const Buffer<float>*> buffers;
+  for_each_buffer(sum, [&](const Buffer<float>& buffer) { buffers.push_back(&buffer); });
+  if (rows_.size() == sent_) rows_.push_back(std::make_shared<std::vector<float>>());
+  const std::shared_ptr<std::vector<float>>& row = rows_[sent_];
+  const auto download = std::make_shared<RowDownload>(context_, buffers, row);
+  if (sent_++ == 0) among_.begin(*ranks_, slots_, row->size());
+  among_.send(*row, [download] { download->wait(); });
+  spare_.push_back(std::move(sum));
+}
+
+void GradientTree::settle() {
+  if (sent_ > 0) among_.settle();
+}
+
 void GradientTree::finish(StepGradients& sum) {
+  if (sent_ > 0) {
+    total_.resize(rows_.front()->size());
+    among_.finish(total_);
+    std::size_t at = 0;
+    for_each_buffer(sum, [&](Buffer<float>& b) {
+      b.upload(std::span<const float>(total_).subspan(at, b.size()));
+      at += b.size();
+    });
+    return;
+  }
   sum_.finish([this](StepGradients& left, StepGradients& right) { join(left, right); });
   if (sum_.parts().empty())
     throw UsageError("There are no gradients to add: give those of one view or more");
   spare_.push_back(std::exchange(sum, std::move(sum_.take().front().second)));
-}
-
-void GradientTree::finish(StepGradients& sum, Communicator& ranks, std::size_t slots) {
-  if (ranks.size() == 1) {
-    finish(sum);
-    return;
-  }
-  const auto& parts = sum_.parts();
-  rows_.resize(parts.size());
-  for (std::size_t k = 0; k < parts.size(); ++k) {
-    std::size_t numbers = 0;
-    for_each_buffer(parts[k].second, [&](const Buffer<float>& b) { numbers += b.size(); });
-    rows_[k].resize(numbers);
-    std::size_t at = 0;
-    for_each_buffer(parts[k].second, [&](const Buffer<float>& b) {
-      b.download(std::span(rows_[k]).subspan(at, b.size()));
-      at += b.size();
-    });
-  }
-  finish(sum);  // for its buffers
-  const std::vector<std::span<const float>> views(rows_.begin(), rows_.end());
-  total_.resize(rows_.front().size());
-  sum_slots(ranks, slots, views, total_, room_);
-  std::size_t at = 0;
-  for_each_buffer(sum, [&](Buffer<float>& b) {
-    b.upload(std::span<const float>(total_).subspan(at, b.size()));
-    at += b.size();
-  });
 }
 
 }  // namespace raysplats

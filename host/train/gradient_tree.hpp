@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "comm/communicator.hpp"
 #include "comm/pairwise.hpp"
+#include "comm/slot_sum.hpp"
 #include "device/context.hpp"
 #include "trace/device_gaussians.hpp"
 
@@ -27,26 +29,34 @@ class GradientTree {
  public:
   explicit GradientTree(Context& context) : context_(context) {}
 
-  /// Forgets what was added: a step that broke off.
-  void clear();
-  /// Takes the gradients of a slot, which follows the last one since finish() or clear(), and
-  /// leaves buffers of an earlier one in their place. Enqueues without waiting.
+  /// All ranks: a sum of `slots` slots, of which each rank adds those of its RankShare. Forgets
+  /// what was added: a step that broke off, after settle().
+  void begin(Communicator& ranks, std::size_t slots);
+  /// Takes the gradients of a slot, which follows the last one since begin(), and leaves buffers of
+  /// an earlier one in their place. Enqueues without waiting; what is whole for other ranks goes to
+  /// them while the device goes on (SlotSum).
   void add(std::size_t slot, StepGradients& gradients);
-  /// Moves the sum of all slots to `sum`. Throws UsageError without any.
+  /// All ranks: waits until all slots have been added and told.
+  void settle();
+  /// All ranks, after settle(): moves the sum of all slots to `sum`, which add() has left. With
+  /// several ranks it comes from the host. Throws UsageError without any slot.
   void finish(StepGradients& sum);
-  /// All ranks: the same for `slots` slots, of which each rank has added those of its RankShare.
-  /// With several ranks the sums go through the host, and are waited for.
-  void finish(StepGradients& sum, Communicator& ranks, std::size_t slots);
 
  private:
   void join(StepGradients& left, StepGradients& right);
+  void send();
 
   Context& context_;
   PairwiseSum<StepGradients> sum_;
   std::vector<StepGradients> spare_;  // buffers of sets that have been added
-  // On the host, with several ranks: the numbers of every part, and their sum.
-  std::vector<std::vector<float>> rows_;
-  std::vector<float> total_, room_;
+  // With several ranks.
+  Communicator* ranks_ = nullptr;
+  std::size_t slots_ = 0;
+  std::vector<PairwiseNode> wanted_;                       // that this one sends
+  std::vector<std::shared_ptr<std::vector<float>>> rows_;  // their numbers, on the host
+  std::size_t sent_ = 0;                                   // of them
+  std::vector<float> total_;
+  SlotSum among_;  // ends before what it reads
 };
 
 }  // namespace raysplats

@@ -49,6 +49,7 @@ void Trainer::Impl::read_ahead(std::int64_t turn) {
 // wait for the sizes.
 bool Trainer::Impl::join_views() {
   if (ranks.size() > 1) {
+    sum.settle();
     const std::vector<std::uint32_t> capped = guard.step_capped().download();
     StepWord sum_of_all{0, 0, 0};
     for (const StepWord& word : ranks.all(StepWord{std::uint64_t{capped[1]} << 32 | capped[0],
@@ -68,7 +69,7 @@ bool Trainer::Impl::join_views() {
     stop_agreed = sum_of_all.stop != 0;
     share_slots();
   }
-  if (slots.size() > 1) sum.finish(gradients, ranks, slots.size());
+  if (slots.size() > 1) sum.finish(gradients);
   return true;
 }
 

@@ -80,8 +80,9 @@ void wait_for_checkpoint(RunningProgram& program, const std::string& run) {
 
 TEST_CASE("devices of a list train the model of one") {
   const TemporaryFolder folder;
-  // Five views: shares of two and three, in the middle of the tree.
-  for (const int views : {4, 5}) {
+  // Five views: shares of two and three, in the middle of the tree. Six: shares of three, of which
+  // one is told in pairs and one.
+  for (const int views : {4, 5, 6}) {
     CAPTURE(views);
     const std::string name = std::to_string(views);
     const Outcome one = raysplats_program(shared_training(folder / (name + " one"), views));
@@ -96,6 +97,7 @@ TEST_CASE("devices of a list train the model of one") {
       REQUIRE(shared.code == 0);
       CHECK(same_run(run, folder / (name + " one")));
       CHECK(has(shared.out, "for each step: "));
+      CHECK(has(shared.out, "ms beside other work"));
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <thread>
 #include <vector>
@@ -33,34 +34,27 @@ float tree(std::size_t first, std::size_t last, std::size_t i) {
   return tree(first, first + half, i) + tree(first + half, last, i);
 }
 
-// The rows of a rank's slots, added as far as its share goes.
-std::vector<std::vector<float>> own_rows(std::size_t slots,
-                                         const Communicator& ranks,
-                                         std::size_t n) {
-  PairwiseSum<std::vector<float>> sum;
-  const RankShare share = RankShare::of(slots, ranks.rank(), ranks.size());
-  for (std::size_t slot = share.first; slot < share.last; ++slot) {
-    std::vector<float> row(n);
-    for (std::size_t i = 0; i < n; ++i) row[i] = number(slot, i);
-    sum.push({slot, 0}, std::move(row), [](std::vector<float>& a, const std::vector<float>& b) {
-      for (std::size_t i = 0; i < a.size(); ++i) a[i] += b[i];
-    });
-  }
-  std::vector<std::vector<float>> rows;
-  for (auto& [node, row] : sum.take()) rows.push_back(std::move(row));
-  return rows;
+// The sum of a node's slots.
+std::vector<float> row_of(const PairwiseNode& node, std::size_t n) {
+  std::vector<float> row(n);
+  for (std::size_t i = 0; i < n; ++i) row[i] = tree(node.first, node.end(), i);
+  return row;
 }
 
 std::vector<float> sum_among(int ranks, std::size_t slots, std::size_t n) {
   std::vector<std::vector<float>> totals(static_cast<std::size_t>(ranks));
   run_thread_ranks(ranks, [&](Communicator& self) {
-    const auto rows = own_rows(slots, self, n);
-    CHECK(rows.size() == pairwise_nodes(RankShare::of(slots, self.rank(), self.size()).first,
-                                        RankShare::of(slots, self.rank(), self.size()).last)
-                             .size());
-    const std::vector<std::span<const float>> parts(rows.begin(), rows.end());
-    std::vector<float> total(n, -1.0f), room;
-    sum_slots(self, slots, parts, total, room);
+    SlotSum sum;
+    std::vector<float> total(n, -1.0f);
+    for (int step = 0; step < 2; ++step) {
+      sum.begin(self, slots, n);
+      std::vector<std::vector<float>> rows;
+      for (const PairwiseNode& node : SlotSum::nodes(slots, self.rank(), self.size()))
+        rows.push_back(row_of(node, n));
+      for (const auto& row : rows) sum.send(row, [] {});
+      sum.settle();
+      sum.finish(total);
+    }
     totals[static_cast<std::size_t>(self.rank())] = total;
   });
   for (const std::vector<float>& total : totals) CHECK(total == totals.front());
@@ -131,15 +125,85 @@ TEST_CASE("a barrier holds until the last rank is there") {
 TEST_CASE("traffic counts what goes out and comes in") {
   constexpr std::size_t kNumbers = 1000;
   run_thread_ranks(2, [&](Communicator& self) {
-    const auto rows = own_rows(2, self, kNumbers);
-    const std::vector<std::span<const float>> parts(rows.begin(), rows.end());
-    std::vector<float> total(kNumbers), room;
-    sum_slots(self, 2, parts, total, room);
-    // Half a row to be added, and half a row of sums.
-    CHECK(self.traffic().sent == kNumbers * sizeof(float));
-    CHECK(self.traffic().received == kNumbers * sizeof(float));
-    CHECK(self.traffic().messages == 2);
+    // The second half of the numbers of rank 1 is 0, but for one that counts as its block does.
+    std::vector<float> row(kNumbers, 1.0f), total(kNumbers);
+    if (self.rank() == 1) std::fill(row.begin() + kNumbers / 2, row.end(), 0.0f);
+    if (self.rank() == 1) row.back() = -0.0f;
+    SlotSum sum;
+    sum.begin(self, 2, kNumbers);
+    sum.send(row, [] {});
+    sum.settle();
+    sum.finish(total);
+    CHECK(total.front() == 2.0f);
+    CHECK(total.back() == 1.0f);
+    // Half a row to be added, and half a row of sums; before each a bit for each of its blocks.
+    constexpr std::size_t kHalf = kNumbers / 2 * sizeof(float), kMarks = 8;
+    CHECK(self.traffic().sent == 2 * (kHalf + kMarks));
+    CHECK(self.traffic().received == 2 * (kHalf + kMarks));
+    CHECK(self.traffic().messages == 4);
+    CHECK(self.traffic().hidden == 0);
   });
+}
+
+TEST_CASE("zeros do not go among ranks, and come back with their signs") {
+  std::vector<float> row(100, 0.0f);
+  SparseRow packed;
+  std::vector<float> back(100, 7.0f);
+  const auto pass = [&] {
+    SparseRow received;
+    packed.pack(row);
+    received.expect(row.size());
+    std::ranges::copy(packed.marks(), received.marks().begin());
+    received.expect_numbers();
+    REQUIRE(received.numbers().size() == packed.numbers().size());
+    std::ranges::copy(packed.numbers(), received.numbers().begin());
+    received.unpack(back);
+    CHECK(std::memcmp(back.data(), row.data(), row.size() * sizeof(float)) == 0);
+    return packed.numbers().size();
+  };
+  CHECK(pass() == 0);
+  row[17] = -0.0f;
+  CHECK(pass() == 16);
+  row[99] = 3.0f;  // of a block of four
+  CHECK(pass() == 20);
+  row.assign(100, 1.0f);
+  CHECK(pass() == 100);
+}
+
+TEST_CASE("what is whole goes while the rest is made") {
+  run_thread_ranks(2, [](Communicator& self) {
+    const std::vector<float> row(1 << 16, 1.0f);
+    std::vector<float> total(row.size());
+    SlotSum sum;
+    sum.begin(self, 4, row.size());
+    REQUIRE(SlotSum::nodes(4, self.rank(), 2).size() == 2);
+    sum.send(row, [] {});
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    sum.send(row, [] {});
+    sum.settle();
+    sum.finish(total);
+    CHECK(total.back() == 4.0f);
+    CHECK(self.traffic().hidden > 0);
+  });
+}
+
+TEST_CASE("a rank that fails with rows on their way does not wait for the others") {
+  const auto run = [] {
+    run_thread_ranks(2, [](Communicator& self) {
+      const std::vector<float> row(100, 1.0f);
+      SlotSum sum;
+      sum.begin(self, 4, row.size());
+      if (self.rank() == 1) {
+        sum.send(row, [] {});
+        throw DataError("The second photo of rank 1 is gone");
+      }
+      // Rank 0 sends what rank 1 will not answer.
+      sum.send(row, [] {});
+      sum.send(row, [] {});
+      sum.settle();
+    });
+  };
+  CHECK_THROWS_WITH_AS(run(), "The second photo of rank 1 is gone", DataError);
 }
 
 TEST_CASE("when a rank fails the others stop waiting, and its error comes out") {

@@ -88,9 +88,11 @@ TrainOptions steps_of(int views, int iterations) {
 TEST_CASE("gradients of a step's views are added in a fixed tree, bit for bit [small]") {
   Context context{test_device()};
   GradientTree tree(context);
+  Communicator alone;
   StepGradients sum;
   for (const std::size_t views : {1u, 2u, 3u, 4u, 5u, 7u, 8u, 11u}) {
     CAPTURE(views);
+    tree.begin(alone, views);
     for (std::size_t slot = 0; slot < views; ++slot) {
       fill(context, slot, sum);
       tree.add(slot, sum);
