@@ -20,16 +20,19 @@ RadixSort::RadixSort(Context& context)
 RadixSort::RadixSort(Context& context, const ChunkShape& shape)
     : context_(&context), shape_(shape), scan_(context, shape), all_(context, 1, "all to sort") {
   all_.fill(0xffffffffu);
-  for (const bool from_pairs : {false, true}) {
-    for (const bool to_pairs : {false, true}) {
-      const BuildOptions options = BuildOptions()
-                                       .define("GROUP", shape.group_size)
-                                       .define("RS_SOURCE_PAIRS", from_pairs ? 1 : 0)
-                                       .define("RS_TARGET_PAIRS", to_pairs ? 1 : 0);
-      scatter_[from_pairs][to_pairs] = context.kernel(kProgram, "scatter", options);
-      if (to_pairs) count_digits_[from_pairs] = context.kernel(kProgram, "count_digits", options);
-    }
-  }
+}
+
+// Which of the programs a sort takes depends on its number of passes.
+void RadixSort::require_kernels(bool from_pairs, bool to_pairs) {
+  Kernel& scatter = scatter_[from_pairs][to_pairs];
+  if (scatter) return;
+  const BuildOptions options = BuildOptions()
+                                   .define("GROUP", shape_.group_size)
+                                   .define("RS_SOURCE_PAIRS", from_pairs ? 1 : 0)
+                                   .define("RS_TARGET_PAIRS", to_pairs ? 1 : 0);
+  scatter = context_->kernel(kProgram, "scatter", options);
+  Kernel& count_digits = count_digits_[from_pairs];
+  if (!count_digits) count_digits = context_->kernel(kProgram, "count_digits", options);
 }
 
 void RadixSort::sort(Buffer<std::uint32_t>& keys,
@@ -76,6 +79,7 @@ void RadixSort::pass(const Ends& ends,
                      const Buffer<std::uint32_t>& live,
                      std::size_t most,
                      int bit) {
+  require_kernels(from_pairs, to_pairs);
   const std::size_t groups = shape_.used_groups(most);
   const auto limit = static_cast<std::uint32_t>(most);
   const auto least = static_cast<std::uint32_t>(shape_.min_chunk);

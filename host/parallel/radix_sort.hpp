@@ -47,6 +47,7 @@ class RadixSort {
     Buffer<std::uint32_t>& values_out;
     Buffer<Pair>& pairs_out;
   };
+  void require_kernels(bool from_pairs, bool to_pairs);
   void pass(const Ends& ends,
             bool from_pairs,
             bool to_pairs,

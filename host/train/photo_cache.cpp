@@ -26,7 +26,6 @@ PhotoCache::PhotoCache(Context& context,
     : context_(context),
       budget_(budget),
       entries_(views.size()),
-      reduce_(context.kernel("train/photo_cache.cl", "reduce_photo")),
       loader_(views, ahead * largest_photo(views)) {
   if (context.device().type != DeviceType::kCpu) uploads_.emplace(context);
 }
@@ -69,6 +68,7 @@ DevicePhoto PhotoCache::get(std::size_t view, int width, int height) {
   const DevicePhoto small{reduced_, kFloatPlanes, entry.weighted};
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   reduced_.ensure(context_, small.words_of(pixels), "reduced photo");
+  if (!reduce_) reduce_ = context_.kernel("train/photo_cache.cl", "reduce_photo");
   reduce_.launch(Range::linear(pixels, kGroup), entry.words, reduced_, entry.planes,
                  entry.weighted ? 1 : 0, entry.width, entry.height, width, height);
   return small;

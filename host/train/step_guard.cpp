@@ -15,9 +15,9 @@ constexpr std::size_t kItems = 64;
 }  // namespace
 
 StepGuard::StepGuard(Context& context)
-    : check_(context.kernel(kProgram, "guard_loss")),
+    : context_(&context),
+      check_(context.kernel(kProgram, "guard_loss")),
       close_(context.kernel(kProgram, "guard_close")),
-      add_(context.kernel("train/gradient_tree.cl", "add_count")),
       state_(context, RS_GUARD_WORDS, "step guard"),
       step_capped_(context, 2, "capped rays of a step") {
   state_.clear();
@@ -32,6 +32,7 @@ void StepGuard::count_capped(const Buffer<std::uint32_t>& capped, bool first) {
   if (first) {
     step_capped_.copy_from(capped, 2);
   } else {
+    if (!add_) add_ = context_->kernel("train/gradient_tree.cl", "add_count");
     add_.launch(Range{{1, 1, 1}, {1, 1, 1}, {}}, capped, step_capped_);
   }
 }

@@ -54,7 +54,9 @@ class StepGuard {
   void restore(const Counts& counts);
 
  private:
-  Kernel check_, close_, add_;
+  Context* context_;
+  Kernel check_, close_;
+  Kernel add_;  // of steps of several views
   Buffer<std::uint32_t> state_, step_capped_;
 };
 
