@@ -100,6 +100,43 @@ __kernel void slow_steps(__global float16* out, uint rounds, float factor) {
   out[i] = x0 + x1 + x2 + x3;
 }
 
+// Vectors that begin at any float of a table of mask + 17 floats, as windows slide over rows.
+//                                                               global: any number of work-items
+__kernel void shifted_reads(__global const float* restrict table,
+                            __global float16* restrict out,
+                            uint rounds,
+                            uint mask) {
+  const uint i = get_global_id(0);
+  uint place = i;
+  float16 x0 = (float16)(0.0f), x1 = x0, x2 = x0, x3 = x0;
+  for (uint k = 0; k < rounds; ++k) {
+    __global const float* p = table + (place & mask);
+    x0 += vload16(0, p + 1);
+    x1 += vload16(0, p + 6);
+    x2 += vload16(0, p + 11);
+    x3 += vload16(0, p + 15);
+    place += 16;
+  }
+  out[i] = x0 + x1 + x2 + x3;
+}
+
+// Whole vectors written in turn to the same lines of each work-item's: 4 a round, lines of 4 (mask
+// + 1).                                                         global: any number of work-items
+__kernel void parked_vectors(__global float16* restrict lines,
+                             uint rounds,
+                             uint mask,
+                             float factor) {
+  __global float16* own = lines + get_global_id(0) * 4 * (size_t)(mask + 1);
+  const float16 a = (float16)(factor);
+  for (uint k = 0; k < rounds; ++k) {
+    __global float16* place = own + 4 * (k & mask);
+    place[0] = a;
+    place[1] = a;
+    place[2] = a;
+    place[3] = a;
+  }
+}
+
 // Lines of 64 bytes at random, of a table of mask + 1: no address waits for what was read.
 //                                                               global: any number of work-items
 __kernel void random_lines(__global const float16* restrict table,

@@ -21,6 +21,7 @@ constexpr double kFmaSeconds = 0.003;  // short: others may share the processors
 constexpr std::uint32_t kFirstRounds = 1u << 12;
 constexpr std::uint32_t kMostRounds = 1u << 24;
 constexpr std::size_t kGroup = 64;
+constexpr std::size_t kNear = 2048;    // floats, which fit the nearest cache twice
 constexpr double kChainSteps = 4 * 4;  // of vector_steps and scalar_steps, a round
 
 using Float4 = std::array<float, 4>;
@@ -94,6 +95,28 @@ double measure_slow_rate(Context& context) {
   Buffer<Float16> out(context, chain_items(context.device()), "sums of steps");
   return 8.0 * round_rate(context, [&](std::uint32_t rounds) {
            kernel.launch(chain_range(context.device()), out, rounds, 0.999f);
+         });
+}
+
+double measure_shifted_rate(Context& context) {
+  Kernel kernel = context.kernel(kProgram, "shifted_reads");
+  Buffer<float> table(context, kNear + 2 * 16, "shifted vectors");
+  Buffer<Float16> out(context, chain_items(context.device()), "sums of vectors");
+  table.clear();
+  context.take_launches();
+  return 4 * round_rate(context, [&](std::uint32_t rounds) {
+           kernel.launch(chain_range(context.device()), table, out, rounds,
+                         static_cast<std::uint32_t>(kNear - 1));
+         });
+}
+
+double measure_parked_rate(Context& context) {
+  Kernel kernel = context.kernel(kProgram, "parked_vectors");
+  constexpr std::size_t kGroups = kNear / 64;
+  Buffer<Float16> lines(context, 4 * kGroups * chain_items(context.device()), "parked vectors");
+  return 4 * round_rate(context, [&](std::uint32_t rounds) {
+           kernel.launch(chain_range(context.device()), lines, rounds,
+                         static_cast<std::uint32_t>(kGroups - 1), 0.5f);
          });
 }
 

@@ -19,6 +19,11 @@ double measure_scalar_rate(Context& context);
 double measure_slow_rate(Context& context);
 double measure_line_rate(Context& context, std::size_t bytes);
 
+/// Vectors of 16 floats a second that are read from near memory and begin at any float; whole ones
+/// that are written there.
+double measure_shifted_rate(Context& context);
+double measure_parked_rate(Context& context);
+
 /// Lines of runs of 16 of them, which lie at random in a table of `bytes`, a second.
 double measure_run_rate(Context& context, std::size_t bytes);
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Instructions per unit of work. Of vectors of 16 floats: as executed, found by stepping through
 // PoCL 3.1's machine code of AVX-512 kernels in a debugger, and its blocks by what
-// cl/trace/work_tally.h counts. Of waves of 32: in clang 22's assembly of the same blocks for
-// gfx1100, loops by their trips. What moves in order is cl/*/work.h's.
+// cl/trace/work_tally.h counts; what is parked or shifted by the code alone, half vectors as
+// halves. Of waves of 32: in clang 22's assembly of the same blocks for gfx1100, loops by their
+// trips. What moves in order is cl/*/work.h's.
 #include "bench/executed_work.hpp"
 
 #include <fmt/format.h>
@@ -23,8 +24,9 @@ constexpr double kDigits = 256;  // of a pass of the sort: lines that are writte
 
 KernelWork times(double count, const KernelWork& unit) {
   KernelWork out = unit;
-  for (double* part : {&out.vectors, &out.scalars, &out.slow, &out.lines, &out.runs, &out.chases,
-                       &out.stores, &out.local, &out.atomics, &out.trips, &out.barriers})
+  for (double* part :
+       {&out.vectors, &out.scalars, &out.slow, &out.shifted, &out.parked, &out.lines, &out.runs,
+        &out.chases, &out.stores, &out.local, &out.atomics, &out.trips, &out.barriers})
     *part *= count;
   return out;
 }
@@ -50,13 +52,14 @@ KernelWork sort_work(const ExecutedCounts& c, double pairs, double passes) {
 KernelWork prepare_work(const ExecutedCounts& c) {
   const double further = c.sh - 1;
   const KernelWork gaussian =
-      c.grouped ? KernelWork{.vectors = (970 + 40 * further) / kWave,
-                             .scalars = (200 + 5 * further) / kWave,
-                             .slow = 20 / kWave,
-                             .local = (100 + 6 * further) / kWave,
-                             .trips = (8 + 0.2 * further) / kWave,
-                             .barriers = (6 + 0.4 * further) / kWave}
-                : KernelWork{.vectors = 65.7 + 0.6 * further, .scalars = 21, .slow = 1.4};
+      c.grouped
+          ? KernelWork{.vectors = (970 + 40 * further) / kWave,
+                       .scalars = (200 + 5 * further) / kWave,
+                       .slow = 20 / kWave,
+                       .local = (100 + 6 * further) / kWave,
+                       .trips = (8 + 0.2 * further) / kWave,
+                       .barriers = (6 + 0.4 * further) / kWave}
+          : KernelWork{.vectors = 57.4 + 0.6 * further, .scalars = 21, .slow = 1.4, .parked = 8.3};
   const double bytes = (RS_WORK_PREPARE_BYTES + RS_WORK_SH_BYTES * c.sh) * c.gaussians;
   KernelWork out = times(c.gaussians, gaussian) + moved(bytes, bytes);
   out.launches = 1;
@@ -148,14 +151,16 @@ KernelWork backward_work(const ExecutedCounts& c) {
 
 KernelWork finalize_work(const ExecutedCounts& c) {
   const double further = c.sh - 1;
-  const KernelWork gaussian =
-      c.grouped ? KernelWork{.vectors = (1090 + 93 * further) / kWave,
-                             .scalars = (275 + 12 * further) / kWave,
-                             .slow = 15 / kWave,
-                             .local = (170 + 12 * further) / kWave,
-                             .trips = (12 + 0.5 * further) / kWave,
-                             .barriers = (16 + 0.75 * further) / kWave}
-                : KernelWork{.vectors = 164 + 2 * further, .scalars = 26, .slow = 1.2};
+  const KernelWork gaussian = c.grouped ? KernelWork{.vectors = (1090 + 93 * further) / kWave,
+                                                     .scalars = (275 + 12 * further) / kWave,
+                                                     .slow = 15 / kWave,
+                                                     .local = (170 + 12 * further) / kWave,
+                                                     .trips = (12 + 0.5 * further) / kWave,
+                                                     .barriers = (16 + 0.75 * further) / kWave}
+                                        : KernelWork{.vectors = 150 + 1.8 * further,
+                                                     .scalars = 26,
+                                                     .slow = 1.2,
+                                                     .parked = 14 + 0.2 * further};
   // Two private copies on CPUs: read, summed into one, the other left at zero.
   const double bytes =
       (RS_WORK_FINALIZE_BYTES + (c.grouped ? 0 : 3 * kLine) + 2 * RS_WORK_SH_BYTES * c.sh) *
@@ -168,20 +173,20 @@ KernelWork finalize_work(const ExecutedCounts& c) {
 // Groups: half as many as operations counted by hand, because most are fused, and half as many
 // again for addresses and edges.
 KernelWork loss_work(const ExecutedCounts& c, bool value) {
-  const KernelWork pixel = c.grouped
-                               ? (value ? KernelWork{.vectors = 600 / kWave,
-                                                     .scalars = 150 / kWave,
-                                                     .slow = 3 / kWave,
-                                                     .local = 260 / kWave,
-                                                     .trips = 8 / kWave,
-                                                     .barriers = 15 / kWave}
-                                        : KernelWork{.vectors = 330 / kWave,
-                                                     .scalars = 90 / kWave,
-                                                     .local = 130 / kWave,
-                                                     .trips = 8 / kWave,
-                                                     .barriers = 6 / kWave})
-                               : (value ? KernelWork{.vectors = 45, .scalars = 17, .slow = 0.19}
-                                        : KernelWork{.vectors = 24, .scalars = 21});
+  const KernelWork pixel =
+      c.grouped ? (value ? KernelWork{.vectors = 600 / kWave,
+                                      .scalars = 150 / kWave,
+                                      .slow = 3 / kWave,
+                                      .local = 260 / kWave,
+                                      .trips = 8 / kWave,
+                                      .barriers = 15 / kWave}
+                         : KernelWork{.vectors = 330 / kWave,
+                                      .scalars = 90 / kWave,
+                                      .local = 130 / kWave,
+                                      .trips = 8 / kWave,
+                                      .barriers = 6 / kWave})
+                : (value ? KernelWork{.vectors = 37.5, .scalars = 17, .slow = 0.19, .shifted = 7.5}
+                         : KernelWork{.vectors = 18.4, .scalars = 21, .shifted = 5.6});
   const double bytes =
       value ? (c.grouped ? RS_WORK_GROUP_LOSS_VALUE_BYTES : RS_WORK_LOSS_VALUE_BYTES)
             : (c.grouped ? RS_WORK_GROUP_LOSS_GRADIENT_BYTES : RS_WORK_LOSS_GRADIENT_BYTES);

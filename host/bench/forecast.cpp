@@ -126,6 +126,8 @@ DeviceSpeeds measure_speeds(Context& context) {
   out.vectors = measure_vector_rate(context);
   out.scalars = measure_scalar_rate(context);
   out.slow = measure_slow_rate(context);
+  out.shifted = measure_shifted_rate(context);
+  out.parked = measure_parked_rate(context);
   for (const std::size_t bytes : kLevels) {
     out.bandwidth.push_back(
         {static_cast<double>(bytes), measure_copy_bandwidth(context, bytes / 2)});
@@ -159,8 +161,9 @@ ForecastReport make_forecast(Context& context,
 std::string forecast_text(const ForecastReport& report) {
   const DeviceSpeeds& d = report.device;
   std::string out = fmt::format(
-      "{}: {:.2f} G vector, {:.2f} G scalar instructions/s, {:.2f} G divisions and roots/s\n",
-      d.name, 1e-9 * d.vectors, 1e-9 * d.scalars, 1e-9 * d.slow);
+      "{}: {:.2f} G vector, {:.2f} G scalar instructions/s, {:.2f} G divisions and roots/s,\n"
+      "  {:.2f} G vectors/s read at any float, {:.2f} G written nearby\n",
+      d.name, 1e-9 * d.vectors, 1e-9 * d.scalars, 1e-9 * d.slow, 1e-9 * d.shifted, 1e-9 * d.parked);
   for (std::size_t i = 0; i < d.bandwidth.size(); ++i) {
     out += fmt::format(
         "  up to {:>6.0f} KiB: {:>6.1f} GB/s in order, {:>7.1f} M lines/s at random, {:>6.1f} "

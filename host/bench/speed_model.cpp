@@ -26,7 +26,10 @@ double arithmetic_seconds(const KernelWork& work, const DeviceSpeeds& device) {
   const double vectors = over(work.vectors, device.vectors);
   const double scalars = over(work.scalars, device.scalars > 0 ? device.scalars : device.vectors);
   const double slow = over(work.slow, device.slow);
-  if (device.cpu) return vectors + scalars + slow;
+  if (device.cpu) {
+    return vectors + scalars + slow + over(work.shifted, device.shifted) +
+           over(work.parked, device.parked);
+  }
   return std::max(device.scalars > 0 ? std::max(vectors, scalars) : vectors + scalars, slow);
 }
 
@@ -171,6 +174,8 @@ KernelWork KernelWork::operator+(const KernelWork& other) const {
   out.vectors += other.vectors;
   out.scalars += other.scalars;
   out.slow += other.slow;
+  out.shifted += other.shifted;
+  out.parked += other.parked;
   out.bytes += other.bytes;
   out.footprint = std::max(footprint, other.footprint);
   out.lines += other.lines;

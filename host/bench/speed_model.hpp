@@ -8,9 +8,11 @@ namespace raysplats {
 
 /// What the kernels of a row execute, work that finds nothing included: counted, not measured.
 struct KernelWork {
-  double vectors = 0;    ///< instructions on a whole vector or wave, but for the next two kinds
+  double vectors = 0;    ///< instructions on a whole vector or wave, but for the next four kinds
   double scalars = 0;    ///< instructions on one number for a whole vector or wave
   double slow = 0;       ///< divisions and roots of a vector or wave; GPUs: and exponentials
+  double shifted = 0;    ///< vectors read that begin at any float
+  double parked = 0;     ///< vectors written to memory that is near, most of them to be read again
   double bytes = 0;      ///< read and written in order
   double footprint = 0;  ///< bytes that these come from: which memory they can be in
   double lines = 0;      ///< of 64 bytes at random
@@ -39,9 +41,11 @@ struct DeviceSpeeds {
 
   std::string name;
   bool cpu = false;
-  double vectors = 0;            ///< instructions a second
-  double scalars = 0;            ///< 0: they take the slots of vectors
-  double slow = 0;               ///< a second; their vectors' slots are not counted
+  double vectors = 0;  ///< instructions a second
+  double scalars = 0;  ///< 0: they take the slots of vectors
+  double slow = 0;     ///< a second; their vectors' slots are not counted
+  double shifted = 0;  ///< a second, of CPUs, like the next one
+  double parked = 0;
   std::vector<Level> bandwidth;  ///< bytes a second
   std::vector<Level> lines;      ///< a second; none: by the bandwidth
   std::vector<Level> runs;       ///< a second; like the next two, none where there are no lines
@@ -63,7 +67,7 @@ struct Prediction {
 
 /// The slowest of: instructions, bytes and lines, local accesses, additions, and the way of one
 /// wave after the other through its instructions and waits where `resident` waves run at once (0:
-/// not asked). Of a CPU the three kinds of instructions add up, and lines and words at random,
+/// not asked). Of a CPU the kinds of instructions add up, and lines and words at random,
 /// which nothing fetches ahead, come on top; so do launches.
 Prediction predict(const KernelWork& work, const DeviceSpeeds& device, double resident = 0);
 

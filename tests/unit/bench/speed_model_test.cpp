@@ -67,6 +67,10 @@ TEST_CASE("the model of speed adds up what a processor does one after the other"
   device.stores = {{INFINITY, 4}};
   const KernelWork work{.vectors = 200, .scalars = 100, .slow = 5, .bytes = 100, .footprint = 10};
   CHECK(predict(work, device).seconds == doctest::Approx(3.0));
+  device.shifted = 5;
+  device.parked = 40;
+  CHECK(predict(work + KernelWork{.shifted = 1, .parked = 8}, device).seconds ==
+        doctest::Approx(3.4));
   device.runs = {{INFINITY, 16}};
   const KernelWork random{.lines = 8, .runs = 4, .chases = 1, .stores = 2};
   const Prediction found = predict(work + random, device);
