@@ -9,6 +9,9 @@
 namespace raysplats {
 namespace {
 
+// Numbers of a row that are added at once, so that sums of sums are still in the processor's cache.
+constexpr std::size_t kTogether = 4096;
+
 void add(std::span<float>& left, std::span<float>& right) {
   for (std::size_t i = 0; i < left.size(); ++i) left[i] += right[i];
 }
@@ -109,11 +112,11 @@ void SlotSum::exchange_round(std::size_t round, std::span<const float> own, Wait
     }
     if (round < rounds_of(rank)) {
       from.emplace_back(rank, &in_[static_cast<std::size_t>(rank)]);
-      from.back().second->expect(here.size());
+      from.back().second->expect(row_of(rank, round).numbers);
     }
   }
   exchange_packed(to, from, wait);
-  for (const auto& [rank, packed] : from) packed->unpack(row_of(rank, round).numbers);
+  for (const auto& [rank, packed] : from) packed->unpack();
   if (sends)
     std::ranges::copy(own.subspan(here.first, here.size()), row_of(self, round).numbers.begin());
 }
@@ -123,28 +126,35 @@ void SlotSum::exchange_round(std::size_t round, std::span<const float> own, Wait
 void SlotSum::exchange_packed(const std::vector<Packed>& to,
                               const std::vector<Packed>& from,
                               Wait wait) {
-  const auto exchange = [&](Wait how, const auto& bytes_of) {
-    std::vector<Outgoing> out;
-    std::vector<Incoming> in;
-    out.reserve(to.size());
-    in.reserve(from.size());
-    for (const auto& [rank, packed] : to) out.push_back({rank, bytes_of(*packed)});
-    for (const auto& [rank, packed] : from) in.push_back({rank, bytes_of(*packed)});
-    ranks_->exchange(out, in, how);
-  };
-  exchange(wait, [](SparseRow& row) { return std::as_writable_bytes(row.marks()); });
-  for (const auto& [rank, packed] : from) packed->expect_numbers();
-  exchange(Wait::kSpinning, [](SparseRow& row) { return std::as_writable_bytes(row.numbers()); });
+  std::vector<Outgoing> out;
+  std::vector<Incoming> in;
+  out.reserve(to.size());
+  in.reserve(from.size());
+  for (const auto& [rank, packed] : to) out.push_back({rank, std::as_bytes(packed->marks())});
+  for (const auto& [rank, packed] : from)
+    in.push_back({rank, std::as_writable_bytes(packed->marks())});
+  ranks_->exchange(out, in, wait);
+  out.clear();
+  in.clear();
+  for (const auto& [rank, packed] : to) out.push_back({rank, std::as_bytes(packed->outgoing())});
+  for (const auto& [rank, packed] : from) {
+    packed->expect_numbers();
+    in.push_back({rank, std::as_writable_bytes(packed->incoming())});
+  }
+  ranks_->exchange(out, in, Wait::kSpinning);
 }
 
 void SlotSum::finish(std::span<float> total) {
-  PairwiseSum<std::span<float>> sum;
-  for (Row& row : rows_) sum.push(row.node, row.numbers, add);
-  sum.finish(add);
   const int self = ranks_->rank();
   const RankShare own = part_of(self);
   const std::span<float> mine = total.subspan(own.first, own.size());
-  std::ranges::copy(sum.parts().front().second, mine.begin());
+  for (std::size_t at = 0; at < mine.size(); at += kTogether) {
+    const std::size_t count = std::min(kTogether, mine.size() - at);
+    PairwiseSum<std::span<float>> sum;
+    for (Row& row : rows_) sum.push(row.node, std::span(row.numbers).subspan(at, count), add);
+    sum.finish(add);
+    std::ranges::copy(sum.parts().front().second, mine.subspan(at, count).begin());
+  }
 
   SparseRow& sums = out_[static_cast<std::size_t>(self)];
   sums.pack(mine);
@@ -153,13 +163,11 @@ void SlotSum::finish(std::span<float> total) {
     if (rank == self) continue;
     to.emplace_back(rank, &sums);
     from.emplace_back(rank, &in_[static_cast<std::size_t>(rank)]);
-    from.back().second->expect(part_of(rank).size());
+    const RankShare theirs = part_of(rank);
+    from.back().second->expect(total.subspan(theirs.first, theirs.size()));
   }
   exchange_packed(to, from, Wait::kSpinning);
-  for (const auto& [rank, packed] : from) {
-    const RankShare theirs = part_of(rank);
-    packed->unpack(total.subspan(theirs.first, theirs.size()));
-  }
+  for (const auto& [rank, packed] : from) packed->unpack();
 }
 
 }  // namespace raysplats
