@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays through the centres of a camera's pixels, row by row, for every camera model (lens.h), with a
-// thin lens. Launch of camera_rays: one work-item per ray, any group size. A pixel that sees nothing
-// gets an empty ray (t_max < 0). Cost: a few dozen operations; models with distortion iterate.
+// Rays through the centres of a camera's pixels, row by row, for every camera model (lens.h), with
+// a thin lens. Launch of camera_rays: one work-item per ray, any group size. A pixel that sees
+// nothing gets an empty ray (t_max < 0). Cost: a few dozen operations; models with distortion
+// iterate.
 #include "bvh/ray.h"
 #include "shared/random.h"
 #include "trace/lens.h"
@@ -28,8 +29,7 @@ __kernel void camera_rays(const RsLensCamera camera,
 
 #if CAMERA_MODEL != RS_CAMERA_ORTHOGRAPHIC
   if (camera.aperture > 0.0f) {
-    const RsRandom4 random =
-        rs_random4(camera.seed_lo, camera.seed_hi, pixel, camera.sample, 0);
+    const RsRandom4 random = rs_random4(camera.seed_lo, camera.seed_hi, pixel, camera.sample, 0);
 #if CAMERA_MODEL == RS_CAMERA_PINHOLE || CAMERA_MODEL == RS_CAMERA_OPENCV
     const float3 focus = direction * (camera.focus_distance / direction.z);
 #else
