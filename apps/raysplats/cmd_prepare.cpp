@@ -20,6 +20,7 @@ struct Options {
   std::string input;
   std::string output;
   std::string matching = "auto";
+  std::string cameras = "size";
   PrepareOptions prepare;
 };
 
@@ -53,6 +54,7 @@ class Steps {
 void run(Options& options, const GlobalOptions& global) {
   if (options.matching == "exhaustive") options.prepare.matching = Matching::kExhaustive;
   if (options.matching == "sequential") options.prepare.matching = Matching::kSequential;
+  if (options.cameras == "photo") options.prepare.cameras = Cameras::kPhoto;
   Steps steps(global.quiet);
   const Prepared made =
       prepare_data(options.input, options.output, options.prepare,
@@ -93,6 +95,16 @@ Command add_prepare_command(CLI::App& app, const GlobalOptions& global) {
                    "Compare every pair of photos (exhaustive) or neighbours by name (sequential); "
                    "auto: sequential for videos and more than 400 photos")
       ->check(one_of({"auto", "exhaustive", "sequential"}))
+      ->capture_default_str();
+  command
+      ->add_option("--cameras", options->cameras,
+                   "Photos of equal size are of one camera (size), or each is of its own (photo)")
+      ->check(one_of({"size", "photo"}))
+      ->capture_default_str();
+  command
+      ->add_option("--features", options->prepare.features,
+                   "Features of a photo at most; 0 chooses: 8192, fewer for more than 100 photos")
+      ->transform(whole_between(0, 100000))
       ->capture_default_str();
   command
       ->add_option("--max-size", options->prepare.max_size,

@@ -2,6 +2,8 @@
 #include "prepare/prepare.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <charconv>
@@ -11,17 +13,18 @@
 #include <string_view>
 
 #include "io/colmap_model.hpp"
+#include "prepare/colmap_plan.hpp"
 #include "prepare/frames.hpp"
 #include "raysplats/error.hpp"
 #include "util/atomic_file.hpp"
 #include "util/program.hpp"
+#include "util/progress.hpp"
 
 namespace raysplats {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kSequentialOverlap = 12;
 constexpr std::size_t kFewestPhotos = 3;
 
 /// The number behind `before` in a line, 0 when there is none.
@@ -42,17 +45,20 @@ class Work {
     fs::create_directories(data_ / "prepare");
   }
 
-  /// Runs `action` unless it was done with the same settings, or after a step that was done anew.
+  /// Whether a step is still to be done with these settings, or follows one that was done anew.
+  bool due(const std::string& name, const std::string& settings) const {
+    std::ifstream stream(mark(name));
+    const std::string before((std::istreambuf_iterator<char>(stream)), {});
+    return anew_ || !stream || before != settings;
+  }
+  /// Runs `action` if the step is due.
   template <class Action>
   void step(const std::string& name, const std::string& settings, Action action) {
-    const fs::path mark = data_ / "prepare" / name;
-    std::ifstream stream(mark);
-    const std::string before((std::istreambuf_iterator<char>(stream)), {});
-    if (!anew_ && stream && before == settings) return;
+    if (!due(name, settings)) return;
     anew_ = true;
-    fs::remove(mark);
+    fs::remove(mark(name));
     action();
-    write_text_file(mark, settings);
+    write_text_file(mark(name), settings);
   }
   void colmap(const std::vector<std::string>& arguments,
               const std::string& step,
@@ -72,6 +78,8 @@ class Work {
   }
 
  private:
+  fs::path mark(const std::string& name) const { return data_ / "prepare" / name; }
+
   fs::path data_;
   const PrepareWatch& watch_;
   bool anew_ = false;
@@ -105,45 +113,78 @@ std::vector<std::string> gather_images(const fs::path& input,
   return photos_in(images);
 }
 
-void find_features(const PrepareOptions& options, std::size_t photos, bool one_camera, Work& work) {
-  work.step("features", fmt::format("{} {}\n", options.camera_model, options.max_size), [&] {
+std::string model_settings(const ColmapPlan& plan) {
+  return plan.finds_axis ? "mapper, axis\n" : "mapper\n";
+}
+
+/// How long the steps that are due will take.
+void tell_time(const ColmapPlan& plan, const Work& work) {
+  ColmapSeconds left = plan.seconds;
+  const bool features = work.due("features", plan.feature_settings);
+  const bool matches = features || work.due("matches", plan.matcher.front() + "\n");
+  if (!features) left.features = 0;
+  if (!matches) left.matches = 0;
+  if (!matches && !work.due("model", model_settings(plan))) return;
+  spdlog::info(
+      "COLMAP will take about {} for {} photos, if nothing else runs: features {}, matches {}, "
+      "poses {}",
+      format_duration(left.features + left.matches + left.poses), plan.photos,
+      format_duration(left.features), format_duration(left.matches), format_duration(left.poses));
+}
+
+void find_features(const PrepareOptions& options, const ColmapPlan& plan, Work& work) {
+  work.step("features", plan.feature_settings, [&] {
     fs::remove(work / "database.db");
-    work.colmap(
-        {"feature_extractor", "--database_path", work.text("database.db"), "--image_path",
-         work.text("images"), "--ImageReader.single_camera", one_camera ? "1" : "0",
-         "--ImageReader.camera_model", options.camera_model, "--SiftExtraction.use_gpu", "0",
-         "--SiftExtraction.max_image_size", std::to_string(options.max_size)},
-        "features",
-        [](std::string_view line, std::size_t& done) {
-          done = std::max(done, number_behind(line, "Processed file ["));
-        },
-        photos);
+    std::size_t before = 0;
+    for (const std::vector<std::string>& photos : plan.cameras) {
+      // COLMAP shares a camera among all photos that one call is given.
+      const fs::path list = work / "prepare/photos.txt";
+      write_text_file(list, fmt::format("{}\n", fmt::join(photos, "\n")));
+      work.colmap(
+          {"feature_extractor", "--database_path", work.text("database.db"), "--image_path",
+           work.text("images"), "--image_list_path", list.string(), "--ImageReader.single_camera",
+           options.cameras == Cameras::kSize ? "1" : "0", "--ImageReader.camera_model",
+           options.camera_model, "--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_image_size",
+           std::to_string(options.max_size), "--SiftExtraction.max_num_features",
+           std::to_string(plan.features)},
+          "features",
+          [&](std::string_view line, std::size_t& done) {
+            done = std::max(done, before + number_behind(line, "Processed file ["));
+          },
+          plan.photos);
+      before += photos.size();
+    }
   });
 }
 
-void match(const PrepareOptions& options, std::size_t photos, bool video, Work& work) {
-  const bool sequential =
-      options.matching == Matching::kSequential ||
-      (options.matching == Matching::kAuto && (video || photos > kMostExhaustive));
-  work.step("matches", sequential ? "sequential\n" : "exhaustive\n", [&] {
-    std::vector<std::string> arguments{sequential ? "sequential_matcher" : "exhaustive_matcher",
-                                       "--database_path", work.text("database.db"),
-                                       "--SiftMatching.use_gpu", "0"};
-    if (sequential) {
-      arguments.insert(arguments.end(),
-                       {"--SequentialMatching.overlap", std::to_string(kSequentialOverlap)});
-    }
+void match(const ColmapPlan& plan, Work& work) {
+  work.step("matches", plan.matcher.front() + "\n", [&] {
+    std::vector<std::string> arguments = plan.matcher;
+    arguments.insert(arguments.end(),
+                     {"--database_path", work.text("database.db"), "--SiftMatching.use_gpu", "0"});
     work.colmap(
         arguments, "matches",
         [](std::string_view line, std::size_t& done) {
           if (line.starts_with("Matching ")) ++done;
         },
-        0);
+        plan.match_lines);
   });
 }
 
-void place(std::size_t photos, Work& work) {
-  work.step("model", "mapper\n", [&] {
+/// The mapper leaves the axis of each lens in the middle of the picture, and turns all photos by
+/// what that is wrong.
+void find_axis(const fs::path& models, Work& work) {
+  for (const fs::directory_entry& model : fs::directory_iterator(models)) {
+    const std::string folder = model.path().string();
+    work.colmap(
+        {"bundle_adjuster", "--input_path", folder, "--output_path", folder,
+         "--BundleAdjustment.refine_principal_point", "1"},
+        "lens", [](std::string_view, std::size_t&) {}, 0);
+  }
+}
+
+void place(const ColmapPlan& plan, Work& work) {
+  work.step("model", model_settings(plan), [&] {
     const fs::path part = work / "sparse.part";
     fs::remove_all(part);
     fs::create_directories(part);
@@ -156,14 +197,15 @@ void place(std::size_t photos, Work& work) {
           if (line.find("Registering image") != std::string_view::npos)
             done = std::max(done, number_behind(line, "("));
         },
-        photos);
+        plan.photos);
     if (!fs::exists(part) || fs::is_empty(part)) {
       throw DataError(
           fmt::format("COLMAP found no poses for the {} photos: they have to overlap by more than "
                       "half and to be "
                       "sharp (what it said is in {})",
-                      photos, work.log().string()));
+                      plan.photos, work.log().string()));
     }
+    if (plan.finds_axis) find_axis(part, work);
     fs::remove_all(work / "sparse");
     fs::rename(part, work / "sparse");
   });
@@ -195,9 +237,11 @@ Prepared prepare_data(const fs::path& input,
   }
   Work work(data, watch);
   const std::vector<std::string> photos = gather_images(input, options, work);
-  find_features(options, photos.size(), video, work);
-  match(options, photos.size(), video, work);
-  place(photos.size(), work);
+  const ColmapPlan plan = plan_colmap(work / "images", photos, options, video);
+  tell_time(plan, work);
+  find_features(options, plan, work);
+  match(plan, work);
+  place(plan, work);
 
   const std::optional<fs::path> folder = io::find_colmap_model(data);
   if (!folder) throw DataError(fmt::format("{} holds no model of COLMAP", data.string()));

@@ -16,10 +16,18 @@ enum class Matching {
   kSequential,  ///< neighbours in the order of the names
 };
 
+/// Which photos were taken by one camera, whose lens they find out together.
+enum class Cameras {
+  kSize,   ///< those of equal width and height
+  kPhoto,  ///< each has its own
+};
+
 struct PrepareOptions {
   std::size_t frames = 150;  ///< of a video
   int max_size = 1600;       ///< longer side at which features are looked for, pixels
+  int features = 0;          ///< at most, of a photo; 0 = by the number of photos
   Matching matching = Matching::kAuto;
+  Cameras cameras = Cameras::kSize;
   std::string camera_model = "OPENCV";  ///< one of COLMAP's that read_colmap_model() knows
 };
 
@@ -39,7 +47,8 @@ using PrepareWatch =
 
 /// Makes a data set of photos (a folder) or a video: `data`/images and `data`/sparse, by the
 /// programs colmap and ffmpeg in PATH, whose words are in `data`/prepare.log. Of a video three
-/// times as many frames as wanted are taken, and of each three the sharpest is kept. Steps that
+/// times as many frames as wanted are taken, and of each three the sharpest is kept. A line of the
+/// log says beforehand how long COLMAP will take, roughly. Steps that
 /// `data` has already from the same input with the same options are not done again. Throws
 /// UsageError for a missing program and for inputs that are neither; DataError for a folder without
 /// photos, for data made from something else, and when no pose was found; Error when a program

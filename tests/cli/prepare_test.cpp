@@ -79,7 +79,10 @@ TEST_CASE("prepare makes a data set of photos and names those without a pose") {
   CHECK(has(outcome.err, "c.png"));
   const std::string calls = stage.calls();
   CHECK(has(calls, "feature_extractor"));
-  CHECK(has(calls, "--ImageReader.single_camera 0"));
+  CHECK(has(calls, "--ImageReader.single_camera 1"));
+  CHECK(has(calls, "--SiftExtraction.max_num_features 8192"));
+  CHECK(has(outcome.err, "COLMAP will take about 0:0"));
+  CHECK(has(outcome.err, "for 3 photos"));
   CHECK(has(calls, "exhaustive_matcher"));
   CHECK(has(read_file(stage.path("data/prepare.log")), "Processed file [3/3]"));
   const Outcome info = raysplats_program({"info", stage.path("data")});
@@ -88,8 +91,10 @@ TEST_CASE("prepare makes a data set of photos and names those without a pose") {
   CHECK(has(info.out, "views            2"));
 
   // All is done: COLMAP is not called again, unless something has changed.
-  CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
+  const Outcome idle = stage.run({stage.path("photos"), "-o", stage.path("data")});
+  CHECK(idle.code == 0);
   CHECK(stage.calls().empty());
+  CHECK(!has(idle.err, "COLMAP will take"));
   CHECK(stage.run({stage.path("photos"), "-o", stage.path("data"), "--matching", "sequential"})
             .code == 0);
   const std::string again = stage.calls();
@@ -112,6 +117,43 @@ TEST_CASE("prepare goes on after the last finished step") {
   CHECK(!has(calls, "feature_extractor"));
   CHECK(!has(calls, "matcher"));
   CHECK(has(calls, "mapper"));
+}
+
+TEST_CASE("prepare shares a camera among photos of one size") {
+  const Stage stage;
+  raysplats::write_image(stage.path("photos/d.png"), raysplats::Image(6, 8, 3, 0.5f));
+  CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
+  const std::string calls = stage.calls();
+  std::size_t extractors = 0;
+  for (std::size_t at = 0; (at = calls.find("feature_extractor", at)) != std::string::npos; ++at)
+    ++extractors;
+  CHECK(extractors == 2);
+  // The list of the last call: photos by their width.
+  CHECK(read_file(stage.path("data/prepare/photos.txt")) == "a.png\nb.png\nc.png\n");
+
+  CHECK(stage
+            .run({stage.path("photos"), "-o", stage.path("data"), "--cameras", "photo",
+                  "--features", "1000"})
+            .code == 0);
+  const std::string own = stage.calls();
+  CHECK(own.find("feature_extractor") == own.rfind("feature_extractor"));
+  CHECK(has(own, "--ImageReader.single_camera 0"));
+  CHECK(has(own, "--SiftExtraction.max_num_features 1000"));
+}
+
+TEST_CASE("prepare finds the axis of a lens that has photos enough") {
+  const Stage stage;
+  for (int i = 0; i < 7; ++i) {
+    raysplats::write_image(stage.path("photos/more_" + std::to_string(i) + ".png"),
+                           raysplats::Image(8, 6, 3, 0.5f));
+  }
+  CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
+  CHECK(has(stage.calls(), "--BundleAdjustment.refine_principal_point 1"));
+  // A tenth photo of another camera does not do.
+  fs::remove(stage.path("photos/more_6.png"));
+  raysplats::write_image(stage.path("photos/tall.png"), raysplats::Image(6, 8, 3, 0.5f));
+  CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
+  CHECK(!has(stage.calls(), "bundle_adjuster"));
 }
 
 TEST_CASE("prepare takes the sharpest of every three frames of a video") {
