@@ -140,8 +140,12 @@ void print_results(const TrainSummary& summary, const std::string& folder) {
 }
 
 /// As one of the ranks that share the run.
-void train(
-    const CLI::App& command, Options options, bool quiet, Communicator& ranks, Context& context) {
+void train(const CLI::App& command,
+           Options options,
+           const GlobalOptions& global,
+           Communicator& ranks,
+           Context& context) {
+  const bool quiet = global.quiet;
   Dataset dataset = load(command, options, context.device());
   check_not_data(options.output, dataset);
   std::vector<View> views;
@@ -152,6 +156,7 @@ void train(
   const std::array<double, 3> origin = dataset.origin;
   Trainer trainer(context, std::move(dataset), options.train, options.output, options.overwrite,
                   &ranks);
+  trainer.set_command(global.command);
   if (!options.resume.empty()) trainer.resume(options.resume);
   options.train.iterations = announce(trainer, options, ranks.said_by(0, quiet));
   std::unique_ptr<view::RunView> shown;
@@ -177,7 +182,7 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
       command.get_option("--end-iteration")->count() == 0)
     options.train.end_iteration = 0;
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
-    train(command, options, global.quiet, ranks, context);
+    train(command, options, global, ranks, context);
   });
 }
 

@@ -64,6 +64,7 @@ int run(int argc, char** argv, GlobalOptions& global) {
   app.require_subcommand(1);
   app.fallthrough();
   add_global_options(app, global);
+  global.command = command_line(argc, argv);
   const std::vector<Command> commands{
       add_devices_command(app),       add_doctor_command(app),
       add_generate_command(app),      add_prepare_command(app, global),

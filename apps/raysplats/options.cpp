@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -308,6 +309,26 @@ bool takes_numbers(std::string_view name) {
 }
 
 }  // namespace
+
+std::string command_line(int argc, const char* const* argv) {
+  std::string line = "raysplats";
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
+      return std::isalnum(c) != 0 ||
+             std::string_view("-_=./:,+@%").find(static_cast<char>(c)) != std::string_view::npos;
+    });
+    if (plain) {
+      line += fmt::format(" {}", word);
+      continue;
+    }
+    // Within single quotes a shell takes everything as it is but these.
+    line += " '";
+    for (const char c : word) line += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    line += '\'';
+  }
+  return line;
+}
 
 std::vector<std::string> own_arguments(int argc, const char* const* argv) {
   // gsplat's and OpenSplat's names for what every trainer needs.

@@ -29,6 +29,7 @@ struct GlobalOptions {
   bool quiet = false;
   /// The processes that mpirun has started, of which this is one; alone as a rule.
   mutable Communicator processes = {};
+  std::string command;  ///< the line that started the program
 };
 void add_global_options(CLI::App& app, GlobalOptions& options);
 /// Log lines go to standard error, so that results on standard output can be piped.
@@ -124,6 +125,8 @@ CLI::Validator one_of(std::vector<std::string> names);
 CLI::Validator triple();
 std::array<double, 3> parse_triple(const std::string& text);
 
+/// The program and its arguments as a shell takes them.
+std::string command_line(int argc, const char* const* argv);
 /// The arguments without the program's name; names that other trainers use for the same become
 /// ours.
 std::vector<std::string> own_arguments(int argc, const char* const* argv);

@@ -167,7 +167,9 @@ std::string origin(const Json& metrics) {
   named("Device", "device");
   named("Driver", "driver");
   named("RaySplats-CL", "version");
+  named("Command", "command");
   named("Fingerprint of the data set", "data");
+  named("Hash of the model (XXH3, 128 bits)", "model_hash");
   if (metrics.contains("seed")) rows += row("Seed", fmt::format("{:.0f}", number(metrics, "seed")));
   return rows;
 }

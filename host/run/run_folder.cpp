@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
@@ -12,11 +13,14 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <memory>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "io/data_origin.hpp"
 #include "raysplats/error.hpp"
@@ -215,6 +219,21 @@ void RunFolder::remove_model(std::int64_t iteration) const {
   remove_if_empty(file.parent_path());
 }
 
+std::string RunFolder::model_hash(std::int64_t iteration) const {
+  std::ifstream stream(model_file(path_, iteration), std::ios::binary);
+  if (!stream) return "";
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(),
+                                                                       &XXH3_freeState);
+  if (!state) throw std::bad_alloc();
+  XXH3_128bits_reset(state.get());
+  constexpr std::size_t kPart = std::size_t{1} << 20;
+  std::vector<char> part(kPart);
+  while (stream.read(part.data(), kPart) || stream.gcount() > 0)
+    XXH3_128bits_update(state.get(), part.data(), static_cast<std::size_t>(stream.gcount()));
+  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
 void RunFolder::remove_after(std::int64_t iteration) const {
   if (!writes_) return;
   for (const auto& [number, file] : numbered(path_ / "checkpoints", "step_", ".rsck")) {
@@ -293,7 +312,9 @@ void RunFolder::write_metrics(const nlohmann::json& summary) const {
     for (const EvaluationRow& row : validations_) json["validations"].push_back(to_json(row));
   }
   json["note"] = "training_seconds exclude evaluation and compiling kernels";
-  write_text_file(path_ / "metrics.json", json.dump(2) + "\n");
+  // The words of a command line are any bytes.
+  constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
+  write_text_file(path_ / "metrics.json", json.dump(2, ' ', false, kReplace) + "\n");
 }
 
 void check_no_run(const std::filesystem::path& folder) {

@@ -61,6 +61,9 @@ class RunFolder {
                    const std::array<double, 3>& origin = {}) const;
   bool has_model(std::int64_t iteration) const;
   void remove_model(std::int64_t iteration) const;
+  /// The XXH3 of 128 bits of that model's file, in hexadecimal digits as `xxh128sum` prints it; ""
+  /// without the file.
+  std::string model_hash(std::int64_t iteration) const;
 
   /// Keeps other runs out of the folder until the lock goes, and removes temporary files that a
   /// killed run left. Throws DataError when another run has the folder.

@@ -199,6 +199,8 @@ Gaussians Trainer::model() const {
 
 const DeviceGaussians& Trainer::gaussians() const { return impl_->gaussians; }
 
+void Trainer::set_command(std::string command) { impl_->command = std::move(command); }
+
 void Trainer::set_watcher(RunWatcher* watcher) {
   const auto turn = impl_->context.lock();
   impl_->watcher = watcher;

@@ -186,6 +186,7 @@ struct Trainer::Impl {
   std::vector<Camera> train_cameras;
   double extent;
   bool cut_out;
+  std::string command;  ///< that started the run
   std::string fingerprint;
   std::array<float, 3> background;
   ViewTracer tracer;

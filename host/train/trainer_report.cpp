@@ -136,9 +136,12 @@ void Trainer::Impl::write_metrics(bool complete) {
   if (!ranks.leads()) return;
   const StepGuard::Counts counts = guard.counts();
   const DeviceInfo& device = context.device();
+  const std::string hash = run.model_hash(iteration);
   run.write_metrics({{"version", RAYSPLATS_VERSION},
                      {"seed", options.seed},
+                     {"command", command},
                      {"data", fingerprint},
+                     {"model_hash", hash.empty() ? nlohmann::json(nullptr) : nlohmann::json(hash)},
                      {"complete", complete},
                      {"iteration", iteration},
                      {"iterations", last_iteration(options)},

@@ -108,6 +108,8 @@ class Trainer {
   /// whether iterations are still to come. Throws UsageError for a count below 1, and what
   /// run() throws for a model that is damaged.
   bool step(std::int64_t count = 1);
+  /// The command line that started the run, which RUN/metrics.json is to name.
+  void set_command(std::string command);
   /// `callback` hears of every iteration of run() and step(), in their thread, before density
   /// control; nullptr ends that. It may use this trainer's loss(), model(), evaluate(), save() and
   /// stop().

@@ -92,6 +92,7 @@ TEST_CASE("generate, train, evaluate, render, resume") {
   CHECK(metrics.at("evaluations").back().at("psnr").get<double>() ==
         doctest::Approx(after).epsilon(1e-4));
   CHECK(psnr_of(model_of(run, 150), data, folder / "eval_file") == after);
+  CHECK(metrics.at("command").get<std::string>().starts_with("raysplats train "));
 
   succeed({"render", run, "--data", data, "-o", folder / "png", "-q"});
   CHECK(file_names(folder / "png") == Names{"r_0.png", "r_1.png", "r_2.png"});

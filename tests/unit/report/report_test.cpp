@@ -70,6 +70,7 @@ class Run {
     write(
         "metrics.json",
         R"({"complete":true,"iteration":200,"iterations":200,"gaussians":140,"device":"<cpu> & co",
+            "command":"raysplats train 'a<b'","model_hash":"00112233445566778899aabbccddeeff",
             "traced_rays":1000,"capped_rays":50,"evaluations":[
             {"iteration":100,"training_seconds":15,"psnr":21.5,"ssim":0.8,"views":3},
             {"iteration":200,"training_seconds":30,"psnr":20.25,"ssim":0.75,"views":3}]})");
@@ -100,6 +101,8 @@ TEST_CASE("a report holds what the run says, escaped, and nothing from elsewhere
   CHECK(has(page, "5.00 % of the rays stopped at --max-hits"));
   CHECK(has(page, "ends 1.25 dB below its best, at iteration 100"));
   CHECK(has(page, "&lt;cpu&gt; &amp; co"));
+  CHECK(has(page, "raysplats train &#39;a&lt;b&#39;"));
+  CHECK(has(page, "00112233445566778899aabbccddeeff"));
   CHECK(has(page, "Worst: a&lt;b&gt;&amp;.png, 10.00 dB"));
   CHECK(has(page, "Best: good.png, 30.00 dB"));
   CHECK(has(page, "Typical: mid.png, 20.00 dB: the run wrote no picture of it"));

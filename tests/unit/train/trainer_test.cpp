@@ -2,11 +2,14 @@
 #include "raysplats/trainer.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
+#include <xxhash.h>
 
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -220,7 +223,9 @@ TEST_CASE("training improves held-out views and leaves the files of a run") {
   options.position_lr = {2e-3, 2e-4};
   options.sh_lr = {2e-2, 5e-3};
   const auto folder = scene.folder / "run";
-  const TrainSummary summary = Trainer(scene.context, scene.dataset, options, folder).run(false);
+  Trainer trainer(scene.context, scene.dataset, options, folder);
+  trainer.set_command("train '\xFF'");
+  const TrainSummary summary = trainer.run(false);
   REQUIRE(summary.evaluations.size() == 2);
   MESSAGE("PSNR " << summary.evaluations[0].psnr << " -> " << summary.evaluations[1].psnr << " dB");
   CHECK(summary.evaluations[1].psnr > summary.evaluations[0].psnr + 4.0);
@@ -252,7 +257,15 @@ TEST_CASE("training improves held-out views and leaves the files of a run") {
   CHECK(metrics.at("most_gaussians") == options.max_gaussians);
   CHECK(metrics.at("seed") == options.seed);
   CHECK(!metrics.at("data").get<std::string>().empty());
-  CHECK(metrics.at("kernels").empty());  // are not timed
+  CHECK(metrics.at("kernels").empty());                    // are not timed
+  CHECK(metrics.at("command") == "train '\xEF\xBF\xBD'");  // what is no UTF-8 is replaced
+  std::ifstream model(folder / "point_cloud/iteration_250/point_cloud.ply", std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(model)), {});
+  XXH128_canonical_t canonical;
+  XXH128_canonicalFromHash(&canonical, XXH3_128bits(bytes.data(), bytes.size()));
+  std::string hash;
+  for (const unsigned char digit : canonical.digest) hash += fmt::format("{:02x}", digit);
+  CHECK(metrics.at("model_hash") == hash);
   CHECK(views.at(0).at("center").size() == 3);
   CHECK(views.at(0).at("sharpness") > 0.0);
 }
