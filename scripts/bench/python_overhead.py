@@ -60,7 +60,8 @@ def main():
             print("| | Python | C++ | ratio |\n|---|---|---|---|")
             for way, name in (("forward", "forward"), ("backward", "forward and backward")):
                 for _ in range(3):  # kernels, and the room of buffers
-                    from_python(way), from_cpp(way)
+                    from_python(way)
+                    from_cpp(way)
                 times = []
                 for number in range(flags.rounds):
                     if number % 2:  # neither always comes first
