@@ -200,7 +200,9 @@ void print_file(const Json& file) {
     } else if (value.is_array() || value.is_object()) {
       for (const auto& [part, entry] : value.items()) {
         const std::string said = entry.is_string() ? entry.get<std::string>() : entry.dump();
-        text += (text.empty() ? "" : ", ") + (value.is_object() ? part + " " + said : said);
+        if (!text.empty()) text += ", ";
+        if (value.is_object()) text += part + ' ';
+        text += said;
       }
     } else if (value.is_boolean()) {
       text = value.get<bool>() ? "yes" : "no";

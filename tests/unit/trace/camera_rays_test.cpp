@@ -50,7 +50,8 @@ std::vector<Camera> cameras() {
 std::vector<Ray> make_rays(Context& context, const Camera& camera, const Lens& lens = {}) {
   CameraRays generator(context);
   Buffer<Ray> rays;
-  const auto pixels = static_cast<std::size_t>(camera.width * camera.height);
+  const std::size_t pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   generator.generate(camera, lens, 0, pixels, rays);
   std::vector<Ray> out(pixels);
   rays.download(std::span<Ray>(out));
@@ -94,8 +95,9 @@ TEST_CASE("camera rays equal the double reference [small]") {
     std::size_t valid = 0, disagree = 0, zero_starts = 0, infinite_ends = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       const auto width = static_cast<std::size_t>(camera.width);
-      const double px = static_cast<double>(i % width) + 0.5;
-      const double py = static_cast<double>(i / width) + 0.5;
+      const std::size_t column = i % width, row = i / width;
+      const double px = static_cast<double>(column) + 0.5;
+      const double py = static_cast<double>(row) + 0.5;
       const CameraRay expected = camera_ray(camera, px, py);
       const Ray& ray = rays[i];
       zero_starts += ray.t_min == 0.0f ? 1 : 0;
@@ -162,7 +164,8 @@ TEST_CASE("camera rays: a lens that folds ends where the reference ends") {
     std::size_t disagree = 0, invalid = 0;
     double worst = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      const double px = static_cast<double>(i % 320) + 0.5, py = static_cast<double>(i / 320) + 0.5;
+      const std::size_t column = i % 320, row = i / 320;
+      const double px = static_cast<double>(column) + 0.5, py = static_cast<double>(row) + 0.5;
       const CameraRay expected = camera_ray(camera, px, py);
       disagree += expected.valid != (rays[i].t_max > 0) ? 1 : 0;
       invalid += expected.valid ? 0 : 1;
