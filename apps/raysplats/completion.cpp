@@ -6,15 +6,10 @@
 
 #include <functional>
 
+#include "options.hpp"
+
 namespace raysplats::cli {
 namespace {
-
-/// In single quotes of a shell.
-std::string quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
-}
 
 /// In single quotes of fish, where a backslash counts.
 std::string fish_quoted(const std::string& text) {
@@ -69,19 +64,20 @@ std::string bash_completion(const CommandEntry& program) {
   const auto add = [&](const CommandEntry& command, const std::string& path) {
     std::vector<std::string> all = below(command);
     for (const std::string& name : named(command)) all.push_back(name);
-    words += fmt::format("    {}) words={} ;;\n", quoted(path),
-                         quoted(fmt::format("{}", fmt::join(all, " "))));
+    words += fmt::format("    {}) words={} ;;\n", shell_quoted(path),
+                         shell_quoted(fmt::format("{}", fmt::join(all, " "))));
     for (const OptionEntry& option : command.options) {
       if (option.choices.empty() || option.argument) continue;
       for (const std::string& name : option.names) {
-        choices += fmt::format("    {}) words={} ;;\n", quoted(path + " " + name),
-                               quoted(fmt::format("{}", fmt::join(option.choices, " "))));
+        choices +=
+            fmt::format("    {}) words={} ;;\n", shell_quoted(fmt::format("{} {}", path, name)),
+                        shell_quoted(fmt::format("{}", fmt::join(option.choices, " "))));
       }
     }
   };
   std::string commands;
   walk(program, "", [&](const CommandEntry& command, const std::string& path) {
-    commands += fmt::format("      {}) command={} ;;\n", quoted(path), quoted(path));
+    commands += fmt::format("      {}) command={} ;;\n", shell_quoted(path), shell_quoted(path));
     add(command, path);
   });
   add(program, "");
@@ -124,8 +120,9 @@ std::string zsh_completion(const CommandEntry& program) {
               ? fmt::format(":{}:_files", zsh_text(option.value))
               : fmt::format(":{}:({})", zsh_text(option.value), fmt::join(option.choices, " "));
       for (const std::string& name : option.names) {
-        out += fmt::format(" \\\n    {}",
-                           quoted(fmt::format("{}[{}]{}", name, zsh_text(option.text), action)));
+        out +=
+            fmt::format(" \\\n    {}",
+                        shell_quoted(fmt::format("{}[{}]{}", name, zsh_text(option.text), action)));
       }
     }
     return out;
@@ -133,7 +130,7 @@ std::string zsh_completion(const CommandEntry& program) {
   std::string list;
   std::string cases;
   for (const CommandEntry& command : program.commands) {
-    list += fmt::format("    {}\n", quoted(command.name + ":" + zsh_text(command.text)));
+    list += fmt::format("    {}\n", shell_quoted(command.name + ":" + zsh_text(command.text)));
     cases += fmt::format("  {}) _arguments{} \\\n    '*:file:_files' ;;\n", command.name,
                          arguments(command));
   }

@@ -310,6 +310,12 @@ bool takes_numbers(std::string_view name) {
 
 }  // namespace
 
+std::string shell_quoted(std::string_view text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
 std::string command_line(int argc, const char* const* argv) {
   std::string line = "raysplats";
   for (int i = 1; i < argc; ++i) {
@@ -318,14 +324,7 @@ std::string command_line(int argc, const char* const* argv) {
       return std::isalnum(c) != 0 ||
              std::string_view("-_=./:,+@%").find(static_cast<char>(c)) != std::string_view::npos;
     });
-    if (plain) {
-      line += fmt::format(" {}", word);
-      continue;
-    }
-    // Within single quotes a shell takes everything as it is but these.
-    line += " '";
-    for (const char c : word) line += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    line += '\'';
+    line += fmt::format(" {}", plain ? std::string(word) : shell_quoted(word));
   }
   return line;
 }

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -125,6 +126,8 @@ CLI::Validator one_of(std::vector<std::string> names);
 CLI::Validator triple();
 std::array<double, 3> parse_triple(const std::string& text);
 
+/// In single quotes, within which a shell takes everything as it is but these.
+std::string shell_quoted(std::string_view text);
 /// The program and its arguments as a shell takes them.
 std::string command_line(int argc, const char* const* argv);
 /// The arguments without the program's name; names that other trainers use for the same become

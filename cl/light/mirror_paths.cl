@@ -137,8 +137,7 @@ __kernel void store_picture(const uint count,
   image[3 * (size_t)pixels + first + i] = value.w;
 }
 
-// Depths and hits of the same rays as planes; Rays have unit
-// length: `axis` is what depth is counted along, or zero for along the ray.
+// Depths and hits of the same rays as planes, depths counted along `axis` (depth_cosine).
 __kernel void store_depth(const uint count,
                           const uint first,
                           const uint pixels,
@@ -148,7 +147,7 @@ __kernel void store_depth(const uint count,
                           __global float* restrict depth) {
   const uint i = get_global_id(0);
   if (i >= count) return;
-  const float cosine = any(axis != 0.0f) ? dot(axis.xyz, load_ray(rays, i).direction) : 1.0f;
+  const float cosine = depth_cosine(axis, load_ray(rays, i).direction);
   const RayResult result = load_result(results, i);
   depth[first + i] = cosine * result.expected_depth;
   depth[(size_t)pixels + first + i] = cosine * result.median_depth;

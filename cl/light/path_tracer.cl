@@ -65,8 +65,7 @@ __kernel void results_of_picture(const uint count,
   store_result(result, results, i);
 }
 
-// Their depths along the rays, from planes that count them along `axis`, or along the rays where it
-// is zero.
+// Their depths along the rays, from planes that count them along `axis` (depth_cosine).
 __kernel void depths_of_picture(const uint count,
                                 const uint first_pixel,
                                 const uint pixels,
@@ -77,7 +76,7 @@ __kernel void depths_of_picture(const uint count,
                                 __global RsRayResult* restrict results) {
   const uint i = get_global_id(0);
   if (i >= count || surfaces[i].material >= 0) return;
-  const float cosine = any(axis != 0.0f) ? dot(axis.xyz, load_ray(rays, i).direction) : 1.0f;
+  const float cosine = depth_cosine(axis, load_ray(rays, i).direction);
   __global const float* at = depth + first_pixel + i;
   RayResult result = load_result(results, i);
   result.expected_depth = at[0] / cosine;

@@ -11,6 +11,11 @@
 
 float3 load3(const float* p) { return (float3)(p[0], p[1], p[2]); }
 
+// What a length along a ray becomes along `axis`; along the ray itself where the axis is zero.
+float depth_cosine(const float4 axis, const float3 direction) {
+  return any(axis != 0.0f) ? dot(axis.xyz, direction) : 1.0f;
+}
+
 float max3(float3 v) { return fmax(v.x, fmax(v.y, v.z)); }
 
 float3 reflected(float3 d, float3 n) { return d - 2.0f * dot(d, n) * n; }

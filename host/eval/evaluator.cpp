@@ -246,6 +246,8 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
     }
     return compare(traced, picture, dataset.alpha_is_background, background);
   };
+  // Ranks that render together stop together.
+  const auto for_all = [&](bool stop) { return options.together ? ranks.any(stop) : stop; };
   const auto picture_of = [&](std::size_t i) { return names[i] + ".png"; };
   const auto write_picture = [&](std::size_t i, const Comparison& pair) {
     write_image(output / picture_of(i), side_by_side(pair.photo, pair.render));
@@ -265,7 +267,7 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
       if (all_shown && pair->valid > 0) write_picture(i, *pair);
       stopped = options.done && !options.done(measured.size());
     }
-    if (options.together) stopped = ranks.any(stopped);
+    stopped = for_all(stopped);
   }
   stopped = ranks.any(stopped);
 
@@ -275,7 +277,7 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   for (const std::size_t i : shown) {
     if (all_shown || i % step != rank) continue;
     const std::optional<Comparison> pair = compare_view(i);
-    if (compares && !pair) break;
+    if (for_all(compares && !pair)) break;
     if (pair) write_picture(i, *pair);
   }
 

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "comm/thread_ranks.hpp"
 #include "eval/metrics.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -212,6 +214,31 @@ TEST_CASE("evaluator: few pictures show worst, median and best, then the first, 
   CHECK(traced == 10);
   CHECK(pictured(6) == "012345");
   CHECK(traced == 16);  // all are written as they are measured
+}
+
+TEST_CASE("evaluator: ranks that render every view together stop together") {
+  Scene scene;
+  for (View& view : scene.dataset.views) view.test = true;
+  // At the second of three views, after which the first is rendered again for its picture, and at
+  // the first of two pictures.
+  for (const auto& [stop_at, until] : std::array<std::array<int, 2>, 2>{{{2, 3}, {4, 4}}}) {
+    std::array<int, 2> calls{};
+    const int at = stop_at;
+    run_thread_ranks(2, [&](Communicator& ranks) {
+      int& own = calls[static_cast<std::size_t>(ranks.rank())];
+      const auto render = [&](const Camera& camera) {
+        if (++own == at) return Image();
+        return Image(camera.width, camera.height, 4, 0.5f);
+      };
+      EvaluationOptions options;
+      options.max_pictures = 2;
+      options.ranks = &ranks;
+      options.together = true;
+      evaluate(render, scene.dataset, Split::kTest, {0, 0, 0}, scene.path("stopped"), options);
+    });
+    CHECK(calls[0] == until);
+    CHECK(calls[1] == until);
+  }
 }
 
 TEST_CASE("evaluator: limits, early stop, LPIPS and refusals") {
