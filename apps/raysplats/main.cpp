@@ -66,14 +66,15 @@ int run(int argc, char** argv, GlobalOptions& global) {
   add_global_options(app, global);
   global.command = command_line(argc, argv);
   const std::vector<Command> commands{
-      add_devices_command(app),       add_doctor_command(app),
-      add_generate_command(app),      add_prepare_command(app, global),
-      add_train_command(app, global), add_render_command(app, global),
-      add_eval_command(app, global),  add_trace_command(app),
-      add_info_command(app),          add_convert_command(app),
-      add_view_command(app),          add_report_command(app),
-      add_bench_command(app),         add_tune_command(app),
-      add_completion_command(app),    add_manual_command(app)};
+      add_devices_command(app),        add_doctor_command(app),
+      add_generate_command(app),       add_prepare_command(app, global),
+      add_train_command(app, global),  add_render_command(app, global),
+      add_eval_command(app, global),   add_trace_command(app),
+      add_info_command(app),           add_convert_command(app),
+      add_view_command(app),           add_report_command(app),
+      add_bench_command(app),          add_tune_command(app),
+      add_completion_command(app),     add_manual_command(app),
+      add_compile_kernels_command(app)};
   try {
     std::vector<std::string> arguments = own_arguments(argc, argv);
     std::reverse(arguments.begin(), arguments.end());  // the order that CLI11 takes them in

@@ -11,9 +11,11 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "run/train_keys.hpp"
@@ -116,6 +118,12 @@ std::function<void(std::size_t, const std::string&)> show_compiling() {
   };
 }
 
+// Empty where the system does not tell.
+std::filesystem::path own_program() {
+  std::error_code error;
+  return std::filesystem::read_symlink("/proc/self/exe", error);
+}
+
 }  // namespace
 
 std::unique_ptr<Context> open_context(const DeviceFlags& flags) {
@@ -125,6 +133,7 @@ std::unique_ptr<Context> open_context(const DeviceFlags& flags) {
 std::unique_ptr<Context> open_context(const DeviceFlags& flags, const DeviceInfo& device) {
   ContextOptions options;
   options.compiling = show_compiling();
+  options.compiler = own_program();
   options.profile = flags.profile;
   options.kernel_cache = !flags.no_kernel_cache;
   spdlog::info("device {}: {} ({})", device.index, device.name, device.platform);

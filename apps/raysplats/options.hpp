@@ -68,6 +68,7 @@ Command add_bench_command(CLI::App& app);
 Command add_tune_command(CLI::App& app);
 Command add_completion_command(CLI::App& app);
 Command add_manual_command(CLI::App& app);
+Command add_compile_kernels_command(CLI::App& app);
 
 struct DeviceFlags {
   std::string device;

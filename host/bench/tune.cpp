@@ -51,6 +51,7 @@ class Course {
     options_.packet_form = tuned_form(tuning);
     auto out = std::make_unique<ViewTracer>(context_, options_);
     run(*out);  // compiles and allocates
+    context_.finish_builds();
     return out;
   }
 

@@ -14,6 +14,7 @@
 #include "device/context.hpp"
 #include "device/fault_injection.hpp"
 #include "device/profiler.hpp"
+#include "device/program_builder.hpp"
 
 namespace raysplats {
 
@@ -54,22 +55,24 @@ struct Context::Impl {
   Profiler profiler;
   std::unique_ptr<Canaries> canaries;  // usually none
   FaultInjection faults;
-  bool check_arguments = false;                 // RAYSPLATS_CHECK_ARGUMENTS
-  std::map<std::string, cl::Program> programs;  // by program path and build options
+  bool check_arguments = false;             // RAYSPLATS_CHECK_ARGUMENTS
+  std::unique_ptr<ProgramBuilder> builder;  // none before the first program
+  std::map<std::string, std::shared_ptr<ProgramBuilder::Build>> programs;  // by path and options
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;
   std::vector<InFlight> in_flight;
   std::vector<cl::Event>* timed_events = nullptr;  // of a LaunchTimer that runs
   std::uint64_t host_waits = 0;
-  std::size_t compiled = 0;  // programs that the compiler made
   double build_seconds = 0;
   std::shared_ptr<MemoryCount> memory = std::make_shared<MemoryCount>();
 
   std::recursive_mutex mutex;
   std::uint64_t revisions = 0;
 
-  cl::Program& program(const std::string& path, const BuildOptions& build);
-  cl::Program make_program(const std::string& path, const BuildOptions& build);
+  std::shared_ptr<ProgramBuilder::Build> begin_program(const std::string& path,
+                                                       const BuildOptions& build);
+  /// Waits for it; the wait counts as build_seconds.
+  cl::Program program(const std::shared_ptr<ProgramBuilder::Build>& build);
   /// Keeps host memory until the command that uses it is over.
   void keep_until(const cl::Event& event, std::shared_ptr<const void> memory);
   /// What an enqueue call takes for its event: null unless launches are timed.
@@ -82,11 +85,15 @@ struct Context::Impl {
 
 struct Kernel::Impl {
   Context::Impl* context = nullptr;
-  cl::Kernel kernel;
+  std::shared_ptr<ProgramBuilder::Build> build;
+  cl::Kernel kernel;  // none before it is used
   std::string program;
   std::string name;
   unsigned argument_count = 0;
   std::vector<ArgumentType> checked;  // what was found right for every argument
+
+  /// Waits for its program the first time.
+  void make();
 };
 
 struct RawBuffer::Impl {
@@ -97,9 +104,5 @@ struct RawBuffer::Impl {
   std::string label;
   ~Impl();
 };
-
-/// The source of `path` with its `#include "..."` lines resolved from the embedded table (or from
-/// `directory`, or RAYSPLATS_KERNEL_DIR when that is set), each file once, with #line marks.
-std::string resolve_kernel_source(const std::string& path, const std::string& directory = "");
 
 }  // namespace raysplats

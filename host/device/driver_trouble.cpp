@@ -90,10 +90,6 @@ std::string pocl_cache_trouble() {
                      error.message());
 }
 
-bool is_pocl(const std::string& platform) {
-  return platform.find("Portable Computing Language") != std::string::npos;
-}
-
 std::vector<std::string> platform_names() {
   std::vector<std::string> names;
   try {
@@ -132,6 +128,10 @@ std::string why_no_platforms() {
 }
 
 }  // namespace
+
+bool is_pocl(const std::string& platform) {
+  return platform.find("Portable Computing Language") != std::string::npos;
+}
 
 std::string why_no_devices() {
   const std::vector<std::string> platforms = platform_names();

@@ -24,6 +24,9 @@ struct RegisteredDriver {
 /// All drivers of a folder by the names of their files; none where it cannot be read.
 std::vector<RegisteredDriver> registered_drivers(const std::filesystem::path& folder);
 
+/// Whether a platform of this name is PoCL's.
+bool is_pocl(const std::string& platform);
+
 /// Why the OpenCL loader finds no device, as one sentence with what to do: no driver is registered,
 /// a driver's library cannot be loaded, or a driver has no place for its cache.
 std::string why_no_devices();

@@ -10,14 +10,27 @@
 
 namespace raysplats {
 
+void Kernel::Impl::make() {
+  if (kernel() != nullptr) return;
+  const cl::Program made = context->program(build);
+  try {
+    kernel = cl::Kernel(made, name.c_str());
+    argument_count = kernel.getInfo<CL_KERNEL_NUM_ARGS>();
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Kernel {} of {}", name, program));
+  }
+}
+
 const std::string& Kernel::name() const { return impl_->name; }
 
 std::size_t Kernel::max_work_group_size() const {
+  impl_->make();
   return impl_->kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(impl_->context->device);
 }
 
 std::size_t Kernel::subgroups(std::size_t items) const {
   if (!impl_->context->info.has_subgroups) return 0;
+  impl_->make();
   // Devices of OpenCL 2.0 know it as an extension alone, others need not have that.
   const cl::Device& device = impl_->context->device;
   void* found = clGetExtensionFunctionAddressForPlatform(device.getInfo<CL_DEVICE_PLATFORM>(),
@@ -31,9 +44,13 @@ std::size_t Kernel::subgroups(std::size_t items) const {
   return status == CL_SUCCESS ? number : 0;
 }
 
-std::size_t Kernel::argument_count() const { return impl_->argument_count; }
+std::size_t Kernel::argument_count() const {
+  impl_->make();
+  return impl_->argument_count;
+}
 
 void Kernel::begin(std::size_t argument_count) {
+  impl_->make();
   if (argument_count != impl_->argument_count) {
     throw DeviceError(fmt::format("Kernel {} takes {} arguments, {} were given", impl_->name,
                                   impl_->argument_count, argument_count));

@@ -43,6 +43,9 @@ class ViewTracer {
   /// What traces views ray by ray; null where none has asked for it yet.
   RayTracer* ray_tracer();
 
+  /// CameraTracer::begin_programs(); nothing for views that are traced ray by ray.
+  void begin_programs(const DeviceGaussians& gaussians, const Camera& camera, bool keep);
+
   /// Traces one view. With `keep` backward() may follow; what it needs stays where the memory
   /// budget has room and is traced again where not. Throws UsageError for a camera without pixels
   /// or focal length, and for one that Traversal::kTiles cannot trace.

@@ -35,6 +35,11 @@ void RadixSort::require_kernels(bool from_pairs, bool to_pairs) {
   if (!count_digits) count_digits = context_->kernel(kProgram, "count_digits", options);
 }
 
+void RadixSort::begin_programs(int bits) {
+  const int passes = (bits + 7) / 8;
+  for (int i = 0; i < passes; ++i) require_kernels(i > 0, i + 1 < passes);
+}
+
 void RadixSort::sort(Buffer<std::uint32_t>& keys,
                      Buffer<std::uint32_t>& values,
                      std::size_t count,

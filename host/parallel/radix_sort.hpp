@@ -38,6 +38,9 @@ class RadixSort {
             std::size_t most,
             int bits = 32);
 
+  /// Begins to make the programs that a sort by so many bits takes.
+  void begin_programs(int bits);
+
  private:
   struct Ends {
     const Buffer<std::uint32_t>& keys;

@@ -40,9 +40,7 @@ void CameraTracer::backward(const DeviceGaussians& gaussians,
 // Gradients of the lines of one face.
 void CameraTracer::Impl::backward_face(const DeviceGaussians& gaussians,
                                        const Buffer<float>& image_gradient) {
-  sums.prepare(GradientSumChoice::of(options, context.device(), gaussians.count,
-                                     shares.packet_gradients(), GradientSumChoice::kPacketCopies),
-               gaussians.count);
+  sums.prepare(sum_choice(gaussians.count), gaussians.count);
   if (hits_complete) {
     launch_backward(image_gradient, 0, lists.tile_rows());
     return;
@@ -88,13 +86,16 @@ void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
   launch_backward(image_gradient, row, rows);
 }
 
+Kernel CameraTracer::Impl::backward_kernel(int lens, const GradientSumChoice& choice) {
+  BuildOptions build = kernels.build(lens);
+  build.define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0);
+  return kernels.backward(choice.define(build, context.device()));
+}
+
 void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
-  BuildOptions build = kernels.build(lens_kind);
-  build.define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0);
-  sums.define(build);
-  Kernel kernel = kernels.backward(build);
+  Kernel kernel = backward_kernel(lens_kind, sums.choice());
   RsBackward pass{};
   pass.gaussians = static_cast<std::uint32_t>(count);
   pass.copies = static_cast<std::uint32_t>(sums.copies());
@@ -117,6 +118,23 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   });
 }
 
+GaussianKernel CameraTracer::Impl::finalize_kernel(const DeviceGaussians& gaussians,
+                                                   int lens,
+                                                   bool accumulate,
+                                                   bool with_pose) {
+  BuildOptions build;
+  build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
+      .define("POSE", with_pose ? 1 : 0)
+      .define("ACCUMULATE", accumulate ? 1 : 0)
+      .define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0)
+      .define("LENS", lens)
+      .define("SH_DEGREE", gaussians.active_sh_degree)
+      .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
+  const bool cpu = context.device().type == DeviceType::kCpu;
+  return {context, cpu ? "trace/finalize_gradients.cl" : "trace/group_finalize.cl",
+          cpu ? "finalize_gradients" : "finalize_group", build};
+}
+
 void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
                                   GaussianGradients& gradients,
                                   bool accumulate,
@@ -124,17 +142,7 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
   const std::size_t n = gaussians.count;
   gradients.ensure(context, gaussians);
   pose.ensure(context, with_pose ? 6 * n : 1, "pose gradients");
-  BuildOptions build;
-  build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
-      .define("POSE", with_pose ? 1 : 0)
-      .define("ACCUMULATE", accumulate ? 1 : 0)
-      .define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0)
-      .define("LENS", lens_kind)
-      .define("SH_DEGREE", gaussians.active_sh_degree)
-      .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
-  const bool cpu = context.device().type == DeviceType::kCpu;
-  GaussianKernel kernel(context, cpu ? "trace/finalize_gradients.cl" : "trace/group_finalize.cl",
-                        cpu ? "finalize_gradients" : "finalize_group", build);
+  GaussianKernel kernel = finalize_kernel(gaussians, lens_kind, accumulate, with_pose);
   const RsFinalize pass{static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(sums.copies()),
                         screen_x(), screen_y()};
   kernel.launch(n, pass, camera, sums.lines(), lists.bounds(), lists.lines(), gaussians.arguments(),

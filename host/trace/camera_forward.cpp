@@ -66,16 +66,16 @@ void CameraTracer::Impl::trace_window(const DeviceGaussians& gaussians,
   launch_forward(window, keep);
 }
 
-Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
+Kernel& CameraTracer::Impl::forward_kernel(int lens, bool keep) {
   const int variant =
-      (options.depth ? 1 : 0) | (options.hit_order == HitOrder::kPeak ? 2 : 0) | lens_kind << 2;
+      (options.depth ? 1 : 0) | (options.hit_order == HitOrder::kPeak ? 2 : 0) | lens << 2;
   if (variant != forward_variant) {
     forward_variant = variant;
     forward_kernels = {};
   }
   Kernel& kernel = forward_kernels[keep ? 1 : 0];
   if (!kernel) {
-    BuildOptions build = kernels.build(lens_kind);
+    BuildOptions build = kernels.build(lens);
     build.define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
         .define("WITH_DEPTH", options.depth ? 1 : 0)
         .define("KEEP_HITS", keep ? 1 : 0);
@@ -86,7 +86,7 @@ Kernel& CameraTracer::Impl::forward_kernel(bool keep) {
 }
 
 void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
-  Kernel& kernel = forward_kernel(keep);
+  Kernel& kernel = forward_kernel(lens_kind, keep);
   const auto rows = static_cast<std::uint32_t>(window.rows);
   const auto columns = static_cast<std::uint32_t>(window.columns);
   LaunchBudget& budget = watch && !forward_budget.bounded() ? watched_budget : forward_budget;

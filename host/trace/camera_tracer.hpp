@@ -43,6 +43,11 @@ class CameraTracer {
   /// whose tiles see too much; may wait for the device when the lens is a new one.
   bool traces(const Camera& camera);
 
+  /// Begins to make the programs that views of such Gaussians (their degrees and activation) take
+  /// through the camera's kind of lens, with `keep_hits` those of gradients too; does not wait for
+  /// them. forward() does it as well.
+  void begin_programs(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits);
+
   /// Boxes of the Gaussians as they are now. forward() needs it after every parameter change.
   void update(const DeviceGaussians& gaussians);
 

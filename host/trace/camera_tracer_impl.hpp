@@ -13,6 +13,7 @@
 #include "scene/row_share.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/candidate_lists.hpp"
+#include "trace/gaussian_kernel.hpp"
 #include "trace/gradient_sums.hpp"
 #include "trace/hit_streams.hpp"
 #include "trace/launch_budget.hpp"
@@ -26,6 +27,8 @@ namespace raysplats {
 struct CameraTracer::Impl {
   Impl(Context& context_in, const TraceOptions& options_in);
 
+  void begin_programs(const DeviceGaussians& gaussians, int lens, bool keep_hits);
+
   // camera_forward.cpp: the faces of a view, from lists to hits.
   void set_face(const DeviceGaussians& gaussians, int face);
   void trace_faces(const DeviceGaussians& gaussians, bool keep);
@@ -34,7 +37,7 @@ struct CameraTracer::Impl {
   void trace_rows(const DeviceGaussians& gaussians, std::uint32_t row, std::uint32_t rows);
   void trace_window(const DeviceGaussians& gaussians, const TileWindow& window, bool keep);
   void launch_forward(const TileWindow& window, bool keep);
-  Kernel& forward_kernel(bool keep);
+  Kernel& forward_kernel(int lens, bool keep);
 
   // camera_backward.cpp: from hits to gradients of lines, and from those to parameters.
   void backward_face(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient);
@@ -42,6 +45,15 @@ struct CameraTracer::Impl {
                      const Buffer<float>& image_gradient,
                      std::uint32_t row,
                      std::uint32_t rows);
+  Kernel backward_kernel(int lens, const GradientSumChoice& choice);
+  GaussianKernel finalize_kernel(const DeviceGaussians& gaussians,
+                                 int lens,
+                                 bool accumulate,
+                                 bool pose);
+  GradientSumChoice sum_choice(std::size_t gaussians) const {
+    return GradientSumChoice::of(options, context.device(), gaussians, shares.packet_gradients(),
+                                 GradientSumChoice::kPacketCopies);
+  }
   void launch_backward(const Buffer<float>& image_gradient, std::uint32_t row, std::uint32_t rows);
   void finalize(const DeviceGaussians& gaussians,
                 GaussianGradients& gradients,
@@ -87,6 +99,7 @@ struct CameraTracer::Impl {
   TraceOptions options;
   MemoryShares shares;
   PacketKernels kernels;
+  int begun_variant = -1;      // of the last begin_programs()
   std::size_t count = 0;       // Gaussians of the last update()
   std::uint64_t revision = 0;  // of their parameters
   Buffer<RsAabb> boxes;

@@ -20,6 +20,8 @@ namespace {
 // Vector loads of boxes may run past the end of a list by one vector.
 constexpr std::size_t kBoxPadding = 16;
 constexpr std::size_t kGatherGroup = 64;
+// Keys are a depth below the number of a tile, which has 16 bits as well.
+constexpr int kDepthBits = 16;
 // Tile numbers have 16 bits.
 constexpr std::size_t kMaxTiles = 65535;
 // What the sort takes; a sum that does not fit 32 bits reads as Scan::kMost, which is more.
@@ -108,27 +110,28 @@ CandidateLists::CandidateLists(Context& context, int tile_size)
   fitted_.clear();
 }
 
-void CandidateLists::require_prepare_kernel(const DeviceGaussians& gaussians,
-                                            const ViewFace& face,
-                                            const TraceOptions& options) {
+void CandidateLists::begin_programs(const DeviceGaussians& gaussians,
+                                    int lens,
+                                    const TraceOptions& options) {
   const bool sigmoid = gaussians.activation == ScaleActivation::kSigmoid;
   const bool peak = options.hit_order == HitOrder::kPeak;
   const int coefficients = sh_coefficients(gaussians.sh_degree);
   const int variant = (sigmoid ? 1 : 0) | (peak ? 2 : 0) | (options.adaptive_radius ? 4 : 0) |
-                      gaussians.active_sh_degree << 3 | coefficients << 8 | face.lens << 16;
+                      gaussians.active_sh_degree << 3 | coefficients << 8 | lens << 16;
   if (variant == prepared_variant_) return;
   BuildOptions build;
   build.define("SIGMOID_SCALE", sigmoid ? 1 : 0)
       .define("PEAK_ORDER", peak ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
-      .define("LENS", face.lens)
+      .define("LENS", lens)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", coefficients);
   prepare_kernel_ = GaussianKernel(*context_, "trace/prepare_view.cl", "prepare_view", build);
   BuildOptions lists;
-  lists.define("TILE", tile_size_).define("PEAK_ORDER", peak ? 1 : 0).define("LENS", face.lens);
+  lists.define("TILE", tile_size_).define("PEAK_ORDER", peak ? 1 : 0).define("LENS", lens);
   count_kernel_ = GaussianKernel(*context_, "trace/tile_lists.cl", "count_tiles", lists);
   fill_kernel_ = GaussianKernel(*context_, "trace/tile_lists.cl", "fill_tiles", lists);
+  sort_.begin_programs(kDepthBits + 1);  // as many passes as pictures of 2 to 256 tiles take
   prepared_variant_ = variant;
 }
 
@@ -140,7 +143,7 @@ void CandidateLists::prepare(const DeviceGaussians& gaussians,
     throw ResourceError(fmt::format(
         "{} Gaussians are more than the 2^31 - 1 that one scene can hold", gaussians.count));
   }
-  require_prepare_kernel(gaussians, face, options);
+  begin_programs(gaussians, face.lens, options);
   face_ = face;
   count_ = gaussians.count;
   tiles_x_ = static_cast<std::uint32_t>((camera.width + tile_size_ - 1) / tile_size_);
@@ -200,7 +203,7 @@ void CandidateLists::fill(const Buffer<RsAabb>& boxes,
     fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, live_, keys_,
                         values_);
   }
-  sort_.sort(keys_, values_, live_, room, 16 + std::bit_width(tiles - 1));
+  sort_.sort(keys_, values_, live_, room, kDepthBits + std::bit_width(tiles - 1));
   gather_kernel_.launch(Range::linear(std::max<std::size_t>(room, 1), kGatherGroup), live_, stride_,
                         tiles, keys_, values_, bounds_, boxes_, limits_, tile_offsets_);
 }

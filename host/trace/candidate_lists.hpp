@@ -58,6 +58,9 @@ class CandidateLists {
 
   CandidateLists(Context& context, int tile_size);
 
+  /// Begins to make the programs of views through this kind of lens; prepare() does it as well.
+  void begin_programs(const DeviceGaussians& gaussians, int lens, const TraceOptions& options);
+
   /// Lines and culling records of all Gaussians for a view.
   void prepare(const DeviceGaussians& gaussians,
                const RsCamera& camera,
@@ -96,9 +99,6 @@ class CandidateLists {
   }
 
  private:
-  void require_prepare_kernel(const DeviceGaussians& gaussians,
-                              const ViewFace& face,
-                              const TraceOptions& options);
   std::size_t allowed(std::size_t budget) const;
   void count(const Buffer<RsAabb>& boxes, const RsCamera& camera, const TileWindow& window);
   void fill(const Buffer<RsAabb>& boxes,

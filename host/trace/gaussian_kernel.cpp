@@ -21,26 +21,15 @@ GaussianKernel::GaussianKernel(Context& context,
                                const std::string& file,
                                const std::string& name,
                                const BuildOptions& build)
-    : context_(&context),
-      file_(file),
-      name_(name),
-      build_(build),
-      width_(gaussians_per_item(context.device())),
+    : width_(gaussians_per_item(context.device())),
       group_(context.device().type == DeviceType::kCpu ? kCpuGroup : kGpuGroup) {
   BuildOptions wide = build;
   wide.define("LANES", width_);
   // Rows of the group's Gaussians go through local memory (cl/trace/staged_rows.h).
   if (context.device().type != DeviceType::kCpu) wide.define("GROUP", group_);
   wide_ = context.kernel(file, name, wide);
-}
-
-Kernel& GaussianKernel::single() {
-  if (width_ == 1) return wide_;
-  if (!single_) {
-    BuildOptions build = build_;
-    single_ = context_->kernel(file_, name_, build.define("LANES", 1));
-  }
-  return single_;
+  BuildOptions single = build;
+  single_ = width_ == 1 ? wide_ : context.kernel(file, name, single.define("LANES", 1));
 }
 
 }  // namespace raysplats

@@ -31,18 +31,12 @@ class GaussianKernel {
                    static_cast<std::uint32_t>(whole), arguments...);
     }
     if (count > whole) {
-      single().launch(Range::linear(count - whole, group_), static_cast<std::uint32_t>(whole),
-                      static_cast<std::uint32_t>(count), arguments...);
+      single_.launch(Range::linear(count - whole, group_), static_cast<std::uint32_t>(whole),
+                     static_cast<std::uint32_t>(count), arguments...);
     }
   }
 
  private:
-  Kernel& single();
-
-  Context* context_ = nullptr;
-  std::string file_;
-  std::string name_;
-  BuildOptions build_;
   std::size_t width_ = 1;
   std::size_t group_ = 1;  // work-items
   Kernel wide_;

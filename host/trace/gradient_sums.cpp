@@ -40,6 +40,14 @@ GradientSumChoice GradientSumChoice::of(const TraceOptions& options,
   return out;
 }
 
+BuildOptions& GradientSumChoice::define(BuildOptions& build, const DeviceInfo& device) const {
+  const bool native = sum == GradientSum::kAtomic;
+  if (native && device.has_float_atomics) build.language("CL3.0");
+  return build.define("PRIVATE_COPIES", sum == GradientSum::kCopies ? 1 : 0)
+      .define("EXACT_SUMS", sum == GradientSum::kExact ? 1 : 0)
+      .define("FLOAT_ATOMICS", native ? 1 : 0);
+}
+
 GradientSums::GradientSums(Context& context, std::string label)
     : context_(&context), label_(std::move(label)) {}
 
@@ -58,14 +66,6 @@ void GradientSums::prepare(const GradientSumChoice& choice, std::size_t count) {
   tidy_exact_ = 0;
   exact_.ensure(*context_, size, "exact " + label_);
   if (!ready) exact_.fill(RS_EXACT_BIAS);
-}
-
-BuildOptions& GradientSums::define(BuildOptions& build) const {
-  const bool native = choice_.sum == GradientSum::kAtomic;
-  if (native && context_->device().has_float_atomics) build.language("CL3.0");
-  return build.define("PRIVATE_COPIES", is_private() ? 1 : 0)
-      .define("EXACT_SUMS", is_exact() ? 1 : 0)
-      .define("FLOAT_ATOMICS", native ? 1 : 0);
 }
 
 float GradientSums::limit(std::size_t addends) {

@@ -29,6 +29,8 @@ struct GradientSumChoice {
                               std::size_t lines,
                               std::size_t room,
                               std::size_t copies_per_unit);
+  /// Build options PRIVATE_COPIES, EXACT_SUMS and FLOAT_ATOMICS, and the language that takes.
+  BuildOptions& define(BuildOptions& build, const DeviceInfo& device) const;
 };
 
 /// Sums of gradients in lines of 16 floats (cl/trace/line_sum.h). A pass is: prepare(); kernels
@@ -44,8 +46,10 @@ class GradientSums {
   /// Zeros for `count` lines and each of their copies. Throws ResourceError where they do not fit
   /// the device.
   void prepare(const GradientSumChoice& choice, std::size_t count);
-  /// Build options PRIVATE_COPIES, EXACT_SUMS and FLOAT_ATOMICS, and the language that takes.
-  BuildOptions& define(BuildOptions& build) const;
+  /// GradientSumChoice::define() of the choice.
+  BuildOptions& define(BuildOptions& build) const {
+    return choice_.define(build, context_->device());
+  }
   /// The largest absolute value that an exact sum may take in so often without leaving its range;
   /// what is larger makes it NaN.
   static float limit(std::size_t addends);
@@ -60,6 +64,7 @@ class GradientSums {
   bool is_private() const { return choice_.sum == GradientSum::kCopies; }
   bool is_exact() const { return choice_.sum == GradientSum::kExact; }
   std::size_t copies() const { return choice_.copies; }
+  const GradientSumChoice& choice() const { return choice_; }
 
  private:
   Context* context_;

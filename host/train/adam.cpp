@@ -46,13 +46,17 @@ Adam::Adam(Context& context, const AdamOptions& options, int vector)
 }
 
 // A work-item takes the floats of a block of Gaussians on CPUs, elsewhere one vector.
-Kernel Adam::step_kernel(ParameterGroup group) const {
-  const std::size_t width = group_width(group, sh_degree_);
+Kernel Adam::step_kernel(ParameterGroup group, int sh_degree) const {
+  const std::size_t width = group_width(group, sh_degree);
   BuildOptions build;
   build.define("LANES", lanes_)
       .define("WIDTH", width)
       .define("SPAN", cpu_ ? kBlock * width : static_cast<std::size_t>(lanes_));
   return context_.kernel(kProgram, "adam_step", build);
+}
+
+void Adam::begin_programs(int sh_degree) {
+  for (const ParameterGroup group : kParameterGroups) step_kernel(group, sh_degree);
 }
 
 void Adam::initialize(std::size_t count, int sh_degree) {
@@ -133,8 +137,8 @@ void Adam::step_slice(std::size_t begin,
         record.rest_rate = static_cast<float>(rates.sh_rest / bias1);
         Range range = Range::linear(((end - begin) * width + span - 1) / span, cpu_ ? 1 : kGroup);
         range.offset[0] = begin * width / span;
-        step_kernel(group).launch(range, parameter, gradient, first, second, chosen_, u32(end),
-                                  record);
+        step_kernel(group, sh_degree_)
+            .launch(range, parameter, gradient, first, second, chosen_, u32(end), record);
       },
       gaussians, gradients, first_, second_);
 }

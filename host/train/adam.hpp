@@ -39,6 +39,9 @@ class Adam {
   /// elsewhere, where neighbouring work-items then touch neighbouring addresses.
   Adam(Context& context, const AdamOptions& options, int vector = 0);
 
+  /// Begins to make the programs of steps of such models.
+  void begin_programs(int sh_degree);
+
   /// Makes moments of zeros for `count` Gaussians and sets steps() to 0.
   void initialize(std::size_t count, int sh_degree);
 
@@ -72,7 +75,7 @@ class Adam {
   std::uint32_t skipped() const { return skipped_.read(0); }
 
  private:
-  Kernel step_kernel(ParameterGroup group) const;
+  Kernel step_kernel(ParameterGroup group, int sh_degree) const;
   std::size_t slice_size() const;
   // Of the Gaussians [begin, end); begin is a multiple of slice_size().
   void step_slice(std::size_t begin,

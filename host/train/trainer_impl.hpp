@@ -7,6 +7,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
@@ -114,6 +115,7 @@ struct Trainer::Impl {
   void check_not_begun(const char* function) const;
   void follow_options();
   double seconds_of(const Pilot& pilot, std::int64_t iterations, std::size_t most) const;
+  void begin_programs(std::initializer_list<int> degrees);
   Pilot run_pilot(double seconds, std::optional<double> run_time);
   void time_steps(double seconds, std::optional<double> run, Pilot& pilot);
   void forget_pilot();

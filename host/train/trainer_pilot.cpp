@@ -195,11 +195,25 @@ void Trainer::Impl::forget_pilot() {
   whole = stepped = false;
 }
 
+// Those of steps that evaluate so many bands.
+void Trainer::Impl::begin_programs(std::initializer_list<int> degrees) {
+  DeviceGaussians form;
+  form.activation = options.scale_activation;
+  form.sh_degree = options.sh_degree;
+  for (const int degree : degrees) {
+    form.active_sh_degree = degree;
+    tracer.begin_programs(form, train_cameras.front(), true);
+  }
+  adam.begin_programs(options.sh_degree);
+}
+
 Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<double> run_time) {
   if (!continues && !overwrite && ranks.leads()) check_no_run(run.path());
   const Timer clock(context);
   Pilot pilot;
   const std::size_t most = limit();
+  // While the start is made: those of the steps that are timed.
+  begin_programs({active_sh_degree(options, 0), active_sh_degree(options, options.iterations / 2)});
   choose_background();
   first_model = initial_model(
       dataset, train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
@@ -209,6 +223,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   upload_start(most);
   pilot.first = gaussians.count;
   if (cut_out) pilot.opaque_share = opaque_share(photos(PhotoChoice::kAll));
+  context.finish_builds();  // compilers would slow down the steps of a CPU
   try {
     time_steps(seconds, run_time, pilot);
   } catch (...) {

@@ -73,6 +73,7 @@ pid_t start(const std::filesystem::path& program,
   std::vector<std::string> words{program.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
   posix_spawnattr_t attributes;
@@ -136,7 +137,7 @@ std::filesystem::path find_program(const std::string& name, const std::string& p
   std::string_view rest = value == nullptr ? "" : value;
   while (!rest.empty()) {
     const std::size_t end = std::min(rest.find(':'), rest.size());
-    const std::filesystem::path path = std::filesystem::path(rest.substr(0, end)) / name;
+    std::filesystem::path path = std::filesystem::path(rest.substr(0, end)) / name;
     rest.remove_prefix(std::min(end + 1, rest.size()));
     std::error_code error;
     // A relative folder of PATH would be another one after every change of directory.
@@ -230,6 +231,21 @@ void ProgramInput::write(std::span<const std::byte> bytes) {
       fail(wait_for(std::exchange(child_, -1)));
     }
     bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
+
+std::string ProgramInput::read_line() {
+  std::string line;
+  while (true) {
+    char byte = 0;
+    const ssize_t count = ::recv(input_, &byte, 1, 0);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      ::close(std::exchange(input_, -1));
+      fail(wait_for(std::exchange(child_, -1)));
+    }
+    if (byte == '\n') return line;
+    line += byte;
   }
 }
 

@@ -38,6 +38,9 @@ class ProgramInput {
 
   /// Blocks until the program has room. Throws Error with the last it said when it has ended.
   void write(std::span<const std::byte> bytes);
+  /// What it writes to its end of the channel, up to the end of a line. Throws Error with the last
+  /// it said when it has ended.
+  std::string read_line();
   /// Ends its input and waits for it. Throws Error with the last it said when it fails.
   void finish();
 

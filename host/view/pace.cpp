@@ -13,6 +13,14 @@ constexpr double kLeastHeight = 48.0;
 constexpr double kMostChange = 1.6;
 /// Differences that are left alone: sizes that flicker look worse than ones that are a bit off.
 constexpr double kTolerance = 1.15;
+/// Of the weight of a picture that the one before it has.
+constexpr double kMemory = 0.85;
+/// Of their mean, by which sizes have to vary to tell what any picture takes.
+constexpr double kSpread = 0.1;
+/// Of the time of a picture; more than that is noise.
+constexpr double kMostFixed = 0.8;
+/// Of the time, what the pixels have at least.
+constexpr double kLeastShare = 0.5;
 
 }  // namespace
 
@@ -24,7 +32,23 @@ Camera Pace::sized(const Camera& camera) const {
 }
 
 void Pace::record(double pixels, double seconds) {
-  const double wanted = pixels * seconds_ / std::max(seconds, 1e-4);
+  for (double* sum : {&number_, &sum_pixels_, &sum_squares_, &sum_seconds_, &sum_products_})
+    *sum *= kMemory;
+  number_ += 1;
+  sum_pixels_ += pixels;
+  sum_squares_ += pixels * pixels;
+  sum_seconds_ += seconds;
+  sum_products_ += pixels * seconds;
+  const double mean = sum_pixels_ / number_;
+  const double mean_seconds = std::max(sum_seconds_ / number_, 1e-4);
+  const double variance = sum_squares_ / number_ - mean * mean;
+  if (variance > kSpread * kSpread * mean * mean) {  // least squares
+    const double slope = (sum_products_ / number_ - mean * mean_seconds) / variance;
+    fixed_ = std::max(mean_seconds - slope * mean, 0.0);
+  }
+  fixed_ = std::min(fixed_, kMostFixed * mean_seconds);
+  const double room = std::max(seconds_ - fixed_, kLeastShare * seconds_);
+  const double wanted = mean * room / (mean_seconds - fixed_);
   const double change = std::clamp(wanted / pixels_, 1.0 / kMostChange, kMostChange);
   if (change < kTolerance && change > 1.0 / kTolerance) return;
   pixels_ *= change;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -27,6 +28,12 @@ struct ContextOptions {
   std::string kernel_directory;  ///< kernels are read from here; "" = those that are built in, or
                                  ///< of the folder that RAYSPLATS_KERNEL_DIR names
   std::string cache_directory;   ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
+  /// A program that is started as `PROGRAM compile-kernels ...` to compile kernels, where several
+  /// wait at once and the driver compiles one of a process at a time; "" = none. `raysplats` is
+  /// one.
+  std::filesystem::path compiler;
+  /// Programs that are compiled at the same time; 0 = one per core of the host, at most 8.
+  std::size_t compilers = 0;
   /// Hears of every program that the compiler, not the cache, makes: before (its number from 1, its
   /// file below cl/), and when it is done (its number, "").
   std::function<void(std::size_t number, const std::string& program)> compiling;
@@ -67,8 +74,8 @@ class Context {
   /// writes of buffers that block.
   std::uint64_t host_waits() const;
 
-  /// What making programs has taken so far, from the cache or by the compiler: it is no part of any
-  /// work, and happens once.
+  /// How long programs have been waited for so far, from the cache or the compiler: it is no part
+  /// of any work, and happens once.
   double build_seconds() const;
 
   /// Keeps other threads from using the context until the lock goes. A thread may lock it again.
@@ -86,9 +93,12 @@ class Context {
   // What follows serves the library itself; its types are not installed.
 
   /// The kernel `name` of the file `program` below cl/, built with `options` (memory, then disk
-  /// cache, then compiler). Throws DeviceError with the compiler's log when the build fails.
+  /// cache, then compiler). The program is made in other threads: the kernel waits for it when it
+  /// is first used, and throws DeviceError with the compiler's log then when the build fails.
   Kernel kernel(const std::string& program, const std::string& name, const BuildOptions& options);
   Kernel kernel(const std::string& program, const std::string& name);
+  /// Waits until all programs that kernels were asked of are made, or have failed.
+  void finish_builds();
   Profiler& profiler();
   FaultInjection& faults();
   /// A number that this context has not given before.

@@ -12,7 +12,7 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
-#include "device/context_impl.hpp"
+#include "device/kernel_sources.hpp"
 #include "device/profiler.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
@@ -99,7 +99,8 @@ TEST_CASE("kernel: a compile error shows file, line and the compiler's message")
       "broken.cl",
       "#include \"good.h\"\n__kernel void f(__global int* a) {\n  a[0] = undeclared_name;\n}\n");
   Context context(test_device(), uncached());
-  const std::string message = device_error([&] { context.kernel("broken.cl", "f"); });
+  const std::string message =
+      device_error([&] { context.kernel("broken.cl", "f").argument_count(); });
   CHECK(contains(message, "broken.cl:3"));
   CHECK(contains(message, "undeclared_name"));
   CHECK(contains(message, context.device().name));
@@ -131,8 +132,9 @@ TEST_CASE("kernel: wrong launches are refused with the kernel's name") {
   folder.write("scale.cl", kScale);
   folder.write("shared/compat.h", "");
   Context context(test_device(), uncached());
-  CHECK(contains(device_error([&] { context.kernel("scale.cl", "no_such_kernel"); }),
-                 "no_such_kernel"));
+  CHECK(
+      contains(device_error([&] { context.kernel("scale.cl", "no_such_kernel").argument_count(); }),
+               "no_such_kernel"));
   Kernel kernel = context.kernel("scale.cl", "scale");
   Buffer<std::int32_t> data(context, 10, "data");
   const std::string count =

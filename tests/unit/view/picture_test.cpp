@@ -35,6 +35,17 @@ TEST_CASE("pictures of a movement become as large as their time allows") {
     CHECK(sized.width * 3 == doctest::Approx(sized.height * 4).epsilon(0.02));
     CHECK(sized.fx / sized.width == doctest::Approx(camera.fx / camera.width).epsilon(0.01));
   }
+  // Where any picture takes longer than that, they do not shrink to nothing for it.
+  Pace large(0.1);
+  for (int i = 0; i < 60; ++i) {
+    const Camera sized = large.sized(camera);
+    const double pixels = static_cast<double>(sized.width) * sized.height;
+    const double noise = 1.0 + 0.1 * std::sin(7.0 * i);
+    large.record(pixels, noise * (0.15 + 1e-6 * pixels));
+  }
+  const Camera shown = large.sized(camera);
+  CHECK(1e-6 * shown.width * shown.height > 0.025);
+  CHECK(1e-6 * shown.width * shown.height < 0.1);
   Pace quick(0.1);
   for (int i = 0; i < 60; ++i) quick.record(1e6, 1e-4);
   CHECK(quick.sized(camera).width == 1600);
