@@ -47,6 +47,4 @@ bool FaultInjection::strikes(Fault fault) {
   return left > 0 && --left == 0;
 }
 
-bool FaultInjection::due(Fault fault) const { return left_[static_cast<std::size_t>(fault)] == 1; }
-
 }  // namespace raysplats

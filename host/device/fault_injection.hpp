@@ -23,8 +23,6 @@ class FaultInjection {
   void check(Fault fault);
   /// Counts one and tells whether it is the one to fail.
   bool strikes(Fault fault);
-  /// Whether the next check() will throw.
-  bool due(Fault fault) const;
 
  private:
   std::array<std::size_t, 5> left_{};  // until the failure; 0 = never

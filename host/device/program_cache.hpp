@@ -30,7 +30,9 @@ class ProgramCache {
   void remove(const std::string& key) const;
   const std::filesystem::path& directory() const { return directory_; }
 
-  /// Keeps other processes and threads from compiling for this cache; gone with its process.
+  /// Keeps other processes and threads from compiling for this cache; gone with its process. Waits
+  /// for its turn. Without a directory, or where the file system knows no locks, nothing is kept
+  /// from anybody.
   class BuildLock {
    public:
     explicit BuildLock(const std::filesystem::path& directory);
@@ -41,9 +43,6 @@ class ProgramCache {
    private:
     int descriptor_;
   };
-  /// Waits for its turn. Without a directory, or where the file system knows no locks, nothing is
-  /// kept from anybody.
-  BuildLock lock_builds() const { return BuildLock(directory_); }
 
  private:
   std::filesystem::path file(const std::string& key) const { return directory_ / (key + ".bin"); }
