@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <utility>
@@ -150,7 +149,7 @@ void Context::Impl::keep_until(const cl::Event& event, std::shared_ptr<const voi
   const auto waits = [](const InFlight& operation) {
     return operation.event.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>() > CL_COMPLETE;
   };
-  in_flight.erase(in_flight.begin(), std::find_if(in_flight.begin(), in_flight.end(), waits));
+  while (!in_flight.empty() && !waits(in_flight.front())) in_flight.pop_front();
 }
 
 bool is_over(const cl::Event& event) {

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -60,7 +61,7 @@ struct Context::Impl {
   std::map<std::string, std::shared_ptr<ProgramBuilder::Build>> programs;  // by path and options
   std::vector<PendingLaunch> pending;
   std::vector<LaunchTime> launches;
-  std::vector<InFlight> in_flight;
+  std::deque<InFlight> in_flight;
   std::vector<cl::Event>* timed_events = nullptr;  // of a LaunchTimer that runs
   std::uint64_t host_waits = 0;
   double build_seconds = 0;
