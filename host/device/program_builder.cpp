@@ -83,9 +83,10 @@ bool one_at_a_time(const std::string& platform) {
 }
 
 // What PoCL has compiled it reads and links again in the process that runs it, one program at a
-// time: two processes take as long as one.
+// time: two processes take as long as one. On a card every process would take memory from the one
+// that runs there.
 bool gains_by_processes(const DeviceInfo& device, std::size_t compilers) {
-  return compilers > (is_pocl(device.platform) ? 2u : 1u);
+  return device.type == DeviceType::kCpu && compilers > (is_pocl(device.platform) ? 2u : 1u);
 }
 
 }  // namespace

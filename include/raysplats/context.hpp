@@ -28,8 +28,8 @@ struct ContextOptions {
   std::string kernel_directory;  ///< kernels are read from here; "" = those that are built in, or
                                  ///< of the folder that RAYSPLATS_KERNEL_DIR names
   std::string cache_directory;   ///< "" = ${XDG_CACHE_HOME:-~/.cache}/raysplats
-  /// A program that is started as `PROGRAM compile-kernels ...` to compile kernels, where several
-  /// wait at once and the driver compiles one of a process at a time; "" = none. `raysplats` is
+  /// A program that is started as `PROGRAM compile-kernels ...` to compile kernels for a CPU, whose
+  /// drivers compile one of a process at a time, where several wait; "" = none. `raysplats` is
   /// one.
   std::filesystem::path compiler;
   /// Programs that are compiled at the same time; 0 = one per core of the host, at most 8.
