@@ -262,10 +262,6 @@ cl::Program ProgramBuilder::make(const Build& build,
     compiling();
     return compile(build);
   }
-  if (driver_keeps_) {
-    const auto entry = cache_.load(build.key);
-    if (entry && entry->empty()) return compile(build);
-  }
   if (const std::optional<cl::Program> cached = from_cache(build)) return *cached;
   // One process at a time: the others find the result, and some drivers fail when several compile
   // the same source.
@@ -290,7 +286,7 @@ std::optional<cl::Program> ProgramBuilder::compile_apart(const Build& build,
     process.reset();
     return std::nullopt;
   }
-  return driver_keeps_ ? compile(build) : from_cache(build);
+  return from_cache(build);
 }
 
 void ProgramBuilder::store(const Build& build, const cl::Program& program) const {
@@ -342,7 +338,8 @@ cl::Program ProgramBuilder::compile(const Build& build) const {
 
 std::optional<cl::Program> ProgramBuilder::from_cache(const Build& build) const {
   const auto binary = cache_.load(build.key);
-  if (!binary || binary->empty()) return std::nullopt;
+  if (!binary) return std::nullopt;
+  if (binary->empty()) return driver_keeps_ ? std::optional(compile(build)) : std::nullopt;
   try {
     cl::Program program(context_, {device_}, cl::Program::Binaries{*binary});
     program.build({device_}, build.flags.c_str());

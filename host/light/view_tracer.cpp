@@ -185,8 +185,11 @@ bool ViewTracer::by_rays(const Camera& camera) const {
   return self.options.traversal != Traversal::kTiles && !self.packets.traces(camera);
 }
 
-void ViewTracer::begin_programs(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
-  if (!by_rays(camera)) impl_->packets.begin_programs(gaussians, camera, keep);
+void ViewTracer::begin_programs(const DeviceGaussians& gaussians,
+                                const Camera& camera,
+                                bool keep,
+                                bool depth_gradient) {
+  if (!by_rays(camera)) impl_->packets.begin_programs(gaussians, camera, keep, depth_gradient);
 }
 
 void ViewTracer::forward(const DeviceGaussians& gaussians,

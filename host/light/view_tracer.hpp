@@ -44,7 +44,10 @@ class ViewTracer {
   RayTracer* ray_tracer();
 
   /// CameraTracer::begin_programs(); nothing for views that are traced ray by ray.
-  void begin_programs(const DeviceGaussians& gaussians, const Camera& camera, bool keep);
+  void begin_programs(const DeviceGaussians& gaussians,
+                      const Camera& camera,
+                      bool keep,
+                      bool depth_gradient);
 
   /// Traces one view. With `keep` backward() may follow; what it needs stays where the memory
   /// budget has room and is traced again where not. Throws UsageError for a camera without pixels

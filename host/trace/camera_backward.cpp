@@ -86,16 +86,18 @@ void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
   launch_backward(image_gradient, row, rows);
 }
 
-Kernel CameraTracer::Impl::backward_kernel(int lens, const GradientSumChoice& choice) {
+Kernel CameraTracer::Impl::backward_kernel(int lens,
+                                           const GradientSumChoice& choice,
+                                           bool with_depth) {
   BuildOptions build = kernels.build(lens);
-  build.define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0);
+  build.define("DEPTH_GRADIENT", with_depth ? 1 : 0);
   return kernels.backward(choice.define(build, context.device()));
 }
 
 void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
-  Kernel kernel = backward_kernel(lens_kind, sums.choice());
+  Kernel kernel = backward_kernel(lens_kind, sums.choice(), depth_gradient != nullptr);
   RsBackward pass{};
   pass.gaussians = static_cast<std::uint32_t>(count);
   pass.copies = static_cast<std::uint32_t>(sums.copies());
@@ -118,15 +120,13 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   });
 }
 
-GaussianKernel CameraTracer::Impl::finalize_kernel(const DeviceGaussians& gaussians,
-                                                   int lens,
-                                                   bool accumulate,
-                                                   bool with_pose) {
+GaussianKernel CameraTracer::Impl::finalize_kernel(
+    const DeviceGaussians& gaussians, int lens, bool with_depth, bool accumulate, bool with_pose) {
   BuildOptions build;
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("POSE", with_pose ? 1 : 0)
       .define("ACCUMULATE", accumulate ? 1 : 0)
-      .define("DEPTH_GRADIENT", depth_gradient != nullptr ? 1 : 0)
+      .define("DEPTH_GRADIENT", with_depth ? 1 : 0)
       .define("LENS", lens)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
@@ -142,7 +142,8 @@ void CameraTracer::Impl::finalize(const DeviceGaussians& gaussians,
   const std::size_t n = gaussians.count;
   gradients.ensure(context, gaussians);
   pose.ensure(context, with_pose ? 6 * n : 1, "pose gradients");
-  GaussianKernel kernel = finalize_kernel(gaussians, lens_kind, accumulate, with_pose);
+  GaussianKernel kernel =
+      finalize_kernel(gaussians, lens_kind, depth_gradient != nullptr, accumulate, with_pose);
   const RsFinalize pass{static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(sums.copies()),
                         screen_x(), screen_y()};
   kernel.launch(n, pass, camera, sums.lines(), lists.bounds(), lists.lines(), gaussians.arguments(),

@@ -68,9 +68,13 @@ std::size_t CameraTracer::Impl::chunks_wanted() {
   return saved.stream_bytes / streams.chunk_bytes();
 }
 
-// Those of one face; of depth gradients what the last backward() had.
-void CameraTracer::Impl::begin_programs(const DeviceGaussians& gaussians, int lens, bool keep) {
-  const int variant = (keep ? 1 : 0) | (gaussians.activation == ScaleActivation::kSigmoid ? 2 : 0) |
+// Those of one face.
+void CameraTracer::Impl::begin_programs(const DeviceGaussians& gaussians,
+                                        int lens,
+                                        bool keep,
+                                        bool with_depth) {
+  const int variant = (keep ? 1 : 0) | (with_depth ? 1 << 10 : 0) |
+                      (gaussians.activation == ScaleActivation::kSigmoid ? 2 : 0) |
                       (options.hit_order == HitOrder::kPeak ? 4 : 0) |
                       gaussians.active_sh_degree << 3 | gaussians.sh_degree << 5 | lens << 7;
   if (variant == begun_variant) return;
@@ -78,8 +82,8 @@ void CameraTracer::Impl::begin_programs(const DeviceGaussians& gaussians, int le
   lists.begin_programs(gaussians, lens, options);
   forward_kernel(lens, keep);
   if (!keep) return;
-  backward_kernel(lens, sum_choice(gaussians.count));
-  finalize_kernel(gaussians, lens, false, false);
+  backward_kernel(lens, sum_choice(gaussians.count), with_depth);
+  finalize_kernel(gaussians, lens, with_depth, false, false);
 }
 
 CameraTracer::CameraTracer(Context& context, const TraceOptions& options)
@@ -97,8 +101,9 @@ void CameraTracer::set_background(const std::array<float, 3>& background) {
 
 void CameraTracer::begin_programs(const DeviceGaussians& gaussians,
                                   const Camera& camera,
-                                  bool keep_hits) {
-  impl_->begin_programs(gaussians, raysplats::lens_kind(camera), keep_hits);
+                                  bool keep_hits,
+                                  bool depth_gradient) {
+  impl_->begin_programs(gaussians, lens_kind(camera), keep_hits, depth_gradient);
 }
 
 void CameraTracer::update(const DeviceGaussians& gaussians) {
@@ -166,7 +171,7 @@ void CameraTracer::forward(const DeviceGaussians& gaussians,
   }
   self.view = camera;
   self.lens_kind = lens_kind(camera);
-  self.begin_programs(gaussians, self.lens_kind, keep_hits);
+  self.begin_programs(gaussians, self.lens_kind, keep_hits, self.depth_gradient != nullptr);
   self.image.ensure(self.context, 4 * self.pixels(), "image");
   self.depth.ensure(self.context, self.options.depth ? 3 * self.pixels() : 1, "depth");
   self.streams.prepare(self.pixels(), self.packet_count(), keep_hits);

@@ -44,9 +44,12 @@ class CameraTracer {
   bool traces(const Camera& camera);
 
   /// Begins to make the programs that views of such Gaussians (their degrees and activation) take
-  /// through the camera's kind of lens, with `keep_hits` those of gradients too; does not wait for
-  /// them. forward() does it as well.
-  void begin_programs(const DeviceGaussians& gaussians, const Camera& camera, bool keep_hits);
+  /// through the camera's kind of lens, with `keep_hits` those of gradients too, of depth as well
+  /// with `depth_gradient`; does not wait for them. forward() does it as well.
+  void begin_programs(const DeviceGaussians& gaussians,
+                      const Camera& camera,
+                      bool keep_hits,
+                      bool depth_gradient);
 
   /// Boxes of the Gaussians as they are now. forward() needs it after every parameter change.
   void update(const DeviceGaussians& gaussians);

@@ -27,7 +27,7 @@ namespace raysplats {
 struct CameraTracer::Impl {
   Impl(Context& context_in, const TraceOptions& options_in);
 
-  void begin_programs(const DeviceGaussians& gaussians, int lens, bool keep_hits);
+  void begin_programs(const DeviceGaussians& gaussians, int lens, bool keep_hits, bool with_depth);
 
   // camera_forward.cpp: the faces of a view, from lists to hits.
   void set_face(const DeviceGaussians& gaussians, int face);
@@ -45,11 +45,9 @@ struct CameraTracer::Impl {
                      const Buffer<float>& image_gradient,
                      std::uint32_t row,
                      std::uint32_t rows);
-  Kernel backward_kernel(int lens, const GradientSumChoice& choice);
-  GaussianKernel finalize_kernel(const DeviceGaussians& gaussians,
-                                 int lens,
-                                 bool accumulate,
-                                 bool pose);
+  Kernel backward_kernel(int lens, const GradientSumChoice& choice, bool with_depth);
+  GaussianKernel finalize_kernel(
+      const DeviceGaussians& gaussians, int lens, bool with_depth, bool accumulate, bool pose);
   GradientSumChoice sum_choice(std::size_t gaussians) const {
     return GradientSumChoice::of(options, context.device(), gaussians, shares.packet_gradients(),
                                  GradientSumChoice::kPacketCopies);

@@ -202,7 +202,7 @@ void Trainer::Impl::begin_programs(std::initializer_list<int> degrees) {
   form.sh_degree = options.sh_degree;
   for (const int degree : degrees) {
     form.active_sh_degree = degree;
-    tracer.begin_programs(form, train_cameras.front(), true);
+    tracer.begin_programs(form, train_cameras.front(), true, options.depth_weight > 0);
   }
   adam.begin_programs(options.sh_degree);
 }
