@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Opens `raysplats view` and reports in a real Chromium without a screen and uses them: tests/view/browser_test.py and
+# Opens `raysplats view` and reports in a real Chromium without a screen and uses them: tests/view/browser_*_test.py and
 # tests/report/browser_test.py.
 # usage: scripts/test_browser.sh [PROGRAM] [SCREENSHOTS]     (default: build/release/bin/raysplats, no screenshots)
 # Installs Debian's chromium, chromium-driver and python3-selenium when they are missing and root may. Ends with 77 and
@@ -31,7 +31,7 @@ if ! have; then
 fi
 [[ -x $program ]] || { echo "$program is missing: build it with scripts/setup.sh" >&2; exit 1; }
 failed=0
-for part in view report; do
-  "$python" "$root/tests/$part/browser_test.py" "$program" ${2:+"$2"} || failed=1
+for test in "$root"/tests/view/browser_*_test.py "$root/tests/report/browser_test.py"; do
+  "$python" "$test" "$program" ${2:+"$2"} || failed=1
 done
 exit $failed

@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Keyframes and their files.
+usage: browser_paths_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
+import base64
+import json
+import math
+import os
+import subprocess
+import sys
+
+from selenium.webdriver.common.by import By
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from browser import main  # noqa: E402
+from page_case import ModelCase  # noqa: E402
+from program import psnr  # noqa: E402
+
+
+class PathsTest(ModelCase):
+    def test_a_path_is_what_render_draws_and_the_page_reads(self):
+        self.rest()
+        # The path of two views is what `render --path` reads, and the page again.
+        text = self.page.execute_script(
+            "return import('/path.js').then(m => JSON.stringify(m.pathFile("
+            "[{eye: [0, 0, -6], turn: [1, 0, 0, 0], fov: 50, distance: 6},"
+            " {eye: [1, 0, -6], turn: [1, 0, 0, 0], fov: 50, distance: 6}],"
+            "{seconds: 1, fps: 3, closed: false, width: 32, height: 24, model: 'pinhole'})))")
+        folder = self.viewer.folder.name
+        with open(os.path.join(folder, "path.json"), "w") as file:
+            file.write(text)
+        subprocess.run([self.program, "render", self.viewer.model, "--path", os.path.join(folder, "path.json"),
+                        "-o", os.path.join(folder, "frames"), "--video", os.path.join(folder, "path.apng"), "-q"],
+                       check=True, stdout=subprocess.DEVNULL)
+        self.assertEqual(len(os.listdir(os.path.join(folder, "frames"))), 3)
+        path = json.loads(text)
+        for frame, x in zip(path["camera_path"], (0, 0.5, 1)):
+            self.assertAlmostEqual(frame["camera_to_world"][3], x, places=6)
+        # nerfstudio's add-ons write matrices as text, by columns.
+        matrix = path["keyframes"][1]["matrix"]
+        path["keyframes"][1]["matrix"] = json.dumps([matrix[4 * (i % 4) + i // 4] for i in range(16)])
+        back = self.page.execute_async_script(
+            "const done = arguments[1];"
+            "import('/path.js').then(m => done(m.keyframesOf(arguments[0], 6)))", path)
+        self.assertEqual((back["fps"], back["seconds"], back["closed"]), (3, 1, False))
+        for key, x in zip(back["keys"], (0, 1)):
+            self.assertLess(math.dist(key["eye"], (x, 0, -6)), 1e-6)
+            self.assertLess(math.dist(key["turn"], (1, 0, 0, 0)), 1e-6)
+            self.assertEqual((key["fov"], key["distance"]), (50, 6))
+        # Chromium plays the file without losses.
+        with open(os.path.join(folder, "path.apng"), "rb") as file:
+            video = base64.b64encode(file.read()).decode()
+        played = self.page.execute_async_script(
+            "const done = arguments[1]; const image = new Image();"
+            "image.onload = () => done([image.naturalWidth, image.naturalHeight]);"
+            "image.onerror = () => done(null);"
+            "image.src = 'data:image/apng;base64,' + arguments[0];", video)
+        self.assertEqual(played, [32, 24])
+        self.assertEqual(self.console(), [])
+
+    def test_keyframes_in_toml_are_those_of_render(self):
+        first = self.rest()
+        turns = [(1, 0, 0, 0), (0.8, 0.36, 0.48, 0), (0.5, 0.5, -0.5, 0.5)]
+        keys = [{"eye": [i, 1e-7 * i, -6], "turn": turn, "fov": 50 + 10 * i, "distance": 2.5, "seconds": [1, 3, 1][i]}
+                for i, turn in enumerate(turns)]
+        settings = {"seconds": 2, "fps": 4, "closed": False, "width": 32, "height": 24, "model": "pinhole"}
+        text = self.module("toml.tomlOf(given[0], given[1])", keys, settings)
+        back = self.module("toml.keyframesIn(given[0])", text)
+        self.assertEqual((back["seconds"], back["fps"], back["closed"], len(back["keys"])), (2, 4, False, 3))
+        for key, own in zip(back["keys"], keys):
+            for name in ("eye", "turn"):
+                self.assertLess(math.dist(key[name], own[name]), 1e-9, name)
+            self.assertAlmostEqual(key["distance"], 2.5)
+            self.assertEqual((key["fov"], key["seconds"]), (own["fov"], own["seconds"]))
+        # `render` draws the same frames of it as of the page's frames one by one.
+        folder = self.viewer.folder.name
+        files = {"a.toml": text, "b.json": json.dumps(self.module("path.pathFile(given[0], given[1])", keys, settings))}
+        for name, content in files.items():
+            with open(os.path.join(folder, name), "w") as file:
+                file.write(content)
+            subprocess.run([self.program, "render", self.viewer.model, "--path", os.path.join(folder, name), "-o",
+                            os.path.join(folder, name[0]), "-q"], check=True, stdout=subprocess.DEVNULL)
+        names = sorted(os.listdir(os.path.join(folder, "a")))
+        self.assertEqual(len(names), 8)
+        for name in names:
+            self.assertGreater(psnr(os.path.join(folder, "a", name), os.path.join(folder, "b", name)), 50, name)
+        # As people write it, through the page's own button; what is none is a sentence.
+        written = os.path.join(folder, "hand.toml")
+        with open(written, "w") as file:
+            file.write('# by hand\nfps = 25\nclosed = true\nspeed = "by-seconds"\n\n[[key]]  # one\n'
+                       "eye = [0, 0,\n -6]\ntarget = [0, 0, 0,]\n[[key]]\neye = [1_0, 0, 0]\ntarget = [0, 0, 0]\nseconds = 2.5\n")
+        self.page.find_element(By.ID, "load-path").send_keys(written)
+        self.wait("the keyframes", lambda: len(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")) == 2)
+        self.assertEqual([self.page.find_element(By.ID, name).get_attribute("value") for name in ("seconds", "fps")],
+                         ["3.5", "25"])
+        self.assertTrue(self.page.find_element(By.ID, "closed").is_selected())
+        self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")[1].find_element(By.TAG_NAME, "button").click()
+        self.rest(first["id"])
+        self.assertLess(math.dist(self.page.execute_script("return window.raysplats.rig.eye"), (10, 0, 0)), 1e-9)
+        for damaged in ("", "[[key]]", "[[key]]\neye = [0, 0, 0]\ntarget = [0, 1, 0]", "[camera]\nx = 1",
+                        "[[key]]\neye = [0, 0]\ntarget = [0, 0, 1]", "[[key]]\neye = 1\ntarget = 2", "key = [[1]]"):
+            self.assertIsNone(self.module("toml.keyframesIn(given[0])", damaged), damaged)
+        self.assertEqual(self.console(), [])
+
+
+if __name__ == "__main__":
+    main()

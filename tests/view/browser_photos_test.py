@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Photos over pictures, and the world's box and directions.
+usage: browser_photos_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
+import os
+import subprocess
+import sys
+import tempfile
+
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.select import Select
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from browser import main  # noqa: E402
+from page_case import PageCase  # noqa: E402
+from program import write_model  # noqa: E402
+
+
+class PhotoTest(PageCase):
+    """A model beside the photos that it was to be like."""
+
+    def arguments(self):
+        folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
+        photos = os.path.join(folder, "photos")
+        subprocess.run([self.program, "generate", photos, "--size", "64", "--train-views", "3", "--test-views", "2",
+                        "-q"], check=True, stdout=subprocess.DEVNULL)
+        model = os.path.join(folder, "model.ply")
+        write_model(model)
+        return [model, "--data", photos, "--split", "train"]
+
+    def overlay(self, x, y):
+        """A pixel of what lies over the picture, at shares of its size."""
+        return self.page.execute_script(
+            "const c = document.getElementById('overlay');"
+            "return Array.from(c.getContext('2d').getImageData(arguments[0] * c.width,"
+            " arguments[1] * c.height, 1, 1).data);", x, y)
+
+    def test_the_photo_of_a_camera_lies_over_the_picture(self):
+        first = self.rest()
+        self.assertFalse(self.page.find_element(By.ID, "photo-section").is_displayed())
+        Select(self.page.find_element(By.ID, "cameras")).select_by_index(1)
+        self.wait("the photo", lambda: self.page.find_element(By.ID, "photo-section").is_displayed())
+        shown = self.rest(first["id"])
+        self.assertEqual(self.page.execute_script("return window.raysplats.photo.number"), 1)
+        # The photo's own pixels: its middle, where the overlay is opaque, and nothing right of the slider.
+        photo = self.page.execute_async_script(
+            "const done = arguments[0]; fetch('api/photo/1').then(r => r.blob()).then(createImageBitmap).then(b => {"
+            "const c = new OffscreenCanvas(b.width, b.height); const g = c.getContext('2d'); g.drawImage(b, 0, 0);"
+            "const p = g.getImageData(b.width * 0.45, b.height / 2, 1, 1).data;"
+            "done([b.width, b.height, Array.from(p)]); });")
+        self.assertEqual(photo[:2], [64, 64])
+        self.assertEqual(self.overlay(0.75, 0.5)[3], 0)
+        # Height fills the picture, so 0.45 of the photo's width is right of the middle by 0.05 of the height.
+        width, height = self.page.execute_script(
+            "const p = document.getElementById('picture'); return [p.clientWidth, p.clientHeight];")
+        pixel = self.overlay(0.5 - 0.05 * height / width, 0.5)
+        self.assertEqual(pixel[3], 255)
+        for a, b in zip(pixel[:3], photo[2][:3]):
+            self.assertLess(abs(a - b), 40)
+        self.screenshot("photo")
+        self.slide("split", 100)
+        self.assertEqual(self.overlay(0.55, 0.5)[3], 255)
+        self.page.find_element(By.ID, "difference").click()
+        self.screenshot("difference")
+        # Where the photo does not reach, there is no difference.
+        self.assertEqual(self.overlay(0.01, 0.5)[:3], [0, 0, 0])
+        # A movement takes the photo away.
+        self.drag(60, 0)
+        self.rest(shown["id"])
+        self.assertFalse(self.page.find_element(By.ID, "photo-section").is_displayed())
+        self.assertEqual(self.overlay(0.25, 0.5)[3], 0)
+        # Only photos that there are, by number.
+        for path, status in (("api/photo/3", 404), ("api/photo/-1", 404), ("api/photo/1x", 404), ("api/photo/", 404),
+                             ("api/photo/../state", 404)):
+            self.assertEqual(self.viewer.ask("/" + path, Cookie=self.viewer.cookie())[0], status, path)
+        self.assertEqual(self.viewer.ask("/api/photo/1")[0], 403)
+        self.assertEqual(self.console(), [])
+
+    def test_order_up_and_crop_box(self):
+        first = self.rest()
+        before = self.pixels()
+        Select(self.page.find_element(By.ID, "order")).select_by_value("entry")
+        second = self.rest(first["id"])
+        entry = self.pixels()
+        Select(self.page.find_element(By.ID, "order")).select_by_value("peak")
+        third = self.rest(second["id"])
+        self.assertNotEqual(entry, self.pixels())
+        self.assertEqual(before, self.pixels())  # as a model of nobody's run is traced
+        self.assertEqual(third["errors"], [])
+        Select(self.page.find_element(By.ID, "up")).select_by_value("0,0,1")
+        self.rest(third["id"])
+        self.assertEqual(self.page.execute_script("return window.raysplats.rig.up"), [0, 0, 1])
+        # Upright: the picture's right is level.
+        self.assertAlmostEqual(self.page.execute_script("return window.raysplats.rig.axes[0][2]"), 0, places=9)
+        self.assertEqual(self.page.find_element(By.ID, "up-text").text, "--up 0,0,1")
+        self.page.find_element(By.ID, "show-crop").click()
+        self.slide("crop-low-x", -0.4)
+        self.slide("crop-high-y", 0.6)
+        painted = self.page.execute_script(
+            "const c = document.getElementById('overlay');"
+            "return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v > 0);")
+        self.assertTrue(painted)
+        self.screenshot("crop")
+        # The option is one that `convert` takes, and keeps what is in the box.
+        option = self.page.find_element(By.ID, "crop-text").text.split()
+        self.assertEqual(option[0], "--crop-min")
+        low, high = ([float(x) for x in option[i].split(",")] for i in (1, 3))
+        self.assertLess(abs(low[0] + 0.4), 0.1)
+        self.assertLess(abs(high[1] - 0.6), 0.1)
+        out = os.path.join(self.viewer.folder.name, "part.ply")
+        told = subprocess.run([self.program, "convert", self.arguments_given[0], "-o", out, *option],
+                              capture_output=True, text=True, check=True).stdout
+        self.assertRegex(told, r"^\d+ of 103 Gaussians")
+        self.assertEqual(self.console(), [])
+
+
+if __name__ == "__main__":
+    main()
