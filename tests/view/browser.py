@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+import tempfile
 import unittest
 
 from selenium import webdriver
@@ -27,6 +28,9 @@ class BrowserCase(unittest.TestCase):
     def open_browser(self):
         self.page = browser()
         self.addCleanup(self.page.quit)
+        self.downloads = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_downloads_"))
+        self.page.execute_cdp_cmd("Browser.setDownloadBehavior", {
+            "behavior": "allow", "downloadPath": self.downloads})
 
     def screenshot(self, name):
         if self.folder_of_screenshots:

@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the page shows: what `render` draws, the newest of it, through every lens.
 usage: browser_pictures_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
-import json
 import math
 import os
-import re
-import subprocess
 import sys
 
 from selenium.webdriver.common.action_chains import ActionChains
@@ -16,6 +13,7 @@ from selenium.webdriver.support.select import Select
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import main  # noqa: E402
 from page_case import ModelCase  # noqa: E402
+from program import psnr  # noqa: E402
 
 
 class PicturesTest(ModelCase):
@@ -25,29 +23,10 @@ class PicturesTest(ModelCase):
         self.screenshot("first")
         self.assertIn("103 Gaussians", self.page.find_element(By.ID, "about").text)
         self.assertEqual(self.page.execute_script("return location.search"), "")
-        # The same camera by `render`, supersampled, against the page's 16 samples.
-        width, height = seen["last"]["width"], seen["last"]["height"]
-        pose, fov = self.page.execute_script(
-            "return [window.raysplats.rig.pose, window.raysplats.rig.fov]")
-        focal = 0.5 * height / math.tan(0.5 * math.radians(fov))
-        rows = [[pose[4 * i], -pose[4 * i + 1], -pose[4 * i + 2], pose[4 * i + 3]] for i in range(3)]
-        folder = self.viewer.folder.name
-        with open(os.path.join(folder, "one.json"), "w") as file:
-            json.dump({"w": width, "h": height, "fl_x": focal, "fl_y": focal, "cx": width / 2,
-                       "cy": height / 2, "frames": [{"file_path": "page.png",
-                                                     "transform_matrix": rows + [[0, 0, 0, 1]]}]}, file)
-        subprocess.run([self.program, "render", self.viewer.model, "--cameras",
-                        os.path.join(folder, "one.json"), "-o", os.path.join(folder, "out"),
-                        "--supersample", "4", "-q"], check=True, stdout=subprocess.DEVNULL)
-        shown = os.path.join(folder, "shown.png")
+        shown = os.path.join(self.viewer.folder.name, "shown.png")
         with open(shown, "wb") as file:
             file.write(self.pixels())
-        # Without alpha, as frames are; idiff says what it finds in the same line everywhere.
-        told = subprocess.run(["oiiotool", shown, "--ch", "R,G,B", os.path.join(folder, "out/page.png"),
-                               "--diff"], capture_output=True, text=True).stdout
-        found = re.search(r"Peak SNR = (\S+)", told)
-        self.assertTrue(found, told)
-        self.assertGreater(float(found.group(1)), 35, told)
+        self.assertGreater(psnr(shown, self.rendered("shown", seen["last"])), 35)
         self.assertEqual(self.console(), [])
 
     def test_dragging_turns_and_the_last_picture_is_the_newest(self):
@@ -72,6 +51,29 @@ class PicturesTest(ModelCase):
             "fire('pointerup', 300);")
         last = self.rest(after["id"])
         self.assertLess(last["pictures"] - after["pictures"], 40)
+        self.assertEqual(self.console(), [])
+
+    def test_a_saved_picture_is_that_of_render_and_a_movement_does_not_lose_it(self):
+        first = self.rest()
+        self.assertEqual(self.page.execute_script(
+            "document.getElementById('png').click(); return document.getElementById('status').textContent"), "saving...")
+        still = self.download("view.png")
+        self.assertGreater(psnr(still, self.rendered("still", first["last"])), 35)
+        self.assertNotIn("saving...", self.rest(first["id"]) and self.status())
+        # A movement right behind the wish: no sample can have been drawn, and the file is that of where it ends.
+        self.page.execute_script(
+            "const p = document.getElementById('picture'); p.setPointerCapture = () => {};"
+            "const fire = (t, x) => p.dispatchEvent(new PointerEvent(t, {pointerId: 1, clientX: x, clientY: 200,"
+            " buttons: 1, bubbles: true}));"
+            "document.getElementById('png').click();"
+            "fire('pointerdown', 200); fire('pointermove', 320); fire('pointerup', 320);")
+        moved = self.download("view.png")
+        self.assertGreater(psnr(moved, self.rendered("moved", first["last"])), 35)
+        self.assertLess(psnr(moved, still), 35)
+        # It is kept once.
+        self.drag(30, 0)
+        self.rest(self.seen()["id"])
+        self.assertEqual(os.listdir(self.downloads), [])
         self.assertEqual(self.console(), [])
 
     def test_a_hundred_quick_moves_leave_one_stale_picture_at_most(self):

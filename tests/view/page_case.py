@@ -2,7 +2,9 @@
 """The viewer's page in Chromium, with what a person does to it."""
 import base64
 import json
+import math
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -52,6 +54,30 @@ class PageCase(BrowserCase):
         data = self.page.execute_script(
             "return document.getElementById('picture').toDataURL('image/png')")
         return base64.b64decode(data.split(",", 1)[1])
+
+    def status(self):
+        return self.page.find_element(By.ID, "status").text
+
+    def download(self, name):
+        """A file that the page has saved, which is then out of its way."""
+        saved, taken = os.path.join(self.downloads, name), os.path.join(self.viewer.folder.name, f"{time.time()}_{name}")
+        self.wait(name, lambda: os.path.exists(saved))
+        os.rename(saved, taken)
+        return taken
+
+    def rendered(self, name, size):
+        """What `render` draws, supersampled, of the pinhole that the page looks through."""
+        width, height = size["width"], size["height"]
+        pose, fov = self.page.execute_script("return [window.raysplats.rig.pose, window.raysplats.rig.fov]")
+        focal = 0.5 * height / math.tan(0.5 * math.radians(fov))
+        rows = [[pose[4 * i], -pose[4 * i + 1], -pose[4 * i + 2], pose[4 * i + 3]] for i in range(3)]
+        out = os.path.join(self.viewer.folder.name, name)
+        with open(out + ".json", "w") as file:
+            json.dump({"w": width, "h": height, "fl_x": focal, "fl_y": focal, "cx": width / 2, "cy": height / 2,
+                       "frames": [{"file_path": "page.png", "transform_matrix": rows + [[0, 0, 0, 1]]}]}, file)
+        subprocess.run([self.program, "render", self.viewer.model, "--cameras", out + ".json", "-o", out,
+                        "--supersample", "4", "-q"], check=True, stdout=subprocess.DEVNULL)
+        return os.path.join(out, "page.png")
 
     def painted(self, canvas):
         return self.page.execute_script(

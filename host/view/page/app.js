@@ -24,7 +24,6 @@ let told = ''; // the state as the program wrote it
 let rig = null;
 let link = null;
 let home = null;
-let saving = 0; // id of the picture to be saved as a file
 let picking = 0; // id of the last question for a point
 let frames = []; // when the last pictures of movements came
 let came = 0; // pictures so far
@@ -113,10 +112,7 @@ function setUp() {
 }
 
 async function show(header, blob) {
-  if (header.png && header.id === saving) {
-    saving = 0;
-    download(blob, 'view.png');
-  }
+  if (header.kept) download(blob, 'view.png');
   const number = ++came;
   const bitmap = await createImageBitmap(blob);
   if (number < drawn) return bitmap.close(); // a newer one has been quicker
@@ -136,8 +132,9 @@ async function show(header, blob) {
   const step = run ? `, iteration ${header.iteration}` : '';
   const speed = moving && frames.length > 2 ? `, ${frames.length} pictures a second` : '';
   const samples = header.samples > 1 ? `, ${header.samples} samples` : '';
+  const keeping = link.keeping ? ', saving...' : '';
   $('status').textContent =
-    `${header.width} \u00d7 ${header.height}${samples}, ${header.milliseconds.toFixed(0)} ms${speed}${step}`;
+    `${header.width} \u00d7 ${header.height}${samples}, ${header.milliseconds.toFixed(0)} ms${speed}${step}${keeping}`;
 }
 
 function download(blob, name) {
@@ -315,7 +312,10 @@ function wire() {
   }
   $('home').addEventListener('click', () => { rig.keyframe = home; changed(); });
   $('level').addEventListener('click', () => { rig.level(); changed(); });
-  $('png').addEventListener('click', () => { saving = link.rest({ png: true }); });
+  $('png').addEventListener('click', () => {
+    $('status').textContent = 'saving...';
+    link.keep();
+  });
   $('toggle').addEventListener('click', () => document.body.classList.toggle('bare'));
   $('show-cameras').addEventListener('change', () => {
     cameras.shown = $('show-cameras').checked;

@@ -13,6 +13,7 @@ export class Connection {
   #waiting = null; // { id, since } of a picture of a movement that is on its way
   #dirty = false;
   #timer = 0;
+  #keeping = 0; // id of the view whose picture is to be a file, 0 for none
 
   // `view()` gives what is to be seen now; `on` has picture(header, blob), a promise, text(message),
   // open(), lost() and answers(), which finds out whether there is somebody to come back to.
@@ -61,6 +62,8 @@ export class Connection {
       iteration: words.getUint32(24, true),
       milliseconds: words.getFloat32(28, true),
     };
+    header.kept = header.png && header.id === this.#keeping;
+    if (header.kept) this.#keeping = 0;
     const type = header.png ? 'image/png' : 'image/jpeg';
     const shown = this.on.picture(header, new Blob([new Uint8Array(data, HEADER)], { type }));
     // It is on its way until it is seen: a page that is slow to decode asks for no second one.
@@ -107,13 +110,24 @@ export class Connection {
     this.send({ type: 'leave' });
   }
 
-  // Nothing moves: the picture of full size.
-  rest(extra = {}) {
+  // Nothing moves: the picture of full size. A movement has taken the place of what was to be kept:
+  // that is asked for again.
+  rest() {
     clearTimeout(this.#timer);
     this.#dirty = false;
     this.#waiting = null;
     const id = this.nextId();
-    this.send({ type: 'view', id, moving: false, ...this.view(), ...extra });
-    return id;
+    if (this.keeping) this.#keeping = id;
+    this.send({ type: 'view', id, moving: false, png: this.keeping, ...this.view() });
+  }
+
+  // The next picture with all its samples comes without losses, and its header says `kept`.
+  keep() {
+    this.#keeping = this.#asked + 1;
+    this.rest();
+  }
+
+  get keeping() {
+    return this.#keeping !== 0;
   }
 }
