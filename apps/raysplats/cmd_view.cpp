@@ -154,6 +154,7 @@ void view_scene(const Options& options) {
       view::first_look(scene_extent(loaded.scene.gaussians), loaded.cameras, up);
   state.about = fmt::format("{} Gaussians, {} meshes, {} lights", loaded.scene.gaussians.size(),
                             loaded.scene.meshes.size(), loaded.scene.lights.size());
+  state.has_background = false;
   const std::unique_ptr<Context> context = open_context(options.device);
   const auto pictures = view::scene_pictures(*context, loaded.scene);
   view::DroppedMeshes meshes(

@@ -129,6 +129,7 @@ struct PathTracer::Impl {
 
   void choose_bias(const std::vector<Mesh>& meshes);
   void render(const Camera& camera, const std::function<bool(double)>& within, Image& out);
+  std::optional<glm::dvec3> first_point(const Camera& camera);
 
   Kernel kernel(const char* name) { return context.kernel(kProgram, name); }
   RsWave wave_record(std::uint32_t sample, std::size_t first_pixel) const;
@@ -413,6 +414,31 @@ Image PathTracer::render(const Camera& camera, const std::function<bool(double)>
     return Image();
   }
   return out;
+}
+
+std::optional<glm::dvec3> PathTracer::first_point(const Camera& camera) {
+  const auto turn = impl_->context.lock();
+  require_pixels(camera);
+  return impl_->first_point(camera);
+}
+
+std::optional<glm::dvec3> PathTracer::Impl::first_point(const Camera& camera) {
+  const auto width = static_cast<std::size_t>(camera.width);
+  const std::size_t middle = width * (static_cast<std::size_t>(camera.height) / 2) + width / 2;
+  camera_rays.generate(camera, Lens(), middle, 1, rays);
+  surfaces.triangles().nearest(rays, 1, hits);
+  tracer.trace(gaussians, rays, 1, results);
+  const RsSurfaceHit surface = hits.read(0);
+  const float cloud = results.read(0).median_depth;
+  float depth = std::numeric_limits<float>::infinity();
+  if (surface.triangle >= 0) depth = surface.t;
+  if (cloud > 0) depth = std::min(depth, cloud);
+  if (!std::isfinite(depth)) return std::nullopt;
+  const Ray ray = rays.read(0);
+  glm::dvec3 point;
+  for (int k = 0; k < 3; ++k)
+    point[k] = static_cast<double>(ray.origin[k]) + static_cast<double>(depth) * ray.direction[k];
+  return point;
 }
 
 // Packets trace a sample of all its rows at once; without them a batch of pixels gets all its

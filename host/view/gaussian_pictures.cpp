@@ -115,7 +115,6 @@ Image GaussianPictures::drawn(const ViewRequest& request,
 }
 
 std::optional<glm::dvec3> GaussianPictures::point(const ViewRequest& request) {
-  if (!has_depth()) return std::nullopt;
   const auto turn = context_.lock();
   ViewTracer& views = tracer(true, request);
   views.forward(gaussians_, request.camera);

@@ -34,7 +34,9 @@ class ScenePictures : public MeshPictures {
     if (rgba.pixels() == 0) return {};
     return request.output == Output::kAlpha ? alpha_picture(rgba) : rgba;
   }
-  std::optional<glm::dvec3> point(const ViewRequest&) override { return std::nullopt; }
+  std::optional<glm::dvec3> point(const ViewRequest& request) override {
+    return tracer_.first_point(request.camera);
+  }
   std::uint64_t samples() const override { return kSceneSamples; }
   bool has_depth() const override { return false; }
 
@@ -81,7 +83,7 @@ class PicturesWithMeshes : public MeshPictures {
     return source.draw(request, sample, watch);
   }
   std::optional<glm::dvec3> point(const ViewRequest& request) override {
-    return plain_->point(request);
+    return (staged_ ? *staged_ : *plain_).point(request);
   }
   std::uint64_t samples() const override { return (staged_ ? *staged_ : *plain_).samples(); }
   bool has_depth() const override { return plain_->has_depth(); }

@@ -31,6 +31,7 @@ class PictureSource {
   /// UsageError for an output that there is not.
   virtual Image draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) = 0;
   /// The point of the world in front of the camera's centre ray; nothing where it meets nothing.
+  /// Throws as draw().
   virtual std::optional<glm::dvec3> point(const ViewRequest& request) = 0;
   /// How many samples of a still view are worth it.
   virtual std::uint64_t samples() const = 0;

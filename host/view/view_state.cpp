@@ -108,6 +108,7 @@ std::string state_json(const ViewState& state) {
                   {"has_near", state.has_near},
                   {"has_depth", state.has_depth},
                   {"has_order", state.has_order},
+                  {"has_background", state.has_background},
                   {"takes_meshes", state.takes_meshes},
                   {"trains", state.trains}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -22,10 +22,11 @@ struct ViewState {
   float near_depth = 0.0f;
   bool has_near = false;  ///< whether a near limit can be asked for
   bool has_depth = false;
-  bool has_order = false;     ///< whether the order of hits can be chosen
-  bool has_photos = false;    ///< whether there is /api/photo/N of the cameras
-  bool takes_meshes = false;  ///< whether meshes can be dropped
-  bool trains = false;        ///< whether there is /api/run
+  bool has_order = false;      ///< whether the order of hits can be chosen
+  bool has_background = true;  ///< whether another one can be chosen
+  bool has_photos = false;     ///< whether there is /api/photo/N of the cameras
+  bool takes_meshes = false;   ///< whether meshes can be dropped
+  bool trains = false;         ///< whether there is /api/run
 };
 
 /// Where to begin: at the first camera, or on an orbit where there is none, looking at what most

@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "raysplats/camera.hpp"
@@ -54,6 +56,11 @@ class PathTracer {
   /// Throws UsageError for a camera without pixels or with a number that is not finite,
   /// ResourceError when its paths would not fit the device beside the scene.
   Image render(const Camera& camera, const std::function<bool(double share)>& within = {});
+
+  /// The point of the world that is seen first through the middle of a camera's picture: a surface
+  /// of any material, or the median depth of the Gaussians before it; nothing where the ray meets
+  /// neither. Throws UsageError as render().
+  std::optional<glm::dvec3> first_point(const Camera& camera);
 
   /// Of the library itself: from the next render() on, draw part `part` of `parts` equal ones of
   /// the picture's rows, and leave the others' pixels 0; the rows, first and last (exclusive), of

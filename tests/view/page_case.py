@@ -91,6 +91,13 @@ class PageCase(BrowserCase):
             chain = chain.move_by_offset(dx / steps, dy / steps)
         chain.release().perform()
 
+    def target(self):
+        """The centre that the camera turns around."""
+        return self.page.execute_script("return window.raysplats.rig.target")
+
+    def double_click(self):
+        ActionChains(self.page).double_click(self.page.find_element(By.ID, "picture")).perform()
+
     def slide(self, name, value):
         self.page.execute_script(
             "const s = document.getElementById(arguments[0]); s.value = arguments[1];"

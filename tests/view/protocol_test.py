@@ -279,6 +279,15 @@ class CamerasTest(unittest.TestCase):
                     self.assertEqual(len(state["cameras"]), count, more)
 
 
+def picked(channel, number, px=(0.5, 0.5), **more):
+    """The point of the world that a page is told of a place in its picture."""
+    channel.send_json(**{**view(number, **more), "type": "pick", "px": list(px)})
+    while True:
+        kind, answer, *_ = channel.receive()
+        if kind == "text" and answer["type"] == "pick":
+            return answer["point"]
+
+
 class ScenesTest(unittest.TestCase):
     def test_scene_files_are_drawn_with_more_samples(self):
         with Viewer(PROGRAM) as plain:
@@ -296,6 +305,12 @@ class ScenesTest(unittest.TestCase):
                 self.assertEqual(samples[-1], 64)
                 channel.send_json(**view(2, output="depth"))
                 self.assertEqual(channel.receive()[1]["type"], "error")
+                state = json.loads(viewer.ask("/api/state", Cookie=viewer.cookie())[2])
+                self.assertEqual([state[f"has_{name}"] for name in ("depth", "near", "order", "background")],
+                                 [False] * 4)
+                # The ball in the middle, and nothing behind the camera.
+                self.assertLess(math.dist(picked(channel, 3), (0, 0, 0)), 0.7)
+                self.assertIsNone(picked(channel, 4, eye=(0, 0, 50)))
 
 
 def cube(half=0.5):
@@ -352,6 +367,8 @@ class MeshesTest(unittest.TestCase):
             self.assertEqual((moved["rotate"], moved["size"]), ([20, 30, 40], 0.8))
             shown = self.still(channel, 3)
             self.assertNotEqual(first, shown)
+            # A ray meets the mesh before the model, whose centre is behind it.
+            self.assertLess(picked(channel, 7)[2], -1.5)
             # The depth is still the model's.
             channel.send_json(**view(4, output="depth"))
             self.assertEqual(channel.receive()[0], "picture")
@@ -372,6 +389,7 @@ class MeshesTest(unittest.TestCase):
             channel.send_json(type="remove", mesh=mesh["mesh"])
             self.assertEqual(self.text(channel)["meshes"], [])
             self.assertEqual(self.still(channel, 6), before)
+            self.assertGreater(picked(channel, 8)[2], -1)
             channel.send_json(type="place", mesh=mesh["mesh"], **place())
             self.assertIn("no mesh", self.text(channel)["text"])
 
@@ -426,7 +444,12 @@ class MeshesTest(unittest.TestCase):
                            '[camera]\norbit = { frames = 4 }\n')
             with Viewer(PROGRAM, [scene]) as viewer, Channel(viewer) as channel:
                 before = self.still(channel, 1)
+                # The front of the file's own cube, a unit below the eye's line, then the one that was dropped before it.
+                own = picked(channel, 5, (0.5, 0.5 + 0.5 / math.tan(math.radians(25)) * 1 / 5.5))
+                self.assertAlmostEqual(own[2], -0.5, places=4)
+                self.assertAlmostEqual(own[1], 1, places=4)
                 (mesh,) = self.drop(channel, cube(), material="glass")["meshes"]
+                self.assertAlmostEqual(picked(channel, 6)[2], -1.5 - 0.6 / math.sqrt(3), places=4)
                 self.assertNotEqual(self.still(channel, 2), before)
                 channel.send_json(**{**view(3), "type": "scene"})
                 text = self.text(channel)["text"]

@@ -16,6 +16,7 @@ const TURN = 0.006; // radians per pixel
 const KEY_TURN = 1.2; // radians per second
 const FLY = 0.5; // distances to the centre per second
 const CLICK = 4; // pixels that a click may slip
+const READ = 3000; // milliseconds in which a sentence is read
 
 const picture = $('picture');
 const overlay = $('overlay');
@@ -28,6 +29,8 @@ let picking = 0; // id of the last question for a point
 let frames = []; // when the last pictures of movements came
 let came = 0; // pictures so far
 let drawn = 0; // the one on the page, as they came
+let facts = ''; // of the last picture, where it came after the last sentence
+let reading = 0; // timer while a sentence is read
 const held = new Set(); // keys
 let run = null; // while the model trains
 let over = false; // the run has said that it ends
@@ -36,6 +39,22 @@ let nearChosen = false; // the model's own holds until somebody moves the slider
 // What automated tests look at; nothing here reads it.
 const seen = { pictures: 0, last: null, lost: 0, id: 0, errors: [] };
 window.raysplats = seen;
+
+// A sentence for people, which pictures do not take away before it is read.
+function say(text) {
+  facts = '';
+  $('status').textContent = text;
+  clearTimeout(reading);
+  reading = setTimeout(() => {
+    reading = 0;
+    if (facts) $('status').textContent = facts;
+  }, READ);
+}
+
+function tell(text) {
+  facts = text;
+  if (!reading) $('status').textContent = text;
+}
 
 // The part of the stage that the picture fills: all of it, or what a panorama leaves black.
 function box() {
@@ -133,8 +152,8 @@ async function show(header, blob) {
   const speed = moving && frames.length > 2 ? `, ${frames.length} pictures a second` : '';
   const samples = header.samples > 1 ? `, ${header.samples} samples` : '';
   const keeping = link.keeping ? ', saving...' : '';
-  $('status').textContent =
-    `${header.width} \u00d7 ${header.height}${samples}, ${header.milliseconds.toFixed(0)} ms${speed}${step}${keeping}`;
+  tell(`${header.width} \u00d7 ${header.height}${samples}, ${header.milliseconds.toFixed(0)} ms`
+    + `${speed}${step}${keeping}${meshes.leftOut(wanted())}`);
 }
 
 function download(blob, name) {
@@ -147,14 +166,18 @@ function download(blob, name) {
 }
 
 function heard(message) {
-  if (message.type === 'pick' && message.id === picking && message.point) {
-    rig.center(message.point);
-    changed();
+  if (message.type === 'pick' && message.id === picking) {
+    if (message.point) {
+      rig.center(message.point);
+      changed();
+    } else {
+      say('Nothing is there to turn around');
+    }
   } else if (message.type === 'error') {
     seen.errors.push(message.text);
-    $('status').textContent = message.text;
+    say(message.text);
   } else if (message.type === 'note') {
-    $('status').textContent = message.text;
+    say(message.text);
   } else if (message.type === 'meshes') {
     meshes.take(message.meshes);
     seen.meshes = message.meshes;
@@ -200,7 +223,7 @@ function click(x, y) {
 function pick(x, y) {
   const { left, top, width, height } = box();
   const px = [(x - left) / width, (y - top) / height];
-  if (!state.has_depth || px.some((share) => share < 0 || share > 1)) return;
+  if (px.some((share) => share < 0 || share > 1)) return;
   picking = link.nextId();
   link.send({ type: 'pick', id: picking, ...wanted(), output: 'color', px });
 }
@@ -264,7 +287,7 @@ const crop = new Crop($('crop-sliders'), $('crop-text'), drawOverlay);
 const meshes = new Meshes($('mesh-section'), {
   send: (message) => link.send(message),
   sendBytes: (bytes) => link.sendBytes(bytes),
-  say: (text) => { $('status').textContent = text; },
+  say,
   changed,
   target: () => rig.target,
 });
@@ -313,7 +336,7 @@ function wire() {
   $('home').addEventListener('click', () => { rig.keyframe = home; changed(); });
   $('level').addEventListener('click', () => { rig.level(); changed(); });
   $('png').addEventListener('click', () => {
-    $('status').textContent = 'saving...';
+    tell('saving...');
     link.keep();
   });
   $('toggle').addEventListener('click', () => document.body.classList.toggle('bare'));
@@ -330,7 +353,7 @@ function wire() {
     const stored = await keyframes.load(event.target.files[0]);
     event.target.value = '';
     if (!stored) {
-      $('status').textContent = 'That file holds no camera path';
+      say('That file holds no camera path');
       return;
     }
     $('seconds').value = stored.seconds;
@@ -343,7 +366,7 @@ function wire() {
   stage.addEventListener('dragover', (event) => event.preventDefault());
   stage.addEventListener('drop', (event) => {
     event.preventDefault();
-    if (!state.takes_meshes) $('status').textContent = 'Meshes cannot be dropped here';
+    if (!state.takes_meshes) say('Meshes cannot be dropped here');
     else if (event.dataTransfer.files.length > 0) meshes.drop(event.dataTransfer.files[0]);
   });
   $('mesh-file').addEventListener('change', (event) => {
@@ -377,6 +400,12 @@ async function start() {
     if (['depth', 'normals', 'hits'].includes(option.value)) option.disabled = !state.has_depth;
   }
   $('order').disabled = !state.has_order;
+  for (const id of ['own-background', 'background']) $(id).disabled = !state.has_background;
+  const missing = [[state.has_depth, 'depth, normals, number of hits'], [state.has_near, 'near limit'],
+    [state.has_order, 'order of hits'], [state.has_background, 'background']]
+    .filter(([has]) => !has).map(([, name]) => name);
+  $('missing').hidden = missing.length === 0;
+  $('missing').textContent = `Not here, because of its surfaces: ${missing.join(', ')}.`;
   cameras.fill(state.cameras, state.center);
   crop.begin(state.center, state.radius);
   $('mesh-section').hidden = !state.takes_meshes;

@@ -66,7 +66,6 @@ export class Meshes {
   // The program's list of meshes.
   take(list) {
     const added = list.find((mesh) => !this.#list.some((known) => known.mesh === mesh.mesh));
-    if (list.length !== this.#list.length) this.on.say('');
     this.#list = list;
     for (const mesh of list) {
       if (!this.#origin.has(mesh.mesh)) this.#origin.set(mesh.mesh, { at: mesh.at, size: mesh.size });
@@ -82,6 +81,15 @@ export class Meshes {
     if (added || !kept) this.#choose(added ? added.mesh : list[0]?.mesh ?? 0);
     else this.#choose(this.#chosen);
     this.on.changed();
+  }
+
+  // What of a view message the program leaves out while there are meshes, for the line of the status.
+  leftOut({ output, near, order, background }) {
+    if (this.#list.length === 0) return '';
+    if (output !== 'color' && output !== 'alpha') return ', without the meshes';
+    const names = [[near, 'near limit'], [order, 'order of hits'], [background, 'background']]
+      .filter(([wish]) => wish !== undefined).map(([, name]) => name);
+    return names.length === 0 ? '' : `, beside meshes without: ${names.join(', ')}`;
   }
 
   #choose(number) {
