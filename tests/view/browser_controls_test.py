@@ -74,14 +74,55 @@ class ControlsTest(ModelCase):
         self.rest(away["id"])
         self.assertEqual(self.console(), [])
 
-    def test_touch_and_the_dark(self):
+    def test_what_the_panel_sets_is_asked_for_and_drawn(self):
+        self.listen()
         first = self.rest()
-        self.prefer("dark")
-        for kind, x in (("touchStart", 300), ("touchMove", 340), ("touchMove", 400), ("touchEnd", None)):
-            points = [] if x is None else [{"x": x, "y": 250}]
-            self.page.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-        self.rest(first["id"])
-        self.screenshot("dark")
+        self.slide("near", 0.5)
+        second = self.rest(first["id"])
+        radius = self.page.execute_script("return fetch('api/state').then((r) => r.json()).then((s) => s.radius)")
+        self.assertAlmostEqual(self.sent()["near"], 0.25 * radius)
+        self.page.find_element(By.ID, "own-background").click()
+        self.slide("background", "#ff0000")
+        third = self.rest(second["id"])
+        self.assertEqual(self.sent()["background"], [1, 0, 0])
+        # The wall ends before the picture does.
+        self.assertEqual(self.pixel(0.01, 0.5), [255, 0, 0])
+        middle = self.pixel(0.5, 0.5)
+        Select(self.page.find_element(By.ID, "output")).select_by_value("alpha")
+        self.rest(third["id"])
+        self.assertEqual(self.sent()["output"], "alpha")
+        self.assertEqual(self.pixel(0.01, 0.5), [0, 0, 0])
+        self.assertNotEqual(self.pixel(0.5, 0.5), middle)
+        self.assertGreater(min(self.pixel(0.5, 0.5)), 200)
+        self.screenshot("alpha")
+        self.assertEqual(self.seen()["errors"], [])
+        self.assertEqual(self.console(), [])
+
+    def pixel(self, x, y):
+        """A colour of the picture, at shares of its size; JPEG is off by a little where it is flat."""
+        found = self.page.execute_script(
+            "const p = document.getElementById('picture'); return Array.from(p.getContext('2d').getImageData("
+            "arguments[0] * p.width, arguments[1] * p.height, 1, 1).data).slice(0, 3);", x, y)
+        return [255 if value > 250 else 0 if value < 5 else value for value in found]
+
+    def test_the_dark_is_dark(self):
+        self.rest()
+        shades = {}
+        for scheme in ("light", "dark"):
+            self.prefer(scheme)
+            shades[scheme] = self.page.execute_script(
+                "return ['body', '#panel', '#stage', '#fov', '#status', 'h1'].map((name) => {"
+                " const style = getComputedStyle(document.querySelector(name));"
+                " return [style.backgroundColor, style.color].map((c) => c.match(/[\\d.]+/g).slice(0, 3).map(Number)"
+                ".reduce((a, b) => a + b)); });")
+            self.screenshot(scheme)
+        text = 1
+        for light, dark in zip(shades["light"], shades["dark"]):
+            self.assertLess(light[text], 300)
+            self.assertGreater(dark[text], 500)
+        for part in (0, 2):  # the page and its stage
+            self.assertGreater(shades["light"][part][0], 600)
+            self.assertLess(shades["dark"][part][0], 150)
         self.assertEqual(self.console(), [])
 
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 
 from selenium.webdriver.common.by import By
+from selenium.webdriver.support.select import Select
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import main  # noqa: E402
@@ -56,6 +57,51 @@ class PathsTest(ModelCase):
             "image.onerror = () => done(null);"
             "image.src = 'data:image/apng;base64,' + arguments[0];", video)
         self.assertEqual(played, [32, 24])
+        self.assertEqual(self.console(), [])
+
+    def test_a_path_is_played_and_saved_by_its_buttons(self):
+        self.listen()
+        self.rest()
+        self.page.find_element(By.ID, "add-key").click()
+        eye = self.page.execute_script("return window.raysplats.rig.eye")
+        Select(self.page.find_element(By.ID, "cameras")).select_by_index(1)
+        self.page.find_element(By.ID, "add-key").click()
+        for name, value in (("seconds", 2), ("fps", 2)):
+            field = self.page.find_element(By.ID, name)
+            field.clear()
+            field.send_keys(str(value))
+        before = self.rest(self.seen()["id"])
+        # From the first view to the last, through places between them, and the last one rests.
+        self.page.execute_script(
+            "const rig = window.raysplats.rig; const way = window.raysplats.way = [[...rig.eye]];"
+            "document.getElementById('play').click();"
+            "const step = () => { way.push([...rig.eye]); if (way.length < 1000) requestAnimationFrame(step); };"
+            "requestAnimationFrame(step);")
+        way = "window.raysplats.way"
+        self.wait("the path's middle", lambda: math.dist(
+            self.page.execute_script(f"return {way}[{way}.length - 1]"), (7, 0, 0)) > 2)
+        self.wait("its end", lambda: math.dist(
+            self.page.execute_script("return window.raysplats.rig.eye"), (7, 0, 0)) < 1e-6)
+        self.rest(before["id"])
+        self.assertLess(math.dist([self.sent()["c2w"][i] for i in (3, 7, 11)], (7, 0, 0)), 1e-6)
+        between = [p for p in self.page.execute_script(f"return {way}")
+                   if min(math.dist(p, eye), math.dist(p, (7, 0, 0))) > 0.5]
+        self.assertGreater(len(between), 5)
+        # Files of either kind are what `render` draws: the first and the last view among four.
+        folder = self.viewer.folder.name
+        for button, name in (("save-path", "path.json"), ("save-toml", "path.toml")):
+            self.page.find_element(By.ID, button).click()
+            saved = self.download(name)
+            out = os.path.join(folder, button)
+            subprocess.run([self.program, "render", self.viewer.model, "--path", saved, "-o", out, "-q"], check=True,
+                           stdout=subprocess.DEVNULL)
+            names = sorted(os.listdir(out))
+            self.assertEqual(len(names), 4)
+            for frame, place in ((names[0], 0), (names[-1], 1)):
+                self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")[place].find_element(
+                    By.TAG_NAME, "button").click()
+                shown = self.rest(self.seen()["id"])
+                self.assertGreater(psnr(os.path.join(out, frame), self.rendered(f"{button}{place}", shown["last"], 1)), 50)
         self.assertEqual(self.console(), [])
 
     def test_keyframes_in_toml_are_those_of_render(self):

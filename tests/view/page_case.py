@@ -65,8 +65,8 @@ class PageCase(BrowserCase):
         os.rename(saved, taken)
         return taken
 
-    def rendered(self, name, size):
-        """What `render` draws, supersampled, of the pinhole that the page looks through."""
+    def rendered(self, name, size, supersample=4):
+        """What `render` draws of the pinhole that the page looks through."""
         width, height = size["width"], size["height"]
         pose, fov = self.page.execute_script("return [window.raysplats.rig.pose, window.raysplats.rig.fov]")
         focal = 0.5 * height / math.tan(0.5 * math.radians(fov))
@@ -76,7 +76,7 @@ class PageCase(BrowserCase):
             json.dump({"w": width, "h": height, "fl_x": focal, "fl_y": focal, "cx": width / 2, "cy": height / 2,
                        "frames": [{"file_path": "page.png", "transform_matrix": rows + [[0, 0, 0, 1]]}]}, file)
         subprocess.run([self.program, "render", self.viewer.model, "--cameras", out + ".json", "-o", out,
-                        "--supersample", "4", "-q"], check=True, stdout=subprocess.DEVNULL)
+                        "--supersample", str(supersample), "-q"], check=True, stdout=subprocess.DEVNULL)
         return os.path.join(out, "page.png")
 
     def painted(self, canvas):
@@ -90,6 +90,19 @@ class PageCase(BrowserCase):
         for _ in range(steps):
             chain = chain.move_by_offset(dx / steps, dy / steps)
         chain.release().perform()
+
+    def listen(self):
+        """Remembers what the page asks for from here on."""
+        self.page.execute_script(
+            "const send = WebSocket.prototype.send;"
+            "WebSocket.prototype.send = function (data) {"
+            " const message = typeof data === 'string' ? JSON.parse(data) : {};"
+            " if (message.type === 'view') window.raysplats.sent = message;"
+            " return send.call(this, data); };")
+
+    def sent(self):
+        """The last view that the page has asked for since listen()."""
+        return self.page.execute_script("return window.raysplats.sent")
 
     def target(self):
         """The centre that the camera turns around."""
