@@ -104,6 +104,77 @@ class PathsTest(ModelCase):
                 self.assertGreater(psnr(os.path.join(out, frame), self.rendered(f"{button}{place}", shown["last"], 1)), 50)
         self.assertEqual(self.console(), [])
 
+    def frames(self, path):
+        """The files of what `render` draws of a camera path, in their order."""
+        out = path + "_frames"
+        subprocess.run([self.program, "render", self.viewer.model, "--path", path, "-o", out, "-q"], check=True,
+                       stdout=subprocess.DEVNULL)
+        return [os.path.join(out, name) for name in sorted(os.listdir(out))]
+
+    def same_frames(self, first, second, least=50):
+        first, second = self.frames(first), self.frames(second)
+        self.assertEqual(len(first), len(second))
+        for a, b in zip(first, second):
+            self.assertGreater(psnr(a, b), least, (a, b))
+
+    def test_keyframes_keep_their_seconds(self):
+        self.rest()
+        keys = [{"eye": [x, 0, -6], "turn": [1, 0, 0, 0], "fov": 50, "distance": 6, "seconds": seconds}
+                for x, seconds in ((0, 1), (1, 4), (2, 2))]
+        for closed in (False, True):
+            settings = {"seconds": 3, "fps": 3, "closed": closed, "constant": False, "width": 40, "height": 30,
+                        "model": "pinhole"}
+            file = self.module("path.pathFile(given[0], given[1])", keys, settings)
+            again = self.module("path.pathFile((given[1] = path.keyframesOf(given[0], 6)).keys, given[1])", file, None)
+            self.assertEqual([k["override_transition_sec"] for k in file["keyframes"]],
+                             [k["override_transition_sec"] for k in again["keyframes"]])
+            self.assertEqual({k: v for k, v in file.items() if not isinstance(v, list)},
+                             {k: v for k, v in again.items() if not isinstance(v, list)})
+            for a, b in zip(file["camera_path"], again["camera_path"], strict=True):
+                self.assertLess(math.dist(a["camera_to_world"], b["camera_to_world"]), 1e-9)
+            # In nerfstudio's terms: `render` takes the same way from the keyframes alone.
+            stem = os.path.join(self.viewer.folder.name, f"seconds_{closed}")
+            for name, content in (("frames", file), ("keys", {**file, "camera_path": []})):
+                with open(f"{stem}_{name}.json", "w") as out:
+                    json.dump(content, out)
+            self.same_frames(f"{stem}_frames.json", f"{stem}_keys.json")
+
+    def test_what_is_loaded_and_saved_plays_the_same(self):
+        self.rest()
+        folder = self.viewer.folder.name
+        written = os.path.join(folder, "written.toml")
+        with open(written, "w") as file:
+            file.write('speed = "constant"\nwidth = 60\nheight = 40\nfps = 4\nseconds = 2\nclosed = false\n'
+                       "[[key]]\neye = [0, 0, -6]\ntarget = [0, 0, 0]\nseconds = 5\n"
+                       "[[key]]\neye = [0.5, 0, -6]\ntarget = [0, 0, 0]\nfov = 40\n"
+                       "[[key]]\neye = [4, 1, -5]\ntarget = [0, 0, 0]\n")
+
+        def load(path):
+            self.page.execute_script("document.getElementById('clear-keys').click();"
+                                     "for (const e of document.querySelectorAll('#constant, #path-width')) {"
+                                     " e.checked = false; e.value = ''; }")
+            self.page.find_element(By.ID, "load-path").send_keys(path)
+            self.wait("the keyframes", lambda: len(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")) == 3)
+            self.wait("the settings", lambda: self.page.find_element(By.ID, "constant").is_selected())
+
+        def save(button, name):
+            self.page.find_element(By.ID, button).click()
+            return self.download(name)
+
+        load(written)
+        toml = save("save-toml", "path.toml")
+        path = save("save-path", "path.json")
+        for saved in (toml, path):
+            self.same_frames(written, saved)
+        load(path)
+        self.same_frames(written, save("save-toml", "path.toml"))
+        load(toml)
+        with open(save("save-path", "path.json")) as again, open(path) as before:
+            again, before = json.load(again), json.load(before)
+            for a, b in zip(again["camera_path"], before["camera_path"], strict=True):
+                self.assertLess(math.dist(a["camera_to_world"], b["camera_to_world"]), 1e-9)
+        self.assertEqual(self.console(), [])
+
     def test_keyframes_in_toml_are_those_of_render(self):
         first = self.rest()
         turns = [(1, 0, 0, 0), (0.8, 0.36, 0.48, 0), (0.5, 0.5, -0.5, 0.5)]

@@ -293,13 +293,18 @@ const meshes = new Meshes($('mesh-section'), {
 });
 const keyframes = new Keyframes({
   list: $('keyframes'),
-  settings: () => ({
-    seconds: Number($('seconds').value) || 5,
-    fps: Number($('fps').value) || 30,
-    closed: $('closed').checked,
-    model: rig.model,
-    ...(([width, height]) => ({ width, height }))(size()),
-  }),
+  settings: () => {
+    const [width, height] = size();
+    return {
+      seconds: Number($('seconds').value) || 5,
+      fps: Number($('fps').value) || 30,
+      closed: $('closed').checked,
+      constant: $('constant').checked,
+      model: rig.model,
+      width: Number($('path-width').value) || width,
+      height: Number($('path-height').value) || height,
+    };
+  },
   view: () => rig.keyframe,
   go: (key) => { rig.keyframe = key; changed(); },
   download,
@@ -356,9 +361,9 @@ function wire() {
       say('That file holds no camera path');
       return;
     }
-    $('seconds').value = stored.seconds;
-    $('fps').value = stored.fps;
-    $('closed').checked = stored.closed;
+    for (const name of ['seconds', 'fps']) $(name).value = stored[name];
+    for (const name of ['width', 'height']) $(`path-${name}`).value = stored[name];
+    for (const name of ['closed', 'constant']) $(name).checked = stored[name];
     rig.lens = stored.model;
     changed();
   });

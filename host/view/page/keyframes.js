@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The list of keyframes: views to go back to, to play, to save as a camera path.
 
-import { keyframesOf, pathFile, viewAt } from './path.js';
+import { courseOf, keyframesOf, pathFile } from './path.js';
 import { keyframesIn, tomlOf } from './toml.js';
 
 export class Keyframes {
@@ -53,11 +53,12 @@ export class Keyframes {
     }
     this.#playing = true;
     const begin = performance.now();
-    const { seconds, closed } = this.page.settings();
+    const { seconds, ...settings } = this.page.settings();
+    const course = courseOf(this.#keys, settings);
     const step = (now) => {
       const share = Math.min((now - begin) / (1000 * seconds), 1);
       if (!this.#playing) return;
-      this.page.go(viewAt(this.#keys, share, closed));
+      this.page.go(course(share));
       if (share < 1) requestAnimationFrame(step);
       else this.#playing = false;
     };

@@ -2,15 +2,17 @@
 // Keyframes in TOML, as `raysplats render --path path.toml` reads them: as much of the language as
 // those files need.
 
+import { HEIGHT, WIDTH } from './path.js';
 import * as v from './vectors.js';
 
 const UP = [0, -1, 0]; // of keys that do not say it
 const FOV = 50;
 const FPS = 30;
 
-export function tomlOf(keys, { seconds, fps, closed, width, height }) {
+export function tomlOf(keys, { seconds, fps, closed, constant, width, height }) {
   const list = (point) => `[${point.join(', ')}]`;
   const lines = Object.entries({ seconds, fps, closed, width, height }).map(([name, value]) => `${name} = ${value}`);
+  if (constant) lines.push('speed = "constant"');
   for (const key of keys) {
     const [, down, forward] = v.axesOf(key.turn);
     lines.push('', '[[key]]', `eye = ${list(key.eye)}`,
@@ -67,7 +69,16 @@ export function keyframesIn(text) {
     if (keys.length === 0) return null;
     const closed = root.closed === true;
     const own = keys.slice(0, closed ? keys.length : -1).reduce((sum, key) => sum + key.seconds, 0);
-    return { keys, closed, model: 'pinhole', fps: root.fps ?? FPS, seconds: root.seconds ?? own };
+    return {
+      keys,
+      closed,
+      constant: root.speed === 'constant',
+      model: 'pinhole',
+      fps: root.fps ?? FPS,
+      seconds: root.seconds ?? own,
+      width: root.width ?? WIDTH,
+      height: root.height ?? HEIGHT,
+    };
   } catch {
     return null;
   }
