@@ -22,7 +22,7 @@ ModelViewer::ModelViewer(Context& context,
   ViewState state = first_look(scene_extent(model.download()), cameras, std::nullopt);
   state.name = name;
   state.about = fmt::format("{} Gaussians, SH degree {}", model.size(), model.sh_degree());
-  state.has_near = state.has_depth = true;
+  state.has_near = state.has_depth = state.has_order = true;
   state.near_depth = trace.near_depth;
   options.state = state_json(state);
   viewer_ = std::make_unique<Viewer>(options);
