@@ -5,7 +5,9 @@ usage: browser_connection_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER
 import http.server
 import os
 import sys
+import tempfile
 import threading
+import unittest.mock
 
 from selenium.webdriver.common.by import By
 
@@ -51,6 +53,23 @@ class ConnectionTest(ModelCase):
             logged = "\n".join(entry["message"] for entry in self.console())
             for said in ("Unexpected response code: 403", "blocked by CORS policy", "frame-ancestors"):
                 self.assertIn(said, logged)
+
+    def test_the_first_picture_is_waited_for_in_words(self):
+        # Kernels of nobody's: they are compiled now.
+        self.viewer.stop()
+        cache = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_cache_"))
+        self.enterContext(unittest.mock.patch.dict(os.environ, {"XDG_CACHE_HOME": cache}))
+        fresh = Viewer(self.program, self.arguments_given)
+        self.addCleanup(fresh.folder.cleanup)
+        self.addCleanup(fresh.stop)
+        self.page.get(fresh.url)
+        self.wait("the page", lambda: self.status())
+        self.assertEqual((self.status(), self.seen()["pictures"]),
+                         ("Waiting for the first picture; kernels may have to be compiled", 0))
+        self.screenshot("waiting")
+        self.rest()
+        self.assertIn("16 samples", self.status())
+        self.assertEqual(self.console(), [])
 
     def test_reload_and_two_pages(self):
         self.rest()

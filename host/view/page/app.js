@@ -415,6 +415,7 @@ async function start() {
   crop.begin(state.center, state.radius);
   $('mesh-section').hidden = !state.takes_meshes;
   meshes.begin(state.radius);
+  tell('Waiting for the first picture; kernels may have to be compiled');
   link = new Connection(wanted, {
     picture: show,
     text: heard,
