@@ -62,6 +62,11 @@ Credentials credentials_of(const http::request<http::empty_body>& request) {
           question == std::string_view::npos ? std::string_view() : target.substr(question + 1)};
 }
 
+/// Whoever reads another one of them than we do would be let in by ours.
+bool says_twice(const http::request<http::empty_body>& request) {
+  return request.count(http::field::host) > 1 || request.count(http::field::origin) > 1;
+}
+
 std::string_view path_of(const http::request<http::empty_body>& request) {
   const std::string_view target = view_of(request.target());
   return target.substr(0, target.find('?'));
@@ -264,7 +269,8 @@ class Server::Impl::Connection : public std::enable_shared_from_this<Connection>
       return last_words({413, "text/plain", "Requests have no body here\n"});
     if (error) return;
     const auto& request = parser_->get();
-    const Verdict verdict = server_.access->judge(credentials_of(request));
+    const Verdict verdict =
+        says_twice(request) ? Verdict::kForbidden : server_.access->judge(credentials_of(request));
     if (verdict == Verdict::kForbidden) {
       return last_words(
           {403, "text/plain", "Forbidden: open the address that raysplats has printed\n"});

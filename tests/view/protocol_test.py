@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `raysplats view` says to its page, to strangers and to damaged messages.
 usage: protocol_test.py PROGRAM"""
+import contextlib
 import json
 import math
 import os
@@ -63,6 +64,14 @@ class ViewerTest(unittest.TestCase):
         self.assertEqual(ask("/app.js", Host="evil.example:80", Cookie=cookie)[0], 403)
         self.assertEqual(ask("/app.js", Origin="http://evil.example", Cookie=cookie)[0], 403)
         self.assertEqual(ask("/app.js", Host=None, Cookie=cookie)[0], 403)
+        # Two of a kind are refused, whichever is ours.
+        ours = {"Host": self.viewer.host, "Origin": f"http://{self.viewer.host}"}
+        for name, theirs in (("Host", "evil.example:80"), ("Origin", "http://evil.example")):
+            for pair in ((ours[name], theirs), (theirs, ours[name]), (ours[name], ours[name])):
+                twice = {**ours, name: f"\r\n{name}: ".join(pair), "Cookie": cookie}
+                self.assertEqual(ask("/app.js", **twice)[0], 403, pair)
+                self.assertEqual(Channel(self.viewer, **twice).status, 403, pair)
+        self.assertEqual(ask("/app.js", **ours, Cookie=cookie)[0], 200)
         port = self.viewer.address.port
         for origin in ("null", "http://evil.example", f"http://127.0.0.1:{port}.evil.example",
                        f"http://localhost:{port}"):
@@ -229,6 +238,34 @@ class ViewerTest(unittest.TestCase):
                     pass
                 raise ConnectionError("closed")
         self.assertEqual(self.viewer.ask("/", Cookie=self.viewer.cookie())[0], 200)
+
+    def test_connections_beyond_the_limit_are_closed(self):
+        time.sleep(0.3)  # the other tests' connections have gone
+        request = f"GET / HTTP/1.1\r\nHost: {self.viewer.host}\r\nCookie: {self.viewer.cookie()}\r\n\r\n".encode()
+
+        def answered(channel):
+            try:
+                channel.sendall(request)
+                return channel.recv(12) == b"HTTP/1.1 200"
+            except ConnectionError:
+                return False
+
+        with Channel(self.viewer) as page, contextlib.ExitStack() as stack:
+            silent = [stack.enter_context(self.viewer.connect()) for _ in range(64)]
+            self.assertTrue(answered(silent[-1]))
+            with self.viewer.connect() as beyond:
+                self.assertFalse(answered(beyond))
+            # Pages that are open go on, and who goes makes room.
+            page.send_json(**view(9, moving=True))
+            self.assertEqual(page.receive()[1]["view"], 9)
+            silent[0].close()
+            for _ in range(100):
+                with self.viewer.connect() as next_one:
+                    if answered(next_one):
+                        break
+                time.sleep(0.02)
+            else:
+                self.fail("there is no room again")
 
     def test_pages_beyond_the_limit_wait_outside(self):
         time.sleep(0.3)  # the other tests' pages have gone
