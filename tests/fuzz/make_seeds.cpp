@@ -377,7 +377,13 @@ void make_view(const fs::path& root) {
                               R"("output":"depth"})");
   corpus.add("pick.json", R"({"type":"pick",)" + seen + R"(,"px":[0.5,0.25]})");
   corpus.add("fisheye.json", R"({"type":"view",)" + seen + R"(,"model":"fisheye"})");
-  corpus.add("pause.json", R"({"type":"pause"})");
+  corpus.add("panorama.json",
+             R"({"type":"view",)" + seen + R"(,"model":"equirectangular","png":true})");
+  corpus.add("scene.json", R"({"type":"scene",)" + seen + "}");
+  for (const std::string type : {"pause", "resume", "save", "leave", "meshes"})
+    corpus.add(type + ".json", R"({"type":")" + type + R"("})");
+  corpus.add("share.json", R"({"type":"share","share":0.25})");
+  corpus.add("remove.json", R"({"type":"remove","mesh":1})");
   const std::string placed = R"("material":"glass","at":[0,0,1],"rotate":[0,90,0],"size":0.5})";
   corpus.add("mesh.json", R"({"type":"mesh","format":"obj","name":"a.obj","bytes":100,)" + placed);
   corpus.add("place.json", R"({"type":"place","mesh":1,"moving":true,)" + placed);
