@@ -51,6 +51,7 @@ class GesturesTest(ModelCase):
         actions.perform()
 
     def test_drags_turn_or_move(self):
+        self.rest()
         self.listen()
         before = self.rig()
         self.mouse(60, 20, MouseButton.RIGHT)
@@ -79,7 +80,7 @@ class GesturesTest(ModelCase):
         ActionChains(self.page).send_keys("f").perform()
         self.assertEqual(self.page.find_element(By.ID, "mode").get_attribute("value"), "orbit")
         # The program is told of the last of it.
-        self.rest(self.seen()["id"])
+        self.settle()
         self.close([self.sent()["c2w"][i] for i in (3, 7, 11)], looked.eye)
         self.assertEqual(self.console(), [])
 

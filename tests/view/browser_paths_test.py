@@ -70,7 +70,7 @@ class PathsTest(ModelCase):
             field = self.page.find_element(By.ID, name)
             field.clear()
             field.send_keys(str(value))
-        before = self.rest(self.seen()["id"])
+        self.settle()
         # From the first view to the last, through places between them, and the last one rests.
         self.page.execute_script(
             "const rig = window.raysplats.rig; const way = window.raysplats.way = [[...rig.eye]];"
@@ -82,7 +82,7 @@ class PathsTest(ModelCase):
             self.page.execute_script(f"return {way}[{way}.length - 1]"), (7, 0, 0)) > 2)
         self.wait("its end", lambda: math.dist(
             self.page.execute_script("return window.raysplats.rig.eye"), (7, 0, 0)) < 1e-6)
-        self.rest(before["id"])
+        self.settle()
         self.assertLess(math.dist([self.sent()["c2w"][i] for i in (3, 7, 11)], (7, 0, 0)), 1e-6)
         between = [p for p in self.page.execute_script(f"return {way}")
                    if min(math.dist(p, eye), math.dist(p, (7, 0, 0))) > 0.5]
@@ -100,7 +100,7 @@ class PathsTest(ModelCase):
             for frame, place in ((names[0], 0), (names[-1], 1)):
                 self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")[place].find_element(
                     By.TAG_NAME, "button").click()
-                shown = self.rest(self.seen()["id"])
+                shown = self.settle()
                 self.assertGreater(psnr(os.path.join(out, frame), self.rendered(f"{button}{place}", shown["last"], 1)), 50)
         self.assertEqual(self.console(), [])
 

@@ -71,8 +71,9 @@ class PicturesTest(ModelCase):
         self.assertGreater(psnr(moved, self.rendered("moved", first["last"])), 35)
         self.assertLess(psnr(moved, still), 35)
         # It is kept once.
+        before = self.seen()
         self.drag(30, 0)
-        self.rest(self.seen()["id"])
+        self.rest(before["id"])
         self.assertEqual(os.listdir(self.downloads), [])
         self.assertEqual(self.console(), [])
 

@@ -104,6 +104,12 @@ class PageCase(BrowserCase):
         """The last view that the page has asked for since listen()."""
         return self.page.execute_script("return window.raysplats.sent")
 
+    def settle(self):
+        """Waits for the best picture of the last of what listen() has heard."""
+        return self.wait("the last picture", lambda: (
+            lambda s, sent: s if sent and s["last"]["last"] and s["last"]["id"] == sent["id"] else None)(
+                self.seen(), self.sent()))
+
     def target(self):
         """The centre that the camera turns around."""
         return self.page.execute_script("return window.raysplats.rig.target")
