@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "io/view_rows.hpp"
+#include "scene/sharpness.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -71,6 +72,15 @@ float Photo::weight(int x, int y) const {
                                    static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
                                    static_cast<std::size_t>(x)];
   return planes == 4 ? std::bit_cast<float>(word) : static_cast<float>(word) / kByte;
+}
+
+double sharpness(const Photo& photo) {
+  return raysplats::sharpness(photo.width, photo.height, [&](int y, double* row) {
+    for (int x = 0; x < photo.width; ++x) {
+      const std::array<float, 4> rgba = photo.at(x, y);
+      row[x] = static_cast<double>(rgba[3] * (rgba[0] + rgba[1] + rgba[2])) / 3.0;
+    }
+  });
 }
 
 std::size_t photo_bytes(const View& view) {

@@ -29,6 +29,9 @@ struct Photo {
   float weight(int x, int y) const;
 };
 
+/// sharpness() of the photo over black.
+double sharpness(const Photo& photo);
+
 /// What load_photo() will take.
 std::size_t photo_bytes(const View& view);
 

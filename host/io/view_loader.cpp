@@ -105,6 +105,11 @@ void ViewLoader::forget(std::size_t index) {
   entry.state = State::kIdle;
 }
 
+std::optional<double> ViewLoader::sharpness_of(std::size_t index) const {
+  const std::lock_guard lock(mutex_);
+  return index < views_.size() ? entries_[index].sharpness : std::nullopt;
+}
+
 std::size_t ViewLoader::cached_bytes() const {
   const std::lock_guard lock(mutex_);
   return cached_bytes_;
@@ -142,15 +147,18 @@ void ViewLoader::work(const std::stop_token& stop) {
     const std::size_t index = queue_.front();
     queue_.pop_front();
     entries_[index].state = State::kLoading;
+    std::optional<double> sharpness = entries_[index].sharpness;
     lock.unlock();
     std::shared_ptr<const Photo> image;
     std::exception_ptr error;
     try {
       image = std::make_shared<const Photo>(load_photo(views_[index]));
+      if (!sharpness) sharpness = io::sharpness(*image);
     } catch (...) {
       error = std::current_exception();
     }
     lock.lock();
+    entries_[index].sharpness = sharpness;
     if (error) {
       entries_[index].error = error;
       entries_[index].state = State::kFailed;

@@ -87,14 +87,14 @@ std::map<std::string, std::vector<double>> columns_of(const fs::path& path) {
 }
 
 Curve curve(const std::string& name,
-            std::map<std::string, std::vector<double>>& columns,
+            const std::map<std::string, std::vector<double>>& columns,
             const std::string& x,
             const std::string& y) {
   Curve out{name, {}};
-  const std::vector<double>& from = columns[x];
-  const std::vector<double>& to = columns[y];
-  for (std::size_t i = 0; i < std::min(from.size(), to.size()); ++i)
-    out.points.emplace_back(from[i], to[i]);
+  const auto from = columns.find(x), to = columns.find(y);
+  if (from == columns.end() || to == columns.end()) return out;
+  for (std::size_t i = 0; i < std::min(from->second.size(), to->second.size()); ++i)
+    out.points.emplace_back(from->second[i], to->second[i]);
   return out;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -28,11 +29,23 @@ std::string text(const nlohmann::json& json, const char* key);
 /// The objects of a list.
 std::vector<nlohmann::json> objects(const nlohmann::json& json, const char* key);
 
+/// What somebody needs to make a run again: what it is called, and the text of metrics.json.
+struct Origin {
+  const char* name;
+  const char* key;
+};
+constexpr std::array<Origin, 6> kOrigins{{{"Device", "device"},
+                                          {"Driver", "driver"},
+                                          {"RaySplats-CL", "version"},
+                                          {"Command", "command"},
+                                          {"Fingerprint of the data set", "data"},
+                                          {"Hash of the model (XXH3, 128 bits)", "model_hash"}}};
+
 /// Columns of metrics.csv by name; rows that are incomplete or no numbers are left out.
 std::map<std::string, std::vector<double>> columns_of(const std::filesystem::path& path);
 /// One column over another.
 Curve curve(const std::string& name,
-            std::map<std::string, std::vector<double>>& columns,
+            const std::map<std::string, std::vector<double>>& columns,
             const std::string& x,
             const std::string& y);
 /// One number of all evaluations over another.

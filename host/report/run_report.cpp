@@ -33,7 +33,7 @@ std::string row(const std::string& name, const std::string& value) {
   return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", escaped(name), escaped(value));
 }
 
-std::string charts(std::map<std::string, std::vector<double>> columns,
+std::string charts(const std::map<std::string, std::vector<double>>& columns,
                    const std::vector<Json>& evaluations) {
   const Curve psnr[] = {curve("training view", columns, "iteration", "psnr"),
                         evaluated("held-out views", evaluations, "iteration", "psnr")};
@@ -152,7 +152,7 @@ std::string kernels(const Json& metrics) {
                         escaped(text(kernel, "name")), number(kernel, "calls"),
                         number(kernel, "ms"), share_cell(number(kernel, "share")));
   }
-  if (rows.empty()) return "";
+  if (rows.empty()) return "<p>Run with --profile to see which kernels take the time.</p>\n";
   return "<table>\n<tr><th>kernel</th><th>launches</th><th>ms</th><th>share</th></tr>\n" + rows +
          "</table>\n";
 }
@@ -160,16 +160,10 @@ std::string kernels(const Json& metrics) {
 /// What somebody needs to make the run again, as far as its files say it.
 std::string origin(const Json& metrics) {
   std::string rows;
-  const auto named = [&](const char* name, const char* key) {
+  for (const auto& [name, key] : kOrigins) {
     const std::string value = text(metrics, key);
     if (!value.empty()) rows += row(name, value);
-  };
-  named("Device", "device");
-  named("Driver", "driver");
-  named("RaySplats-CL", "version");
-  named("Command", "command");
-  named("Fingerprint of the data set", "data");
-  named("Hash of the model (XXH3, 128 bits)", "model_hash");
+  }
   if (metrics.contains("seed")) rows += row("Seed", fmt::format("{:.0f}", number(metrics, "seed")));
   return rows;
 }
@@ -212,19 +206,19 @@ std::string run_report(const fs::path& run) {
   facts += row("Device memory",
                fmt::format("{:.0f} MiB at most", number(metrics, "peak_device_bytes") / 1048576.0));
   facts += origin(metrics);
-  std::string warnings;
-  for (const std::string& each :
-       warnings_of(metrics, settings(text_of(run / "config.toml")), columns, views))
-    warnings += fmt::format("<p class=\"warn\">{}.</p>\n", escaped(each));
-  return report::page(run_name(run),
-                      warnings + "<table>\n" + facts + "</table>\n" +
-                          section("Curves", charts(columns, evaluations)) +
-                          section("Held-out views", held_out(run, evaluations, views)) +
-                          section("Cameras", in_grid(camera_map(run, views))) +
-                          section("Model", model_histograms(run)) +
-                          section("Exposure", exposures(run)) +
-                          section("Kernels", kernels(metrics)) +
-                          section("Settings that differ from the defaults", configuration(run)));
+  const std::vector<std::string> warnings =
+      warnings_of(metrics, settings(text_of(run / "config.toml")), columns, views);
+  std::string said = fmt::format("<p>{}</p>\n", escaped(verdict(metrics, warnings.size())));
+  for (const std::string& each : warnings)
+    said += fmt::format("<p class=\"warn\">{}.</p>\n", escaped(each));
+  return report::page(
+      run_name(run),
+      said + "<table>\n" + facts + "</table>\n" + section("Curves", charts(columns, evaluations)) +
+          section("Held-out views", held_out(run, evaluations, views)) +
+          section("Cameras", in_grid(camera_map(run, views))) +
+          section("Model", model_histograms(run)) + section("Exposure", exposures(run)) +
+          section("Kernels", kernels(metrics)) +
+          section("Settings that differ from the defaults", configuration(run)));
 }
 
 void write_run_report(const fs::path& run, const fs::path& file) {

@@ -50,6 +50,15 @@ std::string far_below(const std::vector<Json>& views,
   return count > kNamed ? fmt::format("{} and {} more", names, count - kNamed) : names;
 }
 
+bool is_complete(const Json& metrics) {
+  const auto complete = metrics.find("complete");
+  return complete != metrics.end() && complete->is_boolean() && complete->get<bool>();
+}
+
+std::string counted(double number, const char* thing) {
+  return fmt::format("{:.0f} {}{}", number, thing, number == 1.0 ? "" : "s");
+}
+
 /// Whether the limit has cut off growth. The other strategies go there by plan.
 bool stopped_growing(const Json& metrics,
                      const std::map<std::string, std::string>& settings,
@@ -63,22 +72,41 @@ bool stopped_growing(const Json& metrics,
          *std::max_element(count->second.begin(), count->second.end()) >= most;
 }
 
+/// Names of the photos that are far less sharp than the others; "" for none.
+std::string blurred(const std::vector<Json>& photos) {
+  std::vector<double> octaves;
+  octaves.reserve(photos.size());
+  for (const Json& photo : photos)
+    octaves.push_back(std::log2(std::max(number(photo, "sharpness"), 1e-12)));
+  return far_below(photos, octaves, kBlurredOctaves);
+}
+
 /// About views that stand out, which tells of their photos and poses more than of the model.
 void warn_of_views(const std::vector<Json>& views, std::vector<std::string>& out) {
-  std::vector<double> psnr, octaves;
-  for (const Json& view : views) {
-    psnr.push_back(number(view, "psnr"));
-    octaves.push_back(std::log2(std::max(number(view, "sharpness"), 1e-12)));
-  }
+  std::vector<double> psnr;
+  psnr.reserve(views.size());
+  for (const Json& view : views) psnr.push_back(number(view, "psnr"));
   const std::string odd = far_below(views, psnr, kOddDecibels);
-  const std::string blurred = far_below(views, octaves, kBlurredOctaves);
   if (!odd.empty()) {
     out.push_back("Views far worse than the others, whose pose or photo may be wrong: " + odd);
   }
-  if (!blurred.empty()) out.push_back("Photos less sharp than the others: " + blurred);
+  if (const std::string names = blurred(views); !names.empty())
+    out.push_back("Held-out photos less sharp than the others: " + names);
 }
 
 }  // namespace
+
+std::string verdict(const Json& metrics, std::size_t warnings) {
+  const std::vector<Json> evaluations = objects(metrics, "evaluations");
+  const std::string quality =
+      evaluations.empty()
+          ? "no held-out views"
+          : fmt::format("{:.1f} dB on {}", number(evaluations.back(), "psnr"),
+                        counted(number(evaluations.back(), "views"), "held-out view"));
+  return fmt::format(
+      "{}: {}, {}.", is_complete(metrics) ? "Complete" : "Not over", quality,
+      warnings == 0 ? "nothing to warn of" : counted(static_cast<double>(warnings), "warning"));
+}
 
 std::vector<std::string> warnings_of(const Json& metrics,
                                      const std::map<std::string, std::string>& settings,
@@ -86,8 +114,7 @@ std::vector<std::string> warnings_of(const Json& metrics,
                                      const std::vector<Json>& views) {
   const std::vector<Json> evaluations = objects(metrics, "evaluations");
   std::vector<std::string> out;
-  const auto complete = metrics.find("complete");
-  if (complete == metrics.end() || !complete->is_boolean() || !complete->get<bool>()) {
+  if (!is_complete(metrics)) {
     out.push_back(fmt::format("The run is not over: {:.0f} of {:.0f} iterations",
                               number(metrics, "iteration"), number(metrics, "iterations")));
   }
@@ -120,6 +147,8 @@ std::vector<std::string> warnings_of(const Json& metrics,
                     number(metrics, "most_gaussians")));
   }
   warn_of_views(views, out);
+  if (const std::string names = blurred(objects(metrics, "photos")); !names.empty())
+    out.push_back("Training photos less sharp than the others, which blur the model: " + names);
   return out;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -15,5 +16,9 @@ std::vector<std::string> warnings_of(const nlohmann::json& metrics,
                                      const std::map<std::string, std::string>& settings,
                                      const std::map<std::string, std::vector<double>>& columns,
                                      const std::vector<nlohmann::json>& views);
+
+/// The whole in one sentence: whether the run is over, how good its last evaluation was, and how
+/// many warnings follow.
+std::string verdict(const nlohmann::json& metrics, std::size_t warnings);
 
 }  // namespace raysplats::report

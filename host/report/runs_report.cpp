@@ -15,6 +15,7 @@
 #include "report/html.hpp"
 #include "report/run_files.hpp"
 #include "report/run_report.hpp"
+#include "report/run_warnings.hpp"
 
 namespace raysplats {
 namespace {
@@ -33,7 +34,10 @@ struct Run {
   std::string letter;  ///< what stands for it in curves
   Json metrics;
   std::vector<Json> evaluations;
-  std::vector<Json> views;  ///< of the last evaluation
+  std::vector<Json> views;                             ///< of the last evaluation
+  std::map<std::string, std::vector<double>> columns;  ///< of metrics.csv
+  std::map<std::string, std::string> settings;
+  std::vector<std::string> warnings;
 };
 
 std::vector<Run> read_runs(const std::vector<fs::path>& folders) {
@@ -46,6 +50,9 @@ std::vector<Run> read_runs(const std::vector<fs::path>& folders) {
     run.metrics = metrics_of(folder);
     run.evaluations = objects(run.metrics, "evaluations");
     run.views = views_of(folder, run.evaluations);
+    run.columns = columns_of(folder / "metrics.csv");
+    run.settings = settings(text_of(folder / "config.toml"));
+    run.warnings = warnings_of(run.metrics, run.settings, run.columns, run.views);
     runs.push_back(std::move(run));
   }
   return runs;
@@ -70,6 +77,18 @@ std::string numbers_row(const std::string& what,
   return out + "</tr>\n";
 }
 
+/// What the reports of the runs begin with, a cell for each.
+std::string verdicts(const std::vector<Run>& runs) {
+  std::string out = "<tr><th>Verdict</th>";
+  for (const Run& run : runs) {
+    out += fmt::format("<td>{}", escaped(verdict(run.metrics, run.warnings.size())));
+    for (const std::string& each : run.warnings)
+      out += fmt::format("<br/><span class=\"warn\">{}.</span>", escaped(each));
+    out += "</td>";
+  }
+  return out + "</tr>\n";
+}
+
 std::string heads(const std::vector<Run>& runs) {
   std::string out = "<tr><th></th>";
   for (std::size_t i = 0; i < runs.size(); ++i) {
@@ -87,7 +106,7 @@ std::string facts(const std::vector<Run>& runs) {
   const auto metric = [](const char* key, double scale = 1.0) {
     return [key, scale](const Run& run) { return scale * number(run.metrics, key); };
   };
-  std::string out = "<table>\n" + heads(runs);
+  std::string out = "<table>\n" + heads(runs) + verdicts(runs);
   out += numbers_row(
       "PSNR of held-out views, dB", runs, "{:.2f}",
       [](const Run& run) { return last_of(run, "psnr"); }, true);
@@ -98,10 +117,12 @@ std::string facts(const std::vector<Run>& runs) {
   out += numbers_row("Training, s", runs, "{:.0f}", metric("training_seconds"));
   out += numbers_row("Device memory at most, MiB", runs, "{:.0f}",
                      metric("peak_device_bytes", 1.0 / 1048576.0));
-  out += "<tr><th>Device</th>";
-  for (const Run& run : runs)
-    out += fmt::format("<td>{}</td>", escaped(text(run.metrics, "device")));
-  return out + "</tr>\n</table>\n";
+  for (const auto& [name, key] : kOrigins) {
+    out += fmt::format("<tr><th>{}</th>", escaped(name));
+    for (const Run& run : runs) out += fmt::format("<td>{}</td>", escaped(text(run.metrics, key)));
+    out += "</tr>\n";
+  }
+  return out + "</table>\n";
 }
 
 std::string charts(const std::vector<Run>& runs) {
@@ -112,13 +133,10 @@ std::string charts(const std::vector<Run>& runs) {
     for (const Run& run : runs) curves.push_back(evaluated(run.letter, run.evaluations, x, y));
     return chart(title, label, curves);
   };
-  std::vector<std::map<std::string, std::vector<double>>> columns;
-  columns.reserve(runs.size());
-  for (const Run& run : runs) columns.push_back(columns_of(run.folder / "metrics.csv"));
   const auto of_columns = [&](const char* title, const char* x, const char* label, const char* y) {
     std::vector<Curve> curves;
-    for (std::size_t i = 0; i < runs.size(); ++i)
-      curves.push_back(curve(runs[i].letter, columns[i], x, y));
+    curves.reserve(runs.size());
+    for (const Run& run : runs) curves.push_back(curve(run.letter, run.columns, x, y));
     return chart(title, label, curves);
   };
   return "<div class=\"charts\">\n" +
@@ -193,18 +211,16 @@ std::string held_out(const std::vector<Run>& runs) {
 }
 
 std::string differences(const std::vector<Run>& runs) {
-  std::vector<std::map<std::string, std::string>> all;
   std::set<std::string> keys;
   for (const Run& run : runs) {
-    all.push_back(settings(text_of(run.folder / "config.toml")));
-    for (const auto& [key, value] : all.back()) keys.insert(key);
+    for (const auto& [key, value] : run.settings) keys.insert(key);
   }
   std::string rows;
   for (const std::string& key : keys) {
     std::vector<std::string> values;
-    for (const auto& of_run : all) {
-      const auto found = of_run.find(key);
-      values.push_back(found == of_run.end() ? "" : found->second);
+    for (const Run& run : runs) {
+      const auto found = run.settings.find(key);
+      values.push_back(found == run.settings.end() ? "" : found->second);
     }
     if (std::all_of(values.begin(), values.end(),
                     [&](const std::string& value) { return value == values.front(); }))

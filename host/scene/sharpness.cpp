@@ -2,30 +2,49 @@
 #include "scene/sharpness.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <vector>
 
 namespace raysplats {
 namespace {
 
-double brightness(const Image& image, int x, int y) {
+/// Sum of the squares of the Laplacian along the middle one of three rows.
+double squares_of_middle(const std::array<std::vector<double>, 3>& rows) {
+  const std::vector<double>& middle = rows[1];
   double sum = 0.0;
-  const int colors = std::min(image.channels, 3);
-  for (int c = 0; c < colors; ++c) sum += static_cast<double>(image.at(x, y, c));
-  return sum / colors;
+  for (std::size_t x = 1; x + 1 < middle.size(); ++x) {
+    const double laplacian =
+        middle[x - 1] + middle[x + 1] + rows[0][x] + rows[2][x] - 4.0 * middle[x];
+    sum += laplacian * laplacian;
+  }
+  return sum;
 }
 
 }  // namespace
 
-double sharpness(const Image& image) {
+double sharpness(int width, int height, const BrightnessRow& read) {
+  if (width < 3 || height < 3) return 0.0;
+  std::array<std::vector<double>, 3> rows;
+  for (std::vector<double>& row : rows) row.resize(static_cast<std::size_t>(width));
   double sum = 0.0;
-  for (int y = 1; y + 1 < image.height; ++y) {
-    for (int x = 1; x + 1 < image.width; ++x) {
-      const double laplacian = brightness(image, x - 1, y) + brightness(image, x + 1, y) +
-                               brightness(image, x, y - 1) + brightness(image, x, y + 1) -
-                               4.0 * brightness(image, x, y);
-      sum += laplacian * laplacian;
-    }
+  for (int y = 0; y < height; ++y) {
+    read(y, rows[2].data());
+    if (y > 1) sum += squares_of_middle(rows);
+    std::rotate(rows.begin(), rows.begin() + 1, rows.end());
   }
-  return sum / std::max<double>(1.0, static_cast<double>(image.pixels()));
+  return sum / (static_cast<double>(width) * height);
+}
+
+double sharpness(const Image& image) {
+  const int colors = std::min(image.channels, 3);
+  return sharpness(image.width, image.height, [&](int y, double* row) {
+    for (int x = 0; x < image.width; ++x) {
+      double sum = 0.0;
+      for (int c = 0; c < colors; ++c) sum += static_cast<double>(image.at(x, y, c));
+      row[x] = sum / colors;
+    }
+  });
 }
 
 }  // namespace raysplats

@@ -36,6 +36,9 @@ class PhotoCache {
   /// Decodes these photos in the background as far as they are not on the device.
   void prefetch(std::span<const std::size_t> views);
 
+  /// How sharp a photo is; none for one that nothing has asked for yet.
+  std::optional<double> sharpness_of(std::size_t view) const { return loader_.sharpness_of(view); }
+
   /// Bytes of the photos that stay on the device.
   std::size_t cached_bytes() const { return cached_; }
 

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -147,6 +148,7 @@ struct Trainer::Impl {
   TraceOptions trace_options();     // that the model looks right with
   Gaussians model_to_save() const;  // without what has left --bounds
   void save_model();
+  nlohmann::json photo_sharpness() const;
   void write_metrics(bool complete);
   std::string capped_share(std::uint64_t capped);
   void warn_of_capped_rays(std::uint64_t capped) const;

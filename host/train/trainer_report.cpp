@@ -28,6 +28,16 @@ nlohmann::json kernels_of(Context& context) {
 
 }  // namespace
 
+// How sharp the training photos are that the run has read so far.
+nlohmann::json Trainer::Impl::photo_sharpness() const {
+  nlohmann::json out = nlohmann::json::array();
+  for (std::size_t i = 0; i < train_cameras.size(); ++i) {
+    const std::optional<double> sharpness = photo_cache.sharpness_of(i);
+    if (sharpness) out.push_back({{"name", train_cameras[i].name}, {"sharpness", *sharpness}});
+  }
+  return out;
+}
+
 // Waits for the device and reports the step just done.
 void Trainer::Impl::report(Progress& progress) {
   settle();
@@ -159,6 +169,7 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", device.name},
                      {"driver", fmt::format("{}, {}", device.platform, device.driver_version)},
+                     {"photos", photo_sharpness()},
                      {"kernels", kernels_of(context)}});
 }
 

@@ -4,6 +4,8 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -56,6 +58,31 @@ void add_mask(const std::string& data, int width, int height, float value) {
   write_file(data + "/transforms_train.json", json.dump());
 }
 
+/// The photo as a lens out of focus had shown it: a Gaussian of `sigma` pixels over it.
+raysplats::Image out_of_focus(const raysplats::Image& photo, double sigma) {
+  const int reach = static_cast<int>(std::ceil(3 * sigma));
+  const auto along = [&](const raysplats::Image& from, int step_x, int step_y) {
+    raysplats::Image out(from.width, from.height, from.channels);
+    for (int y = 0; y < from.height; ++y) {
+      for (int x = 0; x < from.width; ++x) {
+        for (int c = 0; c < from.channels; ++c) {
+          double sum = 0, weights = 0;
+          for (int k = -reach; k <= reach; ++k) {
+            const int at_x = std::clamp(x + k * step_x, 0, from.width - 1);
+            const int at_y = std::clamp(y + k * step_y, 0, from.height - 1);
+            const double weight = std::exp(-0.5 * k * k / (sigma * sigma));
+            sum += weight * static_cast<double>(from.at(at_x, at_y, c));
+            weights += weight;
+          }
+          out.at(x, y, c) = static_cast<float>(sum / weights);
+        }
+      }
+    }
+    return out;
+  };
+  return along(along(photo, 1, 0), 0, 1);
+}
+
 Outcome train(const std::string& data, const std::string& run, const Words& more = {}) {
   Words words{"train", data,          "-o", run, "-n", "4", "--resolution-schedule",
               "[]",    "--sh-degree", "0"};
@@ -81,6 +108,30 @@ void check_refused(const Outcome& outcome, int code, const std::string& part) {
 }
 
 }  // namespace
+
+TEST_CASE("the report names the training photo that is out of focus, and no sharp one") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  REQUIRE(raysplats_program(
+              {"generate", data, "--size", "64", "--train-views", "9", "--test-views", "1", "-q"})
+              .code == 0);
+  const auto report = [&](const std::string& run) {
+    const Outcome outcome = raysplats_program({"train", data, "-o", run, "-n", "9"});
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    return read_file(run + "/report.html");
+  };
+  const std::string warning = "photos less sharp than the others";
+  CHECK(!contains(report(folder / "sharp"), warning));
+  const std::string photo = data + "/train/r_4.png";
+  raysplats::write_image(photo, out_of_focus(raysplats::read_image(photo), 3.0));
+  const std::string page = report(folder / "blurred");
+  const std::size_t at = page.find(warning);
+  REQUIRE(at != std::string::npos);
+  const std::string sentence = page.substr(at, page.find('<', at) - at);
+  INFO(sentence);
+  CHECK(sentence.ends_with(": train/r_4.png."));
+}
 
 TEST_CASE("masks that cannot belong to their photo are refused with their name") {
   const TemporaryFolder folder;

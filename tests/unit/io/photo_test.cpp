@@ -13,6 +13,7 @@
 
 #include "io/image_file.hpp"
 #include "raysplats/io.hpp"
+#include "scene/sharpness.hpp"
 #include "scratch.hpp"
 #include "util/rng.hpp"
 
@@ -98,6 +99,13 @@ TEST_CASE("photos of 8 bits are kept as in their files, grey or colour, with alp
     CHECK(photo.bytes() == 4 * kWidth * kHeight);
     CHECK(photo.bytes() == io::photo_bytes(view));
     CHECK(worst_difference(photo, numbers, channels, 255) < 1e-7);
+    Image over_black(kWidth, kHeight, 1);
+    for (std::size_t i = 0; i < over_black.pixels(); ++i) {
+      double sum = 0;
+      for (int c = 0; c < 3; ++c) sum += channel(numbers, channels, i, c, 255);
+      over_black.data[i] = static_cast<float>(sum / 3 * channel(numbers, channels, i, 3, 255));
+    }
+    CHECK(io::sharpness(photo) == doctest::Approx(sharpness(over_black)).epsilon(1e-5));
     // The word of the device: r, g, b, a from the low byte.
     for (int c = 0; c < 4; ++c) {
       CHECK((photo.words[5] >> (8 * c) & 255u) ==

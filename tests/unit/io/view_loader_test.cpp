@@ -56,6 +56,23 @@ TEST_CASE("views come back right in any order, prefetched or not, within the bud
   }
 }
 
+TEST_CASE("a loaded picture says how sharp it is, also once it is forgotten") {
+  const Scratch scratch;
+  const auto views = make_views(scratch, 3);
+  Image dot(kSide, kSide, 3);
+  for (int c = 0; c < 3; ++c) dot.at(5, 6, c) = 1.0f;
+  write_image(views[1].image_path, dot);
+  io::ViewLoader loader(views, 3 * kBytes);
+  for (std::size_t i = 0; i < 4; ++i) CHECK(!loader.sharpness_of(i));
+  for (std::size_t i = 0; i < 2; ++i) {
+    loader.get(i);
+    loader.forget(i);
+  }
+  CHECK(*loader.sharpness_of(0) == 0.0);
+  CHECK(*loader.sharpness_of(1) == doctest::Approx((16.0 + 4.0) / (kSide * kSide)));
+  CHECK(!loader.sharpness_of(2));
+}
+
 TEST_CASE("what was used last stays: deleted files show what is kept") {
   const Scratch scratch;
   const auto views = make_views(scratch, 4);

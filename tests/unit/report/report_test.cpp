@@ -97,6 +97,7 @@ TEST_CASE("a report holds what the run says, escaped, and nothing from elsewhere
   const Run run;
   const std::string page = run_report(run.path());
   CHECK(fault(page) == "");
+  CHECK(has(page, "<p>Complete: 20.2 dB on 3 held-out views, 2 warnings.</p>"));
   CHECK(has(page, "PSNR 20.25 dB"));
   CHECK(has(page, "5.00 % of the rays stopped at --max-hits"));
   CHECK(has(page, "ends 1.25 dB below its best, at iteration 100"));
@@ -122,6 +123,7 @@ TEST_CASE("a report of a run that is under way or damaged says so") {
   fs::remove(run.path() / "metrics.csv");
   const std::string page = run_report(run.path());
   CHECK(fault(page) == "");
+  CHECK(has(page, "<p>Not over: no held-out views, 1 warning.</p>"));
   CHECK(has(page, "7 of 90 iterations"));
   CHECK(has(page, "no held-out views"));
   run.write("metrics.json", "{");
@@ -244,18 +246,25 @@ TEST_CASE("views that stand out, a full model and blurred photos are warned of")
     "evaluations":[{"iteration":200,"psnr":20}]})");
   const std::string page = run_report(run.path());
   CHECK(has(page, "whose pose or photo may be wrong: 3_.png."));
-  CHECK(has(page, "less sharp than the others: 7_.png."));
+  CHECK(has(page, "Held-out photos less sharp than the others: 7_.png."));
+  CHECK(!has(page, "Training photos"));
   CHECK(has(page, "<td>140, at most 141</td>"));
   CHECK(!has(page, "stopped at its limit"));  // where the budget strategy always ends
   run.write("config.toml", "strategy = \"adc\"\n");
   CHECK(has(run_report(run.path()), "stopped at its limit of 141"));
+  // The same of photos to train with, which metrics.json itself has.
+  run.write("metrics.json", R"({"complete":true,"photos":[)" + images + "]}");
+  CHECK(has(run_report(run.path()),
+            "Training photos less sharp than the others, which blur the model: 7_.png."));
 }
 
 TEST_CASE("a report shows model, cameras, exposure, kernels and where it all comes from") {
   const Run run;
   const std::string bare = run_report(run.path());
-  for (const char* heading : {"<h2>Model", "<h2>Cameras", "<h2>Exposure", "<h2>Kernels"})
+  for (const char* heading : {"<h2>Model", "<h2>Cameras", "<h2>Exposure"})
     CHECK(!has(bare, heading));
+  const std::string advice = "Run with --profile to see which kernels take the time";
+  CHECK(has(bare, advice));
   run.write("metrics.json",
             R"({"complete":true,"seed":42,"driver":"<d>","data":"00ff","version":"9.8",
     "kernels":[{"name":"trace<x>","calls":12,"ms":340,"share":0.75}],
@@ -281,6 +290,8 @@ TEST_CASE("a report shows model, cameras, exposure, kernels and where it all com
   CHECK(has(page, "<td>00ff</td>"));
   CHECK(has(page, "<th>trace&lt;x&gt;</th><td>12</td><td>340.0</td>"));
   CHECK(has(page, "75.0 %"));
+  CHECK(!has(page, advice));
+  CHECK(has(page, "<p>Complete: 20.0 dB on 0 held-out views, nothing to warn of.</p>"));
   CHECK(has(page, "held out: orange 10.00 dB to blue 30.00 dB"));
   CHECK(has(page, "<title>&lt;low&gt;, 10.00 dB</title>"));
   CHECK(has(page, "fill=\"rgb(214,96,30)\""));
@@ -297,7 +308,8 @@ TEST_CASE("several runs stand side by side, with what differs between them") {
   const Run first("_<one>"), second("_two"), third("_three");
   second.write("metrics.json",
                R"({"complete":true,"iteration":300,"gaussians":999,"device":"other","evaluations":[
-          {"iteration":200,"training_seconds":9,"psnr":23.5,"ssim":0.7,"views":2}]})");
+          {"iteration":200,"training_seconds":9,"psnr":23.5,"ssim":0.7,"views":1}],
+          "driver":"<d> 2","data":"00aa","model_hash":"00bb"})");
   second.write("config.toml", "iterations = 300\nname = \"<script>\"\nseed = 7\n");
   second.write("eval/iteration_200/metrics.json",
                R"({"images":[{"name":"a<b>&.png","psnr":11,"ssim":0.5},
@@ -308,6 +320,12 @@ TEST_CASE("several runs stand side by side, with what differs between them") {
   CHECK(has(page, "<td>20.25</td><td><b>23.50</b></td>"));
   CHECK(has(page, "<td><b>0.7500</b></td><td>0.7000</td>"));
   CHECK(has(page, "<td>140</td><td>999</td>"));
+  CHECK(has(page, "<td>Complete: 20.2 dB on 3 held-out views, 2 warnings.<br/>"));
+  CHECK(has(page, "ends 1.25 dB below its best, at iteration 100.</span>"));
+  CHECK(has(page, "<td>Complete: 23.5 dB on 1 held-out view, nothing to warn of.</td>"));
+  CHECK(has(page, "<tr><th>Driver</th><td></td><td>&lt;d&gt; 2</td></tr>"));
+  CHECK(has(page, "data set</th><td></td><td>00aa</td></tr>"));
+  CHECK(has(page, "128 bits)</th><td>00112233445566778899aabbccddeeff</td><td>00bb</td></tr>"));
   // The view in which they differ by 6 dB comes before that in which they differ by one.
   const std::size_t good = page.find("A: good.png, 30.00 dB"), bad = page.find("A: a&lt;b");
   CHECK(good != std::string::npos);
