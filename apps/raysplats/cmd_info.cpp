@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "info_files.hpp"
+#include "info_parts.hpp"
 #include "io/mesh_file.hpp"
 #include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
@@ -59,22 +60,6 @@ const char* kind_name(DatasetKind kind) {
       break;
   }
   return "nerfstudio";
-}
-
-const char* kind_name(Material::Kind kind) {
-  switch (kind) {
-    case Material::Kind::kMirror:
-      return "mirror";
-    case Material::Kind::kGlass:
-      return "glass";
-    case Material::Kind::kTransparent:
-      return "transparent";
-    case Material::Kind::kEmissive:
-      return "emissive";
-    case Material::Kind::kDiffuse:
-      break;
-  }
-  return "diffuse";
 }
 
 const char* kind_name(Light::Kind kind) {
@@ -121,7 +106,7 @@ Json describe(const io::MeshFile& file) {
   }
   Json materials = Json::array();
   for (const Material& material : file.materials) {
-    materials.push_back({{"name", material.name}, {"kind", kind_name(material.kind)}});
+    materials.push_back({{"name", material.name}, {"kind", material_kind(material.kind)}});
   }
   return {{"triangles", file.mesh.triangle_count()},
           {"vertices", file.mesh.vertex_count()},
@@ -140,7 +125,8 @@ Json describe(const SceneFile& scene) {
     meshes.push_back({{"file", mesh.file.string()}, {"moves", mesh.moves()}});
   }
   for (const SceneMaterial& each : scene.materials) {
-    materials.push_back({{"name", each.material.name}, {"kind", kind_name(each.material.kind)}});
+    materials.push_back(
+        {{"name", each.material.name}, {"kind", material_kind(each.material.kind)}});
   }
   for (const Light& light : scene.lights) lights.push_back(kind_name(light.kind));
   Json camera{{"source", source_name(scene.camera.source)},
@@ -302,7 +288,7 @@ void print_json(const Json& json) {
 void info_model(const Options& options) {
   const ModelSource source = find_model(options.path);
   const ModelSummary summary = summarize(read_model(source.file));
-  const bool run = std::filesystem::is_directory(options.path);
+  const bool run = is_run_folder(options.path);
   if (options.json) {
     Json json{
         {"type", run ? "run" : "model"}, {"path", options.path}, {"model", source.file.string()}};
@@ -399,15 +385,20 @@ void info_dataset(const Options& options) {
 void run(const Options& options) {
   const std::filesystem::path path = options.path;
   if (!std::filesystem::exists(path)) {
-    throw DataError(fmt::format(
-        "{} does not exist: name a PLY, a mesh, a scene file, a data set or a run", path.string()));
+    throw DataError(
+        fmt::format("{} does not exist: name a model, a mesh, a scene file, a data set or a run",
+                    path.string()));
   }
   const bool folder = std::filesystem::is_directory(path);
   std::optional<Json> other;
-  if (!folder) other = describe_file(path);
+  if (!folder) {
+    other = describe_file(path);
+  } else if (!is_model_folder(path)) {
+    other = describe_colmap(path);
+  }
   if (other) {
     info_file(options, *other);
-  } else if (folder && !is_run_folder(path)) {
+  } else if (folder && !is_model_folder(path)) {
     info_dataset(options);
   } else if (!folder && is_scene_file(options.path)) {
     info_scene(options);
@@ -422,12 +413,14 @@ void run(const Options& options) {
 
 Command add_info_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
-      "info", "Describe a model, a data set, a training run, or any other file that is read");
+      "info",
+      "Describe a model, a data set, a training run, or another file that is read or written");
   auto options = std::make_shared<Options>();
   command
       ->add_option("PATH", options->path,
-                   "Model (PLY, .splat, SPZ, SOG, glTF), mesh, scene file, data set or run folder; "
-                   "cameras, camera path, rays (.npy), picture, checkpoint or configuration")
+                   "Model (PLY, .splat, SPZ, SOG, glTF), mesh, .mtl, scene file, data set, COLMAP "
+                   "model or run folder; points (PLY), cameras, camera path, rays (.npy), picture, "
+                   "checkpoint, configuration, network (.onnx), metrics, exposures or benchmark")
       ->required()
       ->type_name("");
   command->add_flag("--json", options->json, "Print JSON");

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "info_parts.hpp"
 #include "io/byte_reader.hpp"
 #include "io/camera_path_file.hpp"
 #include "io/image_file.hpp"
@@ -28,30 +29,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Number, sizes and lenses of cameras.
-Json describe(std::span<const Camera> cameras) {
-  std::map<std::pair<int, int>, std::size_t> sizes;
-  std::map<std::string, std::size_t> models;
-  for (const Camera& camera : cameras) {
-    ++sizes[{camera.width, camera.height}];
-    ++models[model_name(camera.model)];
-  }
-  Json out{
-      {"cameras", cameras.size()}, {"sizes", Json::array()}, {"camera_models", Json::object()}};
-  for (const auto& [size, count] : sizes) {
-    out["sizes"].push_back({{"width", size.first}, {"height", size.second}, {"cameras", count}});
-  }
-  for (const auto& [name, count] : models) out["camera_models"][name] = count;
-  return out;
-}
-
 Json describe_path(const std::filesystem::path& path) {
   const CameraPathFile file = read_camera_path(path, {});
   Json out{{"type", "camera path"},
            {"frames", file.cameras.size()},
            {"fps", file.fps},
            {"closed", file.closed}};
-  out.update(describe(file.cameras));
+  out.update(describe_cameras(file.cameras));
   out.erase("cameras");
   return out;
 }
@@ -74,7 +58,7 @@ Json describe_views(const nlohmann::json& views, const std::filesystem::path& pa
     cameras.push_back(camera);
   }
   Json out{{"type", "cameras of viewers"}};
-  out.update(describe(cameras));
+  out.update(describe_cameras(cameras));
   out.erase("camera_models");
   return out;
 }
@@ -93,9 +77,9 @@ std::optional<Json> describe_json(const std::filesystem::path& path) {
   }
   const nlohmann::json json = io::parse_json_object(bytes, path);
   if (json.contains("camera_path") || json.contains("keyframes")) return describe_path(path);
-  if (!json.contains("frames")) return std::nullopt;
+  if (!json.contains("frames")) return describe_record(json, path);
   Json out{{"type", "cameras"}};
-  out.update(describe(read_cameras(path)));
+  out.update(describe_cameras(read_cameras(path)));
   return out;
 }
 
@@ -175,6 +159,38 @@ const char* model_name(CameraModel model) {
   return "pinhole";
 }
 
+Json describe_cameras(std::span<const Camera> cameras) {
+  std::map<std::pair<int, int>, std::size_t> sizes;
+  std::map<std::string, std::size_t> models;
+  for (const Camera& camera : cameras) {
+    ++sizes[{camera.width, camera.height}];
+    ++models[model_name(camera.model)];
+  }
+  Json out{
+      {"cameras", cameras.size()}, {"sizes", Json::array()}, {"camera_models", Json::object()}};
+  for (const auto& [size, count] : sizes) {
+    out["sizes"].push_back({{"width", size.first}, {"height", size.second}, {"cameras", count}});
+  }
+  for (const auto& [name, count] : models) out["camera_models"][name] = count;
+  return out;
+}
+
+const char* material_kind(Material::Kind kind) {
+  switch (kind) {
+    case Material::Kind::kMirror:
+      return "mirror";
+    case Material::Kind::kGlass:
+      return "glass";
+    case Material::Kind::kTransparent:
+      return "transparent";
+    case Material::Kind::kEmissive:
+      return "emissive";
+    case Material::Kind::kDiffuse:
+      break;
+  }
+  return "diffuse";
+}
+
 std::optional<Json> describe_file(const std::filesystem::path& path) {
   const std::string extension = io::lower_extension(path);
   // meta.json is a model of SOG.
@@ -182,8 +198,11 @@ std::optional<Json> describe_file(const std::filesystem::path& path) {
   if (extension == ".npy") return describe_array(path);
   if (extension == ".rsck") return describe_checkpoint(path);
   if (extension == ".toml") return describe_toml(path);
+  if (extension == ".ply") return describe_points(path);
+  if (extension == ".mtl") return describe_materials(path);
+  if (extension == ".onnx") return describe_network(path);
   if (io::has_image_extension(path)) return describe_picture(path);
-  return std::nullopt;
+  return describe_colmap(path);
 }
 
 void print_file(const Json& file) {

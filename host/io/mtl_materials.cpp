@@ -140,6 +140,10 @@ int MtlMaterials::texture(const std::filesystem::path& path, const std::string& 
   return entry->second;
 }
 
+void MtlMaterials::use_all() {
+  for (const auto& [name, material] : known_) index(name);
+}
+
 std::uint32_t MtlMaterials::index(std::string_view name) {
   const std::string key = trimmed(name);
   const auto [entry, added] = used_.emplace(key, static_cast<std::uint32_t>(materials.size()));

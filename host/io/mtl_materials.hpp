@@ -36,6 +36,9 @@ class MtlMaterials {
   /// or broken.
   std::uint32_t index(std::string_view name);
 
+  /// Maps all materials of the files, in the order of their names. Throws as index().
+  void use_all();
+
   std::vector<Material> materials;
   std::vector<Image> textures;
 

@@ -19,6 +19,7 @@ namespace raysplats {
 namespace {
 
 constexpr std::string_view kIterationPrefix = "iteration_";
+constexpr const char* kSogMeta = "meta.json";  // of one that is unpacked
 
 std::optional<std::int64_t> iteration_of(const std::filesystem::path& folder) {
   const std::string name = folder.filename().string();
@@ -27,6 +28,11 @@ std::optional<std::int64_t> iteration_of(const std::filesystem::path& folder) {
   const char* end = name.data() + name.size();
   const auto [next, error] = std::from_chars(name.data() + kIterationPrefix.size(), end, value);
   return error == std::errc() && next == end && value >= 0 ? std::optional(value) : std::nullopt;
+}
+
+bool holds_sog(const std::filesystem::path& folder) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(folder / kSogMeta, error);
 }
 
 std::filesystem::path config_of(const std::filesystem::path& run) { return run / "config.toml"; }
@@ -66,6 +72,10 @@ bool is_run_folder(const std::filesystem::path& path) {
          std::filesystem::is_directory(path / "point_cloud", error);
 }
 
+bool is_model_folder(const std::filesystem::path& path) {
+  return is_run_folder(path) || holds_sog(path);
+}
+
 ModelSource find_model(const std::filesystem::path& path) {
   std::error_code error;
   ModelSource source;
@@ -83,6 +93,10 @@ ModelSource find_model(const std::filesystem::path& path) {
     read_header(source);
     return source;
   }
+  if (holds_sog(path) && !is_run_folder(path)) {
+    source.file = path / kSogMeta;
+    return source;
+  }
   for (std::filesystem::directory_iterator entry(path / "point_cloud", error), end;
        !error && entry != end; entry.increment(error)) {
     const std::optional<std::int64_t> iteration = iteration_of(entry->path());
@@ -96,7 +110,7 @@ ModelSource find_model(const std::filesystem::path& path) {
   if (!source.iteration) {
     throw DataError(
         fmt::format("The folder {} holds no point_cloud/iteration_N/point_cloud.ply: name a run "
-                    "that has saved a model, or a PLY",
+                    "that has saved a model, or a file",
                     path.string()));
   }
   read_options(source, path);

@@ -26,8 +26,11 @@ struct ModelSource {
 /// Whether `path` is the folder of a training run.
 bool is_run_folder(const std::filesystem::path& path);
 
-/// Finds the newest RUN/point_cloud/iteration_N/point_cloud.ply of a run folder; a file is
-/// taken as it is, and when it lies in a run folder at that depth, that run's configuration comes
+/// Whether it is a folder that find_model() looks into: of a run, or an unpacked SOG.
+bool is_model_folder(const std::filesystem::path& path);
+
+/// Finds the newest RUN/point_cloud/iteration_N/point_cloud.ply of a run folder, and the meta.json
+/// of an unpacked SOG; a file is taken as it is, and when it lies in a run folder at that depth, that run's configuration comes
 /// with it. Throws DataError when there is nothing to load, UsageError when the run's configuration
 /// is broken.
 ModelSource find_model(const std::filesystem::path& path);

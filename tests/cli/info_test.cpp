@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -172,6 +173,70 @@ TEST_CASE("info describes every kind of file that is read") {
   for (const char* name : {"damaged.npy", "damaged.json", "damaged.rsck"}) {
     const Outcome outcome = raysplats_program({"info", folder / name});
     CHECK(outcome.code == 3);
+    CHECK(has(outcome.err, name));
+  }
+}
+
+TEST_CASE("info describes the parts of captures, meshes and runs") {
+  const TemporaryFolder folder;
+  const auto type = [&](const std::string& name) {
+    CAPTURE(name);
+    return json_of(folder / name).at("type").get<std::string>();
+  };
+  write_file(folder / "points.ply",
+             "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+             "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+             "end_header\n0 0 0 255 0 0\n1 2 3 0 0 255\n");
+  nlohmann::json json = json_of(folder / "points.ply");
+  CHECK(json.at("type") == "points");
+  CHECK(json.at("points") == 2);
+  CHECK(json.at("bounds") == nlohmann::json::parse("[[0, 0, 0], [1, 2, 3]]"));
+  CHECK(json.at("colours") == true);
+
+  write_file(folder / "my ball.mtl",
+             "newmtl chrome\nillum 3\nKs 0.9 0.9 0.9\nnewmtl wall\nKd 1 0 0\n");
+  json = json_of(folder / "my ball.mtl");
+  CHECK(json.at("type") == "materials");
+  CHECK(json.at("materials") == nlohmann::json{{"chrome", "mirror"}, {"wall", "diffuse"}});
+
+  // The model of a data set: alone, a file of it, and where the photos are beside it.
+  write_photos(folder, "PINHOLE 8 6 10 10 4 3");
+  for (const char* name : {"sparse/0", "sparse/0/cameras.txt", "sparse/0/points3D.txt"}) {
+    CAPTURE(name);
+    json = json_of(folder / name);
+    CHECK(json.at("type") == "COLMAP model");
+    CHECK(json.at("cameras") == 2);
+    CHECK(json.at("points") == 1);
+  }
+  CHECK(type("") == "dataset");
+  for (const char* part : {"cameras.txt", "images.txt", "points3D.txt"})
+    std::filesystem::copy(folder / "sparse/0/" + part, folder / part);
+  CHECK(type("") == "dataset");
+
+  write_file(folder / "dataparser_transforms.json",
+             R"({"transform":[[1,0,0,0],[0,1,0,0],[0,0,1,0]],"scale":0.25})");
+  CHECK(json_of(folder / "dataparser_transforms.json").at("scale") == 0.25);
+  write_file(folder / "exposures.json", R"({"a":[[1,0,0,0],[0,1,0,0],[0,0,1,0]]})");
+  CHECK(json_of(folder / "exposures.json").at("photos") == 1);
+  write_file(folder / "eval.json",
+             R"({"psnr":30,"ssim":0.9,"images":[{"name":"a"},{"name":"b"}]})");
+  CHECK(json_of(folder / "eval.json").at("views") == 2);
+  write_file(folder / "metrics.json", R"({"iteration":7,"training_seconds":2,"photos":[]})");
+  CHECK(type("metrics.json") == "metrics of a run");
+  write_file(folder / "tuning.json",
+             R"({"schema":"raysplats-tuning","schema_version":1,"devices":[{"device":"a cpu"}]})");
+  CHECK(json_of(folder / "tuning.json").at("devices") == nlohmann::json{"a cpu"});
+  write_file(folder / "other.json", R"({"a":1})");
+  write_file(folder / "damaged.ply",
+             "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+             "end_header\n0\n");
+  write_file(folder / "damaged.onnx", "no network");
+  write_file(folder / "bench.json", R"({"schema":"raysplats-bench","schema_version":1})");
+  for (const char* name : {"other.json", "damaged.ply", "damaged.onnx", "bench.json"}) {
+    const Outcome outcome = raysplats_program({"info", folder / name});
+    INFO(outcome.err);
+    CHECK(outcome.code == 3);
+    CHECK(one_sentence(outcome));
     CHECK(has(outcome.err, name));
   }
 }
