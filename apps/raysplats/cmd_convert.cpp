@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,7 @@ struct Options {
   std::optional<std::string> rotate;
   std::string max_gaussians;
   std::optional<std::string> translate;
+  std::optional<std::string> crop;
   std::optional<std::string> crop_min;
   std::optional<std::string> crop_max;
   std::string spz_axes = "ply";
@@ -40,6 +42,10 @@ void run(Options& options) {
     changes.max_gaussians = parse_count("--max-gaussians", options.max_gaussians);
   if (options.rotate) changes.rotate_degrees = vector_of(*options.rotate);
   if (options.translate) changes.translate = vector_of(*options.translate);
+  if (options.crop) {
+    const std::array<double, 6> b = parse_box(*options.crop);
+    changes.crop = CropBox{{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
+  }
   if (options.crop_min || options.crop_max) {
     changes.crop.emplace();
     if (options.crop_min) changes.crop->low = vector_of(*options.crop_min);
@@ -65,13 +71,15 @@ Command add_convert_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   ModelChanges& changes = options->changes;
   command
-      ->add_option("MODEL", options->input,
-                   "PLY, compressed PLY, .splat, SPZ, SOG or glTF with Gaussians, or a run folder")
+      ->add_option(
+          "MODEL", options->input,
+          "PLY, compressed PLY, .splat, SPZ, SOG (its folder too) or glTF with Gaussians, or a "
+          "run folder")
       ->required()
       ->type_name("");
   command
       ->add_option(
-          "-o,--output", options->output,
+          "-o,--output,OUT", options->output,
           "What to write, by its ending: .ply, .compressed.ply, .splat, .spz, .sog or .glb")
       ->required()
       ->type_name("FILE");
@@ -99,13 +107,20 @@ Command add_convert_command(CLI::App& app) {
   command->add_option("--translate", options->translate, "Move the scaled and turned model")
       ->check(triple())
       ->type_name("X,Y,Z");
-  command
-      ->add_option("--crop-min", options->crop_min,
-                   "Leave out Gaussians below, in the coordinates of the result")
+  CLI::Option* crop =
+      command
+          ->add_option("--crop", options->crop,
+                       "Leave out Gaussians outside a box in the coordinates of the result: its "
+                       "least and greatest x, y, z, as in -1,-1,0,1,1,2")
+          ->check(box())
+          ->type_name("LIST");
+  command->add_option("--crop-min", options->crop_min, "The same by its sides: what is below goes")
       ->check(triple())
+      ->excludes(crop)
       ->type_name("X,Y,Z");
-  command->add_option("--crop-max", options->crop_max, "Leave out Gaussians above")
+  command->add_option("--crop-max", options->crop_max, "What is above goes")
       ->check(triple())
+      ->excludes(crop)
       ->type_name("X,Y,Z");
   command
       ->add_option(

@@ -284,32 +284,48 @@ CLI::Validator one_of(std::vector<std::string> names) {
       "", name);
 }
 
-CLI::Validator triple() {
+namespace {
+
+/// That many numbers with commas; `said` is how the sentence that refuses others puts it.
+CLI::Validator numbers(std::size_t count, const char* said) {
   return CLI::Validator(
-      [](const std::string& text) {
+      [count, said](const std::string& text) {
         const std::optional<std::vector<std::string>> parts = list_items({text});
-        const bool good = parts && parts->size() == 3 &&
+        const bool good = parts && parts->size() == count &&
                           std::all_of(parts->begin(), parts->end(), [](const std::string& part) {
                             return parse_real(part).has_value();
                           });
-        return good ? std::string()
-                    : fmt::format("'{}' is not three numbers with commas, as in 1,0.5,0", text);
+        return good ? std::string() : fmt::format("'{}' is not {}", text, said);
       },
       "");
 }
 
-std::array<double, 3> parse_triple(const std::string& text) {
+template <std::size_t kCount>
+std::array<double, kCount> parse_numbers(const std::string& text) {
   const std::vector<std::string> parts = list_items({text}).value_or(std::vector<std::string>());
-  std::array<double, 3> out{};
-  for (std::size_t k = 0; k < out.size(); ++k) out[k] = parse_real(parts.at(k)).value_or(0.0);
+  std::array<double, kCount> out{};
+  for (std::size_t k = 0; k < kCount; ++k) out[k] = parse_real(parts.at(k)).value_or(0.0);
   return out;
 }
+
+}  // namespace
+
+CLI::Validator triple() { return numbers(3, "three numbers with commas, as in 1,0.5,0"); }
+
+std::array<double, 3> parse_triple(const std::string& text) { return parse_numbers<3>(text); }
+
+CLI::Validator box() {
+  return numbers(6, "least and greatest x, y, z with commas, as in -1,-1,0,1,1,2");
+}
+
+std::array<double, 6> parse_box(const std::string& text) { return parse_numbers<6>(text); }
 
 namespace {
 
 /// Whether an option takes a list of numbers, which shells cut into words at its spaces.
 bool takes_numbers(std::string_view name) {
-  if (name == "--background" || name == "--up" || name == "--sizes") return true;
+  if (name == "--background" || name == "--up" || name == "--sizes" || name == "--crop")
+    return true;
   TrainOptions options;
   const std::vector<OptionRow> keys = train_keys(options);
   return name.starts_with("--") && std::any_of(keys.begin(), keys.end(), [&](const OptionRow& key) {

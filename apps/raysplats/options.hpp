@@ -127,6 +127,10 @@ CLI::Validator one_of(std::vector<std::string> names);
 CLI::Validator triple();
 std::array<double, 3> parse_triple(const std::string& text);
 
+/// Accepts the six numbers of a box, as --bounds has them, and reads what it has accepted.
+CLI::Validator box();
+std::array<double, 6> parse_box(const std::string& text);
+
 /// In single quotes, within which a shell takes everything as it is but these.
 std::string shell_quoted(std::string_view text);
 /// The program and its arguments as a shell takes them.

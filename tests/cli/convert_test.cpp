@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "io/zip_archive.hpp"
 #include "program.hpp"
 #include "raysplats/io.hpp"
 
@@ -11,6 +16,22 @@ namespace {
 
 bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
+}
+
+/// The files of a SOG beside each other, as other programs unpack them.
+void unpack_sog(const std::string& archive, const std::filesystem::path& folder) {
+  const std::string bytes = read_file(archive);
+  const raysplats::io::ZipArchive zip(std::as_bytes(std::span(bytes)), archive);
+  const auto unpack = [&](const std::string& name) {
+    const std::vector<std::byte> content = zip.read(name);
+    std::string text(reinterpret_cast<const char*>(content.data()), content.size());
+    write_file(folder / name, text);
+    return text;
+  };
+  for (const auto& part : nlohmann::json::parse(unpack("meta.json"))) {
+    if (!part.is_object() || !part.contains("files")) continue;
+    for (const auto& name : part.at("files")) unpack(name.get<std::string>());
+  }
 }
 
 nlohmann::json told(const std::string& path) {
@@ -29,7 +50,8 @@ TEST_CASE("convert writes every format, which every command reads again") {
     words.insert(words.begin(), "convert");
     return raysplats_program(words);
   };
-  for (const char* name : {"a.spz", "a.splat", "a.glb", "a.sog", "a.ply"}) {
+  for (const char* name : {"a.spz", "a.splat", "a.glb", "a.sog", "a.compressed.ply", "a.ply"}) {
+    CAPTURE(name);
     const Outcome outcome = convert({folder / "balls.ply", "-o", folder / name});
     INFO(outcome.err);
     REQUIRE(outcome.code == 0);
@@ -41,14 +63,56 @@ TEST_CASE("convert writes every format, which every command reads again") {
     CHECK(json.at("type") == "model");
     CHECK(json.at("gaussians") == 5);
   }
+  unpack_sog(folder / "a.sog", folder / "sog");
+  CHECK(told(folder / "sog").at("gaussians") == 5);
+  write_npy(folder / "rays.npy", "False", "(1, 6)", {0, 0, -3, 0, 0, 1});
+  REQUIRE(raysplats_program({"generate", folder / "data", "--size", "16", "--train-views", "1",
+                             "--test-views", "1", "-q"})
+              .code == 0);
+  std::optional<double> first;
+  for (const char* name : {"a.ply", "a.spz", "a.splat", "a.glb", "a.sog", "sog", "sog/meta.json",
+                           "a.compressed.ply"}) {
+    CAPTURE(name);
+    const auto run = [&](const std::string& command, const std::vector<std::string>& more) {
+      std::vector<std::string> words{command, folder / name, "-q"};
+      words.insert(words.end(), more.begin(), more.end());
+      const Outcome outcome = raysplats_program(words);
+      INFO(outcome.err);
+      CHECK(outcome.code == 0);
+    };
+    run("trace", {"--rays", folder / "rays.npy", "-o", folder / "traced.npz"});
+    run("eval", {"--data", folder / "data", "-o", folder / "eval", "--overwrite"});
+    run("render", {"--orbit", "1", "--width", "16", "-o", folder / "frames", "--overwrite"});
+    const double psnr =
+        nlohmann::json::parse(read_file(folder / "eval/metrics.json")).at("psnr").get<double>();
+    if (!first) first = psnr;
+    CHECK(psnr == doctest::Approx(*first).epsilon(0.02));
+  }
   CHECK(convert({folder / "a.glb", "-o", folder / "b.spz", "--spz-version", "4", "--sh-degree", "2",
                  "--rotate", "0,0,90"})
             .code == 0);
   CHECK(told(folder / "b.spz").at("sh_degree") == 2);
-  const Outcome frames = raysplats_program(
-      {"render", folder / "b.spz", "-o", folder / "frames", "--orbit", "1", "--width", "16", "-q"});
-  INFO(frames.err);
-  CHECK(frames.code == 0);
+}
+
+TEST_CASE("convert takes the output as a word, and a box as one option or by its sides") {
+  const TemporaryFolder folder;
+  write_file(folder / "balls.ply", ply_file(5));
+  const auto bounds = told(folder / "balls.ply").at("bounds");
+  const double middle = 0.5 * (bounds[0][0].get<double>() + bounds[1][0].get<double>());
+  const auto kept = [&](const std::string& name, const std::vector<std::string>& more) {
+    std::vector<std::string> words{"convert", folder / "balls.ply", folder / name};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = raysplats_program(words);
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    return told(folder / name).at("gaussians").get<int>();
+  };
+  CHECK(kept("all.spz", {}) == 5);
+  const std::string low = std::to_string(middle) + ",-9,-9";
+  const int part = kept("box.spz", {"--crop", low + ",9,9,9"});
+  CHECK(part > 0);
+  CHECK(part < 5);
+  CHECK(kept("sides.spz", {"--crop-min", low, "--crop-max", "9,9,9"}) == part);
 }
 
 TEST_CASE("convert says in one sentence what it will not do") {
@@ -71,6 +135,10 @@ TEST_CASE("convert says in one sentence what it will not do") {
   refused({"convert", folder / "there.spz", "-o", folder / "b.ply"}, 3, "there.spz");
   refused({"convert", balls, "-o", folder / "a.spz", "--crop-min", "90,90,90"}, 2, "None of the 5");
   refused({"info", folder / "there.spz"}, 3, "there.spz");
+  refused({"convert", balls, folder / "a.spz", "--crop", "0,0,0,1,1"}, 2, "-1,-1,0,1,1,2");
+  refused({"convert", balls, folder / "a.spz", "--crop", "0,0,0,1,1,1", "--crop-min", "0,0,0"}, 2,
+          "--crop-min");
+  refused({"convert", balls}, 2, "output");
   write_file(folder / "notes.txt", "hello");
   refused({"convert", folder / "notes.txt", "-o", folder / "b.ply"}, 3, "no model that is known");
 }

@@ -275,6 +275,8 @@ void run_command(const Place& place, Words words) {
     if (words[i - 1] == "-o" && fresh) place.remove(words[i]);
   }
   if (words.at(0) == "generate") place.remove(words.at(1));
+  // Its output may be its second word.
+  if (words.at(0) == "convert" && !words.at(2).starts_with("-")) place.remove(words.at(2));
   place.run(place.shortened(std::move(words)));
 }
 

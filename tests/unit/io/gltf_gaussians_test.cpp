@@ -114,6 +114,20 @@ TEST_CASE("glTF Gaussians: a written GLB reads back as it was, but for harmonics
   CHECK(contains(data_error([&] { write_model(scratch / "b.glb", none); }), "no Gaussians"));
 }
 
+TEST_CASE("glTF Gaussians: GLBs of one and about 256 Gaussians read back as they were") {
+  const Scratch scratch;
+  for (const std::size_t count : {1u, 255u, 256u, 257u}) {
+    CAPTURE(count);
+    const Gaussians model = trained_like(count, 2);
+    write_model(scratch / "a.glb", model);
+    const Gaussians again = read_model(scratch / "a.glb");
+    CHECK(again.size() == count);
+    CHECK(again.means == model.means);
+    CHECK(farthest(again.opacities, model.opacities) < 1e-3);
+    CHECK(farthest(again.sh, model.sh) < 1e-6);
+  }
+}
+
 TEST_CASE("glTF Gaussians: meshes and Gaussians of one file are told apart") {
   const Scratch scratch;
   GltfFile file = two();

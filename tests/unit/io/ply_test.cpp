@@ -103,6 +103,20 @@ TEST_CASE("a written PLY is Inria's and reads back identically for every SH degr
   }
 }
 
+TEST_CASE("PLYs of no, one and about 256 Gaussians read back identically") {
+  const Scratch scratch;
+  for (const std::size_t count : {0u, 1u, 255u, 256u, 257u}) {
+    CAPTURE(count);
+    const Gaussians model = random_model(count, 1);
+    write_ply(scratch / "a.ply", model);
+    const Gaussians again = read_ply(scratch / "a.ply");
+    CHECK(again.size() == count);
+    CHECK(again.means == model.means);
+    CHECK(again.opacities == model.opacities);
+    CHECK(again.sh == model.sh);
+  }
+}
+
 TEST_CASE("f_rest is channel-major on disk and RGB-innermost in memory") {
   const Scratch scratch;
   Gaussians model;
