@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <functional>
+#include <string_view>
 
 #include "options.hpp"
 
@@ -50,63 +53,87 @@ std::vector<std::string> named(const CommandEntry& command) {
   return names;
 }
 
+/// Whether files are offered for the value of an option: of numbers, names and devices none are.
+bool is_file(const OptionEntry& option) {
+  constexpr std::array<std::string_view, 7> kFiles{"DIR",  "DATA", "DATASET", "MODEL",
+                                                   "PATH", "RUN",  "NETWORK"};
+  return option.value.starts_with("FILE") || option.value == "VALUE" ||
+         std::find(kFiles.begin(), kFiles.end(), option.value) != kFiles.end();
+}
+
 std::vector<std::string> below(const CommandEntry& command) {
   std::vector<std::string> names;
   for (const CommandEntry& each : command.commands) names.push_back(each.name);
   return names;
 }
 
+/// What may stand where no option does: commands below, and words of an argument that is one of a
+/// few. Where there is nothing, files may.
+std::vector<std::string> plain_words(const CommandEntry& command) {
+  std::vector<std::string> words = below(command);
+  for (const OptionEntry& option : command.options) {
+    if (option.argument) words.insert(words.end(), option.choices.begin(), option.choices.end());
+  }
+  return words;
+}
+
 }  // namespace
 
 std::string bash_completion(const CommandEntry& program) {
-  std::string words;
-  std::string choices;
+  const auto joined = [](const std::vector<std::string>& all) {
+    return shell_quoted(fmt::format("{}", fmt::join(all, " ")));
+  };
+  std::string words, values, commands;
   const auto add = [&](const CommandEntry& command, const std::string& path) {
-    std::vector<std::string> all = below(command);
-    for (const std::string& name : named(command)) all.push_back(name);
-    words += fmt::format("    {}) words={} ;;\n", shell_quoted(path),
-                         shell_quoted(fmt::format("{}", fmt::join(all, " "))));
+    const std::vector<std::string> plain = plain_words(command);
+    words += fmt::format("    {}) words={} plain={} ;;\n", shell_quoted(path),
+                         joined(named(command)), joined(plain));
     for (const OptionEntry& option : command.options) {
-      if (option.choices.empty() || option.argument) continue;
+      if (option.argument || option.value.empty()) continue;
       for (const std::string& name : option.names) {
-        choices +=
-            fmt::format("    {}) words={} ;;\n", shell_quoted(fmt::format("{} {}", path, name)),
-                        shell_quoted(fmt::format("{}", fmt::join(option.choices, " "))));
+        values += fmt::format("    {}) {} ;;\n", shell_quoted(fmt::format("{} {}", path, name)),
+                              !option.choices.empty()
+                                  ? fmt::format("kind=words words={}", joined(option.choices))
+                              : is_file(option) ? "kind=files"
+                                                : "kind=none");
       }
     }
   };
-  std::string commands;
   walk(program, "", [&](const CommandEntry& command, const std::string& path) {
-    commands += fmt::format("      {}) command={} ;;\n", shell_quoted(path), shell_quoted(path));
+    commands += fmt::format("      {0}) command={0} ;;\n", shell_quoted(path));
     add(command, path);
   });
   add(program, "");
   return fmt::format(R"(# bash completion of raysplats
 _raysplats() {{
   local current=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD - 1]}}
-  local command='' words='' i
+  local command='' words='' plain='' kind='' i
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case "${{command:+$command }}${{COMP_WORDS[i]}}" in
 {}    esac
   done
   case "$command $before" in
-{}    *) words='' ;;
-  esac
-  if [[ -n $words ]]; then
-    COMPREPLY=($(compgen -W "$words" -- "$current"))
-    return
-  fi
-  case "$command" in
 {}  esac
-  if [[ $current == -* || -z $command ]]; then
-    COMPREPLY=($(compgen -W "$words" -- "$current"))
-  else
-    mapfile -t COMPREPLY < <(compgen -f -- "$current")
+  if [[ -z $kind ]]; then
+    case "$command" in
+{}    esac
+    if [[ $current == -* ]]; then
+      kind=words
+    elif [[ -n $plain ]]; then
+      kind=words words=$plain
+    else
+      kind=files
+    fi
   fi
+  COMPREPLY=()
+  case $kind in
+    words) COMPREPLY=($(compgen -W "$words" -- "$current")) ;;
+    files) mapfile -t COMPREPLY < <(compgen -f -- "$current") ;;
+  esac
 }}
 complete -o filenames -F _raysplats raysplats
 )",
-                     commands, choices, words);
+                     commands, values, words);
 }
 
 std::string zsh_completion(const CommandEntry& program) {
@@ -117,7 +144,7 @@ std::string zsh_completion(const CommandEntry& program) {
       const std::string action =
           option.value.empty() ? ""
           : option.choices.empty()
-              ? fmt::format(":{}:_files", zsh_text(option.value))
+              ? fmt::format(":{}:{}", zsh_text(option.value), is_file(option) ? "_files" : " ")
               : fmt::format(":{}:({})", zsh_text(option.value), fmt::join(option.choices, " "));
       for (const std::string& name : option.names) {
         out +=
@@ -127,12 +154,21 @@ std::string zsh_completion(const CommandEntry& program) {
     }
     return out;
   };
+  const auto everything = [&](const CommandEntry& command) {
+    const std::vector<std::string> plain = plain_words(command);
+    return fmt::format(
+        "_arguments{} \\\n    {}", arguments(command),
+        plain.empty() ? "'*:file:_files'" : fmt::format("'1:word:({})'", fmt::join(plain, " ")));
+  };
   std::string list;
   std::string cases;
   for (const CommandEntry& command : program.commands) {
     list += fmt::format("    {}\n", shell_quoted(command.name + ":" + zsh_text(command.text)));
-    cases += fmt::format("  {}) _arguments{} \\\n    '*:file:_files' ;;\n", command.name,
-                         arguments(command));
+    for (const CommandEntry& below : command.commands) {
+      cases += fmt::format("  '{} {}')\n    shift words\n    ((CURRENT--))\n    {} ;;\n",
+                           command.name, below.name, everything(below));
+    }
+    cases += fmt::format("  {0} | '{0} '*) {1} ;;\n", command.name, everything(command));
   }
   return fmt::format(R"(#compdef raysplats
 # zsh completion of raysplats
@@ -146,6 +182,8 @@ _raysplats() {{
   local command=$words[2]
   shift words
   ((CURRENT--))
+  # The word below a command counts once it is over.
+  ((CURRENT > 2)) && command+=" $words[2]"
   case $command in
 {}  esac
 }}
@@ -156,28 +194,41 @@ _raysplats "$@"
 
 std::string fish_completion(const CommandEntry& program) {
   std::string out = "# fish completion of raysplats\n";
-  const auto options = [&](const CommandEntry& command, const std::string& condition) {
+  const auto add = [&](const CommandEntry& command, const std::string& condition) {
+    const std::string when = condition.empty() ? "" : fmt::format(" -n {}", fish_quoted(condition));
     for (const OptionEntry& option : command.options) {
-      if (option.argument) continue;
-      out += "complete -c raysplats" + condition;
+      const std::string choices = fish_quoted(fmt::format("{}", fmt::join(option.choices, " ")));
+      out += "complete -c raysplats" + when;
+      if (option.argument) {
+        // Files, unless it is one of a few words.
+        out += option.choices.empty() ? " -F\n" : fmt::format(" -f -a {}\n", choices);
+        continue;
+      }
       for (const std::string& name : option.names) {
         out += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
       }
-      if (!option.value.empty()) out += " -r";
-      if (!option.choices.empty()) {
-        out += fmt::format(" -f -a {}",
-                           fish_quoted(fmt::format("{}", fmt::join(option.choices, " "))));
+      if (!option.value.empty()) {
+        out += !option.choices.empty() ? fmt::format(" -x -a {}", choices)
+               : is_file(option)       ? " -r -F"
+                                       : " -x";
       }
       out += fmt::format(" -d {}\n", fish_quoted(option.text));
     }
   };
+  add(program, "");
   for (const CommandEntry& command : program.commands) {
+    const std::string seen = "__fish_seen_subcommand_from " + command.name;
     out += fmt::format("complete -c raysplats -n __fish_use_subcommand -f -a {} -d {}\n",
                        command.name, fish_quoted(command.text));
+    add(command, seen);
+    for (const CommandEntry& below : command.commands) {
+      const std::string deeper = "__fish_seen_subcommand_from " + below.name;
+      out += fmt::format("complete -c raysplats -n {} -f -a {} -d {}\n",
+                         fish_quoted(fmt::format("{}; and not {}", seen, deeper)), below.name,
+                         fish_quoted(below.text));
+      add(below, fmt::format("{}; and {}", seen, deeper));
+    }
   }
-  options(program, "");
-  for (const CommandEntry& command : program.commands)
-    options(command, fmt::format(" -n '__fish_seen_subcommand_from {}'", command.name));
   return out;
 }
 

@@ -16,6 +16,9 @@
 namespace raysplats {
 namespace {
 
+/// Where a remark on the process's limit begins, which continues a sentence: "; this process ...".
+constexpr std::size_t kRemark = 2;
+
 DeviceVerdict examine(const DeviceInfo& device, const ContextOpener& open) {
   DeviceVerdict verdict;
   verdict.device = device;
@@ -147,10 +150,9 @@ std::string diagnosis_text(const Diagnosis& diagnosis) {
   if (diagnosis.drivers.empty()) out += "  none\n";
   for (const GraphicsCard& card : diagnosis.cards)
     out += fmt::format("card             {} at {}\n", card.vendor, card.address);
-  // The remark continues a sentence: "; this process may take ...".
   out += fmt::format("memory limit     {}\n", diagnosis.process_limit.empty()
                                                   ? "none for this process"
-                                                  : diagnosis.process_limit.substr(2));
+                                                  : diagnosis.process_limit.substr(kRemark));
   out += fmt::format("kernel cache     {}: {} programs, {}{}\n",
                      diagnosis.cache.empty() ? "none" : diagnosis.cache.string(),
                      diagnosis.cache_state.programs, mebibytes(diagnosis.cache_state.bytes),
@@ -210,6 +212,9 @@ std::string diagnosis_json(const Diagnosis& diagnosis) {
                  {"drivers", drivers},
                  {"cards", cards},
                  {"closed_card_files", closed},
+                 {"process_limit", diagnosis.process_limit.empty()
+                                       ? Json(nullptr)
+                                       : Json(diagnosis.process_limit.substr(kRemark))},
                  {"kernel_cache",
                   {{"folder", diagnosis.cache.string()},
                    {"programs", diagnosis.cache_state.programs},

@@ -51,6 +51,78 @@ TEST_CASE("bash completes commands, options, words of options and files") {
         Words{"exr", "png", "jpg"});
   CHECK(offered(folder, {"raysplats", "render", "gar"}) == Words{"garden.ply"});
   CHECK(offered(folder, {"raysplats", "train", "d", "-o", "gar"}) == Words{"garden.ply"});
+  // Arguments of a few words, commands below commands, and values that are no files.
+  CHECK(offered(folder, {"raysplats", "completion", ""}) == Words{"bash", "fish", "zsh"});
+  CHECK(offered(folder, {"raysplats", "bench", ""}) == Words{"compare"});
+  CHECK(offered(folder, {"raysplats", "bench", "--json", "gar"}) == Words{"garden.ply"});
+  CHECK(offered(folder, {"raysplats", "bench", "compare", "gar"}) == Words{"garden.ply"});
+  CHECK(offered(folder, {"raysplats", "train", "--device", ""}) == Words{""});
+}
+
+TEST_CASE("fish completes the same, where it is installed") {
+  if (!runs("command -v fish")) {
+    MESSAGE("skipped: no fish");
+    return;
+  }
+  const TemporaryFolder folder;
+  write_file(folder / "a.fish", raysplats_program({"completion", "fish"}).out);
+  write_file(folder / "garden.ply", "");
+  const auto fish = [&](const std::string& line) {
+    const std::string command =
+        "cd '" + folder.path().string() + "' && HOME='" + folder.path().string() +
+        "' fish -c \"source a.fish; complete -C '" + line + "'\" 2>/dev/null | cut -f1 > answer";
+    REQUIRE(std::system(command.c_str()) == 0);
+    std::istringstream lines(read_file(folder / "answer"));
+    Words words;
+    for (std::string word; std::getline(lines, word);) words.insert(word);
+    return words;
+  };
+  CHECK(fish("raysplats completion ") == Words{"bash", "fish", "zsh"});
+  CHECK(fish("raysplats bench com") == Words{"compare"});
+  CHECK(fish("raysplats info gar") == Words{"garden.ply"});
+  CHECK(fish("raysplats bench compare gar") == Words{"garden.ply"});
+  CHECK(fish("raysplats train --quality me") == Words{"medium"});
+  CHECK(fish("raysplats train --device gar").empty());
+}
+
+TEST_CASE("zsh completes the same, where it is installed") {
+  if (!runs("command -v zsh")) {
+    MESSAGE("skipped: no zsh");
+    return;
+  }
+  const TemporaryFolder folder;
+  write_file(folder / "functions/_raysplats", raysplats_program({"completion", "zsh"}).out);
+  write_file(folder / "garden.ply", "");
+  // A shell on a terminal of its own, as completion runs in no other; what it offers is printed in
+  // its place.
+  write_file(folder / "ask.zsh", R"(zmodload zsh/zpty
+cd $1
+zpty -b shell zsh -f -i
+zpty -w shell "PS1='' ; fpath=($1/functions \$fpath); autoload -Uz compinit; compinit -u -d $1/dump"
+zpty -w shell "zstyle ':completion:*' list-separator ''; compadd() { builtin compadd -O found \"\$@\"; print -r -- \"<\${(j:,:)found}>\" >> $1/answer; builtin compadd \"\$@\"; }"
+zpty -w shell "print ready > $1/ready"
+while [[ ! -e $1/ready ]]; do sleep 0.1; done
+zpty -n -w shell "$2"$'\t'
+for i in {1..50}; do sleep 0.1; [[ -e $1/answer ]] && break; done
+sleep 0.3
+zpty -d shell
+)");
+  const auto zsh = [&](const std::string& line) {
+    for (const char* left : {"answer", "ready"}) std::filesystem::remove(folder / left);
+    const std::string command = "zsh -f '" + (folder / "ask.zsh") + "' '" + folder.path().string() +
+                                "' '" + line + "' > /dev/null 2>&1";
+    REQUIRE(std::system(command.c_str()) == 0);
+    return std::filesystem::exists(folder / "answer") ? read_file(folder / "answer") : "";
+  };
+  const auto offers = [&](const std::string& line, const std::string& word) {
+    const std::string all = zsh(line);
+    CAPTURE(all);
+    CHECK(all.find(word) != std::string::npos);
+  };
+  offers("raysplats completion ", "bash,zsh,fish");
+  offers("raysplats bench ", "compare");
+  offers("raysplats bench compare gar", "garden.ply");
+  CHECK(zsh("raysplats train --device gar").find("garden") == std::string::npos);
 }
 
 TEST_CASE("scripts for other shells name every command and option, and their shells take them") {

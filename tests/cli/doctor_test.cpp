@@ -24,6 +24,12 @@ TEST_CASE("doctor tests every device and says that it works") {
   const Outcome json = raysplats_program({"doctor", "--json", "-q"});
   CHECK(json.code == 0);
   CHECK(nlohmann::json::parse(json.out).at("works") == true);
+  CHECK(nlohmann::json::parse(json.out).at("process_limit").is_null());
+  Surroundings limited;
+  limited.memory_limit = rlim_t{60'000} << 20;
+  const Outcome within = raysplats_program({"doctor", "--json", "-q"}, limited);
+  CHECK(contains(nlohmann::json::parse(within.out).at("process_limit").get<std::string>(),
+                 "this process may take 60000 MiB"));
 }
 
 TEST_CASE("doctor without any driver says what to install, exit code 4") {
