@@ -283,14 +283,16 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("N");
 
   const std::string time = "Time";
-  command->add_option("--seconds", options->seconds, "Of --path (the file's)")
+  command
+      ->add_option("--seconds", options->seconds,
+                   "Of --path (the file's), or in which all frames of --video go by")
       ->group(time)
       ->transform(between(1e-3, 86400));
   command
       ->add_option("--fps", options->fps,
                    "Frames a second of --path and --video (the file's, or 30)")
       ->group(time)
-      ->transform(between(1e-3, 1000));
+      ->transform(between(kLeastFps, kMostFps));
   command
       ->add_flag("--constant-speed", options->constant_speed,
                  "The eye of --path moves at one speed, whatever the file says of seconds")

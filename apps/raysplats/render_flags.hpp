@@ -10,6 +10,9 @@
 
 namespace raysplats::cli {
 
+/// Frames a second.
+constexpr double kLeastFps = 1e-3, kMostFps = 1000;
+
 /// Options of the command `render`, as given.
 struct RenderFlags {
   std::string model;

@@ -46,9 +46,15 @@ FrameOptions RenderFlags::frame_options() const {
 
 void RenderFlags::check_path_options() const {
   if (!path.empty()) return;
-  if (!path_transform.empty() || seconds || constant_speed) {
+  if (!path_transform.empty() || constant_speed) {
+    throw UsageError("--path-transform and --constant-speed shape a camera path: add --path FILE");
+  }
+  if (seconds && video.empty())
+    throw UsageError("--seconds is for --path and --video: files of frames have no time");
+  if (seconds && fps) {
     throw UsageError(
-        "--path-transform, --seconds and --constant-speed shape a camera path: add --path FILE");
+        "The frames are so many as are asked for, so --seconds says how fast they go, or --fps: "
+        "give one");
   }
 }
 
@@ -87,7 +93,17 @@ RenderOutput::RenderOutput(const RenderFlags& flags,
         "--video needs frames of one size, and the cameras have {} x {} and {} x {} pixels",
         cameras.front().width, cameras.front().height, camera.width, camera.height));
   }
-  video_ = open_video(flags.video, {flags.fps.value_or(fps.value_or(kFps)), frames});
+  double rate = flags.fps.value_or(fps.value_or(kFps));
+  // A path has made its frames of the seconds; all other cameras go by in them.
+  if (flags.seconds && flags.path.empty()) {
+    rate = static_cast<double>(frames) / *flags.seconds;
+    if (rate < kLeastFps || rate > kMostFps) {
+      throw UsageError(
+          fmt::format("{} frames in {} s are {:.6g} a second, not {} to {}: give other seconds",
+                      frames, *flags.seconds, rate, kLeastFps, kMostFps));
+    }
+  }
+  video_ = open_video(flags.video, {rate, frames});
   options_.video = video_.get();
 }
 

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <thread>
@@ -74,6 +75,48 @@ TEST_CASE("ffmpeg gets every frame as bytes, and the file appears when it is don
   // A video that is there stays.
   CHECK(raysplats_program(command, around).code == 2);
   CHECK(raysplats_program(command + Words{"--overwrite"}, around).code == 0);
+}
+
+TEST_CASE("seconds of a video say how fast its frames go, whatever the cameras are") {
+  const TemporaryFolder folder;
+  const Words command = orbit(folder, "8") + Words{"--video", folder / "out.gif"};
+  REQUIRE(raysplats_program(command + Words{"--seconds", "2"}).code == 0);
+  CHECK(lengths_of(read_file(folder / "out.gif")) == std::vector<int>(8, 25));
+  const auto refused = [&](const Words& words, const std::string& part) {
+    const Outcome outcome = raysplats_program(words);
+    INFO(outcome.err);
+    CHECK(outcome.code == 2);
+    CHECK(outcome.err.find(part) != std::string::npos);
+  };
+  refused(command + Words{"--overwrite", "--seconds", "2", "--fps", "4"}, "give one");
+  refused(command + Words{"--overwrite", "--seconds", "0.001"}, "8000 a second");
+  refused(orbit(folder, "8") + Words{"-o", folder / "frames", "--seconds", "2"}, "no time");
+}
+
+TEST_CASE("the real ffmpeg writes every frame, where it is installed") {
+  if (std::system("command -v ffmpeg > /dev/null && command -v ffprobe > /dev/null") != 0) {
+    MESSAGE("skipped: no ffmpeg");
+    return;
+  }
+  const TemporaryFolder folder;
+  for (const char* name : {"out.mp4", "out.webm"}) {
+    CAPTURE(name);
+    const Outcome outcome =
+        raysplats_program(orbit(folder, "7") + Words{"--video", folder / name, "--seconds", "0.5"});
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    const std::string command =
+        "ffprobe -v error -count_frames -select_streams v -show_entries "
+        "stream=nb_read_frames,r_frame_rate,width,height -of default=nw=1 '" +
+        (folder / name) + "' > '" + (folder / "told") + "'";
+    REQUIRE(std::system(command.c_str()) == 0);
+    const std::string told = read_file(folder / "told");
+    INFO(told);
+    // H.264 halves colours, so that a column is left out.
+    for (const char* part : {"nb_read_frames=7", "r_frame_rate=14/1", "height=24"})
+      CHECK_MESSAGE(told.find(part) != std::string::npos, part);
+    CHECK(told.find("width=3") != std::string::npos);
+  }
 }
 
 TEST_CASE("Ctrl-C ends a video as it ends files, also while ffmpeg takes its time") {
