@@ -211,6 +211,26 @@ void place(const ColmapPlan& plan, Work& work) {
   });
 }
 
+/// Folders below with photos are not taken: they may be the same photos at other sizes, or masks.
+void check_photos(const fs::path& input) {
+  const std::size_t count = photos_in(input).size();
+  if (count >= kFewestPhotos) return;
+  std::error_code error;
+  std::string below;
+  for (const fs::directory_entry& entry : fs::directory_iterator(input)) {
+    if (!entry.is_directory(error)) continue;
+    if (const std::size_t there = photos_in(entry.path()).size(); there > 0)
+      below += fmt::format("{}{} ({})", below.empty() ? "" : ", ", entry.path().filename().string(),
+                           there);
+  }
+  throw DataError(fmt::format(
+      "{} holds {} photos, but at least {} are needed{}", input.string(), count, kFewestPhotos,
+      below.empty() ? ""
+                    : fmt::format("; folders below it hold some: {}: name one of them, or put the "
+                                  "photos into one folder",
+                                  below)));
+}
+
 }  // namespace
 
 Prepared prepare_data(const fs::path& input,
@@ -223,10 +243,7 @@ Prepared prepare_data(const fs::path& input,
   const bool video = !fs::is_directory(input);
   find_program("colmap", "colmap");
   if (video) find_program("ffmpeg", "ffmpeg");
-  if (!video && photos_in(input).size() < kFewestPhotos) {
-    throw DataError(fmt::format("{} holds {} photos, but at least {} are needed", input.string(),
-                                photos_in(input).size(), kFewestPhotos));
-  }
+  if (!video) check_photos(input);
   std::error_code error;
   if (fs::equivalent(input, data / "images", error))
     throw UsageError(fmt::format("{} is what is read: give another folder with -o", data.string()));

@@ -2,12 +2,22 @@
 // `prepare` with stand-ins for COLMAP and FFmpeg that note how they were called.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <glm/trigonometric.hpp>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "io/colmap_model.hpp"
 #include "program.hpp"
 #include "raysplats/io.hpp"
+#include "scene/gaussian_transform.hpp"
 
 namespace {
 
@@ -15,6 +25,56 @@ namespace fs = std::filesystem;
 
 bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
+}
+
+/// How far the poses of one model are from another's of the same photos.
+struct Apart {
+  std::size_t photos = 0;
+  double mean_degrees = 0, most_degrees = 0;
+  double mean_percent = 0,
+         most_percent = 0;  ///< of centres, of the largest distance from their mean
+};
+
+/// After the similarity of which the rotation is the mean one of all photos.
+Apart compare(const fs::path& found, const fs::path& stored) {
+  std::map<std::string, raysplats::io::ColmapImage> theirs;
+  for (const auto& image : raysplats::io::read_colmap_model(stored).images)
+    theirs[image.name] = image;
+  const auto ours = raysplats::io::read_colmap_model(found).images;
+  const auto center = [](const auto& image) {
+    return -(glm::transpose(image.rotation) * image.translation);
+  };
+  Apart out{ours.size()};
+  const auto count = static_cast<double>(ours.size());
+  glm::dmat3 sum(0.0);
+  glm::dvec3 our_mean(0.0), their_mean(0.0);
+  for (const auto& image : ours) {
+    sum += glm::transpose(theirs.at(image.name).rotation) * image.rotation;
+    our_mean += center(image) / count;
+    their_mean += center(theirs.at(image.name)) / count;
+  }
+  const glm::dmat3 turn = raysplats::orthogonal_factor(sum);
+  double our_size = 0, their_size = 0, extent = 0;
+  for (const auto& image : ours) {
+    const double away = glm::distance(center(theirs.at(image.name)), their_mean);
+    extent = std::max(extent, away);
+    their_size += away;
+    our_size += glm::distance(center(image), our_mean);
+  }
+  for (const auto& image : ours) {
+    const auto& other = theirs.at(image.name);
+    const glm::dmat3 rest = other.rotation * turn * glm::transpose(image.rotation);
+    const double cosine = 0.5 * (rest[0][0] + rest[1][1] + rest[2][2] - 1.0);
+    const double degrees = glm::degrees(std::acos(std::clamp(cosine, -1.0, 1.0)));
+    const glm::dvec3 moved =
+        their_mean + their_size / our_size * (turn * (center(image) - our_mean));
+    const double percent = 100.0 * glm::distance(moved, center(other)) / extent;
+    out.mean_degrees += degrees / count;
+    out.most_degrees = std::max(out.most_degrees, degrees);
+    out.mean_percent += percent / count;
+    out.most_percent = std::max(out.most_percent, percent);
+  }
+  return out;
 }
 
 /// Places a.png and b.png, but not c.png.
@@ -204,8 +264,37 @@ TEST_CASE("prepare says in one sentence what is missing") {
   refused(stage.run({stage.path("nothing"), "-o", stage.path("data")}), 3, "does not exist");
   fs::create_directories(stage.path("few"));
   refused(stage.run({stage.path("few"), "-o", stage.path("data")}), 3, "0 photos");
+  // Photos in folders below may be the same at other sizes: none is taken unasked.
+  fs::copy(stage.path("photos"), stage.path("few/camera 1"));
+  const Outcome below = stage.run({stage.path("few"), "-o", stage.path("data")});
+  refused(below, 3, "camera 1 (3)");
+  CHECK(!fs::exists(stage.path("data")));
   // Images of somebody else are not touched.
   write_file(stage.path("mine/images/x.png"), "mine");
   refused(stage.run({stage.path("photos"), "-o", stage.path("mine")}), 3, "another folder");
   CHECK(read_file(stage.path("mine/images/x.png")) == "mine");
+}
+
+// RAYSPLATS_TEST_DATA as in tests/unit/io/real_data_test.cpp. COLMAP takes minutes for the photos.
+TEST_CASE("the real COLMAP finds the poses of a capture, where both are there") {
+  const char* data = std::getenv("RAYSPLATS_TEST_DATA");
+  if (data == nullptr || std::system("command -v colmap > /dev/null") != 0) {
+    MESSAGE("skipped: RAYSPLATS_TEST_DATA is not set, or there is no colmap");
+    return;
+  }
+  const fs::path capture = fs::path(data) / "colmap/fox_undistorted";
+  const TemporaryFolder folder;
+  const Outcome outcome =
+      raysplats_program({"prepare", (capture / "images").string(), "-o", folder / "data", "-q"});
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  const Apart apart = compare(folder / "data/sparse/0", capture / "sparse/0");
+  MESSAGE(apart.photos << " photos: rotations " << apart.mean_degrees << " degrees apart, at most "
+                       << apart.most_degrees << "; centres " << apart.mean_percent
+                       << " % of the extent, at most " << apart.most_percent);
+  CHECK(apart.photos == 50);
+  CHECK(apart.mean_degrees < 0.5);
+  CHECK(apart.most_degrees < 1.0);
+  CHECK(apart.mean_percent < 0.5);
+  CHECK(apart.most_percent < 1.0);
 }
