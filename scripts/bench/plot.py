@@ -178,8 +178,9 @@ def axis_plot(axis: str, rows: list[dict[str, str]]) -> bytes:
         if logarithmic:
             axes.set_xscale("log")
             axes.minorticks_off()
-        axes.set_xticks(xs, labels, rotation=30)
-        axes.set_xlabel(axis)
+        # Between two of its dollars matplotlib would read a formula.
+        axes.set_xticks(xs, [label.replace("$", r"\$") for label in labels], rotation=30)
+        axes.set_xlabel(axis.replace("$", r"\$"))
         axes.set_ylabel(y_label)
         axes.grid(True, linewidth=0.3)
     figure.tight_layout()
@@ -209,8 +210,8 @@ def ablation_page(fields: list[str], runs: list[dict[str, str]]) -> str:
 <html lang="en"><head><meta charset="utf-8"/><title>Ablation</title>
 <meta http-equiv="Content-Security-Policy" content="default-src &#39;none&#39;; img-src data:; style-src &#39;unsafe-inline&#39;"/>
 <style>:root{{color-scheme:light dark}}body{{max-width:1200px;margin:24px auto;padding:0 16px;font:15px/1.5 system-ui,sans-serif}}
-table{{border-collapse:collapse}}td,th{{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid #8886}}
-img{{max-width:100%;background:#fff}}</style></head>
+table{{border-collapse:collapse;display:block;overflow-x:auto}}td,th{{padding:3px 14px 3px 0;text-align:left;border-bottom:1px solid #8886}}
+img{{max-width:100%;background:#fff}}@media print{{:root{{color-scheme:light}}}}</style></head>
 <body><h1>Ablation: one option at a time</h1>
 {body}</body></html>
 """

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder of a training run in which every text is one that could break a page."""
+import csv
 import json
 import os
 import struct
@@ -49,3 +50,19 @@ def write_run(folder, seed=0):
     for view in views[:-1]:
         with open(os.path.join(eval_folder, view["picture"]), "wb") as stream:
             stream.write(png(90, 20))
+
+
+def write_ablation(folder):
+    """What ablation.sh leaves for plot.py: an axis with two runs and one that failed."""
+    axis = f"{HOSTILE} $x^$"
+    with open(os.path.join(folder, "plan.csv"), "w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, ["axis", "value", "folder"])
+        writer.writeheader()
+        for i in range(3):
+            writer.writerow({"axis": axis, "value": f"{HOSTILE} $ {i} $", "folder": f"runs/{i}"})
+    for i in range(2):
+        for path, content in (("eval", {"psnr": 20 + i, "ssim": 0.5}),
+                              ("run", {"iterations": 9, "gaussians": 7, "training_seconds": 1 + i, "capped_rays": 0})):
+            os.makedirs(os.path.join(folder, f"runs/{i}", path))
+            with open(os.path.join(folder, f"runs/{i}", path, "metrics.json"), "w", encoding="utf-8") as stream:
+                json.dump(content, stream)

@@ -13,7 +13,7 @@ from selenium.webdriver.common.by import By
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(HERE, "../view")]
-from awkward_run import HOSTILE, write_run  # noqa: E402
+from awkward_run import HOSTILE, write_ablation, write_run  # noqa: E402
 from browser import BrowserCase, main  # noqa: E402
 
 
@@ -79,6 +79,24 @@ class ReportTest(BrowserCase):
             self.make("report", *given, "-o", file)
             self.look(file, name)
             self.assertIn(HOSTILE, self.page.find_element(By.TAG_NAME, "body").text)
+
+    def test_a_benchmark(self):
+        file = self.path("bench.html")
+        self.make("bench", "--sizes", "1k", "--resolution", "64x64", "--repeat", "1", "--filter", "^(forward|adam)",
+                  "--html", file)
+        self.look(file, "bench")
+        self.assertIn("forward", self.page.find_element(By.TAG_NAME, "body").text)
+
+    def test_an_ablation(self):
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            self.skipTest("no matplotlib: apt-get install python3-matplotlib")
+        write_ablation(self.folder)
+        subprocess.run([sys.executable, os.path.join(HERE, "../../scripts/bench/plot.py"), "ablation", self.folder],
+                       check=True, stdout=subprocess.DEVNULL)
+        self.look(self.path("ablation.html"), "ablation")
+        self.assertIn(HOSTILE, self.page.find_element(By.TAG_NAME, "body").text)
 
 
 if __name__ == "__main__":

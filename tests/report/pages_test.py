@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The pages of `raysplats report` and `raysplats bench --html`, read by an XML parser.
+"""The pages of `raysplats report`, `raysplats bench --html` and scripts/ablation.sh, read by an XML parser.
 usage: pages_test.py PROGRAM"""
 import json
 import os
@@ -12,7 +12,7 @@ import xml.dom.minidom
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(HERE, "../view")]
-from awkward_run import HOSTILE, write_run  # noqa: E402
+from awkward_run import HOSTILE, write_ablation, write_run  # noqa: E402
 from program import write_model  # noqa: E402
 
 PROGRAM = ""
@@ -41,6 +41,9 @@ class PagesTest(unittest.TestCase):
         file = self.path("page.html")
         subprocess.run([PROGRAM, *(file if a is None else a for a in arguments), "-q"], check=True,
                        stdout=subprocess.DEVNULL)
+        return self.parsed(file)
+
+    def parsed(self, file):
         self.assertLess(os.path.getsize(file), MOST_BYTES)
         page = xml.dom.minidom.parse(file)
         for element in page.getElementsByTagName("*"):
@@ -85,6 +88,19 @@ class PagesTest(unittest.TestCase):
         seen = texts(self.page("bench", "--model", model, "--cameras", cameras, "--repeat", "1", "--filter",
                                "^forward", "--html", None))
         self.assertIn("a<b>&'", seen)
+
+    def test_an_ablation(self):
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            self.skipTest("no matplotlib")
+        write_ablation(self.folder)
+        subprocess.run([sys.executable, os.path.join(HERE, "../../scripts/bench/plot.py"), "ablation", self.folder],
+                       check=True, stdout=subprocess.DEVNULL)
+        page = self.parsed(self.path("ablation.html"))
+        # The heading, three values, and the text of the picture.
+        self.assertGreaterEqual(texts(page).count(HOSTILE), 5)
+        self.assertEqual(len(page.getElementsByTagName("img")), 1)
 
 
 if __name__ == "__main__":
