@@ -325,6 +325,7 @@ TEST_CASE("several runs stand side by side, with what differs between them") {
   CHECK(has(page, "<td>Complete: 23.5 dB on 1 held-out view, nothing to warn of.</td>"));
   CHECK(has(page, "<tr><th>Driver</th><td></td><td>&lt;d&gt; 2</td></tr>"));
   CHECK(has(page, "data set</th><td></td><td>00aa</td></tr>"));
+  CHECK(!has(page, "<th>RaySplats-CL</th>"));  // which neither says
   CHECK(has(page, "128 bits)</th><td>00112233445566778899aabbccddeeff</td><td>00bb</td></tr>"));
   // The view in which they differ by 6 dB comes before that in which they differ by one.
   const std::size_t good = page.find("A: good.png, 30.00 dB"), bad = page.find("A: a&lt;b");
