@@ -1,19 +1,25 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Renders the scenes of configs/gallery around a trained model: mirrors, glass, shadows, transparency and an animation.
-# With --data the model is one of photos: a mirror with a ball, a ball on its way around, glass and a shadow around its
+# With DATA the model is one of photos: a mirror with a ball, a ball on its way around, glass and shadows around its
 # subject, wherever its cameras say that this is.
-# usage: scripts/gallery.sh [--data DATA] [OUTPUT [RUN]]
-#   DATA    data set of `raysplats train`, trained with --quality low
+# usage: scripts/gallery.sh [[--data] DATA] [OUTPUT [RUN]]
+#   DATA    data set of `raysplats train`, trained with --quality low; without --data a folder that is one
 #   OUTPUT  folder for the pictures (default: gallery/ in the project)
 #   RUN     folder of a training run on the generated data set, or on DATA; trained into OUTPUT/run when left out
 # RAYSPLATS_DEVICE chooses the OpenCL device (index or part of its name).
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+is_data() { [[ -e $1/transforms.json || -e $1/transforms_train.json || -d $1/sparse || -d $1/colmap/sparse ]]; }
+
 data=
 if [[ ${1:-} == --data ]]; then
   data=$(realpath -- "${2:?--data takes a data set}")
   shift 2
+elif (($# > 0)) && is_data "$1"; then
+  data=$(realpath -- "$1")
+  shift
 fi
 output=$(realpath -m -- "${1:-$root/gallery}")
 run=${2:-}

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes scenes around a captured model: a mirror and a ball, the ball on its way around, glass, and a lamp with a box under it.
+"""Writes scenes around a captured model: a mirror and a ball, the ball on its way around, glass, and a lamp
+with a box and a table in front: the box throws its shadow on what was captured, the subject its own on the table.
 
 usage: around.py RUN OUTPUT   (RUN: folder of a training run; its cameras say where the subject is and what is up)
 """
@@ -101,6 +102,7 @@ def main():
         return angles([across, up, cross(across, up)])
 
     facing = turned(0.0)
+    level = angles([right, forward, up])
     around = f"turn = {{ axis = {numbers(up)}, degrees = 360, pivot = {numbers(target)} }}\n"
     silver = material("wall", "mirror", "color = [0.88, 0.92, 0.95]") + \
         material("chrome", "mirror", "color = [0.95, 0.93, 0.9]")
@@ -115,10 +117,12 @@ def main():
         mesh("box", "green", 0.1 * half, place(0.45, -0.35, -0.05), facing) +
         material("clear", "glass", "ior = 1.5") +
         material("green", "glass", f"ior = 1.5\nabsorption = {numbers([6 / half, 1.2 / half, 4 / half])}"),
-        "shadow": mesh("box", "red", 0.12 * half, place(-0.5, -0.15, 0.3), turned(0.4)) +
+        "shadow": mesh("quad", "table", [0.5 * half, 0.3 * half, 1.0], place(0.1, -0.62, -0.28), level) +
+        mesh("box", "red", 0.1 * half, place(-0.52, -0.12, 0.1), turned(0.4)) +
         material("red", "diffuse", "color = [0.85, 0.2, 0.15]") +
-        f'[[light]]\nkind = "sphere"\nposition = {numbers(place(-0.3, -0.5, 2.2))}\nradius = {0.12 * half:.4g}\n'
-        f'color = [1.0, 0.98, 0.94]\nintensity = {9 * half * half:.4g}\n\n',
+        material("table", "diffuse", "color = [0.55, 0.55, 0.53]") +
+        f'[[light]]\nkind = "sphere"\nposition = {numbers(place(0.25, 0.9, 1.05))}\nradius = {0.08 * half:.4g}\n'
+        f'color = [1.0, 0.98, 0.94]\nintensity = {7 * half * half:.4g}\n\n',
     }
     rest = {"turn": "[animation]\nframes = 24\n",
             "shadow": "light-samples = 8\n\n[render.shadows]\nstrength = 0.65\n"}
