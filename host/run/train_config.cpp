@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <set>
@@ -154,6 +155,23 @@ std::string shell_text(std::string text) {
   return text;
 }
 
+void check_rate(const LearningRate& rate) {
+  if ((rate.initial > 0) == (rate.final_value > 0)) return;
+  throw UsageError(
+      "A learning rate and its final value are both 0 (the group stays as it is) or both above 0");
+}
+
+void check_fitted_rate(const LearningRate& rate) {
+  for (const double value : {rate.initial, rate.final_value}) {
+    if (value >= 0 || value == kFittedRate) continue;
+    throw UsageError(fmt::format(
+        "A learning rate is {}: use 0 or above, or -1 for one that fits the length of the run",
+        value));
+  }
+  const double initial = std::abs(rate.initial);
+  if (rate.final_value != kFittedRate) check_rate({initial, rate.final_value});
+}
+
 }  // namespace
 
 void add_train_options(CLI::App& app, TrainOptions& options) {
@@ -230,15 +248,12 @@ void validate(const TrainOptions& options) {
   if (!std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
     throw UsageError("The iterations of 'resolution-schedule' have to ascend");
   }
-  for (const LearningRate& rate :
-       {options.position_lr, options.rotation_lr, options.scale_lr, options.opacity_lr,
-        options.sh_lr, options.sh_rest_lr, options.sky_lr, options.pose_lr}) {
-    if ((rate.initial > 0) != (rate.final_value > 0)) {
-      throw UsageError(
-          "A learning rate and its final value are both 0 (the group stays as it is) or both above "
-          "0");
-    }
+  for (const LearningRate& rate : {options.position_lr, options.rotation_lr, options.opacity_lr,
+                                   options.sh_lr, options.sky_lr, options.pose_lr}) {
+    check_rate(rate);
   }
+  check_fitted_rate(options.scale_lr);
+  check_fitted_rate(options.sh_rest_lr);
   if (options.max_gaussians > 0 && options.init_count > options.max_gaussians) {
     throw UsageError(
         fmt::format("The start of 'init-count' = {} Gaussians is above 'max-gaussians' = {}: lower "

@@ -263,10 +263,17 @@ void add_optimiser_keys(TrainTable& t, TrainOptions& o) {
   t.section("Optimiser (Adam)");
   t.learning_rate("position-lr", o.position_lr, "the means, times the scene extent");
   t.learning_rate("rotation-lr", o.rotation_lr, "the quaternions");
-  t.learning_rate("scale-lr", o.scale_lr, "the scale parameters");
+  t.number("scale-lr", o.scale_lr.initial, kFittedRate, 1e3,
+           "learning rate of the scale parameters; -1 = 2.5 / sqrt(iterations), from 0.04 to 0.12");
+  t.number("scale-lr-final", o.scale_lr.final_value, 0, 1e3, "value that scale-lr decays to");
   t.learning_rate("opacity-lr", o.opacity_lr, "the opacity parameters");
   t.learning_rate("sh-lr", o.sh_lr, "colour (SH band 0)");
-  t.learning_rate("sh-rest-lr", o.sh_rest_lr, "the SH bands above 0");
+  t.number(
+      "sh-rest-lr", o.sh_rest_lr.initial, kFittedRate, 1e3,
+      "learning rate of the SH bands above 0; -1 = 0.095 / sqrt(iterations), from 0.0005 to 0.003");
+  t.number(
+      "sh-rest-lr-final", o.sh_rest_lr.final_value, kFittedRate, 1e3,
+      "value that sh-rest-lr decays to; -1 = 0.032 / sqrt(iterations), from 0.000125 to 0.001");
   t.learning_rate("sky-lr", o.sky_lr, "the sky");
   t.learning_rate("pose-lr", o.pose_lr, "the poses, in radians and shares of the scene extent");
   t.number("lr-decay", o.lr_decay, 0, 1,

@@ -18,7 +18,41 @@ constexpr std::uint64_t kJoinedPass = std::uint64_t{1} << 48;  // of passes over
 constexpr double kValidationShare = 0.9;  // of the run; then validation views are trained on too
 constexpr int kValidations = 9;
 
+// What a rate is in a run of 1000 iterations, and between what it stays in others.
+struct FittedRate {
+  double usual;
+  double least;
+  double most;
+};
+
+constexpr double kFittedIterations = 1000;
+constexpr FittedRate kScaleRate{0.08, 0.04, 0.12};
+constexpr FittedRate kShRestRate{0.003, 0.0005, 0.003};
+constexpr FittedRate kShRestFinalRate{0.001, 0.000125, 0.001};
+
+// By the root of the number of steps, as far as a walk of that many steps leads.
+double fitted(const FittedRate& rate, const TrainOptions& options) {
+  const auto steps = static_cast<double>(std::max<std::int64_t>(options.iterations, 1));
+  return std::clamp(rate.usual * std::sqrt(kFittedIterations / steps), rate.least, rate.most);
+}
+
 }  // namespace
+
+LearningRate scale_rate(const TrainOptions& options) {
+  LearningRate rate = options.scale_lr;
+  if (rate.initial == kFittedRate)
+    rate.initial = std::max(fitted(kScaleRate, options), rate.final_value);
+  return rate;
+}
+
+LearningRate sh_rest_rate(const TrainOptions& options) {
+  LearningRate rate = options.sh_rest_lr;
+  if (rate.initial == kFittedRate)
+    rate.initial = std::max(fitted(kShRestRate, options), rate.final_value);
+  if (rate.final_value == kFittedRate)
+    rate.final_value = std::min(fitted(kShRestFinalRate, options), rate.initial);
+  return rate;
+}
 
 double learning_rate(const LearningRate& rate,
                      const TrainOptions& options,

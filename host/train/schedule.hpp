@@ -19,6 +19,11 @@ namespace raysplats {
 /// iteration, as in 3DGS.
 double learning_rate(const LearningRate& rate, const TrainOptions& options, std::int64_t iteration);
 
+/// Rates of the scale parameters and of the SH bands above 0 as they are given, with what the
+/// number of iterations asks for in place of kFittedRate.
+LearningRate scale_rate(const TrainOptions& options);
+LearningRate sh_rest_rate(const TrainOptions& options);
+
 /// Degree of the SH bands that are switched on.
 int active_sh_degree(const TrainOptions& options, std::int64_t iteration);
 

@@ -31,10 +31,10 @@ AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t
   rates.quaternions =
       (options.flat ? kFlatTurn : 1.0) * learning_rate(options.rotation_lr, options, iteration);
   rates.scales = (options.scale_lr_by_extent ? extent : 1.0) *
-                 learning_rate(options.scale_lr, options, iteration);
+                 learning_rate(scale_rate(options), options, iteration);
   rates.opacities = learning_rate(options.opacity_lr, options, iteration);
   rates.sh_dc = learning_rate(options.sh_lr, options, iteration);
-  rates.sh_rest = learning_rate(options.sh_rest_lr, options, iteration);
+  rates.sh_rest = learning_rate(sh_rest_rate(options), options, iteration);
   return rates;
 }
 

@@ -70,6 +70,10 @@ struct Bounds {
   bool operator==(const Bounds&) const = default;
 };
 
+/// In place of a number of a learning rate that has a default by the length of the run: in short
+/// runs every step has to go farther.
+inline constexpr double kFittedRate = -1;
+
 /// Learning rate of one parameter group: `initial` decays exponentially to `final_value`.
 struct LearningRate {
   double initial = 0;
@@ -133,10 +137,10 @@ struct TrainOptions {
   // Optimiser
   LearningRate position_lr{5e-4, 5e-6};  ///< times the scene extent
   LearningRate rotation_lr{3e-3, 1e-3};
-  LearningRate scale_lr{4e-2, 5e-3};
+  LearningRate scale_lr{kFittedRate, 5e-3};
   LearningRate opacity_lr{1e-1, 3e-2};
   LearningRate sh_lr{1e-2, 2.5e-3};
-  LearningRate sh_rest_lr{5e-4, 1.25e-4};
+  LearningRate sh_rest_lr{kFittedRate, kFittedRate};
   LearningRate sky_lr{1e-2, 1e-3};
   LearningRate pose_lr{5e-3, 5e-4};  ///< radians, and shares of the scene extent
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration

@@ -5,6 +5,9 @@
 
 #include <cmath>
 #include <set>
+#include <vector>
+
+#include "train/step_options.hpp"
 
 using namespace raysplats;
 
@@ -21,6 +24,34 @@ TEST_CASE("learning rates decay to their final value") {
   CHECK(learning_rate({5e-3, 1e-3}, options, 10000) == doctest::Approx(5e-3 * std::exp(-0.86643)));
   CHECK(learning_rate({5e-3, 1e-3}, options, 30000) == doctest::Approx(1e-3));
   CHECK(learning_rate({5e-2, 5e-2}, options, 30000) == doctest::Approx(5e-2));
+}
+
+TEST_CASE("rates that fit the run fall with the root of its length, and given ones stay") {
+  TrainOptions options;
+  const auto rates_of = [&options](std::int64_t iterations) {
+    options.iterations = iterations;
+    const LearningRate scale = scale_rate(options), rest = sh_rest_rate(options);
+    return std::vector<double>{scale.initial, scale.final_value, rest.initial, rest.final_value};
+  };
+  const auto check = [](const std::vector<double>& found, const std::vector<double>& expected) {
+    for (std::size_t k = 0; k < 4; ++k) CHECK(found[k] == doctest::Approx(expected[k]));
+  };
+  check(rates_of(1000), {0.08, 0.005, 0.003, 0.001});
+  check(rates_of(500), {0.08 * std::sqrt(2.0), 0.005, 0.003, 0.001});
+  check(rates_of(0), {0.12, 0.005, 0.003, 0.001});
+  check(rates_of(4000), {0.04, 0.005, 0.0015, 0.0005});
+  check(rates_of(1000000), {0.04, 0.005, 0.0005, 0.000125});
+  CHECK(adam_rates_of(options, 2.0, 0).scales == doctest::Approx(0.04));
+  CHECK(adam_rates_of(options, 2.0, 0).sh_rest == doctest::Approx(0.0005));
+
+  options.scale_lr = {0.01, 0.002};
+  options.sh_rest_lr = {0, kFittedRate};
+  check(rates_of(1000), {0.01, 0.002, 0, 0});
+  options.scale_lr = {kFittedRate, 0.5};
+  options.sh_rest_lr = {kFittedRate, 0.01};
+  check(rates_of(1000), {0.5, 0.5, 0.01, 0.01});
+  options.sh_rest_lr = {0.0002, kFittedRate};
+  check(rates_of(1000), {0.5, 0.5, 0.0002, 0.0002});
 }
 
 TEST_CASE("bands and resolution are switched on over time") {
