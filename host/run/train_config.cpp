@@ -30,7 +30,7 @@ constexpr std::string_view kRunMark = "# ---- Run ----\n";
 
 // A file that a run wrote, in the dialect of older versions: strings without escapes and seeds
 // beyond the integers of TOML.
-std::string modern(std::string text) {
+std::string modern(const std::string& text) {
   std::string out;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size() - 1) + 1;
