@@ -43,8 +43,12 @@ glm::dmat3 rotation_by(const glm::dvec3& turn) {
 
 PoseRefinement::PoseRefinement(std::vector<Camera> cameras,
                                double extent,
-                               std::vector<double> distances)
-    : cameras_(std::move(cameras)), extent_(extent), distances_(std::move(distances)) {
+                               std::vector<double> distances,
+                               double prior)
+    : cameras_(std::move(cameras)),
+      extent_(extent),
+      distances_(std::move(distances)),
+      prior_(prior) {
   const std::size_t numbers = kNumbers * cameras_.size();
   state_.deltas.resize(numbers);
   state_.first.resize(numbers);
@@ -68,8 +72,10 @@ std::vector<Camera> PoseRefinement::cameras() const {
 }
 
 void PoseRefinement::step(std::size_t view, const PoseGradient& gradient, double rate) {
-  const glm::dvec3 by_turn(gradient.rotation[0], gradient.rotation[1], gradient.rotation[2]);
-  const glm::dvec3 by_center(gradient.center[0], gradient.center[1], gradient.center[2]);
+  glm::dvec3 by_turn(gradient.rotation[0], gradient.rotation[1], gradient.rotation[2]);
+  glm::dvec3 by_center(gradient.center[0], gradient.center[1], gradient.center[2]);
+  by_turn += prior_ * turn_of(state_.deltas, view);
+  by_center += prior_ / (extent_ * extent_) * shift_of(state_.deltas, view);
   const glm::dmat3 back = turn_back(view);
   const glm::dvec3 around = extent_ * (by_center + glm::transpose(back) * by_turn);
   const std::array<double, kNumbers> slope{by_turn.x, by_turn.y, by_turn.z,

@@ -34,8 +34,14 @@ class PoseRefinement {
   };
 
   /// `extent` is the length that a turn by one radian is weighed against (scene_extent()),
-  /// `distances` are those of what the cameras see (subject_distances()).
-  PoseRefinement(std::vector<Camera> cameras, double extent, std::vector<double> distances);
+  /// `distances` are those of what the cameras see (subject_distances()). `prior` is the weight of
+  /// half the squared correction (radians and extents) beside a photo's loss: errors of poses are
+  /// small and do not agree between photos. It holds the motions of which the photos tell next to
+  /// nothing, where the model's own errors would decide, and leaves the others to the loss.
+  PoseRefinement(std::vector<Camera> cameras,
+                 double extent,
+                 std::vector<double> distances,
+                 double prior = 0.0);
 
   /// The camera of a photo where it is now, at the size of the data set.
   Camera camera(std::size_t view) const;
@@ -56,6 +62,7 @@ class PoseRefinement {
   std::vector<Camera> cameras_;
   double extent_;
   std::vector<double> distances_;
+  double prior_;
   State state_;
 };
 

@@ -87,8 +87,7 @@ Trainer::Impl::Impl(Context& device,
   if (options.strategy == DensityStrategy::kMcmc) mcmc.emplace(device, options, extent);
   if (options.exposure) exposure.emplace(device, train_views.size(), slots.size());
   forget_sky();
-  if (options.poses)
-    poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
+  forget_poses();
   if (options.scale_activation == ScaleActivation::kSigmoid && options.scale_min * extent >= 1) {
     throw UsageError(
         fmt::format("The option 'scale-min' = {} is {:.3g} units of this data set, and with "

@@ -88,6 +88,7 @@ struct Trainer::Impl {
   std::vector<SmallPhoto> reduced_photos(std::span<const std::size_t> views) const;
   void choose_background();
   void forget_sky();
+  void forget_poses();
   std::size_t pass_steps() const;
   std::int64_t turn_of(std::size_t slot) const;
   std::int64_t last_turn() const;

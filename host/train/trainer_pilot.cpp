@@ -187,8 +187,7 @@ void Trainer::Impl::forget_pilot() {
   guard.restore({});
   if (exposure) exposure.emplace(context, train_views.size(), slots.size());
   forget_sky();
-  if (poses)
-    poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent));
+  forget_poses();
   iteration = 0;
   reads_ahead = true;
   traced_rays = 0;

@@ -18,6 +18,7 @@ namespace {
 constexpr int kSmallPhoto = 200;         // longer side of photos that the start looks at, in pixels
 constexpr std::size_t kFewViews = 3;     // below, photos say next to nothing of depth
 constexpr double kSigmoidExtent = 20;    // then one unit is less than 0.05 extents, a usual limit
+constexpr double kPosePrior = 1;         // PoseRefinement: what errors of half a degree can bear
 constexpr std::size_t kSomePhotos = 24;  // that tell what is typical of all
 
 std::vector<std::size_t> evenly_spread(const std::vector<std::size_t>& all, std::size_t most) {
@@ -68,6 +69,13 @@ void Trainer::Impl::forget_sky() {
   if (light.empty()) return;
   tracer.set_background({}, light);
   sky.emplace(context, 3 * light.size());
+}
+
+// Poses as the data set has them, where they are trained.
+void Trainer::Impl::forget_poses() {
+  if (!options.poses) return;
+  poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent),
+                kPosePrior);
 }
 
 // What shows through where no Gaussian is. No photo says what lies there, and of all colours the

@@ -124,6 +124,28 @@ TEST_CASE("a motion that all cameras have in common is taken off, and nothing el
   for (std::size_t i = 0; i < 6; ++i) CHECK(std::abs(kept.state().deltas[6 * 8 + i]) < 0.01f);
 }
 
+TEST_CASE("a prior holds poses back as far as it outweighs what photos tell") {
+  const std::vector<Camera> start = ring(24);
+  PoseRefinement::State state = refinement(start).state();
+  for (std::size_t i = 0; i < state.deltas.size(); i += 7) state.deltas[i] = 0.004f;
+  const std::vector<Camera> truth = settled(start, state).cameras();
+  // The loss is the squared distance, whose slope is twice it: an equal prior meets it half way.
+  PoseRefinement poses(start, kExtent, subject_distances(start, {}, kExtent), 2.0);
+  for (int pass = 0; pass < 300; ++pass) {
+    const double rate = 1e-3 * std::pow(0.003, pass / 300.0);
+    for (std::size_t view = 0; view < truth.size(); ++view)
+      poses.step(view, towards(poses.camera(view), truth[view]), rate);
+  }
+  for (std::size_t view = 0; view < truth.size(); ++view) {
+    CAPTURE(view);
+    const double apart = angle_between(start[view], truth[view]);
+    const double moved = glm::distance(start[view].center(), truth[view].center());
+    CHECK(std::abs(angle_between(poses.camera(view), start[view]) - 0.5 * apart) < 1e-4);
+    CHECK(std::abs(glm::distance(poses.camera(view).center(), start[view].center()) - 0.5 * moved) <
+          1e-4 * kExtent);
+  }
+}
+
 TEST_CASE("what a camera sees lies at its points, else where all look, else at the extent") {
   const std::vector<Camera> cameras = ring(20);
   for (const double distance : subject_distances(cameras, {}, kExtent))
