@@ -196,6 +196,30 @@ __kernel void chased_lines(__global const uint16* restrict table,
   out[i] = place;
 }
 
+// Lines of planes of a picture in the order of its tiles, which are two lines wide and four rows
+// high: `planes` planes of get_global_size(0) rows of tiles, `stride` lines a row, read `passes`
+// times.                                                        global: rows of tiles
+__kernel void tiled_lines(__global const float16* restrict table,
+                          __global float16* restrict out,
+                          uint planes,
+                          uint stride,
+                          uint passes) {
+  const size_t plane = get_global_size(0) * 4 * (size_t)stride;
+  const size_t first = get_global_id(0) * 4 * (size_t)stride;
+  float16 x0 = (float16)(0.0f), x1 = x0;
+  for (uint k = 0; k < passes * stride; k += 2) {
+    for (uint row = 0; row < 4; ++row) {
+      for (uint p = 0; p < planes; ++p) {
+        __global const float16* pair =
+            table + p * plane + first + row * (size_t)stride + k % stride;
+        x0 += pair[0];
+        x1 += pair[1];
+      }
+    }
+  }
+  out[get_global_id(0)] = x0 + x1;
+}
+
 // Words of 8 bytes written at random into a table of mask + 1: what a sort's scatter waits for.
 //                                                               global: any number of work-items
 __kernel void random_stores(__global uint2* restrict table, uint rounds, uint mask) {

@@ -164,6 +164,51 @@ double measure_chase_rate(Context& context, std::size_t bytes) {
   });
 }
 
+double measure_tile_rate(Context& context, std::size_t bytes) {
+  // Planes that the loss reads of a channel, lines of a row of 800 pixels and its borders.
+  constexpr std::size_t kPlanes = 5, kStride = 52, kTileRows = 4;
+  constexpr std::size_t kLines = std::size_t{1} << 20;  // that a launch reads, at least
+  const std::size_t rows =
+      std::max<std::size_t>(1, bytes / sizeof(Float16) / (kPlanes * kStride * kTileRows));
+  const std::size_t lines = kPlanes * kStride * kTileRows * rows;
+  const auto passes = static_cast<std::uint32_t>((kLines + lines - 1) / lines);
+  Kernel kernel = context.kernel(kProgram, "tiled_lines");
+  Buffer<Float16> table(context, lines, "planes of pictures");
+  Buffer<Float16> out(context, rows, "sums of tiles");
+  table.clear();
+  context.take_launches();
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kCopies; ++i) {
+    const ProcessorTime processors(context);
+    kernel.launch(Range::linear(rows, 1), table, out, static_cast<std::uint32_t>(kPlanes),
+                  static_cast<std::uint32_t>(kStride), passes);
+    const double spent = launch_seconds(context);
+    best = std::min(best, spent * processors.share(spent));
+  }
+  return static_cast<double>(passes * lines) / best;
+}
+
+// Of a launch that all processors at once do in kSeconds: what it takes longer is what the others
+// miss, shared among all.
+double measure_late_seconds(Context& context) {
+  constexpr double kSeconds = 2e-4;
+  const double units = std::max<double>(1, context.device().compute_units);
+  Kernel kernel = context.kernel(kProgram, "vector_steps");
+  const std::size_t items = chain_items(context.device());
+  Buffer<Float16> out(context, items, "sums of steps");
+  const double rounds =
+      kSeconds * measure_vector_rate(context) / (kChainSteps * static_cast<double>(items));
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 10 * kRepetitions; ++i) {
+    const ProcessorTime processors(context);
+    kernel.launch(chain_range(context.device()), out, static_cast<std::uint32_t>(rounds), 0.999f,
+                  0.001f);
+    const double spent = launch_seconds(context);
+    best = std::min(best, spent * processors.share(spent));
+  }
+  return units > 1 ? std::max(0.0, best - kSeconds) * units / (units - 1) : 0.0;
+}
+
 double measure_store_rate(Context& context, std::size_t bytes) {
   const std::size_t words = std::bit_floor(std::max<std::size_t>(1, bytes / sizeof(std::uint64_t)));
   Kernel kernel = context.kernel(kProgram, "random_stores");

@@ -30,6 +30,13 @@ double measure_run_rate(Context& context, std::size_t bytes);
 /// Lines of 64 bytes of a table of `bytes`, each of which tells where the next one is, a second.
 double measure_chase_rate(Context& context, std::size_t bytes);
 
+/// Lines of pictures that take up `bytes` together, read tile by tile, a second.
+double measure_tile_rate(Context& context, std::size_t bytes);
+
+/// How much later than the first one the other processors take part in a launch, in seconds: 0
+/// where there is one alone.
+double measure_late_seconds(Context& context);
+
 /// Words of 8 bytes written at random into a table of `bytes`, a second.
 double measure_store_rate(Context& context, std::size_t bytes);
 

@@ -26,7 +26,7 @@ KernelWork times(double count, const KernelWork& unit) {
   KernelWork out = unit;
   for (double* part :
        {&out.vectors, &out.scalars, &out.slow, &out.shifted, &out.parked, &out.lines, &out.runs,
-        &out.chases, &out.stores, &out.local, &out.atomics, &out.trips, &out.barriers})
+        &out.chases, &out.tiled, &out.stores, &out.local, &out.atomics, &out.trips, &out.barriers})
     *part *= count;
   return out;
 }
@@ -46,6 +46,7 @@ KernelWork sort_work(const ExecutedCounts& c, double pairs, double passes) {
       times(passes * pairs, pair) + moved(passes * RS_WORK_SORT_PASS_BYTES * pairs, 2 * 8 * pairs);
   out.targets = kDigits * kLine;
   out.launches = 3 * passes;
+  out.shared = 2 * passes;  // the scan of a few numbers between them is not worth sharing
   return out;
 }
 
@@ -62,7 +63,7 @@ KernelWork prepare_work(const ExecutedCounts& c) {
           : KernelWork{.vectors = 57.4 + 0.6 * further, .scalars = 21, .slow = 1.4, .parked = 8.3};
   const double bytes = (RS_WORK_PREPARE_BYTES + RS_WORK_SH_BYTES * c.sh) * c.gaussians;
   KernelWork out = times(c.gaussians, gaussian) + moved(bytes, bytes);
-  out.launches = 1;
+  out.launches = out.shared = 1;
   return out;
 }
 
@@ -85,6 +86,7 @@ KernelWork lists_work(const ExecutedCounts& c) {
       sort_work(c, c.candidates, c.sort_passes);
   out.table = 96 * c.gaussians;
   out.launches += 5;
+  out.shared += 2;
   return out;
 }
 
@@ -121,7 +123,7 @@ KernelWork forward_work(const ExecutedCounts& c, bool keep) {
   const double lists = (RS_WORK_FORWARD_CANDIDATE_BYTES - kLine) * c.candidates;
   out = out + moved(lists + RS_WORK_FORWARD_PIXEL_BYTES * c.pixels + (keep ? c.stream_bytes : 0),
                     lists + (keep ? c.stream_bytes : 0));
-  out.launches = 1;
+  out.launches = out.shared = 1;
   return out;
 }
 
@@ -145,7 +147,7 @@ KernelWork backward_work(const ExecutedCounts& c) {
   out = out +
         moved(RS_WORK_BACKWARD_PIXEL_BYTES * c.pixels + c.stream_bytes + 2 * kLine * c.gaussians,
               c.stream_bytes);
-  out.launches = 2;
+  out.launches = out.shared = 2;
   return out;
 }
 
@@ -166,7 +168,7 @@ KernelWork finalize_work(const ExecutedCounts& c) {
       (RS_WORK_FINALIZE_BYTES + (c.grouped ? 0 : 3 * kLine) + 2 * RS_WORK_SH_BYTES * c.sh) *
       c.gaussians;
   KernelWork out = times(c.gaussians, gaussian) + moved(bytes, bytes);
-  out.launches = 1;
+  out.launches = out.shared = 1;
   return out;
 }
 
@@ -191,7 +193,9 @@ KernelWork loss_work(const ExecutedCounts& c, bool value) {
       value ? (c.grouped ? RS_WORK_GROUP_LOSS_VALUE_BYTES : RS_WORK_LOSS_VALUE_BYTES)
             : (c.grouped ? RS_WORK_GROUP_LOSS_GRADIENT_BYTES : RS_WORK_LOSS_GRADIENT_BYTES);
   KernelWork out = times(c.pixels, pixel) + moved(bytes * c.pixels, bytes * c.pixels);
-  out.launches = value ? 2 : 1;
+  // Of planes that tiles read in rows: u and v, for the gradient slopes as well.
+  if (!c.grouped) out.tiled = (value ? 24 : 60) * c.pixels / kLine;
+  out.launches = out.shared = value ? 2 : 1;
   return out;
 }
 
@@ -205,7 +209,7 @@ KernelWork adam_work(const ExecutedCounts& c) {
                                    : KernelWork{.vectors = 1.35, .scalars = 0.6, .slow = 0.125};
   KernelWork out =
       times(parameters, parameter) + moved(RS_WORK_ADAM_BYTES * parameters, 20 * parameters);
-  out.launches = 6;
+  out.launches = out.shared = 6;
   return out;
 }
 
@@ -228,7 +232,7 @@ KernelWork rays_work(const ExecutedCounts& c) {
   out.chases = c.grouped ? 0 : c.ray_nodes;
   out.path = kNodeLines * kLine / 256 * c.gaussians;
   out = out + moved(RS_WORK_RAY_BYTES * c.rays, RS_WORK_RAY_BYTES * c.rays);
-  out.launches = 1;
+  out.launches = out.shared = 1;
   return out;
 }
 

@@ -128,12 +128,15 @@ DeviceSpeeds measure_speeds(Context& context) {
   out.slow = measure_slow_rate(context);
   out.shifted = measure_shifted_rate(context);
   out.parked = measure_parked_rate(context);
+  out.processors = std::max<double>(1, context.device().compute_units);
+  out.late_seconds = measure_late_seconds(context);
   for (const std::size_t bytes : kLevels) {
     out.bandwidth.push_back(
         {static_cast<double>(bytes), measure_copy_bandwidth(context, bytes / 2)});
     out.lines.push_back({static_cast<double>(bytes), measure_line_rate(context, bytes)});
     out.runs.push_back({static_cast<double>(bytes), measure_run_rate(context, bytes)});
     out.chases.push_back({static_cast<double>(bytes), measure_chase_rate(context, bytes)});
+    out.tiled.push_back({static_cast<double>(bytes), measure_tile_rate(context, bytes)});
     out.stores.push_back({static_cast<double>(bytes), measure_store_rate(context, bytes)});
   }
   return out;
@@ -162,14 +165,16 @@ std::string forecast_text(const ForecastReport& report) {
   const DeviceSpeeds& d = report.device;
   std::string out = fmt::format(
       "{}: {:.2f} G vector, {:.2f} G scalar instructions/s, {:.2f} G divisions and roots/s,\n"
-      "  {:.2f} G vectors/s read at any float, {:.2f} G written nearby\n",
-      d.name, 1e-9 * d.vectors, 1e-9 * d.scalars, 1e-9 * d.slow, 1e-9 * d.shifted, 1e-9 * d.parked);
+      "  {:.2f} G vectors/s read at any float, {:.2f} G written nearby,\n"
+      "  {:.0f} processors, the others {:.0f} us after the first\n",
+      d.name, 1e-9 * d.vectors, 1e-9 * d.scalars, 1e-9 * d.slow, 1e-9 * d.shifted, 1e-9 * d.parked,
+      d.processors, 1e6 * d.late_seconds);
   for (std::size_t i = 0; i < d.bandwidth.size(); ++i) {
     out += fmt::format(
         "  up to {:>6.0f} KiB: {:>6.1f} GB/s in order, {:>7.1f} M lines/s at random, {:>6.1f} "
-        "chased\n",
+        "chased, {:>7.1f} by tiles\n",
         d.bandwidth[i].bytes / 1024, 1e-9 * d.bandwidth[i].per_second, 1e-6 * d.lines[i].per_second,
-        1e-6 * d.chases[i].per_second);
+        1e-6 * d.chases[i].per_second, 1e-6 * d.tiled[i].per_second);
   }
   for (const Forecast& f : report.forecasts) {
     out += fmt::format("\n{}, {} Gaussians, {}x{}\n", f.scene, f.size, f.width, f.height);

@@ -46,7 +46,15 @@ double random_seconds(const KernelWork& work, const DeviceSpeeds& device) {
   return over(work.lines, per_second(device.lines, work.table)) +
          over(work.runs, per_second(device.runs, work.table)) +
          over(work.chases, per_second(device.chases, work.path)) +
+         over(work.tiled, per_second(device.tiled, work.footprint)) +
          over(work.stores, per_second(device.stores, work.targets));
+}
+
+// More than if all processors took part from the beginning, of launches that take `seconds` then:
+// what they miss, shared among all, but no more than all of their part.
+double late_seconds(const KernelWork& work, const DeviceSpeeds& device, double seconds) {
+  const double others = device.processors - 1;
+  return std::min(others * seconds, work.shared * device.late_seconds * others / device.processors);
 }
 
 // Of all waves one after the other.
@@ -69,6 +77,7 @@ std::vector<Card> make_cards() {
                 .lines = {},
                 .runs = {},
                 .chases = {},
+                .tiled = {},
                 .stores = {},
                 .local = 96 * 2.5 * kGiga,
                 .atomics = 64 * 2.5 * kGiga,
@@ -91,6 +100,7 @@ std::vector<Card> make_cards() {
                   .lines = {},
                   .runs = {},
                   .chases = {},
+                  .tiled = {},
                   .stores = {},
                   .local = 32 * 2.1 * kGiga,
                   .atomics = 32 * 2.1 * kGiga,
@@ -112,6 +122,7 @@ std::vector<Card> make_cards() {
                 .lines = {},
                 .runs = {},
                 .chases = {},
+                .tiled = {},
                 .stores = {},
                 .local = 128 * 2.52 * kGiga,
                 .atomics = 64 * 2.52 * kGiga,
@@ -134,6 +145,7 @@ std::vector<Card> make_cards() {
                    .lines = {},
                    .runs = {},
                    .chases = {},
+                   .tiled = {},
                    .stores = {},
                    .local = 132 * 1.98 * kGiga,
                    .atomics = 64 * 1.98 * kGiga,
@@ -182,6 +194,7 @@ KernelWork KernelWork::operator+(const KernelWork& other) const {
   out.runs += other.runs;
   out.chases += other.chases;
   out.path = std::max(path, other.path);
+  out.tiled += other.tiled;
   out.stores += other.stores;
   out.targets = std::max(targets, other.targets);
   out.table = std::max(table, other.table);
@@ -190,6 +203,7 @@ KernelWork KernelWork::operator+(const KernelWork& other) const {
   out.trips += other.trips;
   out.barriers += other.barriers;
   out.launches += other.launches;
+  out.shared += other.shared;
   return out;
 }
 
@@ -206,7 +220,8 @@ Prediction predict(const KernelWork& work, const DeviceSpeeds& device, double re
   const double random = random_seconds(work, device);
   if (random > out.seconds) out.bound = "memory";
   out.seconds += random;
-  const double launches = work.launches * device.launch_seconds;
+  const double launches =
+      work.launches * device.launch_seconds + late_seconds(work, device, out.seconds);
   if (launches > out.seconds) out.bound = "launches";
   out.seconds += launches;
   return out;

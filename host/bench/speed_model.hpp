@@ -20,6 +20,7 @@ struct KernelWork {
   double table = 0;      ///< bytes that both come from
   double chases = 0;     ///< of these lines where the address of one is in the one before
   double path = 0;       ///< bytes that those come from
+  double tiled = 0;      ///< lines of pictures, read tile by tile, of the footprint
   double stores = 0;     ///< of 8 bytes at random
   double targets = 0;    ///< bytes of the lines that they go to
   double local = 0;      ///< accesses of a wave to local memory
@@ -27,6 +28,7 @@ struct KernelWork {
   double trips = 0;      ///< times that a wave waits for global memory
   double barriers = 0;   ///< of a wave
   double launches = 0;   ///< kernels
+  double shared = 0;     ///< of these those whose work is worth sharing among processors
 
   KernelWork operator+(const KernelWork& other) const;
 };
@@ -50,7 +52,10 @@ struct DeviceSpeeds {
   std::vector<Level> lines;      ///< a second; none: by the bandwidth
   std::vector<Level> runs;       ///< a second; like the next two, none where there are no lines
   std::vector<Level> chases;
+  std::vector<Level> tiled;
   std::vector<Level> stores;
+  double processors = 1;    ///< of CPUs, like the next one
+  double late_seconds = 0;  ///< that all processors but one come later to a launch
   double local = 0;         ///< accesses a second; 0: none apart
   double atomics = 0;       ///< a second; 0: none apart
   double clock = 0;         ///< Hz, of what follows
@@ -68,7 +73,8 @@ struct Prediction {
 /// The slowest of: instructions, bytes and lines, local accesses, additions, and the way of one
 /// wave after the other through its instructions and waits where `resident` waves run at once (0:
 /// not asked). Of a CPU the kinds of instructions add up, and lines and words at random,
-/// which nothing fetches ahead, come on top; so do launches.
+/// which nothing fetches ahead, come on top, as do lines of tiles; so do launches, and on CPUs what
+/// one processor does of each before the others come.
 Prediction predict(const KernelWork& work, const DeviceSpeeds& device, double resident = 0);
 
 /// A graphics card that nothing has run on: public figures (docs/gpu.md) and what the vendor's

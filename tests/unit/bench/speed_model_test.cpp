@@ -77,6 +77,21 @@ TEST_CASE("the model of speed adds up what a processor does one after the other"
   CHECK(found.seconds == doctest::Approx(3.0 + 1.0 + 0.25 + 0.5 + 0.5));
   CHECK(found.bound == "arithmetic");
   CHECK(predict(random, device).bound == "memory");
+  device.tiled = {{100, 80}, {INFINITY, 20}};
+  CHECK(predict(work + KernelWork{.footprint = 200, .tiled = 10}, device).seconds ==
+        doctest::Approx(3.5));
+}
+
+TEST_CASE("the model of speed lets the other processors come late to every launch") {
+  DeviceSpeeds device = sample_device();
+  device.cpu = true;
+  device.processors = 3;
+  device.late_seconds = 0.3;
+  // Two of three miss 0.3 seconds of each launch, but no more than there is to do.
+  CHECK(predict({.vectors = 200, .shared = 4}, device).seconds == doctest::Approx(2.8));
+  const Prediction small = predict({.vectors = 1, .shared = 4}, device);
+  CHECK(small.seconds == doctest::Approx(0.03));
+  CHECK(small.bound == "launches");
 }
 
 TEST_CASE("the model's registers and local memory are those of the compilers' baseline") {
