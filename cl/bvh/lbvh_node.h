@@ -29,16 +29,30 @@ typedef union {
   float s[LANES];
 } RayLanes;
 
-// One lane of a vector. On GPUs by choice: an array indexed by a number that is not known would lie
-// in memory.
-RS_INLINE float lane_value(const RayLanes* v, const uint lane) {
+// What a ray tests at once of a leaf block: with TRAIL one lane of it, so that few numbers are
+// alive (GPUs), else all LANES. RS_BLOCK_VALUE is vector k of the block, or its lane.
 #if TRAIL
-  const float2 half_of = lane & 2 ? v->v.hi : v->v.lo;
-  return lane & 1 ? half_of.y : half_of.x;
+#define RS_BLOCK_LANES 1
+typedef float bv;
+typedef int bi;
+#define RS_BLOCK_VALUE(block, k, lane) (((__global const float*)((block) + (k)))[lane])
+#define RS_BLOCK_MASK(comparison) (-(comparison))
+#define rs_block_any(mask) ((mask) != 0)
+#define rs_block_bits(mask) ((uint)((mask)&1))
 #else
-  return v->s[lane];
+#define RS_BLOCK_LANES LANES
+typedef fv bv;
+typedef iv bi;
+#define RS_BLOCK_VALUE(block, k, lane) ((block)[k])
+#define RS_BLOCK_MASK(comparison) RS_MASK(comparison)
+#define rs_block_any(mask) rs_any(mask)
+#define rs_block_bits(mask) rs_lane_bits(mask)
 #endif
-}
+
+typedef union {
+  bv v;
+  float s[RS_BLOCK_LANES];
+} BlockLanes;
 
 typedef struct {
   float3 o, d, inverse;
@@ -68,8 +82,8 @@ RS_INLINE RayData ray_data(const Ray ray) {
 
 // Depth of a slab. With RS_EXACT_SLABS it is good to a few units in the last place even far from
 // the world's origin, so that no ray slips between boxes that touch (surfaces need that); the plain
-// form is one operation.
-#ifdef RS_EXACT_SLABS
+// form is one operation, and three more numbers per ray, which GPUs have no registers for.
+#if defined(RS_EXACT_SLABS) || TRAIL
 #define RS_SLAB(plane, axis) (((plane)-ray->o.axis) * ray->inverse.axis)
 #else
 #define RS_SLAB(plane, axis) ((plane)*ray->inverse.axis - ray->shift.axis)

@@ -31,6 +31,9 @@ typedef struct {
 #error "a trail has room for four children a node"
 #endif
 
+// Of children_by_depth().
+#define RS_NO_CHILD 0xffffffffu
+
 typedef struct {
   ushort children[16];  // by level: lane + 1 of those left, four bits each, the next one lowest
   uint number;          // of the node within its level
@@ -52,19 +55,41 @@ RS_INLINE void walk_begin(TreeWalk* walk, const RayTree* tree, const float t_min
   walk->children[walk->root] = 0;
 }
 
-// The lanes of `bits` by their depths, which are not negative: the two lowest bits of each give way
-// to the lane.
-RS_INLINE uint lanes_by_depth(const uint bits, const fv depth) {
-  uint4 key = (as_uint4(depth) & ~3u) | (uint4)(0, 1, 2, 3);
-  key = select(key, (uint4)(0xffffffffu), (uint4)(bits & 1, bits & 2, bits & 4, bits & 8) == 0);
-  const uint2 low = min(key.xy, key.zw), high = max(key.xy, key.zw);
-  const uint first = min(low.x, low.y), last = max(high.x, high.y);
-  const uint a = max(low.x, low.y), b = min(high.x, high.y);
-  const uint second = min(a, b), third = max(a, b);
-  uint out = first == 0xffffffffu ? 0 : (first & 3) + 1;
-  out |= second == 0xffffffffu ? 0 : ((second & 3) + 1) << 4;
-  out |= third == 0xffffffffu ? 0 : ((third & 3) + 1) << 8;
-  return out | (last == 0xffffffffu ? 0 : ((last & 3) + 1) << 12);
+// Where the ray enters a child, whose slabs are lo and hi: the bits of the depth, which is not
+// negative, the two lowest of which give way to the child's lane. RS_NO_CHILD where it does not.
+RS_INLINE uint child_key(
+    const RayData* ray, const float3 lo, const float3 hi, const float t_end, const uint lane) {
+  const float x0 = RS_SLAB(lo.x, x), x1 = RS_SLAB(hi.x, x);
+  const float y0 = RS_SLAB(lo.y, y), y1 = RS_SLAB(hi.y, y);
+  const float z0 = RS_SLAB(lo.z, z), z1 = RS_SLAB(hi.z, z);
+  const float nx = ray->inverse.x < 0.0f ? x1 : x0, fx = ray->inverse.x < 0.0f ? x0 : x1;
+  const float ny = ray->inverse.y < 0.0f ? y1 : y0, fy = ray->inverse.y < 0.0f ? y0 : y1;
+  const float nz = ray->inverse.z < 0.0f ? z1 : z0, fz = ray->inverse.z < 0.0f ? z0 : z1;
+  // As in ray_meets_boxes().
+  const float near = fmax(fmax(nx, ny), fmax(nz, ray->t_min * 0.999999f));
+  const float far = fmin(fmin(fx, fy), fmin(fz, t_end)) * 1.0000004f;
+  return near <= far ? (as_uint(near) & ~3u) | lane : RS_NO_CHILD;
+}
+
+// The keys of a node's children, the nearest first. Two children at a time: all four would take
+// most of the registers, and so would vectors of two, for which compilers keep every number of the
+// ray twice.
+RS_INLINE uint4 children_by_depth(const RayData* ray, __global const fv* node, const float t_end) {
+  uint4 keys = (uint4)(RS_NO_CHILD);
+#pragma unroll 1
+  for (uint lane = 0; lane < LANES; lane += 2) {
+    __global const float2* planes = (__global const float2*)((__global const float*)node + lane);
+    const float2 x0 = planes[0], y0 = planes[2], z0 = planes[4];
+    const float2 x1 = planes[6], y1 = planes[8], z1 = planes[10];
+    const uint even =
+        child_key(ray, (float3)(x0.x, y0.x, z0.x), (float3)(x1.x, y1.x, z1.x), t_end, lane);
+    const uint odd =
+        child_key(ray, (float3)(x0.y, y0.y, z0.y), (float3)(x1.y, y1.y, z1.y), t_end, lane + 1);
+    // Each to its place among those before it.
+    keys = min(keys, (uint4)(even, max(keys.xyz, even)));
+    keys = min(keys, (uint4)(odd, max(keys.xyz, odd)));
+  }
+  return keys;
 }
 
 RS_INLINE uint walk_next(
@@ -73,20 +98,21 @@ RS_INLINE uint walk_next(
     uint left = 0;
     if (walk->arrived) {
       const size_t node = (size_t)(tree->level_begin[walk->level] + walk->number);
-      fv depth;
 #if COUNT_WORK
       ++walk->nodes;
 #endif
-      const uint bits = ray_meets_boxes(ray, tree->nodes + node * RS_NODE_VECTORS, t_end, &depth);
+      const uint4 keys = children_by_depth(ray, tree->nodes + node * RS_NODE_VECTORS, t_end);
+      const uint4 lanes = (keys & 3u) + 1u;
+      const uint4 met = select(lanes, (uint4)(0), keys == RS_NO_CHILD);
+      left = met.x | met.y << 4 | met.z << 8 | met.w << 12;
       walk->arrived = false;
       if (walk->level == 1) {
         walk->children[1] = 0;
-        if (bits != 0) {
+        if (left != 0) {
           *first_block = walk->number * LANES;
-          return bits;
+          const uint4 bits = ((uint4)(1) << met) >> 1;
+          return bits.x | bits.y | bits.z | bits.w;
         }
-      } else {
-        left = lanes_by_depth(bits, depth);
       }
     } else {
       left = walk->children[walk->level];

@@ -46,45 +46,48 @@ RS_INLINE ShearedRay sheared_ray(const RayData* ray) {
 }
 
 // a b - c d, whose sign is exact.
-fv difference_of_products(fv a, fv b, fv c, fv d) {
-  const fv product = c * d;
-  const fv error = fma(-c, d, product);
+bv difference_of_products(bv a, bv b, bv c, bv d) {
+  const bv product = c * d;
+  const bv error = fma(-c, d, product);
   return fma(a, b, -product) + error;
 }
 
 typedef struct {
-  RayLanes t, u, v;
+  BlockLanes t, u, v;
 } TriangleMeeting;
 
-// Triangles whose plane the ray crosses inside, in (t_min, t_max], one bit each.
+// Triangles whose plane the ray crosses inside, in (t_min, t_max], one bit each, of the
+// RS_BLOCK_LANES from `lane` on.
 RS_INLINE uint ray_meets_triangles(const ShearedRay* ray,
                                    __global const fv* block,
+                                   const uint lane,
                                    float t_min,
                                    float t_max,
                                    TriangleMeeting* meeting) {
-  const fv az = block[ray->z] - ray->oz;
-  const fv bz = block[3 + ray->z] - ray->oz;
-  const fv cz = block[6 + ray->z] - ray->oz;
-  const fv ax = fma((fv)(-ray->sx), az, block[ray->x] - ray->ox);
-  const fv bx = fma((fv)(-ray->sx), bz, block[3 + ray->x] - ray->ox);
-  const fv cx = fma((fv)(-ray->sx), cz, block[6 + ray->x] - ray->ox);
-  const fv ay = fma((fv)(-ray->sy), az, block[ray->y] - ray->oy);
-  const fv by = fma((fv)(-ray->sy), bz, block[3 + ray->y] - ray->oy);
-  const fv cy = fma((fv)(-ray->sy), cz, block[6 + ray->y] - ray->oy);
-  const fv a = difference_of_products(cx, by, cy, bx);
-  const fv b = difference_of_products(ax, cy, ay, cx);
-  const fv c = difference_of_products(bx, ay, by, ax);
-  const iv front = RS_MASK(a >= 0.0f) & RS_MASK(b >= 0.0f) & RS_MASK(c >= 0.0f);
-  const iv back = RS_MASK(a <= 0.0f) & RS_MASK(b <= 0.0f) & RS_MASK(c <= 0.0f);
-  const iv inside = front | back;
-  if (!rs_any(inside)) return 0;
-  const fv sum = a + b + c;
-  const fv reciprocal = 1.0f / sum;
+  (void)lane;
+  const bv az = RS_BLOCK_VALUE(block, ray->z, lane) - ray->oz;
+  const bv bz = RS_BLOCK_VALUE(block, 3 + ray->z, lane) - ray->oz;
+  const bv cz = RS_BLOCK_VALUE(block, 6 + ray->z, lane) - ray->oz;
+  const bv ax = fma((bv)(-ray->sx), az, RS_BLOCK_VALUE(block, ray->x, lane) - ray->ox);
+  const bv bx = fma((bv)(-ray->sx), bz, RS_BLOCK_VALUE(block, 3 + ray->x, lane) - ray->ox);
+  const bv cx = fma((bv)(-ray->sx), cz, RS_BLOCK_VALUE(block, 6 + ray->x, lane) - ray->ox);
+  const bv ay = fma((bv)(-ray->sy), az, RS_BLOCK_VALUE(block, ray->y, lane) - ray->oy);
+  const bv by = fma((bv)(-ray->sy), bz, RS_BLOCK_VALUE(block, 3 + ray->y, lane) - ray->oy);
+  const bv cy = fma((bv)(-ray->sy), cz, RS_BLOCK_VALUE(block, 6 + ray->y, lane) - ray->oy);
+  const bv a = difference_of_products(cx, by, cy, bx);
+  const bv b = difference_of_products(ax, cy, ay, cx);
+  const bv c = difference_of_products(bx, ay, by, ax);
+  const bi front = RS_BLOCK_MASK(a >= 0.0f) & RS_BLOCK_MASK(b >= 0.0f) & RS_BLOCK_MASK(c >= 0.0f);
+  const bi back = RS_BLOCK_MASK(a <= 0.0f) & RS_BLOCK_MASK(b <= 0.0f) & RS_BLOCK_MASK(c <= 0.0f);
+  const bi inside = front | back;
+  if (!rs_block_any(inside)) return 0;
+  const bv sum = a + b + c;
+  const bv reciprocal = 1.0f / sum;
   meeting->t.v = (a * az + b * bz + c * cz) * ray->sz * reciprocal;
   meeting->u.v = b * reciprocal;
   meeting->v.v = c * reciprocal;
-  return rs_lane_bits(inside & RS_MASK(sum != 0.0f) & RS_MASK(meeting->t.v > t_min) &
-                      RS_MASK(meeting->t.v <= t_max));
+  return rs_block_bits(inside & RS_BLOCK_MASK(sum != 0.0f) & RS_BLOCK_MASK(meeting->t.v > t_min) &
+                       RS_BLOCK_MASK(meeting->t.v <= t_max));
 }
 
 int triangle_index(__global const fv* block, uint lane) {

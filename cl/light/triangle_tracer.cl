@@ -3,11 +3,18 @@
 // same t the one with the lowest index. light_through: the share of light that passes all triangles
 // between the ends of a ray. Launch: one work-item per `rays_per_item` neighbours (1 on GPUs; on
 // CPUs more, in groups of one, so that all rays share one piece of private memory). Cost per ray:
-// nodes and blocks met / LANES lanes.
+// nodes and blocks met / LANES lanes. Work-groups of GROUP, where that is defined.
 #include "light/triangle_block.h"
+#include "parallel/wave.h"
 
 // Less light than this counts as none.
 #define RS_DARK 1e-4f
+
+#ifdef GROUP
+#define RS_SURFACE_KERNEL RS_WAVE_OF_16 __attribute__((reqd_work_group_size(GROUP, 1, 1)))
+#else
+#define RS_SURFACE_KERNEL
+#endif
 
 // skip: triangle that ray i does not meet, read with a
 // stride of `skip_stride` words; 0 = none is skipped.
@@ -17,7 +24,8 @@
       const uint skip_stride
 
 // Hits lie in (t_min, t_max].
-__kernel void nearest_surface(RS_SURFACE_RAY_ARGUMENTS, __global RsSurfaceHit* restrict hits) {
+RS_SURFACE_KERNEL __kernel void nearest_surface(RS_SURFACE_RAY_ARGUMENTS,
+                                                __global RsSurfaceHit* restrict hits) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
   const RayTree tree = {levels, level_begin, nodes, blocks};
@@ -38,18 +46,21 @@ __kernel void nearest_surface(RS_SURFACE_RAY_ARGUMENTS, __global RsSurfaceHit* r
         __global const fv* block =
             blocks + (size_t)(first_block + rs_lowest_bit(bits)) * RS_TRIANGLE_VECTORS;
         TriangleMeeting meeting;
-        for (uint met = ray_meets_triangles(&sheared, block, ray.t_min, best.t, &meeting); met != 0;
-             met &= met - 1) {
-          const uint lane = rs_lowest_bit(met);
-          const float t = lane_value(&meeting.t, lane);
-          const int triangle = triangle_index(block, lane);
-          if (triangle == skipped) continue;
-          if (t > best.t || (t == best.t && best.triangle >= 0 && triangle > best.triangle))
-            continue;
-          best.t = t;
-          best.u = lane_value(&meeting.u, lane);
-          best.v = lane_value(&meeting.v, lane);
-          best.triangle = triangle;
+#pragma unroll 1
+        for (uint from = 0; from < LANES; from += RS_BLOCK_LANES) {
+          uint met = ray_meets_triangles(&sheared, block, from, ray.t_min, best.t, &meeting);
+          for (; met != 0; met &= met - 1) {
+            const uint lane = rs_lowest_bit(met);
+            const float t = meeting.t.s[lane];
+            const int triangle = triangle_index(block, from + lane);
+            if (triangle == skipped) continue;
+            if (t > best.t || (t == best.t && best.triangle >= 0 && triangle > best.triangle))
+              continue;
+            best.t = t;
+            best.u = meeting.u.s[lane];
+            best.v = meeting.v.s[lane];
+            best.triangle = triangle;
+          }
         }
       }
     }
@@ -59,9 +70,9 @@ __kernel void nearest_surface(RS_SURFACE_RAY_ARGUMENTS, __global RsSurfaceHit* r
 
 // passes[i] = product of 1 - shadow over the triangles that ray i crosses; rays with t_max < t_min
 // give 1. shadow: one value per triangle.
-__kernel void light_through(RS_SURFACE_RAY_ARGUMENTS,
-                            __global const float* restrict shadow,
-                            __global float* restrict passes) {
+RS_SURFACE_KERNEL __kernel void light_through(RS_SURFACE_RAY_ARGUMENTS,
+                                              __global const float* restrict shadow,
+                                              __global float* restrict passes) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
   const RayTree tree = {levels, level_begin, nodes, blocks};
@@ -80,10 +91,13 @@ __kernel void light_through(RS_SURFACE_RAY_ARGUMENTS,
         __global const fv* block =
             blocks + (size_t)(first_block + rs_lowest_bit(bits)) * RS_TRIANGLE_VECTORS;
         TriangleMeeting meeting;
-        for (uint met = ray_meets_triangles(&sheared, block, ray.t_min, raw.t_max, &meeting);
-             met != 0; met &= met - 1) {
-          const int triangle = triangle_index(block, rs_lowest_bit(met));
-          if (triangle != skipped) light *= 1.0f - shadow[triangle];
+#pragma unroll 1
+        for (uint from = 0; from < LANES; from += RS_BLOCK_LANES) {
+          uint met = ray_meets_triangles(&sheared, block, from, ray.t_min, raw.t_max, &meeting);
+          for (; met != 0; met &= met - 1) {
+            const int triangle = triangle_index(block, from + rs_lowest_bit(met));
+            if (triangle != skipped) light *= 1.0f - shadow[triangle];
+          }
         }
       }
     }

@@ -10,17 +10,26 @@
 #include "trace/hit_stream.h"
 #include "trace/packet_state.h"
 
-// Hits found in a pass, in registers.
+// Hits found in a pass, at most OPEN_LOCAL.
 #define RS_PASS_HITS 4
 
+// Where they are kept: in the columns of the open rows, of which there are none now. The keys are
+// infinite where there are no more hits.
 typedef struct {
-  float key[RS_PASS_HITS];  // infinite where there are no more
-  float alpha[RS_PASS_HITS];
-  uint reference[RS_PASS_HITS];
+  RowColumns key, alpha, reference;  // references as the bits of floats
+  int lane;
 } PassHits;
 
-bool hit_before(const float key, const uint reference, const float other, const uint of) {
-  return key < other || (key == other && reference < of);
+bool pass_before(const PassHits* hits, const int i, const float key, const uint reference) {
+  const float own = hits->key[i][hits->lane];
+  return own < key || (own == key && as_uint(hits->reference[i][hits->lane]) < reference);
+}
+
+void pass_set(
+    const PassHits* hits, const int i, const float key, const float alpha, const float reference) {
+  hits->key[i][hits->lane] = key;
+  hits->alpha[i][hits->lane] = alpha;
+  hits->reference[i][hits->lane] = reference;
 }
 
 // The nearest hits behind (key, reference), by one work-item for itself.
@@ -31,15 +40,11 @@ RS_GROUP_INLINE void find_behind(const GroupCandidates* c,
                                  __global const float2* restrict limits,
                                  const float last_key,
                                  const int last_reference,
-                                 PassHits* hits) {
-#pragma unroll
-  for (int i = 0; i < RS_PASS_HITS; ++i) {
-    hits->key[i] = INFINITY;
-    hits->alpha[i] = 0.0f;
-    hits->reference[i] = 0;
-  }
+                                 const PassHits* hits) {
+  const int lane = hits->lane;
+  for (int i = 0; i < RS_PASS_HITS; ++i) pass_set(hits, i, INFINITY, 0.0f, 0.0f);
   for (uint k = c->begin; k < c->end; ++k) {
-    if (limits[k].x > hits->key[RS_PASS_HITS - 1]) break;
+    if (limits[k].x > hits->key[RS_PASS_HITS - 1][lane]) break;
     __global const float* box = c->boxes + k;
     if (!(box[0] <= c->x1 && box[c->stride] <= c->y1 && box[2 * c->stride] >= c->x0 &&
           box[3 * c->stride] >= c->y0))
@@ -47,34 +52,17 @@ RS_GROUP_INLINE void find_behind(const GroupCandidates* c,
     const uint reference = references[k];
     const PacketHit found = packet_hit(p, lines, reference, limits[k].y, -1);
     if (!found.hit || !(found.alpha > 0.0f)) continue;
-    float key = fabs(found.key);
+    const float key = fabs(found.key);
     if (key < last_key || (key == last_key && (int)reference <= last_reference)) continue;
-    float alpha = found.alpha;
-    uint id = reference;
-#pragma unroll
-    for (int i = 0; i < RS_PASS_HITS; ++i) {
-      if (!hit_before(key, id, hits->key[i], hits->reference[i])) continue;
-      const float other_key = hits->key[i], other_alpha = hits->alpha[i];
-      const uint other_id = hits->reference[i];
-      hits->key[i] = key;
-      hits->alpha[i] = alpha;
-      hits->reference[i] = id;
-      key = other_key;
-      alpha = other_alpha;
-      id = other_id;
+    // What is farther moves up; the farthest falls out.
+    int i = RS_PASS_HITS;
+    for (; i > 0 && !pass_before(hits, i - 1, key, reference); --i) {
+      if (i == RS_PASS_HITS) continue;
+      pass_set(hits, i, hits->key[i - 1][lane], hits->alpha[i - 1][lane],
+               hits->reference[i - 1][lane]);
     }
+    if (i < RS_PASS_HITS) pass_set(hits, i, key, found.alpha, as_float(reference));
   }
-}
-
-// By moving the others up: an index known at compile time keeps them in registers.
-RS_GROUP_INLINE void take_first(PassHits* hits) {
-#pragma unroll
-  for (int i = 0; i + 1 < RS_PASS_HITS; ++i) {
-    hits->key[i] = hits->key[i + 1];
-    hits->alpha[i] = hits->alpha[i + 1];
-    hits->reference[i] = hits->reference[i + 1];
-  }
-  hits->key[RS_PASS_HITS - 1] = INFINITY;
 }
 
 // Traces the rays that are `alive`. Returns whether the ray lost a hit to max_hits.
@@ -92,13 +80,15 @@ RS_GROUP_INLINE bool group_in_passes(__local GroupMemory* memory,
   bool capped = false;
   float last_key = -1.0f;
   int last_reference = -1;
-  PassHits hits;
-  hits.key[0] = INFINITY;
+  const PassHits hits = {memory->open.key, memory->open.alpha, memory->open.before, lane};
+  int next = RS_PASS_HITS;  // of those found
   bool goes_on = true;
   while (goes_on) {
-    if (alive && !(hits.key[0] < INFINITY))
+    if (alive && (next == RS_PASS_HITS || !(hits.key[next][lane] < INFINITY))) {
       find_behind(candidates, p, lines, references, limits, last_key, last_reference, &hits);
-    alive = alive && hits.key[0] < INFINITY;
+      next = 0;
+    }
+    alive = alive && hits.key[next][lane] < INFINITY;
     capped = capped || (alive && p->hits >= max_hits);
     alive = alive && !capped;
     bool mine = alive;
@@ -107,30 +97,28 @@ RS_GROUP_INLINE bool group_in_passes(__local GroupMemory* memory,
     const ulong waiting = rs_group_bits(memory->words, lane, alive);
     goes_on = waiting != 0;
     if (alive && lane == (int)rs_lowest_of(waiting)) {
-      memory->taken = hits.reference[0];
+      memory->taken = as_uint(hits.reference[next][lane]);
     }
     rs_group_barrier();
     const uint common = memory->taken;
     rs_group_barrier();
     if (goes_on && lane == 0) memory->taken = stream_push(stream, common, 0);
     rs_group_barrier();
-    mine = alive && hits.reference[0] == common;
+    mine = alive && as_uint(hits.reference[next][lane]) == common;
     if (goes_on) group_stream_set(stream, lane, memory->taken, mine ? p->T : 0.0f);
 #else
     goes_on = alive;
 #endif
     if (mine) {
-      const uint reference = hits.reference[0];
-      packet_blend(p, lines[reference >> 1].v, reference & 1, -1, p->T, hits.alpha[0]);
-      last_key = hits.key[0];
+      const uint reference = as_uint(hits.reference[next][lane]);
+      packet_blend(p, lines[reference >> 1].v, reference & 1, -1, p->T, hits.alpha[next][lane]);
+      last_key = hits.key[next][lane];
       last_reference = (int)reference;
-      take_first(&hits);
+      ++next;
       alive = p->T >= min_transmittance;
     }
   }
 #if !KEEP_HITS
-  (void)memory;
-  (void)lane;
   (void)stream;
 #endif
   return capped;

@@ -46,17 +46,24 @@ void rs_fetch_line(const LineSums* sums, const size_t line) {
 #endif
 }
 
-// Adds to all of line number `line`.
-void rs_add_line(const LineSums* sums, const size_t line, const float16 value) {
-#if PRIVATE_COPIES
-  *(__global float16*)(sums->lines + line * 16) += value;
-#else
+// Adds the numbers begin .. end of `value` to those of line number `line`.
+void rs_add_numbers(
+    const LineSums* sums, const size_t line, const float16 value, const int begin, const int end) {
   union {
     float16 v;
     float s[16];
   } part;
   part.v = value;
-  for (int i = 0; i < 16; ++i) rs_add_sum(sums, line * 16 + i, part.s[i]);
+#pragma unroll
+  for (int i = begin; i < end; ++i) rs_add_sum(sums, line * 16 + i, part.s[i]);
+}
+
+// Adds to all of line number `line`.
+void rs_add_line(const LineSums* sums, const size_t line, const float16 value) {
+#if PRIVATE_COPIES
+  *(__global float16*)(sums->lines + line * 16) += value;
+#else
+  rs_add_numbers(sums, line, value, 0, 16);
 #endif
 }
 

@@ -15,7 +15,8 @@
 // residual as moving the mean back does; with t_p, the parameter of the point nearest to the mean,
 // a change of the direction moves that point by t_p times as much.
 //
-// Launch: `items` work-items; each takes every items-th chunk of `chunk` rays in the order given.
+// Launch: `items` work-items; each takes every items-th chunk of `chunk` rays in the order given,
+// or with RS_ONE_RAY one ray.
 //   PRIVATE_COPIES 1: work-item i adds to copy i of `sums`: no atomics, the same sum every time
 //   EXACT_SUMS 1:     one copy of long integers (exact_sum.h): the same sum in any order
 //   otherwise:        one copy of shared floats (float_add.h)
@@ -26,6 +27,12 @@
 #ifndef RAY_SLOPES
 #define RAY_SLOPES 0
 #endif
+
+// On GPUs, whose compilers then need no registers for loops.
+#define RS_ONE_RAY (KEPT && !PRIVATE_COPIES)
+
+// Of functions that every hit takes, whatever the compiler thinks of their size.
+#define RS_SHARE __attribute__((always_inline)) static
 
 // Lines of sums per Gaussian.
 #define RS_RAY_LINES (RS_RAY_SUMS / 16)
@@ -51,17 +58,12 @@ typedef struct {
 #endif
 } RayState;
 
-// Adds what one hit contributes: `by_alpha` = dL/dalpha, `by_color` = dL/dcolour, zero where the
-// colour is clamped.
-RS_INLINE void add_hit(const RayScene* scene,
-                       const RayData* ray,
-                       const float* basis_of_ray,
-                       const uint index,
-                       const float alpha,
-                       const float by_alpha,
-                       const float3 by_color,
-                       RayState* state) {
-  const float16 record = *(__global const float16*)(state->records + (size_t)index * 16);
+// What a hit brings to the line of its Gaussian, but for the colour: `by_alpha` = dL/dalpha.
+RS_SHARE float16 line_sums(const RayData* ray,
+                           const float16 record,
+                           const float alpha,
+                           const float by_alpha,
+                           RayState* state) {
   const float3 x = record.s012, y = record.s345, z = record.s678;  // rows of M = S^-1 R^T
   const float3 offset = ray->o - record.s9ab;
   const float3 o = (float3)(dot(x, offset), dot(y, offset), dot(z, offset));
@@ -79,81 +81,102 @@ RS_INLINE void add_hit(const RayScene* scene,
 #endif
   const float3 on_screen = (float3)(dot(state->screen_x, by_mean), dot(state->screen_y, by_mean),
                                     dot(state->screen_z, by_mean));
-  float16 sum;
+  float16 sum = (float16)(0.0f);
   sum.s012 = by_v;
   sum.s345 = g * v.x * v;
   sum.s67 = g * v.y * v.yz;
   sum.s8 = g * v.z * v.z;
   sum.s9 = alpha * by_alpha;
   sum.sa = sqrt(dot(on_screen, on_screen));
-  sum.sef = (float2)(0.0f);
-#if SH_DEGREE == 0
-  (void)scene;
-  (void)basis_of_ray;
-  sum.sbcd = by_color;
-#else
-  sum.sbcd = (float3)(0.0f);
-  float own_basis[RS_RAY_FUNCTIONS];
-  const float* basis = basis_of_ray;
+  return sum;
+}
+
+#if SH_DEGREE > 0
+// Gradient of what a colour's direction goes to, from that of the colour: n is the unit direction,
+// `inverse` one over the length it had.
+RS_SHARE float3 direction_slope(const RayScene* scene,
+                                const uint index,
+                                const float3 n,
+                                const float inverse,
+                                const float3 by_color) {
+  float along[RS_RAY_FUNCTIONS];
+  __global const float* c = scene->sh + (size_t)index * 3 * scene->sh_coefficients;
 #if KEPT
-  // ray_color.h: nothing is kept of the basis along the ray.
-  if (!scene->color_from_origin) {
-    const float3 n = ray->d * rsqrt(fmax(dot(ray->d, ray->d), 1e-38f));
-    rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, own_basis);
-  }
-  basis = own_basis;
+#pragma unroll 1
 #endif
-  if (scene->color_from_origin) {
-    const float inverse = rsqrt(fmax(dot(offset, offset), 1e-30f));
-    const float3 n = -inverse * offset;
-    rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, own_basis);
-    basis = own_basis;
-    float along[RS_RAY_FUNCTIONS];
-    __global const float* c = scene->sh + (size_t)index * 3 * scene->sh_coefficients;
-    for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) along[k] = dot(vload3(k, c), by_color);
-    float slope[3];
-    rs_sh_gradient(SH_DEGREE, n.x, n.y, n.z, along, slope);
-    const float3 by_n = (float3)(slope[0], slope[1], slope[2]);
-    sum.sbcd = (by_n - n * dot(by_n, n)) * inverse;
-#if RAY_SLOPES
-    state->by_origin -= sum.sbcd;
-#endif
-  }
-#if RAY_SLOPES
-  if (!scene->color_from_origin) {
-    const float inverse = rsqrt(fmax(dot(ray->d, ray->d), 1e-38f));
-    const float3 n = inverse * ray->d;
-    float along[RS_RAY_FUNCTIONS];
-    __global const float* c = scene->sh + (size_t)index * 3 * scene->sh_coefficients;
-    for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) along[k] = dot(vload3(k, c), by_color);
-    float slope[3];
-    rs_sh_gradient(SH_DEGREE, n.x, n.y, n.z, along, slope);
-    const float3 by_n = (float3)(slope[0], slope[1], slope[2]);
-    state->by_direction += (by_n - n * dot(by_n, n)) * inverse;
-  }
-#endif
+  for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) along[k] = dot(vload3(k, c), by_color);
+  float slope[3];
+  rs_sh_gradient(SH_DEGREE, n.x, n.y, n.z, along, slope);
+  const float3 by_n = (float3)(slope[0], slope[1], slope[2]);
+  return (by_n - n * dot(by_n, n)) * inverse;
+}
+
+// Adds the gradients of the coefficients of a Gaussian.
+RS_SHARE void add_coefficients(const LineSums* sums,
+                               const uint index,
+                               const float* basis,
+                               const float3 by_color) {
   const size_t first = (size_t)index * RS_RAY_SUMS + RS_RAY_SH;
 #if KEPT
 #pragma unroll 1
 #endif
   for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) {
-    rs_add_sum(&state->sums, first + k, basis[k] * by_color.x);
-    rs_add_sum(&state->sums, first + RS_RAY_FUNCTIONS + k, basis[k] * by_color.y);
-    rs_add_sum(&state->sums, first + 2 * RS_RAY_FUNCTIONS + k, basis[k] * by_color.z);
+    rs_add_sum(sums, first + k, basis[k] * by_color.x);
+    rs_add_sum(sums, first + RS_RAY_FUNCTIONS + k, basis[k] * by_color.y);
+    rs_add_sum(sums, first + 2 * RS_RAY_FUNCTIONS + k, basis[k] * by_color.z);
   }
-#endif
-  rs_add_line(&state->sums, (size_t)index * RS_RAY_LINES, sum);
 }
+#endif
 
 #if KEPT
+// Adds what a hit brings, one share after the other: together they would take most of the
+// registers. `basis`: of the hit (ray_color.h); `by_color` = dL/dcolour, zero where the colour is
+// clamped.
+RS_INLINE void add_hit(const RayScene* scene,
+                       const RayData* ray,
+                       const float* basis,
+                       const Pending* pending,
+                       const int k,
+                       const float by_alpha,
+                       const float3 by_color,
+                       RayState* state) {
+  const uint index = pending_index(scene->tree.blocks, pending, k);
+  const size_t line = (size_t)index * RS_RAY_LINES;
+  float16 sum = (float16)(0.0f);
+#if SH_DEGREE == 0
+  (void)basis;
+  sum.sbcd = by_color;
+  rs_add_numbers(&state->sums, line, sum, 11, 14);
+#else
+  add_coefficients(&state->sums, index, basis, by_color);
+  if (RAY_SLOPES || scene->color_from_origin) {
+    const float4 n = color_direction(scene, ray, pending, k);
+    const float3 slope = direction_slope(scene, index, n.xyz, n.w, by_color);
+    if (scene->color_from_origin) {
+      sum.sbcd = slope;
+      rs_add_numbers(&state->sums, line, sum, 11, 14);
+#if RAY_SLOPES
+      state->by_origin -= slope;
+    } else {
+      state->by_direction += slope;
+#endif
+    }
+  }
+#endif
+  const float16 record = *(__global const float16*)(state->records + (size_t)index * 16);
+  sum = line_sums(ray, record, pending_alpha(pending, k), by_alpha, state);
+  rs_add_numbers(&state->sums, line, sum, 0, 11);
+}
+
 // From the nearest hit on: what lies behind each is the known result minus what is blended, but for
 // the last of the ray.
 RS_INLINE void blend_hits(const RayScene* scene,
                           const RayData* ray,
-                          const float* basis,
+                          const float* ray_basis,
                           const Pending* pending,
                           const int count,
                           RayState* state) {
+  (void)ray_basis;
   const float3 gradient = state->gradient.xyz;
   for (int k = 0; k < count && !state->stopped; ++k) {
     if (state->hits == scene->max_hits) {
@@ -162,7 +185,9 @@ RS_INLINE void blend_hits(const RayScene* scene,
     }
     const uint index = pending_index(scene->tree.blocks, pending, k);
     const float alpha = pending_alpha(pending, k);
-    const float3 color = hit_color(scene, ray, basis, pending, k).xyz;
+    float basis[RS_RAY_FUNCTIONS];
+    hit_basis(scene, ray, pending, k, basis);
+    const float3 color = basis_color(scene, basis, pending, k).xyz;
     const float projected = dot(color, gradient) + state->gradient.w;
     const float before = state->transmittance;
     state->blended += before * alpha * projected;
@@ -176,10 +201,51 @@ RS_INLINE void blend_hits(const RayScene* scene,
     // Nothing passes where the colour is clamped.
     const float3 by_color =
         color > 0.0f && color < RS_MAX_COLOR ? before * alpha * gradient : (float3)(0.0f);
-    add_hit(scene, ray, basis, index, alpha, before * (projected - behind), by_color, state);
+    add_hit(scene, ray, basis, pending, k, before * (projected - behind), by_color, state);
   }
 }
 #else
+// Adds what one hit contributes: `by_alpha` = dL/dalpha, `by_color` = dL/dcolour, zero where the
+// colour is clamped.
+RS_INLINE void add_hit(const RayScene* scene,
+                       const RayData* ray,
+                       const float* basis_of_ray,
+                       const uint index,
+                       const float alpha,
+                       const float by_alpha,
+                       const float3 by_color,
+                       RayState* state) {
+  const float16 record = *(__global const float16*)(state->records + (size_t)index * 16);
+  float16 sum = line_sums(ray, record, alpha, by_alpha, state);
+#if SH_DEGREE == 0
+  (void)scene;
+  (void)basis_of_ray;
+  sum.sbcd = by_color;
+#else
+  float own_basis[RS_RAY_FUNCTIONS];
+  const float* basis = basis_of_ray;
+  if (scene->color_from_origin) {
+    const float3 offset = ray->o - record.s9ab;
+    const float inverse = rsqrt(fmax(dot(offset, offset), 1e-30f));
+    const float3 n = -inverse * offset;
+    rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, own_basis);
+    basis = own_basis;
+    sum.sbcd = direction_slope(scene, index, n, inverse, by_color);
+#if RAY_SLOPES
+    state->by_origin -= sum.sbcd;
+#endif
+  }
+#if RAY_SLOPES
+  if (!scene->color_from_origin) {
+    const float inverse = rsqrt(fmax(dot(ray->d, ray->d), 1e-38f));
+    state->by_direction += direction_slope(scene, index, inverse * ray->d, inverse, by_color);
+  }
+#endif
+  add_coefficients(&state->sums, index, basis, by_color);
+#endif
+  rs_add_line(&state->sums, (size_t)index * RS_RAY_LINES, sum);
+}
+
 RS_INLINE void blend_hits(const RayScene* scene,
                           const RayData* ray,
                           const float* basis,
@@ -275,7 +341,7 @@ RS_RAY_KERNEL __kernel void ray_backward(const uint first,
   state.screen_y = (float3)(ray_sums.screen[3], ray_sums.screen[4], ray_sums.screen[5]);
   state.screen_z = (float3)(ray_sums.screen[6], ray_sums.screen[7], ray_sums.screen[8]);
   for (size_t begin = first + (size_t)item * chunk; begin < last; begin += (size_t)items * chunk) {
-    const size_t end = min(begin + chunk, (size_t)last);
+    const size_t end = RS_ONE_RAY ? begin + 1 : min(begin + chunk, (size_t)last);
     for (size_t position = begin; position < end; ++position) {
       const size_t id = ordered ? ray_order[position] : position;
       const float4 gradient = gradients[id];
@@ -304,5 +370,6 @@ RS_RAY_KERNEL __kernel void ray_backward(const uint first,
       slopes[id] = (float8)(state.by_origin, 0.0f, state.by_direction, 0.0f);
 #endif
     }
+    if (RS_ONE_RAY) break;
   }
 }

@@ -36,27 +36,6 @@
 #error "the colours are the end of a block"
 #endif
 
-// On GPUs one Gaussian of the block after the other: four at once would take twice the registers.
-#if TRAIL
-typedef float bv;
-typedef int bi;
-typedef struct {
-  float v;
-} BlockLanes;
-#define RS_BLOCK_VALUE(block, k, lane) (((__global const float*)((block) + (k)))[lane])
-#define RS_BLOCK_MASK(comparison) (-(comparison))
-#define rs_block_any(mask) ((mask) != 0)
-#define rs_block_bits(mask) ((uint)((mask)&1))
-#else
-typedef fv bv;
-typedef iv bi;
-typedef RayLanes BlockLanes;
-#define RS_BLOCK_VALUE(block, k, lane) ((block)[k])
-#define RS_BLOCK_MASK(comparison) RS_MASK(comparison)
-#define rs_block_any(mask) rs_any(mask)
-#define rs_block_bits(mask) rs_lane_bits(mask)
-#endif
-
 // How a ray passes the Gaussians of a block, in the space where they are unit spheres.
 typedef struct {
   BlockLanes cross2;      // |o' x d'|^2

@@ -67,28 +67,39 @@ RS_INLINE void basis_along_ray(const RayScene* scene, const RayData* ray, float*
   (void)basis;
 }
 
-// Of hit k from the nearest.
-RS_INLINE float4 hit_color(const RayScene* scene,
-                           const RayData* ray,
-                           const float* ray_basis,
-                           const Pending* pending,
-                           const int k) {
-  __global const fv* blocks = scene->tree.blocks;
-  (void)ray_basis;
-#if SH_DEGREE == 0
-  (void)ray;
-  return pending_color(blocks, pending, k);
-#else
-  const uint slot = pending_slot(pending, k);
+// Unit direction of the colour of hit k from the nearest, and one over the length it had.
+RS_INLINE float4 color_direction(const RayScene* scene,
+                                 const RayData* ray,
+                                 const Pending* pending,
+                                 const int k) {
   float3 v = ray->d;
   if (scene->color_from_origin) {
-    __global const float* mean = (__global const float*)(blocks + slot / LANES * RS_BLOCK_VECTORS) +
-                                 RS_GAUSSIAN_MEAN * LANES + slot % LANES;
+    const uint slot = pending_slot(pending, k);
+    __global const float* mean =
+        (__global const float*)(scene->tree.blocks + slot / LANES * RS_BLOCK_VECTORS) +
+        RS_GAUSSIAN_MEAN * LANES + slot % LANES;
     v = (float3)(mean[0], mean[LANES], mean[2 * LANES]) - ray->o;
   }
-  const float3 n = v * rsqrt(fmax(dot(v, v), 1e-38f));
-  float basis[RS_COLOR_FUNCTIONS];
+  const float inverse = rsqrt(fmax(dot(v, v), 1e-38f));
+  return (float4)(v * inverse, inverse);
+}
+
+// The functions in the direction of hit k from the nearest, and the colour that they give.
+RS_INLINE void hit_basis(
+    const RayScene* scene, const RayData* ray, const Pending* pending, const int k, float* basis) {
+  const float4 n = color_direction(scene, ray, pending, k);
   rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, basis);
+}
+
+RS_INLINE float4 basis_color(const RayScene* scene,
+                             const float* basis,
+                             const Pending* pending,
+                             const int k) {
+  __global const fv* blocks = scene->tree.blocks;
+#if SH_DEGREE == 0
+  (void)basis;
+  return pending_color(blocks, pending, k);
+#else
   __global const float* c =
       scene->sh + (size_t)pending_index(blocks, pending, k) * 3 * scene->sh_coefficients;
   float3 color = (float3)(0.5f);
@@ -96,6 +107,17 @@ RS_INLINE float4 hit_color(const RayScene* scene,
   for (int j = 0; j < RS_COLOR_FUNCTIONS; ++j) color += basis[j] * vload3(j, c);
   return (float4)(fmin(fmax(color, (float3)(0.0f)), (float3)(RS_MAX_COLOR)), 0.0f);
 #endif
+}
+
+RS_INLINE float4 hit_color(const RayScene* scene,
+                           const RayData* ray,
+                           const float* ray_basis,
+                           const Pending* pending,
+                           const int k) {
+  (void)ray_basis;
+  float basis[RS_COLOR_FUNCTIONS];
+  hit_basis(scene, ray, pending, k, basis);
+  return basis_color(scene, basis, pending, k);
 }
 
 #else

@@ -215,7 +215,7 @@ KernelWork adam_work(const ExecutedCounts& c) {
 
 KernelWork rays_work(const ExecutedCounts& c) {
   KernelWork out =
-      c.grouped ? times(c.ray_nodes / kWave, {.vectors = 140, .scalars = 40, .trips = 2}) +
+      c.grouped ? times(c.ray_nodes / kWave, {.vectors = 160, .scalars = 55, .trips = 3}) +
                       times(c.ray_blocks / kWave,
                             {.vectors = 150, .scalars = 40, .slow = 1, .trips = 3}) +
                       times(c.ray_hits / kWave,

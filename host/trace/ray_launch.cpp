@@ -46,7 +46,13 @@ RayNear RayNear::of(const Camera& camera, float near_depth) {
 }
 
 BuildOptions tree_walk_build(const DeviceInfo& device, int lanes) {
-  return BuildOptions().define("LANES", lanes).define("TRAIL", keeps_trail(device, lanes) ? 1 : 0);
+  BuildOptions build = BuildOptions().define("LANES", lanes);
+  if (keeps_trail(device, lanes)) {
+    build.define("TRAIL", 1).define("GROUP", kGroup);
+  } else {
+    build.define("TRAIL", 0);
+  }
+  return build;
 }
 
 BuildOptions ray_walk_build(const DeviceInfo& device,
@@ -60,7 +66,7 @@ BuildOptions ray_walk_build(const DeviceInfo& device,
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
       .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
   if (keeps_trail(device, lanes)) {
-    build.define("KEPT", kKept).define("GROUP", kGroup).define("SH_DEGREE", sh_degree);
+    build.define("KEPT", kKept).define("SH_DEGREE", sh_degree);
   } else {
     build.define("PENDING", kPending);
   }

@@ -112,7 +112,7 @@ PROGRAMS = [
     ("validate", "train/model_validator.cl", {}),
     ("waves", "light/path_tracer.cl", {}),
     ("mirror paths", "light/mirror_paths.cl", {}),
-    ("surface rays", "light/triangle_tracer.cl", dict(LANES=4, TRAIL=1)),
+    ("surface rays", "light/triangle_tracer.cl", dict(LANES=4, TRAIL=1, GROUP=64)),
     ("triangle blocks", "light/triangle_blocks.cl", dict(LANES=4)),
     ("ceilings", "bench/ceilings.cl", dict(CHAINS=8)),
 ]

@@ -1,42 +1,49 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of kernels in docs/gpu.md, from the stored figures."""
+"""The tables of kernels in docs/gpu.md, from the stored figures: what each takes, and how many waves of it are resident."""
 import os
 
 DOCUMENT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "gpu.md")
 INTEL = ("dg2-g10", "tgllp")
 
-# Label; program and kernel in the baseline; where Intel's is another program, that.
+# Label; work-items of a group; whether rows of its own lie in local memory, which halves its budget of waves; program and
+# kernel in the baseline; where Intel's is another program, that.
 ROWS = [
-    ("`trace_forward_group` (training)", "group forward train: trace_forward_group"),
-    ("`trace_backward_group` (atomic)", "group backward atomic: trace_backward_group"),
-    ("`trace_backward_group` (swap)", "group backward swap: trace_backward_group"),
-    ("`trace_forward_group` (subgroup of 32; Intel 16)", "subgroup forward train: trace_forward_group", "subgroup forward train 16: trace_forward_group"),
-    ("`trace_backward_group` (atomic, the same)", "subgroup backward atomic: trace_backward_group", "subgroup backward atomic 16: trace_backward_group"),
-    ("`trace_forward` (training)", "forward train: trace_forward"),
-    ("`trace_backward` (atomic)", "backward atomic: trace_backward"),
-    ("`trace_backward` (exact)", "backward exact: trace_backward"),
-    ("`prepare_view` (SH 3)", "prepare sh3: prepare_view"),
-    ("`finalize_group` (SH 3)", "finalize group sh3: finalize_group"),
-    ("`count_tiles`", "lists: count_tiles"),
-    ("`fill_tiles`", "lists: fill_tiles"),
-    ("`scatter` (radix sort)", "sort pairs: scatter"),
-    ("`trace_rays`", "rays: trace_rays"),
-    ("`ray_backward` (SH 3, atomic)", "ray backward atomic: ray_backward"),
-    ("`ray_backward` (SH 3, exact)", "ray backward exact: ray_backward"),
-    ("`nearest_surface`", "surface rays: nearest_surface"),
-    ("`light_through`", "surface rays: light_through"),
-    ("`group_slopes` (loss)", "loss group: group_slopes"),
-    ("`group_gradient` (loss)", "loss group: group_gradient"),
-    ("`choose_steps` (Adam)", "adam sh3: choose_steps"),
-    ("`adam_step` (SH 3)", "adam sh3: adam_step"),
-    ("`advance` (light)", "waves: advance"),
-    ("`order_group` (tree)", "tree order: order_group"),
+    ("`trace_forward_group` (training)", 32, True, "group forward train: trace_forward_group"),
+    ("`trace_backward_group` (atomic)", 32, True, "group backward atomic: trace_backward_group"),
+    ("`trace_backward_group` (swap)", 32, True, "group backward swap: trace_backward_group"),
+    ("`trace_forward_group` (subgroup of 32; Intel 16)", 32, True, "subgroup forward train: trace_forward_group",
+     "subgroup forward train 16: trace_forward_group"),
+    ("`trace_backward_group` (atomic, the same)", 32, True, "subgroup backward atomic: trace_backward_group",
+     "subgroup backward atomic 16: trace_backward_group"),
+    ("`trace_forward` (training)", 64, False, "forward train: trace_forward"),
+    ("`trace_backward` (atomic)", 64, False, "backward atomic: trace_backward"),
+    ("`trace_backward` (exact)", 64, False, "backward exact: trace_backward"),
+    ("`prepare_view` (SH 3)", 64, False, "prepare sh3: prepare_view"),
+    ("`finalize_group` (SH 3)", 64, False, "finalize group sh3: finalize_group"),
+    ("`count_tiles`", 64, False, "lists: count_tiles"),
+    ("`fill_tiles`", 64, False, "lists: fill_tiles"),
+    ("`scatter` (radix sort)", 256, False, "sort pairs: scatter"),
+    ("`trace_rays`", 64, True, "rays: trace_rays"),
+    ("`ray_backward` (SH 3, atomic)", 64, True, "ray backward atomic: ray_backward"),
+    ("`ray_backward` (SH 3, exact)", 64, True, "ray backward exact: ray_backward"),
+    ("`nearest_surface`", 64, False, "surface rays: nearest_surface"),
+    ("`light_through`", 64, False, "surface rays: light_through"),
+    ("`group_slopes` (loss)", 256, False, "loss group: group_slopes"),
+    ("`group_gradient` (loss)", 256, False, "loss group: group_gradient"),
+    ("`choose_steps` (Adam)", 64, False, "adam sh3: choose_steps"),
+    ("`adam_step` (SH 3)", 64, False, "adam sh3: adam_step"),
+    ("`advance` (light)", 64, False, "waves: advance"),
+    ("`order_group` (tree)", 64, False, "tree order: order_group"),
 ]
+
+# Of a SIMD of AMD's: registers of a work-item and how many are given out together, most waves, local bytes.
+AMD = {"gfx906": (256, 4, 10, 16384), "gfx90a": (512, 8, 8, 16384), "gfx1030": (1024, 16, 16, 32768), "gfx1100": (1536, 24, 16, 32768)}
+# Of a multiprocessor of NVIDIA's: most warps, most groups, local bytes, and of them those that each group takes beside its own.
+NVIDIA = {"sm_70": (64, 32, 98304, 0), "sm_86": (48, 16, 102400, 1024), "sm_90": (64, 32, 233472, 1024)}
+BUDGETS = {"gfx906": 4, "gfx90a": 4, "gfx1030": 8, "gfx1100": 8, "sm_70": 16, "sm_86": 16, "sm_90": 16}
 
 
 def _cell(target, figures):
-    if figures is None:
-        return "-"
     first = f"w{figures['width']}" if target in INTEL else figures["registers"]
     marks = [f"s {figures['spills']}"] if figures["spills"] else []
     marks += [f"m {figures['moved']}"] if figures["moved"] else []
@@ -44,28 +51,74 @@ def _cell(target, figures):
     return ", ".join([f"{first} / {figures['private']}", *marks])
 
 
-def _lines(baseline, targets):
-    yield "| kernel | " + " | ".join(targets) + " |"
-    yield "|---|" + "---|" * len(targets)
-    for label, kernel, *intel in ROWS:
-        of = lambda target: intel[0] if intel and target in INTEL else kernel
-        yield f"| {label} | " + " | ".join(_cell(target, baseline[target].get(of(target))) for target in targets) + " |"
+def _up(value, granule):
+    return -(-value // granule) * granule
 
 
-def _split(targets):
-    """The lines of the document before the table, its own, and those behind it."""
+def resident(target, figures, group):
+    """Waves of a SIMD (AMD) or multiprocessor (NVIDIA), and what there is no more of: r(egisters), l(ocal memory) or, of
+    waves and groups, m(ore)."""
+    waves = -(-group // figures["width"])
+    if target in AMD:
+        registers, granule, most, local = AMD[target]
+        limits = [(registers // _up(figures["registers"], granule), "r"), (most, "m")]
+        if figures["local"]:
+            # Groups are spread over the four SIMDs that share local memory.
+            limits.append((4 * local // _up(figures["local"], 512) * waves / 4, "l"))
+        return min(limits)
+    most, groups, local, own = NVIDIA[target]
+    limits = [(2048 // _up(figures["registers"], 8) // 4 * 4, "r"), (min(most, groups * waves), "m")]
+    if figures["local"]:
+        limits.append((local // (_up(figures["local"], 128) + own) * waves, "l"))
+    return min(limits)
+
+
+def _waves_cell(target, figures, group, half):
+    if target in INTEL:
+        met, text = figures["width"] >= 16 and not figures["spills"], f"w{figures['width']}"
+    else:
+        waves, limit = resident(target, figures, group)
+        met, text = waves >= BUDGETS[target] / (2 if half else 1), f"{waves:g} {limit}"
+    return text if met else f"**{text}**"
+
+
+def _rows(baseline, targets, cell):
+    for row in ROWS:
+        label, group, half, kernel, *intel = row
+        cells = []
+        for target in targets:
+            figures = baseline[target].get(intel[0] if intel and target in INTEL else kernel)
+            cells.append("-" if figures is None else cell(target, figures, group, half))
+        yield f"| {label} | " + " | ".join(cells) + " |"
+
+
+def _tables(baseline, targets):
+    """The lines of every table by their first one."""
+    rule = "|---|" + "---|" * len(targets)
+    for title, cell in (("kernel", lambda target, figures, *_: _cell(target, figures)), ("waves", _waves_cell)):
+        head = f"| {title} | " + " | ".join(targets) + " |"
+        yield head, [head, rule, *_rows(baseline, targets, cell)]
+
+
+def _updated(lines, baseline, targets):
+    for head, table in _tables(baseline, targets):
+        begin = lines.index(head)
+        end = next(i for i in range(begin, len(lines)) if not lines[i].startswith("|"))
+        lines = [*lines[:begin], *table, *lines[end:]]
+    return lines
+
+
+def _read():
     with open(DOCUMENT, encoding="utf-8") as file:
-        lines = file.read().split("\n")
-    begin = lines.index("| kernel | " + " | ".join(targets) + " |")
-    end = next(i for i in range(begin, len(lines)) if not lines[i].startswith("|"))
-    return lines[:begin], lines[begin:end], lines[end:]
+        return file.read().split("\n")
 
 
 def is_current(baseline, targets):
-    return _split(targets)[1] == list(_lines(baseline, targets))
+    lines = _read()
+    return lines == _updated(lines, baseline, targets)
 
 
 def write(baseline, targets):
-    before, _, behind = _split(targets)
+    lines = _updated(_read(), baseline, targets)
     with open(DOCUMENT, "w", encoding="utf-8") as file:
-        file.write("\n".join([*before, *_lines(baseline, targets), *behind]))
+        file.write("\n".join(lines))
