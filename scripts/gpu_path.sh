@@ -9,7 +9,8 @@
 #   --as-it-is     devices say what they are: the same programs without the library, to compare
 #   --build BUILD  build folder with the test programs (default: build/release)
 #   --cache DIR    keeps compiled kernels (default: BUILD/gpu_path_cache)
-# Needs a C compiler and built tests (scripts/setup.sh --tests). There are no known exceptions on PoCL 3.1.
+# Needs a C compiler and built tests (scripts/setup.sh --tests). Exceptions on PoCL 3.1, which docs/gpu.md explains: of train
+# 'a sky pays outdoors*', and where the machine is slow 'a run by time of few iterations*'.
 set -euo pipefail
 called_from=$PWD
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
