@@ -25,11 +25,6 @@ using Source = SceneCamera::Source;
 
 void check(const RenderFlags& flags) {
   flags.frame_options();
-  if (flags.depth || flags.normals || flags.hits) {
-    throw UsageError(
-        "--depth, --normals and --hits are for models alone: a scene with mirrors and glass has no "
-        "single depth");
-  }
   if (flags.supersample != 1) {
     throw UsageError("--supersample is for models alone: scene files take --samples");
   }

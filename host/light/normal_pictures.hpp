@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <functional>
 
+#include "light/normal_gaussians.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
@@ -12,8 +12,8 @@
 
 namespace raysplats {
 
-/// Pictures of normals (Tracer::normals()). Keeps a copy of the Gaussians without their colours, 56
-/// bytes each, and traces it as colours, so every camera and way of finding hits is known.
+/// Pictures of normals (Tracer::normals()), traced as colours, so every camera and way of finding
+/// hits is known.
 class NormalPictures {
  public:
   NormalPictures(Context& context, const TraceOptions& options);
@@ -25,13 +25,8 @@ class NormalPictures {
              const std::function<bool(double share)>& watch = {});
 
  private:
-  void follow(const DeviceGaussians& gaussians);
-
-  Context& context_;
-  Kernel kernel_;
+  NormalGaussians normals_;
   ViewTracer views_;
-  DeviceGaussians copy_;
-  std::uint64_t revision_ = 0;  // of the Gaussians that were copied
 };
 
 }  // namespace raysplats

@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 
+#include "light/first_hit_tracer.hpp"
 #include "light/path_memory.hpp"
 #include "light/surface_store.hpp"
 #include "parallel/scan.hpp"
@@ -31,6 +32,7 @@ namespace {
 constexpr const char* kProgram = "light/path_tracer.cl";
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kTallyChunk = 1024;
+constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;  // rays between two looks at the watch
 
 std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
@@ -129,6 +131,7 @@ struct PathTracer::Impl {
 
   void choose_bias(const std::vector<Mesh>& meshes);
   void render(const Camera& camera, const std::function<bool(double)>& within, Image& out);
+  PathTracer::FirstHits first_hits(const Camera& camera, const std::function<bool(double)>& within);
   std::optional<glm::dvec3> first_point(const Camera& camera);
 
   Kernel kernel(const char* name) { return context.kernel(kProgram, name); }
@@ -157,6 +160,7 @@ struct PathTracer::Impl {
   DeviceGaussians gaussians;
   RayTracer tracer;
   std::optional<CameraTracer> packets;  // once they are wanted
+  std::optional<FirstHitTracer> first;
   bool packet_depth = false;
   std::size_t packet_pixels = 0;  // of the picture that they have traced; 0 = none
   std::array<float, 4> packet_axis{};
@@ -412,6 +416,38 @@ Image PathTracer::render(const Camera& camera, const std::function<bool(double)>
     impl_->render(camera, within, out);
   } catch (const Stopped&) {
     return Image();
+  }
+  return out;
+}
+
+PathTracer::FirstHits PathTracer::first_hits(const Camera& camera,
+                                             const std::function<bool(double)>& within) {
+  const auto turn = impl_->context.lock();
+  require_pixels(camera);
+  return impl_->first_hits(camera, within);
+}
+
+PathTracer::FirstHits PathTracer::Impl::first_hits(const Camera& camera,
+                                                   const std::function<bool(double)>& within) {
+  const std::size_t pixels = pixels_of(camera);
+  const std::size_t batch = std::min(memory.batch(), within ? kWatchedBatch : pixels);
+  if (!first) first.emplace(context, options);
+  PathTracer::FirstHits out{Image(camera.width, camera.height, 3),
+                            Image(camera.width, camera.height, 3),
+                            Image(camera.width, camera.height, 1)};
+  for (std::size_t begin = 0; begin < pixels; begin += batch) {
+    const std::size_t count = std::min(batch, pixels - begin);
+    const std::vector<RayResult> part = first->trace(gaussians, surfaces, camera, begin, count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const RayResult& result = part[i];
+      const std::array<float, 3> depth{result.expected_depth, result.median_depth,
+                                       static_cast<float>(result.hits)};
+      std::copy_n(depth.begin(), 3, &out.depth.data[3 * (begin + i)]);
+      std::copy_n(&result.color[0], 3, &out.normals.data[3 * (begin + i)]);
+      out.alpha.data[begin + i] = result.alpha;
+    }
+    const double share = static_cast<double>(begin + count) / static_cast<double>(pixels);
+    if (within && !within(share)) return {};
   }
   return out;
 }

@@ -30,6 +30,7 @@ float linear_from_display(float value) {
 
 constexpr int kMaxSupersample = 16;
 constexpr float kLeastNormal = 1e-5f;
+constexpr float kLeastRange = 1e-5f;  // of depths; less is what rounding makes of a wall
 
 /// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
 std::string joined(const std::filesystem::path& name) {
@@ -73,6 +74,19 @@ Image average_depth(const Image& weighted, int factor) {
     out.data[i] = alpha > 0.0f ? mean.data[2 * i] / alpha : 0.0f;
   }
   return out;
+}
+
+Image channel(const Image& image, std::size_t number) {
+  Image out(image.width, image.height, 1);
+  const auto channels = static_cast<std::size_t>(image.channels);
+  for (std::size_t i = 0; i < out.pixels(); ++i) out.data[i] = image.data[channels * i + number];
+  return out;
+}
+
+/// Whether a pixel shows something, by the last channel.
+bool is_covered(const Image& alpha, std::size_t pixel) {
+  const auto channels = static_cast<std::size_t>(alpha.channels);
+  return alpha.data[channels * pixel + channels - 1] >= 0.5f;
 }
 
 /// The camera `share` of the way from a frame to the next one.
@@ -186,8 +200,8 @@ Image box_average(const Image& image, int factor) {
   return out;
 }
 
-Image depth_preview(const Image& depth, const Image& rgba) {
-  const auto covered = [&](std::size_t i) { return rgba.data[4 * i + 3] >= 0.5f; };
+Image depth_preview(const Image& depth, const Image& alpha) {
+  const auto covered = [&](std::size_t i) { return is_covered(alpha, i); };
   float low = std::numeric_limits<float>::infinity();
   float high = -low;
   for (std::size_t i = 0; i < depth.pixels(); ++i) {
@@ -196,17 +210,16 @@ Image depth_preview(const Image& depth, const Image& rgba) {
     high = std::max(high, depth.data[i]);
   }
   Image out(depth.width, depth.height, 1);
+  const bool flat = !(high - low > kLeastRange * std::abs(high));
   for (std::size_t i = 0; i < depth.pixels(); ++i) {
-    if (covered(i)) out.data[i] = high > low ? (high - depth.data[i]) / (high - low) : 1.0f;
+    if (covered(i)) out.data[i] = flat ? 1.0f : (high - depth.data[i]) / (high - low);
   }
   return out;
 }
 
-Image hits_of(const Image& depth) {
-  Image out(depth.width, depth.height, 1);
-  for (std::size_t i = 0; i < out.pixels(); ++i) out.data[i] = depth.data[3 * i + 2];
-  return out;
-}
+Image expected_of(const Image& depth) { return channel(depth, 0); }
+
+Image hits_of(const Image& depth) { return channel(depth, 2); }
 
 Image unit_normals(Image sums) {
   for (std::size_t i = 0; i < sums.pixels(); ++i) {
@@ -219,10 +232,10 @@ Image unit_normals(Image sums) {
   return sums;
 }
 
-Image normals_preview(const Image& normals, const Image& rgba, const Camera& camera) {
+Image normals_preview(const Image& normals, const Image& alpha, const Camera& camera) {
   Image out(normals.width, normals.height, 3);
   for (std::size_t i = 0; i < normals.pixels(); ++i) {
-    if (rgba.data[4 * i + 3] < 0.5f) continue;
+    if (!is_covered(alpha, i)) continue;
     const float* n = &normals.data[3 * i];
     const glm::dvec3 seen = camera.rotation * glm::dvec3(n[0], n[1], n[2]);
     // The camera's y points down and its z away.
@@ -282,9 +295,10 @@ void write_frame(const std::filesystem::path& stem,
     return;
   }
   write_image(file("", file_extension(options.format)), with_channels(rgba, 3));
-  if (options.depth) write_image(file("_depth", ".png"), depth_preview(layers.depth, rgba));
+  const Image& alpha = layers.alpha.data.empty() ? rgba : layers.alpha;
+  if (options.depth) write_image(file("_depth", ".png"), depth_preview(layers.depth, alpha));
   if (options.normals)
-    write_image(file("_normals", ".png"), normals_preview(layers.normals, rgba, camera));
+    write_image(file("_normals", ".png"), normals_preview(layers.normals, alpha, camera));
   if (options.hits) write_image(file("_hits", ".png"), hits_preview(layers.hits));
 }
 

@@ -67,8 +67,11 @@ std::vector<std::string> frame_names(std::span<const Camera> cameras);
 Image box_average(const Image& image, int factor);
 
 /// Expected depth (1 channel) as grey in [0, 1]: the nearest pixel 1, the farthest 0. Pixels whose
-/// alpha (channel 3 of `rgba`) is below one half are 0 and do not count.
-Image depth_preview(const Image& depth, const Image& rgba);
+/// alpha (last channel of `alpha`) is below one half are 0 and do not count.
+Image depth_preview(const Image& depth, const Image& alpha);
+
+/// The first channel of Tracer::depth(): expected depth.
+Image expected_of(const Image& depth);
 
 /// The third channel of Tracer::depth(): numbers of hits.
 Image hits_of(const Image& depth);
@@ -77,8 +80,9 @@ Image hits_of(const Image& depth);
 Image unit_normals(Image sums);
 
 /// Normals in world axes (3 channels) in the colours of the camera's axes: red to the right, green
-/// up, blue towards the camera, 0.5 in the middle. Pixels whose alpha is below one half are 0.
-Image normals_preview(const Image& normals, const Image& rgba, const Camera& camera);
+/// up, blue towards the camera, 0.5 in the middle. Pixels whose alpha (last channel of `alpha`) is
+/// below one half are 0.
+Image normals_preview(const Image& normals, const Image& alpha, const Camera& camera);
 
 /// Number of hits (1 channel) as grey in [0, 1]: as many as the pixel with the most 1, none 0.
 Image hits_preview(const Image& hits);
@@ -88,6 +92,7 @@ struct FrameLayers {
   Image depth;    ///< expected, 1 channel
   Image normals;  ///< 3 channels, world axes, of length 1 or 0
   Image hits;     ///< blended Gaussians, 1 channel; means where several rays make a pixel
+  Image alpha;    ///< for previews, in the last channel; of the colours where empty
 };
 
 /// Gives a frame to options.video, and where options.files says so writes it: `stem` with the

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "comm/communicator.hpp"
@@ -17,6 +18,15 @@ void add(PathTracer::Statistics& sum, const PathTracer::Statistics& frame) {
   sum.shadow_rays += frame.shadow_rays;
   sum.capped_rays += frame.capped_rays;
   sum.ended_by_bounces += frame.ended_by_bounces;
+}
+
+FrameLayers layers_of(PathTracer& tracer,
+                      const Camera& camera,
+                      const std::function<bool(double)>& within) {
+  PathTracer::FirstHits first = tracer.first_hits(camera, within);
+  if (first.alpha.data.empty()) return {};
+  return {expected_of(first.depth), unit_normals(std::move(first.normals)), hits_of(first.depth),
+          std::move(first.alpha)};
 }
 
 }  // namespace
@@ -47,7 +57,15 @@ SceneReport write_scene_frames(PathTracer& tracer,
     collect_rows(ranks, tracer.rows(), rgba);
     // What follows is left to the one that leads.
     if (ranks.leads()) {
-      write_frame(folder / names[i], rgba, {}, {}, options);
+      FrameLayers layers;
+      if (options.depth || options.normals || options.hits) {
+        layers = layers_of(tracer, scene.cameras[i], within);
+        if (layers.alpha.data.empty()) {
+          ranks.any(true);
+          break;
+        }
+      }
+      write_frame(folder / names[i], rgba, scene.cameras[i], layers, options);
       ++report.frames;
     }
     if (ranks.any(done && !done(report.frames))) break;

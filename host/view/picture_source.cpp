@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "raysplats/error.hpp"
 #include "raysplats/path_tracer.hpp"
 #include "trace/model_impl.hpp"
 #include "view/dropped_meshes.hpp"
@@ -27,18 +26,24 @@ class ScenePictures : public MeshPictures {
       : ScenePictures(context, prepared(std::move(scene)), 0) {}
 
   Image draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) override {
-    if (request.output != Output::kColor && request.output != Output::kAlpha)
-      throw UsageError("A scene with surfaces has no single depth");
-    tracer_.set_sampling(1, seed_ + sample);
-    const Image rgba = tracer_.render(jittered(request.camera, sample), watch);
-    if (rgba.pixels() == 0) return {};
-    return request.output == Output::kAlpha ? alpha_picture(rgba) : rgba;
+    const Camera camera = jittered(request.camera, sample);
+    if (request.output == Output::kColor || request.output == Output::kAlpha) {
+      tracer_.set_sampling(1, seed_ + sample);
+      const Image rgba = tracer_.render(camera, watch);
+      if (rgba.pixels() == 0) return {};
+      return request.output == Output::kAlpha ? alpha_picture(rgba) : rgba;
+    }
+    const PathTracer::FirstHits first = tracer_.first_hits(camera, watch);
+    if (first.alpha.pixels() == 0) return {};
+    if (request.output == Output::kDepth) return depth_picture(first.depth, first.alpha);
+    if (request.output == Output::kHits) return hits_picture(first.depth);
+    return normals_picture(first.normals, first.alpha, camera);
   }
   std::optional<glm::dvec3> point(const ViewRequest& request) override {
     return tracer_.first_point(request.camera);
   }
   std::uint64_t samples() const override { return kSceneSamples; }
-  bool has_depth() const override { return false; }
+  bool has_depth() const override { return true; }
 
   void set_meshes(const std::vector<Mesh>& meshes) override {
     std::vector<Mesh> all = own_;
@@ -78,14 +83,12 @@ class PicturesWithMeshes : public MeshPictures {
       : context_(context), plain_(std::move(plain)), scene_(std::move(scene)) {}
 
   Image draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) override {
-    const bool surfaces = request.output == Output::kColor || request.output == Output::kAlpha;
-    PictureSource& source = staged_ && surfaces ? *staged_ : *plain_;
-    return source.draw(request, sample, watch);
+    return source().draw(request, sample, watch);
   }
   std::optional<glm::dvec3> point(const ViewRequest& request) override {
-    return (staged_ ? *staged_ : *plain_).point(request);
+    return source().point(request);
   }
-  std::uint64_t samples() const override { return (staged_ ? *staged_ : *plain_).samples(); }
+  std::uint64_t samples() const override { return source().samples(); }
   bool has_depth() const override { return plain_->has_depth(); }
 
   void set_meshes(const std::vector<Mesh>& meshes) override {
@@ -97,6 +100,8 @@ class PicturesWithMeshes : public MeshPictures {
   }
 
  private:
+  PictureSource& source() const { return staged_ ? *staged_ : *plain_; }
+
   Context& context_;
   std::unique_ptr<PictureSource> plain_;
   std::function<Scene()> scene_;

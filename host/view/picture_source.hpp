@@ -57,9 +57,8 @@ std::unique_ptr<PictureSource> model_pictures(Context& context,
 /// A scene file's: what `render scene.toml` draws, its first frame's meshes.
 std::unique_ptr<MeshPictures> scene_pictures(Context& context, Scene scene);
 
-/// `plain` until there are meshes, then `scene` with them, of colour and alpha; the other outputs
-/// are those of `plain` always. `scene` is asked for when the first mesh comes, and its memory is
-/// given back with the last.
+/// `plain` until there are meshes, then `scene` with them. `scene` is asked for when the first mesh
+/// comes, and its memory is given back with the last.
 std::unique_ptr<MeshPictures> pictures_with_meshes(Context& context,
                                                    std::unique_ptr<PictureSource> plain,
                                                    std::function<Scene()> scene);

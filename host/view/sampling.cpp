@@ -49,15 +49,12 @@ Image alpha_picture(const Image& rgba) {
   return out;
 }
 
-Image depth_picture(const Image& depth, const Image& rgba) {
-  Image expected(depth.width, depth.height, 1);
-  for (std::size_t i = 0; i < expected.pixels(); ++i)
-    expected.data[i] = depth.data[i * static_cast<std::size_t>(depth.channels)];
-  return opaque(depth_preview(expected, rgba));
+Image depth_picture(const Image& depth, const Image& alpha) {
+  return opaque(depth_preview(expected_of(depth), alpha));
 }
 
-Image normals_picture(const Image& sums, const Image& rgba, const Camera& camera) {
-  return opaque(normals_preview(unit_normals(sums), rgba, camera));
+Image normals_picture(const Image& sums, const Image& alpha, const Camera& camera) {
+  return opaque(normals_preview(unit_normals(sums), alpha, camera));
 }
 
 Image hits_picture(const Image& depth) { return opaque(hits_preview(hits_of(depth))); }

@@ -34,6 +34,13 @@ class PathTracer {
     std::uint64_t ended_by_bounces = 0;  ///< paths that max_bounces ended
   };
 
+  /// Pictures of what rays meet first.
+  struct FirstHits {
+    Image depth;    ///< 3 channels as of Tracer::depth(): expected, median, number of Gaussians
+    Image normals;  ///< 3 channels as of Tracer::normals(): sums, in world axes
+    Image alpha;    ///< 1 channel: share of the ray that ends there
+  };
+
   /// Uploads the scene and builds both trees. Throws UsageError for settings out of range and
   /// Gaussians whose arrays do not fit each other, DataError for meshes with a number that is not
   /// finite or an index out of range and for Gaussians with a number that is not finite,
@@ -56,6 +63,13 @@ class PathTracer {
   /// Throws UsageError for a camera without pixels or with a number that is not finite,
   /// ResourceError when its paths would not fit the device beside the scene.
   Image render(const Camera& camera, const std::function<bool(double share)>& within = {});
+
+  /// What the rays through the middles of a picture's pixels meet first: Gaussians, and behind them
+  /// the nearest surface, which counts as opaque whatever its material: a mirror has the depth of
+  /// its glass, not of what it shows. Its normal is the one that it is shaded with. Whole pictures
+  /// for every share (set_share()); `within` and what is thrown as in render(), and ResourceError
+  /// where there is no room for some 160 bytes more of each Gaussian.
+  FirstHits first_hits(const Camera& camera, const std::function<bool(double share)>& within = {});
 
   /// The point of the world that is seen first through the middle of a camera's picture: a surface
   /// of any material, or the median depth of the Gaussians before it; nothing where the ray meets

@@ -70,7 +70,6 @@ TEST_CASE("scene files with mistakes are refused with one sentence") {
   check_refused("[[mesh]]\nfile = \"balls.ply\"\n" + kCamera, 3, "balls.ply");
   check_refused("[[model]]\nfile = \"cube.obj\"\n" + kCamera, 3, "cube.obj");
   const std::string good = kModel + kCamera;
-  check_refused(good, 2, "--depth", {"--depth"});
   check_refused(good, 2, "--samples", {"--supersample", "2"});
   check_refused(good, 2, "--near", {"--near", "1"});
   check_refused(good, 2, "--orbit", {"--fov", "30"});
@@ -150,4 +149,47 @@ TEST_CASE("a scene with a mirror is rendered") {
                                 "--max-bounces", "2", "--format", "jpg"});
   CHECK(entries(folder / "orbit") == 2);
   CHECK(raysplats::read_image(folder / "orbit/frame_0001.jpg").height == 16);
+}
+
+TEST_CASE(
+    "depth, normals and hits of a scene file are those of its model until a mesh is before it") {
+  const TemporaryFolder folder;
+  write_scene(folder, kModel + kCamera);
+  write_file(folder / "camera.json",
+             R"({"camera_angle_x": 0.9, "w": 48, "h": 48, "frames": [{"file_path": "view.png",
+             "transform_matrix": [[1,0,0,0.5],[0,-1,0,0],[0,0,-1,-6],[0,0,0,1]]}]})");
+  const auto layers = [&](const std::string& what, const std::string& out) {
+    const Outcome outcome =
+        raysplats_program({"render", folder / what, "--cameras", folder / "camera.json", "-o",
+                           folder / out, "--depth", "--normals", "--hits", "-q"});
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    std::vector<raysplats::Image> read;
+    for (const char* layer : {"depth", "normals", "hits"})
+      read.push_back(raysplats::read_image(folder / (out + "/view_" + layer + ".png")));
+    return read;
+  };
+  const std::vector<raysplats::Image> model = layers("balls.ply", "model");
+  const std::vector<raysplats::Image> scene = layers("scene.toml", "scene");
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    CAPTURE(i);
+    CHECK(difference(scene[i], model[i]) < 0.005);
+    double sum = 0.0;
+    for (const float value : model[i].data) sum += static_cast<double>(value);
+    CHECK(sum > 1.0);
+  }
+  // A mirror over all of the picture is the nearest, flat, and hides every Gaussian; that its
+  // reflection is of the environment alone changes nothing.
+  write_file(folder / "cube.obj", "v -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3 4\n");
+  write_file(folder / "scene.toml", kModel +
+                                        "[[mesh]]\nfile = \"cube.obj\"\ntranslate = [0.5, 0, -3]\n"
+                                        "material = \"chrome\"\n[[material]]\nname = \"chrome\"\n"
+                                        "kind = \"mirror\"\n" +
+                                        kCamera);
+  const std::vector<raysplats::Image> mirror = layers("scene.toml", "mirror");
+  for (std::size_t i = 0; i < 48u * 48u; ++i) {
+    CHECK(mirror[0].data[i] == 1.0f);
+    CHECK(mirror[1].data[3 * i + 2] == 1.0f);
+    CHECK(mirror[2].data[i] == 0.0f);
+  }
 }

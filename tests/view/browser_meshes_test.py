@@ -44,9 +44,15 @@ class MeshesTest(ModelCase):
         self.slide("near", 0.1)
         second = self.rest(second["id"])
         self.assertTrue(self.status().endswith("beside meshes without: near limit"), self.status())
-        Select(self.page.find_element(By.ID, "output")).select_by_value("depth")
+        # Its front is nearer than all of the model, and looks at the camera.
+        self.slide("near", 0)
         second = self.rest(second["id"])
-        self.assertTrue(self.status().endswith("without the meshes"), self.status())
+        for output, middle in (("depth", (255, 255, 255)), ("normals", (128, 128, 255))):
+            Select(self.page.find_element(By.ID, "output")).select_by_value(output)
+            second = self.rest(second["id"])
+            for got, expected in zip(self.middle(), middle):
+                self.assertAlmostEqual(got, expected, delta=12, msg=output)
+            self.screenshot(f"mesh_{output}")
         Select(self.page.find_element(By.ID, "output")).select_by_value("color")
         second = self.rest(second["id"])
         Select(self.page.find_element(By.ID, "mesh-material")).select_by_value("diffuse")
@@ -74,6 +80,12 @@ class MeshesTest(ModelCase):
         self.assertEqual(self.console(), [])
 
 
+    def middle(self):
+        return self.page.execute_script(
+            "const p = document.getElementById('picture'); return Array.from(p.getContext('2d').getImageData("
+            "p.width / 2, p.height / 2, 1, 1).data).slice(0, 3);")
+
+
 class SceneTest(PageCase):
     """A scene file, which has surfaces of its own."""
 
@@ -88,8 +100,8 @@ class SceneTest(PageCase):
 
     def test_a_scene_has_a_centre_and_says_what_it_has_not(self):
         first = self.rest()
-        self.assertEqual(self.page.find_element(By.ID, "missing").text, "Not here, because of its surfaces: depth, "
-                         "normals, number of hits, near limit, order of hits, background.")
+        self.assertEqual(self.page.find_element(By.ID, "missing").text, "Not here, because of its surfaces: "
+                         "near limit, order of hits, background.")
         for name in ("near", "order", "own-background", "background"):
             self.assertFalse(self.page.find_element(By.ID, name).is_enabled(), name)
         # The ball in the middle.

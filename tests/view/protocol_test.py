@@ -340,11 +340,17 @@ class ScenesTest(unittest.TestCase):
                 self.assertEqual(samples, sorted(set(samples)))
                 self.assertLessEqual(set(samples), {1, 2, 4, 8, 16, 32, 64})
                 self.assertEqual(samples[-1], 64)
-                channel.send_json(**view(2, output="depth"))
-                self.assertEqual(channel.receive()[1]["type"], "error")
+                for number, (output, count) in enumerate((("depth", 1), ("normals", 64), ("hits", 64)), 10):
+                    channel.send_json(**view(number, (32, 24), output=output))
+                    while True:
+                        kind, header, data = channel.receive()
+                        self.assertEqual(kind, "picture")
+                        if header["view"] == number and header["flags"] & LAST:
+                            break
+                    self.assertEqual((header["samples"], data[:2]), (count, b"\xff\xd8"))
                 state = json.loads(viewer.ask("/api/state", Cookie=viewer.cookie())[2])
                 self.assertEqual([state[f"has_{name}"] for name in ("depth", "near", "order", "background")],
-                                 [False] * 4)
+                                 [True, False, False, False])
                 # The ball in the middle, and nothing behind the camera.
                 self.assertLess(math.dist(picked(channel, 3), (0, 0, 0)), 0.7)
                 self.assertIsNone(picked(channel, 4, eye=(0, 0, 50)))
@@ -406,9 +412,8 @@ class MeshesTest(unittest.TestCase):
             self.assertNotEqual(first, shown)
             # A ray meets the mesh before the model, whose centre is behind it.
             self.assertLess(picked(channel, 7)[2], -1.5)
-            # The depth is still the model's.
-            channel.send_json(**view(4, output="depth"))
-            self.assertEqual(channel.receive()[0], "picture")
+            # So does its depth, which is the nearest.
+            near = self.still(channel, 4, output="depth")
             channel.send_json(**{**view(5, (96, 64)), "type": "scene"})
             scene = self.text(channel)["text"]
             # What is saved is what `render` draws, with the mesh beside it.
@@ -426,6 +431,7 @@ class MeshesTest(unittest.TestCase):
             channel.send_json(type="remove", mesh=mesh["mesh"])
             self.assertEqual(self.text(channel)["meshes"], [])
             self.assertEqual(self.still(channel, 6), before)
+            self.assertNotEqual(self.still(channel, 9, output="depth"), near)
             self.assertGreater(picked(channel, 8)[2], -1)
             channel.send_json(type="place", mesh=mesh["mesh"], **place())
             self.assertIn("no mesh", self.text(channel)["text"])

@@ -131,6 +131,20 @@ TEST_CASE("normals follow the model and leave the last picture alone") {
   CHECK(tracer.normals(first, camera, [](double) { return true; }).data == one.data);
 }
 
+TEST_CASE("normals follow the camera, in packets and ray by ray [small]") {
+  Context context = make_test_context();
+  const Model model(context, reference::random_scene(40, 7, 1));
+  const Camera front = reference::cube_camera(16, 12);
+  const Camera side = look_at({4, 0, 0.5}, {0, 0, 0.5}, {0, -1, 0}, 16, 12, 16.0);
+  for (const Traversal traversal : {Traversal::kTiles, Traversal::kBvh}) {
+    TraceOptions options;
+    options.traversal = traversal;
+    Tracer tracer(context, options), fresh(context, options);
+    tracer.normals(model, front);
+    CHECK(tracer.normals(model, side).data == fresh.normals(model, side).data);
+  }
+}
+
 TEST_CASE("what a watch of normals throws comes out, and the last picture stays [small]") {
   Context context = make_test_context();
   const Camera camera = reference::cube_camera(16, 12);

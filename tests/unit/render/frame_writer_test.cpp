@@ -76,6 +76,10 @@ TEST_CASE("the depth preview is white near, black far and where nothing is") {
   Image rgba(4, 1, 4);
   for (std::size_t i = 0; i < 3; ++i) rgba.data[4 * i + 3] = 1.0f;
   CHECK(depth_preview(depth, rgba).data == std::vector<float>{1.0f, 0.0f, 0.5f, 0.0f});
+  // What a wall that faces the camera has is flat but for rounding.
+  Image wall(4, 1, 1, 3.0f);
+  wall.data[1] = std::nextafter(3.0f, 4.0f);
+  CHECK(depth_preview(wall, Image(4, 1, 1, 1.0f)).data == std::vector<float>(4, 1.0f));
 }
 
 TEST_CASE("depth, hits and capped rays of a blurred frame are those of all its moments") {
