@@ -14,6 +14,9 @@
 #define RS_GUARD_POISONED 1u  // bits of its first word
 #define RS_GUARD_REPEATED 2u
 
+// Parts of the sums that train/photo_fit.cl keeps of a photo.
+#define RS_FIT_ITEMS 64
+
 // One step of Adam for one group of parameters.
 typedef struct {
   rs_float beta1, rest1;  // rest = 1 - beta

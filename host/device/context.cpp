@@ -138,7 +138,7 @@ void Context::Impl::timed(const std::string& path,
                           const std::string& kernel,
                           const cl::Event& event) {
   if (timed_events != nullptr) timed_events->push_back(event);
-  if (!options.profile) return;
+  if (!profiled()) return;
   pending.push_back({path, kernel, event});
   if (pending.size() >= 4096) collect_profile();
 }

@@ -63,6 +63,7 @@ struct Context::Impl {
   std::vector<LaunchTime> launches;
   std::deque<InFlight> in_flight;
   std::vector<cl::Event>* timed_events = nullptr;  // of a LaunchTimer that runs
+  bool sampled = false;                            // by a KernelSample
   std::uint64_t host_waits = 0;
   double build_seconds = 0;
   std::shared_ptr<MemoryCount> memory = std::make_shared<MemoryCount>();
@@ -78,8 +79,9 @@ struct Context::Impl {
   void keep_until(const cl::Event& event, std::shared_ptr<const void> memory);
   /// What an enqueue call takes for its event: null unless launches are timed.
   cl::Event* next_event(cl::Event& event) {
-    return options.profile || timed_events != nullptr ? &event : nullptr;
+    return profiled() || timed_events != nullptr ? &event : nullptr;
   }
+  bool profiled() const { return options.profile || sampled; }
   void timed(const std::string& program, const std::string& kernel, const cl::Event& event);
   void collect_profile();
 };

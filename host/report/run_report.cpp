@@ -152,9 +152,14 @@ std::string kernels(const Json& metrics) {
                         escaped(text(kernel, "name")), number(kernel, "calls"),
                         number(kernel, "ms"), share_cell(number(kernel, "share")));
   }
-  if (rows.empty()) return "<p>Run with --profile to see which kernels take the time.</p>\n";
-  return "<table>\n<tr><th>kernel</th><th>launches</th><th>ms</th><th>share</th></tr>\n" + rows +
-         "</table>\n";
+  if (rows.empty()) return "<p>The run was too short for one of its steps to be timed.</p>\n";
+  const double steps = number(metrics, "timed_steps");
+  const std::string what =
+      steps > 0 ? fmt::format("Device time in {:.0f} steps of training, one of every 32", steps)
+                : "Device time of the whole run";
+  return "<p>" + what +
+         ".</p>\n<table>\n<tr><th>kernel</th><th>launches</th><th>ms</th><th>share</th></tr>\n" +
+         rows + "</table>\n";
 }
 
 /// What somebody needs to make the run again, as far as its files say it.

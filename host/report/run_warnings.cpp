@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "report/run_files.hpp"
 
@@ -29,25 +30,54 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Names of the views whose value lies far below the median: by 3.5 robust standard deviations
-/// (Iglewicz and Hoaglin 1993) and by `least`; "" for none.
-std::string far_below(const std::vector<Json>& views,
-                      const std::vector<double>& values,
-                      double least) {
+double itself(double value) { return value; }
+double octaves(double sharpness) { return std::log2(std::max(sharpness, 1e-12)); }
+
+/// The views whose number `key`, on its `scale`, lies far below the median: by 3.5 robust standard
+/// deviations (Iglewicz and Hoaglin 1993) and by `least`. Those without that number are left out.
+std::vector<Json> far_below(std::vector<Json> views,
+                            const char* key,
+                            double (*scale)(double),
+                            double least) {
   constexpr double kDeviations = 3.5;
   constexpr double kOfNormal = 1.4826;  // standard deviations in a median of absolute deviations
-  if (views.size() < kFewViews) return "";
+  std::erase_if(views, [&](const Json& view) { return !view.contains(key); });
+  if (views.size() < kFewViews) return {};
+  std::vector<double> values;
+  for (const Json& view : views) values.push_back(scale(number(view, key)));
   const double middle = median(values);
   std::vector<double> deviations = values;
   for (double& each : deviations) each = std::abs(each - middle);
   const double below = std::max(least, kDeviations * kOfNormal * median(deviations));
+  std::erase_if(views,
+                [&](const Json& view) { return !(scale(number(view, key)) < middle - below); });
+  return views;
+}
+
+/// Their names; "" for none.
+std::string names_of(const std::vector<Json>& views) {
   std::string names;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    if (!(values[i] < middle - below)) continue;
-    if (count++ < kNamed) names += (names.empty() ? "" : ", ") + text(views[i], "name");
+  for (std::size_t i = 0; i < std::min(views.size(), kNamed); ++i)
+    names += (i == 0 ? "" : ", ") + text(views[i], "name");
+  return views.size() > kNamed ? fmt::format("{} and {} more", names, views.size() - kNamed)
+                               : names;
+}
+
+double coordinate(const Json& photo, std::size_t axis) {
+  const auto center = photo.find("center");
+  const bool sound = center != photo.end() && center->is_array() && center->size() == 3 &&
+                     (*center)[axis].is_number();
+  return sound ? (*center)[axis].get<double>() : 0.0;
+}
+
+/// The squared distance between the places that two photos were taken at.
+double squared_distance(const Json& a, const Json& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double along = coordinate(a, k) - coordinate(b, k);
+    sum += along * along;
   }
-  return count > kNamed ? fmt::format("{} and {} more", names, count - kNamed) : names;
+  return sum;
 }
 
 bool is_complete(const Json& metrics) {
@@ -72,26 +102,45 @@ bool stopped_growing(const Json& metrics,
          *std::max_element(count->second.begin(), count->second.end()) >= most;
 }
 
-/// Names of the photos that are far less sharp than the others; "" for none.
 std::string blurred(const std::vector<Json>& photos) {
-  std::vector<double> octaves;
-  octaves.reserve(photos.size());
-  for (const Json& photo : photos)
-    octaves.push_back(std::log2(std::max(number(photo, "sharpness"), 1e-12)));
-  return far_below(photos, octaves, kBlurredOctaves);
+  return names_of(far_below(photos, "sharpness", octaves, kBlurredOctaves));
+}
+
+/// Training photos that the model comes far less near to than to the others, and than to those from
+/// the two nearest places: what lies at the border of a capture is learned later, all of it.
+std::string odd(const std::vector<Json>& photos) {
+  constexpr std::size_t kNeighbours = 2;
+  std::vector<Json> found = far_below(photos, "psnr", itself, kOddDecibels);
+  std::erase_if(found, [&](const Json& photo) {
+    std::vector<std::pair<double, double>> others;  // squared distance, PSNR
+    for (const Json& other : photos) {
+      if (other.contains("psnr") && text(other, "name") != text(photo, "name"))
+        others.emplace_back(squared_distance(photo, other), number(other, "psnr"));
+    }
+    std::sort(others.begin(), others.end());
+    others.resize(std::min(others.size(), kNeighbours));
+    return std::any_of(others.begin(), others.end(), [&](const auto& other) {
+      return number(photo, "psnr") > other.second - kOddDecibels;
+    });
+  });
+  return names_of(found);
 }
 
 /// About views that stand out, which tells of their photos and poses more than of the model.
-void warn_of_views(const std::vector<Json>& views, std::vector<std::string>& out) {
-  std::vector<double> psnr;
-  psnr.reserve(views.size());
-  for (const Json& view : views) psnr.push_back(number(view, "psnr"));
-  const std::string odd = far_below(views, psnr, kOddDecibels);
-  if (!odd.empty()) {
-    out.push_back("Views far worse than the others, whose pose or photo may be wrong: " + odd);
-  }
-  if (const std::string names = blurred(views); !names.empty())
-    out.push_back("Held-out photos less sharp than the others: " + names);
+void warn_of_views(const std::vector<Json>& views,
+                   const std::vector<Json>& photos,
+                   std::vector<std::string>& out) {
+  const auto warn = [&](const char* what, const std::string& names) {
+    if (!names.empty()) out.push_back(what + names);
+  };
+  warn("Views far worse than the others, whose pose or photo may be wrong: ",
+       names_of(far_below(views, "psnr", itself, kOddDecibels)));
+  warn("Held-out photos less sharp than the others: ", blurred(views));
+  warn("Training photos less sharp than the others, which blur the model: ", blurred(photos));
+  warn(
+      "Training photos that the model comes far less near to than to the others; their pose or "
+      "exposure may be wrong, or something in them has moved: ",
+      odd(photos));
 }
 
 }  // namespace
@@ -146,9 +195,7 @@ std::vector<std::string> warnings_of(const Json& metrics,
         fmt::format("The number of Gaussians stopped at its limit of {:.0f}: raise --max-gaussians",
                     number(metrics, "most_gaussians")));
   }
-  warn_of_views(views, out);
-  if (const std::string names = blurred(objects(metrics, "photos")); !names.empty())
-    out.push_back("Training photos less sharp than the others, which blur the model: " + names);
+  warn_of_views(views, objects(metrics, "photos"), out);
   return out;
 }
 

@@ -32,6 +32,7 @@
 #include "train/mcmc.hpp"
 #include "train/model_validator.hpp"
 #include "train/photo_cache.hpp"
+#include "train/photo_fit.hpp"
 #include "train/photo_set.hpp"
 #include "train/pose_refinement.hpp"
 #include "train/psnr_rise.hpp"
@@ -132,6 +133,7 @@ struct Trainer::Impl {
 
   // trainer_pace.cpp: steps on their way.
   void step();
+  void sampled_step();
   void follow(bool all);
   void settle();
   void abandon();
@@ -149,7 +151,7 @@ struct Trainer::Impl {
   TraceOptions trace_options();     // that the model looks right with
   Gaussians model_to_save() const;  // without what has left --bounds
   void save_model();
-  nlohmann::json photo_sharpness() const;
+  nlohmann::json photo_facts() const;
   void write_metrics(bool complete);
   std::string capped_share(std::uint64_t capped);
   void warn_of_capped_rays(std::uint64_t capped) const;
@@ -207,6 +209,7 @@ struct Trainer::Impl {
   std::optional<PoseRefinement> poses;     // with the option
   std::optional<Mcmc> mcmc;                // with the strategy
   StepGuard guard;
+  PhotoFit fit;
   std::optional<ModelValidator> validator;  // once it is asked for
   PhotoCache photo_cache;
   ViewOrder order{0, 0};  // of views, of which a step takes several (follow_options())
@@ -229,6 +232,7 @@ struct Trainer::Impl {
   std::deque<SentStep> sent;      // the oldest first
   bool await_sizes = false;       // of the next step: its view had too little room
   bool cap_reported = false;
+  std::int64_t timed_steps = 0;  // whose kernels were timed
   PsnrRise rise;
   Stopwatch training{context};
   Stopwatch evaluating{context};

@@ -64,7 +64,7 @@ void Trainer::Impl::run_iterations(std::int64_t until,
   while (iteration < std::min(until, last_iteration(options)) && !stop) {
     const auto turn = context.lock();
     if (ranks.size() > 1) stop_wished = interrupted() || stop_asked;
-    step();
+    sampled_step();
     keep_time();
     const bool last = iteration == last_iteration(options);
     if (last || every(options.log_every, iteration)) report(progress);

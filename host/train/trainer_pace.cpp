@@ -3,6 +3,7 @@
 // finds too little changes nothing, nor does any step behind it; when the host sees that, it goes
 // back to that step and makes it again with the room that it needs. So parameters do not depend on
 // the sizes of buffers.
+#include "device/kernel_sample.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {
@@ -11,6 +12,7 @@ namespace {
 // The host stays this far ahead at most: enough for the device never to run dry, few enough for a
 // step that is made again and for a signal not to cost much.
 constexpr std::size_t kMostAhead = 4;
+constexpr std::int64_t kTimedEvery = 32;
 
 }  // namespace
 
@@ -22,6 +24,15 @@ void Trainer::Impl::step() {
   enqueue_step();
   await_sizes = false;
   sent.push_back({begun, optimiser_steps, rays, ReadBack(context, tracer.overflow(), 1)});
+}
+
+// A step now and then has its kernels timed, which tells of all of them and costs nothing that
+// could be measured. Not the first: it finds out what the later ones know.
+void Trainer::Impl::sampled_step() {
+  if (iteration % kTimedEvery != kTimedEvery / 2) return step();
+  const KernelSample sample(context);
+  step();
+  if (sample.alone()) ++timed_steps;
 }
 
 // Takes note of the steps that are done, of all of them with `all`. Goes back to the first one

@@ -185,6 +185,7 @@ void Trainer::Impl::forget_pilot() {
   density.restore_statistics({});
   gaussians = DeviceGaussians();
   guard.restore({});
+  fit.forget();
   if (exposure) exposure.emplace(context, train_views.size(), slots.size());
   forget_sky();
   forget_poses();

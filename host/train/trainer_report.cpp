@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "device/profiler.hpp"
@@ -16,7 +17,7 @@ namespace {
 
 constexpr double kManyCapped = 1e-3;  // share of rays at which the cap on hits gets a warning
 
-// With --profile: what every kernel took so far.
+// What the kernels of the timed steps took so far; with --profile all of them.
 nlohmann::json kernels_of(Context& context) {
   nlohmann::json out = nlohmann::json::array();
   for (const Profiler::Row& row : context.profiler().rows()) {
@@ -28,12 +29,20 @@ nlohmann::json kernels_of(Context& context) {
 
 }  // namespace
 
-// How sharp the training photos are that the run has read so far.
-nlohmann::json Trainer::Impl::photo_sharpness() const {
+// Of the training photos that the run has read so far: how sharp they are, and how near it came to
+// those that it has seen at full size last.
+nlohmann::json Trainer::Impl::photo_facts() const {
   nlohmann::json out = nlohmann::json::array();
+  const std::vector<double> psnr = fit.psnr();
   for (std::size_t i = 0; i < train_cameras.size(); ++i) {
     const std::optional<double> sharpness = photo_cache.sharpness_of(i);
-    if (sharpness) out.push_back({{"name", train_cameras[i].name}, {"sharpness", *sharpness}});
+    if (!sharpness) continue;
+    const glm::dvec3 center = train_cameras[i].center();
+    nlohmann::json photo{{"name", train_cameras[i].name},
+                         {"sharpness", *sharpness},
+                         {"center", {center.x, center.y, center.z}}};
+    if (std::isfinite(psnr[i])) photo["psnr"] = std::min(psnr[i], kMostPsnr);
+    out.push_back(std::move(photo));
   }
   return out;
 }
@@ -169,7 +178,8 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", device.name},
                      {"driver", fmt::format("{}, {}", device.platform, device.driver_version)},
-                     {"photos", photo_sharpness()},
+                     {"photos", photo_facts()},
+                     {"timed_steps", timed_steps},
                      {"kernels", kernels_of(context)}});
 }
 

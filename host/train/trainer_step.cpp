@@ -42,6 +42,7 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
   const DevicePhoto photo = photo_cache.get(view, camera.width, camera.height);
   loss.evaluate(shown, photo, cut_out, behind, camera.width, camera.height, image_gradient);
   guard.check_loss(loss.partials(), tracer.overflow());
+  fit.note(view, divisor == 1, loss.partials(), tracer.overflow());
   if (exposure) {
     exposure->observe(tracer.image(), photo, cut_out, behind, camera.width, camera.height, slot);
     exposure->backward(image_gradient, view, camera.width, camera.height);

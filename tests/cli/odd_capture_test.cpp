@@ -133,6 +133,47 @@ TEST_CASE("the report names the training photo that is out of focus, and no shar
   CHECK(sentence.ends_with(": train/r_4.png."));
 }
 
+TEST_CASE(
+    "the report names the training photo with a wrong pose, exposure or content, and no other") {
+  const TemporaryFolder folder;
+  const auto named = [&](const std::string& run, const auto& spoil) {
+    const std::string data = folder / (run + "_data");
+    REQUIRE(raysplats_program({"generate", data, "--size", "64", "--train-views", "16",
+                               "--test-views", "1", "-q"})
+                .code == 0);
+    spoil(data);
+    const Outcome outcome = raysplats_program({"train", data, "-o", folder / run, "-n", "400"});
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    const std::string page = read_file(folder / (run + "/report.html"));
+    const std::string warning = "or something in them has moved: ";
+    const std::size_t at = page.find(warning);
+    if (at == std::string::npos) return std::string();
+    return page.substr(at + warning.size(), page.find('<', at) - at - warning.size());
+  };
+  CHECK(named("clean", [](const std::string&) {}).empty());
+  CHECK(named("pose", [](const std::string& data) {
+          nlohmann::json json = training_file(data);
+          json["frames"][5]["transform_matrix"] = json["frames"][12]["transform_matrix"];
+          write_file(data + "/transforms_train.json", json.dump());
+        }) == "train/r_5.png.");
+  CHECK(named("exposure", [](const std::string& data) {
+          raysplats::Image photo = raysplats::read_image(data + "/train/r_7.png");
+          for (std::size_t i = 0; i < photo.data.size(); ++i) photo.data[i] *= i % 4 < 3 ? 0.4f : 1;
+          raysplats::write_image(data + "/train/r_7.png", photo);
+        }) == "train/r_7.png.");
+  CHECK(named("moved", [](const std::string& data) {
+          raysplats::Image photo = raysplats::read_image(data + "/train/r_2.png");
+          for (int y = 20; y < 44; ++y) {
+            for (int x = 20; x < 44; ++x) {
+              photo.at(x, y, 0) = photo.at(x, y, 1) = photo.at(x, y, 3) = 1;
+              photo.at(x, y, 2) = 0;
+            }
+          }
+          raysplats::write_image(data + "/train/r_2.png", photo);
+        }) == "train/r_2.png.");
+}
+
 TEST_CASE("masks that cannot belong to their photo are refused with their name") {
   const TemporaryFolder folder;
   const std::string data = folder / "data";

@@ -254,8 +254,24 @@ TEST_CASE("views that stand out, a full model and blurred photos are warned of")
   CHECK(has(run_report(run.path()), "stopped at its limit of 141"));
   // The same of photos to train with, which metrics.json itself has.
   run.write("metrics.json", R"({"complete":true,"photos":[)" + images + "]}");
-  CHECK(has(run_report(run.path()),
-            "Training photos less sharp than the others, which blur the model: 7_.png."));
+  const std::string trained = run_report(run.path());
+  CHECK(has(trained, "Training photos less sharp than the others, which blur the model: 7_.png."));
+  CHECK(has(trained, "or something in them has moved: 3_.png."));
+  // What the run has not seen at full size says nothing, and is no odd one.
+  std::string seen = images;
+  for (int i = 0; i < 6; ++i) seen += R"(,{"name":"unseen.png","sharpness":0.05})";
+  run.write("metrics.json", R"({"complete":true,"photos":[)" + seen + "]}");
+  CHECK(has(run_report(run.path()), "or something in them has moved: 3_.png."));
+  // At the border of a capture the photos beside it are as far off.
+  std::string border = seen;
+  for (const char* psnr : {"12.5", "13"})
+    border += R"(,{"name":"beside.png","sharpness":0.05,"psnr":)" + std::string(psnr) +
+              R"(,"center":[9,0,0]})";
+  border += R"(,{"name":"corner.png","sharpness":0.05,"psnr":11,"center":[9,0,0]})";
+  run.write("metrics.json", R"({"complete":true,"photos":[)" + border + "]}");
+  const std::string corner = run_report(run.path());
+  CHECK(!has(corner, "corner.png"));
+  CHECK(has(corner, "or something in them has moved: 3_.png."));
 }
 
 TEST_CASE("a report shows model, cameras, exposure, kernels and where it all comes from") {
@@ -263,7 +279,7 @@ TEST_CASE("a report shows model, cameras, exposure, kernels and where it all com
   const std::string bare = run_report(run.path());
   for (const char* heading : {"<h2>Model", "<h2>Cameras", "<h2>Exposure"})
     CHECK(!has(bare, heading));
-  const std::string advice = "Run with --profile to see which kernels take the time";
+  const std::string advice = "The run was too short for one of its steps to be timed";
   CHECK(has(bare, advice));
   run.write("metrics.json",
             R"({"complete":true,"seed":42,"driver":"<d>","data":"00ff","version":"9.8",
@@ -290,6 +306,7 @@ TEST_CASE("a report shows model, cameras, exposure, kernels and where it all com
   CHECK(has(page, "<td>00ff</td>"));
   CHECK(has(page, "<th>trace&lt;x&gt;</th><td>12</td><td>340.0</td>"));
   CHECK(has(page, "75.0 %"));
+  CHECK(has(page, "<p>Device time of the whole run.</p>"));
   CHECK(!has(page, advice));
   CHECK(has(page, "<p>Complete: 20.0 dB on 0 held-out views, nothing to warn of.</p>"));
   CHECK(has(page, "held out: orange 10.00 dB to blue 30.00 dB"));

@@ -258,7 +258,17 @@ TEST_CASE("training improves held-out views and leaves the files of a run") {
   CHECK(metrics.at("most_gaussians") == options.max_gaussians);
   CHECK(metrics.at("seed") == options.seed);
   CHECK(!metrics.at("data").get<std::string>().empty());
-  CHECK(metrics.at("kernels").empty());                    // are not timed
+  // Steps 16, 48, 80 and so on are timed.
+  CHECK(metrics.at("timed_steps") == 8);
+  double share = 0.0;
+  std::int64_t steps = 0;
+  for (const nlohmann::json& kernel : metrics.at("kernels")) {
+    share += kernel.at("share").get<double>();
+    if (kernel.at("name") == "guard_close") steps = kernel.at("calls");
+  }
+  CHECK(share == doctest::Approx(1.0));
+  CHECK(steps == 8);
+  CHECK(metrics.at("photos").at(0).at("psnr") > 10.0);
   CHECK(metrics.at("command") == "train '\xEF\xBF\xBD'");  // what is no UTF-8 is replaced
   std::ifstream model(folder / "point_cloud/iteration_250/point_cloud.ply", std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(model)), {});
