@@ -145,15 +145,15 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
     });
   }
 
-  bool idle() const { return texts_.empty() && !writing_; }
+  bool idle() const { return texts_.empty() && !kept_ && !writing_; }
 
   void send_text(std::string text) {
     if (texts_.size() >= kMostTexts) return;
     texts_.push_back(std::move(text));
     write();
   }
-  void send_picture(std::vector<std::byte> bytes) {
-    picture_ = std::move(bytes);
+  void send_picture(std::vector<std::byte> bytes, bool kept) {
+    (kept ? kept_ : picture_) = std::move(bytes);
     write();
   }
 
@@ -201,18 +201,20 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
   }
 
   void write() {
-    if (writing_ || !open_ || (texts_.empty() && !picture_)) return;
+    if (writing_ || !open_ || (texts_.empty() && !kept_ && !picture_)) return;
     writing_ = true;
     net::const_buffer out;
-    if (!texts_.empty()) {
+    // What is to be kept goes before the word that the run has ended.
+    if (!kept_ && !texts_.empty()) {
       socket_.text(true);
       text_in_work_ = std::move(texts_.front());
       texts_.pop_front();
       out = net::buffer(text_in_work_);
     } else {
       socket_.binary(true);
-      picture_in_work_ = std::move(*picture_);
-      picture_.reset();
+      std::optional<std::vector<std::byte>>& next = kept_ ? kept_ : picture_;
+      picture_in_work_ = std::move(*next);
+      next.reset();
       out = net::buffer(picture_in_work_);
     }
     socket_.async_write(out, [self = shared_from_this()](Code error, std::size_t) {
@@ -236,7 +238,7 @@ class Server::Impl::Channel : public std::enable_shared_from_this<Channel> {
   Clock::time_point due_;  ///< of the next message
   beast::flat_buffer buffer_;
   std::deque<std::string> texts_;
-  std::optional<std::vector<std::byte>> picture_;
+  std::optional<std::vector<std::byte>> picture_, kept_;
   std::string text_in_work_;
   std::vector<std::byte> picture_in_work_;
   bool writing_ = false;
@@ -373,10 +375,10 @@ Server::~Server() = default;
 
 std::vector<std::string> Server::urls() const { return impl_->access->urls(); }
 
-void Server::send_picture(ClientId client, std::vector<std::byte> bytes) {
-  net::post(impl_->io, [impl = impl_.get(), client, bytes = std::move(bytes)]() mutable {
+void Server::send_picture(ClientId client, std::vector<std::byte> bytes, bool kept) {
+  net::post(impl_->io, [impl = impl_.get(), client, bytes = std::move(bytes), kept]() mutable {
     const auto found = impl->channels.find(client);
-    if (found != impl->channels.end()) found->second->send_picture(std::move(bytes));
+    if (found != impl->channels.end()) found->second->send_picture(std::move(bytes), kept);
   });
 }
 

@@ -41,7 +41,8 @@ struct ServerHandlers {
 /// HTTP and WebSocket on one address, for those whom Access allows; everybody else gets 403. Only
 /// GET and HEAD are answered; what a request may cost is limited (8 KiB of header, no body, 64 KiB
 /// a message, 250 messages a second, 10 s to make up one's mind). One thread serves all. A slow
-/// client costs nothing: of the pictures that it has not taken only the newest waits.
+/// client costs nothing: of the pictures that it has not taken only the newest waits, and the
+/// newest that is to be kept.
 class Server {
  public:
   /// Listens. Throws UsageError for an address that is none, DataError for a port that is taken,
@@ -53,10 +54,12 @@ class Server {
 
   /// The addresses to open, with the token: one, or those of all interfaces when it listens on all.
   std::vector<std::string> urls() const;
-  /// From any thread. A picture replaces the one that still waits; texts wait in line.
-  void send_picture(ClientId client, std::vector<std::byte> bytes);
+  /// From any thread. A picture replaces the one that still waits, one that is to be kept only
+  /// another such one; texts wait in line.
+  void send_picture(ClientId client, std::vector<std::byte> bytes, bool kept = false);
   void send_text(ClientId client, std::string text);
-  /// Waits up to `seconds` until the texts that were sent are on their way.
+  /// Waits up to `seconds` until the texts and the pictures to be kept that were sent are on their
+  /// way.
   void flush(double seconds);
 
  private:

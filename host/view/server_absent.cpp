@@ -17,7 +17,7 @@ Server::~Server() = default;
 
 std::vector<std::string> Server::urls() const { return {}; }
 
-void Server::send_picture(ClientId, std::vector<std::byte>) {}
+void Server::send_picture(ClientId, std::vector<std::byte>, bool) {}
 
 void Server::flush(double) {}
 void Server::send_text(ClientId, std::string) {}

@@ -38,6 +38,9 @@ constexpr std::string_view kPhotoPath = "/api/photo/";
 constexpr int kMovingQuality = 60;
 constexpr int kStillQuality = 85;
 constexpr int kLastQuality = 94;
+/// From one wish of a page to the next: screens show no more, and whoever wishes more gets the
+/// newest of them.
+constexpr std::chrono::nanoseconds kWishTime{1'000'000'000 / 60};
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -95,6 +98,10 @@ struct Client {
   Pace pace{0.0};          ///< of movements
   Pace rest{0.0};          ///< of pictures in a hurry
   std::uint64_t turn = 0;  ///< when it was served last
+  bool fresh = false;      ///< nothing has been tried of `wanted`
+  Clock::time_point due;   ///< of its next wish
+
+  bool ready(Clock::time_point now) const { return !fresh || now >= due; }
 };
 
 void add(Image& sum, const Image& image) {
@@ -161,6 +168,7 @@ struct Viewer::Impl {
   void closed(ClientId id) {
     const std::lock_guard<std::mutex> guard(mutex);
     clients.erase(id);
+    picks.erase(id);
     uploads.forget(id);
   }
   void heard(ClientId id, std::string_view text) {
@@ -172,6 +180,7 @@ struct Viewer::Impl {
         if (auto* view = std::get_if<ViewRequest>(&message)) {
           client.wanted = std::move(*view);
           client.wish = ++wishes;
+          client.fresh = true;
           client.drawn = 0;
           client.sum = {};
           if (client.wanted->moving) last_motion = Clock::now();
@@ -179,7 +188,7 @@ struct Viewer::Impl {
           client.wanted.reset();
           client.wish = ++wishes;  // what is drawn of the last one comes too late
         } else if (auto* pick = std::get_if<PickRequest>(&message)) {
-          if (picks.size() < kMostWaiting) picks.emplace_back(id, std::move(*pick));
+          picks[id] = std::move(*pick);
         } else if (auto* command = std::get_if<RunCommand>(&message)) {
           if (commands.size() < kMostWaiting) commands.push_back(*command);
         } else if (options.meshes == nullptr) {
@@ -248,12 +257,13 @@ struct Viewer::Impl {
   }
 
   /// The page that has waited longest, those that move first; nothing when all have what they want.
-  std::optional<ClientId> next(std::uint64_t most) const {
+  std::optional<ClientId> next(std::uint64_t most, Clock::time_point now) const {
     std::optional<ClientId> best;
     bool best_moves = false;
     std::uint64_t best_turn = 0;
     for (const auto& [id, client] : clients) {
-      if (!client.wanted || client.drawn >= samples_of(*client.wanted, most)) continue;
+      if (!client.wanted || !client.ready(now)) continue;
+      if (client.drawn >= samples_of(*client.wanted, most)) continue;
       const bool moves = client.wanted->moving;
       if (!best || (moves && !best_moves) || (moves == best_moves && client.turn < best_turn)) {
         best = id;
@@ -262,6 +272,28 @@ struct Viewer::Impl {
       }
     }
     return best;
+  }
+
+  /// A page whose question may be answered.
+  std::optional<ClientId> next_pick(Clock::time_point now) const {
+    for (const auto& each : picks) {
+      if (now >= clients.at(each.first).due) return each.first;
+    }
+    return std::nullopt;
+  }
+
+  bool has_work(std::uint64_t most, Clock::time_point now) const {
+    return !commands.empty() || !about_meshes.empty() || next_pick(now) || next(most, now);
+  }
+
+  /// When the next wish that has to wait may be seen to.
+  Clock::time_point next_due(Clock::time_point now) const {
+    auto soonest = Clock::time_point::max();
+    for (const auto& [id, client] : clients) {
+      const bool waits = (client.wanted && client.fresh) || picks.contains(id);
+      if (waits && client.due > now) soonest = std::min(soonest, client.due);
+    }
+    return soonest;
   }
 
   std::uint64_t samples_of(const ViewRequest& request, std::uint64_t most) const {
@@ -292,7 +324,7 @@ struct Viewer::Impl {
   mutable std::mutex mutex;
   std::condition_variable news;
   std::map<ClientId, Client> clients;
-  std::deque<std::pair<ClientId, PickRequest>> picks;
+  std::map<ClientId, PickRequest> picks;  ///< the newest of each page
   std::deque<RunCommand> commands;
   MeshUploads uploads;
   std::deque<std::pair<ClientId, MeshMessage>> about_meshes;
@@ -383,6 +415,8 @@ void Viewer::Impl::draw(PictureSource& source,
     const auto found = clients.find(id);
     if (found == clients.end() || !found->second.wanted) return;
     Client& client = found->second;
+    if (client.fresh) client.due = Clock::now() + kWishTime;
+    client.fresh = false;
     order.request = *client.wanted;
     if (order.request.moving) {
       order.pace = client.pace;
@@ -419,7 +453,8 @@ void Viewer::Impl::deliver(PictureSource& source,
     return std::none_of(clients.begin(), clients.end(), [&](const auto& each) {
       const Client& client = each.second;
       if (each.first == id) return client.wish != wish;
-      return client.wanted && client.wanted->moving && client.drawn == 0;
+      return client.wanted && client.wanted->moving && client.drawn == 0 &&
+             client.ready(Clock::now());
     });
   };
   const auto start = Clock::now();
@@ -459,7 +494,7 @@ void Viewer::Impl::deliver(PictureSource& source,
   if (samples > 1) picture = divided(picture, samples);
   const int quality =
       request.moving ? kMovingQuality : (header.last ? kLastQuality : kStillQuality);
-  server.send_picture(id, picture_message(header, picture, quality));
+  server.send_picture(id, picture_message(header, picture, quality), header.png);
 }
 
 Viewer::Viewer(const ViewerOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -525,20 +560,22 @@ bool Viewer::work(PictureSource& source,
   std::optional<std::pair<ClientId, MeshMessage>> about_mesh;
   {
     std::unique_lock<std::mutex> lock(self.mutex);
-    const auto something = [&] {
-      return !self.picks.empty() || !self.commands.empty() || !self.about_meshes.empty() ||
-             self.next(source.samples());
-    };
-    if (!self.news.wait_for(lock, std::chrono::duration<double>(wait), something)) return false;
+    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                        std::chrono::duration<double>(wait));
+    auto now = Clock::now();
+    for (; !self.has_work(source.samples(), now); now = Clock::now()) {
+      if (now >= end) return false;
+      self.news.wait_until(lock, std::min(end, self.next_due(now)));
+    }
     commands.swap(self.commands);
     if (!self.about_meshes.empty()) {
       about_mesh = std::move(self.about_meshes.front());
       self.about_meshes.pop_front();
-    } else if (!self.picks.empty()) {
-      pick = std::move(self.picks.front());
-      self.picks.pop_front();
+    } else if (const std::optional<ClientId> asks = self.next_pick(now)) {
+      pick.emplace(*asks, std::move(self.picks.extract(*asks).mapped()));
+      self.clients.at(*asks).due = now + kWishTime;
     } else {
-      client = self.next(source.samples());
+      client = self.next(source.samples(), now);
     }
   }
   for (const RunCommand command : commands) {

@@ -432,7 +432,7 @@ async function start() {
   if (state.trains) {
     run = new Run((message) => link.send(message), (text) => {
       over = true;
-      banner(text);
+      banner(link.keeping ? `${text} The picture that was to be saved could not be drawn before.` : text);
     });
     seen.run = run;
   }

@@ -4,10 +4,14 @@
 #include <doctest/doctest.h>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include "page_client.hpp"
 #include "raysplats/error.hpp"
@@ -68,6 +72,37 @@ TEST_CASE("a page whose message ends in an error is let go, and others are serve
   unwelcome = false;
   Page(url).say("good");
   wait_until([&] { return heard == 2; });
+}
+
+TEST_CASE("of pictures that a slow page has not taken the newest comes, and the one to be kept") {
+  std::atomic<ClientId> client = 0;
+  ServerHandlers handlers;
+  handlers.get = [](std::string_view) { return HttpReply{200, "text/plain", ""}; };
+  handlers.opened = [&](ClientId id) { client = id; };
+  handlers.message = [](ClientId, std::string_view) {};
+  handlers.closed = [](ClientId) {};
+  const auto server = opened<Server>(ServerOptions{}, handlers);
+  if (!server) return;
+  Page page(server->urls().front());
+  wait_until([&] { return client != 0; });
+  // More than sockets take before somebody reads.
+  constexpr std::size_t kPictures = 40, kKept = 20;
+  const auto word = [](std::size_t i) { return "<" + std::to_string(i) + ">"; };
+  for (std::size_t i = 0; i < kPictures; ++i) {
+    std::vector<std::byte> bytes(std::size_t{1} << 20, std::byte{'.'});
+    for (const char c : word(i)) bytes.push_back(static_cast<std::byte>(c));
+    server->send_picture(client, std::move(bytes), i == kKept);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  server->send_text(client, "the end");
+  const std::string heard = page.hear(word(kPictures - 1));
+  std::size_t came = 0;
+  for (std::size_t i = 0; i < kPictures; ++i)
+    came += heard.find(word(i)) != std::string::npos ? 1 : 0;
+  CHECK(came < kPictures);  // else nothing was slow
+  const std::size_t kept = heard.find(word(kKept));
+  REQUIRE(kept != std::string::npos);
+  CHECK(kept < heard.find("the end"));
 }
 
 TEST_CASE("photos and figures that cannot be given are one sentence") {

@@ -4,12 +4,15 @@
 
 #include <doctest/doctest.h>
 
+#include <atomic>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "page_client.hpp"
@@ -76,6 +79,31 @@ TEST_CASE("nothing is drawn for a page that goes between its choice and its pict
     CHECK(viewer->work(pictures, 0, 1.0));
     CHECK(pictures.drawn == 0);
   }
+}
+
+TEST_CASE("a page that wishes more than a screen can show gets sixty pictures a second") {
+  const std::unique_ptr<Viewer> viewer = opened();
+  if (!viewer) return;
+  Page page(viewer->urls().front());
+  Pictures pictures;
+  std::atomic<bool> over = false;
+  std::thread hasty([&] {
+    for (int i = 0; i < 240; ++i) {
+      page.say(kView);
+      std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    }
+    over = true;
+  });
+  const auto start = std::chrono::steady_clock::now();
+  while (!over) viewer->work(pictures, 0, 0.05);
+  hasty.join();
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  CHECK(pictures.drawn <= 60.0 * seconds + 1);
+  CHECK(pictures.drawn > 10);
+  // The last wish is seen to.
+  viewer->work(pictures, 0, 0.1);
+  CHECK(!viewer->work(pictures, 0, 0.1));
 }
 
 TEST_CASE("a picture ends when its page has gone") {
