@@ -54,6 +54,7 @@ class Steps {
 void run(Options& options, const GlobalOptions& global) {
   if (options.matching == "exhaustive") options.prepare.matching = Matching::kExhaustive;
   if (options.matching == "sequential") options.prepare.matching = Matching::kSequential;
+  if (options.cameras == "folder") options.prepare.cameras = Cameras::kFolder;
   if (options.cameras == "photo") options.prepare.cameras = Cameras::kPhoto;
   Steps steps(global.quiet);
   const Prepared made =
@@ -98,9 +99,12 @@ Command add_prepare_command(CLI::App& app, const GlobalOptions& global) {
       ->capture_default_str();
   command
       ->add_option("--cameras", options->cameras,
-                   "Photos of equal size are of one camera (size), or each is of its own (photo)")
-      ->check(one_of({"size", "photo"}))
+                   "Photos of equal size are of one camera (size), if they are in one folder "
+                   "(folder), or each is of its own (photo)")
+      ->check(one_of({"size", "folder", "photo"}))
       ->capture_default_str();
+  command->add_flag("--subfolders", options->prepare.subfolders,
+                    "Take the photos of all folders below PHOTOS too");
   command
       ->add_option("--features", options->prepare.features,
                    "Features of a photo at most; 0 chooses: 8192, fewer for more than 100 photos")

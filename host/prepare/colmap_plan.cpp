@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <thread>
+#include <tuple>
 #include <utility>
 
 #include "io/image_file.hpp"
@@ -66,22 +67,25 @@ ColmapPlan plan_colmap(const std::filesystem::path& images,
   }
   plan.features = options.features > 0 ? options.features : features_for(plan.photos, sequential);
 
-  const bool shared = options.cameras == Cameras::kSize;
-  std::map<std::pair<int, int>, std::vector<std::string>> by_size;
+  const bool shared = options.cameras != Cameras::kPhoto;
+  using Camera = std::tuple<int, int, std::string>;
+  std::map<Camera, std::vector<std::string>> by_camera;
   double megapixels = 0;
   for (const std::string& name : photos) {
     const io::ImageSize size = io::image_size(images / name);
-    by_size[shared ? std::pair(size.width, size.height) : std::pair(0, 0)].push_back(name);
+    const bool own = options.cameras == Cameras::kFolder;
+    const std::string folder = own ? std::filesystem::path(name).parent_path().string() : "";
+    by_camera[shared ? Camera(size.width, size.height, folder) : Camera()].push_back(name);
     const double shrunk =
         std::min(1.0, static_cast<double>(options.max_size) / std::max(size.width, size.height));
     megapixels += 1e-6 * size.width * size.height * shrunk * shrunk;
   }
-  plan.finds_axis = shared && std::all_of(by_size.begin(), by_size.end(), [](const auto& each) {
+  plan.finds_axis = shared && std::all_of(by_camera.begin(), by_camera.end(), [](const auto& each) {
                       return each.second.size() >= kFewestForAxis;
                     });
-  for (auto& [size, names] : by_size) plan.cameras.push_back(std::move(names));
+  for (auto& [camera, names] : by_camera) plan.cameras.push_back(std::move(names));
   plan.feature_settings = fmt::format("{} {} {} {}\n", options.camera_model, options.max_size,
-                                      plan.features, shared ? "size" : "photo");
+                                      plan.features, static_cast<int>(options.cameras));
   plan.seconds = seconds_for(plan, megapixels, pairs);
   return plan;
 }

@@ -57,6 +57,20 @@ std::vector<std::string> photos_in(const fs::path& folder) {
   return names;
 }
 
+std::vector<std::string> photos_below(const fs::path& folder, const fs::path& without) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::recursive_directory_iterator at(folder), end; at != end; ++at) {
+    const bool left_out =
+        at->path().filename().string().starts_with('.') || fs::equivalent(*at, without, error);
+    if (at->is_directory() && left_out) at.disable_recursion_pending();
+    if (at->is_regular_file() && is_photo(at->path()))
+      names.push_back(at->path().lexically_relative(folder).generic_string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 void copy_photos(const fs::path& from,
                  const fs::path& to,
                  const std::vector<std::string>& names,
@@ -64,7 +78,8 @@ void copy_photos(const fs::path& from,
   fs::create_directories(to);
   for (std::size_t i = 0; i < names.size(); ++i) {
     std::error_code error;
-    fs::copy_file(from / names[i], to / names[i], error);
+    fs::create_directories((to / names[i]).parent_path(), error);
+    if (!error) fs::copy_file(from / names[i], to / names[i], error);
     if (error) {
       throw DataError(fmt::format("{} cannot be copied to {}: {}", (from / names[i]).string(),
                                   to.string(), error.message()));

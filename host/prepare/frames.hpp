@@ -12,6 +12,9 @@ namespace raysplats {
 
 /// Names of the files in a folder that are photos by their extension, sorted.
 std::vector<std::string> photos_in(const std::filesystem::path& folder);
+/// With those of all folders below it, as "folder/photo", but for hidden folders and `without`.
+std::vector<std::string> photos_below(const std::filesystem::path& folder,
+                                      const std::filesystem::path& without = {});
 
 /// Copies photos to a new folder.
 void copy_photos(const std::filesystem::path& from,

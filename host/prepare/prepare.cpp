@@ -9,6 +9,7 @@
 #include <charconv>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <set>
 #include <string_view>
 
@@ -86,11 +87,11 @@ class Work {
 };
 
 std::vector<std::string> gather_images(const fs::path& input,
+                                       const std::vector<std::string>& given,
                                        const PrepareOptions& options,
                                        Work& work) {
   const bool video = !fs::is_directory(input);
   std::string settings = fs::absolute(input).string() + "\n";
-  const std::vector<std::string> given = video ? std::vector<std::string>{} : photos_in(input);
   if (video) settings += fmt::format("{} frames\n", options.frames);
   // Photos that have come, gone or changed since are to be seen.
   for (const std::string& name : given)
@@ -110,7 +111,7 @@ std::vector<std::string> gather_images(const fs::path& input,
                     "Interrupted among the photos: the same command copies them anew");
     });
   });
-  return photos_in(images);
+  return photos_below(images);
 }
 
 std::string model_settings(const ColmapPlan& plan) {
@@ -143,7 +144,7 @@ void find_features(const PrepareOptions& options, const ColmapPlan& plan, Work& 
       work.colmap(
           {"feature_extractor", "--database_path", work.text("database.db"), "--image_path",
            work.text("images"), "--image_list_path", list.string(), "--ImageReader.single_camera",
-           options.cameras == Cameras::kSize ? "1" : "0", "--ImageReader.camera_model",
+           options.cameras == Cameras::kPhoto ? "0" : "1", "--ImageReader.camera_model",
            options.camera_model, "--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_image_size",
            std::to_string(options.max_size), "--SiftExtraction.max_num_features",
            std::to_string(plan.features)},
@@ -211,23 +212,31 @@ void place(const ColmapPlan& plan, Work& work) {
   });
 }
 
-/// Folders below with photos are not taken: they may be the same photos at other sizes, or masks.
-void check_photos(const fs::path& input) {
-  const std::size_t count = photos_in(input).size();
-  if (count >= kFewestPhotos) return;
-  std::error_code error;
-  std::string below;
-  for (const fs::directory_entry& entry : fs::directory_iterator(input)) {
-    if (!entry.is_directory(error)) continue;
-    if (const std::size_t there = photos_in(entry.path()).size(); there > 0)
-      below += fmt::format("{}{} ({})", below.empty() ? "" : ", ", entry.path().filename().string(),
-                           there);
+/// The photos to take. Those in folders below may be the same at other sizes, or masks: they are
+/// taken where that is wished, and else it is said that they are there.
+std::vector<std::string> chosen_photos(const fs::path& input,
+                                       const fs::path& data,
+                                       const PrepareOptions& options) {
+  const std::vector<std::string> all = photos_below(input, data);
+  std::vector<std::string> chosen = options.subfolders ? all : photos_in(input);
+  const bool enough = chosen.size() >= kFewestPhotos;
+  std::map<std::string, std::size_t> left_out;
+  for (const std::string& name : all) {
+    const fs::path folder = fs::path(name).parent_path();
+    if (!options.subfolders && !folder.empty()) ++left_out[folder.string()];
   }
+  std::string below;
+  for (const auto& [folder, count] : left_out)
+    below += fmt::format("{}{} ({})", below.empty() ? "" : ", ", folder, count);
+  if (enough && !below.empty())
+    spdlog::info("photos in folders below are left out: {}; --subfolders takes them too", below);
+  if (enough) return chosen;
   throw DataError(fmt::format(
-      "{} holds {} photos, but at least {} are needed{}", input.string(), count, kFewestPhotos,
+      "{} holds {} photos, but at least {} are needed{}", input.string(), chosen.size(),
+      kFewestPhotos,
       below.empty() ? ""
-                    : fmt::format("; folders below it hold some: {}: name one of them, or put the "
-                                  "photos into one folder",
+                    : fmt::format("; folders below it hold some: {}: name one of them, or take all "
+                                  "with --subfolders",
                                   below)));
 }
 
@@ -243,7 +252,8 @@ Prepared prepare_data(const fs::path& input,
   const bool video = !fs::is_directory(input);
   find_program("colmap", "colmap");
   if (video) find_program("ffmpeg", "ffmpeg");
-  if (!video) check_photos(input);
+  const std::vector<std::string> given =
+      video ? std::vector<std::string>{} : chosen_photos(input, data, options);
   std::error_code error;
   if (fs::equivalent(input, data / "images", error))
     throw UsageError(fmt::format("{} is what is read: give another folder with -o", data.string()));
@@ -253,7 +263,7 @@ Prepared prepare_data(const fs::path& input,
                     data.string()));
   }
   Work work(data, watch);
-  const std::vector<std::string> photos = gather_images(input, options, work);
+  const std::vector<std::string> photos = gather_images(input, given, options, work);
   const ColmapPlan plan = plan_colmap(work / "images", photos, options, video);
   tell_time(plan, work);
   find_features(options, plan, work);

@@ -18,8 +18,9 @@ enum class Matching {
 
 /// Which photos were taken by one camera, whose lens they find out together.
 enum class Cameras {
-  kSize,   ///< those of equal width and height
-  kPhoto,  ///< each has its own
+  kSize,    ///< those of equal width and height
+  kFolder,  ///< likewise, in one folder
+  kPhoto,   ///< each has its own
 };
 
 struct PrepareOptions {
@@ -28,6 +29,7 @@ struct PrepareOptions {
   int features = 0;          ///< at most, of a photo; 0 = by the number of photos
   Matching matching = Matching::kAuto;
   Cameras cameras = Cameras::kSize;
+  bool subfolders = false;              ///< photos in folders below are taken too
   std::string camera_model = "OPENCV";  ///< one of COLMAP's that read_colmap_model() knows
 };
 

@@ -201,6 +201,42 @@ TEST_CASE("prepare shares a camera among photos of one size") {
   CHECK(has(own, "--SiftExtraction.max_num_features 1000"));
 }
 
+TEST_CASE("prepare takes photos of folders below where that is wished") {
+  const Stage stage;
+  for (const char* name : {"left/a.png", "left/deep/d.png", "right cam/b.png", ".trash/e.png"})
+    raysplats::write_image(stage.path("photos/" + std::string(name)), raysplats::Image(8, 6, 3));
+  const Outcome without = stage.run({stage.path("photos"), "-o", stage.path("data")});
+  CHECK(without.code == 0);
+  CHECK(has(without.err, "left out: left (1), left/deep (1), right cam (1); --subfolders takes"));
+  CHECK(has(without.out, "2 of 3 photos"));
+  // What it has made lies below the photos, and is none of them.
+  const std::string data = stage.path("photos/data");
+  const auto with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words{stage.path("photos"), "-o", data, "--subfolders"};
+    words.insert(words.end(), more.begin(), more.end());
+    return stage.run(words);
+  };
+  stage.calls();
+  const Outcome outcome = with({});
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(has(outcome.out, "2 of 6 photos"));
+  CHECK(read_file(data + "/prepare/photos.txt") ==
+        "a.png\nb.png\nc.png\nleft/a.png\nleft/deep/d.png\nright cam/b.png\n");
+  CHECK(fs::exists(data + "/images/right cam/b.png"));
+  stage.calls();
+  CHECK(with({}).code == 0);
+  CHECK(stage.calls().empty());
+  // A camera for each folder.
+  CHECK(with({"--cameras", "folder"}).code == 0);
+  const std::string calls = stage.calls();
+  std::size_t extractors = 0;
+  for (std::size_t at = 0; (at = calls.find("feature_extractor", at)) != std::string::npos; ++at)
+    ++extractors;
+  CHECK(extractors == 4);
+  CHECK(has(calls, "--ImageReader.single_camera 1"));
+}
+
 TEST_CASE("prepare finds the axis of a lens that has photos enough") {
   const Stage stage;
   for (int i = 0; i < 7; ++i) {
@@ -267,7 +303,7 @@ TEST_CASE("prepare says in one sentence what is missing") {
   // Photos in folders below may be the same at other sizes: none is taken unasked.
   fs::copy(stage.path("photos"), stage.path("few/camera 1"));
   const Outcome below = stage.run({stage.path("few"), "-o", stage.path("data")});
-  refused(below, 3, "camera 1 (3)");
+  refused(below, 3, "camera 1 (3): name one of them, or take all with --subfolders");
   CHECK(!fs::exists(stage.path("data")));
   // Images of somebody else are not touched.
   write_file(stage.path("mine/images/x.png"), "mine");
