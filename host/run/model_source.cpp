@@ -2,12 +2,16 @@
 #include "run/model_source.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "io/model_file.hpp"
 #include "raysplats/error.hpp"
@@ -64,6 +68,29 @@ SkyLight trained_sky(const ModelSource& source) {
   return source.sky;
 }
 
+// What somebody who named a folder without a run may have meant.
+std::string meant(const std::filesystem::path& folder) {
+  constexpr std::array<std::string_view, 5> kModels{".ply", ".spz", ".sog", ".splat", ".glb"};
+  constexpr std::size_t kNamed = 3;
+  std::error_code error;
+  for (const char* cameras : {"transforms.json", "transforms_train.json", "sparse"}) {
+    if (std::filesystem::exists(folder / cameras, error))
+      return fmt::format("it is a data set: 'raysplats train {} -o RUN' makes a model of it",
+                         folder.string());
+  }
+  std::vector<std::string> names;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string extension = entry->path().extension().string();
+    if (std::find(kModels.begin(), kModels.end(), extension) != kModels.end())
+      names.push_back(entry->path().filename().string());
+  }
+  if (names.empty()) return "name a run that has saved a model, or a file";
+  std::sort(names.begin(), names.end());
+  names.resize(std::min(names.size(), kNamed));
+  return fmt::format("name a file in it, such as {}", fmt::join(names, ", "));
+}
+
 }  // namespace
 
 bool is_run_folder(const std::filesystem::path& path) {
@@ -109,9 +136,9 @@ ModelSource find_model(const std::filesystem::path& path) {
   }
   if (!source.iteration) {
     throw DataError(
-        fmt::format("The folder {} holds no point_cloud/iteration_N/point_cloud.ply: name a run "
-                    "that has saved a model, or a file",
-                    path.string()));
+        fmt::format("The folder {} is no run that has saved a model "
+                    "(point_cloud/iteration_N/point_cloud.ply): {}",
+                    path.string(), meant(path)));
   }
   read_options(source, path);
   read_header(source);

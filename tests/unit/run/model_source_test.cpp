@@ -142,4 +142,17 @@ TEST_CASE("nothing to load is an error") {
   const TemporaryDirectory folder;
   CHECK_THROWS_AS(find_model(folder.path()), DataError);
   CHECK_THROWS_AS(find_model(folder.path() / "missing.ply"), DataError);
+  const auto advice = [](const fs::path& path) -> std::string {
+    try {
+      find_model(path);
+    } catch (const DataError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  CHECK(advice(folder.path()).ends_with("name a run that has saved a model, or a file"));
+  for (const char* name : {"b.spz", "a.ply", "notes.txt"}) std::ofstream(folder.path() / name);
+  CHECK(advice(folder.path()).ends_with(": name a file in it, such as a.ply, b.spz"));
+  std::ofstream(folder.path() / "transforms.json");
+  CHECK(advice(folder.path()).find("it is a data set: 'raysplats train ") != std::string::npos);
 }
