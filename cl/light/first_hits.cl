@@ -3,10 +3,9 @@
 //
 // end_at_surfaces: rays end where they meet a triangle. Gaussians that carry their normals as
 //   colours (normal_gaussians.cl) are traced then, over black.
-// add_surfaces: color becomes the sum of w n, alpha and the depths (along `axis`, depth_cosine)
-// take
-//   the surface in as an opaque hit behind all Gaussians. What begins before it and is strongest
-//   behind it has its depth at most.
+// add_surfaces: color becomes the sum of w n; alpha and the depths (along `axis`, depth_cosine)
+//   take the surface in as an opaque hit behind all Gaussians. What begins before it and is
+//   strongest behind it has its depth at most.
 // Launch: one work-item per ray.
 #include "bvh/ray.h"
 #include "light/shading.h"
