@@ -225,6 +225,9 @@ void print_dataset(const Json& dataset) {
   if (const auto masks = dataset["masks"].get<std::size_t>(); masks > 0) {
     fmt::print("masks            {}: what is black there does not count\n", masks);
   }
+  if (dataset["alpha_is_background"].get<bool>()) {
+    fmt::print("transparency     photos are cut out: what is transparent is background\n");
+  }
   fmt::print("points           {}\n", dataset["points"].get<std::size_t>());
 }
 

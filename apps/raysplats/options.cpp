@@ -197,7 +197,7 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags) {
   app.add_option("--split", flags.split, "test (default), train or all")
       ->group(group)
       ->check(one_of({"test", "train", "all"}));
-  for (const char* name : {"downscale", "test-every", "undistort", "masks"})
+  for (const char* name : {"downscale", "test-every", "undistort", "masks", "alpha"})
     add_setting(app, flags.settings, name)->group(group);
   return data;
 }
@@ -210,10 +210,11 @@ Split DataFlags::chosen_split() const {
 
 void DataFlags::check_used(bool orbit) const {
   const bool chosen = split || settings.has("test-every");
-  if (data.empty() && (chosen || settings.has("undistort") || settings.has("masks"))) {
+  if (data.empty() &&
+      (chosen || settings.has("undistort") || settings.has("masks") || settings.has("alpha"))) {
     throw UsageError(
-        "--split, --test-every, --undistort and --masks are about the views of a data set: add "
-        "--data DATASET");
+        "--split, --test-every, --undistort, --masks and --alpha are about the views of a data "
+        "set: add --data DATASET");
   }
   if (orbit && chosen) {
     throw UsageError(

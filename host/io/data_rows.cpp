@@ -52,6 +52,13 @@ void add_data_rows(OptionTable& table, DatasetOptions& options) {
       "masks", options.masks, {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
       "what is black in the photos' masks: ignore (it counts neither in the loss nor in metrics) "
       "or cutout (background, as transparent pixels are)");
+  table.choice<AlphaUse>(
+      "alpha", options.alpha,
+      {{"auto", AlphaUse::kAuto}, {"ignore", AlphaUse::kIgnore}, {"cutout", AlphaUse::kCutout}},
+      "what is transparent in photos: ignore (it counts neither in the loss nor in metrics), "
+      "cutout "
+      "(background) or auto (cutout where most photos have something transparent, but for a border "
+      "that is the same in all)");
   add_origin_row(table, options);
 }
 

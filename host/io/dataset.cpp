@@ -14,6 +14,7 @@
 #include <string>
 
 #include "io/colmap_model.hpp"
+#include "io/cut_out.hpp"
 #include "io/data_origin.hpp"
 #include "io/image_file.hpp"
 #include "io/photo_turn.hpp"
@@ -269,7 +270,6 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
 Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
   Dataset dataset;
   dataset.kind = DatasetKind::kBlender;
-  dataset.alpha_is_background = true;
   dataset.views = transforms_views(io::read_transforms(root / "transforms_train.json"), options);
   sort_by_name(dataset.views);
   std::optional<fs::path> held_out;
@@ -326,6 +326,25 @@ Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
   return dataset;
 }
 
+/// Whether what is transparent in the photos is background.
+bool shows_cut_outs(const Dataset& dataset, AlphaUse use) {
+  if (use != AlphaUse::kAuto) return use == AlphaUse::kCutout;
+  const io::Transparency found = io::transparency(dataset.views);
+  // Rendered photos have no lens that leaves a border.
+  if (dataset.kind == DatasetKind::kBlender) return found != io::Transparency::kNone;
+  if (found == io::Transparency::kBorder) {
+    spdlog::info(
+        "All photos are transparent in the same places, as at the edge of a lens: these do not "
+        "count (alpha = cutout makes them background)");
+  }
+  if (found == io::Transparency::kCutOut) {
+    spdlog::info(
+        "The photos are cut out: what is transparent in them is background (with alpha = ignore "
+        "it does not count)");
+  }
+  return found == io::Transparency::kCutOut;
+}
+
 Dataset load_any(const fs::path& root, const DatasetOptions& options) {
   if (const auto model = io::find_colmap_model(root)) return load_colmap(root, *model, options);
   if (is_file(root / "transforms.json")) return load_nerfstudio(root, options);
@@ -365,6 +384,7 @@ Dataset load_dataset(const fs::path& root, const DatasetOptions& options) {
     throw DataError(
         fmt::format("The data set {} has no views: there is nothing to train on", root.string()));
   }
+  dataset.alpha_is_background = shows_cut_outs(dataset, options.alpha);
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
   if (masked > 0) {

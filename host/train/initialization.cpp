@@ -11,6 +11,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "io/model_file.hpp"
 #include "raysplats/error.hpp"
@@ -215,8 +216,17 @@ PointCloud start_points(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const PhotoSource& photos,
                         const TrainOptions& options) {
-  const PointCloud reliable = reliable_points(dataset.points);
-  if (options.init == "auto") {
+  PointCloud reliable = reliable_points(dataset.points);
+  if (options.init == "auto" && dataset.alpha_is_background) {
+    // Points were often found before the photos were cut out.
+    PointCloud hull = hull_points(reliable, photos(PhotoChoice::kSome));
+    if (hull.size() < reliable.size()) {
+      spdlog::info("{} of {} sparse points lie outside of what the cut-out photos show",
+                   reliable.size() - hull.size(), reliable.size());
+    }
+    reliable = std::move(hull);
+  }
+  if (options.init == "auto" && reliable.size() > 0) {
     const PointMatch match = match_points(reliable, cameras, photos(PhotoChoice::kSome));
     spdlog::debug("sparse points: {}", match_text(match));
     if (!plausible(match)) {

@@ -354,6 +354,23 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
   return out;
 }
 
+PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> photos) {
+  PointCloud out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    const float* c = points.colors.data() + 3 * i;
+    std::size_t looked = 0, shown = 0;
+    for (const SmallPhoto& photo : photos) {
+      const auto point = photo.sees({p[0], p[1], p[2]});
+      if (!point || !photo.known(*point)) continue;
+      ++looked;
+      shown += shows_something(photo, *point) ? 1 : 0;
+    }
+    if (2 * shown > looked) append(out, {p[0], p[1], p[2]}, {c[0], c[1], c[2]});
+  }
+  return out;
+}
+
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed) {
   const DepthRange around{kNearest * guess, guess, kFarthest * guess};
   std::vector<std::vector<std::size_t>> neighbours(photos.size());

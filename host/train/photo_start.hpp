@@ -11,8 +11,7 @@
 
 namespace raysplats {
 
-/// Points to start from where the data set has none, from the photos themselves. All are functions
-/// of the seed.
+/// Points to start from, told by the photos themselves. All are functions of the seed.
 
 /// Points inside the visual hull of photos that are cut out by alpha: drawn evenly from `region`
 /// until `count` of them are seen as background by no photo (Laurentini 1994; with one pixel to
@@ -22,6 +21,11 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
                          const Region& region,
                          std::size_t count,
                          std::uint64_t seed);
+
+/// Those of a data set's points that lie in the visual hull of some of its cut-out photos, with
+/// room for errors of poses and outlines: most of the photos that see a point's place show
+/// something there. Points that no photo sees are left out.
+PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> photos);
 
 /// Where a sweep looks, as distances from the cameras.
 struct DepthRange {

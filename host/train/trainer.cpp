@@ -98,7 +98,7 @@ Trainer::Impl::Impl(Context& device,
   if (options.background == "sky" && cut_out) {
     throw UsageError(
         "The option 'background' = sky is for photos that show one, but these are cut out: leave "
-        "it at auto, or choose 'masks' = ignore where masks cut them out");
+        "it at auto, or choose 'masks' = ignore and 'alpha' = ignore");
   }
   if (train_views.empty()) {
     const bool held_out = options.data.test_every == 1 && !test_views.empty();

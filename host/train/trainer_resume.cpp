@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <system_error>
+#include <utility>
 
 #include "run/train_config.hpp"
 #include "train/run_state.hpp"
@@ -102,6 +103,10 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   differs("background = sky and sky-degree", degree(before), degree(options));
   const auto cuts = [](const TrainOptions& o) { return o.data.masks == MaskUse::kCutout; };
   differs("masks = cutout", cuts(before), cuts(options));
+  const auto alpha = [](const TrainOptions& o, AlphaUse use) { return o.data.alpha == use; };
+  for (const auto& [name, use] : {std::pair{"alpha = cutout", AlphaUse::kCutout},
+                                  std::pair{"alpha = ignore", AlphaUse::kIgnore}})
+    differs(name, alpha(before, use), alpha(options, use));
 }
 
 // All ranks read the same state, before one of them writes into the folder again.

@@ -23,6 +23,14 @@ enum class MaskUse {
   kCutout,  ///< they are background, as the transparent pixels of cut-out photos
 };
 
+/// What is transparent in photos.
+enum class AlphaUse {
+  kAuto,    ///< kCutout where most photos have something transparent, but for a border that is the
+            ///< same in all of them; else kIgnore
+  kIgnore,  ///< unknown, as what MaskUse::kIgnore ignores
+  kCutout,  ///< background: the photos show a body that was cut out
+};
+
 /// One photo and the camera that took it, at the size it is used (after --downscale).
 struct View {
   Camera camera;                     ///< of the picture that load_view_image() gives
@@ -51,7 +59,7 @@ struct Dataset {
   std::filesystem::path root;
   std::vector<View> views;  ///< sorted by name within a split
   PointCloud points;
-  bool alpha_is_background = false;  ///< RGBA is composited over the background (Blender,
+  bool alpha_is_background = false;  ///< RGBA is composited over the background (AlphaUse, or
                                      ///< MaskUse::kCutout), else alpha is a mask
   std::array<double, 3> origin{};    ///< what was taken off all positions of the files
 
@@ -66,6 +74,7 @@ struct DatasetOptions {
   /// theirs either way.
   bool undistort = true;
   MaskUse masks = MaskUse::kIgnore;
+  AlphaUse alpha = AlphaUse::kAuto;
   /// What is taken off all positions; none = 0, but a point near the cameras where the scene lies
   /// so far from the origin of its files (surveyed captures) that single precision would blur it.
   std::optional<std::array<double, 3>> origin;

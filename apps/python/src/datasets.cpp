@@ -24,12 +24,14 @@ Dataset load(const std::filesystem::path& path,
              int test_every,
              bool undistort,
              const std::string& masks,
+             const std::string& alpha,
              const std::optional<std::array<double, 3>>& origin) {
   DatasetOptions options;
   options.downscale = downscale;
   options.test_every = test_every;
   options.undistort = undistort;
   options.masks = value_of(kMaskUses, "masks", masks);
+  options.alpha = value_of(kAlphaUses, "alpha", alpha);
   options.origin = origin;
   return load_dataset(path, options);
 }
@@ -65,8 +67,8 @@ void bind_datasets(nb::module_& module) {
   nb::class_<Dataset>(module, "Dataset", "Photos, cameras and points of one scene.")
       .def_static("load", &load, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1.0,
                   nb::arg("test_every") = 8, nb::arg("undistort") = true,
-                  nb::arg("masks") = "ignore", nb::arg("origin") = nb::none(),
-                  nb::call_guard<nb::gil_scoped_release>(),
+                  nb::arg("masks") = "ignore", nb::arg("alpha") = "auto",
+                  nb::arg("origin") = nb::none(), nb::call_guard<nb::gil_scoped_release>(),
                   "Reads a COLMAP, nerfstudio or Blender folder, everything but the pixels.")
       .def_prop_ro(
           "kind", [](const Dataset& self) { return name_of(kDatasetKinds, self.kind); },

@@ -52,6 +52,8 @@ inline constexpr std::array<Name<Split>, 3> kSplits{
     {{"train", Split::kTrain}, {"test", Split::kTest}, {"all", Split::kAll}}};
 inline constexpr std::array<Name<MaskUse>, 2> kMaskUses{
     {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}}};
+inline constexpr std::array<Name<AlphaUse>, 3> kAlphaUses{
+    {{"auto", AlphaUse::kAuto}, {"ignore", AlphaUse::kIgnore}, {"cutout", AlphaUse::kCutout}}};
 inline constexpr std::array<Name<SpzAxes>, 2> kSpzAxes{
     {{"ply", SpzAxes::kPly}, {"rub", SpzAxes::kRub}}};
 inline constexpr std::array<Name<DatasetKind>, 3> kDatasetKinds{

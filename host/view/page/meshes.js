@@ -86,7 +86,7 @@ export class Meshes {
   // What of a view message the program leaves out while there are meshes, for the line of the status.
   leftOut({ near, order, background }) {
     if (this.#list.length === 0) return '';
-    const names = [[near, 'near limit'], [order, 'order of hits'], [background, 'background']]
+    const names = [[near || undefined, 'near limit'], [order, 'order of hits'], [background, 'background']]
       .filter(([wish]) => wish !== undefined).map(([, name]) => name);
     return names.length === 0 ? '' : `, beside meshes without: ${names.join(', ')}`;
   }

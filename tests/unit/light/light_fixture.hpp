@@ -42,6 +42,32 @@ inline void add_mesh(Scene& scene, Mesh mesh, const Material& material) {
   scene.meshes.push_back(std::move(mesh));
 }
 
+inline Material diffuse(const Rgb& color) {
+  Material out;
+  out.color = color;
+  return out;
+}
+
+/// A floor under the cloud (y points down).
+inline void add_floor(Scene& scene) {
+  add_mesh(scene, reference::rectangle({0, 1.1, 0}, {3, 0, 0}, {0, 0.1, 3}, 0),
+           diffuse({0.8f, 0.7f, 0.5f}));
+}
+
+/// An environment whose colour changes slowly with both angles.
+inline Image waves(int width, int height) {
+  Image out(width, height, 3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double u = 6.2831853 * (x + 0.5) / width, v = 3.1415926 * (y + 0.5) / height;
+      out.at(x, y, 0) = static_cast<float>(0.6 + 0.4 * std::sin(u) * std::sin(v));
+      out.at(x, y, 1) = static_cast<float>(0.5 + 0.4 * std::cos(v));
+      out.at(x, y, 2) = static_cast<float>(0.5 + 0.3 * std::cos(2 * u) * std::sin(v) * std::sin(v));
+    }
+  }
+  return out;
+}
+
 inline Image render_on_device(Context& context, const Scene& scene, const Camera& camera) {
   return PathTracer(context, scene).render(camera);
 }
@@ -65,6 +91,9 @@ inline double largest_difference(const Image& a, const Image& b) {
 }
 
 constexpr double kTolerance = 1e-4;
+// The light of an environment's picture on a surface is nine coefficients; the reference adds up
+// the picture.
+constexpr double kLitByPicture = 1.5e-3;
 
 /// A picture of one sample per pixel against the reference: every pixel within `tolerance`, but for
 /// those with a decision within `tie` of going the other way and those where the device chooses by

@@ -66,6 +66,26 @@ TEST_CASE("carving fills the body that the photos show, in its colour") {
   CHECK(carved_points(photos, {{9, 9, 9}, 0.1}, 10, 7).size() == 0);
 }
 
+TEST_CASE("points that cut-out photos show as background are left out") {
+  const std::vector<SmallPhoto> photos = ring_of_ball();
+  PointCloud points;
+  const auto add = [&points](const glm::dvec3& place, float red) {
+    for (int a = 0; a < 3; ++a) {
+      points.positions.push_back(static_cast<float>(place[a]));
+      points.colors.push_back(a == 0 ? red : 0.25f);
+    }
+  };
+  add(kMiddle, 0.1f);
+  add(kMiddle + glm::dvec3(0, 0, 0.95 * kRadius), 0.2f);
+  add(kMiddle + glm::dvec3(0, 0, 2 * kRadius), 0.3f);  // outside
+  add({0, 0, -1.5}, 0.4f);                             // the table
+  add({900, 0, 0}, 0.5f);                              // nobody looks there
+  const PointCloud hull = hull_points(points, photos);
+  REQUIRE(hull.size() == 2);
+  CHECK(hull.positions[5] == points.positions[5]);
+  CHECK(hull.colors[3] == 0.2f);
+}
+
 TEST_CASE("sweeping finds a textured wall and its colours") {
   const std::vector<SmallPhoto> photos = photos_of_wall();
   const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5);
