@@ -26,14 +26,16 @@ constexpr std::uint64_t kCarveStream = 0x6361727665;
 constexpr std::uint64_t kSweepStream = 0x7377656570;
 constexpr std::uint64_t kProbeStream = 0x70726f6265;
 constexpr std::size_t kTriesPerPoint = 200;
+constexpr std::size_t kTriesPerSweptPoint = 4;
 
 constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
+constexpr std::size_t kWitnesses = 2;   // of them that see a point at least
 constexpr double kLeastBase = 1e-3;     // between them, of the distance of what they show
-constexpr std::size_t kDepths = 48;
+constexpr std::size_t kDepths = 128;
 constexpr double kAgreement = 0.012;   // largest mean squared difference of what agrees
 constexpr double kClear = 0.5;         // and the best depth's share of the median one
 constexpr double kUnique = 0.7;        // and of the best one elsewhere: patterns repeat
-constexpr std::size_t kElsewhere = 3;  // depth steps from the best one
+constexpr std::size_t kElsewhere = 8;  // depth steps from the best one
 constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of a sweep, times the typical one
 
 // The search for the typical depth, from kNearest times the guess on.
@@ -47,6 +49,8 @@ constexpr double kFloorCost = 1e-4;   // of photos' noise
 constexpr double kWrongGuess = 3.0;   // factor
 constexpr double kDoubtShare = 0.25;  // of probes that see no end of the depths: doubts the guess
 constexpr double kOpenShare = 0.5;    // and leaves most depths open
+constexpr int kRounds = 4;            // of looking for nearer depths
+constexpr double kMuchNearer = 0.65;  // than the typical one, as a share of it
 
 void append(PointCloud& cloud, const glm::dvec3& position, const glm::dvec3& color) {
   for (int a = 0; a < 3; ++a) {
@@ -149,7 +153,7 @@ double cost_at(std::span<const SmallPhoto> photos,
     if (point && photos[i].at(*point).w >= 0.5)
       differences[count++] = difference(reference, patch_at(photos[i], *point));
   }
-  if (2 * count < neighbours.size() || count < 2) return -1;
+  if (count < kWitnesses) return -1;
   // The better half: what hides the point from some photos does not speak against it.
   const std::size_t half = (count + 1) / 2 + (count > 3 ? 1 : 0);
   const auto begin = differences.begin();
@@ -325,6 +329,31 @@ Probe probe_pixel(std::span<const SmallPhoto> photos,
   return {depth_at(static_cast<double>(best) / (kProbeDepths - 1), depths), open};
 }
 
+// The range about the depth at which pixels agree, where that is much nearer than the range's own:
+// photos to compare with are chosen by it, and those too far apart show little in common.
+DepthRange settled(std::span<const SmallPhoto> photos, DepthRange depths, std::uint64_t seed) {
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::vector<std::size_t>> neighbours(photos.size());
+    for (std::size_t i = 0; i < photos.size(); ++i)
+      neighbours[i] = neighbours_of(photos, i, depths.typical);
+    std::vector<double> found(kProbes);
+    in_parallel(kProbes, [&](std::size_t i) {
+      CounterRng rng(seed, kProbeStream, 8 * i);
+      const Pixel pixel = random_pixel(photos, rng);
+      if (!pixel.shows()) return;
+      const auto depth = agreed_depth(photos, neighbours[pixel.view], pixel.ray,
+                                      patch_at(photos[pixel.view], pixel.point), depths);
+      found[i] = depth.value_or(0);
+    });
+    std::erase(found, 0.0);
+    if (found.size() < kFewProbes) return depths;
+    const double typical = quantiles(found, std::array<double, 1>{0.5})[0];
+    if (typical > kMuchNearer * depths.typical) return depths;
+    depths = {kNearest * typical, typical, kFarthest * typical};
+  }
+  return depths;
+}
+
 }  // namespace
 
 PointCloud carved_points(std::span<const SmallPhoto> photos,
@@ -392,14 +421,15 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
     depths.push_back(probe.depth);
     open += probe.open ? 1 : 0;
   }
-  if (depths.size() < kFewProbes) return around;
+  if (depths.size() < kFewProbes) return settled(photos, around, seed);
   const std::array<double, 2> ranks{0.5, 0.75};
   const std::vector<double> found = quantiles(depths, ranks);
   const double open_share = static_cast<double>(open) / static_cast<double>(depths.size());
   if (open_share > kOpenShare) return open_range(found[1]);
   // Photos far apart may agree by chance beyond what they show together, but at an end.
   const double typical = found[0];
-  if (open_share < kDoubtShare || typical < kWrongGuess * guess) return around;
+  if (open_share < kDoubtShare || typical < kWrongGuess * guess)
+    return settled(photos, around, seed);
   return {kNearest * typical, typical, kFarthest * typical};
 }
 
@@ -411,19 +441,23 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
   std::vector<std::vector<std::size_t>> neighbours(photos.size());
   for (std::size_t i = 0; i < photos.size(); ++i)
     neighbours[i] = neighbours_of(photos, i, depths.typical);
-  const std::size_t tries = 4 * count;
+  const std::size_t tries = kTriesPerSweptPoint * count;
   std::vector<Sample> samples(tries);
   in_parallel(
       tries, [&](std::size_t i) { samples[i] = sweep_pixel(photos, neighbours, depths, seed, i); });
-  const auto fog = static_cast<std::size_t>(unsure * static_cast<double>(count));
   const auto sure = static_cast<std::size_t>(std::count_if(
       samples.begin(), samples.end(), [](const Sample& sample) { return sample.agreed; }));
+  const auto vague = static_cast<std::size_t>(std::count_if(
+      samples.begin(), samples.end(),
+      [](const Sample& sample) { return !sample.agreed && sample.position != glm::dvec3(0.0); }));
+  const auto fog = static_cast<std::size_t>(unsure * static_cast<double>(count));
+  const std::size_t most_agreed = count - std::min(fog, vague);
   const std::size_t most_random = depths.open ? count - std::min(sure, count - fog) : fog;
   PointCloud out;
   std::size_t agreed = 0, random = 0;
   for (const Sample& sample : samples) {
     std::size_t& number = sample.agreed ? agreed : random;
-    if (number >= (sample.agreed ? count - fog : most_random) || sample.position == glm::dvec3(0.0))
+    if (number >= (sample.agreed ? most_agreed : most_random) || sample.position == glm::dvec3(0.0))
       continue;
     ++number;
     append(out, sample.position, sample.color);

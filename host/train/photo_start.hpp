@@ -37,7 +37,9 @@ struct DepthRange {
 
 /// The range of depths around `guess`, unless many photos cannot tell what they show from the
 /// infinitely far, as from a tripod: then it lies around what they do tell, or, where that is less
-/// than half (`open`), beyond the depth up to which they would tell it. `guess` is positive.
+/// than half (`open`), beyond the depth up to which they would tell it. Where pixels agree much nearer
+/// than that, as below a drone whose cameras have no common target, it lies around their depth.
+/// `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
 
 /// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane

@@ -192,6 +192,28 @@ TEST_CASE("cameras on a tripod look at what is far away") {
   CHECK(before_white.typical == 3.0);
 }
 
+TEST_CASE("cameras side by side find the depth of the wall, however far away it was guessed") {
+  // As from a drone: axes are parallel, and a photo shares its view with its next neighbours only.
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 25; ++i) {
+    const double y = 1.8 * (i % 5 - 2), z = 1.4 * (i / 5 - 2);
+    photos.push_back(photo_of(look_at({0, y, z}, {4, y, z}, {0, 0, 1}, 96, 72, 90), wall));
+  }
+  for (const double guess : {4.0, 20.0}) {
+    CAPTURE(guess);
+    const DepthRange depths = swept_depths(photos, guess, 3);
+    CHECK(!depths.open);
+    CHECK(depths.typical > 3.5);
+    CHECK(depths.typical < 6.5);
+    const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+    std::size_t near = 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      near += std::abs(points.positions[3 * i] - 4.0f) > 0.5f ? 0 : 1;
+    MESSAGE(near << " of " << points.size() << " points on the wall");
+    CHECK(near > points.size() * 6 / 10);
+  }
+}
+
 TEST_CASE("few sparse points get company from the photos, up to the limit") {
   Dataset dataset;
   const std::vector<SmallPhoto> photos = photos_of_wall();
