@@ -61,7 +61,7 @@ Places transparent_places(const View& view) {
   if (extension == ".jpg" || extension == ".jpeg" || extension == ".hdr") return {};
   try {
     return transparent_places(read_raw_image(view.image_path));
-  } catch (const DataError&) {
+  } catch (const Error&) {
     return {};  // who needs the photo says what is wrong with it
   }
 }

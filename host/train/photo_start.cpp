@@ -29,7 +29,6 @@ constexpr std::size_t kTriesPerPoint = 200;
 constexpr std::size_t kTriesPerSweptPoint = 4;
 
 constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
-constexpr std::size_t kWitnesses = 2;   // of them that see a point at least
 constexpr double kLeastBase = 1e-3;     // between them, of the distance of what they show
 constexpr std::size_t kDepths = 128;
 constexpr double kAgreement = 0.012;   // largest mean squared difference of what agrees
@@ -153,7 +152,7 @@ double cost_at(std::span<const SmallPhoto> photos,
     if (point && photos[i].at(*point).w >= 0.5)
       differences[count++] = difference(reference, patch_at(photos[i], *point));
   }
-  if (count < kWitnesses) return -1;
+  if (2 * count < neighbours.size() || count < 2) return -1;
   // The better half: what hides the point from some photos does not speak against it.
   const std::size_t half = (count + 1) / 2 + (count > 3 ? 1 : 0);
   const auto begin = differences.begin();
