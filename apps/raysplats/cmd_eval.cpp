@@ -29,6 +29,7 @@ struct Options {
   std::string model;
   std::string output;
   std::string lpips;
+  bool align = false;
   bool overwrite = false;
   DataFlags data;
   TraceSettings trace;
@@ -65,7 +66,7 @@ void run(const Options& options, const GlobalOptions& global) {
     std::uint64_t rays = 0;
     std::uint64_t capped = 0;
     // As frames are: rows of every view where there are fewer than ranks.
-    const bool together = views < static_cast<std::size_t>(ranks.size());
+    const bool together = !options.align && views < static_cast<std::size_t>(ranks.size());
     if (together) {
       tracer.set_share(static_cast<std::size_t>(ranks.rank()),
                        static_cast<std::size_t>(ranks.size()));
@@ -83,6 +84,7 @@ void run(const Options& options, const GlobalOptions& global) {
     };
     EvaluationOptions evaluation;
     evaluation.lpips = lpips.get();
+    evaluation.align = options.align;
     evaluation.done = [&](std::size_t done) { return progress.done(done); };
     evaluation.ranks = &ranks;
     evaluation.together = together;
@@ -114,6 +116,9 @@ Command add_eval_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("DIR");
   command->add_option("--lpips", options->lpips, "ONNX network of LPIPS, for that measure too")
       ->type_name("NETWORK");
+  command->add_flag("--align", options->align,
+                    "Also move each camera to where its render comes closest to the photo, and "
+                    "measure PSNR there: errors of poses do not count");
   add_overwrite_flag(*command, options->overwrite);
   add_data_flags(*command, options->data)->required();
   add_trace_flags(*command, options->trace);

@@ -21,27 +21,36 @@
 #define ACCUMULATE 0
 #endif
 
-// Stages the sums of the copies of the present rows' line gradients; leaves them in the first copy
-// and zeros in the others.
+// Stages eight columns, from number `column` on, of the sums of the copies of the present rows'
+// line gradients; leaves them in the first copy and zeros in the others.
 void stage_copies(__global float* gradients,
+                  const uint column,
                   const size_t copy_floats,
                   const uint copies,
                   __local StagedRows* staged) {
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (uint k = get_local_id(0); k < GROUP * 16; k += GROUP) {
-    const uint row = k / 16;
+  for (uint k = get_local_id(0); k < GROUP * 8; k += GROUP) {
+    const uint row = k / 8;
     if (!staged->present[row]) continue;
-    float sum = gradients[k];
+    __global float* first = gradients + 16 * row + column + k % 8;
+    float sum = *first;
     for (uint copy = 1; copy < copies; ++copy) {
-      __global float* part = gradients + copy * copy_floats + k;
+      __global float* part = first + copy * copy_floats;
       if (*part == 0.0f) continue;
       sum += *part;
       *part = 0.0f;
-      gradients[k] = sum;
+      *first = sum;
     }
-    staged->rows[row][k % 16] = sum;
+    staged->rows[row][k % 8] = sum;
   }
   barrier(CLK_LOCAL_MEM_FENCE);
+}
+
+// The sum of what the work-item's row holds of them.
+float staged_size(const __local float* row) {
+  float sum = 0.0f;
+  for (int k = 0; k < 8; ++k) sum += fabs(row[k]);
+  return sum;
 }
 
 // Adds the products of the colour's slope with RS_STAGE floats of the SH coefficients from number
@@ -83,7 +92,7 @@ void store_sh_gradient(const int column,
 
 // What parameter_gradient() needs of a Gaussian and line_gradient() does not, in the work-item's
 // own row meanwhile. The barrier is for the compiler: behind it these numbers may have changed.
-void park(__local float* row, const ViewGaussian* g, const float opacity_slope, const float* mean) {
+void park(__local float* row, const ViewGaussian* g, const float* mean) {
   for (int j = 0; j < 3; ++j) {
     row[j] = mean[j];
     row[3 + j] = g->raw_scale[j];
@@ -92,11 +101,10 @@ void park(__local float* row, const ViewGaussian* g, const float opacity_slope, 
   for (int j = 0; j < 4; ++j) row[9 + j] = g->q[j];
   row[13] = g->q_norm;
   row[14] = g->opacity;
-  row[15] = opacity_slope;
   barrier(CLK_LOCAL_MEM_FENCE);
 }
 
-float unpark(const __local float* row, ViewGaussian* g, float* mean) {
+void unpark(const __local float* row, ViewGaussian* g, float* mean) {
   barrier(CLK_LOCAL_MEM_FENCE);
   for (int j = 0; j < 3; ++j) {
     mean[j] = row[j];
@@ -106,7 +114,6 @@ float unpark(const __local float* row, ViewGaussian* g, float* mean) {
   for (int j = 0; j < 4; ++j) g->q[j] = row[9 + j];
   g->q_norm = row[13];
   g->opacity = row[14];
-  return row[15];
 }
 
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
@@ -134,12 +141,12 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   const iv kind = exists ? bounds[first + lane].kind : RS_LINE_HIDDEN;
   __local float* row = staged.rows[lane];
   staged.present[lane] = kind != RS_LINE_HIDDEN;
-  for (int k = 0; k < 16; ++k) row[k] = 0.0f;
-  stage_copies(line_gradients + 16 * first, (size_t)finalize.gaussians * 16, finalize.copies,
-               &staged);
-  float sum = 0.0f;
-  for (int k = 0; k < 16; ++k) sum += fabs(row[k]);
-  const iv touched = sum != 0.0f;
+  for (int k = 0; k < 8; ++k) row[k] = 0.0f;
+  const size_t copy_floats = (size_t)finalize.gaussians * 16;
+  stage_copies(line_gradients + 16 * first, 0, copy_floats, finalize.copies, &staged);
+  const float shape = staged_size(row);
+  stage_copies(line_gradients + 16 * first, 8, copy_floats, finalize.copies, &staged);
+  const iv touched = shape + staged_size(row) != 0.0f;
   // Who is not touched reads what a neighbour reads, and stores zeros or nothing.
   const size_t i = touched ? first + lane : first;
   const uint stored = ACCUMULATE ? touched : exists;
@@ -148,7 +155,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   load_offset(i, means, &camera, colour.n);
   colour_direction(&colour);
   for (int j = 0; j < 3; ++j)
-    colour.slope[j] = touched && lines[i].v[13 + j] > 0.0f ? row[13 + j] : 0.0f;
+    colour.slope[j] = touched && lines[i].v[13 + j] > 0.0f ? row[5 + j] : 0.0f;
   ParameterGradient out;
   for (int j = 0; j < 3; ++j) out.mean[j] = 0.0f;
 #if SH_DEGREE > 0
@@ -162,6 +169,8 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   add_along(2 * RS_STAGE, coefficients, colour.slope, &staged, along);
   add_along(3 * RS_STAGE, coefficients, colour.slope, &staged, along);
   add_along(4 * RS_STAGE, coefficients, colour.slope, &staged, along);
+  add_along(5 * RS_STAGE, coefficients, colour.slope, &staged, along);
+  add_along(6 * RS_STAGE, coefficients, colour.slope, &staged, along);
   direction_gradient(&colour, along, out.mean);
 #endif
   rs_sh_basis(SH_DEGREE, colour.n[0], colour.n[1], colour.n[2], colour.basis);
@@ -173,8 +182,10 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   store_sh_gradient(2 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
   store_sh_gradient(3 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
   store_sh_gradient(4 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
+  store_sh_gradient(5 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
+  store_sh_gradient(6 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
 
-  stage_fetch(line_gradients + 16 * first, 16, 0, 16, &staged);
+  stage_fetch(line_gradients + 16 * first, 16, 0, 13, &staged);
   float v[16];
   for (int k = 0; k < 13; ++k) v[k] = row[k];
   ViewGaussian g;
@@ -195,13 +206,13 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   stage_store(&staged, 0, 3, screen + 3 * first, 3, 0, 0);
 
   ViewGradient view;
-  park(row, &g, v[12], out.mean);
+  park(row, &g, out.mean);
   line_gradient(&g, v, touched, kind, &view);
 #if DEPTH_GRADIENT
   view.m[2] += depth;
 #endif
-  const float opacity_slope = unpark(row, &g, out.mean);
-  parameter_gradient(&g, &view, opacity_slope, touched, &camera, &out);
+  unpark(row, &g, out.mean);
+  parameter_gradient(&g, &view, v[12], touched, &camera, &out);
   for (int j = 0; j < 3; ++j) {
     row[j] = out.mean[j];
     row[7 + j] = out.scale[j];

@@ -134,6 +134,8 @@ void write_colour(const ViewGaussian* g,
   add_colour(2 * RS_STAGE, sh, basis, staged, sum);
   add_colour(3 * RS_STAGE, sh, basis, staged, sum);
   add_colour(4 * RS_STAGE, sh, basis, staged, sum);
+  add_colour(5 * RS_STAGE, sh, basis, staged, sum);
+  add_colour(6 * RS_STAGE, sh, basis, staged, sum);
   for (int j = 0; j < 3; ++j) colour[j] = fmin(fmax(sum[j], 0.0f), RS_MAX_COLOR);
 }
 #else
@@ -240,9 +242,11 @@ prepare_view(const uint begin,
   if (rs_any_of(visible & !projective)) write_general(&g, !projective, v);
   v[12] = g.opacity;
 #if GROUP
+  for (int k = 0; k < 13; ++k) staged.rows[lane][k] = v[k];
+  stage_store(&staged, 0, 13, (__global float*)(lines + first), 16, 0, 0);
   write_colour(&g, sh + first * 3 * SH_COEFFICIENTS, &staged, v + 13);
-  for (int k = 0; k < 16; ++k) staged.rows[lane][k] = v[k];
-  stage_store(&staged, 0, 16, (__global float*)(lines + first), 16, 0, 0);
+  for (int k = 0; k < 3; ++k) staged.rows[lane][k] = v[13 + k];
+  stage_store(&staged, 0, 3, (__global float*)(lines + first), 16, 13, 0);
 #else
   write_colour(&g, sh + i * 3 * SH_COEFFICIENTS, v + 13);
   store_columns(v, 16, (__global float*)(lines + i), 16);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // On GPUs a work-item has one Gaussian, whose floats lie together: its neighbour's are a row away.
 // The work-items of a group therefore fetch and store the rows of their Gaussians together, through
-// local memory, RS_STAGE columns at a time: neighbours touch neighbouring addresses, and no
-// work-item keeps a long row in its private memory. GROUP is the number of work-items, 0 on CPUs,
-// where vectors do this (gaussian_lanes.h).
+// local memory, at most RS_COLUMNS columns at a time: neighbours touch neighbouring addresses, and
+// no work-item keeps a long row in its private memory. GROUP is the number of work-items, 0 on
+// CPUs, where vectors do this (gaussian_lanes.h).
 #ifndef RS_TRACE_STAGED_ROWS_H
 #define RS_TRACE_STAGED_ROWS_H
 
@@ -12,12 +12,15 @@
 #endif
 
 #if GROUP
-// 64 bytes: whole sectors and lines of all caches.
-#define RS_STAGE 16
+// Odd, so that the same column of all rows lies on all banks, and so many that with `present` a row
+// takes 64 bytes: 16 groups of 64 fit 64 kB, four waves a SIMD of gfx9.
+#define RS_COLUMNS 15
+// SH coefficients at a time: whole colours.
+#define RS_STAGE 12
 
 typedef struct {
-  float rows[GROUP][RS_STAGE + 1];  // one more: the same column of all rows lies on all banks
-  uint present[GROUP];              // rows that are fetched or stored
+  float rows[GROUP][RS_COLUMNS];
+  uint present[GROUP];  // rows that are fetched or stored
 } StagedRows;
 
 // Columns column .. column + count of the group's rows, which begin at p and are `stride` apart.

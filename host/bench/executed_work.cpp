@@ -59,7 +59,7 @@ KernelWork prepare_work(const ExecutedCounts& c) {
                        .slow = 20 / kWave,
                        .local = (100 + 6 * further) / kWave,
                        .trips = (8 + 0.2 * further) / kWave,
-                       .barriers = (6 + 0.4 * further) / kWave}
+                       .barriers = (8 + 0.4 * further) / kWave}
           : KernelWork{.vectors = 57.4 + 0.6 * further, .scalars = 21, .slow = 1.4, .parked = 8.3};
   const double bytes = (RS_WORK_PREPARE_BYTES + RS_WORK_SH_BYTES * c.sh) * c.gaussians;
   KernelWork out = times(c.gaussians, gaussian) + moved(bytes, bytes);
@@ -158,7 +158,7 @@ KernelWork finalize_work(const ExecutedCounts& c) {
                                                      .slow = 15 / kWave,
                                                      .local = (170 + 12 * further) / kWave,
                                                      .trips = (12 + 0.5 * further) / kWave,
-                                                     .barriers = (16 + 0.75 * further) / kWave}
+                                                     .barriers = (21 + further) / kWave}
                                         : KernelWork{.vectors = 150 + 1.8 * further,
                                                      .scalars = 26,
                                                      .slow = 1.2,

@@ -13,6 +13,7 @@
 #include "comm/communicator.hpp"
 #include "eval/error_map.hpp"
 #include "eval/metrics.hpp"
+#include "eval/view_alignment.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render/frame_writer.hpp"
@@ -63,17 +64,21 @@ Comparison compare(const Image& traced,
 // What ranks tell each other of a view.
 struct MeasuredView {
   std::size_t index;  // among those that are evaluated
-  bool compared, has_all, has_lpips;
-  double psnr, psnr_corrected, psnr_all, ssim, lpips, sharpness;
+  bool compared, has_all, has_lpips, has_aligned;
+  double psnr, psnr_corrected, psnr_all, ssim, lpips, sharpness, psnr_aligned;
 };
+
+// Masked pixels are equal; they must not count as well reconstructed ones.
+double psnr_of(const Comparison& pair) {
+  return std::min(psnr(pair.render, pair.photo) + 10.0 * std::log10(pair.valid), kMostPsnr);
+}
 
 MeasuredView measure(std::size_t index, const Comparison& pair, Lpips* lpips) {
   MeasuredView out{};
   out.index = index;
   out.compared = pair.valid > 0;
   if (!out.compared) return out;
-  // Masked pixels are equal; they must not count as well reconstructed ones.
-  out.psnr = std::min(psnr(pair.render, pair.photo) + 10.0 * std::log10(pair.valid), kMostPsnr);
+  out.psnr = psnr_of(pair);
   out.psnr_corrected = std::min(corrected_psnr(pair.whole, pair.photo, pair.mask), kMostPsnr);
   out.has_all = pair.valid < 1.0;
   if (out.has_all) out.psnr_all = std::min(psnr(pair.whole, pair.photo), kMostPsnr);
@@ -90,6 +95,7 @@ EvaluationMetrics metrics_of(const MeasuredView& view) {
   out.ssim = view.ssim;
   out.psnr_corrected = view.psnr_corrected;
   if (view.has_all) out.psnr_all = view.psnr_all;
+  if (view.has_aligned) out.psnr_aligned = view.psnr_aligned;
   if (view.has_lpips) out.lpips = view.lpips;
   out.sharpness = view.sharpness;
   return out;
@@ -138,6 +144,7 @@ nlohmann::json to_json(const EvaluationMetrics& metrics) {
   json["psnr"] = metrics.psnr;
   json["ssim"] = metrics.ssim;
   json["psnr_corrected"] = metrics.psnr_corrected;
+  if (metrics.psnr_aligned) json["psnr_aligned"] = *metrics.psnr_aligned;
   if (metrics.psnr_all) json["psnr_all"] = *metrics.psnr_all;
   if (metrics.lpips) json["lpips"] = *metrics.lpips;
   if (!metrics.picture.empty()) json["picture"] = metrics.picture;
@@ -157,6 +164,8 @@ EvaluationMetrics mean_of(const std::vector<EvaluationMetrics>& images) {
     mean.ssim += image.ssim * share;
     mean.psnr_corrected += image.psnr_corrected * share;
     if (masked) *mean.psnr_all += image.psnr_all.value_or(image.psnr) * share;
+    if (image.psnr_aligned)
+      mean.psnr_aligned = mean.psnr_aligned.value_or(0.0) + *image.psnr_aligned * share;
     if (image.lpips) mean.lpips = mean.lpips.value_or(0.0) + *image.lpips * share;
   }
   return mean;
@@ -186,12 +195,14 @@ std::vector<std::string> evaluated_names(const Dataset& dataset, Split split) {
 std::string EvaluationReport::table() const {
   std::size_t width = 5;
   for (const EvaluationMetrics& image : images) width = std::max(width, image.name.size());
-  const bool lpips = mean.lpips.has_value();
-  std::string out = fmt::format("{:<{}} {:>8} {:>8} {:>9}{}\n", "image", width, "PSNR", "SSIM",
-                                "corrected", lpips ? "    LPIPS" : "");
+  std::string out =
+      fmt::format("{:<{}} {:>8} {:>8} {:>9}{}{}\n", "image", width, "PSNR", "SSIM", "corrected",
+                  mean.psnr_aligned ? "  aligned" : "", mean.lpips ? "    LPIPS" : "");
   const auto line = [&](const std::string& name, const EvaluationMetrics& m) {
-    out += fmt::format("{:<{}} {:>8.3f} {:>8.4f} {:>9.3f}{}\n", name, width, m.psnr, m.ssim,
-                       m.psnr_corrected, m.lpips ? fmt::format(" {:>8.4f}", *m.lpips) : "");
+    out += fmt::format("{:<{}} {:>8.3f} {:>8.4f} {:>9.3f}{}{}\n", name, width, m.psnr, m.ssim,
+                       m.psnr_corrected,
+                       m.psnr_aligned ? fmt::format(" {:>8.3f}", *m.psnr_aligned) : "",
+                       m.lpips ? fmt::format(" {:>8.4f}", *m.lpips) : "");
   };
   for (const EvaluationMetrics& image : images) line(image.name, image);
   line("mean", mean);
@@ -228,6 +239,8 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
 
   Communicator alone;
   Communicator& ranks = options.ranks != nullptr ? *options.ranks : alone;
+  if (options.align && options.together)
+    throw UsageError("Views that ranks render together cannot be aligned with their photos");
   const bool compares = !options.together || ranks.leads();
   // None where it was stopped, and of pictures that another rank compares.
   const auto compare_view = [&](std::size_t i) -> std::optional<Comparison> {
@@ -245,6 +258,15 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
           traced.width, traced.height, traced.channels, rgba.width, rgba.height));
     }
     return compare(traced, picture, dataset.alpha_is_background, background);
+  };
+  // After compare_view(), whose pair that is; none where it was stopped.
+  const auto aligned_psnr = [&](std::size_t i, const Comparison& pair) -> std::optional<double> {
+    const View& view = dataset.views[views[i]];
+    const std::optional<AlignedView> aligned =
+        align_view(render, view.camera, pair.photo, pair.mask);
+    if (!aligned) return std::nullopt;
+    return psnr_of(
+        compare(aligned->render, load_view_picture(view), dataset.alpha_is_background, background));
   };
   // Ranks that render together stop together.
   const auto for_all = [&](bool stop) { return options.together ? ranks.any(stop) : stop; };
@@ -265,7 +287,14 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
     if (pair) {
       measured.push_back(measure(i, *pair, options.lpips));
       if (all_shown && pair->valid > 0) write_picture(i, *pair);
-      stopped = options.done && !options.done(measured.size());
+      if (options.align && pair->valid > 0) {
+        const std::optional<double> aligned = aligned_psnr(i, *pair);
+        measured.back().has_aligned = true;
+        measured.back().psnr_aligned = aligned.value_or(0.0);
+        stopped = !aligned;
+        if (stopped) measured.pop_back();
+      }
+      stopped = stopped || (options.done && !options.done(measured.size()));
     }
     stopped = for_all(stopped);
   }

@@ -55,6 +55,7 @@ nlohmann::json to_json(const EvaluationRow& row) {
                       {"gaussians", row.gaussians},
                       {"psnr_corrected", row.psnr_corrected}};
   if (row.psnr_all) json["psnr_all"] = *row.psnr_all;
+  if (row.psnr_aligned) json["psnr_aligned"] = *row.psnr_aligned;
   return json;
 }
 
@@ -68,6 +69,7 @@ EvaluationRow evaluation_from_json(const nlohmann::json& json) {
   json.at("gaussians").get_to(row.gaussians);
   row.psnr_corrected = json.value("psnr_corrected", 0.0);  // runs of older versions have none
   if (json.contains("psnr_all")) row.psnr_all = json.at("psnr_all").get<double>();
+  if (json.contains("psnr_aligned")) row.psnr_aligned = json.at("psnr_aligned").get<double>();
   return row;
 }
 

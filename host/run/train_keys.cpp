@@ -203,10 +203,12 @@ void add_data_keys(TrainTable& t, TrainOptions& o) {
 
 void add_start_keys(TrainTable& t, TrainOptions& o) {
   t.section("Start");
-  t.text("init", o.init,
-         "\"colmap\" (sparse points of the data set), \"photos\" (inside what cut-out photos show, "
-         "else where neighbouring photos agree), \"random\" (the region that the cameras see), the "
-         "path of a model, or \"auto\" (points when there are any, else photos)");
+  t.text(
+      "init", o.init,
+      "\"colmap\" (sparse points of the data set), \"photos\" (inside what cut-out photos show, "
+      "else where neighbouring photos agree), \"random\" (anywhere in sight of the cameras, in the "
+      "photos' colours), the path of a model, or \"auto\" (points when there are any, else "
+      "photos)");
   t.number("init-count", o.init_count, 0, 1e9,
            "Gaussians of a start without points, or beside few; 0 = a share of max-gaussians");
   t.number("init-opacity", o.init_opacity, 1e-4, 0.9999,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 
 namespace raysplats {
@@ -20,6 +21,16 @@ Camera downscaled(const Camera& camera, double factor) {
   out.cx *= sx;
   out.fy *= sy;
   out.cy *= sy;
+  return out;
+}
+
+Camera moved(const Camera& camera, const glm::dvec3& turn, const glm::dvec3& shift) {
+  Camera out = camera;
+  const glm::dvec3 center = out.center() + shift;
+  const double angle = glm::length(turn);
+  if (angle != 0.0)
+    out.rotation = glm::mat3_cast(glm::angleAxis(angle, turn / angle)) * out.rotation;
+  out.translation = -(out.rotation * center);
   return out;
 }
 

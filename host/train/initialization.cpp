@@ -20,13 +20,10 @@
 #include "shared/sh.h"
 #include "train/photo_start.hpp"
 #include "train/point_check.hpp"
-#include "util/rng.hpp"
 
 namespace raysplats {
 namespace {
 
-constexpr std::uint64_t kPointStream =
-    0x706f696e7473;                 // random streams of one seed are told apart by a constant
 constexpr double kMinScale = 1e-4;  // of the scene extent
 constexpr double kMaxScale = 0.1;   // of the distance to the nearest camera
 constexpr std::uint32_t kReliableTrack = 3;
@@ -180,6 +177,14 @@ Gaussians subset(const Gaussians& model, std::size_t limit) {
   return gathered(model, indices);
 }
 
+// How far away what the cameras look at is, as far as they tell.
+double guessed_depth(std::span<const Camera> cameras, const Region& region) {
+  // Cameras in one place have no middle to be distant from.
+  const double middle = median_distance(cameras, region.center);
+  const double extent = scene_extent(cameras);
+  return middle > 1e-3 * extent ? middle : extent;
+}
+
 // Points that the photos tell of: of a body that is cut out, else of what a sweep finds.
 PointCloud photo_points(const Dataset& dataset,
                         std::span<const Camera> cameras,
@@ -187,16 +192,13 @@ PointCloud photo_points(const Dataset& dataset,
                         const std::vector<SmallPhoto>& photos,
                         std::size_t count,
                         std::uint64_t seed) {
+  const double guess = guessed_depth(cameras, region);
   if (dataset.alpha_is_background) {
     PointCloud hull = carved_points(photos, region, count, seed);
     if (hull.size() > 0) return hull;
     spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
-    return random_points(region, count, seed);
+    return scattered_points(photos, region, depths_around(guess), count, seed);
   }
-  // Cameras in one place have no middle to be distant from.
-  const double middle = median_distance(cameras, region.center);
-  const double extent = scene_extent(cameras);
-  const double guess = middle > 1e-3 * extent ? middle : extent;
   return swept_points(photos, swept_depths(photos, guess, seed), count, kUnsureShare, seed);
 }
 
@@ -298,22 +300,6 @@ std::size_t fitted_limit(double pixels, std::int64_t iterations) {
   return std::max(kLeastLimit, static_cast<std::size_t>(std::llround(kLimitFactor * root)));
 }
 
-PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed) {
-  CounterRng rng(seed, kPointStream);
-  PointCloud out;
-  out.positions.reserve(3 * count);
-  out.colors.reserve(3 * count);
-  for (std::size_t i = 0; i < count; ++i) {
-    for (int a = 0; a < 3; ++a) {
-      out.positions.push_back(
-          static_cast<float>(region.center[a] + region.half_side * (2.0 * rng.uniform() - 1.0)));
-    }
-    for (int a = 0; a < 3; ++a)
-      out.colors.push_back(static_cast<float>(0.5 + 0.1 * (rng.uniform() - 0.5)));
-  }
-  return out;
-}
-
 std::optional<Bounds> about_origin(const std::optional<Bounds>& bounds,
                                    const std::array<double, 3>& origin) {
   if (!bounds) return std::nullopt;
@@ -392,7 +378,11 @@ Gaussians initial_model(const Dataset& dataset,
     }
   }
   const Region region = visible_region(cameras);
-  if (options.init == "random") return start(random_points(region, count, options.seed));
+  if (options.init == "random") {
+    return start(scattered_points(photos(PhotoChoice::kAll), region,
+                                  depths_around(guessed_depth(cameras, region)), count,
+                                  options.seed));
+  }
   const std::size_t room = std::min(count, limit - std::min(limit, points.size()));
   const PointCloud seen =
       photo_points(dataset, cameras, region, photos(PhotoChoice::kAll), room, options.seed);

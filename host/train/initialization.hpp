@@ -39,9 +39,6 @@ PointCloud reliable_points(const PointCloud& points);
 /// and pixels to learn from.
 std::size_t fitted_limit(double pixels, std::int64_t iterations);
 
-/// `count` points uniform in the region, mid-grey with a little noise, a function of the seed.
-PointCloud random_points(const Region& region, std::size_t count, std::uint64_t seed);
-
 /// A box of the world as a model counts positions, from `origin` (Dataset::origin).
 std::optional<Bounds> about_origin(const std::optional<Bounds>& bounds,
                                    const std::array<double, 3>& origin);

@@ -25,8 +25,11 @@ namespace {
 constexpr std::uint64_t kCarveStream = 0x6361727665;
 constexpr std::uint64_t kSweepStream = 0x7377656570;
 constexpr std::uint64_t kProbeStream = 0x70726f6265;
+constexpr std::uint64_t kScatterStream = 0x73636174746572;
 constexpr std::size_t kTriesPerPoint = 200;
 constexpr std::size_t kTriesPerSweptPoint = 4;
+
+constexpr std::size_t kColourPhotos = 24;  // that tell the colour of a scattered point
 
 constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
 constexpr double kLeastBase = 1e-3;     // between them, of the distance of what they show
@@ -348,7 +351,7 @@ DepthRange settled(std::span<const SmallPhoto> photos, DepthRange depths, std::u
     if (found.size() < kFewProbes) return depths;
     const double typical = quantiles(found, std::array<double, 1>{0.5})[0];
     if (typical > kMuchNearer * depths.typical) return depths;
-    depths = {kNearest * typical, typical, kFarthest * typical};
+    depths = depths_around(typical);
   }
   return depths;
 }
@@ -399,8 +402,12 @@ PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> pho
   return out;
 }
 
+DepthRange depths_around(double typical) {
+  return {kNearest * typical, typical, kFarthest * typical};
+}
+
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed) {
-  const DepthRange around{kNearest * guess, guess, kFarthest * guess};
+  const DepthRange around = depths_around(guess);
   std::vector<std::vector<std::size_t>> neighbours(photos.size());
   for (std::size_t i = 0; i < photos.size(); ++i)
     neighbours[i] = distant_neighbours(photos, i, guess);
@@ -429,7 +436,7 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
   const double typical = found[0];
   if (open_share < kDoubtShare || typical < kWrongGuess * guess)
     return settled(photos, around, seed);
-  return {kNearest * typical, typical, kFarthest * typical};
+  return depths_around(typical);
 }
 
 PointCloud swept_points(std::span<const SmallPhoto> photos,
@@ -461,6 +468,37 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
     ++number;
     append(out, sample.position, sample.color);
   }
+  return out;
+}
+
+PointCloud scattered_points(std::span<const SmallPhoto> photos,
+                            const Region& region,
+                            const DepthRange& depths,
+                            std::size_t count,
+                            std::uint64_t seed) {
+  std::vector<Sample> samples(count);
+  const std::size_t stride = std::max<std::size_t>(1, photos.size() / kColourPhotos);
+  in_parallel(count, [&](std::size_t i) {
+    CounterRng rng(seed, kScatterStream, 8 * i);
+    glm::dvec3 world;
+    for (int a = 0; a < 3; ++a)
+      world[a] = region.center[a] + region.half_side * (2.0 * rng.uniform() - 1.0);
+    if (!photos.empty() && i % 2 == 1) {
+      const Pixel pixel = random_pixel(photos, rng);
+      if (pixel.shows())
+        world = pixel.ray.origin + depth_at(rng.uniform(), depths) * pixel.ray.direction;
+    }
+    std::vector<glm::dvec3> colors;
+    for (std::size_t k = i % stride; k < photos.size(); k += stride) {
+      const auto point = photos[k].sees(world);
+      if (!point) continue;
+      const glm::dvec4 color = photos[k].at(*point);
+      if (color.w > 0.5) colors.emplace_back(color);
+    }
+    samples[i] = {world, median_color(colors), false};
+  });
+  PointCloud out;
+  for (const Sample& sample : samples) append(out, sample.position, sample.color);
   return out;
 }
 

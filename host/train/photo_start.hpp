@@ -35,11 +35,14 @@ struct DepthRange {
   bool open = false;  ///< the photos are too near to each other to tell any depth
 };
 
+/// The range of depths around what most cameras look at, `typical`.
+DepthRange depths_around(double typical);
+
 /// The range of depths around `guess`, unless many photos cannot tell what they show from the
 /// infinitely far, as from a tripod: then it lies around what they do tell, or, where that is less
-/// than half (`open`), beyond the depth up to which they would tell it. Where pixels agree much nearer
-/// than that, as below a drone whose cameras have no common target, it lies around their depth.
-/// `guess` is positive.
+/// than half (`open`), beyond the depth up to which they would tell it. Where pixels agree much
+/// nearer than that, as below a drone whose cameras have no common target, it lies around their
+/// depth. `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
 
 /// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
@@ -51,5 +54,14 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
                         std::size_t count,
                         double unsure,
                         std::uint64_t seed);
+
+/// Points in random places, half of them evenly in `region`, half on the rays of random pixels of
+/// the photos at any depth of the range, evenly by its logarithm. Their colours are the medians of
+/// what some of the photos show there; grey where no photo looks.
+PointCloud scattered_points(std::span<const SmallPhoto> photos,
+                            const Region& region,
+                            const DepthRange& depths,
+                            std::size_t count,
+                            std::uint64_t seed);
 
 }  // namespace raysplats

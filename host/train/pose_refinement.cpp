@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <optional>
@@ -33,12 +32,6 @@ glm::dvec3 shift_of(const std::vector<float>& deltas, std::size_t view) {
   return {d[0], d[1], d[2]};
 }
 
-glm::dmat3 rotation_by(const glm::dvec3& turn) {
-  const double angle = glm::length(turn);
-  if (angle == 0.0) return glm::dmat3(1.0);
-  return glm::mat3_cast(glm::angleAxis(angle, turn / angle));
-}
-
 }  // namespace
 
 PoseRefinement::PoseRefinement(std::vector<Camera> cameras,
@@ -57,11 +50,7 @@ PoseRefinement::PoseRefinement(std::vector<Camera> cameras,
 }
 
 Camera PoseRefinement::camera(std::size_t view) const {
-  Camera out = cameras_[view];
-  const glm::dvec3 center = out.center() + shift_of(state_.deltas, view);
-  out.rotation = rotation_by(turn_of(state_.deltas, view)) * out.rotation;
-  out.translation = -(out.rotation * center);
-  return out;
+  return moved(cameras_[view], turn_of(state_.deltas, view), shift_of(state_.deltas, view));
 }
 
 std::vector<Camera> PoseRefinement::cameras() const {

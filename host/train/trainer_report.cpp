@@ -117,16 +117,22 @@ void Trainer::Impl::evaluate_views(bool last) {
   choice.ranks = &ranks;
   choice.max_views = last ? 0 : static_cast<std::size_t>(options.eval_views);
   choice.max_pictures = static_cast<std::size_t>(options.eval_renders);
+  choice.align = last && options.poses;
   const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
                                                       run.evaluation_folder(iteration), choice);
   run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
-              report.images.size(), shown.count, report.mean.psnr_corrected, report.mean.psnr_all});
+              report.images.size(), shown.count, report.mean.psnr_corrected, report.mean.psnr_all,
+              report.mean.psnr_aligned});
   if (watcher) watcher->evaluated(run.evaluations().back());
   write_metrics(false);
   evaluating.stop();
   spdlog::info("iteration {}: PSNR {:.2f} dB, SSIM {:.4f} over {} test views after {} of training",
                iteration, report.mean.psnr, report.mean.ssim, report.images.size(),
                format_duration(training.seconds()));
+  if (report.mean.psnr_aligned) {
+    spdlog::info("with cameras moved to where they fit the photos best, PSNR is {:.2f} dB",
+                 *report.mean.psnr_aligned);
+  }
 }
 
 Gaussians Trainer::Impl::model_to_save() const {

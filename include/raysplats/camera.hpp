@@ -43,6 +43,10 @@ struct Camera {
 /// nearest). For every model: the field of view stays.
 Camera downscaled(const Camera& camera, double factor);
 
+/// The camera turned about its own axes by the rotation vector `turn` (radians) and with its centre
+/// moved by `shift` in the world.
+Camera moved(const Camera& camera, const glm::dvec3& turn, const glm::dvec3& shift);
+
 /// A camera at `eye` that looks at `target`; `up` is the world direction that points up in the
 /// image.
 Camera look_at(const glm::dvec3& eye,

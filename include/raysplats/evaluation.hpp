@@ -25,6 +25,9 @@ struct EvaluationMetrics {
   /// The same after the affine colour (3 x 4) that brings the render closest to the photo: what is
   /// left when exposure and white balance do not count.
   double psnr_corrected = 0;
+  /// With EvaluationOptions::align, as psnr where the camera was turned and shifted to where its
+  /// picture comes closest to the photo: what is left when errors of poses do not count.
+  std::optional<double> psnr_aligned;
   std::optional<double> psnr_all;  ///< over all pixels, when some are masked out
   std::optional<double> lpips;     ///< when a network was given
   std::string picture;             ///< its file in the output folder; empty when none was written
@@ -40,9 +43,9 @@ struct EvaluationReport {
 
   /// One line per image and the mean, aligned.
   std::string table() const;
-  /// {"psnr", "ssim", "psnr_corrected", "psnr_all" (if some pixels are masked out), "lpips" (if
-  /// measured), "images": [{"name", "psnr", "ssim", ..., "center", "sharpness",
-  /// "picture" (if written)}]}.
+  /// {"psnr", "ssim", "psnr_corrected", "psnr_aligned" (if asked for), "psnr_all" (if some pixels
+  /// are masked out), "lpips" (if measured), "images": [{"name", "psnr", "ssim", ..., "center",
+  /// "sharpness", "picture" (if written)}]}.
   std::string json() const;
 };
 
@@ -52,6 +55,8 @@ struct EvaluationOptions {
   /// median and the best by PSNR, then the first ones, and are traced a second time.
   std::optional<std::size_t> max_pictures;
   Lpips* lpips = nullptr;  ///< not owned
+  /// Measure psnr_aligned too, which takes 10 to 60 pictures of each view. Not with `together`.
+  bool align = false;
   std::function<bool(std::size_t)> done =
       {};  ///< hears the number of finished views, returns false to stop early
   /// Of the library itself; its type is not installed. With it every rank calls evaluate() and

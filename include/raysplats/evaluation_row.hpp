@@ -15,8 +15,9 @@ struct EvaluationRow {
   double ssim = 0;
   std::size_t views = 0;
   std::size_t gaussians = 0;
-  double psnr_corrected = 0;       ///< as EvaluationMetrics::psnr_corrected
-  std::optional<double> psnr_all;  ///< as EvaluationMetrics::psnr_all
+  double psnr_corrected = 0;           ///< as EvaluationMetrics::psnr_corrected
+  std::optional<double> psnr_all;      ///< as EvaluationMetrics::psnr_all
+  std::optional<double> psnr_aligned;  ///< as EvaluationMetrics::psnr_aligned
 };
 
 }  // namespace raysplats

@@ -34,9 +34,11 @@ EvaluationReport evaluate_renders(const nb::callable& render,
                                   const std::string& split,
                                   const std::array<float, 3>& background,
                                   const std::optional<std::filesystem::path>& output,
-                                  std::size_t max_views) {
+                                  std::size_t max_views,
+                                  bool align) {
   EvaluationOptions options;
   options.max_views = max_views;
+  options.align = align;
   options.done = [](std::size_t) { return heed_signals(0); };
   const auto call = [&render](const Camera& camera) {
     const nb::gil_scoped_acquire acquire;
@@ -58,6 +60,8 @@ void bind_report(nb::module_& module) {
               "PSNR when exposure and white balance do not count.")
       .def_ro("psnr_all", &EvaluationMetrics::psnr_all,
               "Over all pixels, when some are masked out.")
+      .def_ro("psnr_aligned", &EvaluationMetrics::psnr_aligned,
+              "PSNR when errors of poses do not count, if asked for.")
       .def_ro("picture", &EvaluationMetrics::picture,
               "Its file in the output folder; empty when none was written.")
       .def_ro("center", &EvaluationMetrics::center, "Of the camera.")
@@ -82,9 +86,10 @@ void bind_metrics(nb::module_& module) {
   module.def(
       "evaluate", &evaluate_renders, nb::arg("render"), nb::arg("dataset"),
       nb::arg("split") = "test", nb::kw_only(), nb::arg("background") = std::array<float, 3>{},
-      nb::arg("output") = nb::none(), nb::arg("max_views") = 0,
+      nb::arg("output") = nb::none(), nb::arg("max_views") = 0, nb::arg("align") = false,
       "Compares render(camera), an array (height, width, 3 or 4), with the photos of a split; "
-      "`output`: a folder for pictures and metrics.json.");
+      "`output`: a folder for pictures and metrics.json; `align`: also with cameras moved to where "
+      "their pictures fit best.");
 }
 
 }  // namespace raysplats::python

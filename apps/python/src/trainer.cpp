@@ -122,7 +122,8 @@ void bind_records(nb::module_& module) {
       .def_ro("views", &EvaluationRow::views)
       .def_ro("gaussians", &EvaluationRow::gaussians)
       .def_ro("psnr_corrected", &EvaluationRow::psnr_corrected)
-      .def_ro("psnr_all", &EvaluationRow::psnr_all);
+      .def_ro("psnr_all", &EvaluationRow::psnr_all)
+      .def_ro("psnr_aligned", &EvaluationRow::psnr_aligned);
   nb::class_<TrainSummary>(module, "TrainSummary")
       .def_ro("iterations", &TrainSummary::iterations)
       .def_ro("gaussians", &TrainSummary::gaussians)

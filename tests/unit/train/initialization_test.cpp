@@ -94,24 +94,6 @@ TEST_CASE("points become Gaussians with their colour, clamped scales and the opa
         doctest::Approx(22.0 * 1e-4));
 }
 
-TEST_CASE("a random start is a function of the seed and fills the region") {
-  const Region region{{1, 2, 3}, 0.5};
-  const PointCloud a = random_points(region, 1000, 3);
-  CHECK(a.positions == random_points(region, 1000, 3).positions);
-  CHECK(a.positions != random_points(region, 1000, 4).positions);
-  double low = 1e9, high = -1e9, mean = 0;
-  for (std::size_t i = 0; i < 1000; ++i) {
-    low = std::min<double>(low, a.positions[3 * i + 1]);
-    high = std::max<double>(high, a.positions[3 * i + 1]);
-    mean += a.positions[3 * i + 1] / 1000.0;
-  }
-  CHECK(low >= 1.5);
-  CHECK(high <= 2.5);
-  CHECK(low < 1.52);
-  CHECK(high > 2.48);
-  CHECK(mean == doctest::Approx(2.0).epsilon(0.02));
-}
-
 TEST_CASE("points that few photos show or that fit them badly are left out when enough remain") {
   PointCloud points;
   const auto add = [&points](std::uint32_t track, float error) {

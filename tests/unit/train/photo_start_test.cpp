@@ -214,6 +214,56 @@ TEST_CASE("cameras side by side find the depth of the wall, however far away it 
   }
 }
 
+TEST_CASE("a random start fills the region and what the photos see, in their colours") {
+  const Region region{{1, 2, 3}, 0.5};
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const DepthRange depths = depths_around(3.0);
+  const PointCloud points = scattered_points(photos, region, depths, 2000, 3);
+  REQUIRE(points.size() == 2000);
+  CHECK(points.positions == scattered_points(photos, region, depths, 2000, 3).positions);
+  CHECK(points.positions != scattered_points(photos, region, depths, 2000, 4).positions);
+  std::size_t inside = 0, seen = 0, near = 0, coloured = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    const glm::dvec3 place(p[0], p[1], p[2]);
+    const glm::dvec3 off = glm::abs(place - region.center);
+    inside += std::max({off.x, off.y, off.z}) <= region.half_side ? 1 : 0;
+    double least = 1e9;
+    for (const SmallPhoto& photo : photos) {
+      if (photo.sees(place)) least = std::min(least, glm::distance(place, photo.camera.center()));
+    }
+    if (least > 1e8) {
+      for (int c = 0; c < 3; ++c) CHECK(points.colors[3 * i + static_cast<std::size_t>(c)] == 0.5f);
+      continue;
+    }
+    ++seen;
+    CHECK(least <= 30.001);
+    near += least < std::sqrt(0.6 * 30.0) ? 1 : 0;
+    coloured += points.colors[3 * i] != 0.5f ? 1 : 0;
+  }
+  MESSAGE(inside << " in the region, " << seen << " seen, " << near << " of them near");
+  CHECK(inside > 950);
+  CHECK(inside < 1100);
+  CHECK(seen > 950);
+  CHECK(near > 400);
+  CHECK(near < 1100);
+  CHECK(coloured > seen * 9 / 10);
+  // Without photos the region alone, evenly and grey.
+  const PointCloud grey = scattered_points({}, region, depths, 1000, 3);
+  double low = 1e9, high = -1e9, mean = 0;
+  for (std::size_t i = 0; i < 1000; ++i) {
+    low = std::min<double>(low, grey.positions[3 * i + 1]);
+    high = std::max<double>(high, grey.positions[3 * i + 1]);
+    mean += grey.positions[3 * i + 1] / 1000.0;
+  }
+  CHECK(low >= 1.5);
+  CHECK(high <= 2.5);
+  CHECK(low < 1.52);
+  CHECK(high > 2.48);
+  CHECK(mean == doctest::Approx(2.0).epsilon(0.02));
+  CHECK(std::ranges::all_of(grey.colors, [](float c) { return c == 0.5f; }));
+}
+
 TEST_CASE("few sparse points get company from the photos, up to the limit") {
   Dataset dataset;
   const std::vector<SmallPhoto> photos = photos_of_wall();
