@@ -17,6 +17,7 @@
 #include "raysplats/model.hpp"
 #include "render_flags.hpp"
 #include "run/model_source.hpp"
+#include "run/run_cameras.hpp"
 #include "scene/morton_order.hpp"
 #include "scene/orbit.hpp"
 #include "scene/trace_rows.hpp"
@@ -49,6 +50,17 @@ std::vector<View> views_of(const Options& options, const Dataset& dataset) {
   return views;
 }
 
+/// Those that the model was trained from, where it is a run's: what they show is looked at without
+/// them if their file is damaged.
+std::vector<Camera> trained_cameras(const ModelSource& source) {
+  try {
+    return run_cameras(source);
+  } catch (const DataError& error) {
+    spdlog::warn("the page has no cameras of the run: {}", error.what());
+    return {};
+  }
+}
+
 std::vector<Camera> cameras_of(const Options& options,
                                const std::vector<View>& views,
                                const ModelSource& source) {
@@ -59,6 +71,7 @@ std::vector<Camera> cameras_of(const Options& options,
       io::move_origin(camera, {source.origin[0], source.origin[1], source.origin[2]});
     return cameras;
   }
+  if (options.data.data.empty()) return trained_cameras(source);
   for (const View& each : views) cameras.push_back(each.camera);
   return cameras;
 }
@@ -174,6 +187,10 @@ void view_model(const Options& options) {
   const std::vector<Camera> cameras = cameras_of(options, views, source);
   view::ViewState state = view::first_look(scene_extent(gaussians), cameras, up_of(options));
   state.about = fmt::format("{} Gaussians, SH degree {}", gaussians.size(), gaussians.sh_degree);
+  const bool has_photos = !options.data.data.empty() && options.cameras.empty();
+  if (options.cameras.empty() && !has_photos && !cameras.empty())
+    state.about += "; --data DATASET adds the photos of its cameras";
+  state.origin = {source.origin[0], source.origin[1], source.origin[2]};
   const Mirrors mirrors = mirrors_of(source);
   const std::unique_ptr<Context> context = open_context(options.device);
   const Model model(*context, gaussians);
@@ -189,7 +206,7 @@ void view_model(const Options& options) {
   view::Photos photos(views, trace.background);
   // Mirrors that a model was trained with are no part of a scene.
   serve(options, *pictures, std::move(state), mirrors.meshes.empty() ? &meshes : nullptr,
-        options.cameras.empty() ? &photos : nullptr);
+        has_photos ? &photos : nullptr);
 }
 
 void check(const Options& options) {
@@ -225,7 +242,7 @@ Command add_view_command(CLI::App& app) {
                    "file (.toml)")
       ->required()
       ->type_name("");
-  add_data_flags(*command, options->data);
+  add_data_flags(*command, options->data, "test, train or all (default)");
   command
       ->add_option("--cameras", options->cameras,
                    "Cameras of a transforms.json, for the page's list")

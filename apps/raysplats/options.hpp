@@ -106,8 +106,11 @@ struct DataFlags {
   /// an orbit goes around all of them.
   void check_used(bool orbit) const;
 };
-/// Returns the option --data.
-CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags);
+/// Returns the option --data. `split` is the help of --split, with what is taken where it is not
+/// given.
+CLI::Option* add_data_flags(CLI::App& app,
+                            DataFlags& flags,
+                            const std::string& split = "test (default), train or all");
 DataError no_views(const DataFlags& flags);
 
 /// --overwrite: outputs may take the place of what is there.

@@ -478,7 +478,7 @@ __kernel void advance(const uint count,
     }
   } else if (kind == RS_MIRROR) {
     float3 facet = n;
-    if (material->roughness > 0.0f && wave.samples > 1) {
+    if (material->roughness > 0.0f && wave.scatter) {
       facet = ggx_normal(n, material->roughness, random.x, random.y);
     }
     float3 direction = reflected(ray.direction, facet);

@@ -97,7 +97,8 @@ RS_STATIC_ASSERT_SIZE(RsSurface, 68);
 // What all kernels of a wave must know.
 typedef struct {
   rs_uint seed_lo, seed_hi;
-  rs_uint sample, samples;
+  rs_uint sample;
+  rs_uint scatter;  // 1 = rough mirrors do; a picture of one sample alone is sharp
   rs_int bounce, max_bounces;
   rs_float min_throughput;
   rs_int indirect;

@@ -61,7 +61,7 @@
     FIELD(RsSurface, triangle) FIELD(RsSurface, color) FIELD(RsSurface, t) \
     FIELD(RsSurface, offset) \
   RECORD(RsWave) FIELD(RsWave, seed_lo) FIELD(RsWave, seed_hi) FIELD(RsWave, sample) \
-    FIELD(RsWave, samples) FIELD(RsWave, bounce) FIELD(RsWave, max_bounces) \
+    FIELD(RsWave, scatter) FIELD(RsWave, bounce) FIELD(RsWave, max_bounces) \
     FIELD(RsWave, min_throughput) FIELD(RsWave, indirect) FIELD(RsWave, ambient) \
     FIELD(RsWave, strength) FIELD(RsWave, bias) FIELD(RsWave, lights) \
     FIELD(RsWave, light_samples) FIELD(RsWave, first_pixel) \

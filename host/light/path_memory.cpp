@@ -86,8 +86,9 @@ PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
   set_meshes(triangles);
 }
 
-void PathMemory::set_render(const RenderSettings& settings) {
-  one_point_ = settings.samples == 1 || settings.aperture == 0.0f;
+void PathMemory::set_render(const RenderSettings& settings, bool of_many) {
+  const bool through_centre = settings.samples == 1 && !of_many;
+  one_point_ = through_centre || settings.aperture == 0.0f;
 }
 
 bool PathMemory::packets(std::size_t pixels) const {

@@ -14,8 +14,8 @@ class PathMemory {
  public:
   PathMemory(const Scene& scene, const DeviceInfo& device);
 
-  /// Other settings, of the scene's lights and glass.
-  void set_render(const RenderSettings& settings);
+  /// Other settings, of the scene's lights and glass; `of_many` as in PathTracer::set_sampling().
+  void set_render(const RenderSettings& settings, bool of_many = false);
   /// Other meshes in the same scene.
   void set_meshes(std::size_t triangles);
 

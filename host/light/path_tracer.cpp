@@ -135,6 +135,8 @@ struct PathTracer::Impl {
   std::optional<glm::dvec3> first_point(const Camera& camera);
 
   Kernel kernel(const char* name) { return context.kernel(kProgram, name); }
+  /// Whether lens and rough mirrors are sampled: one sample alone stays sharp.
+  bool scatters() const { return of_many || settings.samples > 1; }
   RsWave wave_record(std::uint32_t sample, std::size_t first_pixel) const;
   void trace_sample(const Camera& camera,
                     std::uint32_t sample,
@@ -155,6 +157,7 @@ struct PathTracer::Impl {
 
   Context& context;
   RenderSettings settings;
+  bool of_many = false;  // set_sampling()
   PathMemory memory;
   TraceOptions options;
   DeviceGaussians gaussians;
@@ -201,7 +204,7 @@ RsWave PathTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pix
   wave.seed_lo = static_cast<std::uint32_t>(settings.seed);
   wave.seed_hi = static_cast<std::uint32_t>(settings.seed >> 32);
   wave.sample = sample;
-  wave.samples = static_cast<std::uint32_t>(settings.samples);
+  wave.scatter = scatters() ? 1 : 0;
   wave.max_bounces = settings.max_bounces;
   wave.min_throughput = settings.min_throughput;
   wave.indirect = settings.indirect ? 1 : 0;
@@ -222,7 +225,7 @@ void PathTracer::Impl::trace_sample(const Camera& camera,
   Lens lens;
   lens.sample = sample;
   lens.seed = settings.seed;
-  lens.aperture = settings.samples > 1 ? settings.aperture : 0.0f;
+  lens.aperture = scatters() ? settings.aperture : 0.0f;
   lens.focus_distance = settings.focus_distance;
   camera_rays.generate(camera, lens, first, count, rays);
   paths.ensure(context, count, "paths");
@@ -540,14 +543,15 @@ std::array<int, 2> PathTracer::rows() const {
   return impl_->rows;
 }
 
-void PathTracer::set_sampling(int samples, std::uint64_t seed) {
+void PathTracer::set_sampling(int samples, std::uint64_t seed, bool of_many) {
   const auto turn = impl_->context.lock();
   RenderSettings settings = impl_->settings;
   settings.samples = samples;
   settings.seed = seed;
   check_render_settings(settings);
   impl_->settings = settings;
-  impl_->memory.set_render(settings);
+  impl_->of_many = of_many;
+  impl_->memory.set_render(settings, of_many);
 }
 
 const Context& PathTracer::context() const { return impl_->context; }

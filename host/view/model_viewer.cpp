@@ -16,11 +16,13 @@ ModelViewer::ModelViewer(Context& context,
                          const TraceOptions& trace,
                          const std::vector<Camera>& cameras,
                          const std::string& name,
-                         ViewerOptions options)
+                         ViewerOptions options,
+                         const std::array<double, 3>& origin)
     : context_(context), model_(model), pictures_(model_pictures(context, model, trace, {})) {
   if (model.size() == 0) throw UsageError("A model without Gaussians cannot be looked at");
   ViewState state = first_look(scene_extent(model.download()), cameras, std::nullopt);
   state.name = name;
+  state.origin = {origin[0], origin[1], origin[2]};
   state.about = fmt::format("{} Gaussians, SH degree {}", model.size(), model.sh_degree());
   state.has_near = state.has_depth = state.has_order = true;
   state.near_depth = trace.near_depth;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <exception>
 #include <memory>
@@ -23,13 +24,16 @@ namespace raysplats::view {
 class ModelViewer {
  public:
   /// Listens. `cameras` are the page's list, the first where it begins. The `state` of the options
-  /// is set here. Throws as Viewer, UsageError for a model without Gaussians.
+  /// is set here. `origin` is the model's (Dataset::origin): camera paths of the page are in the
+  /// coordinates of the data set's files, as `raysplats render --path` takes them. Throws as
+  /// Viewer, UsageError for a model without Gaussians.
   ModelViewer(Context& context,
               const Model& model,
               const TraceOptions& trace,
               const std::vector<Camera>& cameras,
               const std::string& name,
-              ViewerOptions options);
+              ViewerOptions options,
+              const std::array<double, 3>& origin = {});
   ~ModelViewer();
   ModelViewer(const ModelViewer&) = delete;
   ModelViewer& operator=(const ModelViewer&) = delete;

@@ -28,7 +28,8 @@ class ScenePictures : public MeshPictures {
   Image draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) override {
     const Camera camera = jittered(request.camera, sample);
     if (request.output == Output::kColor || request.output == Output::kAlpha) {
-      tracer_.set_sampling(1, seed_ + sample);
+      // Of a picture that moves there is one sample, which is sharp; a still one's are averaged.
+      tracer_.set_sampling(1, seed_ + sample, !request.moving);
       const Image rgba = tracer_.render(camera, watch);
       if (rgba.pixels() == 0) return {};
       return request.output == Output::kAlpha ? alpha_picture(rgba) : rgba;

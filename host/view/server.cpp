@@ -93,6 +93,12 @@ struct Server::Impl {
     if (!error && address.is_v6()) acceptor.set_option(net::ip::v6_only(false), error);
     if (!error) acceptor.bind(endpoint, error);
     if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
+    if (error == boost::system::errc::address_not_available) {
+      throw UsageError(fmt::format(
+          "--host {} is no address of this machine: give one that is, such as 127.0.0.1, or {} for "
+          "all of them",
+          options.host, address.is_v6() ? "::" : "0.0.0.0"));
+    }
     if (error) {
       throw DataError(
           fmt::format("The viewer cannot listen on {}, port {}: {}; choose another --port",

@@ -101,6 +101,7 @@ std::string state_json(const ViewState& state) {
                   {"about", state.about},
                   {"center", vector_json(state.extent.center)},
                   {"radius", state.extent.radius},
+                  {"origin", vector_json(state.origin)},
                   {"up", vector_json(state.up)},
                   {"start", camera_json(state.start, false)},
                   {"cameras", cameras},

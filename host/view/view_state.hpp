@@ -13,9 +13,10 @@ namespace raysplats::view {
 
 /// What the page has to know before its first picture.
 struct ViewState {
-  std::string name;    ///< of the model
-  std::string about;   ///< a line of facts
-  SceneExtent extent;  ///< what is looked at
+  std::string name;        ///< of the model
+  std::string about;       ///< a line of facts
+  SceneExtent extent;      ///< what is looked at
+  glm::dvec3 origin{0.0};  ///< of the model, in the coordinates of the data set's files
   glm::dvec3 up{0, -1, 0};
   Camera start;                     ///< first view
   std::span<const Camera> cameras;  ///< of the data set
@@ -40,7 +41,8 @@ ViewState first_look(const SceneExtent& extent,
 /// where they have none, out to the median camera.
 SceneExtent extent_before(std::span<const Camera> cameras);
 
-/// The JSON of /api/state: poses as view messages have them, vertical angles of view in degrees.
+/// The JSON of /api/state: poses as view messages have them, in the model's coordinates, vertical
+/// angles of view in degrees.
 /// Bytes of names that are no UTF-8 are replaced.
 std::string state_json(const ViewState& state);
 

@@ -50,9 +50,11 @@ class PathTracer {
   PathTracer(PathTracer&&) noexcept;
   PathTracer& operator=(PathTracer&&) noexcept;
 
-  /// Rays per pixel and the seed of everything random from the next render() on. Throws UsageError
-  /// for less than one sample.
-  void set_sampling(int samples, std::uint64_t seed);
+  /// Rays per pixel and the seed of everything random from the next render() on. Pictures of one
+  /// sample are sharp, unless they are `of_many` that are to be averaged: then their rays too pass
+  /// anywhere through the lens and scatter at rough mirrors. Throws UsageError for less than one
+  /// sample.
+  void set_sampling(int samples, std::uint64_t seed, bool of_many = false);
 
   /// The same materials and Gaussians with other meshes (an animation's next frame).
   void set_meshes(const std::vector<Mesh>& meshes);

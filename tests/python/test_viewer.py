@@ -47,12 +47,15 @@ def seen(channel, number):
 def test_a_page_sees_the_model_and_its_changes(context):
     model = rs.Model(context, ball((1, 0, 0)))
     camera = rs.Camera.look_at((0, 0, -4), (0, 0, 0), (0, -1, 0), 64, 48, 60.0)
-    with rs.Viewer(context, model, cameras=[camera], name="ball", open=False) as viewer:
+    with rs.Viewer(
+        context, model, cameras=[camera], name="ball", origin=(4e6, 0.1, 0), open=False
+    ) as viewer:
         page = Address(viewer.url)
         assert page.ask("/")[0] == 403
         state = json.loads(page.ask("/api/state", Cookie=page.cookie())[2])
         assert state["name"] == "ball" and state["about"] == "1 Gaussians, SH degree 0"
         assert len(state["cameras"]) == 1
+        assert state["origin"] == [4e6, 0.1, 0]
         with Channel(page) as channel:
             channel.send_json(**view(1))
             assert np.allclose(seen(channel, 1), (1, 0, 0), atol=0.05)

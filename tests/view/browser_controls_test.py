@@ -9,6 +9,7 @@ import sys
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -56,6 +57,61 @@ class ControlsTest(ModelCase):
         ActionChains(self.page).send_keys("k").perform()
         self.assertEqual(len(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")), 1)
         self.assertEqual(self.console(), [])
+
+    def test_keys_act_wherever_they_are_of_no_use_to_a_control(self):
+        self.rest()
+        eye = "return [...window.raysplats.rig.eye]"
+
+        def focus(name):
+            self.page.execute_script("document.getElementById(arguments[0]).focus()", name)
+
+        def value(name):
+            return self.page.execute_script(
+                "const e = document.getElementById(arguments[0]); return [e.value, e.checked]", name)
+
+        def press(key):
+            before = self.page.execute_script(eye)
+            ActionChains(self.page).key_down(key).pause(0.4).key_up(key).perform()
+            return math.dist(before, self.page.execute_script(eye))
+
+        for name in ("output", "fov", "show-crop", "background", "load-path"):
+            focus(name)
+            before = value(name)
+            for key in "wd":  # a list would go to "depth"
+                self.assertGreater(press(key), 0.01, (name, key))
+            self.assertEqual(value(name), before, name)
+        # Arrows are a list's and a slider's own, and all keys those of a field.
+        turn = "return window.raysplats.rig.axes[2]"
+        for name, moves in (("output", True), ("fov", True), ("show-crop", False)):
+            focus(name)
+            before, ahead = value(name), self.page.execute_script(turn)
+            ActionChains(self.page).key_down(Keys.ARROW_RIGHT).pause(0.2).key_up(Keys.ARROW_RIGHT).perform()
+            self.assertEqual(value(name) != before, moves, name)
+            self.assertEqual(math.dist(ahead, self.page.execute_script(turn)) > 1e-6, not moves, name)
+        focus("path-width")
+        self.assertEqual(press("w"), 0)
+        ActionChains(self.page).send_keys("k").perform()
+        self.assertEqual(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li"), [])
+        # Nothing acts behind the list of keys.
+        focus("picture")
+        ActionChains(self.page).send_keys("?").perform()
+        self.assertTrue(self.page.find_element(By.ID, "help").is_displayed())
+        self.assertEqual(press("w"), 0)
+        ActionChains(self.page).send_keys("k").perform()
+        self.assertEqual(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li"), [])
+        ActionChains(self.page).send_keys(Keys.ESCAPE).perform()
+        self.assertGreater(press("w"), 0.01)
+        self.assertEqual(self.console(), [])
+
+    def test_every_control_is_reached_by_the_tab_key(self):
+        self.rest()
+        self.page.execute_script("document.getElementById('picture').focus()")
+        reached = set()
+        for _ in range(80):
+            ActionChains(self.page).send_keys(Keys.TAB).perform()
+            reached.add(self.page.execute_script("return document.activeElement.id"))
+        for name in ("mesh-file", "load-path", "save-path", "png", "fov"):
+            self.assertIn(name, reached)
 
     def test_a_frustum_in_the_picture_is_clicked(self):
         first = self.rest()

@@ -8,14 +8,15 @@ import math
 import os
 import subprocess
 import sys
+import tempfile
 
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import main  # noqa: E402
-from page_case import ModelCase  # noqa: E402
-from program import psnr  # noqa: E402
+from page_case import ModelCase, PageCase  # noqa: E402
+from program import psnr, write_model  # noqa: E402
 
 
 class PathsTest(ModelCase):
@@ -217,6 +218,48 @@ class PathsTest(ModelCase):
         for damaged in ("", "[[key]]", "[[key]]\neye = [0, 0, 0]\ntarget = [0, 1, 0]", "[camera]\nx = 1",
                         "[[key]]\neye = [0, 0]\ntarget = [0, 0, 1]", "[[key]]\neye = 1\ntarget = 2", "key = [[1]]"):
             self.assertIsNone(self.module("toml.keyframesIn(given[0])", damaged), damaged)
+        self.assertEqual(self.console(), [])
+
+
+class FarPathsTest(PageCase):
+    """A model whose coordinates begin somewhere else than those of its data set."""
+    origin = (4321012.125, -250000.5, 80)
+
+    def arguments(self):
+        folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
+        model = os.path.join(folder, "model.ply")
+        write_model(model, self.origin)
+        return [model]
+
+    def test_a_path_is_in_the_coordinates_of_the_data_set(self):
+        self.listen()
+        self.page.execute_script("window.raysplats.rig.pose = [1, 0, 0, 0.5, 0, 1, 0, 0.2, 0, 0, 1, -6]")
+        self.page.find_element(By.ID, "add-key").click()
+        self.page.find_element(By.ID, "level").click()
+        shown = self.settle()
+        picture = os.path.join(self.viewer.folder.name, "shown.png")
+        with open(picture, "wb") as file:
+            file.write(self.pixels())
+        for name, value in (("seconds", 1), ("fps", 1)):
+            field = self.page.find_element(By.ID, name)
+            field.clear()
+            field.send_keys(str(value))
+        for button, name in (("save-path", "path.json"), ("save-toml", "path.toml")):
+            self.page.find_element(By.ID, button).click()
+            saved = self.download(name)
+            out = saved + "_frames"
+            subprocess.run([self.program, "render", self.viewer.model, "--path", saved, "-o", out, "--format", "png",
+                            "--supersample", "4", "--width", str(shown["last"]["width"]), "--height",
+                            str(shown["last"]["height"]), "-q"], check=True, stdout=subprocess.DEVNULL)
+            frame, = os.listdir(out)
+            self.assertGreater(psnr(picture, os.path.join(out, frame)), 30)
+            # And the page goes back there.
+            self.page.find_element(By.ID, "clear-keys").click()
+            self.page.find_element(By.ID, "load-path").send_keys(saved)
+            self.wait("the keyframe", lambda: len(self.page.find_elements(By.CSS_SELECTOR, "#keyframes li")) == 1)
+            self.page.find_element(By.ID, "home").click()
+            self.page.find_element(By.CSS_SELECTOR, "#keyframes li button").click()
+            self.assertLess(math.dist(self.page.execute_script("return window.raysplats.rig.eye"), (0.5, 0.2, -6)), 1e-6)
         self.assertEqual(self.console(), [])
 
 

@@ -162,8 +162,8 @@ class Channel:
                 self.send(data, code=10)
 
 
-def write_model(path):
-    """Three balls before a dark wall of many."""
+def write_model(path, origin=None):
+    """Three balls before a dark wall of many; `origin` is where its coordinates begin in those of a data set."""
     names = ("x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2",
              "rot_0", "rot_1", "rot_2", "rot_3")
     rows = []
@@ -173,6 +173,8 @@ def write_model(path):
         rows.append((i % 10 - 4.5, i // 10 - 4.5, 3, -1, -1, -0.5, 3, -0.6, -0.6, -2, 1, 0, 0, 0))
     with open(path, "wb") as file:
         file.write(b"ply\nformat binary_little_endian 1.0\n")
+        if origin:
+            file.write("comment raysplats origin {},{},{}\n".format(*origin).encode())
         file.write(f"element vertex {len(rows)}\n".encode())
         file.write("".join(f"property float {name}\n" for name in names).encode())
         file.write(b"end_header\n")

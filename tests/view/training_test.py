@@ -5,6 +5,7 @@ import glob
 import json
 import os
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
@@ -115,6 +116,19 @@ class TrainingTest(unittest.TestCase):
         # The command itself is heard within a look, which may draw what waits.
         self.assertLessEqual(len(pictures), 1)
         self.assertEqual(result("quiet"), result("alone"))
+
+    def test_the_page_hears_that_the_run_was_interrupted(self):
+        with Viewer(PROGRAM, [*arguments("interrupted"), "-n", "100000000", "--view"], "train") as run, \
+                Channel(run) as channel:
+            while self.iteration(run) == 0:
+                time.sleep(0.02)
+            run.process.send_signal(signal.SIGINT)
+            told = channel.receive()
+            while told[0] == "picture" or "ended" not in told[1]:
+                told = channel.receive()
+            self.assertIn("--resume", told[1]["ended"])
+            run.process.stdout.read()
+            self.assertEqual(run.process.wait(timeout=120), 130)
 
     def test_damaged_commands_are_refused(self):
         with Viewer(PROGRAM, [*arguments("refused"), "--view"], "train") as run, Channel(run) as channel:

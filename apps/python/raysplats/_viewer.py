@@ -16,9 +16,11 @@ class Viewer:
 
     `options` are those that the model looks right with, `cameras` the page's list, the first of
     them where it begins. With port 0 any that is free is taken; `url` has it, and whoever has the
-    url may look, from other machines too unless `host` is 127.0.0.1. `open` opens a browser. It
-    ends with close(), at the end of a `with` block, or with the program. Pillow draws its pictures
-    into files, or whatever set_image_functions() was given."""
+    url may look, from other machines too unless `host` is 127.0.0.1. `origin` is that of the model
+    (`Dataset.origin`): camera paths of the page are in the coordinates of the data set's files, as
+    `raysplats render --path` takes them. `open` opens a browser. It ends with close(), at the end
+    of a `with` block, or with the program. Pillow draws its pictures into files, or whatever
+    set_image_functions() was given."""
 
     def __init__(
         self,
@@ -31,12 +33,13 @@ class Viewer:
         host: str = "127.0.0.1",
         port: int = 0,
         max_size: int = 1920,
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
         open: bool = True,
     ) -> None:
         if options is None:
             options = TraceOptions()
         self._viewer = _ModelViewer(
-            context, model, options, list(cameras), name, host, port, max_size
+            context, model, options, list(cameras), name, host, port, max_size, list(origin)
         )
         self._end = weakref.finalize(self, self._viewer.close)
         if open:

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <array>
 #include <chrono>
 #include <string>
 #include <thread>
@@ -29,12 +31,13 @@ void make(HeldViewer* self,
           const std::string& name,
           const std::string& host,
           std::uint16_t port,
-          int max_size) {
+          int max_size,
+          const std::array<double, 3>& origin) {
   view::ViewerOptions viewer;
   viewer.server.host = host;
   viewer.server.port = port;
   viewer.max_side = max_size;
-  new (self) HeldViewer(*context, *model, options, cameras, name, viewer);
+  new (self) HeldViewer(*context, *model, options, cameras, name, viewer, origin);
 }
 
 // Until it is closed, or a signal says otherwise.
@@ -54,7 +57,7 @@ void bind_viewer(nb::module_& module) {
   nb::class_<HeldViewer>(module, "_ModelViewer", "What raysplats.Viewer is made of.")
       .def("__init__", &make, nb::arg("context"), nb::arg("model"), nb::arg("options"),
            nb::arg("cameras"), nb::arg("name"), nb::arg("host"), nb::arg("port"),
-           nb::arg("max_size"), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
+           nb::arg("max_size"), nb::arg("origin"), nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
       .def_prop_ro("url", [](HeldViewer& self) { return self->url(); })
       .def("wait", &wait)
       .def(

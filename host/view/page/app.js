@@ -256,11 +256,19 @@ function fly(now) {
   if (held.size > 0) requestAnimationFrame(fly);
 }
 
+// Whether a control with the focus has its own use for a key: fields for text for all of them, lists and
+// sliders for the arrows.
+function takes(control, key) {
+  if (control.matches('input:not([type=range], [type=checkbox], [type=color], [type=file])')) return true;
+  return key.startsWith('arrow') && control.matches('select, input[type=range]');
+}
+
 function keyDown(event) {
-  if (event.target.matches('input, select') || event.ctrlKey || event.metaKey || event.altKey) return;
+  if ($('help').open || event.ctrlKey || event.metaKey || event.altKey) return;
   const key = event.key.toLowerCase();
+  if (takes(event.target, key)) return;
   const actions = {
-    '?': () => $('help').showModal(),
+    '?': () => { held.clear(); $('help').showModal(); },
     f: () => { $('mode').value = $('mode').value === 'fly' ? 'orbit' : 'fly'; },
     r: () => { rig.keyframe = home; changed(); },
     u: () => { rig.level(); changed(); },
@@ -272,7 +280,8 @@ function keyDown(event) {
     event.preventDefault();
     actions[key]();
   } else if ('wasdqe'.includes(key) || key.startsWith('arrow') || key === 'shift') {
-    if (key.startsWith('arrow')) event.preventDefault();
+    // A page scrolls by arrows, and a list goes to what begins with a letter.
+    if (key !== 'shift') event.preventDefault();
     if (held.size === 0) {
       clock = performance.now();
       requestAnimationFrame(fly);
@@ -293,6 +302,7 @@ const meshes = new Meshes($('mesh-section'), {
 });
 const keyframes = new Keyframes({
   list: $('keyframes'),
+  origin: () => state.origin,
   settings: () => {
     const [width, height] = size();
     return {

@@ -8,7 +8,8 @@ export class Keyframes {
   #keys = [];
   #playing = false;
 
-  // `page` has list (an element), settings(), view(), go(view) and download(blob, name).
+  // `page` has list (an element), origin() of the model, settings(), view(), go(view) and
+  // download(blob, name).
   constructor(page) {
     this.page = page;
   }
@@ -75,7 +76,8 @@ export class Keyframes {
 
   #save(write, type, name) {
     if (this.#keys.length === 0) this.add();
-    this.page.download(new Blob([write(this.#keys, this.page.settings())], { type }), name);
+    const text = write(this.#keys, this.page.settings(), this.page.origin());
+    this.page.download(new Blob([text], { type }), name);
   }
 
   // Takes the keyframes of a file; its settings, or null where it has none.
@@ -83,8 +85,8 @@ export class Keyframes {
     const text = await file.text();
     let stored = null;
     try {
-      stored = file.name.endsWith('.toml') ? keyframesIn(text)
-        : keyframesOf(JSON.parse(text), this.page.view().distance);
+      stored = file.name.endsWith('.toml') ? keyframesIn(text, this.page.origin())
+        : keyframesOf(JSON.parse(text), this.page.view().distance, this.page.origin());
     } catch {
       return null;
     }

@@ -6,6 +6,7 @@ import * as v from './vectors.js';
 // Of the frames of files that do not say it.
 export const WIDTH = 1920;
 export const HEIGHT = 1080;
+const ZERO = [0, 0, 0];
 const PIECES = 64; // straight ones, of a span whose length is measured
 
 // Centripetal Catmull-Rom (Yuksel, Schaefer and Keyser 2011) between p1 and p2.
@@ -74,14 +75,16 @@ export function courseOf(keys, { closed, constant }) {
   };
 }
 
-// 4 x 4 by rows, with nerfstudio's camera axes (right, up, back).
-function matrixOf({ eye, turn }) {
+// 4 x 4 by rows, with nerfstudio's camera axes (right, up, back), in the world of the data set's files,
+// of which `origin` is where the page's coordinates begin.
+function matrixOf({ eye: own, turn }, origin) {
+  const eye = v.add(own, origin);
   const [right, down, forward] = v.axesOf(turn);
   return [...[0, 1, 2].flatMap((k) => [right[k], -down[k], -forward[k], eye[k]]), 0, 0, 0, 1];
 }
 
 // The view of such a matrix; as text it is by columns, as nerfstudio's add-ons write it.
-function viewOf(matrix, fov, distance) {
+function viewOf(matrix, fov, distance, origin) {
   let m = matrix;
   if (typeof matrix === 'string') {
     const columns = (matrix.match(/-?[\d.]+(?:e[-+]?\d+)?/gi) || []).map(Number);
@@ -90,7 +93,7 @@ function viewOf(matrix, fov, distance) {
   m = m.flat();
   const axis = (k, sign) => v.normalized([sign * m[k], sign * m[4 + k], sign * m[8 + k]]);
   return {
-    eye: [m[3], m[7], m[11]],
+    eye: v.sub([m[3], m[7], m[11]], origin),
     turn: v.quaternionOf([axis(0, 1), axis(1, -1), axis(2, -1)]),
     fov,
     distance,
@@ -112,8 +115,9 @@ function transitions(keys, seconds, closed) {
   return keys.map((_, i) => own[(i + keys.length - 1) % keys.length] * (sum > 0 ? seconds / sum : 1));
 }
 
-// A camera path of nerfstudio: its frames one by one, and the keyframes that they are made of.
-export function pathFile(keys, { seconds, fps, closed, constant, width, height, model }) {
+// A camera path of nerfstudio: its frames one by one, and the keyframes that they are made of. `origin`
+// is that of the model (api/state), which `raysplats render --path` takes off again.
+export function pathFile(keys, { seconds, fps, closed, constant, width, height, model }, origin = ZERO) {
   const count = Math.max(1, Math.round(seconds * fps));
   const last = closed ? count : Math.max(count - 1, 1);
   const aspect = width / height;
@@ -121,7 +125,7 @@ export function pathFile(keys, { seconds, fps, closed, constant, width, height, 
   const camera_path = [];
   for (let i = 0; i < count; ++i) {
     const view = course(i / last);
-    camera_path.push({ camera_to_world: matrixOf(view), fov: fileFov(model, view.fov), aspect });
+    camera_path.push({ camera_to_world: matrixOf(view, origin), fov: fileFov(model, view.fov), aspect });
   }
   const ways = transitions(keys, seconds, closed);
   return {
@@ -134,7 +138,7 @@ export function pathFile(keys, { seconds, fps, closed, constant, width, height, 
     default_transition_sec: seconds / Math.max(closed ? keys.length : keys.length - 1, 1),
     raysplats_constant_speed: constant,
     keyframes: keys.map((key, i) => ({
-      matrix: matrixOf(key),
+      matrix: matrixOf(key, origin),
       fov: fileFov(model, key.fov),
       aspect,
       override_transition_enabled: true,
@@ -146,14 +150,14 @@ export function pathFile(keys, { seconds, fps, closed, constant, width, height, 
 }
 
 // The keyframes of a camera path, of this page or of nerfstudio; null for any other file.
-// `distance` is that of the centre to turn around where the file does not say it.
-export function keyframesOf(file, distance) {
+// `distance` is that of the centre to turn around where the file does not say it, `origin` as above.
+export function keyframesOf(file, distance, origin = ZERO) {
   const list = file && (file.keyframes?.length ? file.keyframes : file.camera_path);
   if (!Array.isArray(list) || list.length === 0) return null;
   const model = Object.keys(TYPES).find((each) => TYPES[each] === (file.camera_type ?? 'perspective'));
   if (!model) return null;
   const keys = list.map((key) => viewOf(key.matrix ?? key.camera_to_world,
-    lensFov(model, Number(key.fov ?? file.default_fov ?? 50)), Number(key.raysplats_distance ?? distance)));
+    lensFov(model, Number(key.fov ?? file.default_fov ?? 50)), Number(key.raysplats_distance ?? distance), origin));
   if (file.keyframes?.length) {
     const common = Number(file.default_transition_sec ?? 1);
     const ways = list.map((key) => (key.override_transition_enabled === true

@@ -353,6 +353,12 @@ TEST_CASE("a thin lens is sharp at its focus alone") {
   // One sample goes through the lens's centre.
   scene.render.samples = 1;
   const Image centre = render_on_device(context, scene, kCamera);
+  // One of many goes anywhere through it.
+  PathTracer tracer(context, scene);
+  tracer.set_sampling(1, scene.render.seed, true);
+  CHECK(largest_difference(centre, tracer.render(kCamera)) > 0.1);
+  tracer.set_sampling(1, scene.render.seed);
+  CHECK(largest_difference(centre, tracer.render(kCamera)) == 0.0);
   scene.render.aperture = 0.0f;
   CHECK(largest_difference(centre, render_on_device(context, scene, kCamera)) == 0.0);
 }

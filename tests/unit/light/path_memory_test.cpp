@@ -114,3 +114,20 @@ TEST_CASE("a batch of paths fits its share of the budget, a scene that does not 
   CHECK_THROWS_WITH_AS(narrow.check(1000), doctest::Contains("in the largest buffer"),
                        ResourceError);
 }
+
+TEST_CASE(
+    "rays of a sample leave one point unless the lens is open and more samples go through it") {
+  const Scene scene = many_gaussians(1000, 0);
+  PathMemory memory(scene, make_test_context().device());
+  constexpr std::size_t kPixels = 10'000;
+  CHECK(!memory.packets(kPixels));
+  RenderSettings one = scene.render;
+  one.samples = 1;
+  memory.set_render(one);
+  CHECK(memory.packets(kPixels));
+  memory.set_render(one, true);
+  CHECK(!memory.packets(kPixels));
+  one.aperture = 0.0f;
+  memory.set_render(one, true);
+  CHECK(memory.packets(kPixels));
+}

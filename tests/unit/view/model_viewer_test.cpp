@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -22,7 +23,8 @@ TEST_CASE("the page of a model in memory has all that a model's file has") {
   std::unique_ptr<ModelViewer> viewer;
   try {
     viewer = std::make_unique<ModelViewer>(context, model, TraceOptions{}, std::vector<Camera>{},
-                                           "cloud", ViewerOptions{});
+                                           "cloud", ViewerOptions{},
+                                           std::array<double, 3>{4e6, 0.1, -2});
   } catch (const UsageError& error) {
     REQUIRE(std::string(error.what()).find("RAYSPLATS_VIEWER") != std::string::npos);
     return;
@@ -33,4 +35,5 @@ TEST_CASE("the page of a model in memory has all that a model's file has") {
     CAPTURE(std::string(each));
     CHECK(state[each] == true);
   }
+  CHECK(state["origin"] == nlohmann::json{4e6, 0.1, -2.0});
 }

@@ -135,6 +135,7 @@ TEST_CASE("the page learns what it starts with") {
   state.cameras = cameras;
   state.has_near = true;
   state.has_photos = true;
+  state.origin = {4321012.125, -0.1, 1e-9};
   const nlohmann::json json = nlohmann::json::parse(state_json(state));
   CHECK(json["start"]["fov"] == doctest::Approx(90));
   CHECK(json["start"]["aspect"] == 2);
@@ -160,4 +161,6 @@ TEST_CASE("the page learns what it starts with") {
   CHECK(nlohmann::json::parse(state_json(state))["cameras"][0]["photo"] == false);
   CHECK(json["up"] == nlohmann::json{0, -1, 0});
   CHECK(json["has_near"] == true);
+  // In double precision, which surveyed coordinates need.
+  CHECK(json["origin"] == nlohmann::json{4321012.125, -0.1, 1e-9});
 }

@@ -87,7 +87,7 @@ TEST_CASE("of pictures that a slow page has not taken the newest comes, and the 
   wait_until([&] { return client != 0; });
   // More than sockets take before somebody reads.
   constexpr std::size_t kPictures = 40, kKept = 20;
-  const auto word = [](std::size_t i) { return "<" + std::to_string(i) + ">"; };
+  const auto word = [](std::size_t i) { return std::string("<").append(std::to_string(i)) + ">"; };
   for (std::size_t i = 0; i < kPictures; ++i) {
     std::vector<std::byte> bytes(std::size_t{1} << 20, std::byte{'.'});
     for (const char c : word(i)) bytes.push_back(static_cast<std::byte>(c));
@@ -118,4 +118,18 @@ TEST_CASE("photos and figures that cannot be given are one sentence") {
     CHECK(answer.ends_with("\r\n\r\nnobody expected this\n"));
   }
   CHECK(get(url, "/api/photo/x").starts_with("HTTP/1.1 404"));
+}
+
+TEST_CASE("an address that is none of this machine's is told, and no other port asked for") {
+  ServerOptions options;
+  options.host = "192.0.2.1";  // of documents (RFC 5737)
+  std::string told;
+  try {
+    const Server server(options, ServerHandlers{});
+  } catch (const UsageError& error) {
+    told = error.what();
+  }
+  if (told.find("RAYSPLATS_VIEWER") != std::string::npos) return;
+  CHECK(told.find("--host 192.0.2.1 is no address of this machine") != std::string::npos);
+  CHECK(told.find("--port") == std::string::npos);
 }
