@@ -20,6 +20,7 @@
 #include "scene/morton_order.hpp"
 #include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
+#include "util/number_text.hpp"
 #include "util/output_directory.hpp"
 
 namespace raysplats::cli {
@@ -60,7 +61,8 @@ void run(const Options& options, const GlobalOptions& global) {
     Tracer tracer(context, trace, mirrors_of(source));
     std::unique_ptr<Lpips> lpips;
     if (!options.lpips.empty()) lpips = std::make_unique<Lpips>(options.lpips);
-    spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(), views);
+    spdlog::info("{} Gaussians of {}, {}", model.size(), source.file.string(),
+                 counted(views, "view"));
 
     FrameProgress progress("evaluating", views, ranks, global.quiet);
     std::uint64_t rays = 0;

@@ -17,7 +17,9 @@
 
 #include "info_files.hpp"
 #include "info_parts.hpp"
+#include "io/colmap_model.hpp"
 #include "io/mesh_file.hpp"
+#include "io/model_file.hpp"
 #include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
 #include "io/scene_file.hpp"
@@ -28,6 +30,7 @@
 #include "run/model_source.hpp"
 #include "scene/model_summary.hpp"
 #include "scene/trace_rows.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -92,9 +95,13 @@ const char* source_name(SceneCamera::Source source) {
 }
 
 Json describe(const TraceOptions& trace) {
-  return {{"hit_order", hit_order_name(trace.hit_order)}, {"quantile", trace.quantile},
-          {"adaptive_radius", trace.adaptive_radius},     {"near_depth", trace.near_depth},
-          {"min_transmittance", trace.min_transmittance}, {"max_hits", trace.max_hits}};
+  return {{"hit_order", hit_order_name(trace.hit_order)},
+          {"quantile", trace.quantile},
+          {"adaptive_radius", trace.adaptive_radius},
+          {"near_depth", trace.near_depth},
+          {"min_transmittance", trace.min_transmittance},
+          {"max_hits", trace.max_hits},
+          {"background", trace.background}};
 }
 
 Json describe(const io::MeshFile& file) {
@@ -214,13 +221,13 @@ void print_dataset(const Json& dataset) {
   }
   fmt::print("data set         {}{}\n", dataset["kind"].get<std::string>(), lenses);
   for (const auto& [name, count] : dataset["camera_models"].items()) {
-    fmt::print("cameras          {} ({} views)\n", name, count.get<std::size_t>());
+    fmt::print("cameras          {} ({})\n", name, counted(count.get<std::size_t>(), "view"));
   }
   fmt::print("views            {}: {} to train, {} to test\n", dataset["views"].get<std::size_t>(),
              dataset["train_views"].get<std::size_t>(), dataset["test_views"].get<std::size_t>());
   for (const Json& size : dataset["sizes"]) {
-    fmt::print("size             {}x{} ({} views)\n", size["width"].get<int>(),
-               size["height"].get<int>(), size["views"].get<std::size_t>());
+    fmt::print("size             {}x{} ({})\n", size["width"].get<int>(), size["height"].get<int>(),
+               counted(size["views"].get<std::size_t>(), "view"));
   }
   if (const auto masks = dataset["masks"].get<std::size_t>(); masks > 0) {
     fmt::print("masks            {}: what is black there does not count\n", masks);
@@ -247,11 +254,12 @@ void print_mesh(const Json& mesh) {
     return fmt::format("({:.4g}, {:.4g}, {:.4g})", v[0].get<float>(), v[1].get<float>(),
                        v[2].get<float>());
   };
-  fmt::print("mesh             {} triangles, {} vertices\n", mesh["triangles"].get<std::size_t>(),
-             mesh["vertices"].get<std::size_t>());
+  fmt::print("mesh             {}, {}\n", counted(mesh["triangles"].get<std::size_t>(), "triangle"),
+             counted(mesh["vertices"].get<std::size_t>(), "vertex", "vertices"));
   fmt::print("bounds           {} to {}\n", corner(0), corner(1));
   fmt::print("normals          {}\n", mesh["normals"].get<bool>() ? "of the file" : "none: flat");
-  fmt::print("texture          {} pictures, {} coordinates\n", mesh["textures"].get<std::size_t>(),
+  fmt::print("texture          {}, {} coordinates\n",
+             counted(mesh["textures"].get<std::size_t>(), "picture"),
              mesh["texture_coordinates"].get<bool>() ? "with" : "without");
   fmt::print("materials        {}\n", named_kinds(mesh["materials"]));
 }
@@ -273,15 +281,17 @@ void print_scene(const Json& scene) {
           ? "none"
           : fmt::format("{}", fmt::join(scene["lights"].get<std::vector<std::string>>(), ", ")));
   const Json& camera = scene["camera"];
-  fmt::print(
-      "camera           {}, {}{}\n", camera["source"].get<std::string>(),
-      camera["model"].get<std::string>(),
-      camera.contains("frames") ? fmt::format(", {} frames", camera["frames"].get<int>()) : "");
+  fmt::print("camera           {}, {}{}\n", camera["source"].get<std::string>(),
+             camera["model"].get<std::string>(),
+             camera.contains("frames")
+                 ? ", " + counted(camera["frames"].get<std::size_t>(), "frame")
+                 : "");
   if (scene.contains("animation_frames")) {
-    fmt::print("animation        {} frames\n", scene["animation_frames"].get<int>());
+    fmt::print("animation        {}\n",
+               counted(scene["animation_frames"].get<std::size_t>(), "frame"));
   }
-  fmt::print("samples          {} a pixel, {} bounces at most\n", scene["samples"].get<int>(),
-             scene["max_bounces"].get<int>());
+  fmt::print("samples          {} a pixel, {} at most\n", scene["samples"].get<int>(),
+             counted(scene["max_bounces"].get<std::size_t>(), "bounce"));
 }
 
 void print_json(const Json& json) {
@@ -316,6 +326,8 @@ void info_model(const Options& options) {
     fmt::print("traced           in {} order, quantile {:.4g}, {} radius\n",
                hit_order_name(source.header->hit_order), source.header->quantile,
                source.header->adaptive_radius ? "adaptive" : "whole");
+    if (source.sky.empty())
+      fmt::print("background       {}\n", fmt::join(source.header->background, ", "));
   }
   if (!source.sky.empty()) {
     fmt::print("sky              trained, by direction, {} coefficients a channel\n",
@@ -385,6 +397,31 @@ void info_dataset(const Options& options) {
   }
 }
 
+bool is_dataset(const std::filesystem::path& folder) {
+  std::error_code error;
+  return io::find_colmap_model(folder) ||
+         std::filesystem::exists(folder / "transforms.json", error) ||
+         std::filesystem::exists(folder / "transforms_train.json", error);
+}
+
+/// A folder that is neither a run nor a data set may hold models.
+void check_folder(const std::filesystem::path& folder) {
+  const std::vector<std::string> models = models_in(folder);
+  if (models.empty() || is_dataset(folder)) return;
+  throw DataError(fmt::format("{} is neither a run nor a data set: name a file in it, such as {}",
+                              folder.string(), fmt::join(models, ", ")));
+}
+
+void check_known(const std::filesystem::path& file) {
+  if (io::model_format(file) != io::ModelFormat::kUnknown) return;
+  throw DataError(fmt::format(
+      "{} is nothing that info reads: those are models (PLY, .splat, SPZ, SOG, glTF), meshes (PLY, "
+      "OBJ, glTF, .mtl), scene files, data sets, runs, COLMAP models, cameras, camera paths, "
+      "arrays (.npy), pictures, checkpoints, configurations (.toml), networks (.onnx) and the JSON "
+      "of runs, evaluations and benchmarks",
+      file.string()));
+}
+
 void run(const Options& options) {
   const std::filesystem::path path = options.path;
   if (!std::filesystem::exists(path)) {
@@ -402,12 +439,14 @@ void run(const Options& options) {
   if (other) {
     info_file(options, *other);
   } else if (folder && !is_model_folder(path)) {
+    check_folder(path);
     info_dataset(options);
   } else if (!folder && is_scene_file(options.path)) {
     info_scene(options);
   } else if (!folder && is_mesh(path)) {
     info_mesh(options);
   } else {
+    if (!folder) check_known(path);
     info_model(options);
   }
 }

@@ -11,6 +11,7 @@
 #include "options.hpp"
 #include "prepare/prepare.hpp"
 #include "util/interrupt.hpp"
+#include "util/number_text.hpp"
 #include "util/progress.hpp"
 
 namespace raysplats::cli {
@@ -66,14 +67,14 @@ void run(Options& options, const GlobalOptions& global) {
   if (!made.without_pose.empty()) {
     constexpr std::size_t kNamed = 10;
     const std::size_t named = std::min(kNamed, made.without_pose.size());
-    spdlog::warn("{} photos have no pose and are not used: {}{}", made.without_pose.size(),
+    spdlog::warn("{} without a pose, not used: {}{}", counted(made.without_pose.size(), "photo"),
                  fmt::join(made.without_pose.begin(),
                            made.without_pose.begin() + static_cast<std::ptrdiff_t>(named), ", "),
                  named < made.without_pose.size() ? ", ..." : "");
   }
-  fmt::print("{} of {} photos with poses and {} points in {}; next: raysplats train {} -o RUN\n",
-             made.photos - made.without_pose.size(), made.photos, made.points, options.output,
-             options.output);
+  fmt::print("{} of {} photos with poses and {} in {}; next: raysplats train {} -o RUN\n",
+             made.photos - made.without_pose.size(), made.photos, counted(made.points, "point"),
+             options.output, options.output);
 }
 
 }  // namespace

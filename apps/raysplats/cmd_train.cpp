@@ -15,6 +15,7 @@
 #include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/quality_preset.hpp"
+#include "util/number_text.hpp"
 #include "util/progress.hpp"
 #include "view/photos.hpp"
 #include "view/run_view.hpp"
@@ -97,7 +98,8 @@ std::unique_ptr<view::RunView> show(Context& context,
   for (const View& each : views) cameras.push_back(each.camera);
   view::ViewState state = view::first_look(view::extent_before(cameras), cameras, std::nullopt);
   state.name = std::filesystem::path(options.output).filename().string();
-  state.about = fmt::format("in training on {} photos of {}", cameras.size(),
+  state.origin = {origin[0], origin[1], origin[2]};
+  state.about = fmt::format("in training on {} of {}", counted(cameras.size(), "photo"),
                             std::filesystem::path(options.data).filename().string());
   state.has_near = state.has_depth = mirrors.meshes.empty();
   state.near_depth = options.train.trace.near_depth;
@@ -114,14 +116,14 @@ std::unique_ptr<view::RunView> show(Context& context,
   return shown;
 }
 
-/// The model is what the run was for: no failure of its page fails it.
-void report(const std::filesystem::path& folder) {
+/// The model is what the run was for: no failure of its page fails it. `state` is what the run is.
+void report(const std::filesystem::path& folder, const char* state) {
   const std::filesystem::path file = folder / "report.html";
   try {
     write_run_report(folder, file);
     fmt::print("Report: {}\n", file.string());
   } catch (const std::exception& error) {
-    spdlog::warn("the run is whole, but has no report: {}; try again by 'raysplats report {}'",
+    spdlog::warn("the run is {}, but has no report: {}; try again by 'raysplats report {}'", state,
                  error.what(), folder.string());
   }
 }
@@ -133,10 +135,28 @@ void print_results(const TrainSummary& summary, const std::string& folder) {
              summary.gaussians, folder);
   if (!summary.evaluations.empty()) {
     const EvaluationRow& last = summary.evaluations.back();
-    fmt::print("PSNR {:.2f} dB, SSIM {:.4f} on {} held-out views\n", last.psnr, last.ssim,
-               last.views);
+    fmt::print("PSNR {:.2f} dB, SSIM {:.4f} on {}\n", last.psnr, last.ssim,
+               counted(static_cast<std::size_t>(last.views), "held-out view"));
   }
-  report(folder);
+  report(folder, "whole");
+}
+
+/// Runs to the end. One that is interrupted gets its page too, and who watches hears of any end.
+TrainSummary run_to_end(Trainer& trainer,
+                        const Options& options,
+                        bool show_progress,
+                        Communicator& ranks,
+                        view::RunView* shown) {
+  try {
+    return trainer.run(show_progress);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInterrupted) {
+      if (ranks.leads()) report(options.output, "saved");
+      ranks.barrier();  // of processes, mpirun ends all when the first one fails
+    }
+    if (shown != nullptr) shown->finish(error.what());
+    throw;
+  }
 }
 
 /// As one of the ranks that share the run.
@@ -163,7 +183,8 @@ void train(const CLI::App& command,
   if (options.view && ranks.leads()) shown = show(context, trainer, options, views, origin);
   const std::int64_t begun = trainer.iteration();
   const Communicator::Traffic before = ranks.traffic();
-  const TrainSummary summary = trainer.run(!quiet && ranks.leads());
+  const TrainSummary summary =
+      run_to_end(trainer, options, !quiet && ranks.leads(), ranks, shown.get());
   if (!ranks.leads()) return;
 
   print_results(summary, options.output);

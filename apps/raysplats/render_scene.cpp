@@ -17,6 +17,7 @@
 #include "render_output.hpp"
 #include "run/model_source.hpp"
 #include "shared_work.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -154,7 +155,14 @@ void print_summary(const SceneReport& report, const std::string& output, double 
       "shadow",
       report.trace_seconds, millions(report.rays.camera_rays), millions(report.rays.continued_rays),
       millions(report.rays.shadow_rays));
-  fmt::print("{} frames in {} ({})\n", report.frames, output, with_compiling(speed, compiling));
+  fmt::print("{} in {} ({})\n", counted(report.frames, "frame"), output,
+             with_compiling(speed, compiling));
+}
+
+std::string contents(const Scene& scene, std::size_t frames) {
+  return fmt::format("{}, {}, {}, {}", counted(scene.gaussians.size(), "Gaussian"),
+                     counted(scene.meshes.size(), "mesh", "meshes"),
+                     counted(scene.lights.size(), "light"), counted(frames, "frame"));
 }
 
 // All ranks: the report of all.
@@ -194,9 +202,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
                PathTracer tracer(context, loaded.scene);
                const FrameOptions share = share_of(ranks, output.options(), last - first);
                output.begin();
-               spdlog::info("{}: {} Gaussians, {} meshes, {} lights, {} frames", flags.model,
-                            loaded.scene.gaussians.size(), loaded.scene.meshes.size(),
-                            loaded.scene.lights.size(), last - first);
+               spdlog::info("{}: {}", flags.model, contents(loaded.scene, last - first));
 
                FrameProgress progress("rendering", last - first, ranks, global.quiet);
                SceneReport report = write_scene_frames(

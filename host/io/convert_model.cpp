@@ -4,11 +4,33 @@
 #include <fmt/format.h>
 
 #include "io/model_file.hpp"
+#include "io/ply_options.hpp"
 #include "raysplats/error.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "scene/model_changes.hpp"
 
 namespace raysplats {
+namespace {
+
+// What a file without the comments of our PLY does not say of a model.
+std::string not_said(const std::array<double, 3>& origin,
+                     const std::optional<TraceOptions>& trace) {
+  std::string out;
+  if (origin != std::array<double, 3>{}) {
+    out += fmt::format(", positions count from {}, {}, {}, which is not said in the file",
+                       origin[0], origin[1], origin[2]);
+  }
+  if (!trace) return out;
+  if (!trace->sky.empty()) out += ", the sky behind the model is not said in the file";
+  const std::string flags = io::flags_to_show(*trace);
+  if (!flags.empty()) {
+    out += fmt::format(", how it is shown is not said in the file: give {} to render it", flags);
+  }
+  return out;
+}
+
+}  // namespace
+
 Conversion convert_model(const std::filesystem::path& input,
                          const std::filesystem::path& output,
                          const ModelChanges& changes,
@@ -36,13 +58,9 @@ Conversion convert_model(const std::filesystem::path& input,
   if (trace) trace->sky = transformed(trace->sky, movement(changes));
   write_model(output, result, encoding, trace, origin);
   std::string losses = io::losses(format, result);
-  if (format != io::ModelFormat::kPly && origin != std::array<double, 3>{}) {
-    losses += fmt::format(", positions count from {}, {}, {}, which is not said in the file",
-                          origin[0], origin[1], origin[2]);
-  }
-  if (format != io::ModelFormat::kPly && trace && !trace->sky.empty())
-    losses += ", the sky behind the model is not said in the file";
-  return {model.size(), result.size(), result.sh_degree, losses};
+  const std::string unsaid = format == io::ModelFormat::kPly ? "" : not_said(origin, trace);
+  if (!unsaid.empty() && losses == io::kNoLoss) losses = "no number of the Gaussians is changed";
+  return {model.size(), result.size(), result.sh_degree, losses + unsaid};
 }
 
 }  // namespace raysplats

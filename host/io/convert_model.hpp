@@ -15,7 +15,7 @@ namespace raysplats {
 struct Conversion {
   std::size_t read = 0, written = 0;  ///< Gaussians
   int sh_degree = 0;                  ///< of what was written, before the format's losses
-  std::string losses;                 ///< as io::losses()
+  std::string losses;                 ///< as io::losses(), and what the file does not say
 };
 
 /// Reads `input` with the encoding, changes it and writes `output`; a sky in `trace` turns with it.

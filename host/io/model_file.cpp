@@ -78,7 +78,8 @@ std::string spz_clamped(const Gaussians& model) {
 
 std::string spz_losses(const Gaussians& model) {
   return fmt::format(
-      "positions are kept to 1/{}, scales to 3 %, opacities and colours to 8 bits{}{}",
+      "positions are kept to 1/{}, scales to 3 %, rotations to 1/400, opacities and colours to 8 "
+      "bits{}{}",
       1 << spz_fractional_bits(model), model.sh_degree > 0 ? ", SH to 6 bits" : "",
       spz_clamped(model));
 }
@@ -125,7 +126,7 @@ ModelFormat output_format(const std::filesystem::path& path) {
 std::string losses(ModelFormat format, const Gaussians& model) {
   switch (format) {
     case ModelFormat::kPly:
-      return "nothing is lost";
+      return kNoLoss;
     case ModelFormat::kCompressedPly:
       return fmt::format(
           "positions, scales, colours and opacities are kept to 1/1000 of their range among 256 "
@@ -149,7 +150,7 @@ std::string losses(ModelFormat format, const Gaussians& model) {
     case ModelFormat::kGltf:
       return model.sh_degree > kSplattingMaxDegree
                  ? fmt::format("SH above degree {} is left out", kSplattingMaxDegree)
-                 : "nothing is lost";
+                 : kNoLoss;
     case ModelFormat::kUnknown:
       break;
   }

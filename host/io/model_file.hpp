@@ -22,6 +22,8 @@ std::array<double, 3> model_origin(const std::filesystem::path& path);
 /// What a file of this name is written as. Throws UsageError for names that do not say it.
 ModelFormat output_format(const std::filesystem::path& path);
 
+/// What losses() says of a format that keeps every number of the model.
+inline constexpr const char* kNoLoss = "nothing is lost";
 /// What the format does not keep of a model, as part of a sentence.
 std::string losses(ModelFormat format, const Gaussians& model);
 

@@ -147,6 +147,27 @@ std::string io::ply_origin_comment(const std::array<double, 3>& origin) {
   return fmt::format("{}{} {},{},{}\n", kPrefix, kOrigin, origin[0], origin[1], origin[2]);
 }
 
+std::string io::flags_to_show(const TraceOptions& shown) {
+  TraceOptions told = shown;
+  TraceOptions taken = peak_order();
+  const std::vector<OptionRow> rows = trace_rows(told), defaults = trace_rows(taken);
+  std::string out;
+  const auto add = [&](const std::string& flag) { out += (out.empty() ? "" : " ") + flag; };
+  for (const char* name : kOptions) {
+    const OptionRow& row = *find_row(rows, name);
+    std::string text = row.text();
+    if (text == find_row(defaults, name)->text()) continue;
+    std::erase(text, '"');
+    add(row.flag ? fmt::format("--{}{}", text == "true" ? "" : "no-", name)
+                 : fmt::format("--{} {}", name, text));
+  }
+  // Behind a sky there is no colour.
+  const auto& color = shown.background;
+  if (shown.sky.empty() && color != taken.background)
+    add(fmt::format("--background {},{},{}", color[0], color[1], color[2]));
+  return out;
+}
+
 std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path) {
   std::optional<TraceOptions> out;
   for_each_comment(path, [&](std::string_view key, std::string_view value) {

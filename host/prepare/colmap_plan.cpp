@@ -15,7 +15,6 @@
 namespace raysplats {
 namespace {
 
-constexpr std::size_t kSequentialOverlap = 12;
 constexpr std::size_t kFewestForAxis = 10;
 constexpr std::size_t kBlock = 20;  ///< small, so that the bar moves
 

@@ -10,6 +10,9 @@
 
 namespace raysplats {
 
+/// Photos that follow one by name and are compared with it where not all pairs are.
+constexpr std::size_t kSequentialOverlap = 12;
+
 /// How long the steps take on the cores of this machine, roughly.
 struct ColmapSeconds {
   double features = 0, matches = 0, poses = 0;

@@ -21,10 +21,15 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kCandidates = 3;  ///< frames of which the sharpest is kept
 
-bool is_photo(const fs::path& path) {
+std::string lower_extension(const fs::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+bool is_photo(const fs::path& path) {
+  const std::string extension = lower_extension(path);
   constexpr std::array<const char*, 7> kKnown{".jpg",  ".jpeg", ".png", ".tif",
                                               ".tiff", ".bmp",  ".webp"};
   return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end();
@@ -69,6 +74,24 @@ std::vector<std::string> photos_below(const fs::path& folder, const fs::path& wi
   }
   std::sort(names.begin(), names.end());
   return names;
+}
+
+std::map<std::string, std::size_t> unread_pictures(const fs::path& folder, bool below) {
+  constexpr std::array<const char*, 12> kUnread{".heic", ".heif", ".avif", ".jxl", ".dng", ".cr2",
+                                                ".cr3",  ".nef",  ".arw",  ".raf", ".orf", ".rw2"};
+  std::map<std::string, std::size_t> out;
+  std::error_code error;
+  for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end;
+       at.increment(error)) {
+    std::error_code ignored;
+    const bool hidden = at->path().filename().string().starts_with('.');
+    if (at->is_directory(ignored) && (!below || hidden)) at.disable_recursion_pending();
+    const std::string extension = lower_extension(at->path());
+    if (at->is_regular_file(ignored) &&
+        std::find(kUnread.begin(), kUnread.end(), extension) != kUnread.end())
+      ++out[extension];
+  }
+  return out;
 }
 
 void copy_photos(const fs::path& from,

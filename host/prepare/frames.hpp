@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +16,9 @@ std::vector<std::string> photos_in(const std::filesystem::path& folder);
 /// With those of all folders below it, as "folder/photo", but for hidden folders and `without`.
 std::vector<std::string> photos_below(const std::filesystem::path& folder,
                                       const std::filesystem::path& without = {});
+/// Number of files by extension that are pictures of cameras and phones in formats that are not
+/// read, with those in folders below as photos_below() takes them.
+std::map<std::string, std::size_t> unread_pictures(const std::filesystem::path& folder, bool below);
 
 /// Copies photos to a new folder.
 void copy_photos(const std::filesystem::path& from,

@@ -18,6 +18,8 @@
 #include "prepare/frames.hpp"
 #include "raysplats/error.hpp"
 #include "util/atomic_file.hpp"
+#include "util/number_text.hpp"
+#include "util/output_directory.hpp"
 #include "util/program.hpp"
 #include "util/progress.hpp"
 
@@ -43,7 +45,8 @@ std::size_t number_behind(std::string_view line, std::string_view before) {
 class Work {
  public:
   Work(fs::path data, const PrepareWatch& watch) : data_(std::move(data)), watch_(watch) {
-    fs::create_directories(data_ / "prepare");
+    make_output_directory(data_);
+    make_output_directory(data_ / "prepare");
   }
 
   /// Whether a step is still to be done with these settings, or follows one that was done anew.
@@ -131,6 +134,19 @@ void tell_time(const ColmapPlan& plan, const Work& work) {
       "poses {}",
       format_duration(left.features + left.matches + left.poses), plan.photos,
       format_duration(left.features), format_duration(left.matches), format_duration(left.poses));
+}
+
+/// Which photos are compared, where nobody has said it and the number of photos decides.
+void tell_matching(const PrepareOptions& options, const ColmapPlan& plan, const Work& work) {
+  if (options.matching != Matching::kAuto || plan.photos <= kMostExhaustive) return;
+  if (!work.due("features", plan.feature_settings) &&
+      !work.due("matches", plan.matcher.front() + "\n"))
+    return;
+  spdlog::info(
+      "more than {} photos: each is compared with the {} that follow it by name, as by --matching "
+      "sequential, because every pair would take long; photos in no order need --matching "
+      "exhaustive",
+      kMostExhaustive, kSequentialOverlap);
 }
 
 void find_features(const PrepareOptions& options, const ColmapPlan& plan, Work& work) {
@@ -228,12 +244,22 @@ std::vector<std::string> chosen_photos(const fs::path& input,
   std::string below;
   for (const auto& [folder, count] : left_out)
     below += fmt::format("{}{} ({})", below.empty() ? "" : ", ", folder, count);
+  std::string unread;
+  for (const auto& [extension, count] : unread_pictures(input, options.subfolders))
+    unread += fmt::format("{}{} {}", unread.empty() ? "" : ", ", count, extension);
   if (enough && !below.empty())
     spdlog::info("photos in folders below are left out: {}; --subfolders takes them too", below);
+  if (enough && !unread.empty())
+    spdlog::warn("pictures in formats that are not read are left out: {}; convert them to JPEG",
+                 unread);
   if (enough) return chosen;
   throw DataError(fmt::format(
-      "{} holds {} photos, but at least {} are needed{}", input.string(), chosen.size(),
-      kFewestPhotos,
+      "{} holds {}, but at least {} are needed{}{}", input.string(),
+      counted(chosen.size(), "photo"), kFewestPhotos,
+      unread.empty() ? ""
+                     : fmt::format("; it has pictures in formats that are not read ({}): convert "
+                                   "them to JPEG",
+                                   unread),
       below.empty() ? ""
                     : fmt::format("; folders below it hold some: {}: name one of them, or take all "
                                   "with --subfolders",
@@ -257,7 +283,7 @@ Prepared prepare_data(const fs::path& input,
   std::error_code error;
   if (fs::equivalent(input, data / "images", error))
     throw UsageError(fmt::format("{} is what is read: give another folder with -o", data.string()));
-  if (fs::exists(data / "images") && !fs::exists(data / "prepare/own")) {
+  if (fs::exists(data / "images", error) && !fs::exists(data / "prepare/own", error)) {
     throw DataError(
         fmt::format("{} holds images that 'prepare' has not put there: give another folder with -o",
                     data.string()));
@@ -265,6 +291,7 @@ Prepared prepare_data(const fs::path& input,
   Work work(data, watch);
   const std::vector<std::string> photos = gather_images(input, given, options, work);
   const ColmapPlan plan = plan_colmap(work / "images", photos, options, video);
+  if (!video) tell_matching(options, plan, work);
   tell_time(plan, work);
   find_features(options, plan, work);
   match(plan, work);

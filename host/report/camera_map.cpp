@@ -8,8 +8,11 @@
 #include <cstddef>
 #include <glm/glm.hpp>
 #include <limits>
+#include <map>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "io/json_file.hpp"
 #include "report/html.hpp"
@@ -24,8 +27,10 @@ using Json = nlohmann::json;
 constexpr double kWidth = 460.0;
 constexpr double kHeight = 300.0;
 constexpr double kMargin = 34.0;
+constexpr double kLegendLine = 13.0;
 constexpr double kLook = 14.0;            ///< length of the line that says where a camera looks
 constexpr std::size_t kMostDrawn = 1500;  ///< of a kind, so that the page stays small
+constexpr std::size_t kMostNamed = 300;   ///< of what was trained on, for the same reason
 constexpr double kFarthest = 1e12;        ///< what is farther away is a broken file's
 
 struct Place {
@@ -62,8 +67,14 @@ struct Cameras {
   glm::dvec3 up{0, 0, 1};
 };
 
-Cameras cameras_of(const fs::path& run, const std::vector<Json>& views) {
+Cameras cameras_of(const fs::path& run,
+                   const std::vector<Json>& views,
+                   const std::vector<Json>& photos) {
   Cameras out;
+  std::map<std::string, double> measured;
+  for (const Json& photo : photos) {
+    if (photo.contains("psnr")) measured[report::text(photo, "name")] = number(photo, "psnr");
+  }
   glm::dvec3 up{0};
   // The file is a list; the reader of bounded depth takes objects.
   const std::string text = "{\"cameras\":" + text_of(run / "cameras.json") + "}";
@@ -76,6 +87,9 @@ Cameras cameras_of(const fs::path& run, const std::vector<Json>& views) {
     const std::optional<glm::dvec3> center = vector_of(camera, "position");
     if (!center) continue;
     Place place{*center};
+    place.name = report::text(camera, "img_name");
+    if (const auto found = measured.find(place.name); found != measured.end())
+      place.psnr = found->second;
     const auto rotation = camera.find("rotation");
     if (rotation != camera.end() && rotation->is_array() && rotation->size() == 3) {
       // Rows of camera to world, whose columns are right, down and forward.
@@ -135,14 +149,35 @@ std::string color(double share) {
   return fmt::format("rgb({:.0f},{:.0f},{:.0f})", mixed.r, mixed.g, mixed.b);
 }
 
+/// The least and the greatest PSNR of these.
+struct Range {
+  double worst = std::numeric_limits<double>::infinity(), best = -worst;
+  std::size_t count = 0;  ///< that have one
+
+  explicit Range(const std::vector<Place>& places) {
+    for (const Place& place : places) {
+      if (!place.psnr) continue;
+      worst = std::min(worst, *place.psnr);
+      best = std::max(best, *place.psnr);
+      ++count;
+    }
+  }
+  std::string color_of(double psnr) const {
+    return color(best > worst ? (psnr - worst) / (best - worst) : 0.5);
+  }
+  std::string text() const {
+    return fmt::format("orange {:.2f} dB to blue {:.2f} dB", worst, best);
+  }
+};
+
 std::string drawn(const std::string& title, const Cameras& cameras, const Sheet& sheet) {
   glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-low);
-  double worst = std::numeric_limits<double>::infinity(), best = -worst;
+  // Photos that a run has seen are better than others: each kind has colours of its own.
+  const Range trained(cameras.trained), held_out(cameras.held_out);
   for (const auto* places : {&cameras.trained, &cameras.held_out}) {
     for (const Place& place : *places) {
       low = glm::min(low, sheet.of(place.center));
       high = glm::max(high, sheet.of(place.center));
-      if (place.psnr) worst = std::min(worst, *place.psnr), best = std::max(best, *place.psnr);
     }
   }
   const glm::dvec2 room(kWidth - 2 * kMargin, kHeight - 2 * kMargin);
@@ -160,34 +195,52 @@ std::string drawn(const std::string& title, const Cameras& cameras, const Sheet&
     const std::size_t step = places.size() / kMostDrawn + 1;
     for (std::size_t i = 0; i < places.size(); i += step) draw(places[i]);
   };
+  const auto disc = [](const glm::dvec2& center, int radius, const Place& place, const Range& range,
+                       bool named) {
+    const double psnr = place.psnr.value_or(0.0);
+    const std::string circle =
+        fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\"", center.x, center.y,
+                    radius, range.color_of(psnr));
+    if (!named) return circle + "/>";
+    return fmt::format("{}><title>{}, {:.2f} dB</title></circle>", circle, escaped(place.name),
+                       psnr);
+  };
+  const bool named = cameras.trained.size() <= kMostNamed;
   spread(cameras.trained, [&](const Place& place) {
     const glm::dvec2 from = at(place.center);
     const glm::dvec2 look = kLook * sheet.of(place.look);
     out += fmt::format(
-        "<line class=\"look\" x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{2:.1f}\" y2=\"{3:.1f}\"/><circle "
-        "class=\"plain\" cx=\"{0:.1f}\" cy=\"{1:.1f}\" r=\"2\"/>",
-        from.x, from.y, from.x + look.x, from.y - look.y);
+        "<line class=\"look\" x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>", from.x,
+        from.y, from.x + look.x, from.y - look.y);
+    out += place.psnr ? disc(from, 3, place, trained, named)
+                      : fmt::format("<circle class=\"plain\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2\"/>",
+                                    from.x, from.y);
   });
-  spread(cameras.held_out, [&](const Place& place) {
-    const glm::dvec2 center = at(place.center);
-    const double psnr = place.psnr.value_or(0.0);
-    const double share = best > worst ? (psnr - worst) / (best - worst) : 0.5;
-    out += fmt::format(
-        "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"><title>{}, {:.2f} "
-        "dB</title></circle>",
-        center.x, center.y, color(share), escaped(place.name), psnr);
-  });
-  std::string legend = "grey: trained on";
-  if (!cameras.held_out.empty()) {
-    legend = fmt::format("held out: orange {:.2f} dB to blue {:.2f} dB; ", worst, best) + legend;
+  spread(cameras.held_out,
+         [&](const Place& place) { out += disc(at(place.center), 5, place, held_out, true); });
+  std::vector<std::string> legend;
+  if (held_out.count > 0) legend.push_back("large, held out: " + held_out.text());
+  if (trained.count > 0) legend.push_back("small, trained on: " + trained.text());
+  const bool all = trained.count == cameras.trained.size();
+  if (trained.count == 0) {
+    legend.emplace_back("grey: trained on");
+  } else if (!all) {
+    legend.back() += "; grey: not yet at full size";
   }
-  return out + fmt::format("<text x=\"12\" y=\"{}\">{}</text></svg>\n", kHeight - 6, legend);
+  for (std::size_t i = 0; i < legend.size(); ++i) {
+    out += fmt::format("<text x=\"12\" y=\"{}\">{}</text>",
+                       kHeight - 6 - kLegendLine * static_cast<double>(legend.size() - 1 - i),
+                       legend[i]);
+  }
+  return out + "</svg>\n";
 }
 
 }  // namespace
 
-std::string camera_map(const fs::path& run, const std::vector<Json>& views) {
-  const Cameras cameras = cameras_of(run, views);
+std::string camera_map(const fs::path& run,
+                       const std::vector<Json>& views,
+                       const std::vector<Json>& photos) {
+  const Cameras cameras = cameras_of(run, views, photos);
   if (cameras.trained.empty() && cameras.held_out.empty()) return "";
   const glm::dvec3 right = along(cameras);
   return drawn("From above", cameras, {right, glm::cross(cameras.up, right)}) +

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
@@ -31,8 +32,31 @@ nlohmann::json metrics_of(const fs::path& run) {
   return io::read_json_object(run / "metrics.json");
 }
 
-std::string run_name(const fs::path& run) {
-  return fs::absolute(run).lexically_normal().filename().string();
+std::string run_name(const fs::path& run) { return run_names({run}).front(); }
+
+std::vector<std::string> run_names(const std::vector<fs::path>& runs) {
+  std::vector<std::string> names;
+  std::vector<std::vector<std::string>> above;  // the nearest folder last
+  for (const fs::path& run : runs) {
+    std::vector<std::string> parts;
+    for (const fs::path& part : fs::absolute(run).lexically_normal().relative_path())
+      if (!part.empty()) parts.push_back(part.string());
+    names.push_back(parts.empty() ? "" : parts.back());
+    if (!parts.empty()) parts.pop_back();
+    above.push_back(std::move(parts));
+  }
+  for (bool longer = true; longer;) {
+    longer = false;
+    std::map<std::string, std::size_t> count;
+    for (const std::string& name : names) ++count[name];
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (count[names[i]] == 1 || above[i].empty()) continue;
+      names[i] = above[i].back() + "/" + names[i];
+      above[i].pop_back();
+      longer = true;
+    }
+  }
+  return names;
 }
 
 std::string text_of(const fs::path& path) {

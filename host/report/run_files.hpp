@@ -19,6 +19,8 @@ namespace raysplats::report {
 nlohmann::json metrics_of(const std::filesystem::path& run);
 /// Name of the folder, however it was given.
 std::string run_name(const std::filesystem::path& run);
+/// Names of several: the ends of their paths, each as long as it takes to tell it from the others.
+std::vector<std::string> run_names(const std::vector<std::filesystem::path>& runs);
 /// Content of a file of at most 64 MiB. Throws DataError for a larger one.
 std::string text_of(const std::filesystem::path& path);
 

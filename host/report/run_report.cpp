@@ -197,9 +197,12 @@ std::string run_report(const fs::path& run) {
   std::string facts;
   if (!evaluations.empty()) {
     const Json& last = evaluations.back();
-    facts += row("Held-out views",
-                 fmt::format("PSNR {:.2f} dB, SSIM {:.4f}, {:.0f} views", number(last, "psnr"),
-                             number(last, "ssim"), number(last, "views")));
+    facts +=
+        row("Held-out views",
+            fmt::format(
+                "PSNR {:.2f} dB, SSIM {:.4f}, {}", number(last, "psnr"), number(last, "ssim"),
+                number(last, "views") == 1 ? "1 view"
+                                           : fmt::format("{:.0f} views", number(last, "views"))));
   }
   const double most = number(metrics, "most_gaussians");
   facts += row("Gaussians", fmt::format("{:.0f}", number(metrics, "gaussians")) +
@@ -220,7 +223,7 @@ std::string run_report(const fs::path& run) {
       run_name(run),
       said + "<table>\n" + facts + "</table>\n" + section("Curves", charts(columns, evaluations)) +
           section("Held-out views", held_out(run, evaluations, views)) +
-          section("Cameras", in_grid(camera_map(run, views))) +
+          section("Cameras", in_grid(camera_map(run, views, objects(metrics, "photos")))) +
           section("Model", model_histograms(run)) + section("Exposure", exposures(run)) +
           section("Kernels", kernels(metrics)) +
           section("Settings that differ from the defaults", configuration(run)));

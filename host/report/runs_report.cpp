@@ -35,6 +35,7 @@ struct Run {
   Json metrics;
   std::vector<Json> evaluations;
   std::vector<Json> views;                             ///< of the last evaluation
+  std::map<std::string, std::size_t> by_name;          ///< places of these
   std::map<std::string, std::vector<double>> columns;  ///< of metrics.csv
   std::map<std::string, std::string> settings;
   std::vector<std::string> warnings;
@@ -42,14 +43,17 @@ struct Run {
 
 std::vector<Run> read_runs(const std::vector<fs::path>& folders) {
   std::vector<Run> runs;
+  const std::vector<std::string> names = run_names(folders);
   for (const fs::path& folder : folders) {
     Run run;
     run.folder = folder;
-    run.name = run_name(folder);
+    run.name = names[runs.size()];
     run.letter = std::string(1, static_cast<char>('A' + runs.size()));
     run.metrics = metrics_of(folder);
     run.evaluations = objects(run.metrics, "evaluations");
     run.views = views_of(folder, run.evaluations);
+    for (std::size_t i = 0; i < run.views.size(); ++i)
+      run.by_name.emplace(text(run.views[i], "name"), i);
     run.columns = columns_of(folder / "metrics.csv");
     run.settings = settings(text_of(folder / "config.toml"));
     run.warnings = warnings_of(run.metrics, run.settings, run.columns, run.views);
@@ -153,9 +157,8 @@ std::string charts(const std::vector<Run>& runs) {
 }
 
 const Json* view_named(const Run& run, const std::string& name) {
-  const auto found = std::find_if(run.views.begin(), run.views.end(),
-                                  [&](const Json& view) { return text(view, "name") == name; });
-  return found == run.views.end() ? nullptr : &*found;
+  const auto found = run.by_name.find(name);
+  return found == run.by_name.end() ? nullptr : &run.views[found->second];
 }
 
 /// The views that all runs have, those in which they differ most first.

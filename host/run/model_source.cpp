@@ -50,9 +50,8 @@ void read_options(ModelSource& source, const std::filesystem::path& run) {
 
 void read_header(ModelSource& source) {
   if (io::model_format(source.file) == io::ModelFormat::kPly) {
-    const std::optional<TraceOptions> said = read_ply_options(source.file);
-    if (said) source.sky = said->sky;
-    if (!source.trained) source.header = said;
+    source.header = read_ply_options(source.file);
+    if (source.header) source.sky = source.header->sky;
   }
   source.origin = io::model_origin(source.file);
 }
@@ -70,24 +69,14 @@ SkyLight trained_sky(const ModelSource& source) {
 
 // What somebody who named a folder without a run may have meant.
 std::string meant(const std::filesystem::path& folder) {
-  constexpr std::array<std::string_view, 5> kModels{".ply", ".spz", ".sog", ".splat", ".glb"};
-  constexpr std::size_t kNamed = 3;
   std::error_code error;
   for (const char* cameras : {"transforms.json", "transforms_train.json", "sparse"}) {
     if (std::filesystem::exists(folder / cameras, error))
       return fmt::format("it is a data set: 'raysplats train {} -o RUN' makes a model of it",
                          folder.string());
   }
-  std::vector<std::string> names;
-  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string extension = entry->path().extension().string();
-    if (std::find(kModels.begin(), kModels.end(), extension) != kModels.end())
-      names.push_back(entry->path().filename().string());
-  }
+  const std::vector<std::string> names = models_in(folder);
   if (names.empty()) return "name a run that has saved a model, or a file";
-  std::sort(names.begin(), names.end());
-  names.resize(std::min(names.size(), kNamed));
   return fmt::format("name a file in it, such as {}", fmt::join(names, ", "));
 }
 
@@ -101,6 +90,22 @@ bool is_run_folder(const std::filesystem::path& path) {
 
 bool is_model_folder(const std::filesystem::path& path) {
   return is_run_folder(path) || holds_sog(path);
+}
+
+std::vector<std::string> models_in(const std::filesystem::path& folder) {
+  constexpr std::array<std::string_view, 5> kModels{".ply", ".spz", ".sog", ".splat", ".glb"};
+  constexpr std::size_t kNamed = 3;
+  std::error_code error;
+  std::vector<std::string> names;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string extension = entry->path().extension().string();
+    if (std::find(kModels.begin(), kModels.end(), extension) != kModels.end())
+      names.push_back(entry->path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  names.resize(std::min(names.size(), kNamed));
+  return names;
 }
 
 ModelSource find_model(const std::filesystem::path& path) {

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "io/scene_file.hpp"
 #include "raysplats/dataset.hpp"
@@ -17,7 +19,7 @@ struct ModelSource {
   std::filesystem::path file;
   std::optional<TrainOptions>
       trained;  ///< of the run folder it is in; none for a PLY from elsewhere
-  std::optional<TraceOptions> header;     ///< of a PLY that is in no run: what its header says
+  std::optional<TraceOptions> header;     ///< what the header of a PLY says
   SkyLight sky;                           ///< that the header of a PLY names
   std::optional<std::int64_t> iteration;  ///< of RUN/point_cloud/iteration_N
   std::array<double, 3> origin{};         ///< from which its positions count (Dataset::origin)
@@ -29,10 +31,13 @@ bool is_run_folder(const std::filesystem::path& path);
 /// Whether it is a folder that find_model() looks into: of a run, or an unpacked SOG.
 bool is_model_folder(const std::filesystem::path& path);
 
+/// Names of a few files in a folder that are models by their extension, sorted.
+std::vector<std::string> models_in(const std::filesystem::path& folder);
+
 /// Finds the newest RUN/point_cloud/iteration_N/point_cloud.ply of a run folder, and the meta.json
-/// of an unpacked SOG; a file is taken as it is, and when it lies in a run folder at that depth, that run's configuration comes
-/// with it. Throws DataError when there is nothing to load, UsageError when the run's configuration
-/// is broken.
+/// of an unpacked SOG; a file is taken as it is, and when it lies in a run folder at that depth,
+/// that run's configuration comes with it. Throws DataError when there is nothing to load,
+/// UsageError when the run's configuration is broken.
 ModelSource find_model(const std::filesystem::path& path);
 
 /// The image size and the held-out views of the model's training, the defaults when nothing is

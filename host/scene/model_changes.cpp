@@ -36,6 +36,16 @@ glm::dmat4 uprighting(const glm::dvec3& up) {
   return glm::rotate(glm::dmat4(1.0), std::atan2(sine, cosine), axis / sine);
 }
 
+void check_box(const CropBox& box) {
+  for (int i = 0; i < 3; ++i) {
+    if (box.low[i] <= box.high[i]) continue;
+    throw UsageError(fmt::format(
+        "The box to crop to has no inside: its least {} is {} and its greatest {}: swap "
+        "them, as in least x,y,z and then greatest x,y,z",
+        "xyz"[i], box.low[i], box.high[i]));
+  }
+}
+
 }  // namespace
 
 glm::dmat4 movement(const ModelChanges& changes) {
@@ -54,6 +64,7 @@ Gaussians changed(const Gaussians& model, const ModelChanges& changes) {
     throw UsageError(fmt::format("min-opacity is 0 to 1, not {}", *changes.min_opacity));
   if (changes.sh_degree && (*changes.sh_degree < 0 || *changes.sh_degree > kMaxShDegree))
     throw UsageError(fmt::format("sh-degree is 0 to {}, not {}", kMaxShDegree, *changes.sh_degree));
+  if (changes.crop) check_box(*changes.crop);
   Gaussians out = changes.min_opacity ? with_opacity(model, *changes.min_opacity) : model;
   const glm::dmat4 map = movement(changes);
   if (map != glm::dmat4(1.0)) out = transformed(out, map);

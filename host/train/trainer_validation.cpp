@@ -52,7 +52,7 @@ void Trainer::Impl::judge() {
   if (!rows.empty()) former = best_of(rows).iteration;
   run.record_validation({iteration, training.seconds(), psnr, report.mean.ssim,
                          report.images.size(), gaussians.count, report.mean.psnr_corrected,
-                         report.mean.psnr_all});
+                         report.mean.psnr_all, report.mean.psnr_aligned});
   if (best_of(rows).iteration == iteration) {
     save_model();
     if (former > 0 && !is_scheduled(options, former)) run.remove_model(former);

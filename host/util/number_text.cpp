@@ -61,6 +61,11 @@ bool looks_like_number(std::string_view text) {
 
 }  // namespace
 
+std::string counted(std::size_t count, std::string_view one, std::string_view many) {
+  if (count == 1) return fmt::format("1 {}", one);
+  return many.empty() ? fmt::format("{} {}s", count, one) : fmt::format("{} {}", count, many);
+}
+
 std::string number_words(bool whole, double low, double high) {
   const char* kind = whole ? "a whole number" : "a number";
   if (high >= kNoBound) {

@@ -31,7 +31,8 @@ struct ModelChanges {
 };
 
 /// The model with these changes; what is left keeps its order, and harmonics turn as well. Throws
-/// UsageError for a number out of range and for an `up` of length 0.
+/// UsageError for a number out of range, an `up` of length 0 and a box whose least is above its
+/// greatest.
 Gaussians changed(const Gaussians& model, const ModelChanges& changes);
 
 }  // namespace raysplats

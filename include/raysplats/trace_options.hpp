@@ -73,4 +73,13 @@ struct TraceOptions {
                                    ///< CPUs, elsewhere a quarter of the memory, 1 to 4 GiB
 };
 
+/// What models are trained with and shown by unless something else is said: the order of hits in
+/// which standard viewers blend, and ellipsoids no larger than what they show.
+inline TraceOptions peak_order() {
+  TraceOptions options;
+  options.hit_order = HitOrder::kPeak;
+  options.adaptive_radius = true;
+  return options;
+}
+
 }  // namespace raysplats

@@ -80,15 +80,6 @@ struct LearningRate {
   double final_value = 0;
 };
 
-/// What a model is trained with unless options say otherwise: the order of hits in which standard
-/// viewers blend, and ellipsoids no larger than what they show.
-inline TraceOptions peak_order() {
-  TraceOptions options;
-  options.hit_order = HitOrder::kPeak;
-  options.adaptive_radius = true;
-  return options;
-}
-
 /// Everything that decides how a model is trained. The defaults are those of configs/default.toml;
 /// every member is a key of the configuration files and an option of `raysplats train` (the name
 /// with dashes).

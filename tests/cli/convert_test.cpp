@@ -138,6 +138,7 @@ TEST_CASE("convert says in one sentence what it will not do") {
   refused({"convert", balls, folder / "a.spz", "--crop", "0,0,0,1,1"}, 2, "-1,-1,0,1,1,2");
   refused({"convert", balls, folder / "a.spz", "--crop", "0,0,0,1,1,1", "--crop-min", "0,0,0"}, 2,
           "--crop-min");
+  refused({"convert", balls, folder / "a.spz", "--crop", "1,1,1,0,0,0"}, 2, "swap them");
   refused({"convert", balls}, 2, "output");
   write_file(folder / "notes.txt", "hello");
   refused({"convert", folder / "notes.txt", "-o", folder / "b.ply"}, 3, "no model that is known");

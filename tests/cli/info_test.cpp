@@ -104,6 +104,11 @@ TEST_CASE("info describes meshes, scene files and the header of a model") {
   raysplats::write_ply(folder / "shown.ply", raysplats::read_ply(folder / "balls.ply"), trace);
   CHECK(json_of(folder / "shown.ply").at("trace").at("quantile") == 5.5);
   CHECK(has(told(folder / "shown.ply"), "entry order, quantile 5.5"));
+  trace.background = {0.25f, 0.5f, 1.0f};
+  raysplats::write_ply(folder / "shown.ply", raysplats::read_ply(folder / "balls.ply"), trace);
+  CHECK(json_of(folder / "shown.ply").at("trace").at("background") ==
+        nlohmann::json{0.25, 0.5, 1.0});
+  CHECK(has(told(folder / "shown.ply"), "background       0.25, 0.5, 1\n"));
 
   write_file(folder / "scene.toml",
              "[[model]]\nfile = \"balls.ply\"\n[[mesh]]\nfile = \"wall.obj\"\n"
@@ -175,6 +180,29 @@ TEST_CASE("info describes every kind of file that is read") {
     CHECK(outcome.code == 3);
     CHECK(has(outcome.err, name));
   }
+}
+
+TEST_CASE("info says what it reads, and which models a folder without a run holds") {
+  const TemporaryFolder folder;
+  const auto refused = [&](const std::string& path, const std::string& part) {
+    const Outcome outcome = raysplats_program({"info", path});
+    INFO(outcome.err);
+    CHECK(outcome.code == 3);
+    CHECK(one_sentence(outcome));
+    CHECK(has(outcome.err, part));
+  };
+  write_file(folder / "README.md", "# Notes\n");
+  write_file(folder / "metrics.csv", "iteration,loss\n");
+  for (const char* name : {"README.md", "metrics.csv"})
+    refused(folder / name, std::string(name) + " is nothing that info reads: those are models");
+  write_file(folder / "iteration_60/point_cloud.ply", ply_file(1));
+  refused(folder / "iteration_60",
+          "neither a run nor a data set: name a file in it, such as point_cloud.ply");
+  write_file(folder / "empty/notes.txt", "");
+  refused(folder / "empty", "is no data set");
+  // One thing is no several things.
+  write_file(folder / "wall.obj", "v 0 0 0\nv 2 0 0\nv 0 3 0\nf 1 2 3\n");
+  CHECK(has(told(folder / "wall.obj"), "1 triangle, 3 vertices"));
 }
 
 TEST_CASE("info describes the parts of captures, meshes and runs") {

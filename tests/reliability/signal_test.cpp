@@ -68,7 +68,26 @@ TEST_CASE("SIGINT and SIGTERM finish the iteration, save and end with 130") {
     CHECK(has(outcome.err, "iteration " + std::to_string(newest.iteration)));
     CHECK(std::filesystem::exists(model_of(run, static_cast<int>(newest.iteration))));
     CHECK(temporaries(run) == 0);
+    const std::string page = run + "/report.html";
+    REQUIRE(std::filesystem::exists(page));
+    CHECK(has(read_file(page), "Not over"));
+    CHECK(has(outcome.out, "Report: " + page));
   }
+}
+
+TEST_CASE("an interrupted run whose report cannot be written says and ends the same") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run";
+  RunningProgram program(endless(run));
+  wait_for_checkpoint(program, run);
+  // A folder is in the page's way.
+  std::filesystem::create_directories(run + "/report.html/in the way");
+  REQUIRE(::kill(program.process(), SIGINT) == 0);
+  const Outcome outcome = program.wait();
+  INFO(outcome.err);
+  CHECK(outcome.code == 130);
+  CHECK(has(outcome.err, "Interrupted at iteration"));
+  CHECK(has(outcome.err, "--resume"));
 }
 
 TEST_CASE("a second signal of another kind ends the run at once with whole files") {

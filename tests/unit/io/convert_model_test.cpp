@@ -99,6 +99,10 @@ TEST_CASE("changes out of range are refused, and half a box is half of space") {
   CHECK(contains(refused([](ModelChanges& c) { c.min_opacity = 1.5; }), "min-opacity is 0 to 1"));
   CHECK(contains(refused([](ModelChanges& c) { c.sh_degree = 5; }), "sh-degree is 0 to 4"));
   CHECK(!refused([](ModelChanges& c) { c.translate.x = HUGE_VAL; }).empty());
+  CHECK(contains(refused([](ModelChanges& c) {
+                   c.crop = CropBox{{0, 2, 0}, {1, 1, 1}};
+                 }),
+                 "its least y is 2 and its greatest 1: swap them"));
   ModelChanges half;
   half.crop.emplace().low.x = 0.0;
   REQUIRE(changed(model, half).size() == 1);
@@ -141,6 +145,40 @@ TEST_CASE("conversion refuses what would be lost") {
   CHECK(!fs::exists(scratch / "c.ply"));
 }
 
+TEST_CASE("conversion names what only the header of our PLY says") {
+  const Scratch scratch;
+  write_model(scratch / "a.ply", trained_like(3, 1));
+  const auto told = [&](const char* to, const std::optional<TraceOptions>& trace) {
+    return convert_model(scratch / "a.ply", scratch / to, {}, {}, trace, true).losses;
+  };
+  TraceOptions trace = peak_order();
+  // What a reader of a file that says nothing takes is not lost.
+  CHECK(told("b.glb", trace) == "nothing is lost");
+  CHECK(told("b.glb", std::nullopt) == "nothing is lost");
+  trace.background = {1, 1, 1};
+  CHECK(told("b.ply", trace) == "nothing is lost");
+  CHECK(contains(told("b.glb", trace), "give --background 1,1,1 to render it"));
+  CHECK(!contains(told("b.glb", trace), "nothing is lost"));
+  trace.hit_order = HitOrder::kEntry;
+  trace.adaptive_radius = false;
+  trace.quantile = 9.5f;
+  trace.near_depth = 0.25f;
+  trace.min_transmittance = 0.5f;
+  trace.max_hits = 77;
+  trace.memory_budget = std::size_t{17} << 20;  // shows nothing else
+  for (const char* name : {"b.glb", "b.spz", "b.sog", "b.splat", "b.compressed.ply"}) {
+    CAPTURE(name);
+    CHECK(contains(told(name, trace),
+                   "give --hit-order entry --quantile 9.5 --no-adaptive-radius --near 0.25 "
+                   "--min-transmittance 0.5 --max-hits 77 --background 1,1,1 to render it"));
+  }
+  trace = peak_order();
+  trace.background = {1, 1, 1};
+  trace.sky = {{0.5f, 0.5f, 0.5f}};
+  CHECK(contains(told("b.glb", trace), "the sky behind the model is not said"));
+  CHECK(!contains(told("b.glb", trace), "--background"));
+}
+
 TEST_CASE("losses are named for the model at hand") {
   const Gaussians flat = trained_like(2, 0);
   CHECK(contains(io::losses(io::ModelFormat::kSplat, trained_like(2, 2)), "SH"));
@@ -152,6 +190,7 @@ TEST_CASE("losses are named for the model at hand") {
   CHECK(contains(io::losses(io::ModelFormat::kSpz, needles), "clamped"));
   CHECK(!contains(io::losses(io::ModelFormat::kSpz, flat), "clamped"));
   CHECK(contains(io::losses(io::ModelFormat::kSpz, flat), "1/4096"));
+  CHECK(contains(io::losses(io::ModelFormat::kSpz, flat), "rotations to 1/400"));
   // 24 bits hold 100000 with 6 of them behind the point.
   Gaussians far = flat;
   far.means[4] = -100000.5f;

@@ -54,7 +54,7 @@ Camera tilted_camera(int width, int height) {
 }
 
 /// The camera about its centre, turned by exp([w]x) on the left, its centre moved by `shift`.
-Camera moved(const Camera& camera, const glm::dvec3& shift, const glm::dvec3& w) {
+Camera stepped(const Camera& camera, const glm::dvec3& shift, const glm::dvec3& w) {
   Camera out = camera;
   const double angle = glm::length(w);
   if (angle > 0.0) {
@@ -111,11 +111,11 @@ struct Check {
       glm::dvec3 step(0.0);
       step[k] = kStep;
       const glm::dvec3 none(0.0);
-      compare(g.center[k], render(parameters, options, moved(camera, step, none)),
-              render(parameters, options, moved(camera, -step, none)), at, loss,
+      compare(g.center[k], render(parameters, options, stepped(camera, step, none)),
+              render(parameters, options, stepped(camera, -step, none)), at, loss,
               "center " + std::to_string(k));
-      compare(g.rotation[k], render(parameters, options, moved(camera, none, step)),
-              render(parameters, options, moved(camera, none, -step)), at, loss,
+      compare(g.rotation[k], render(parameters, options, stepped(camera, none, step)),
+              render(parameters, options, stepped(camera, none, -step)), at, loss,
               "rotation " + std::to_string(k));
     }
     CHECK(crossed == 0);

@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -309,7 +310,8 @@ TEST_CASE("a report shows model, cameras, exposure, kernels and where it all com
   CHECK(has(page, "<p>Device time of the whole run.</p>"));
   CHECK(!has(page, advice));
   CHECK(has(page, "<p>Complete: 20.0 dB on 0 held-out views, nothing to warn of.</p>"));
-  CHECK(has(page, "held out: orange 10.00 dB to blue 30.00 dB"));
+  CHECK(has(page, "large, held out: orange 10.00 dB to blue 30.00 dB"));
+  CHECK(has(page, ">grey: trained on<"));
   CHECK(has(page, "<title>&lt;low&gt;, 10.00 dB</title>"));
   CHECK(has(page, "fill=\"rgb(214,96,30)\""));
   // 4 units across fill the width between margins; the view 2 units up stands on top of the side.
@@ -319,6 +321,26 @@ TEST_CASE("a report shows model, cameras, exposure, kernels and where it all com
   CHECK(has(page, "aria-label=\"Gain of the colours\""));
   // 30 of 40 stand at an opacity of a half: the highest bar, in the middle.
   CHECK(has(page, "x=\"250.0\" y=\"30.0\""));
+}
+
+TEST_CASE("cameras that were trained on have the colours of their own PSNR") {
+  const Run run;
+  run.write("cameras.json", R"([{"img_name":"<a>","position":[0,0,0]},
+    {"img_name":"b","position":[4,0,0]},{"img_name":"c","position":[2,1,0]},
+    {"img_name":"d","position":[1,1,0]}])");
+  run.write("eval/iteration_200/metrics.json",
+            R"({"images":[{"name":"low","psnr":10,"center":[1,0,0]},
+              {"name":"high","psnr":30,"center":[2,-2,0]}]})");
+  run.write("metrics.json", R"({"complete":true,"evaluations":[{"iteration":200,"psnr":20}],
+    "photos":[{"name":"<a>","psnr":25,"center":[0,0,0]},{"name":"b","psnr":35,"center":[4,0,0]},
+              {"name":"c","sharpness":0.1,"center":[2,1,0]}]})");
+  const std::string page = run_report(run.path());
+  CHECK(fault(page) == "");
+  CHECK(has(page, "large, held out: orange 10.00 dB to blue 30.00 dB"));
+  CHECK(has(page, "small, trained on: orange 25.00 dB to blue 35.00 dB; grey: not yet at full"));
+  CHECK(has(page, "r=\"3\" fill=\"rgb(214,96,30)\"><title>&lt;a&gt;, 25.00 dB</title>"));
+  CHECK(has(page, "r=\"3\" fill=\"rgb(60,120,215)\"><title>b, 35.00 dB</title>"));
+  CHECK(has(page, "class=\"plain\""));
 }
 
 TEST_CASE("several runs stand side by side, with what differs between them") {
@@ -368,6 +390,38 @@ TEST_CASE("several runs stand side by side, with what differs between them") {
   CHECK(has(bare, "All settings are the same"));
   CHECK_THROWS_AS(runs_report({first.path()}), UsageError);
   CHECK_THROWS_AS(runs_report({first.path(), first.path() / "none"}), DataError);
+}
+
+TEST_CASE("runs of one folder name are told apart by the folders above") {
+  const Run first("day 1/bike/run"), second("day 2/bike/run"), third("run"), fourth("other");
+  const std::string two = runs_report({first.path(), second.path() / ""});
+  CHECK(has(two, "A: day 1/bike/run</th>"));
+  CHECK(has(two, "B: day 2/bike/run</th>"));
+  CHECK(has(two, "<title>day 1/bike/run, day 2/bike/run</title>"));
+  const std::string two_others = runs_report({third.path(), fourth.path() / ""});
+  CHECK(has(two_others, "A: run</th>"));
+  CHECK(has(two_others, "B: other</th>"));
+  // One folder twice has one name, whatever is taken in.
+  CHECK(fault(runs_report({third.path(), third.path()})) == "");
+}
+
+TEST_CASE("runs of very many common views are compared in the time that reading them takes") {
+  std::string images;
+  constexpr int kViews = 20000;
+  for (int i = 0; i < kViews; ++i) {
+    images.append(i == 0 ? "" : ",").append("{\"name\":\"view_").append(std::to_string(i));
+    images.append(".png\",\"psnr\":20}");
+  }
+  const Run first("one"), second("two");
+  for (const Run* run : {&first, &second})
+    run->write("eval/iteration_200/metrics.json", "{\"images\":[" + images + "]}");
+  const auto start = std::chrono::steady_clock::now();
+  const std::string page = runs_report({first.path(), second.path()});
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  CHECK(has(page, "view_19999.png"));
+  // It took 20 s where every view was sought among all.
+  CHECK(seconds < 10);
 }
 
 TEST_CASE("text, bytes and curves as HTML has them") {

@@ -104,6 +104,13 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   CHECK(trace.sky == shown.sky);
   CHECK(read_ply(moved).size() == 1);
 
+  // In the run, too, the header knows a background that the photos have chosen.
+  std::ofstream(run / "config.toml") << to_toml(TrainOptions{});
+  const ModelSource inside = find_model(run);
+  REQUIRE(inside.trained.has_value());
+  CHECK(inside.header.value().background == shown.background);
+  CHECK(trace_options(inside, false).quantile == TraceOptions{}.quantile);
+
   // In a scene the first model that tells decides.
   const fs::path other = folder.path() / "other.ply";
   write_ply(other, model);

@@ -27,6 +27,14 @@ TEST_CASE("numbers are read in the spellings of TOML and of shells") {
   for (const char* text : {"inf", "nan", "", "1,5", "0x"}) CHECK_FALSE(parse_real(text));
 }
 
+TEST_CASE("a number of things is one thing or several") {
+  CHECK(counted(0, "photo") == "0 photos");
+  CHECK(counted(1, "photo") == "1 photo");
+  CHECK(counted(2, "photo") == "2 photos");
+  CHECK(counted(1, "mesh", "meshes") == "1 mesh");
+  CHECK(counted(2, "mesh", "meshes") == "2 meshes");
+}
+
 TEST_CASE("every spelling of a list gives the same items") {
   const Words expected{"5", "10", "15"};
   for (const Words& values :
