@@ -107,7 +107,7 @@ class PageCase(BrowserCase):
     def settle(self):
         """Waits for the best picture of the last of what listen() has heard."""
         return self.wait("the last picture", lambda: (
-            lambda s, sent: s if sent and s["last"]["last"] and s["last"]["id"] == sent["id"] else None)(
+            lambda s, sent: s if sent and s["last"] and s["last"]["last"] and s["last"]["id"] == sent["id"] else None)(
                 self.seen(), self.sent()))
 
     def target(self):
