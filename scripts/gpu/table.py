@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of kernels in docs/gpu.md, from the stored figures: what each takes, and how many waves of it are resident."""
+"""What else is made of the stored figures: the tables of kernels in docs/gpu.md (what each takes, and how many waves of it are
+resident), and what the library's model of speed knows of its cards' kernels."""
 import os
 
-DOCUMENT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "gpu.md")
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+DOCUMENT = os.path.join(ROOT, "docs", "gpu.md")
+SOURCE = os.path.join(ROOT, "host", "bench", "compiled_kernels.cpp")
 INTEL = ("dg2-g10", "tgllp")
 
 # Label; work-items of a group; whether rows of its own lie in local memory, which halves its budget of waves; program and
@@ -41,6 +44,22 @@ AMD = {"gfx906": (256, 4, 10, 16384), "gfx90a": (512, 8, 8, 16384), "gfx1030": (
 # Of a multiprocessor of NVIDIA's: most warps, most groups, local bytes, and of them those that each group takes beside its own.
 NVIDIA = {"sm_70": (64, 32, 98304, 0), "sm_86": (48, 16, 102400, 1024), "sm_90": (64, 32, 233472, 1024)}
 BUDGETS = {"gfx906": 4, "gfx90a": 4, "gfx1030": 8, "gfx1100": 8, "sm_70": 16, "sm_86": 16, "sm_90": 16}
+
+# The model of speed: targets of its cards; kernels of its rows (speed_model.cpp) and work-items of a group.
+MODEL_TARGETS = ["gfx1100", "dg2-g10", "sm_86", "sm_90"]
+MODEL_KERNELS = [
+    ("sort pairs: scatter", 256),
+    ("prepare sh0: prepare_view", 64),
+    ("lists: fill_tiles", 64),
+    ("group forward render: trace_forward_group", 32),
+    ("group forward train: trace_forward_group", 32),
+    ("group backward atomic: trace_backward_group", 32),
+    ("finalize group sh3: finalize_group", 64),
+    ("loss group: group_slopes", 256),
+    ("loss group: group_gradient", 256),
+    ("adam sh3: adam_step", 64),
+    ("rays: trace_rays", 64),
+]
 
 
 def _cell(target, figures):
@@ -108,17 +127,46 @@ def _updated(lines, baseline, targets):
     return lines
 
 
-def _read():
-    with open(DOCUMENT, encoding="utf-8") as file:
-        return file.read().split("\n")
+def _source(baseline):
+    rows = []
+    for target in MODEL_TARGETS:
+        for kernel, group in MODEL_KERNELS:
+            figures = baseline[target][kernel]
+            rows.append(f'{{"{target}", "{kernel}", {figures["registers"]}, {figures["local"]}, {group}, {figures["width"]}}}')
+    joined = ",\n      ".join(rows)
+    return f"""// SPDX-License-Identifier: Apache-2.0
+// Written by scripts/gpu_compile.py --write-baseline, from scripts/gpu/baseline.json.
+#include "bench/speed_model.hpp"
+
+namespace raysplats {{
+
+const std::vector<CompiledKernel>& compiled_kernels() {{
+  static const std::vector<CompiledKernel> all{{
+      {joined}}};
+  return all;
+}}
+
+}}  // namespace raysplats
+"""
 
 
-def is_current(baseline, targets):
-    lines = _read()
-    return lines == _updated(lines, baseline, targets)
+def _read(path):
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+def _written(baseline, targets):
+    """What every file has to hold, by its path."""
+    lines = _read(DOCUMENT).split("\n")
+    return {DOCUMENT: "\n".join(_updated(lines, baseline, targets)), SOURCE: _source(baseline)}
+
+
+def stale(baseline, targets):
+    """The files that hold other figures, from the project's root."""
+    return [os.path.relpath(path, ROOT) for path, text in _written(baseline, targets).items() if _read(path) != text]
 
 
 def write(baseline, targets):
-    lines = _updated(_read(), baseline, targets)
-    with open(DOCUMENT, "w", encoding="utf-8") as file:
-        file.write("\n".join(lines))
+    for path, text in _written(baseline, targets).items():
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
