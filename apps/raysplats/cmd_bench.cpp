@@ -152,7 +152,7 @@ void run(const CLI::App& command, const Options& options) {
   if (!options.model.empty()) {
     const ModelSource source = find_model(options.model);
     model = load_model(options, source);
-    bench.trace = trace_options(source, false);
+    bench.trace = trace_options(source);
   } else if (!options.cameras.empty()) {
     throw UsageError("--cameras goes with --model");
   }

@@ -52,9 +52,8 @@ void run(Options& options) {
     if (options.crop_max) changes.crop->high = vector_of(*options.crop_max);
   }
   const ModelSource source = find_model(options.input);
-  // The header knows the background, which in a run may be one that its photos choose.
-  std::optional<TraceOptions> trace = source.header;
-  if (!trace && source.trained) trace = trace_options(source, false);
+  std::optional<TraceOptions> trace;
+  if (source.header || source.trained) trace = trace_options(source);
   const ModelEncoding encoding{options.spz_axes == "rub" ? SpzAxes::kRub : SpzAxes::kPly,
                                options.spz_version};
   const Conversion done =

@@ -54,7 +54,7 @@ void run(const Options& options, const GlobalOptions& global) {
   check_not_data(options.output, dataset);
   check_leftovers(options.output, evaluated_names(dataset, split), FrameFormat::kPng,
                   options.overwrite);
-  const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
+  const TraceOptions trace = options.trace.over(trace_options(source));
   make_output_directory(options.output);
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
     const Model on_device(context, model);

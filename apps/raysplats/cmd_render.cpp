@@ -25,6 +25,7 @@
 #include "scene/orbit.hpp"
 #include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -188,7 +189,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
     check_not_data(options.output, dataset);
   RenderOutput output(options, cameras, cameras.size(), fps, closed);
 
-  TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
+  TraceOptions trace = options.trace.over(trace_options(source));
   trace.depth = options.depth || options.hits;
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
     const Model on_device(context, model);
@@ -214,7 +215,7 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
     const std::string speed =
         fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,
                     1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
-    fmt::print("{} frames in {} ({})\n", report.frames, output.name(),
+    fmt::print("{} in {} ({})\n", counted(report.frames, "frame"), output.name(),
                with_compiling(speed, context.build_seconds()));
     if (options.device.profile) fmt::print("{}", context.profile_table());
   });
@@ -304,7 +305,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("FILE");
   command
       ->add_option("--shutter-samples", options->shutter_samples,
-                   "Motion blur: moments of every frame that are averaged (models alone)")
+                   "Motion blur: moments of every frame that are averaged")
       ->group(time)
       ->transform(whole_between(1, 1024))
       ->type_name("N");

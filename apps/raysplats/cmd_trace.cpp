@@ -30,7 +30,7 @@ void run(const Options& options) {
   const ModelSource source = find_model(options.model);
   const io::RayList list = io::read_rays(options.rays);
   const Gaussians gaussians = in_morton_order(read_model(source.file));
-  const TraceOptions trace = options.trace.over(trace_options(source, false));
+  const TraceOptions trace = options.trace.over(trace_options(source));
   const std::unique_ptr<Context> context = open_context(options.device);
   const Model model(*context, gaussians);
   Tracer tracer(*context, trace);

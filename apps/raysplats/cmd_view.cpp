@@ -23,6 +23,7 @@
 #include "scene/trace_rows.hpp"
 #include "train/mirror_meshes.hpp"
 #include "util/interrupt.hpp"
+#include "util/number_text.hpp"
 #include "view/dropped_meshes.hpp"
 #include "view/photos.hpp"
 #include "view/view_state.hpp"
@@ -111,7 +112,7 @@ std::string scene_tail(const ModelSource& source, TraceOptions trace, const glm:
   std::string text = fmt::format(
       "\n[[light]]\nkind = \"directional\"\ndirection = [{}, {}, {}]\n\n[render]\nsamples = 16\n",
       light.direction[0], light.direction[1], light.direction[2]);
-  TraceOptions own = trace_options(source, false);
+  TraceOptions own = trace_options(source);
   const std::vector<OptionRow> given = trace_rows(trace);
   const std::vector<OptionRow> trained = trace_rows(own);
   std::string rows;
@@ -165,8 +166,9 @@ void view_scene(const Options& options) {
   if (!up) up = file.camera.up;
   view::ViewState state =
       view::first_look(scene_extent(loaded.scene.gaussians), loaded.cameras, up);
-  state.about = fmt::format("{} Gaussians, {} meshes, {} lights", loaded.scene.gaussians.size(),
-                            loaded.scene.meshes.size(), loaded.scene.lights.size());
+  state.about = fmt::format("{}, {}, {}", counted(loaded.scene.gaussians.size(), "Gaussian"),
+                            counted(loaded.scene.meshes.size(), "mesh", "meshes"),
+                            counted(loaded.scene.lights.size(), "light"));
   state.has_background = false;
   const std::unique_ptr<Context> context = open_context(options.device);
   const auto pictures = view::scene_pictures(*context, loaded.scene);
@@ -182,7 +184,7 @@ void view_model(const Options& options) {
   Dataset dataset;
   if (!options.data.data.empty())
     dataset = load_dataset(options.data.data, options.data.settings.over(dataset_options(source)));
-  const TraceOptions trace = options.trace.over(trace_options(source, dataset.alpha_is_background));
+  const TraceOptions trace = options.trace.over(trace_options(source));
   const std::vector<View> views = views_of(options, dataset);
   const std::vector<Camera> cameras = cameras_of(options, views, source);
   view::ViewState state = view::first_look(scene_extent(gaussians), cameras, up_of(options));

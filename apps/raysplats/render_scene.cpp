@@ -33,10 +33,6 @@ void check(const RenderFlags& flags) {
     throw UsageError(
         "--near is for models alone: rays that leave a mirror have no camera that could be near");
   }
-  if (flags.shutter_samples) {
-    throw UsageError(
-        "--shutter-samples is for models alone: what moves in a scene file has no blur");
-  }
   if (flags.ellipse || flags.spiral || flags.interpolate) {
     throw UsageError(
         "--ellipse, --spiral and --interpolate are for models: give a scene file --path or "
@@ -70,8 +66,14 @@ void check_angle(const RenderFlags& flags, const SceneCamera& camera) {
   }
 }
 
-/// What the command line says goes over what the file says. `fps` is that of a path.
-void override_camera(const RenderFlags& flags, SceneFile& scene, std::optional<double>& fps) {
+struct Pace {
+  std::optional<double> fps;  ///< of a path
+  bool closed = false;        ///< the frame after the last one is the first
+};
+
+/// What the command line says goes over what the file says.
+Pace override_camera(const RenderFlags& flags, SceneFile& scene) {
+  Pace pace;
   SceneCamera& camera = scene.camera;
   scene.width = flags.width;
   scene.height = flags.height;
@@ -113,7 +115,7 @@ void override_camera(const RenderFlags& flags, SceneFile& scene, std::optional<d
     scene.width = scene.height = std::nullopt;  // they have it already
     // One frame for each, unless the file's animation is longer or shorter.
     if (!scene.frames) scene.frames = static_cast<int>(camera.given.size());
-    fps = path.fps;
+    pace = {path.fps, path.closed};
   } else if (!flags.cameras.empty()) {
     camera = {};
     camera.source = Source::kFile;
@@ -121,6 +123,8 @@ void override_camera(const RenderFlags& flags, SceneFile& scene, std::optional<d
   }
   if (data || camera.source == Source::kFile) camera.place = scene.path.string();
   if (!data) scene.downscale = flags.data.settings.over({}).downscale;
+  pace.closed |= camera.source == Source::kOrbit;
+  return pace;
 }
 
 /// "START:END" as a range within `count` frames.
@@ -186,8 +190,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   SceneFile file = read_scene_file(flags.model);
   find_models(file);
   check_angle(flags, file.camera);
-  std::optional<double> fps;
-  override_camera(flags, file, fps);
+  const Pace pace = override_camera(flags, file);
   file.trained = flags.trace.over(file.trace.over(file.trained));
   file.trace = {};
   file.render = flags.render.over(file.render);
@@ -195,7 +198,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   const auto [first, last] = parse_frames(flags.frames, loaded.cameras.size());
   if (!file.camera.file.empty() && !flags.output.empty())
     check_not_data(flags.output, file.camera.file);
-  RenderOutput output(flags, loaded.cameras, last - first, fps, false);
+  RenderOutput output(flags, loaded.cameras, last - first, pace.fps, pace.closed);
 
   share_work(flags.device, global,
              [&, first = first, last = last](Communicator& ranks, Context& context) {

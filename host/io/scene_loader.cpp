@@ -184,8 +184,8 @@ bool LoadedScene::moves() const {
                      [](const SceneMesh& mesh) { return mesh.moves(); });
 }
 
-std::vector<Mesh> LoadedScene::meshes(int frame) const {
-  const double time = frames() > 0 ? static_cast<double>(frame) / frames() : 0.0;
+std::vector<Mesh> LoadedScene::meshes(double frame) const {
+  const double time = frames() > 0 ? frame / frames() : 0.0;
   std::vector<Mesh> out;
   out.reserve(still.size());
   for (std::size_t i = 0; i < still.size(); ++i) {

@@ -20,8 +20,8 @@ struct LoadedScene {
   /// Whether meshes differ between frames.
   bool moves() const;
   /// The meshes of a frame in the world: frame f of n is at time f / n of the animation, so that a
-  /// full turn closes.
-  std::vector<Mesh> meshes(int frame) const;
+  /// full turn closes. What lies between two frames is a moment between them.
+  std::vector<Mesh> meshes(double frame) const;
 };
 
 /// Loads models, meshes, textures and the environment, and works out the cameras. The animation has

@@ -16,7 +16,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render/bands.hpp"
-#include "scene/camera_path.hpp"
+#include "render/shutter.hpp"
 
 namespace raysplats {
 namespace {
@@ -89,15 +89,6 @@ bool is_covered(const Image& alpha, std::size_t pixel) {
   return alpha.data[channels * pixel + channels - 1] >= 0.5f;
 }
 
-/// The camera `share` of the way from a frame to the next one.
-Camera later(std::span<const Camera> cameras, std::size_t frame, double share, bool closed) {
-  const Camera& now = cameras[frame];
-  if (share == 0.0 || cameras.size() < 2) return now;
-  if (frame + 1 < cameras.size()) return between(now, cameras[frame + 1], share);
-  if (closed) return between(now, cameras.front(), share);
-  return between(cameras[frame - 1], now, 1.0 + share);
-}
-
 /// A frame at its number of rays per pixel, means of the moments at which the shutter is open.
 struct Exposed {
   Image rgba;   ///< empty when it was stopped
@@ -105,14 +96,6 @@ struct Exposed {
   Image hits;   ///< where options ask
   std::uint64_t capped_rays = 0;
 };
-
-void add(Image& sum, Image image) {
-  if (sum.data.empty()) {
-    sum = std::move(image);
-    return;
-  }
-  for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += image.data[i];
-}
 
 Exposed exposed(Tracer& tracer,
                 const Model& model,
@@ -124,25 +107,22 @@ Exposed exposed(Tracer& tracer,
   const int moments = options.shutter_samples;
   Exposed out;
   for (int k = 0; k < moments; ++k) {
-    const Camera camera = later(cameras, frame, options.shutter * k / moments, options.closed);
-    Image moment =
+    const Camera camera = camera_between(cameras, frame, moment(options, k), options.closed);
+    Image picture =
         tracer.render(model, downscaled(camera, 1.0 / options.supersample), false,
                       [&](double share) { return !within || within((k + share) / moments); });
-    if (ranks.any(moment.data.empty())) return {};
-    collect_rows(ranks, tracer.rows(), moment);
+    if (ranks.any(picture.data.empty())) return {};
+    collect_rows(ranks, tracer.rows(), picture);
     if (options.depth || options.hits) {
       Image depth = tracer.depth();
       collect_rows(ranks, tracer.rows(), depth);
-      if (options.depth) add(out.depth, weighted_depth(depth, moment));
+      if (options.depth) add(out.depth, weighted_depth(depth, picture));
       if (options.hits) add(out.hits, hits_of(depth));
     }
-    add(out.rgba, std::move(moment));
+    add(out.rgba, std::move(picture));
     out.capped_rays += tracer.capped_rays();
   }
-  const float scale = 1.0f / static_cast<float>(moments);
-  for (Image* image : {&out.rgba, &out.depth, &out.hits}) {
-    for (float& value : image->data) value *= scale;
-  }
+  for (Image* image : {&out.rgba, &out.depth, &out.hits}) divide(*image, moments);
   return out;
 }
 
@@ -313,11 +293,7 @@ FrameReport write_frames(Tracer& tracer,
     throw UsageError(fmt::format("--supersample {} is out of range: use 1 to {}",
                                  options.supersample, kMaxSupersample));
   }
-  if (options.shutter_samples < 1 || !(options.shutter > 0.0 && options.shutter <= 1.0)) {
-    throw UsageError(fmt::format(
-        "--shutter-samples {} over --shutter {} are no motion blur: use 1 or more, over 0 to 1",
-        options.shutter_samples, options.shutter));
-  }
+  check_shutter(options);
   const std::vector<std::string> names = frame_names(cameras);
   FrameReport report;
   Communicator alone;
@@ -342,9 +318,10 @@ FrameReport write_frames(Tracer& tracer,
     }
     report.rays += samples.rgba.pixels() * static_cast<std::uint64_t>(options.shutter_samples);
     if (options.normals) {
-      const double last = options.shutter * (options.shutter_samples - 1) / options.shutter_samples;
+      const double last = moment(options, options.shutter_samples - 1);
       const Image sums = tracer.normals(
-          model, downscaled(later(cameras, i, last, options.closed), 1.0 / options.supersample),
+          model,
+          downscaled(camera_between(cameras, i, last, options.closed), 1.0 / options.supersample),
           within);
       if (sums.data.empty()) {
         ranks.any(true);

@@ -2,12 +2,14 @@
 #include "render/scene_frames.hpp"
 
 #include <chrono>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "comm/communicator.hpp"
 #include "render/bands.hpp"
+#include "render/shutter.hpp"
 
 namespace raysplats {
 namespace {
@@ -29,6 +31,34 @@ FrameLayers layers_of(PathTracer& tracer,
           std::move(first.alpha)};
 }
 
+/// A frame, the mean of the moments at which the shutter is open; empty when it was stopped.
+Image exposed(PathTracer& tracer,
+              const LoadedScene& scene,
+              std::size_t frame,
+              const FrameOptions& options,
+              PathTracer::Statistics& rays,
+              const std::function<bool(double)>& within) {
+  const RenderSettings& settings = scene.scene.render;
+  const int moments = options.shutter_samples;
+  Image sum;
+  for (int k = 0; k < moments; ++k) {
+    const double share = moment(options, k);
+    if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<double>(frame) + share));
+    // Moments that scatter alike would add up to one picture's noise.
+    if (moments > 1) {
+      tracer.set_sampling(settings.samples, settings.seed + static_cast<std::uint64_t>(k), true);
+    }
+    Image picture =
+        tracer.render(camera_between(scene.cameras, frame, share, options.closed),
+                      [&](double done) { return !within || within((k + done) / moments); });
+    add(rays, tracer.statistics());
+    if (picture.pixels() == 0) return {};
+    add(sum, std::move(picture));
+  }
+  divide(sum, moments);
+  return sum;
+}
+
 }  // namespace
 
 SceneReport write_scene_frames(PathTracer& tracer,
@@ -39,6 +69,7 @@ SceneReport write_scene_frames(PathTracer& tracer,
                                const FrameOptions& options,
                                const std::function<bool(std::size_t)>& done,
                                const std::function<bool(double)>& within) {
+  check_shutter(options);
   const std::vector<std::string> names = frame_names(scene.cameras);
   SceneReport report;
   Communicator alone;
@@ -47,18 +78,17 @@ SceneReport write_scene_frames(PathTracer& tracer,
   for (std::size_t i = first + options.offset; i < last; i += options.stride) {
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
-    if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<int>(i)));
-    Image rgba = tracer.render(scene.cameras[i], within);
+    Image rgba = exposed(tracer, scene, i, options, report.rays, within);
     report.trace_seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
         (tracer.context().build_seconds() - built);
-    add(report.rays, tracer.statistics());
     if (ranks.any(rgba.pixels() == 0)) break;
     collect_rows(ranks, tracer.rows(), rgba);
     // What follows is left to the one that leads.
     if (ranks.leads()) {
       FrameLayers layers;
       if (options.depth || options.normals || options.hits) {
+        if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<double>(i)));
         layers = layers_of(tracer, scene.cameras[i], within);
         if (layers.alpha.data.empty()) {
           ranks.any(true);
@@ -71,6 +101,7 @@ SceneReport write_scene_frames(PathTracer& tracer,
     if (ranks.any(done && !done(report.frames))) break;
   }
   tracer.set_share(0, 1);
+  tracer.set_sampling(scene.scene.render.samples, scene.scene.render.seed);
   return report;
 }
 

@@ -19,10 +19,11 @@ struct SceneReport {
 
 /// Draws the frames from `first` up to but without `last` and writes them to `folder`, which
 /// exists, named as their cameras (frame_names()). Depth, normals and hits are those of the rays
-/// through the pixels' middles (PathTracer::first_hits()), however many samples there are. `done`
-/// hears the number of finished frames and returns false to stop early; so does `within` with the
-/// share of the frame that is being drawn, which is not written then. Throws what the tracer
-/// throws, DataError when a file fails.
+/// through the pixels' middles (PathTracer::first_hits()), however many samples there are, at the
+/// first of the shutter's moments. `done` hears the number of finished frames and returns false to
+/// stop early; so does `within` with the share of the frame that is being drawn, which is not
+/// written then. Throws what the tracer throws, UsageError for shutters out of range, DataError
+/// when a file fails.
 SceneReport write_scene_frames(PathTracer& tracer,
                                const LoadedScene& scene,
                                std::size_t first,

@@ -156,7 +156,7 @@ DatasetOptions dataset_options(const ModelSource& source) {
   return out;
 }
 
-TraceOptions trace_options(const ModelSource& source, bool cut_out) {
+TraceOptions trace_options(const ModelSource& source) {
   if (!source.trained && source.header) return *source.header;
   if (!source.trained) {
     spdlog::info(
@@ -165,7 +165,10 @@ TraceOptions trace_options(const ModelSource& source, bool cut_out) {
     return peak_order();
   }
   TraceOptions out = source.trained->trace;
-  out.background = background_color(*source.trained, cut_out);
+  // The header knows a background that the photos have chosen; a run whose configuration leaves the
+  // choice open has photos that are cut out.
+  out.background =
+      source.header ? source.header->background : background_color(*source.trained, true);
   if (source.trained->background == "sky") out.sky = trained_sky(source);
   return out;
 }
@@ -183,7 +186,7 @@ void find_models(SceneFile& scene) {
     first_transform = model.transform;
   }
   if (!first) return;
-  scene.trained = trace_options(*first, false);
+  scene.trained = trace_options(*first);
   scene.trained.sky = transformed(scene.trained.sky, first_transform);
 }
 

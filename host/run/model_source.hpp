@@ -44,10 +44,11 @@ ModelSource find_model(const std::filesystem::path& path);
 /// known; positions count from the model's origin.
 DatasetOptions dataset_options(const ModelSource& source);
 
-/// What a model has to be traced with to look as in training; `cut_out` as for background_color().
-/// Without a run the header of the PLY tells. Models of other programs, which rasterise, are shown
-/// right in peak order and where they reach 1/255: that is taken, and said, when nothing is known.
-TraceOptions trace_options(const ModelSource& source, bool cut_out);
+/// What a model has to be traced with to look as in training: the run's configuration tells, and
+/// its background the header of the PLY; without a run that header tells all. Models of other
+/// programs, which rasterise, are shown right in peak order and where they reach 1/255: that is
+/// taken, and said, when nothing is known.
+TraceOptions trace_options(const ModelSource& source);
 
 /// Replaces run folders among a scene's models by their newest PLY, and makes the options of the
 /// first model that tells them what the scene's [trace] goes over. Throws as find_model().

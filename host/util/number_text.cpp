@@ -61,9 +61,10 @@ bool looks_like_number(std::string_view text) {
 
 }  // namespace
 
-std::string counted(std::size_t count, std::string_view one, std::string_view many) {
-  if (count == 1) return fmt::format("1 {}", one);
-  return many.empty() ? fmt::format("{} {}s", count, one) : fmt::format("{} {}", count, many);
+std::string counted(double count, std::string_view one, std::string_view many) {
+  const std::string number = fmt::format("{:.0f}", count);
+  if (number == "1") return fmt::format("1 {}", one);
+  return many.empty() ? fmt::format("{} {}s", number, one) : fmt::format("{} {}", number, many);
 }
 
 std::string number_words(bool whole, double low, double high) {

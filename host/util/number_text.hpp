@@ -16,8 +16,9 @@ constexpr double kNoBound = 1e30;
 /// "a whole number from 1 to 1000", "a number of at least 0": what a range accepts, in words.
 std::string number_words(bool whole, double low, double high);
 
-/// "1 photo", "3 photos": a number of things; `many` where an s at the end does not do.
-std::string counted(std::size_t count, std::string_view one, std::string_view many = {});
+/// "1 photo", "3 photos": a whole number of things below 2^53; `many` where an s at the end does
+/// not do.
+std::string counted(double count, std::string_view one, std::string_view many = {});
 
 /// The number that the whole of a text is, in the spellings of TOML (1_000, 1e4) and of shells;
 /// none for any other text and for numbers that are not finite. Whole numbers may be written as

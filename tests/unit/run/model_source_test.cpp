@@ -48,7 +48,7 @@ TEST_CASE("a run folder means its newest saved model and its settings") {
     CHECK(source.file == run / "point_cloud" / "iteration_1000" / "point_cloud.ply");
     CHECK(source.iteration == 1000);
     REQUIRE(source.trained.has_value());
-    const TraceOptions trace = trace_options(source, true);
+    const TraceOptions trace = trace_options(source);
     CHECK(trace.hit_order == HitOrder::kPeak);
     CHECK(trace.quantile == 9.5f);
     CHECK_FALSE(trace.adaptive_radius);
@@ -68,7 +68,7 @@ TEST_CASE("a PLY from elsewhere is traced in peak order") {
   CHECK(source.file == ply);
   CHECK_FALSE(source.trained.has_value());
   CHECK_FALSE(source.header.has_value());
-  const TraceOptions trace = trace_options(source, true);
+  const TraceOptions trace = trace_options(source);
   CHECK(trace.quantile == TraceOptions{}.quantile);
   CHECK(trace.hit_order == HitOrder::kPeak);
   CHECK(trace.adaptive_radius);
@@ -93,7 +93,7 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   fs::copy_file(run / "point_cloud" / "iteration_12" / "point_cloud.ply", moved);
   const ModelSource source = find_model(moved);
   REQUIRE(source.header.has_value());
-  const TraceOptions trace = trace_options(source, false);
+  const TraceOptions trace = trace_options(source);
   CHECK(trace.hit_order == shown.hit_order);
   CHECK(trace.quantile == shown.quantile);
   CHECK(trace.adaptive_radius == shown.adaptive_radius);
@@ -109,7 +109,7 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   const ModelSource inside = find_model(run);
   REQUIRE(inside.trained.has_value());
   CHECK(inside.header.value().background == shown.background);
-  CHECK(trace_options(inside, false).quantile == TraceOptions{}.quantile);
+  CHECK(trace_options(inside).quantile == TraceOptions{}.quantile);
 
   // In a scene the first model that tells decides.
   const fs::path other = folder.path() / "other.ply";

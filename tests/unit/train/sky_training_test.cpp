@@ -97,7 +97,7 @@ TEST_CASE("a sky pays outdoors, and its run can be looked at, moved and resumed 
 
   // What the run's files say is what the run showed.
   const ModelSource source = find_model(folder.path() / "sky");
-  const TraceOptions shown = trace_options(source, false);
+  const TraceOptions shown = trace_options(source);
   CHECK(shown.sky.size() == 9);
   Tracer tracer(context, shown);
   const Model model(context, read_model(source.file));
@@ -107,7 +107,7 @@ TEST_CASE("a sky pays outdoors, and its run can be looked at, moved and resumed 
   CHECK(report.mean.psnr == doctest::Approx(with).epsilon(1e-5));
   // A copy elsewhere has it in its header.
   fs::copy_file(source.file, folder.path() / "copy.ply");
-  CHECK(trace_options(find_model(folder.path() / "copy.ply"), false).sky == shown.sky);
+  CHECK(trace_options(find_model(folder.path() / "copy.ply")).sky == shown.sky);
 
   options.checkpoint_every = 71;
   Trainer part(context, dataset, options, folder.path() / "part");
@@ -117,7 +117,7 @@ TEST_CASE("a sky pays outdoors, and its run can be looked at, moved and resumed 
   rest.resume(folder.path() / "part");
   rest.run(false);
   check_equal(rest.model(), sky.model);
-  CHECK(trace_options(find_model(folder.path() / "rest"), false).sky == shown.sky);
+  CHECK(trace_options(find_model(folder.path() / "rest")).sky == shown.sky);
   options.sky_degree = 1;
   Trainer other(context, dataset, options, folder.path() / "other");
   CHECK_THROWS_AS(other.resume(folder.path() / "part"), UsageError);

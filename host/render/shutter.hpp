@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/image.hpp"
+#include "render/frame_writer.hpp"
+
+namespace raysplats {
+
+/// Throws UsageError for a number of moments or a share of time out of range.
+void check_shutter(const FrameOptions& options);
+
+/// How far moment `k` of a frame's lies on the way to the next frame.
+double moment(const FrameOptions& options, int k);
+
+/// The camera `share` of the way from a frame to the next one.
+Camera camera_between(std::span<const Camera> cameras,
+                      std::size_t frame,
+                      double share,
+                      bool closed);
+
+/// Adds a picture to a sum, which may have none yet.
+void add(Image& sum, Image image);
+/// The mean of that many.
+void divide(Image& sum, int count);
+
+}  // namespace raysplats
