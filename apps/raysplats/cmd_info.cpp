@@ -417,8 +417,8 @@ void check_known(const std::filesystem::path& file) {
   throw DataError(fmt::format(
       "{} is nothing that info reads: those are models (PLY, .splat, SPZ, SOG, glTF), meshes (PLY, "
       "OBJ, glTF, .mtl), scene files, data sets, runs, COLMAP models, cameras, camera paths, "
-      "arrays (.npy), pictures, checkpoints, configurations (.toml), networks (.onnx) and the JSON "
-      "of runs, evaluations and benchmarks",
+      "arrays (.npy), pictures, checkpoints, configurations (.toml), networks (.onnx), the JSON of "
+      "runs, evaluations and benchmarks, and the course of runs (metrics.csv)",
       file.string()));
 }
 

@@ -136,7 +136,7 @@ void print_results(const TrainSummary& summary, const std::string& folder) {
   if (!summary.evaluations.empty()) {
     const EvaluationRow& last = summary.evaluations.back();
     fmt::print("PSNR {:.2f} dB, SSIM {:.4f} on {}\n", last.psnr, last.ssim,
-               counted(static_cast<std::size_t>(last.views), "held-out view"));
+               counted(last.views, "held-out view"));
   }
   report(folder, "whole");
 }

@@ -7,13 +7,13 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "info_parts.hpp"
 #include "io/byte_reader.hpp"
+#include "io/camera_list.hpp"
 #include "io/camera_path_file.hpp"
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
@@ -21,6 +21,7 @@
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "report/run_files.hpp"
 #include "run/checkpoint.hpp"
 #include "run/train_config.hpp"
 
@@ -40,22 +41,16 @@ Json describe_path(const std::filesystem::path& path) {
   return out;
 }
 
-/// cameras.json of a run, which viewers of 3DGS read: a list of views.
-Json describe_views(const nlohmann::json& views, const std::filesystem::path& path) {
+/// cameras.json of a run, which viewers of 3DGS read.
+Json describe_views(const std::filesystem::path& path) {
   std::vector<Camera> cameras;
-  for (const nlohmann::json& view : views) {
-    const bool sound = view.is_object() && view.contains("position") && view.contains("rotation") &&
-                       view.value("width", nlohmann::json()).is_number_integer() &&
-                       view.value("height", nlohmann::json()).is_number_integer();
-    if (!sound) {
+  for (const std::optional<Camera>& camera : io::read_camera_list(path)) {
+    if (!camera) {
       throw DataError(
           fmt::format("{}: entry {} is no view with position, rotation, width and height",
                       path.string(), cameras.size()));
     }
-    Camera camera;
-    camera.width = view["width"].get<int>();
-    camera.height = view["height"].get<int>();
-    cameras.push_back(camera);
+    cameras.push_back(*camera);
   }
   Json out{{"type", "cameras of viewers"}};
   out.update(describe_cameras(cameras));
@@ -69,17 +64,25 @@ std::optional<Json> describe_json(const std::filesystem::path& path) {
   const auto begin = std::find_if_not(text, text + bytes.size(), [](char c) {
     return c == ' ' || c == '\n' || c == '\r' || c == '\t';
   });
-  if (begin != text + bytes.size() && *begin == '[') {
-    // The reader of objects knows how deep a file may be.
-    std::string wrapped = "{\"views\":" + std::string(text, bytes.size()) + "}";
-    return describe_views(
-        io::parse_json_object(std::as_bytes(std::span(wrapped)), path).at("views"), path);
-  }
+  if (begin != text + bytes.size() && *begin == '[') return describe_views(path);
   const nlohmann::json json = io::parse_json_object(bytes, path);
   if (json.contains("camera_path") || json.contains("keyframes")) return describe_path(path);
   if (!json.contains("frames")) return describe_record(json, path);
   Json out{{"type", "cameras"}};
   out.update(describe_cameras(read_cameras(path)));
+  return out;
+}
+
+/// metrics.csv of a run.
+std::optional<Json> describe_curves(const std::filesystem::path& path) {
+  const std::map<std::string, std::vector<double>> columns = report::columns_of(path);
+  const auto iterations = columns.find("iteration");
+  if (iterations == columns.end()) return std::nullopt;
+  const std::vector<double>& rows = iterations->second;
+  Json out{{"type", "course of a run"},
+           {"rows", rows.size()},
+           {"iterations", rows.empty() ? 0.0 : rows.back()}};
+  for (const auto& [name, values] : columns) out["columns"].push_back(name);
   return out;
 }
 
@@ -196,6 +199,7 @@ std::optional<Json> describe_file(const std::filesystem::path& path) {
   // meta.json is a model of SOG.
   if (extension == ".json" && path.filename() != "meta.json") return describe_json(path);
   if (extension == ".npy") return describe_array(path);
+  if (extension == ".csv") return describe_curves(path);
   if (extension == ".rsck") return describe_checkpoint(path);
   if (extension == ".toml") return describe_toml(path);
   if (extension == ".ply") return describe_points(path);

@@ -12,6 +12,7 @@
 #include "device/context.hpp"
 #include "device/device_json.hpp"
 #include "util/memory_limit.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -56,6 +57,7 @@ bool has_device(const Diagnosis& diagnosis, const std::string& vendor) {
 constexpr double kMebibyte = 1024.0 * 1024.0;
 
 std::string mebibytes(std::uint64_t bytes) {
+  if (bytes < std::uint64_t{1} << 20) return fmt::format("{} KiB", bytes >> 10);
   return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / kMebibyte);
 }
 
@@ -153,12 +155,12 @@ std::string diagnosis_text(const Diagnosis& diagnosis) {
   out += fmt::format("memory limit     {}\n", diagnosis.process_limit.empty()
                                                   ? "none for this process"
                                                   : diagnosis.process_limit.substr(kRemark));
-  out += fmt::format("kernel cache     {}: {} programs, {}{}\n",
-                     diagnosis.cache.empty() ? "none" : diagnosis.cache.string(),
-                     diagnosis.cache_state.programs, mebibytes(diagnosis.cache_state.bytes),
-                     diagnosis.cache_state.trouble.empty()
-                         ? ""
-                         : fmt::format(", {}", diagnosis.cache_state.trouble));
+  out += fmt::format(
+      "kernel cache     {}: {}, {}{}\n",
+      diagnosis.cache.empty() ? "none" : diagnosis.cache.string(),
+      counted(diagnosis.cache_state.programs, "program"), mebibytes(diagnosis.cache_state.bytes),
+      diagnosis.cache_state.trouble.empty() ? ""
+                                            : fmt::format(", {}", diagnosis.cache_state.trouble));
   for (const DeviceVerdict& verdict : diagnosis.devices) {
     const DeviceInfo& device = verdict.device;
     out += fmt::format("device {}         {} ({}), {}, driver {}\n", device.index, device.name,

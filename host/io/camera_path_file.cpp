@@ -2,6 +2,7 @@
 #include "io/camera_path_file.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <array>
 #include <charconv>
@@ -189,6 +190,12 @@ Stored read_json(const std::filesystem::path& path) {
     out.path.keys.push_back(key);
   }
   count_from_start(out.path.keys);
+  if (const auto crop = json.find("crop"); crop != json.end() && !crop->is_null()) {
+    spdlog::warn(
+        "The camera path {} crops the scene, which is drawn whole: 'raysplats convert MODEL OUT "
+        "--crop' makes a model of a part",
+        path.string());
+  }
   return out;
 }
 

@@ -10,11 +10,11 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
-#include "io/json_file.hpp"
+#include "io/camera_list.hpp"
 #include "report/html.hpp"
 #include "report/run_files.hpp"
 
@@ -40,21 +40,27 @@ struct Place {
   std::string name = {};
 };
 
-std::optional<glm::dvec3> vector_of(const Json& json) {
-  if (!json.is_array() || json.size() != 3) return std::nullopt;
-  glm::dvec3 out;
-  for (int i = 0; i < 3; ++i) {
-    const Json& value = json.at(static_cast<std::size_t>(i));
-    if (!value.is_number()) return std::nullopt;
-    out[i] = value.get<double>();
-    if (!(std::abs(out[i]) < kFarthest)) return std::nullopt;
-  }
-  return out;
+bool is_near(const glm::dvec3& point) {
+  return glm::all(glm::lessThan(glm::abs(point), glm::dvec3(kFarthest)));
 }
 
-std::optional<glm::dvec3> vector_of(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found == json.end() ? std::nullopt : vector_of(*found);
+/// Where a view of an evaluation stands.
+std::optional<glm::dvec3> center_of(const Json& view) {
+  const Json center = view.value("center", Json());
+  if (!center.is_array() || center.size() != 3) return std::nullopt;
+  glm::dvec3 out;
+  for (int i = 0; i < 3; ++i) {
+    const Json& value = center.at(static_cast<std::size_t>(i));
+    if (!value.is_number()) return std::nullopt;
+    out[i] = value.get<double>();
+  }
+  return is_near(out) ? std::optional(out) : std::nullopt;
+}
+
+std::vector<std::optional<Camera>> listed_cameras(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return {};
+  return io::read_camera_list(path);
 }
 
 glm::dvec3 unit(const glm::dvec3& v, const glm::dvec3& otherwise) {
@@ -73,39 +79,21 @@ Cameras cameras_of(const fs::path& run,
   Cameras out;
   std::map<std::string, double> measured;
   for (const Json& photo : photos) {
-    if (photo.contains("psnr")) measured[report::text(photo, "name")] = number(photo, "psnr");
+    if (photo.contains("psnr")) measured[text(photo, "name")] = number(photo, "psnr");
   }
   glm::dvec3 up{0};
-  // The file is a list; the reader of bounded depth takes objects.
-  const std::string text = "{\"cameras\":" + text_of(run / "cameras.json") + "}";
-  std::error_code error;
-  const Json json =
-      fs::is_regular_file(run / "cameras.json", error)
-          ? io::parse_json_object(std::as_bytes(std::span(text)), run / "cameras.json")
-          : Json::object();
-  for (const Json& camera : objects(json, "cameras")) {
-    const std::optional<glm::dvec3> center = vector_of(camera, "position");
-    if (!center) continue;
-    Place place{*center};
-    place.name = report::text(camera, "img_name");
+  for (const std::optional<Camera>& camera : listed_cameras(run / "cameras.json")) {
+    if (!camera || !is_near(camera->center())) continue;
+    const glm::dmat3 axes = glm::transpose(camera->rotation);  // right, down and forward
+    up -= axes[1];
+    Place place{camera->center(), axes[2], std::nullopt, camera->name};
     if (const auto found = measured.find(place.name); found != measured.end())
       place.psnr = found->second;
-    const auto rotation = camera.find("rotation");
-    if (rotation != camera.end() && rotation->is_array() && rotation->size() == 3) {
-      // Rows of camera to world, whose columns are right, down and forward.
-      for (int row = 0; row < 3; ++row) {
-        const glm::dvec3 axes =
-            vector_of(rotation->at(static_cast<std::size_t>(row))).value_or(glm::dvec3(0));
-        up[row] -= axes[1];
-        place.look[row] = axes[2];
-      }
-    }
     out.trained.push_back(place);
   }
   for (const Json& view : views) {
-    const std::optional<glm::dvec3> center = vector_of(view, "center");
-    if (center)
-      out.held_out.push_back({*center, {}, number(view, "psnr"), report::text(view, "name")});
+    const std::optional<glm::dvec3> center = center_of(view);
+    if (center) out.held_out.push_back({*center, {}, number(view, "psnr"), text(view, "name")});
   }
   out.up = unit(up, out.up);
   return out;

@@ -199,10 +199,11 @@ std::string run_report(const fs::path& run) {
     const Json& last = evaluations.back();
     facts +=
         row("Held-out views",
-            fmt::format(
-                "PSNR {:.2f} dB, SSIM {:.4f}, {}", number(last, "psnr"), number(last, "ssim"),
-                number(last, "views") == 1 ? "1 view"
-                                           : fmt::format("{:.0f} views", number(last, "views"))));
+            fmt::format("PSNR {:.2f} dB{}, SSIM {:.4f}, {}", number(last, "psnr"),
+                        last.contains("psnr_aligned")
+                            ? fmt::format(" ({:.2f} where they fit)", number(last, "psnr_aligned"))
+                            : "",
+                        number(last, "ssim"), counted(number(last, "views"), "view")));
   }
   const double most = number(metrics, "most_gaussians");
   facts += row("Gaussians", fmt::format("{:.0f}", number(metrics, "gaussians")) +

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "report/run_files.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats::report {
 namespace {
@@ -85,10 +86,6 @@ bool is_complete(const Json& metrics) {
   return complete != metrics.end() && complete->is_boolean() && complete->get<bool>();
 }
 
-std::string counted(double number, const char* thing) {
-  return fmt::format("{:.0f} {}{}", number, thing, number == 1.0 ? "" : "s");
-}
-
 /// Whether the limit has cut off growth. The other strategies go there by plan.
 bool stopped_growing(const Json& metrics,
                      const std::map<std::string, std::string>& settings,
@@ -147,14 +144,16 @@ void warn_of_views(const std::vector<Json>& views,
 
 std::string verdict(const Json& metrics, std::size_t warnings) {
   const std::vector<Json> evaluations = objects(metrics, "evaluations");
-  const std::string quality =
-      evaluations.empty()
-          ? "no held-out views"
-          : fmt::format("{:.1f} dB on {}", number(evaluations.back(), "psnr"),
-                        counted(number(evaluations.back(), "views"), "held-out view"));
-  return fmt::format(
-      "{}: {}, {}.", is_complete(metrics) ? "Complete" : "Not over", quality,
-      warnings == 0 ? "nothing to warn of" : counted(static_cast<double>(warnings), "warning"));
+  std::string quality = is_complete(metrics) ? "no held-out views" : "nothing measured yet";
+  if (!evaluations.empty()) {
+    const Json& last = evaluations.back();
+    quality = fmt::format("{:.1f} dB on {}", number(last, "psnr"),
+                          counted(number(last, "views"), "held-out view"));
+    if (last.contains("psnr_aligned"))
+      quality += fmt::format(", {:.1f} dB where they fit", number(last, "psnr_aligned"));
+  }
+  return fmt::format("{}: {}, {}.", is_complete(metrics) ? "Complete" : "Not over", quality,
+                     warnings == 0 ? "nothing to warn of" : counted(warnings, "warning"));
 }
 
 std::vector<std::string> warnings_of(const Json& metrics,

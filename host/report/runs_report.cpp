@@ -114,6 +114,15 @@ std::string facts(const std::vector<Run>& runs) {
   out += numbers_row(
       "PSNR of held-out views, dB", runs, "{:.2f}",
       [](const Run& run) { return last_of(run, "psnr"); }, true);
+  const auto aligned = [](const Run& run) {
+    return !run.evaluations.empty() && run.evaluations.back().contains("psnr_aligned");
+  };
+  if (std::any_of(runs.begin(), runs.end(), aligned)) {
+    const auto psnr = [&](const Run& run) {
+      return aligned(run) ? last_of(run, "psnr_aligned") : std::nan("");
+    };
+    out += numbers_row("The same where the views fit, dB", runs, "{:.2f}", psnr);
+  }
   out += numbers_row(
       "SSIM", runs, "{:.4f}", [](const Run& run) { return last_of(run, "ssim"); }, true);
   out += numbers_row("Gaussians", runs, "{:.0f}", metric("gaussians"));

@@ -9,9 +9,8 @@
 namespace raysplats {
 
 /// The cameras that a run's model was trained from, in the model's coordinates: those of
-/// RUN/cameras.json (RunFolder::write_cameras(), and other trainers of 3DGS), which says neither
-/// lens nor centre, so that they are pinholes that look through the middle of their pictures. None
-/// for models that are in no run and runs without that file. Throws DataError for a damaged one.
+/// RUN/cameras.json (io::read_camera_list()). None for models that are in no run and runs without
+/// that file. Throws DataError for a damaged one.
 std::vector<Camera> run_cameras(const ModelSource& source);
 
 }  // namespace raysplats

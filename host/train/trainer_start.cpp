@@ -11,6 +11,7 @@
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -187,8 +188,8 @@ void Trainer::Impl::start() {
   small_photos = some_photos = {};
   warn_of_strays(train_cameras);
   if (train_views.size() < kFewViews) {
-    spdlog::warn("{} training view{} of {}: depth is open, and other views will look wrong",
-                 train_views.size(), train_views.size() == 1 ? "" : "s", dataset.root.string());
+    spdlog::warn("{} of {}: depth is open, and other views will look wrong",
+                 counted(train_views.size(), "training view"), dataset.root.string());
   }
   if (options.scale_activation == ScaleActivation::kSigmoid && extent > kSigmoidExtent) {
     spdlog::warn(

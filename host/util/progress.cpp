@@ -15,6 +15,7 @@ constexpr double kDrawSeconds = 0.1;   // between redraws of the bar
 constexpr double kLineSeconds = 10.0;  // between plain lines
 constexpr double kRateSeconds = 1.0;   // between updates of the rate
 constexpr double kRateMemory = 20.0;   // seconds that the rate averages over
+constexpr double kCountable = 1000.0;  // steps a second, of which more tell nobody anything
 
 int terminal_width(std::FILE* stream) {
   winsize size{};
@@ -95,8 +96,8 @@ std::string Progress::line(int width) const {
   std::string text = known ? fmt::format("{}/{}", done_, total_) : std::to_string(done_);
   if (!fields_.empty()) text += ", " + fields_;
   if (rate_ > 0 && known) {
-    text += fmt::format(", {:.{}f} it/s, {} left", rate_, rate_ < 10 ? 2 : 1,
-                        format_duration(static_cast<double>(total_ - done_) / rate_));
+    if (rate_ < kCountable) text += fmt::format(", {:.{}f} it/s", rate_, rate_ < 10 ? 2 : 1);
+    text += fmt::format(", {} left", format_duration(static_cast<double>(total_ - done_) / rate_));
   }
   const int room = std::clamp(width - static_cast<int>(label_.size() + text.size()) - 5, 0, 30);
   if (room < 5)

@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kLeastFov = 10.0;
+constexpr double kLeastFov = 1.0;
 constexpr double kMostFov = 120.0;  // of the page's slider
 
 Json vector_json(const glm::dvec3& v) { return {v.x, v.y, v.z}; }

@@ -155,8 +155,15 @@ TEST_CASE("info describes every kind of file that is read") {
   CHECK(json["cameras"] == 1);
   CHECK(json["sizes"][0]["width"] == 8);
   write_file(folder / "viewer.json",
-             "[{\"id\":0,\"width\":8,\"height\":6,\"position\":[0,0,0],\"rotation\":[]}]");
+             "[{\"id\":0,\"width\":8,\"height\":6,\"position\":[0,0,0],\"rotation\":"
+             "[[1,0,0],[0,1,0],[0,0,1]]}]");
   CHECK(json_of(folder / "viewer.json")["type"] == "cameras of viewers");
+  write_file(folder / "metrics.csv", "iteration,psnr\n10,20.5\n20,21\n30,");
+  json = json_of(folder / "metrics.csv");
+  CHECK(json["type"] == "course of a run");
+  CHECK(json["rows"] == 2);
+  CHECK(json["iterations"] == 20);
+  CHECK(json["columns"] == nlohmann::json{"iteration", "psnr"});
   write_file(folder / "path.toml",
              "seconds = 1\nfps = 4\n[[key]]\neye = [0,0,-5]\ntarget = [0,0,0]\n"
              "[[key]]\neye = [1,0,-5]\ntarget = [0,0,0]\n");

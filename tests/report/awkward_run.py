@@ -37,7 +37,8 @@ def write_run(folder, seed=0):
     os.makedirs(eval_folder)
     for path, content in (
             ("metrics.json", metrics), ("eval/iteration_20/metrics.json", {"images": views}),
-            ("cameras.json", [{"img_name": HOSTILE, "position": [i, 1, 2], "rotation": identity} for i in range(4)]),
+            ("cameras.json", [{"img_name": HOSTILE, "position": [i, 1, 2], "rotation": identity,
+                               "width": 8, "height": 6} for i in range(4)]),
             ("exposures.json", {f"{HOSTILE}{i}": [[1, 0, 0, 0], [0, 1 + 0.1 * i, 0, 0], [0, 0, 1, 0]]
                                 for i in range(4)})):
         with open(os.path.join(folder, path), "w", encoding="utf-8") as stream:

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <glm/vec3.hpp>
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "raysplats/error.hpp"
@@ -92,6 +95,20 @@ class Run {
   fs::path path_;
 };
 
+/// Views at places, looking up, as RunFolder writes them; `more` stands behind them.
+void write_cameras(const Run& run,
+                   const std::vector<std::pair<std::string, glm::ivec3>>& views,
+                   const std::string& more = "") {
+  std::string text;
+  for (const auto& [name, at] : views) {
+    text += fmt::format(
+        R"({}{{"img_name":"{}","position":[{},{},{}],"rotation":[[1,0,0],[0,1,0],[0,0,1]],)"
+        R"("width":8,"height":6}})",
+        text.empty() ? "" : ",", name, at.x, at.y, at.z);
+  }
+  run.write("cameras.json", "[" + text + (more.empty() ? "" : "," + more) + "]");
+}
+
 }  // namespace
 
 TEST_CASE("a report holds what the run says, escaped, and nothing from elsewhere") {
@@ -124,7 +141,7 @@ TEST_CASE("a report of a run that is under way or damaged says so") {
   fs::remove(run.path() / "metrics.csv");
   const std::string page = run_report(run.path());
   CHECK(fault(page) == "");
-  CHECK(has(page, "<p>Not over: no held-out views, 1 warning.</p>"));
+  CHECK(has(page, "<p>Not over: nothing measured yet, 1 warning.</p>"));
   CHECK(has(page, "7 of 90 iterations"));
   CHECK(has(page, "no held-out views"));
   run.write("metrics.json", "{");
@@ -286,9 +303,7 @@ TEST_CASE("a report shows model, cameras, exposure, kernels and where it all com
             R"({"complete":true,"seed":42,"driver":"<d>","data":"00ff","version":"9.8",
     "kernels":[{"name":"trace<x>","calls":12,"ms":340,"share":0.75}],
     "evaluations":[{"iteration":200,"psnr":20}]})");
-  run.write("cameras.json", R"([{"img_name":"a","position":[0,0,0],
-    "rotation":[[1,0,0],[0,1,0],[0,0,1]]},{"position":[4,0,0],"rotation":[[1,0,0],[0,1,0],[0,0,1]]},
-    {"position":"none"}])");
+  write_cameras(run, {{"a", {0, 0, 0}}, {"", {4, 0, 0}}}, R"({"position":"none"})");
   run.write("eval/iteration_200/metrics.json",
             R"({"images":[{"name":"<low>","psnr":10,"center":[1,0,0]},
               {"name":"high","psnr":30,"center":[2,-2,0]}]})");
@@ -325,9 +340,7 @@ TEST_CASE("a report shows model, cameras, exposure, kernels and where it all com
 
 TEST_CASE("cameras that were trained on have the colours of their own PSNR") {
   const Run run;
-  run.write("cameras.json", R"([{"img_name":"<a>","position":[0,0,0]},
-    {"img_name":"b","position":[4,0,0]},{"img_name":"c","position":[2,1,0]},
-    {"img_name":"d","position":[1,1,0]}])");
+  write_cameras(run, {{"<a>", {0, 0, 0}}, {"b", {4, 0, 0}}, {"c", {2, 1, 0}}, {"d", {1, 1, 0}}});
   run.write("eval/iteration_200/metrics.json",
             R"({"images":[{"name":"low","psnr":10,"center":[1,0,0]},
               {"name":"high","psnr":30,"center":[2,-2,0]}]})");
@@ -341,6 +354,18 @@ TEST_CASE("cameras that were trained on have the colours of their own PSNR") {
   CHECK(has(page, "r=\"3\" fill=\"rgb(214,96,30)\"><title>&lt;a&gt;, 25.00 dB</title>"));
   CHECK(has(page, "r=\"3\" fill=\"rgb(60,120,215)\"><title>b, 35.00 dB</title>"));
   CHECK(has(page, "class=\"plain\""));
+}
+
+TEST_CASE("reports say what views measure where they fit") {
+  const Run refined("_refined"), plain("_plain");
+  refined.write("metrics.json", R"({"complete":true,"evaluations":[
+    {"iteration":200,"psnr":20.5,"psnr_aligned":24.25,"ssim":0.75,"views":1}]})");
+  const std::string page = run_report(refined.path());
+  CHECK(has(page, "<p>Complete: 20.5 dB on 1 held-out view, 24.2 dB where they fit, "));
+  CHECK(has(page, "<td>PSNR 20.50 dB (24.25 where they fit), SSIM 0.7500, 1 view</td>"));
+  const std::string both = runs_report({plain.path(), refined.path()});
+  CHECK(has(both, "<th>The same where the views fit, dB</th><td></td><td>24.25</td>"));
+  CHECK(!has(runs_report({plain.path(), plain.path()}), "where the views fit"));
 }
 
 TEST_CASE("several runs stand side by side, with what differs between them") {

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/camera_list.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+#include "io/byte_reader.hpp"
+#include "io/json_file.hpp"
+#include "scene/camera_check.hpp"
+
+namespace raysplats::io {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kRotation = 1e-3;  // that its columns may be off an orthonormal system
+
+std::optional<glm::dvec3> triple(const Json& json) {
+  if (!json.is_array() || json.size() != 3) return std::nullopt;
+  glm::dvec3 out;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!json[k].is_number()) return std::nullopt;
+    out[static_cast<int>(k)] = json[k].get<double>();
+    if (!std::isfinite(out[static_cast<int>(k)])) return std::nullopt;
+  }
+  return out;
+}
+
+std::optional<int> side(const Json& view, const char* name) {
+  const Json value = view.value(name, Json());
+  if (!value.is_number_integer()) return std::nullopt;
+  const auto pixels = value.get<std::int64_t>();
+  if (pixels < 1 || pixels > kMaxSide) return std::nullopt;
+  return static_cast<int>(pixels);
+}
+
+double focal(const Json& view, const char* name) {
+  const Json value = view.value(name, Json());
+  return value.is_number() ? value.get<double>() : 0.0;  // as of a panorama
+}
+
+/// World to camera, of the rows of camera to world; nothing for what is no rotation.
+std::optional<glm::dmat3> rotation_of(const Json& rows) {
+  if (!rows.is_array() || rows.size() != 3) return std::nullopt;
+  glm::dmat3 out;  // whose columns they are
+  for (std::size_t r = 0; r < 3; ++r) {
+    const std::optional<glm::dvec3> row = triple(rows[r]);
+    if (!row) return std::nullopt;
+    out[static_cast<int>(r)] = *row;
+  }
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      if (std::abs(glm::dot(out[a], out[b]) - (a == b ? 1.0 : 0.0)) > kRotation)
+        return std::nullopt;
+    }
+  }
+  if (glm::determinant(out) < 0.0) return std::nullopt;
+  return out;
+}
+
+std::optional<Camera> camera_of(const Json& view) {
+  if (!view.is_object()) return std::nullopt;
+  const std::optional<glm::dvec3> center = triple(view.value("position", Json()));
+  const std::optional<glm::dmat3> rotation = rotation_of(view.value("rotation", Json()));
+  const std::optional<int> width = side(view, "width");
+  const std::optional<int> height = side(view, "height");
+  if (!center || !rotation || !width || !height) return std::nullopt;
+  Camera camera;
+  const Json name = view.value("img_name", Json());
+  if (name.is_string()) camera.name = name.get<std::string>();
+  camera.width = *width;
+  camera.height = *height;
+  camera.fx = focal(view, "fx");
+  camera.fy = focal(view, "fy");
+  camera.cx = 0.5 * *width;
+  camera.cy = 0.5 * *height;
+  camera.rotation = *rotation;
+  camera.translation = -(*rotation * *center);
+  return camera;
+}
+
+}  // namespace
+
+std::vector<std::optional<Camera>> read_camera_list(const std::filesystem::path& path) {
+  // The file is a list; the reader of bounded depth takes objects.
+  const std::vector<std::byte> bytes = read_file(path);
+  const std::string text =
+      "{\"cameras\":" + std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()) +
+      "}";
+  const Json json = parse_json_object(std::as_bytes(std::span(text)), path);
+  std::vector<std::optional<Camera>> out;
+  for (const Json& view : json.at("cameras")) out.push_back(camera_of(view));
+  return out;
+}
+
+}  // namespace raysplats::io
