@@ -7,6 +7,8 @@ import subprocess
 import sys
 import tempfile
 
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
 
@@ -74,6 +76,25 @@ class PhotoTest(PageCase):
                              ("api/photo/../state", 404)):
             self.assertEqual(self.viewer.ask("/" + path, Cookie=self.viewer.cookie())[0], status, path)
         self.assertEqual(self.viewer.ask("/api/photo/1")[0], 403)
+        self.assertEqual(self.console(), [])
+
+    def test_a_frustum_under_the_pointer_has_its_photo(self):
+        first = self.rest()
+        stage = self.page.find_element(By.ID, "picture")
+        ActionChains(self.page).scroll_from_origin(ScrollOrigin.from_element(stage), 0, 400).perform()
+        ActionChains(self.page).move_to_element_with_offset(stage, 150, 100).send_keys("c").perform()
+        self.rest(first["id"])
+        self.assertTrue(self.painted("overlay"))
+        filled = ("const c = document.getElementById('overlay');"
+                  "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+                  "let count = 0; for (let i = 3; i < d.length; i += 4) count += d[i] === 255; return count;")
+        lines = self.page.execute_script(filled)
+        # The camera came from this tip, which is in the middle.
+        ActionChains(self.page).move_to_element(stage).perform()
+        self.wait("the photo in its frustum", lambda: self.page.execute_script(filled) > 1.5 * lines)
+        self.screenshot("frustum")
+        ActionChains(self.page).move_to_element_with_offset(stage, 150, 100).perform()
+        self.wait("the frustum alone", lambda: self.page.execute_script(filled) == lines)
         self.assertEqual(self.console(), [])
 
     def test_order_up_and_crop_box(self):

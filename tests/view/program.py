@@ -11,6 +11,8 @@ import subprocess
 import tempfile
 import urllib.parse
 
+LAST, PNG = 1, 2  # flags of a picture
+
 
 class Address:
     """What a viewer listens on."""
@@ -199,3 +201,12 @@ def view(number, size=(64, 48), eye=(0, 0, -6), **more):
     x, y, z = eye
     return {"type": "view", "id": number, "fov": 50, "size": list(size),
             "c2w": [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z], **more}
+
+
+def picked(channel, number, px=(0.5, 0.5), **more):
+    """The point of the world that a page is told of a place in its picture."""
+    channel.send_json(**{**view(number, **more), "type": "pick", "px": list(px)})
+    while True:
+        kind, answer, *_ = channel.receive()
+        if kind == "text" and answer["type"] == "pick":
+            return answer["point"]

@@ -16,6 +16,7 @@ const TURN = 0.006; // radians per pixel
 const KEY_TURN = 1.2; // radians per second
 const FLY = 0.5; // distances to the centre per second
 const CLICK = 4; // pixels that a click may slip
+const REST = 80; // milliseconds after which a pointer does not move
 const READ = 3000; // milliseconds in which a sentence is read
 
 const picture = $('picture');
@@ -30,6 +31,7 @@ let frames = []; // when the last pictures of movements came
 let came = 0; // pictures so far
 let drawn = 0; // the one on the page, as they came
 let facts = ''; // of the last picture, where it came after the last sentence
+let resting = 0; // timer until the pointer is taken to rest
 let reading = 0; // timer while a sentence is read
 const held = new Set(); // keys
 let run = null; // while the model trains
@@ -220,6 +222,16 @@ function click(x, y) {
   if (found) goTo(found);
 }
 
+// A pointer that moves on asks for nothing.
+function hover(event) {
+  clearTimeout(resting);
+  if (event.buttons !== 0 || rig.model !== 'pinhole') return;
+  const { offsetX, offsetY } = event;
+  resting = setTimeout(() => {
+    cameras.hover(rig, offsetX, offsetY, overlay.clientWidth, overlay.clientHeight).catch(() => {});
+  }, REST);
+}
+
 function pick(x, y) {
   const { left, top, width, height } = box();
   const px = [(x - left) / width, (y - top) / height];
@@ -290,7 +302,7 @@ function keyDown(event) {
   }
 }
 
-const cameras = new TrainingCameras($('cameras'), goTo);
+const cameras = new TrainingCameras($('cameras'), goTo, drawOverlay);
 const photo = new Photo(drawOverlay);
 const crop = new Crop($('crop-sliders'), $('crop-text'), drawOverlay);
 const meshes = new Meshes($('mesh-section'), {
@@ -322,6 +334,7 @@ const keyframes = new Keyframes({
 
 function wire() {
   new Pointers(picture, { drag, zoom: (factor) => { rig.zoom(factor); changed(); }, click, pick, slip: CLICK });
+  picture.addEventListener('pointermove', hover);
   document.addEventListener('keydown', keyDown);
   document.addEventListener('keyup', (event) => held.delete(event.key.toLowerCase()));
   window.addEventListener('blur', () => held.clear());

@@ -5,6 +5,13 @@
 const SAME = 1e-6; // deviation of a pose that is no movement
 const BRIGHTER = 4; // a difference of a quarter is white
 
+// The photo of a camera by its number, at most so many pixels wide; null where there is none.
+export async function fetchPhoto(number, resizeWidth = undefined) {
+  const reply = await fetch(`api/photo/${number}`);
+  if (!reply.ok) return null;
+  return createImageBitmap(await reply.blob(), resizeWidth ? { resizeWidth } : {});
+}
+
 export class Photo {
   #camera = null;
   #number = -1;
@@ -25,9 +32,7 @@ export class Photo {
     this.#number = number;
     if (!this.#camera) return;
     const asked = ++this.#asked;
-    const reply = await fetch(`api/photo/${number}`);
-    if (!reply.ok || asked !== this.#asked) return;
-    const bitmap = await createImageBitmap(await reply.blob());
+    const bitmap = await fetchPhoto(number);
     if (asked !== this.#asked) return;
     this.#bitmap = bitmap;
     this.redraw();
