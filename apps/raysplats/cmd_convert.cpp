@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <array>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "io/convert_model.hpp"
 #include "options.hpp"
+#include "raysplats/contributions.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
 #include "run/model_source.hpp"
+#include "run/run_cameras.hpp"
+#include "train/mirror_meshes.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -27,12 +34,34 @@ struct Options {
   std::string spz_axes = "ply";
   int spz_version = ModelEncoding{}.spz_version;
   bool overwrite = false;
+  std::string data;
+  DeviceFlags device;
   ModelChanges changes;
 };
 
 glm::dvec3 vector_of(const std::string& text) {
   const std::array<double, 3> v = parse_triple(text);
   return {v[0], v[1], v[2]};
+}
+
+/// The views that a model is to be good for: those of a data set, or of its run.
+std::vector<Camera> views_of(const Options& options, const ModelSource& source) {
+  if (options.data.empty()) return run_cameras(source);
+  return cameras_of(load_dataset(options.data, dataset_options(source)), Split::kAll);
+}
+
+std::vector<double> weights(const Options& options,
+                            const ModelSource& source,
+                            const ModelEncoding& encoding) {
+  const std::vector<Camera> cameras = views_of(options, source);
+  if (cameras.empty()) {
+    spdlog::info("no views are known (--data): the largest and most opaque Gaussians are kept");
+    return {};
+  }
+  spdlog::info("what is seen in {} is kept", counted(cameras.size(), "view"));
+  const std::unique_ptr<Context> context = open_context(options.device);
+  return contributions(*context, read_model(source.file, encoding), cameras, trace_options(source),
+                       mirrors_of(source));
 }
 
 void run(Options& options) {
@@ -56,6 +85,11 @@ void run(Options& options) {
   if (source.header || source.trained) trace = trace_options(source);
   const ModelEncoding encoding{options.spz_axes == "rub" ? SpzAxes::kRub : SpzAxes::kPly,
                                options.spz_version};
+  if (changes.max_gaussians) {
+    changes.contributions = weights(options, source, encoding);
+  } else if (!options.data.empty()) {
+    throw UsageError("--data has the views that --max-gaussians goes by: give that as well");
+  }
   const Conversion done =
       convert_model(source.file, options.output, changes, encoding, trace, options.overwrite);
   const std::string left = done.written == done.read ? "" : fmt::format(" of {}", done.read);
@@ -88,9 +122,13 @@ Command add_convert_command(CLI::App& app) {
   command->add_option("--min-opacity", changes.min_opacity, "Leave out Gaussians that are fainter")
       ->check(between(0.0, 1.0));
   command
-      ->add_option("--max-gaussians", options->max_gaussians,
-                   "Keep the N (such as 500k) that contribute most: opacity times largest section")
+      ->add_option(
+          "--max-gaussians", options->max_gaussians,
+          "Keep the N (such as 500k) that contribute most to the views of --data or the run; "
+          "of other models the largest and most opaque")
       ->type_name("N");
+  command->add_option("--data", options->data, "Data set with the views of --max-gaussians")
+      ->type_name("DIR");
   command
       ->add_option("--up", options->up,
                    "Turn the model so that this direction is up, before everything else")
@@ -133,6 +171,7 @@ Command add_convert_command(CLI::App& app) {
       ->transform(whole_between(3, 4))
       ->capture_default_str();
   add_overwrite_flag(*command, options->overwrite);
+  add_device_flags(*command, options->device);
   return {command, [options] { run(*options); }};
 }
 

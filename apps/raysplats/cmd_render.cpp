@@ -91,12 +91,6 @@ CameraModel camera_model(const std::string& name) {
   return CameraModel::kPinhole;
 }
 
-std::vector<Camera> cameras_of(const Dataset& dataset, Split split) {
-  std::vector<Camera> cameras;
-  for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
-  return cameras;
-}
-
 /// Cameras that follow the photos of a data set.
 std::vector<Camera> along(const RenderFlags& options, const std::vector<Camera>& photos) {
   std::vector<Camera> cameras = options.ellipse ? ellipse_cameras(photos, *options.ellipse)

@@ -232,6 +232,12 @@ void add_overwrite_flag(CLI::App& app, bool& flag) {
   app.add_flag("--overwrite", flag, "Also into a folder that holds results of something else");
 }
 
+std::vector<Camera> cameras_of(const Dataset& dataset, Split split) {
+  std::vector<Camera> cameras;
+  for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
+  return cameras;
+}
+
 DataError no_views(const DataFlags& flags) {
   return DataError(fmt::format("The {} split of {} has no views: choose another --split",
                                flags.split.value_or("test"), flags.data));

@@ -112,6 +112,7 @@ CLI::Option* add_data_flags(CLI::App& app,
                             DataFlags& flags,
                             const std::string& split = "test (default), train or all");
 DataError no_views(const DataFlags& flags);
+std::vector<Camera> cameras_of(const Dataset& dataset, Split split);
 
 /// --overwrite: outputs may take the place of what is there.
 void add_overwrite_flag(CLI::App& app, bool& flag);

@@ -9,12 +9,12 @@ namespace raysplats {
 namespace {
 
 template <class Keep>
-Gaussians kept(const Gaussians& model, Keep keep) {
+std::vector<std::uint32_t> kept(const Gaussians& model, Keep keep) {
   std::vector<std::uint32_t> indices;
   for (std::uint32_t i = 0; i < model.size(); ++i) {
     if (keep(i)) indices.push_back(i);
   }
-  return gathered(model, indices);
+  return indices;
 }
 
 }  // namespace
@@ -37,7 +37,7 @@ Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indice
   return out;
 }
 
-Gaussians within(const Gaussians& model, const CropBox& box) {
+std::vector<std::uint32_t> within(const Gaussians& model, const CropBox& box) {
   return kept(model, [&](std::uint32_t i) {
     bool inside = true;
     for (int k = 0; k < 3; ++k) {
@@ -49,30 +49,33 @@ Gaussians within(const Gaussians& model, const CropBox& box) {
   });
 }
 
-Gaussians with_opacity(const Gaussians& model, double least) {
+std::vector<std::uint32_t> with_opacity(const Gaussians& model, double least) {
   return kept(model, [&](std::uint32_t i) {
     return 1.0 / (1.0 + std::exp(-static_cast<double>(model.opacities[i]))) >= least;
   });
 }
 
-Gaussians most_contributing(const Gaussians& model, std::size_t most) {
-  if (model.size() <= most) return model;
-  std::vector<double> weights(model.size());
+std::vector<double> sections(const Gaussians& model) {
+  std::vector<double> out(model.size());
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* s = &model.log_scales[3 * i];
     // Of the two longer axes; logarithms, which do not overflow.
     const double area = static_cast<double>(s[0]) + static_cast<double>(s[1]) +
                         static_cast<double>(s[2]) -
                         static_cast<double>(std::min({s[0], s[1], s[2]}));
-    weights[i] = area - std::log1p(std::exp(-static_cast<double>(model.opacities[i])));
+    out[i] = area - std::log1p(std::exp(-static_cast<double>(model.opacities[i])));
   }
-  std::vector<std::uint32_t> order(model.size());
+  return out;
+}
+
+std::vector<std::uint32_t> largest(std::span<const double> weights, std::size_t most) {
+  std::vector<std::uint32_t> order(weights.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return weights[a] > weights[b]; });
-  order.resize(most);
+  order.resize(std::min(most, order.size()));
   std::sort(order.begin(), order.end());
-  return gathered(model, order);
+  return order;
 }
 
 }  // namespace raysplats

@@ -4,10 +4,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/trigonometric.hpp>
 #include <numbers>
+#include <vector>
 
 #include "raysplats/error.hpp"
 #include "scene/gaussian_selection.hpp"
@@ -65,11 +68,25 @@ Gaussians changed(const Gaussians& model, const ModelChanges& changes) {
   if (changes.sh_degree && (*changes.sh_degree < 0 || *changes.sh_degree > kMaxShDegree))
     throw UsageError(fmt::format("sh-degree is 0 to {}, not {}", kMaxShDegree, *changes.sh_degree));
   if (changes.crop) check_box(*changes.crop);
-  Gaussians out = changes.min_opacity ? with_opacity(model, *changes.min_opacity) : model;
+  std::vector<double> weights = changes.contributions;
+  if (!weights.empty() && weights.size() != model.size()) {
+    throw UsageError(fmt::format("There are {} contributions of {} Gaussians: give one of each",
+                                 weights.size(), model.size()));
+  }
+  Gaussians out = model;
+  const auto keep = [&](const std::vector<std::uint32_t>& indices) {
+    if (indices.size() == out.size()) return;
+    out = gathered(out, indices);
+    if (weights.empty()) return;
+    for (std::size_t i = 0; i < indices.size(); ++i) weights[i] = weights[indices[i]];
+    weights.resize(indices.size());
+  };
+  if (changes.min_opacity) keep(with_opacity(out, *changes.min_opacity));
   const glm::dmat4 map = movement(changes);
   if (map != glm::dmat4(1.0)) out = transformed(out, map);
-  if (changes.crop) out = within(out, *changes.crop);
-  if (changes.max_gaussians) out = most_contributing(out, *changes.max_gaussians);
+  if (changes.crop) keep(within(out, *changes.crop));
+  if (changes.max_gaussians)
+    keep(largest(weights.empty() ? sections(out) : weights, *changes.max_gaussians));
   if (changes.sh_degree) out = with_sh_degree(out, *changes.sh_degree);
   return out;
 }

@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 #include <optional>
+#include <vector>
 
 #include "raysplats/gaussians.hpp"
 
@@ -24,15 +25,16 @@ struct ModelChanges {
   glm::dvec3 rotate_degrees{0.0};     ///< about the axes x, then y, then z
   glm::dvec3 translate{0.0};          ///< world units
   std::optional<CropBox> crop;        ///< in the coordinates of the result, borders included
-  /// Those that contribute most to pictures from anywhere: by opacity times the area of the
-  /// ellipsoid's largest section.
+  /// Those of the greatest `contributions`; without these, by opacity times the area of the
+  /// ellipsoid's largest section, which is what they can give to pictures from anywhere.
   std::optional<std::size_t> max_gaussians;
-  std::optional<int> sh_degree;  ///< 0 to 4: bands are dropped, or added as zero
+  std::vector<double> contributions;  ///< of each Gaussian, as by raysplats::contributions()
+  std::optional<int> sh_degree;       ///< 0 to 4: bands are dropped, or added as zero
 };
 
 /// The model with these changes; what is left keeps its order, and harmonics turn as well. Throws
 /// UsageError for a number out of range, an `up` of length 0 and a box whose least is above its
-/// greatest.
+/// greatest, and for another number of contributions than of Gaussians.
 Gaussians changed(const Gaussians& model, const ModelChanges& changes);
 
 }  // namespace raysplats

@@ -115,6 +115,33 @@ TEST_CASE("convert takes the output as a word, and a box as one option or by its
   CHECK(kept("sides.spz", {"--crop-min", low, "--crop-max", "9,9,9"}) == part);
 }
 
+TEST_CASE("convert keeps what the views of a run see") {
+  const TemporaryFolder folder;
+  const std::filesystem::path run(folder / "run");
+  std::filesystem::create_directories(run / "point_cloud/iteration_5");
+  write_file(run / "point_cloud/iteration_5/point_cloud.ply", ply_file(5));
+  // Balls lie along x, half a unit apart; the camera looks along z and sees the last two.
+  write_file(run / "cameras.json",
+             "[{\"img_name\":\"a\",\"width\":40,\"height\":40,\"fx\":100,\"fy\":100,\"position\":"
+             "[1.85,0,-3],\"rotation\":[[1,0,0],[0,1,0],[0,0,1]]}]");
+  const auto kept = [&](const std::string& input, const std::string& name) {
+    const Outcome outcome =
+        raysplats_program({"convert", input, folder / name, "--max-gaussians", "2"});
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    CHECK(has(outcome.err, name == "seen.ply" ? "what is seen in 1 view is kept" : "no views"));
+    return raysplats::read_ply(folder / name).means;
+  };
+  CHECK(kept(run.string(), "seen.ply") == std::vector<float>{1.5f, 0, 0, 2, 0, 0});
+  write_file(folder / "alone.ply", ply_file(5));
+  CHECK(kept(folder / "alone.ply", "first.ply") == std::vector<float>{0, 0, 0, 0.5f, 0, 0});
+  const Outcome idle =
+      raysplats_program({"convert", folder / "alone.ply", folder / "x.ply", "--data", "data"});
+  CHECK(idle.code == 2);
+  CHECK(one_sentence(idle));
+  CHECK(has(idle.err, "--max-gaussians"));
+}
+
 TEST_CASE("convert says in one sentence what it will not do") {
   const TemporaryFolder folder;
   write_file(folder / "balls.ply", ply_file(5));

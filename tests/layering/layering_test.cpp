@@ -56,7 +56,7 @@ const std::map<std::string, std::string> kFaces{
     {"path_tracer", "light"},   {"lpips", "eval"},
     {"evaluation", "eval"},     {"evaluation_row", "run"},
     {"train_options", "run"},   {"trainer", "train"},
-    {"opencl", "light"}};
+    {"opencl", "light"},        {"contributions", "light"}};
 
 Names reach_of(const std::string& module) {
   Names reach{module};

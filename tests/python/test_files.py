@@ -120,6 +120,10 @@ def test_changes_are_those_of_convert(arrays):
     assert len(g.changed(crop_min=(-1, -1, -1), crop_max=(0.9, 1, 1))) == len(g) - 1
     bright = 1 / (1 + np.exp(-g.opacities)) >= 0.5
     assert np.array_equal(g.changed(min_opacity=0.5).means, g.means[bright])
+    seen = np.arange(len(g), dtype=np.float32)
+    assert np.array_equal(g.changed(max_gaussians=2, contributions=seen).means, g.means[-2:])
+    with pytest.raises(rs.UsageError, match="contributions"):
+        g.changed(max_gaussians=2, contributions=seen[1:])
     assert len(g.changed(max_gaussians=3)) == 3 and np.array_equal(g.changed().sh, g.sh)
     with pytest.raises(rs.UsageError, match="scale is above 0"):
         g.changed(scale=0)

@@ -113,6 +113,15 @@ def test_views(context):
     assert_close("rotation", found.camera_rotation, differences(loss, turn))
 
 
+def test_contributions_make_up_alpha(context, arrays):
+    gaussians = as_gaussians(arrays)
+    camera = rs.Camera.look_at([0, -3, 0.5], [0, 0, 0], [0, 0, 1], 40, 30, 40.0)
+    found = rs.contributions(context, gaussians, [camera])
+    assert found.shape == (len(gaussians),) and found.dtype == np.float32 and found.min() >= 0
+    alpha = rs.Tracer(context).render(rs.Model(context, gaussians), camera).alpha
+    assert found.sum() == pytest.approx(alpha.mean(), rel=1e-4)
+
+
 def test_backward_is_refused_where_it_means_nothing(context, arrays):
     model = rs.Model(context, as_gaussians(arrays))
     tracer = rs.Tracer(context)

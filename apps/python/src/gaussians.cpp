@@ -102,7 +102,8 @@ Gaussians change(const Gaussians& self,
                  const std::optional<Triple>& crop_min,
                  const std::optional<Triple>& crop_max,
                  const std::optional<std::size_t>& max_gaussians,
-                 const std::optional<int>& sh_degree) {
+                 const std::optional<int>& sh_degree,
+                 const std::vector<double>& contributions) {
   ModelChanges changes;
   changes.min_opacity = min_opacity;
   if (up) changes.up = vector_of(*up);
@@ -114,6 +115,7 @@ Gaussians change(const Gaussians& self,
   if (crop_max) changes.crop->high = vector_of(*crop_max);
   changes.max_gaussians = max_gaussians;
   changes.sh_degree = sh_degree;
+  changes.contributions = contributions;
   return changed(self, changes);
 }
 
@@ -180,12 +182,14 @@ void bind_gaussians(nb::module_& module) {
            nb::arg("up") = nb::none(), nb::arg("scale") = 1.0, nb::arg("rotate") = Triple{},
            nb::arg("translate") = Triple{}, nb::arg("crop_min") = nb::none(),
            nb::arg("crop_max") = nb::none(), nb::arg("max_gaussians") = nb::none(),
-           nb::arg("sh_degree") = nb::none(), nb::call_guard<nb::gil_scoped_release>(),
+           nb::arg("sh_degree") = nb::none(), nb::arg("contributions") = std::vector<double>(),
+           nb::call_guard<nb::gil_scoped_release>(),
            "A copy with the changes of `raysplats convert`, in this order: fainter Gaussians than "
            "`min_opacity` (0 to 1) are left out, the direction `up` becomes -y, then come `scale`, "
            "`rotate` (degrees about x, then y, then z) and `translate`, harmonics included; the "
-           "box from `crop_min` to `crop_max` cuts the result, `max_gaussians` keeps those that "
-           "contribute most, and `sh_degree` drops bands or adds zeros.")
+           "box from `crop_min` to `crop_max` cuts the result, `max_gaussians` keeps those of the "
+           "greatest `contributions` (one number of each Gaussian, as by contributions(); without "
+           "them the largest and most opaque), and `sh_degree` drops bands or adds zeros.")
       .def("with_sh_degree", &with_sh_degree, nb::arg("degree"),
            "A copy with bands added (zero) or dropped.")
       .def_ro("sh_degree", &Gaussians::sh_degree)

@@ -22,6 +22,7 @@
 #include "context.hpp"
 #include "images.hpp"
 #include "names.hpp"
+#include "raysplats/contributions.hpp"
 #include "raysplats/error.hpp"
 #include "signals.hpp"
 
@@ -323,6 +324,23 @@ void bind_tracer(nb::module_& module) {
           nb::arg("color"), nb::arg("sky") = SkyLight(), nb::call_guard<nb::gil_scoped_release>(),
           "Colour behind everything from the next call on, or TraceOptions.sky in its place.")
       .def_prop_ro("options", [](HeldTracer& self) { return self->options(); });
+  module.def(
+      "contributions",
+      [](HeldContext& context, const Gaussians& gaussians, const std::vector<Camera>& cameras,
+         const std::optional<TraceOptions>& options, const std::optional<Mirrors>& mirrors) {
+        std::vector<double> found;
+        {
+          const nb::gil_scoped_release others;
+          found = contributions(*context, gaussians, cameras, options.value_or(TraceOptions{}),
+                                mirrors.value_or(Mirrors{}));
+        }
+        const std::size_t count = found.size();
+        return array_of(std::vector<float>(found.begin(), found.end()), {count});
+      },
+      nb::arg("context"), nb::arg("gaussians"), nb::arg("cameras"), nb::arg("options") = nb::none(),
+      nb::kw_only(), nb::arg("mirrors") = nb::none(),
+      "(N,): what each Gaussian gives to pictures of these views, the mean over their pixels of "
+      "its share of the light. For Gaussians.changed(max_gaussians=..., contributions=...).");
 }
 
 }  // namespace raysplats::python

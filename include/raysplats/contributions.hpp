@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "raysplats/context.hpp"
+#include "raysplats/gaussians.hpp"
+#include "raysplats/mirrors.hpp"
+#include "raysplats/trace_options.hpp"
+
+namespace raysplats {
+
+/// What each Gaussian gives to the pictures of views: the mean over their pixels of its share of
+/// the light, alpha times the transmittance before it, as the backward pass adds it up. Views that
+/// are many are thinned out evenly (64), and large pictures made smaller (600 000 pixels). Throws
+/// as Tracer, and UsageError without a camera.
+std::vector<double> contributions(Context& context,
+                                  const Gaussians& model,
+                                  std::span<const Camera> cameras,
+                                  TraceOptions trace,
+                                  const Mirrors& mirrors = {});
+
+}  // namespace raysplats
