@@ -30,6 +30,10 @@ constexpr double kMostSeconds = 86400.0;
 constexpr double kMostFrames = 1e6;
 constexpr double kRigid = 1e-2;  // deviation from a rotation that rounding may cause
 
+double element(const Matrix& matrix, int row, int column) {
+  return matrix[4 * static_cast<std::size_t>(row) + static_cast<std::size_t>(column)];
+}
+
 /// A path as a file has it, before anybody asks for other moments.
 struct Stored {
   CameraPath path;
@@ -128,10 +132,10 @@ void set_pose(const std::filesystem::path& path, const Matrix& matrix, Keyframe&
   glm::dmat3 axes;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
-      const double value = matrix[static_cast<std::size_t>(4 * row + column)];
+      const double value = element(matrix, row, column);
       axes[column][row] = column == 0 ? value : -value;
     }
-    key.eye[row] = matrix[static_cast<std::size_t>(4 * row + 3)];
+    key.eye[row] = element(matrix, row, 3);
   }
   const glm::dmat3 off = glm::transpose(axes) * axes - glm::dmat3(1.0);
   for (int i = 0; i < 3; ++i) {
@@ -243,9 +247,8 @@ void undo_transform(const std::filesystem::path& file, CameraPath& path) {
   glm::dmat3 turn;
   glm::dvec3 shift;
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column)
-      turn[column][row] = matrix[static_cast<std::size_t>(4 * row + column)];
-    shift[row] = matrix[static_cast<std::size_t>(4 * row + 3)];
+    for (int column = 0; column < 3; ++column) turn[column][row] = element(matrix, row, column);
+    shift[row] = element(matrix, row, 3);
   }
   const glm::dmat3 back = glm::transpose(orthogonal_factor(turn));
   for (Keyframe& key : path.keys) {

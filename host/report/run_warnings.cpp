@@ -45,6 +45,7 @@ std::vector<Json> far_below(std::vector<Json> views,
   std::erase_if(views, [&](const Json& view) { return !view.contains(key); });
   if (views.size() < kFewViews) return {};
   std::vector<double> values;
+  values.reserve(views.size());
   for (const Json& view : views) values.push_back(scale(number(view, key)));
   const double middle = median(values);
   std::vector<double> deviations = values;

@@ -28,7 +28,8 @@ constexpr std::size_t kMostRuns = 12;
 /// Views that are shown, so that the page stays small.
 constexpr std::size_t kShownViews = 2;
 
-struct Run {
+// nlohmann::json says that its moves throw nothing, and asserts in them.
+struct Run {  // NOLINT(bugprone-exception-escape)
   fs::path folder;
   std::string name;
   std::string letter;  ///< what stands for it in curves

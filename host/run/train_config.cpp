@@ -125,12 +125,11 @@ void read_keys(const toml::table& table,
 }
 
 // Returns the names of all keys that are there.
-std::set<std::string> read_text(std::string text,
+std::set<std::string> read_text(const std::string& text,
                                 const std::filesystem::path& path,
                                 TrainOptions& options,
                                 const std::function<bool(const std::string&)>& skip) {
-  const toml::table root =
-      io::parse_toml(text.starts_with(kRunMark) ? modern(std::move(text)) : text, path);
+  const toml::table root = io::parse_toml(text.starts_with(kRunMark) ? modern(text) : text, path);
   std::set<std::string> seen;
   read_keys(root, "", path, train_keys(options), seen, skip);
   return seen;
@@ -161,15 +160,20 @@ void check_rate(const LearningRate& rate) {
       "A learning rate and its final value are both 0 (the group stays as it is) or both above 0");
 }
 
+void check_fitted(const char* name, double value, double least) {
+  if (value >= least || value == kFitted) return;
+  throw UsageError(fmt::format(
+      "The option '{}' is {}: use {} or above, or -1 for what fits the start", name, value, least));
+}
+
 void check_fitted_rate(const LearningRate& rate) {
   for (const double value : {rate.initial, rate.final_value}) {
-    if (value >= 0 || value == kFittedRate) continue;
+    if (value >= 0 || value == kFitted) continue;
     throw UsageError(fmt::format(
-        "A learning rate is {}: use 0 or above, or -1 for one that fits the length of the run",
-        value));
+        "A learning rate is {}: use 0 or above, or -1 for one that fits the run", value));
   }
   const double initial = std::abs(rate.initial);
-  if (rate.final_value != kFittedRate) check_rate({initial, rate.final_value});
+  if (rate.final_value != kFitted) check_rate({initial, rate.final_value});
 }
 
 }  // namespace
@@ -248,10 +252,13 @@ void validate(const TrainOptions& options) {
   if (!std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
     throw UsageError("The iterations of 'resolution-schedule' have to ascend");
   }
-  for (const LearningRate& rate : {options.position_lr, options.rotation_lr, options.opacity_lr,
-                                   options.sh_lr, options.sky_lr, options.pose_lr}) {
+  for (const LearningRate& rate :
+       {options.rotation_lr, options.opacity_lr, options.sh_lr, options.sky_lr, options.pose_lr}) {
     check_rate(rate);
   }
+  check_fitted("init-opacity", options.init_opacity, 1e-4);
+  check_fitted("opacity-decay", options.opacity_decay, 0.0);
+  check_fitted_rate(options.position_lr);
   check_fitted_rate(options.scale_lr);
   check_fitted_rate(options.sh_rest_lr);
   if (options.max_gaussians > 0 && options.init_count > options.max_gaussians) {

@@ -211,8 +211,10 @@ void add_start_keys(TrainTable& t, TrainOptions& o) {
       "photos)");
   t.number("init-count", o.init_count, 0, 1e9,
            "Gaussians of a start without points, or beside few; 0 = a share of max-gaussians");
-  t.number("init-opacity", o.init_opacity, 1e-4, 0.9999,
-           "opacity of the first Gaussians (not of a model)");
+  t.number(
+      "init-opacity", o.init_opacity, kFitted, 0.9999,
+      "opacity of the first Gaussians (not of a model), at least 0.0001; -1 = 0.1, or 0.02 of a "
+      "random start");
   t.box("bounds", o.bounds,
         "box of the model in world units, least and greatest x, y, z as in -1,-1,0,1,1,2: "
         "Gaussians with their mean outside are not made and not kept; [] = everywhere");
@@ -263,18 +265,23 @@ void add_loss_keys(TrainTable& t, TrainOptions& o) {
 
 void add_optimiser_keys(TrainTable& t, TrainOptions& o) {
   t.section("Optimiser (Adam)");
-  t.learning_rate("position-lr", o.position_lr, "the means, times the scene extent");
+  t.number(
+      "position-lr", o.position_lr.initial, kFitted, 1e3,
+      "learning rate of the means, times the scene extent; -1 = 0.0005, or 0.002 after a random "
+      "start");
+  t.number("position-lr-final", o.position_lr.final_value, 0, 1e3,
+           "value that position-lr decays to");
   t.learning_rate("rotation-lr", o.rotation_lr, "the quaternions");
-  t.number("scale-lr", o.scale_lr.initial, kFittedRate, 1e3,
+  t.number("scale-lr", o.scale_lr.initial, kFitted, 1e3,
            "learning rate of the scale parameters; -1 = 2.5 / sqrt(iterations), from 0.04 to 0.12");
   t.number("scale-lr-final", o.scale_lr.final_value, 0, 1e3, "value that scale-lr decays to");
   t.learning_rate("opacity-lr", o.opacity_lr, "the opacity parameters");
   t.learning_rate("sh-lr", o.sh_lr, "colour (SH band 0)");
   t.number(
-      "sh-rest-lr", o.sh_rest_lr.initial, kFittedRate, 1e3,
+      "sh-rest-lr", o.sh_rest_lr.initial, kFitted, 1e3,
       "learning rate of the SH bands above 0; -1 = 0.095 / sqrt(iterations), from 0.0005 to 0.003");
   t.number(
-      "sh-rest-lr-final", o.sh_rest_lr.final_value, kFittedRate, 1e3,
+      "sh-rest-lr-final", o.sh_rest_lr.final_value, kFitted, 1e3,
       "value that sh-rest-lr decays to; -1 = 0.032 / sqrt(iterations), from 0.000125 to 0.001");
   t.learning_rate("sky-lr", o.sky_lr, "the sky");
   t.learning_rate("pose-lr", o.pose_lr, "the poses, in radians and shares of the scene extent");
@@ -344,8 +351,9 @@ void add_density_keys(TrainTable& t, TrainOptions& o) {
       "max-gaussians", o.max_gaussians, 0, 2e9,
       "hard limit of the count; the strongest candidates win; 0 = from the photos' pixels, the "
       "iterations and the device's memory");
-  t.number("opacity-decay", o.opacity_decay, 0, 0.5,
-           "taken off every opacity in each pass of the budget strategy");
+  t.number("opacity-decay", o.opacity_decay, kFitted, 0.5,
+           "taken off every opacity in each pass of the budget strategy; -1 = 0, or 0.01 after a "
+           "random start");
   t.number("opacity-reg", o.opacity_reg, 0, 1e3,
            "weight of the mean opacity in the loss of the mcmc strategy");
   t.number("scale-reg", o.scale_reg, 0, 1e3,

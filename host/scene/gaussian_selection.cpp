@@ -33,7 +33,7 @@ Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indice
   copy(model.quaternions, out.quaternions, 4);
   copy(model.log_scales, out.log_scales, 3);
   copy(model.opacities, out.opacities, 1);
-  copy(model.sh, out.sh, static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree)));
+  copy(model.sh, out.sh, 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree)));
   return out;
 }
 

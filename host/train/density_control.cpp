@@ -9,6 +9,7 @@
 
 #include "raysplats/error.hpp"
 #include "train/mcmc.hpp"
+#include "train/schedule.hpp"
 #include "util/rng.hpp"
 
 namespace raysplats {
@@ -186,7 +187,7 @@ DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iter
   }
   if (plan.changes()) gather(gaussians, plan, iteration);
   if (moves && plan.changes()) apply_shares(context_, relocation.shares, gaussians);
-  if (options_.strategy == DensityStrategy::kBudget && options_.opacity_decay > 0)
+  if (options_.strategy == DensityStrategy::kBudget && pass_decay(options_) > 0)
     fade_opacities(gaussians);
   // Without changes the statistics start anew all the same, as in 3DGS.
   if (statistics_.size() == 2 * gaussians.count) {
@@ -201,8 +202,8 @@ DensityPlan DensityControl::split_evenly(DeviceGaussians& gaussians, std::size_t
   BudgetRules rules;
   rules.target = most;
   const std::vector<float> alike(2 * gaussians.count, 1.0f);
-  const DensityPlan plan = plan_budget(gaussians.means.download(), gaussians.scales.download(),
-                                       gaussians.opacities.download(), alike, rules);
+  DensityPlan plan = plan_budget(gaussians.means.download(), gaussians.scales.download(),
+                                 gaussians.opacities.download(), alike, rules);
   if (plan.changes()) gather(gaussians, plan, 0);
   statistics_ = Buffer<float>();
   return plan;
@@ -240,7 +241,7 @@ void DensityControl::gather(DeviceGaussians& gaussians,
 void DensityControl::fade_opacities(DeviceGaussians& gaussians) {
   context_.kernel(kProgram, "fade_opacity")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
-              static_cast<float>(options_.opacity_decay), static_cast<float>(kLeastOpacity),
+              static_cast<float>(pass_decay(options_)), static_cast<float>(kLeastOpacity),
               gaussians.opacities);
 }
 

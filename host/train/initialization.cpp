@@ -20,6 +20,7 @@
 #include "shared/sh.h"
 #include "train/photo_start.hpp"
 #include "train/point_check.hpp"
+#include "train/schedule.hpp"
 
 namespace raysplats {
 namespace {
@@ -30,7 +31,7 @@ constexpr std::uint32_t kReliableTrack = 3;
 constexpr float kReliableError = 2.0f;
 constexpr std::size_t kEnoughPoints = 2000;
 constexpr std::size_t kFewPoints = 1000;  // fewer leave most of the photos without a start
-constexpr double kStartShare = 0.5;       // of the limit that points may take
+constexpr double kStartShare = 0.5;       // of the limit that points, or random places, may take
 constexpr double kPhotoShare = 0.3;       // of the limit that a start from photos takes
 constexpr double kUnsureShare = 0.25;     // of a start from photos alone: points at a random depth
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
@@ -353,12 +354,12 @@ Gaussians initial_model(const Dataset& dataset,
     return std::max<std::size_t>(1, static_cast<std::size_t>(part * static_cast<double>(limit)));
   };
   const auto start = [&](const PointCloud& points) {
-    return inside(gaussians_from_points(points, options.sh_degree, options.init_opacity, cameras),
+    return inside(gaussians_from_points(points, options.sh_degree, start_opacity(options), cameras),
                   bounds);
   };
   const std::size_t count = options.init_count > 0
                                 ? std::min(limit, static_cast<std::size_t>(options.init_count))
-                                : share(kPhotoShare);
+                                : share(options.init == "random" ? kStartShare : kPhotoShare);
   PointCloud points;
   if (has_points && (options.init == "auto" || options.init == "colmap")) {
     points = start_points(dataset, cameras, photos, options);

@@ -37,9 +37,9 @@ void Mcmc::press(const DeviceGaussians& gaussians,
 void Mcmc::disturb(DeviceGaussians& gaussians,
                    std::int64_t iteration,
                    const Buffer<std::uint32_t>& guard) {
-  if (options_.mcmc_noise <= 0 || options_.position_lr.initial <= 0) return;
-  const double decay =
-      learning_rate(options_.position_lr, options_, iteration) / options_.position_lr.initial;
+  const LearningRate rate = position_rate(options_);
+  if (options_.mcmc_noise <= 0 || rate.initial <= 0) return;
+  const double decay = learning_rate(rate, options_, iteration) / rate.initial;
   const std::uint64_t key =
       CounterRng(options_.seed, kNoiseStream, static_cast<std::uint64_t>(iteration)).bits();
   kernel(context_, "mcmc_noise", gaussians)

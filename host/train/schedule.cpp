@@ -36,22 +36,41 @@ double fitted(const FittedRate& rate, const TrainOptions& options) {
   return std::clamp(rate.usual * std::sqrt(kFittedIterations / steps), rate.least, rate.most);
 }
 
+bool is_random(const TrainOptions& options) { return options.init == "random"; }
+
 }  // namespace
 
 LearningRate scale_rate(const TrainOptions& options) {
   LearningRate rate = options.scale_lr;
-  if (rate.initial == kFittedRate)
+  if (rate.initial == kFitted)
     rate.initial = std::max(fitted(kScaleRate, options), rate.final_value);
   return rate;
 }
 
 LearningRate sh_rest_rate(const TrainOptions& options) {
   LearningRate rate = options.sh_rest_lr;
-  if (rate.initial == kFittedRate)
+  if (rate.initial == kFitted)
     rate.initial = std::max(fitted(kShRestRate, options), rate.final_value);
-  if (rate.final_value == kFittedRate)
+  if (rate.final_value == kFitted)
     rate.final_value = std::min(fitted(kShRestFinalRate, options), rate.initial);
   return rate;
+}
+
+LearningRate position_rate(const TrainOptions& options) {
+  LearningRate rate = options.position_lr;
+  if (rate.initial == kFitted)
+    rate.initial = std::max(is_random(options) ? 2e-3 : 5e-4, rate.final_value);
+  return rate;
+}
+
+double start_opacity(const TrainOptions& options) {
+  if (options.init_opacity != kFitted) return options.init_opacity;
+  return is_random(options) ? 0.02 : 0.1;
+}
+
+double pass_decay(const TrainOptions& options) {
+  if (options.opacity_decay != kFitted) return options.opacity_decay;
+  return is_random(options) ? 0.01 : 0.0;
 }
 
 double learning_rate(const LearningRate& rate,

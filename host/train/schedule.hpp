@@ -20,9 +20,17 @@ namespace raysplats {
 double learning_rate(const LearningRate& rate, const TrainOptions& options, std::int64_t iteration);
 
 /// Rates of the scale parameters and of the SH bands above 0 as they are given, with what the
-/// number of iterations asks for in place of kFittedRate.
+/// number of iterations asks for in place of kFitted.
 LearningRate scale_rate(const TrainOptions& options);
 LearningRate sh_rest_rate(const TrainOptions& options);
+
+/// The rate of the means, the opacity of the first Gaussians and what passes of density control
+/// take off opacities, as they are given, with what the start asks for in place of kFitted:
+/// Gaussians at random places stand in front of each other, have far to go, and many are to go
+/// altogether.
+LearningRate position_rate(const TrainOptions& options);
+double start_opacity(const TrainOptions& options);
+double pass_decay(const TrainOptions& options);
 
 /// Degree of the SH bands that are switched on.
 int active_sh_degree(const TrainOptions& options, std::int64_t iteration);

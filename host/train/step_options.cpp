@@ -27,7 +27,7 @@ AdamOptions adam_options_of(const TrainOptions& options) {
 
 AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t iteration) {
   AdamRates rates;
-  rates.means = extent * learning_rate(options.position_lr, options, iteration);
+  rates.means = extent * learning_rate(position_rate(options), options, iteration);
   rates.quaternions =
       (options.flat ? kFlatTurn : 1.0) * learning_rate(options.rotation_lr, options, iteration);
   rates.scales = (options.scale_lr_by_extent ? extent : 1.0) *

@@ -70,9 +70,9 @@ struct Bounds {
   bool operator==(const Bounds&) const = default;
 };
 
-/// In place of a number of a learning rate that has a default by the length of the run: in short
-/// runs every step has to go farther.
-inline constexpr double kFittedRate = -1;
+/// In place of a number that has a default by the length of the run, as in short runs every step
+/// has to go farther, or by its start.
+inline constexpr double kFitted = -1;
 
 /// Learning rate of one parameter group: `initial` decays exponentially to `final_value`.
 struct LearningRate {
@@ -105,10 +105,10 @@ struct TrainOptions {
   int mirror_bounces = 4;            ///< mirrors that a ray may meet
 
   // Start
-  std::string init = "auto";    ///< "auto", "colmap", "random" or the path of a PLY
-  std::int64_t init_count = 0;  ///< 0 = a share of max_gaussians
-  double init_opacity = 0.1;
-  std::optional<Bounds> bounds;  ///< where Gaussians may be
+  std::string init = "auto";      ///< "auto", "colmap", "random" or the path of a PLY
+  std::int64_t init_count = 0;    ///< 0 = a share of max_gaussians
+  double init_opacity = kFitted;  ///< as start_opacity()
+  std::optional<Bounds> bounds;   ///< where Gaussians may be
 
   // Model
   int sh_degree = 3;
@@ -126,12 +126,12 @@ struct TrainOptions {
   bool poses = false;              ///< the poses of the training photos are trained too
 
   // Optimiser
-  LearningRate position_lr{5e-4, 5e-6};  ///< times the scene extent
+  LearningRate position_lr{kFitted, 5e-6};  ///< times the scene extent; as position_rate()
   LearningRate rotation_lr{3e-3, 1e-3};
-  LearningRate scale_lr{kFittedRate, 5e-3};
+  LearningRate scale_lr{kFitted, 5e-3};
   LearningRate opacity_lr{1e-1, 3e-2};
   LearningRate sh_lr{1e-2, 2.5e-3};
-  LearningRate sh_rest_lr{kFittedRate, kFittedRate};
+  LearningRate sh_rest_lr{kFitted, kFitted};
   LearningRate sky_lr{1e-2, 1e-3};
   LearningRate pose_lr{5e-3, 5e-4};  ///< radians, and shares of the scene extent
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration
@@ -161,7 +161,7 @@ struct TrainOptions {
   double prune_scale = 0.0;        ///< times the scene extent; 0 = off
   double prune_scale_min = 0.0;    ///< times the scene extent; 0 = off
   std::int64_t max_gaussians = 0;  ///< 0 = from photos, iterations and device memory
-  double opacity_decay = 0.0;      ///< taken off every opacity in each pass
+  double opacity_decay = kFitted;  ///< taken off every opacity in each pass; as pass_decay()
   double opacity_reg = 0.01;       ///< weight of the mean opacity in the loss of kMcmc
   double scale_reg = 0.01;         ///< weight of the mean size over the extent in the loss of kMcmc
   double mcmc_noise = 80.0;        ///< strength of the noise on faint Gaussians' means with kMcmc

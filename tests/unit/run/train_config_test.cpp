@@ -146,6 +146,10 @@ TEST_CASE("values out of range and of the wrong kind are refused by name") {
                                  "strategy = \"grow\"",
                                  "eval-at = [0]",
                                  "position-lr = 0",
+                                 "position-lr = -0.5",
+                                 "init-opacity = -0.5",
+                                 "init-opacity = 0",
+                                 "opacity-decay = -0.1",
                                  "sh-degree = 5",
                                  "iterations = [1, 2]"}) {
     INFO(line);

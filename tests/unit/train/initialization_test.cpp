@@ -165,7 +165,8 @@ TEST_CASE("the first model follows the options") {
   options.init = "random";
   CHECK(first(1000).size() == 50);
   options.init_count = 0;
-  CHECK(first(1000).size() == 300);
+  CHECK(first(1000).size() == 500);
+  CHECK(first(1000).opacities.front() == doctest::Approx(std::log(0.02 / 0.98)));
   options.init = "colmap";
   CHECK_THROWS_AS(first(1000), UsageError);
   for (int i = 0; i < 90; ++i) {
@@ -178,6 +179,7 @@ TEST_CASE("the first model follows the options") {
   // Half of the limit: the start leaves room to grow.
   const Gaussians few = first(14);
   CHECK(few.size() == 7);
+  CHECK(few.opacities.front() == doctest::Approx(std::log(0.1 / 0.9)));
   CHECK(few.sh.size() == 7 * 12);
   options.init = "random";
   options.init_count = 50;

@@ -45,13 +45,34 @@ TEST_CASE("rates that fit the run fall with the root of its length, and given on
   CHECK(adam_rates_of(options, 2.0, 0).sh_rest == doctest::Approx(0.0005));
 
   options.scale_lr = {0.01, 0.002};
-  options.sh_rest_lr = {0, kFittedRate};
+  options.sh_rest_lr = {0, kFitted};
   check(rates_of(1000), {0.01, 0.002, 0, 0});
-  options.scale_lr = {kFittedRate, 0.5};
-  options.sh_rest_lr = {kFittedRate, 0.01};
+  options.scale_lr = {kFitted, 0.5};
+  options.sh_rest_lr = {kFitted, 0.01};
   check(rates_of(1000), {0.5, 0.5, 0.01, 0.01});
-  options.sh_rest_lr = {0.0002, kFittedRate};
+  options.sh_rest_lr = {0.0002, kFitted};
   check(rates_of(1000), {0.5, 0.5, 0.0002, 0.0002});
+}
+
+TEST_CASE("a random start has its own rate, opacity and decay unless they are given") {
+  TrainOptions options;
+  CHECK(position_rate(options).initial == 5e-4);
+  CHECK(start_opacity(options) == 0.1);
+  CHECK(pass_decay(options) == 0.0);
+  options.init = "random";
+  CHECK(position_rate(options).initial == 2e-3);
+  CHECK(position_rate(options).final_value == 5e-6);
+  CHECK(adam_rates_of(options, 3.0, 0).means == doctest::Approx(6e-3));
+  CHECK(start_opacity(options) == 0.02);
+  CHECK(pass_decay(options) == 0.01);
+  options.position_lr = {1e-3, 1e-4};
+  options.init_opacity = 0.3;
+  options.opacity_decay = 0;
+  CHECK(position_rate(options).initial == 1e-3);
+  CHECK(start_opacity(options) == 0.3);
+  CHECK(pass_decay(options) == 0.0);
+  options.position_lr = {kFitted, 0.01};
+  CHECK(position_rate(options).initial == 0.01);
 }
 
 TEST_CASE("bands and resolution are switched on over time") {
