@@ -42,7 +42,7 @@ std::optional<int> side(const Json& view, const char* name) {
 
 double focal(const Json& view, const char* name) {
   const Json value = view.value(name, Json());
-  return value.is_number() ? value.get<double>() : 0.0;  // as of a panorama
+  return value.is_number() ? value.get<double>() : 0.0;
 }
 
 /// World to camera, of the rows of camera to world; nothing for what is no rotation.
@@ -78,6 +78,7 @@ std::optional<Camera> camera_of(const Json& view) {
   camera.height = *height;
   camera.fx = focal(view, "fx");
   camera.fy = focal(view, "fy");
+  if (!(camera.fx > 0.0 && camera.fy > 0.0)) camera.model = CameraModel::kEquirectangular;
   camera.cx = 0.5 * *width;
   camera.cy = 0.5 * *height;
   camera.rotation = *rotation;

@@ -61,7 +61,8 @@ TEST_CASE("models of no run have no cameras, and damaged files are told") {
     return run_cameras(model_of(run));
   };
   CHECK(read("[]").empty());
-  CHECK(read("[{" + sound + "}]").size() == 1);
+  CHECK(read("[{" + sound + "}]").at(0).model == CameraModel::kEquirectangular);
+  CHECK(read("[{\"fx\":5,\"fy\":5," + sound + "}]").at(0).model == CameraModel::kPinhole);
   for (const char* text :
        {"", "[", "[1]", "[{}]", "[{\"position\":[0,0]}]",
         R"([{"position":[0,0,0],"rotation":[[1,0,0],[0,1,0],[0,0,0]],"width":8,"height":6}])",
