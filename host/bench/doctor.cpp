@@ -56,7 +56,7 @@ bool has_device(const Diagnosis& diagnosis, const std::string& vendor) {
 
 constexpr double kMebibyte = 1024.0 * 1024.0;
 
-std::string mebibytes(std::uint64_t bytes) {
+std::string size_text(std::uint64_t bytes) {
   if (bytes < std::uint64_t{1} << 20) return fmt::format("{} KiB", bytes >> 10);
   return fmt::format("{:.0f} MiB", static_cast<double>(bytes) / kMebibyte);
 }
@@ -158,7 +158,7 @@ std::string diagnosis_text(const Diagnosis& diagnosis) {
   out += fmt::format(
       "kernel cache     {}: {}, {}{}\n",
       diagnosis.cache.empty() ? "none" : diagnosis.cache.string(),
-      counted(diagnosis.cache_state.programs, "program"), mebibytes(diagnosis.cache_state.bytes),
+      counted(diagnosis.cache_state.programs, "program"), size_text(diagnosis.cache_state.bytes),
       diagnosis.cache_state.trouble.empty() ? ""
                                             : fmt::format(", {}", diagnosis.cache_state.trouble));
   for (const DeviceVerdict& verdict : diagnosis.devices) {
@@ -166,7 +166,7 @@ std::string diagnosis_text(const Diagnosis& diagnosis) {
     out += fmt::format("device {}         {} ({}), {}, driver {}\n", device.index, device.name,
                        device_type_name(device.type), device.platform, device.driver_version);
     out += fmt::format("  memory         {}, largest buffer {}, local {} KiB\n",
-                       mebibytes(device.global_memory), mebibytes(device.max_allocation),
+                       size_text(device.global_memory), size_text(device.max_allocation),
                        device.local_memory >> 10);
     if (!verdict.checks.empty()) {
       const auto passed = std::count_if(verdict.checks.begin(), verdict.checks.end(),

@@ -28,14 +28,16 @@ std::optional<fs::path> run_of(const ModelSource& source) {
 
 std::vector<Camera> run_cameras(const ModelSource& source) {
   const std::optional<fs::path> run = run_of(source);
+  if (!run) return {};
+  const fs::path path = *run / "cameras.json";
   std::error_code error;
-  if (!run || !fs::is_regular_file(*run / "cameras.json", error)) return {};
+  if (!fs::is_regular_file(path, error)) return {};
   std::vector<Camera> out;
-  for (std::optional<Camera>& camera : io::read_camera_list(*run / "cameras.json")) {
+  for (std::optional<Camera>& camera : io::read_camera_list(path)) {
     if (!camera) {
       throw DataError(fmt::format(
           "{}: entry {} is no view with position, rotation, width and height: start with --data",
-          (*run / "cameras.json").string(), out.size()));
+          path.string(), out.size()));
     }
     out.push_back(std::move(*camera));
   }

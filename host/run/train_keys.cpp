@@ -214,7 +214,7 @@ void add_start_keys(TrainTable& t, TrainOptions& o) {
   t.number(
       "init-opacity", o.init_opacity, kFitted, 0.9999,
       "opacity of the first Gaussians (not of a model), at least 0.0001; -1 = 0.1, or 0.02 of a "
-      "random start");
+      "random start (not mcmc)");
   t.box("bounds", o.bounds,
         "box of the model in world units, least and greatest x, y, z as in -1,-1,0,1,1,2: "
         "Gaussians with their mean outside are not made and not kept; [] = everywhere");
@@ -268,7 +268,7 @@ void add_optimiser_keys(TrainTable& t, TrainOptions& o) {
   t.number(
       "position-lr", o.position_lr.initial, kFitted, 1e3,
       "learning rate of the means, times the scene extent; -1 = 0.0005, or 0.002 after a random "
-      "start");
+      "start (not mcmc)");
   t.number("position-lr-final", o.position_lr.final_value, 0, 1e3,
            "value that position-lr decays to");
   t.learning_rate("rotation-lr", o.rotation_lr, "the quaternions");

@@ -359,7 +359,7 @@ Gaussians initial_model(const Dataset& dataset,
   };
   const std::size_t count = options.init_count > 0
                                 ? std::min(limit, static_cast<std::size_t>(options.init_count))
-                                : share(options.init == "random" ? kStartShare : kPhotoShare);
+                                : share(clears_random_start(options) ? kStartShare : kPhotoShare);
   PointCloud points;
   if (has_points && (options.init == "auto" || options.init == "colmap")) {
     points = start_points(dataset, cameras, photos, options);

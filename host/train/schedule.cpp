@@ -36,9 +36,11 @@ double fitted(const FittedRate& rate, const TrainOptions& options) {
   return std::clamp(rate.usual * std::sqrt(kFittedIterations / steps), rate.least, rate.most);
 }
 
-bool is_random(const TrainOptions& options) { return options.init == "random"; }
-
 }  // namespace
+
+bool clears_random_start(const TrainOptions& options) {
+  return options.init == "random" && options.strategy != DensityStrategy::kMcmc;
+}
 
 LearningRate scale_rate(const TrainOptions& options) {
   LearningRate rate = options.scale_lr;
@@ -59,18 +61,18 @@ LearningRate sh_rest_rate(const TrainOptions& options) {
 LearningRate position_rate(const TrainOptions& options) {
   LearningRate rate = options.position_lr;
   if (rate.initial == kFitted)
-    rate.initial = std::max(is_random(options) ? 2e-3 : 5e-4, rate.final_value);
+    rate.initial = std::max(clears_random_start(options) ? 2e-3 : 5e-4, rate.final_value);
   return rate;
 }
 
 double start_opacity(const TrainOptions& options) {
   if (options.init_opacity != kFitted) return options.init_opacity;
-  return is_random(options) ? 0.02 : 0.1;
+  return clears_random_start(options) ? 0.02 : 0.1;
 }
 
 double pass_decay(const TrainOptions& options) {
   if (options.opacity_decay != kFitted) return options.opacity_decay;
-  return is_random(options) ? 0.01 : 0.0;
+  return clears_random_start(options) ? 0.01 : 0.0;
 }
 
 double learning_rate(const LearningRate& rate,

@@ -24,10 +24,12 @@ double learning_rate(const LearningRate& rate, const TrainOptions& options, std:
 LearningRate scale_rate(const TrainOptions& options);
 LearningRate sh_rest_rate(const TrainOptions& options);
 
+/// Whether Gaussians begin at random places, where they stand in front of each other, have far to
+/// go, and many are to go altogether. The mcmc strategy moves and revives them by itself.
+bool clears_random_start(const TrainOptions& options);
+
 /// The rate of the means, the opacity of the first Gaussians and what passes of density control
-/// take off opacities, as they are given, with what the start asks for in place of kFitted:
-/// Gaussians at random places stand in front of each other, have far to go, and many are to go
-/// altogether.
+/// take off opacities, as they are given, with what the start asks for in place of kFitted.
 LearningRate position_rate(const TrainOptions& options);
 double start_opacity(const TrainOptions& options);
 double pass_decay(const TrainOptions& options);

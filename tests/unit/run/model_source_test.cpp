@@ -110,6 +110,11 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   REQUIRE(inside.trained.has_value());
   CHECK(inside.header.value().background == shown.background);
   CHECK(trace_options(inside).quantile == TraceOptions{}.quantile);
+  CHECK(trace_options(inside).background == shown.background);
+  // Without a header a run that leaves the choice open has cut-out photos, shown before white.
+  ModelSource bare = inside;
+  bare.header.reset();
+  CHECK(trace_options(bare).background == std::array<float, 3>{1, 1, 1});
 
   // In a scene the first model that tells decides.
   const fs::path other = folder.path() / "other.ply";

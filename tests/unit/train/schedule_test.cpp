@@ -65,6 +65,12 @@ TEST_CASE("a random start has its own rate, opacity and decay unless they are gi
   CHECK(adam_rates_of(options, 3.0, 0).means == doctest::Approx(6e-3));
   CHECK(start_opacity(options) == 0.02);
   CHECK(pass_decay(options) == 0.01);
+  options.strategy = DensityStrategy::kMcmc;
+  CHECK(position_rate(options).initial == 5e-4);
+  CHECK(start_opacity(options) == 0.1);
+  CHECK(pass_decay(options) == 0.0);
+  options.strategy = DensityStrategy::kAdc;
+  CHECK(start_opacity(options) == 0.02);
   options.position_lr = {1e-3, 1e-4};
   options.init_opacity = 0.3;
   options.opacity_decay = 0;
