@@ -96,6 +96,7 @@ nlohmann::json header_of(const Checkpoint& c) {
           {"bad_steps_in_a_row", c.bad_steps_in_a_row},
           {"traced_rays", c.traced_rays},
           {"capped_rays", c.capped_rays},
+          {"mean_since", c.mean_since},
           {"config", c.config}};
 }
 
@@ -131,6 +132,8 @@ Checkpoint parse_header(const std::string& text, std::uint32_t version) {
     get_whole<std::uint64_t>(json, "traced_rays", 0, UINT64_MAX, c.traced_rays);
     get_whole<std::uint64_t>(json, "capped_rays", 0, UINT64_MAX, c.capped_rays);
   }
+  if (json.contains("mean_since"))
+    get_whole<std::int64_t>(json, "mean_since", 0, kMaxIterations, c.mean_since);
   json.at("config").get_to(c.config);
   return c;
 }

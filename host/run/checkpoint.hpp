@@ -29,6 +29,7 @@ struct Checkpoint {
   std::uint32_t bad_steps_in_a_row = 0;
   std::uint64_t traced_rays = 0;  ///< of all training views so far; 0 in older files, as the next
   std::uint64_t capped_rays = 0;  ///< of them, those that stopped because of max_hits
+  std::int64_t mean_since = 0;    ///< iterations before those that the mean of the parameters is of
   std::string config;             ///< configuration of the run, TOML
   std::map<std::string, std::vector<float>> sections;  ///< names of at most 31 characters
 };

@@ -176,6 +176,11 @@ void check_fitted_rate(const LearningRate& rate) {
   if (rate.final_value != kFitted) check_rate({initial, rate.final_value});
 }
 
+// Of a rate that begins as it is given.
+void check_fitted_end(const LearningRate& rate) {
+  check_rate({rate.initial, rate.final_value == kFitted ? rate.initial : rate.final_value});
+}
+
 }  // namespace
 
 void add_train_options(CLI::App& app, TrainOptions& options) {
@@ -252,15 +257,13 @@ void validate(const TrainOptions& options) {
   if (!std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
     throw UsageError("The iterations of 'resolution-schedule' have to ascend");
   }
-  for (const LearningRate& rate :
-       {options.rotation_lr, options.opacity_lr, options.sh_lr, options.sky_lr, options.pose_lr}) {
-    check_rate(rate);
-  }
+  for (const LearningRate& rate : {options.sky_lr, options.pose_lr}) check_rate(rate);
   check_fitted("init-opacity", options.init_opacity, 1e-4);
   check_fitted("opacity-decay", options.opacity_decay, 0.0);
-  check_fitted_rate(options.position_lr);
-  check_fitted_rate(options.scale_lr);
-  check_fitted_rate(options.sh_rest_lr);
+  for (const LearningRate& rate : {options.position_lr, options.scale_lr, options.sh_rest_lr})
+    check_fitted_rate(rate);
+  for (const LearningRate& rate : {options.rotation_lr, options.opacity_lr, options.sh_lr})
+    check_fitted_end(rate);
   if (options.max_gaussians > 0 && options.init_count > options.max_gaussians) {
     throw UsageError(
         fmt::format("The start of 'init-count' = {} Gaussians is above 'max-gaussians' = {}: lower "

@@ -150,6 +150,11 @@ class TrainTable : public OptionTable {
     number(name, rate.initial, 0, 1e3, "learning rate of " + help);
     number(name + "-final", rate.final_value, 0, 1e3, "value that " + name + " decays to");
   }
+  // The final value of a rate, which kFitted makes what `fit` says.
+  void fitted_end(const std::string& name, LearningRate& rate, const std::string& fit) {
+    number(name + "-final", rate.final_value, kFitted, 1e3,
+           fmt::format("value that {} decays to; -1 = {}", name, fit));
+  }
 };
 
 void add_run_keys(TrainTable& t, TrainOptions& o) {
@@ -269,20 +274,20 @@ void add_optimiser_keys(TrainTable& t, TrainOptions& o) {
       "position-lr", o.position_lr.initial, kFitted, 1e3,
       "learning rate of the means, times the scene extent; -1 = 0.0005, or 0.002 after a random "
       "start (not mcmc)");
-  t.number("position-lr-final", o.position_lr.final_value, 0, 1e3,
-           "value that position-lr decays to");
-  t.learning_rate("rotation-lr", o.rotation_lr, "the quaternions");
+  t.fitted_end("position-lr", o.position_lr, "0.00032 / sqrt(iterations), from 5e-6 to 2e-5");
+  t.number("rotation-lr", o.rotation_lr.initial, 0, 1e3, "learning rate of the quaternions");
+  t.fitted_end("rotation-lr", o.rotation_lr, "0.095 / sqrt(iterations), from 0.001 to 0.003");
   t.number("scale-lr", o.scale_lr.initial, kFitted, 1e3,
            "learning rate of the scale parameters; -1 = 2.5 / sqrt(iterations), from 0.04 to 0.12");
-  t.number("scale-lr-final", o.scale_lr.final_value, 0, 1e3, "value that scale-lr decays to");
-  t.learning_rate("opacity-lr", o.opacity_lr, "the opacity parameters");
-  t.learning_rate("sh-lr", o.sh_lr, "colour (SH band 0)");
+  t.fitted_end("scale-lr", o.scale_lr, "0.32 / sqrt(iterations), from 0.005 to 0.02");
+  t.number("opacity-lr", o.opacity_lr.initial, 0, 1e3, "learning rate of the opacity parameters");
+  t.fitted_end("opacity-lr", o.opacity_lr, "1.9 / sqrt(iterations), from 0.03 to 0.1");
+  t.number("sh-lr", o.sh_lr.initial, 0, 1e3, "learning rate of colour (SH band 0)");
+  t.fitted_end("sh-lr", o.sh_lr, "0.16 / sqrt(iterations), from 0.0025 to 0.01");
   t.number(
       "sh-rest-lr", o.sh_rest_lr.initial, kFitted, 1e3,
       "learning rate of the SH bands above 0; -1 = 0.095 / sqrt(iterations), from 0.0005 to 0.003");
-  t.number(
-      "sh-rest-lr-final", o.sh_rest_lr.final_value, kFitted, 1e3,
-      "value that sh-rest-lr decays to; -1 = 0.032 / sqrt(iterations), from 0.000125 to 0.001");
+  t.fitted_end("sh-rest-lr", o.sh_rest_lr, "0.032 / sqrt(iterations), from 0.000125 to 0.001");
   t.learning_rate("sky-lr", o.sky_lr, "the sky");
   t.learning_rate("pose-lr", o.pose_lr, "the poses, in radians and shares of the scene extent");
   t.number("lr-decay", o.lr_decay, 0, 1,
@@ -295,6 +300,11 @@ void add_optimiser_keys(TrainTable& t, TrainOptions& o) {
   t.number("adam-beta2", o.adam_beta2, 0, 0.9999999, "decay of the second moment");
   t.number("adam-epsilon", o.adam_epsilon, 1e-30, 1, "added to the root of the second moment");
   t.flag("sparse-adam", o.sparse_adam, "leave Gaussians alone that no ray of the view met");
+  t.share(
+      "average-from", o.average_from, true,
+      "share of the run, or iteration, from which on the model is the mean of the parameters of "
+      "all steps, once photos have their full size, all SH bands are on and density control is "
+      "over; 0 = never");
 }
 
 void add_density_keys(TrainTable& t, TrainOptions& o) {

@@ -113,8 +113,8 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                                 : 0;
   MemoryEstimate out;
   // Parameters, gradients, two moments, gradients on the screen (3) and statistics of density
-  // control (2); while the set changes the new parameters, their sources and roles; the least
-  // scales.
+  // control (2); while the set changes the new parameters, their sources and roles, later the mean
+  // of the parameters in their place; the least scales.
   const std::size_t footprint = options.footprint > 0 ? 1 : 0;
   out.gaussians = demand.gaussians * (floats * 5 + 5 + 2 + footprint) * sizeof(float);
   // Steps of several views: sums of gradients, one for every level of their tree.

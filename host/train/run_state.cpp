@@ -27,6 +27,8 @@ const std::vector<float>& section(const Checkpoint& checkpoint,
   return found->second;
 }
 
+std::string mean_section(ParameterGroup group) { return std::string("mean.") + group_name(group); }
+
 }  // namespace
 
 void store_state(const DeviceGaussians& gaussians,
@@ -84,6 +86,26 @@ void restore_state(Context& context,
   const bool accumulated = statistics != checkpoint.sections.end() && !statistics->second.empty();
   density.restore_statistics(accumulated ? section(checkpoint, "density", 2 * count)
                                          : std::vector<float>());
+}
+
+void store_mean(const ParameterMean& mean, Checkpoint& checkpoint) {
+  checkpoint.mean_since = mean.since();
+  if (!mean.known()) return;
+  for (const ParameterGroup group : kParameterGroups)
+    checkpoint.sections[mean_section(group)] = mean.model()[group].download();
+}
+
+void restore_mean(const Checkpoint& checkpoint,
+                  const TrainOptions& options,
+                  const DeviceGaussians& gaussians,
+                  ParameterMean& mean) {
+  const bool stored = checkpoint.sections.count(mean_section(ParameterGroup::kMeans)) > 0;
+  if (!stored) return mean.restart(checkpoint.mean_since);
+  if (!mean.restore(options, gaussians, checkpoint.iteration, checkpoint.mean_since)) return;
+  for (const ParameterGroup group : kParameterGroups) {
+    const std::size_t size = gaussians.count * group_width(group, gaussians.sh_degree);
+    mean.model()[group].upload(section(checkpoint, mean_section(group), size));
+  }
 }
 
 }  // namespace raysplats

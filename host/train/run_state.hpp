@@ -7,6 +7,7 @@
 #include "trace/device_gaussians.hpp"
 #include "train/adam.hpp"
 #include "train/density_control.hpp"
+#include "train/parameter_mean.hpp"
 
 namespace raysplats {
 
@@ -25,5 +26,14 @@ void restore_state(Context& context,
                    DeviceGaussians& gaussians,
                    Adam& adam,
                    DensityControl& density);
+
+/// The same of the mean of the parameters, if there is one.
+void store_mean(const ParameterMean& mean, Checkpoint& checkpoint);
+/// Checkpoints of versions without one leave it unknown. `gaussians` are restored. Throws DataError
+/// when arrays do not fit the counts.
+void restore_mean(const Checkpoint& checkpoint,
+                  const TrainOptions& options,
+                  const DeviceGaussians& gaussians,
+                  ParameterMean& mean);
 
 }  // namespace raysplats

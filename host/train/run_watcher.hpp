@@ -15,6 +15,7 @@ struct RunMoment {
   std::int64_t iteration = 0;         ///< completed
   std::array<float, 3> background{};  ///< behind test views
   SkyLight sky{};                     ///< in its place, as far as it is trained; empty without one
+  const DeviceGaussians* model = nullptr;  ///< as it would be saved
 };
 
 /// What a watcher asks for after a look.
@@ -24,7 +25,7 @@ struct RunWish {
 };
 
 /// Looks at a run from within its loop, in its thread. The run is the same with and without: a
-/// watcher may trace Trainer::gaussians() with tracers of its own, and changes nothing.
+/// watcher may trace the model with tracers of its own, and changes nothing.
 class RunWatcher {
  public:
   virtual ~RunWatcher() = default;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -17,6 +18,7 @@ constexpr std::uint64_t kBackgroundStream = 0x6261636b;
 constexpr std::uint64_t kJoinedPass = std::uint64_t{1} << 48;  // of passes over all views
 constexpr double kValidationShare = 0.9;  // of the run; then validation views are trained on too
 constexpr int kValidations = 9;
+constexpr double kTimedShare = 0.05;  // of a run, once its steps are alike, that is timed
 
 // What a rate is in a run of 1000 iterations, and between what it stays in others.
 struct FittedRate {
@@ -26,7 +28,12 @@ struct FittedRate {
 };
 
 constexpr double kFittedIterations = 1000;
+constexpr FittedRate kPositionFinalRate{1e-5, 5e-6, 2e-5};
+constexpr FittedRate kRotationFinalRate{0.003, 0.001, 0.003};
 constexpr FittedRate kScaleRate{0.08, 0.04, 0.12};
+constexpr FittedRate kScaleFinalRate{0.01, 0.005, 0.02};
+constexpr FittedRate kOpacityFinalRate{0.06, 0.03, 0.1};
+constexpr FittedRate kShFinalRate{0.005, 0.0025, 0.01};
 constexpr FittedRate kShRestRate{0.003, 0.0005, 0.003};
 constexpr FittedRate kShRestFinalRate{0.001, 0.000125, 0.001};
 
@@ -36,33 +43,49 @@ double fitted(const FittedRate& rate, const TrainOptions& options) {
   return std::clamp(rate.usual * std::sqrt(kFittedIterations / steps), rate.least, rate.most);
 }
 
+// A rate whose initial value is known: it never rises to a final one that is fitted.
+LearningRate with_end(LearningRate rate, const FittedRate& end, const TrainOptions& options) {
+  if (rate.final_value == kFitted) rate.final_value = std::min(fitted(end, options), rate.initial);
+  return rate;
+}
+
 }  // namespace
 
 bool clears_random_start(const TrainOptions& options) {
   return options.init == "random" && options.strategy != DensityStrategy::kMcmc;
 }
 
+LearningRate rotation_rate(const TrainOptions& options) {
+  return with_end(options.rotation_lr, kRotationFinalRate, options);
+}
+
 LearningRate scale_rate(const TrainOptions& options) {
   LearningRate rate = options.scale_lr;
   if (rate.initial == kFitted)
     rate.initial = std::max(fitted(kScaleRate, options), rate.final_value);
-  return rate;
+  return with_end(rate, kScaleFinalRate, options);
+}
+
+LearningRate opacity_rate(const TrainOptions& options) {
+  return with_end(options.opacity_lr, kOpacityFinalRate, options);
+}
+
+LearningRate sh_rate(const TrainOptions& options) {
+  return with_end(options.sh_lr, kShFinalRate, options);
 }
 
 LearningRate sh_rest_rate(const TrainOptions& options) {
   LearningRate rate = options.sh_rest_lr;
   if (rate.initial == kFitted)
     rate.initial = std::max(fitted(kShRestRate, options), rate.final_value);
-  if (rate.final_value == kFitted)
-    rate.final_value = std::min(fitted(kShRestFinalRate, options), rate.initial);
-  return rate;
+  return with_end(rate, kShRestFinalRate, options);
 }
 
 LearningRate position_rate(const TrainOptions& options) {
   LearningRate rate = options.position_lr;
   if (rate.initial == kFitted)
     rate.initial = std::max(clears_random_start(options) ? 2e-3 : 5e-4, rate.final_value);
-  return rate;
+  return with_end(rate, kPositionFinalRate, options);
 }
 
 double start_opacity(const TrainOptions& options) {
@@ -113,6 +136,15 @@ std::int64_t steady_from(const TrainOptions& options) {
   for (const ResolutionStep& step : options.resolution_schedule)
     from = std::max(from, step.until.of(options.iterations));
   return from;
+}
+
+std::int64_t timed_until(const TrainOptions& options) {
+  return steady_from(options) + std::llround(kTimedShare * static_cast<double>(options.iterations));
+}
+
+std::int64_t mean_from(const TrainOptions& options) {
+  if (options.average_from.value == 0) return std::numeric_limits<std::int64_t>::max();
+  return std::max(options.average_from.of(last_iteration(options)), timed_until(options));
 }
 
 std::array<float, 3> step_background(const TrainOptions& options,

@@ -19,17 +19,22 @@ namespace raysplats {
 /// iteration, as in 3DGS.
 double learning_rate(const LearningRate& rate, const TrainOptions& options, std::int64_t iteration);
 
-/// Rates of the scale parameters and of the SH bands above 0 as they are given, with what the
-/// number of iterations asks for in place of kFitted.
+/// Rates of the groups of parameters as they are given, with what the number of iterations asks
+/// for in place of kFitted: short runs need large steps to their end, and what those do to a model
+/// the mean of the last ones takes away.
+LearningRate rotation_rate(const TrainOptions& options);
 LearningRate scale_rate(const TrainOptions& options);
+LearningRate opacity_rate(const TrainOptions& options);
+LearningRate sh_rate(const TrainOptions& options);
 LearningRate sh_rest_rate(const TrainOptions& options);
 
 /// Whether Gaussians begin at random places, where they stand in front of each other, have far to
 /// go, and many are to go altogether. The mcmc strategy moves and revives them by itself.
 bool clears_random_start(const TrainOptions& options);
 
-/// The rate of the means, the opacity of the first Gaussians and what passes of density control
-/// take off opacities, as they are given, with what the start asks for in place of kFitted.
+/// The rate of the means (its end as above), the opacity of the first Gaussians and what passes of
+/// density control take off opacities, as they are given, with what the start asks for in place of
+/// kFitted.
 LearningRate position_rate(const TrainOptions& options);
 double start_opacity(const TrainOptions& options);
 double pass_decay(const TrainOptions& options);
@@ -46,6 +51,14 @@ std::int64_t last_iteration(const TrainOptions& options);
 /// From when on steps are alike: photos have their full size, all SH bands are on, and density
 /// control is over.
 std::int64_t steady_from(const TrainOptions& options);
+
+/// Until when a run by time takes the time of such steps, which then tells when it will end.
+std::int64_t timed_until(const TrainOptions& options);
+
+/// Steps before those whose parameters are averaged: average-from of the run, but not before
+/// timed_until(), so that runs by time and those that replay them average the same steps; a number
+/// that no run reaches where the option is 0.
+std::int64_t mean_from(const TrainOptions& options);
 
 /// Background of a step: `constant` unless the option is "random" and the photos are cut out by
 /// their alpha.

@@ -29,11 +29,11 @@ AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t
   AdamRates rates;
   rates.means = extent * learning_rate(position_rate(options), options, iteration);
   rates.quaternions =
-      (options.flat ? kFlatTurn : 1.0) * learning_rate(options.rotation_lr, options, iteration);
+      (options.flat ? kFlatTurn : 1.0) * learning_rate(rotation_rate(options), options, iteration);
   rates.scales = (options.scale_lr_by_extent ? extent : 1.0) *
                  learning_rate(scale_rate(options), options, iteration);
-  rates.opacities = learning_rate(options.opacity_lr, options, iteration);
-  rates.sh_dc = learning_rate(options.sh_lr, options, iteration);
+  rates.opacities = learning_rate(opacity_rate(options), options, iteration);
+  rates.sh_dc = learning_rate(sh_rate(options), options, iteration);
   rates.sh_rest = learning_rate(sh_rest_rate(options), options, iteration);
   return rates;
 }

@@ -68,6 +68,7 @@ Trainer::Impl::Impl(Context& device,
                 options.footprint,
                 {options.scale_min * extent, options.scale_max * extent},
                 options.flat),
+      mean(device),
       guard(device),
       fit(device, train_views.size()),
       photo_cache(device,
@@ -194,7 +195,7 @@ TrainLoss Trainer::loss() {
 
 Gaussians Trainer::model() const {
   const auto turn = impl_->context.lock();
-  return impl_->started ? impl_->gaussians.download() : Gaussians();
+  return impl_->started ? impl_->shown().download() : Gaussians();
 }
 
 const DeviceGaussians& Trainer::gaussians() const { return impl_->gaussians; }

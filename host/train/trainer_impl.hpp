@@ -31,6 +31,7 @@
 #include "train/initialization.hpp"
 #include "train/mcmc.hpp"
 #include "train/model_validator.hpp"
+#include "train/parameter_mean.hpp"
 #include "train/photo_cache.hpp"
 #include "train/photo_fit.hpp"
 #include "train/photo_set.hpp"
@@ -148,8 +149,9 @@ struct Trainer::Impl {
   void report(Progress& progress);
   void evaluate_views(bool last);
   void set_background();
-  TraceOptions trace_options();     // that the model looks right with
-  Gaussians model_to_save() const;  // without what has left --bounds
+  TraceOptions trace_options();          // that the model looks right with
+  const DeviceGaussians& shown() const;  // the mean of the last steps, if they have begun
+  Gaussians model_to_save() const;       // of these, without what has left --bounds
   void save_model();
   nlohmann::json photo_facts() const;
   void write_metrics(bool complete);
@@ -203,6 +205,7 @@ struct Trainer::Impl {
   std::vector<std::size_t> apart;
   DensityControl density;
   Footprint footprint;
+  ParameterMean mean;
   std::optional<Exposure> exposure;        // with the option
   std::optional<DepthSupervision> depths;  // likewise
   std::optional<SkyAdam> sky;              // with a background that is one; the tracer has it

@@ -114,8 +114,8 @@ void Trainer::Impl::show(const std::function<bool()>& interrupted) {
   const auto stopping = [&] { return stop_asked || interrupted(); };
   RunWish wish;
   do {
-    wish =
-        watcher->look({iteration, background, sky ? tracer.sky()->light() : SkyLight()}, stopping);
+    wish = watcher->look(
+        {iteration, background, sky ? tracer.sky()->light() : SkyLight(), &shown()}, stopping);
     if (!wish.save) continue;
     save_model();
     if (saved != iteration) save_checkpoint();

@@ -27,8 +27,7 @@ constexpr std::int64_t kLeastIterations = 10;
 constexpr double kShortRun = 20;    // seconds of a run that is not worth more measuring
 constexpr double kFillShare = 0.5;  // of the limit that a start takes at most
 constexpr std::int64_t kFewIterations = 500;
-constexpr double kTimedShare = 0.05;  // of a run, once its steps are alike, that is timed
-constexpr double kLatestEnd = 2;      // of the iterations that were planned
+constexpr double kLatestEnd = 2;  // of the iterations that were planned
 
 class Timer {
  public:
@@ -185,6 +184,7 @@ void Trainer::Impl::forget_pilot() {
   density.restore_statistics({});
   gaussians = DeviceGaussians();
   guard.restore({});
+  mean.restart(0);
   fit.forget();
   if (exposure) exposure.emplace(context, train_views.size(), slots.size());
   forget_sky();
@@ -286,16 +286,17 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
 void Trainer::Impl::keep_time() {
   if (!run_seconds) return;
   const std::int64_t from = steady_from(options);
-  const std::int64_t timed = std::llround(kTimedShare * static_cast<double>(options.iterations));
+  const std::int64_t until = timed_until(options);
   if (iteration == from) {
     settle();
     steady_seconds = training.seconds();
     return;
   }
-  if (!steady_seconds || iteration != from + timed || iteration >= options.iterations) return;
+  if (!steady_seconds || iteration != until || iteration >= options.iterations) return;
   settle();
   const double now = training.seconds();
-  const double more = (*run_seconds - now) / (now - *steady_seconds) * static_cast<double>(timed);
+  const double more =
+      (*run_seconds - now) / (now - *steady_seconds) * static_cast<double>(until - from);
   const auto latest = kLatestEnd * static_cast<double>(options.iterations);
   const double end =
       std::clamp(static_cast<double>(iteration) + more, static_cast<double>(iteration) + 1, latest);

@@ -108,9 +108,9 @@ void Trainer::Impl::evaluate_views(bool last) {
   std::optional<DeviceGaussians> cropped;
   if (options.bounds)
     cropped = DeviceGaussians::upload(context, model_to_save(), ScaleActivation::kExp);
-  const DeviceGaussians& shown = cropped ? *cropped : gaussians;
+  const DeviceGaussians& judged = cropped ? *cropped : shown();
   const auto render = [&](const Camera& camera) {
-    tracer.forward(shown, camera);
+    tracer.forward(judged, camera);
     return tracer.download_image();
   };
   EvaluationOptions choice;
@@ -121,7 +121,7 @@ void Trainer::Impl::evaluate_views(bool last) {
   const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
                                                       run.evaluation_folder(iteration), choice);
   run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
-              report.images.size(), shown.count, report.mean.psnr_corrected, report.mean.psnr_all,
+              report.images.size(), judged.count, report.mean.psnr_corrected, report.mean.psnr_all,
               report.mean.psnr_aligned});
   if (watcher) watcher->evaluated(run.evaluations().back());
   write_metrics(false);
@@ -135,8 +135,12 @@ void Trainer::Impl::evaluate_views(bool last) {
   }
 }
 
+const DeviceGaussians& Trainer::Impl::shown() const {
+  return mean.known() ? mean.model() : gaussians;
+}
+
 Gaussians Trainer::Impl::model_to_save() const {
-  return inside(gaussians.download(), about_origin(options.bounds, dataset.origin));
+  return inside(shown().download(), about_origin(options.bounds, dataset.origin));
 }
 
 // Behind views that are judged. A sky is with the tracer already.

@@ -24,6 +24,7 @@ Checkpoint Trainer::Impl::state() {
   checkpoint.traced_rays = traced_rays;
   checkpoint.capped_rays = counts.capped_rays;
   store_state(gaussians, adam, density, checkpoint);
+  store_mean(mean, checkpoint);
   if (footprint.lows().size() > 0) checkpoint.sections["footprint"] = footprint.lows().download();
   if (poses) {
     const PoseRefinement::State& state = poses->state();
@@ -163,6 +164,7 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
         run.path().string(), files.back().filename().string(), checkpoint.iteration));
   }
   restore_state(context, checkpoint, options, gaussians, adam, density);
+  restore_mean(checkpoint, options, gaussians, mean);
   const auto lows = checkpoint.sections.find("footprint");
   if (lows != checkpoint.sections.end() && lows->second.size() == gaussians.count) {
     footprint.restore(lows->second);

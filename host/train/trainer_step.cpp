@@ -103,6 +103,8 @@ void Trainer::Impl::enqueue_step() {
   if (measured) density.end_step(gaussians, guard.mark());
   if (mcmc) mcmc->disturb(gaussians, iteration, guard.mark());
   footprint.apply(gaussians, guard.mark());
+  if (mean.add(options, gaussians, iteration + 1, guard.mark()))
+    footprint.apply(mean.model(), guard.mark());
   guard.close(adam.refused(), several ? guard.step_capped() : tracer.kept_capped_rays(),
               gaussians.count);
   ++iteration;
@@ -123,6 +125,7 @@ void Trainer::Impl::control_density() {
   settle();
   check_guard();
   whole = false;
+  mean.restart(iteration);
   if (refines) {
     check_alike();
     const DensityPlan plan = density.refine(gaussians, iteration);

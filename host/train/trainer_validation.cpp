@@ -38,7 +38,7 @@ void Trainer::Impl::judge() {
   }
   set_background();
   const auto render = [this](const Camera& camera) {
-    tracer.forward(gaussians, camera);
+    tracer.forward(shown(), camera);
     return tracer.download_image();
   };
   EvaluationOptions choice;

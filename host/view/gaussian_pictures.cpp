@@ -38,7 +38,7 @@ GaussianPictures::GaussianPictures(Context& context,
                                    const TraceOptions& options,
                                    Mirrors mirrors)
     : context_(context),
-      gaussians_(gaussians),
+      gaussians_(&gaussians),
       options_(options),
       mirrors_(std::move(mirrors)),
       near_(options.near_depth),
@@ -78,7 +78,7 @@ Image GaussianPictures::normals_of(const Camera& camera, const Watch& watch) {
     options.hit_order = order_;
     normals_ = std::make_unique<NormalPictures>(context_, options);
   }
-  return normals_->draw(gaussians_, camera, watch);
+  return normals_->draw(*gaussians_, camera, watch);
 }
 
 Image GaussianPictures::draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) {
@@ -105,7 +105,7 @@ Image GaussianPictures::drawn(const ViewRequest& request,
   const Watched watched(views, watch);
   const Camera camera = jittered(request.camera, sample);
   Image sums;
-  views.forward(gaussians_, camera);
+  views.forward(*gaussians_, camera);
   if (normals) sums = normals_of(camera, watch);
   const Image rgba = views.download_image();
   if (normals) return normals_picture(sums, rgba, camera);
@@ -117,7 +117,7 @@ Image GaussianPictures::drawn(const ViewRequest& request,
 std::optional<glm::dvec3> GaussianPictures::point(const ViewRequest& request) {
   const auto turn = context_.lock();
   ViewTracer& views = tracer(true, request);
-  views.forward(gaussians_, request.camera);
+  views.forward(*gaussians_, request.camera);
   const int x = request.camera.width / 2;
   const int y = request.camera.height / 2;
   const float z = views.download_depth().at(x, y, kMedian);

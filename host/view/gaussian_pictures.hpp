@@ -30,6 +30,8 @@ class GaussianPictures : public PictureSource {
   std::uint64_t samples() const override;
   bool has_depth() const override { return mirrors_.meshes.empty(); }
 
+  /// In place of those so far; they outlive it too.
+  void set_gaussians(const DeviceGaussians& gaussians) { gaussians_ = &gaussians; }
   /// Behind everything where a page wishes nothing else.
   void set_background(const std::array<float, 3>& background, const SkyLight& sky) {
     options_.background = background;
@@ -45,7 +47,7 @@ class GaussianPictures : public PictureSource {
   Image normals_of(const Camera& camera, const Watch& watch);
 
   Context& context_;
-  const DeviceGaussians& gaussians_;
+  const DeviceGaussians* gaussians_;
   TraceOptions options_;
   Mirrors mirrors_;
   float near_;  // of the tracers

@@ -82,6 +82,7 @@ bool RunView::wants_look() {
 RunWish RunView::look(const RunMoment& moment, const std::function<bool()>& stopping) {
   const Clock::time_point start = Clock::now();
   const bool goes_on = !paused_;
+  pictures_.set_gaussians(*moment.model);
   pictures_.set_background(moment.background, moment.sky);
   // The model is another one than that of the last picture.
   if (goes_on && !viewer_.awaited()) viewer_.refresh();

@@ -126,11 +126,11 @@ struct TrainOptions {
   bool poses = false;              ///< the poses of the training photos are trained too
 
   // Optimiser
-  LearningRate position_lr{kFitted, 5e-6};  ///< times the scene extent; as position_rate()
-  LearningRate rotation_lr{3e-3, 1e-3};
-  LearningRate scale_lr{kFitted, 5e-3};
-  LearningRate opacity_lr{1e-1, 3e-2};
-  LearningRate sh_lr{1e-2, 2.5e-3};
+  LearningRate position_lr{kFitted, kFitted};  ///< times the scene extent; as position_rate()
+  LearningRate rotation_lr{3e-3, kFitted};
+  LearningRate scale_lr{kFitted, kFitted};
+  LearningRate opacity_lr{1e-1, kFitted};
+  LearningRate sh_lr{1e-2, kFitted};
   LearningRate sh_rest_lr{kFitted, kFitted};
   LearningRate sky_lr{1e-2, 1e-3};
   LearningRate pose_lr{5e-3, 5e-4};  ///< radians, and shares of the scene extent
@@ -140,6 +140,7 @@ struct TrainOptions {
   double adam_beta2 = 0.999;
   double adam_epsilon = 1e-15;
   bool sparse_adam = false;
+  RunShare average_from = 0.85;  ///< the model is the mean of the parameters from here on; 0 = off
 
   // Ray tracing
   /// As standard viewers blend. Its background is not read: `background` above says it.

@@ -127,14 +127,15 @@ class Trainer {
 
   /// Loss and PSNR of the last step's view; blocks. Throws UsageError before the first step.
   TrainLoss loss();
-  /// The model as it is now; without Gaussians before the first step.
+  /// The model as it would be saved now, in the last steps the mean of theirs
+  /// (TrainOptions::average_from); without Gaussians before the first step.
   Gaussians model() const;
   /// Completed iterations.
   std::int64_t iteration() const;
 
   // What follows serves the library itself; its types are not installed.
 
-  /// The model on the device, the same object as long as the trainer lives.
+  /// The parameters in training, on the device; the same object as long as the trainer lives.
   const DeviceGaussians& gaussians() const;
   /// Lets `watcher`, which outlives the run, look at it between steps; nullptr ends that.
   void set_watcher(RunWatcher* watcher);

@@ -102,6 +102,7 @@ PROGRAMS = [
     ("adam means", "train/adam.cl", dict(LANES=1, BLOCK=256, GROUP=64, WIDTH=3, SPAN=1)),
     ("densify", "train/density_control.cl", dict(SH_COEFFICIENTS=16, SIGMOID_SCALE=0)),
     ("footprint", "train/footprint.cl", dict(SIGMOID_SCALE=0)),
+    ("parameter mean", "train/parameter_mean.cl", {}),
     ("mcmc", "train/mcmc.cl", dict(SIGMOID_SCALE=0)),
     ("guard", "train/step_guard.cl", {}),
     ("photo fit", "train/photo_fit.cl", {}),

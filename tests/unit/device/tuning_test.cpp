@@ -2,18 +2,14 @@
 #include "device/tuning.hpp"
 
 #include <doctest/doctest.h>
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <fstream>
 #include <iterator>
-#include <memory>
-#include <sstream>
 
 #include "device/context.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 
@@ -33,27 +29,6 @@ std::string text_of(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
-
-// What is logged while it lives.
-class LogCapture {
- public:
-  LogCapture() : before_(spdlog::default_logger()) {
-    auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_);
-    spdlog::set_default_logger(std::make_shared<spdlog::logger>("capture", sink));
-  }
-  ~LogCapture() { spdlog::set_default_logger(before_); }
-  std::size_t lines() const {
-    const std::string text = text_.str();
-    return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-  }
-  bool contains(const std::string& part) const {
-    return text_.str().find(part) != std::string::npos;
-  }
-
- private:
-  std::ostringstream text_;
-  std::shared_ptr<spdlog::logger> before_;
-};
 
 }  // namespace
 

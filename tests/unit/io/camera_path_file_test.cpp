@@ -11,6 +11,7 @@
 #include <string>
 
 #include "raysplats/error.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/temporary_directory.hpp"
 #include "util/atomic_file.hpp"
 
@@ -150,6 +151,18 @@ TEST_CASE("nerfstudio's transform is undone") {
   CHECK(glm::distance(2.0 * glm::dvec3(-x.y + 1, x.x, x.z - 1), glm::dvec3(4, 2, 3)) < 1e-9);
   CHECK(glm::distance(glm::transpose(camera.rotation)[2], glm::dvec3(0, 0, -1)) < 1e-9);
   CHECK(glm::distance(glm::transpose(camera.rotation)[0], glm::dvec3(0, -1, 0)) < 1e-9);
+}
+
+TEST_CASE("that nerfstudio's crop is not drawn is said, where a path has one") {
+  const Folder folder;
+  json file = key_file(matrix_at(0), matrix_at(4));
+  for (const json& crop : {json(), json{{"crop_center", {0, 0, 0}}, {"crop_scale", {1, 1, 1}}}}) {
+    CAPTURE(crop.dump());
+    file["crop"] = crop;
+    const LogCapture log;
+    CHECK(read_camera_path(folder.write("path.json", file.dump()), {}).cameras.size() == 11);
+    CHECK(log.contains("crops the scene") == !crop.is_null());
+  }
 }
 
 TEST_CASE("keyframes in TOML are eye, target, up, angle and seconds") {

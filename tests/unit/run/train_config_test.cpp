@@ -145,7 +145,8 @@ TEST_CASE("values out of range and of the wrong kind are refused by name") {
                                  "densify-from = 2.5",
                                  "strategy = \"grow\"",
                                  "eval-at = [0]",
-                                 "position-lr = 0",
+                                 "position-lr-final = 0",
+                                 "rotation-lr = -1",
                                  "position-lr = -0.5",
                                  "init-opacity = -0.5",
                                  "init-opacity = 0",
@@ -156,6 +157,8 @@ TEST_CASE("values out of range and of the wrong kind are refused by name") {
     write_text_file(path, line + "\n");
     CHECK(message_of(path) != "");
   }
+  write_text_file(path, "opacity-lr = 0\n");  // off, to the end
+  CHECK(message_of(path) == "");
   write_text_file(
       path, "position-lr = 0 # off\nposition-lr-final = 0\n\n# comment\neval-at = [1,\n 2]\n");
   CHECK(message_of(path) == "");

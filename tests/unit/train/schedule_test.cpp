@@ -36,9 +36,9 @@ TEST_CASE("rates that fit the run fall with the root of its length, and given on
   const auto check = [](const std::vector<double>& found, const std::vector<double>& expected) {
     for (std::size_t k = 0; k < 4; ++k) CHECK(found[k] == doctest::Approx(expected[k]));
   };
-  check(rates_of(1000), {0.08, 0.005, 0.003, 0.001});
-  check(rates_of(500), {0.08 * std::sqrt(2.0), 0.005, 0.003, 0.001});
-  check(rates_of(0), {0.12, 0.005, 0.003, 0.001});
+  check(rates_of(1000), {0.08, 0.01, 0.003, 0.001});
+  check(rates_of(500), {0.08 * std::sqrt(2.0), 0.01 * std::sqrt(2.0), 0.003, 0.001});
+  check(rates_of(0), {0.12, 0.02, 0.003, 0.001});
   check(rates_of(4000), {0.04, 0.005, 0.0015, 0.0005});
   check(rates_of(1000000), {0.04, 0.005, 0.0005, 0.000125});
   CHECK(adam_rates_of(options, 2.0, 0).scales == doctest::Approx(0.04));
@@ -50,8 +50,32 @@ TEST_CASE("rates that fit the run fall with the root of its length, and given on
   options.scale_lr = {kFitted, 0.5};
   options.sh_rest_lr = {kFitted, 0.01};
   check(rates_of(1000), {0.5, 0.5, 0.01, 0.01});
+  options.scale_lr = {0.001, kFitted};
   options.sh_rest_lr = {0.0002, kFitted};
-  check(rates_of(1000), {0.5, 0.5, 0.0002, 0.0002});
+  check(rates_of(1000), {0.001, 0.001, 0.0002, 0.0002});
+}
+
+TEST_CASE("the last rates fall with the root of the run's length, unless they are given") {
+  TrainOptions options;
+  const auto check_last = [&options](std::int64_t iterations, double rotation, double opacity,
+                                     double sh, double position) {
+    CAPTURE(iterations);
+    options.iterations = iterations;
+    const AdamRates last = adam_rates_of(options, 2.0, iterations - 1);
+    CHECK(last.quaternions == doctest::Approx(rotation));
+    CHECK(last.opacities == doctest::Approx(opacity));
+    CHECK(last.sh_dc == doctest::Approx(sh));
+    CHECK(last.means == doctest::Approx(2.0 * position));
+    CHECK(adam_rates_of(options, 2.0, 0).opacities == doctest::Approx(0.1));
+  };
+  check_last(100, 0.003, 0.1, 0.01, 2e-5);
+  check_last(1000, 0.003, 0.06, 0.005, 1e-5);
+  check_last(2000, 0.003 / std::sqrt(2.0), 0.06 / std::sqrt(2.0), 0.005 / std::sqrt(2.0),
+             1e-5 / std::sqrt(2.0));
+  check_last(30000, 0.001, 0.03, 0.0025, 5e-6);
+  options.rotation_lr.final_value = options.opacity_lr.final_value = 0.002;
+  options.sh_lr.final_value = options.position_lr.final_value = 0.0001;
+  check_last(30000, 0.002, 0.002, 0.0001, 0.0001);
 }
 
 TEST_CASE("a random start has its own rate, opacity and decay unless they are given") {
@@ -61,7 +85,8 @@ TEST_CASE("a random start has its own rate, opacity and decay unless they are gi
   CHECK(pass_decay(options) == 0.0);
   options.init = "random";
   CHECK(position_rate(options).initial == 2e-3);
-  CHECK(position_rate(options).final_value == 5e-6);
+  options.iterations = 1000;
+  CHECK(position_rate(options).final_value == 1e-5);
   CHECK(adam_rates_of(options, 3.0, 0).means == doctest::Approx(6e-3));
   CHECK(start_opacity(options) == 0.02);
   CHECK(pass_decay(options) == 0.01);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 
@@ -38,6 +39,12 @@ TEST_CASE("the progress line fits its width and shows the state") {
     CHECK(bar.find("] " + std::to_string(i) + ", a.cl") != std::string::npos);
     CHECK(bar.find("left") == std::string::npos);
   }
+  // Far too many steps a second to be told.
+  Progress fast("Bytes", std::int64_t{1} << 50, 0, nullptr);
+  fast.update(std::int64_t{1} << 40, "");
+  CHECK(fast.rate() > 1e9);
+  CHECK(fast.line(120).find("it/s") == std::string::npos);
+  CHECK(fast.line(120).find("left") != std::string::npos);
   Progress nothing("Empty", 0, 0, nullptr);
   CHECK(nothing.line(80).find("0/0") != std::string::npos);
 }
