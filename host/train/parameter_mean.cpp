@@ -39,7 +39,8 @@ bool ParameterMean::add(const TrainOptions& options,
   const std::int64_t step = iteration - before - 1;
   if (step % every != 0) return false;
   if (step == 0) shape(gaussians);
-  const auto share = static_cast<float>(1.0 / static_cast<double>(step / every + 1));
+  const std::int64_t number = step / every + 1;
+  const auto share = static_cast<float>(1.0 / static_cast<double>(number));
   Kernel kernel = context_.kernel(kProgram, "add_sample");
   for (const ParameterGroup group : kParameterGroups) {
     const std::size_t size = gaussians.count * group_width(group, gaussians.sh_degree);
