@@ -43,16 +43,15 @@ typedef struct {
   LineSums sums;
   float3 screen_x, screen_y, screen_z;  // rows of RsRaySums::screen
   float4 gradient;                      // of the ray's colour and alpha
-  float sky;                            // background . gradient
-  float total;                          // final colour . gradient + final alpha * gradient of alpha
-  int total_hits;                       // of the ray
-  // What a walk needs, and the part of `total` that is blended.
+  float3 background;
+  // Final colour . gradient + final alpha * gradient of alpha, less what is blended.
+  float behind;
+  // What a walk needs.
   float transmittance;
-  int hits;
+  int room;  // for further hits
   bool stopped;
   float last_key;
-  uint last_index;
-  float blended;
+  uint next_index;  // one more than its own
 #if RAY_SLOPES
   float3 by_origin, by_direction;
 #endif
@@ -179,10 +178,6 @@ RS_INLINE void blend_hits(const RayScene* scene,
   (void)ray_basis;
   const float3 gradient = state->gradient.xyz;
   for (int k = 0; k < count && !state->stopped; ++k) {
-    if (state->hits == scene->max_hits) {
-      state->stopped = true;
-      return;
-    }
     const uint index = pending_index(scene->tree.blocks, pending, k);
     const float alpha = pending_alpha(pending, k);
     float basis[RS_RAY_FUNCTIONS];
@@ -190,14 +185,14 @@ RS_INLINE void blend_hits(const RayScene* scene,
     const float3 color = basis_color(scene, basis, pending, k).xyz;
     const float projected = dot(color, gradient) + state->gradient.w;
     const float before = state->transmittance;
-    state->blended += before * alpha * projected;
+    state->behind -= before * alpha * projected;
     state->transmittance = before * (1.0f - alpha);
-    ++state->hits;
+    --state->room;
     state->last_key = pending_key(pending, k);
-    state->last_index = index;
-    state->stopped = state->transmittance < scene->min_transmittance;
-    const bool last = state->stopped || state->hits == state->total_hits;
-    const float behind = last ? state->sky : (state->total - state->blended) / state->transmittance;
+    state->next_index = index + 1;
+    state->stopped = state->transmittance < scene->min_transmittance || state->room == 0;
+    const float behind =
+        state->stopped ? dot(state->background, gradient) : state->behind / state->transmittance;
     // Nothing passes where the colour is clamped.
     const float3 by_color =
         color > 0.0f && color < RS_MAX_COLOR ? before * alpha * gradient : (float3)(0.0f);
@@ -256,32 +251,28 @@ RS_INLINE void blend_hits(const RayScene* scene,
   float* before = pending->opacity;
   int blended = 0;
   while (blended < count && !state->stopped) {
-    if (state->hits == scene->max_hits) {
-      state->stopped = true;
-      break;
-    }
     const int i = pending->order[blended++];
     pending->color[i] = hit_color(scene, ray, basis, pending, blended - 1);
     before[i] = state->transmittance;
     state->transmittance *= 1.0f - pending->alpha[i];
-    ++state->hits;
+    --state->room;
     state->last_key = pending->key.s[i];
-    state->last_index = pending->index[i];
-    state->stopped = state->transmittance < scene->min_transmittance;
+    state->next_index = pending->index[i] + 1;
+    state->stopped = state->transmittance < scene->min_transmittance || state->room == 0;
     RS_PREFETCH_READ(state->records + (size_t)pending->index[i] * 16);
     for (int line = 0; line < RS_RAY_LINES; ++line) {
       rs_fetch_line(&state->sums, (size_t)pending->index[i] * RS_RAY_LINES + line);
     }
   }
   const float3 gradient = state->gradient.xyz;
-  float behind = state->sky;
-  if (!state->stopped && state->hits < state->total_hits) {
+  float behind = dot(state->background, gradient);
+  if (!state->stopped) {
     for (int k = 0; k < blended; ++k) {
       const int i = pending->order[k];
       const float projected = dot(pending->color[i].xyz, gradient) + state->gradient.w;
-      state->blended += before[i] * pending->alpha[i] * projected;
+      state->behind -= before[i] * pending->alpha[i] * projected;
     }
-    behind = (state->total - state->blended) / state->transmittance;
+    behind = state->behind / state->transmittance;
   }
   for (int k = blended - 1; k >= 0; --k) {
     const int i = pending->order[k];
@@ -329,6 +320,7 @@ RS_RAY_KERNEL __kernel void ray_backward(const uint first,
 #endif
   RayState state;
   state.records = records;
+  state.background = background;
 #if PRIVATE_COPIES
   sums += (size_t)item * ray_sums.gaussians * RS_RAY_SUMS;
 #endif
@@ -353,15 +345,12 @@ RS_RAY_KERNEL __kernel void ray_backward(const uint first,
       float basis[RS_RAY_FUNCTIONS];
       basis_along_ray(&scene, &ray, basis);
       state.gradient = gradient;
-      state.sky = dot(background, gradient.xyz);
-      state.total = dot(result.color, gradient.xyz) + result.alpha * gradient.w;
-      state.total_hits = hits;
+      state.behind = dot(result.color, gradient.xyz) + result.alpha * gradient.w;
       state.transmittance = 1.0f;
-      state.hits = 0;
+      state.room = hits;
       state.stopped = false;
       state.last_key = -1.0f;
-      state.last_index = 0;
-      state.blended = 0.0f;
+      state.next_index = 0;
 #if RAY_SLOPES
       state.by_origin = state.by_direction = (float3)(0.0f);
 #endif

@@ -29,7 +29,6 @@ typedef struct {
   int color_from_origin;
   float quantile;
   float min_transmittance;
-  int max_hits;
   float4 near;  // of ray_meets_block()
 #if KEPT
   __local HitMemory* memory;
@@ -46,7 +45,6 @@ RS_INLINE RayScene ray_scene(RS_TREE_ARGUMENTS,
                     walk->color_from_origin,
                     walk->quantile,
                     walk->min_transmittance,
-                    walk->max_hits,
                     (float4)(walk->near[0], walk->near[1], walk->near[2], walk->near[3])};
   return scene;
 }

@@ -3,6 +3,9 @@
 // Launch of trace_rays: one work-item per `rays_per_item` neighbours (1 on GPUs; on CPUs more, in
 // groups of one, so that all rays share one piece of private memory). Cost per ray: nodes and
 // blocks met / LANES lanes, plus hits^2 / LANES for the order (ray_walk.h).
+#define RS_PARK_END  // of ray_nearest.h: a wave of 16 has no register for it
+
+#include "parallel/wave.h"
 #include "trace/ray_color.h"
 
 #ifndef LEADING
@@ -12,10 +15,10 @@
 typedef struct {
   float4 color;  // the fourth lane is zero
   float transmittance, depth_sum, median;
-  int hits;
+  int room;  // for further hits
   bool capped, stopped;
-  float last_key;  // of the last blended hit
-  uint last_index;
+  float last_key;   // of the last blended hit
+  uint next_index;  // one more than its own
 #if LEADING
   float most;    // the largest weight so far, in front of the median
   uint leading;  // the Gaussian of the median depth, or else of the largest weight
@@ -32,7 +35,7 @@ RS_INLINE void blend_hits(const RayScene* scene,
                           int count,
                           RayState* state) {
   for (int k = 0; k < count; ++k) {
-    if (state->hits == scene->max_hits) {
+    if (state->room == 0) {
       state->capped = state->stopped = true;
       return;
     }
@@ -51,9 +54,9 @@ RS_INLINE void blend_hits(const RayScene* scene,
       state->leading = index;
     }
 #endif
-    ++state->hits;
+    --state->room;
     state->last_key = pending_key(pending, k);
-    state->last_index = index;
+    state->next_index = index + 1;
     if (state->transmittance < scene->min_transmittance) {
       state->stopped = true;
       return;
@@ -66,14 +69,14 @@ RS_INLINE void blend_hits(const RayScene* scene,
 // With LEADING the hits of a result are the Gaussian that leads them: of the median depth, or the
 // one that shows most where there is none.
 // from_origin: of every ray, read where the launch's color_from_origin is 2.
-RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
-                                       const uint rays_per_item,
-                                       RS_TREE_ARGUMENTS,
-                                       __global const float* restrict sh,
-                                       const RsRayWalk walk_argument,
-                                       RS_RAY_ARGUMENTS,
-                                       __global const uint* restrict from_origin,
-                                       __global RsRayResult* restrict results) {
+RS_WAVE_OF_16 RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
+                                                     const uint rays_per_item,
+                                                     RS_TREE_ARGUMENTS,
+                                                     __global const float* restrict sh,
+                                                     const RsRayWalk walk_argument,
+                                                     RS_RAY_ARGUMENTS,
+                                                     __global const uint* restrict from_origin,
+                                                     __global RsRayResult* restrict results) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
   const RsRayWalk walk = walk_argument;
@@ -90,7 +93,7 @@ RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
     if (walk.color_from_origin == 2) scene.color_from_origin = (int)from_origin[id];
     float basis[25];
     basis_along_ray(&scene, &ray, basis);
-    RayState state = {(float4)(0.0f), 1.0f, 0.0f, 0.0f, 0, false, false, -1.0f, 0};
+    RayState state = {(float4)(0.0f), 1.0f, 0.0f, 0.0f, walk.max_hits, false, false, -1.0f, 0};
 #if LEADING
     state.most = 0.0f;
     state.leading = 0;
@@ -111,7 +114,7 @@ RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
 #if LEADING
     const uint count = state.leading;
 #else
-    const uint count = (uint)state.hits;
+    const uint count = (uint)(walk.max_hits - state.room);
 #endif
     const RayResult result = {color, weight, depth, state.median, count, state.capped ? 1 : 0};
     store_result(result, results, id);

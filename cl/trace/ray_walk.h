@@ -12,9 +12,10 @@
 // With KEPT, a walk ends with the nearest few hits (ray_nearest.h).
 //
 // Who includes this defines RayState, with at least the members
-//   float transmittance; int hits; bool stopped; float last_key; uint last_index;
-// (1, 0, false, -1, 0 before the walk; with COUNT_WORK also uint nodes and blocks, that were
-// tested) and
+//   float transmittance; int room; bool stopped; float last_key; uint next_index;
+// (1, the most hits that count, false, -1, 0 before the walk; what follows the last blended hit has
+// its key and at least this index, or a greater key; with COUNT_WORK also uint nodes and blocks,
+// that were tested) and
 //   void blend_hits(scene, ray, basis, pending, count, state),
 // which takes the first `count` sorted hits, keeps those members up to date, and ends early, with
 // `stopped`, where the ray does.
@@ -33,12 +34,11 @@ RS_INLINE void walk_ray(
   Pending pending;
   pending.memory = scene->memory;
   pending.column = get_local_id(0);
+  park_end(&pending, t_max);
   __global const fv* blocks = scene->tree.blocks;
   float begin = ray->t_min;
-  uint begin_index = 0;  // least index that counts at `begin`
-  bool again = true;
-  while (again) {
-    float end = t_max;
+  do {
+    float end = parked_end(&pending, t_max);
     pending.size = 0;
     pending.remaining = state->transmittance;
     TreeWalk walk;
@@ -69,7 +69,7 @@ RS_INLINE void walk_ray(
 #endif
           if (!(key >= begin && key <= end)) continue;
           const uint index = block_index(block, lane);
-          if (key == begin && index < begin_index) continue;
+          if (key == begin && index < state->next_index) continue;
 #if ADAPTIVE_RADIUS
           const float exponent = block_half_quantile(block, lane);
 #else
@@ -87,13 +87,11 @@ RS_INLINE void walk_ray(
 #if COUNT_WORK
     state->nodes += walk.nodes;
 #endif
-    again = pending.size == KEPT;
     blend_hits(scene, ray, basis, &pending, pending.size, state);
     if (state->stopped) break;
     // The next walk begins behind the last blended hit.
     ray->t_min = begin = fmax(ray->t_min, state->last_key);
-    begin_index = state->last_index + 1;
-  }
+  } while (pending.size == KEPT);
 }
 
 #else
@@ -108,7 +106,7 @@ RS_INLINE void walk_ray(
 // becomes the transmittance behind them.
 int sort_to_end(const RayScene* scene, const RayState* state, Pending* pending, float* remaining) {
   pending_sort(pending);
-  const int room = scene->max_hits - state->hits;
+  const int room = state->room;
   float transmittance = state->transmittance;
   for (int k = 0; k < pending->size; ++k) {
     transmittance *= 1.0f - pending->alpha[pending->order[k]];
@@ -153,7 +151,7 @@ RS_INLINE void walk_ray(
           prefetch_color(scene, pending.index[pending.size - 1]);
           hopeful *= 1.0f - block_opacity(block, lane);
         }
-        const int room = scene->max_hits - state->hits;
+        const int room = state->room;
         if (!(hopeful < scene->min_transmittance) && pending.size <= min(room, PENDING - LANES))
           continue;
         remaining = hopeful = pending_evaluate(&pending, &range, half_quantile, remaining);
@@ -203,7 +201,7 @@ RS_INLINE void walk_ray(
     if (state->stopped) break;
     // The next walk begins behind the last blended hit.
     ray->t_min = range.begin = fmax(ray->t_min, state->last_key);
-    range.begin_index = state->last_index + 1;
+    range.begin_index = state->next_index;
     range.end = t_max;
     range.end_index = 0xffffffffu;
   }

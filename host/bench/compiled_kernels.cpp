@@ -16,7 +16,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"gfx1100", "loss group: group_slopes", 55, 12064, 256, 32},
       {"gfx1100", "loss group: group_gradient", 39, 13104, 256, 32},
       {"gfx1100", "adam sh3: adam_step", 33, 0, 64, 32},
-      {"gfx1100", "rays: trace_rays", 68, 7680, 64, 32},
+      {"gfx1100", "rays: trace_rays", 69, 7936, 64, 32},
       {"dg2-g10", "sort pairs: scatter", 128, 15424, 256, 16},
       {"dg2-g10", "prepare sh0: prepare_view", 128, 4096, 64, 16},
       {"dg2-g10", "lists: fill_tiles", 128, 0, 64, 16},
@@ -27,7 +27,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"dg2-g10", "loss group: group_slopes", 128, 12064, 256, 32},
       {"dg2-g10", "loss group: group_gradient", 128, 13120, 256, 32},
       {"dg2-g10", "adam sh3: adam_step", 128, 0, 64, 16},
-      {"dg2-g10", "rays: trace_rays", 128, 7680, 64, 8},
+      {"dg2-g10", "rays: trace_rays", 128, 7936, 64, 16},
       {"sm_86", "sort pairs: scatter", 40, 15424, 256, 32},
       {"sm_86", "prepare sh0: prepare_view", 48, 4096, 64, 32},
       {"sm_86", "lists: fill_tiles", 56, 0, 64, 32},
@@ -38,7 +38,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"sm_86", "loss group: group_slopes", 60, 12064, 256, 32},
       {"sm_86", "loss group: group_gradient", 40, 13104, 256, 32},
       {"sm_86", "adam sh3: adam_step", 36, 0, 64, 32},
-      {"sm_86", "rays: trace_rays", 64, 7680, 64, 32},
+      {"sm_86", "rays: trace_rays", 64, 7936, 64, 32},
       {"sm_90", "sort pairs: scatter", 32, 15424, 256, 32},
       {"sm_90", "prepare sh0: prepare_view", 48, 4096, 64, 32},
       {"sm_90", "lists: fill_tiles", 62, 0, 64, 32},
@@ -49,7 +49,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"sm_90", "loss group: group_slopes", 58, 12064, 256, 32},
       {"sm_90", "loss group: group_gradient", 32, 13104, 256, 32},
       {"sm_90", "adam sh3: adam_step", 36, 0, 64, 32},
-      {"sm_90", "rays: trace_rays", 64, 7680, 64, 32}};
+      {"sm_90", "rays: trace_rays", 64, 7936, 64, 32}};
   return all;
 }
 
