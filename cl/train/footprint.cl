@@ -53,15 +53,23 @@ __kernel void limit_scales(
   vstore3(select(raised, (float3)(high), raised > (float3)(high)), i, scales);
 }
 
-// Keeps the third scale parameter, a logarithm, at the smaller of the others + `thinner`. A guard
-// word that is not 0 turns it off.
+// Makes discs: the shortest scale parameter, a logarithm, becomes at most the next one + `thinner`.
+// Of equal ones it is the last. A guard word that is not 0 turns it off.
 __kernel void flatten_scales(uint count,
                              float thinner,
                              __global const uint* guard,
                              __global float* scales) {
   const size_t i = get_global_id(0);
   if (i >= count || guard[0] != 0) return;
-  scales[3 * i + 2] = fmin(scales[3 * i], scales[3 * i + 1]) + thinner;
+  float3 s = vload3(i, scales);
+  if (s.x < s.y && s.x < s.z) {
+    s.x = fmin(s.x, fmin(s.y, s.z) + thinner);
+  } else if (s.y < s.z) {
+    s.y = fmin(s.y, fmin(s.x, s.z) + thinner);
+  } else {
+    s.z = fmin(s.z, fmin(s.x, s.y) + thinner);
+  }
+  vstore3(s, i, scales);
 }
 
 // Raises scale parameters to their least value. A guard word that is not 0 turns it off.

@@ -237,7 +237,7 @@ void add_model_keys(TrainTable& t, TrainOptions& o) {
       {{"exp", ScaleActivation::kExp}, {"sigmoid", ScaleActivation::kSigmoid}},
       "standard deviation from the trained number: exp (3DGS) or sigmoid (the paper; below 1)");
   t.flag("flat", o.flat,
-         "train flat Gaussians: the third axis stays a hundredth of the smaller of the others");
+         "train flat Gaussians: from 0.4 of the run on their shortest axis shrinks, to a hundredth of the next one");
 }
 
 void add_loss_keys(TrainTable& t, TrainOptions& o) {

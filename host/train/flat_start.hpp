@@ -8,13 +8,8 @@
 
 namespace raysplats {
 
-/// Thickness of a flat Gaussian, as a share of the smaller of its other two axes.
-constexpr double kFlatness = 0.01;
-/// Flat Gaussians have to find their orientation: by so much faster than others they turn.
-constexpr double kFlatTurn = 10;
-
-/// Makes Gaussians flat: the shortest axis becomes the third and kFlatness of the smaller of the
-/// others. Those without a shortest axis, as starts from points are, turn it to the nearest camera.
-void flatten(Gaussians& model, std::span<const Camera> cameras);
+/// Turns the third axis of Gaussians without a shortest axis, as starts from points are, to the
+/// nearest camera: what is flat from there on shows its face.
+void face_cameras(Gaussians& model, std::span<const Camera> cameras);
 
 }  // namespace raysplats

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "train/flat_start.hpp"
 
 namespace raysplats {
 namespace {
@@ -78,12 +77,10 @@ RsFootprintView footprint_view(const Camera& camera) {
 Footprint::Footprint(Context& context,
                      std::span<const Camera> cameras,
                      double share,
-                     const ScaleLimits& limits,
-                     bool flat)
+                     const ScaleLimits& limits)
     : context_(context),
       share_(share),
       limits_(limits),
-      flat_(flat),
       views_(static_cast<std::uint32_t>(cameras.size())) {
   if (share <= 0) return;
   std::vector<RsFootprintView> views;
@@ -108,7 +105,9 @@ void Footprint::restore(std::span<const float> lows) {
   lows_.upload(lows);
 }
 
-void Footprint::apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard) {
+void Footprint::apply(DeviceGaussians& gaussians,
+                      const Buffer<std::uint32_t>& guard,
+                      double thickness) {
   if (limits_.least > 0 || limits_.greatest > 0) {
     const double low = limits_.least, high = limits_.greatest;
     context_.kernel(kProgram, "limit_scales", build_options(gaussians))
@@ -118,10 +117,10 @@ void Footprint::apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& g
                 gaussians.scales);
   }
   if (share_ > 0) raise(gaussians, guard);
-  if (flat_) {
+  if (thickness < 1) {
     context_.kernel(kProgram, "flatten_scales", build_options(gaussians))
         .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
-                static_cast<float>(std::log(kFlatness)), guard, gaussians.scales);
+                static_cast<float>(std::log(thickness)), guard, gaussians.scales);
   }
 }
 

@@ -21,13 +21,11 @@ struct ScaleLimits {
 /// themselves, so the model that is written needs nothing else to look as it did in training.
 class Footprint {
  public:
-  /// `share` of a pixel as a standard deviation; 0 = without. `flat` Gaussians keep a third axis of
-  /// kFlatness instead (ScaleActivation::kExp).
+  /// `share` of a pixel as a standard deviation; 0 = without.
   Footprint(Context& context,
             std::span<const Camera> cameras,
             double share,
-            const ScaleLimits& limits = {},
-            bool flat = false);
+            const ScaleLimits& limits = {});
 
   /// Finds the least sizes for the Gaussians' present means; enqueues without waiting.
   void update(const DeviceGaussians& gaussians);
@@ -37,9 +35,11 @@ class Footprint {
   /// Puts them back: what a resumed run does until its next update() depends on them.
   void restore(std::span<const float> lows);
 
-  /// Raises what is smaller, keeps to the limits and flattens; update() has to have seen this
-  /// number of Gaussians. A guard whose first word is not 0 keeps them as they are.
-  void apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard);
+  /// Raises what is smaller and keeps to the limits; update() has to have seen this number of
+  /// Gaussians. Below 1 (ScaleActivation::kExp), `thickness` then is what the shortest axis may
+  /// have of the next one, however thin that makes it. A guard whose first word is not 0 keeps
+  /// Gaussians as they are.
+  void apply(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard, double thickness = 1);
 
  private:
   void raise(DeviceGaussians& gaussians, const Buffer<std::uint32_t>& guard);
@@ -47,7 +47,6 @@ class Footprint {
   Context& context_;
   double share_;
   ScaleLimits limits_;
-  bool flat_;
   std::uint32_t views_ = 0;
   Buffer<RsFootprintView> cameras_;
   Buffer<float> lows_;

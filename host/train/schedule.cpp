@@ -27,6 +27,11 @@ struct FittedRate {
   double most;
 };
 
+// Flat Gaussians: they find their shortest axis while they are round, and lose it from one share of
+// the run to the other, at last to so much of the next one.
+constexpr double kFlatFrom = 0.4, kFlatUntil = 0.8;
+constexpr double kFlatness = 0.01;
+
 constexpr double kFittedIterations = 1000;
 constexpr FittedRate kPositionFinalRate{1e-5, 5e-6, 2e-5};
 constexpr FittedRate kRotationFinalRate{0.003, 0.001, 0.003};
@@ -110,6 +115,12 @@ double learning_rate(const LearningRate& rate,
   const auto last = static_cast<double>(std::max<std::int64_t>(options.iterations - 1, 1));
   const double share = std::min(static_cast<double>(iteration) / last, 1.0);
   return rate.initial * std::pow(rate.final_value / rate.initial, share);
+}
+
+double flat_thickness(const TrainOptions& options, std::int64_t iteration) {
+  if (!options.flat) return 1;
+  const double share = static_cast<double>(iteration + 1) / static_cast<double>(options.iterations);
+  return std::pow(kFlatness, std::clamp((share - kFlatFrom) / (kFlatUntil - kFlatFrom), 0.0, 1.0));
 }
 
 int active_sh_degree(const TrainOptions& options, std::int64_t iteration) {

@@ -39,6 +39,10 @@ LearningRate position_rate(const TrainOptions& options);
 double start_opacity(const TrainOptions& options);
 double pass_decay(const TrainOptions& options);
 
+/// What the shortest axis of a flat Gaussian may have of the next one after this step; 1 where all
+/// are round.
+double flat_thickness(const TrainOptions& options, std::int64_t iteration);
+
 /// Degree of the SH bands that are switched on.
 int active_sh_degree(const TrainOptions& options, std::int64_t iteration);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/step_options.hpp"
 
-#include "train/flat_start.hpp"
 #include "train/schedule.hpp"
 #include "train/sky_adam.hpp"
 
@@ -28,8 +27,7 @@ AdamOptions adam_options_of(const TrainOptions& options) {
 AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t iteration) {
   AdamRates rates;
   rates.means = extent * learning_rate(position_rate(options), options, iteration);
-  rates.quaternions =
-      (options.flat ? kFlatTurn : 1.0) * learning_rate(rotation_rate(options), options, iteration);
+  rates.quaternions = learning_rate(rotation_rate(options), options, iteration);
   rates.scales = (options.scale_lr_by_extent ? extent : 1.0) *
                  learning_rate(scale_rate(options), options, iteration);
   rates.opacities = learning_rate(opacity_rate(options), options, iteration);

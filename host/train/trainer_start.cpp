@@ -157,7 +157,7 @@ void Trainer::Impl::upload_start(std::size_t most) {
                 train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
                 most, options);
   first_model.reset();
-  if (options.flat) flatten(model, train_cameras);
+  if (options.flat) face_cameras(model, train_cameras);
   if (model.size() == 0) {
     throw UsageError(options.bounds
                          ? "No Gaussian of the start lies within --bounds: give a larger box"

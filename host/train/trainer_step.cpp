@@ -102,9 +102,10 @@ void Trainer::Impl::enqueue_step() {
   adam.step(gaussians, slopes, adam_rates_of(options, extent, iteration), &guard.mark());
   if (measured) density.end_step(gaussians, guard.mark());
   if (mcmc) mcmc->disturb(gaussians, iteration, guard.mark());
-  footprint.apply(gaussians, guard.mark());
+  const double thickness = flat_thickness(options, iteration);
+  footprint.apply(gaussians, guard.mark(), thickness);
   if (mean.add(options, gaussians, iteration + 1, guard.mark()))
-    footprint.apply(mean.model(), guard.mark());
+    footprint.apply(mean.model(), guard.mark(), thickness);
   guard.close(adam.refused(), several ? guard.step_capped() : tracer.kept_capped_rays(),
               gaussians.count);
   ++iteration;

@@ -114,7 +114,7 @@ struct TrainOptions {
   int sh_degree = 3;
   RunShare sh_degree_interval = 0.1;
   ScaleActivation scale_activation = ScaleActivation::kExp;
-  bool flat = false;  ///< the third axis stays a hundredth of the smaller of the others
+  bool flat = false;  ///< the shortest axis shrinks to a hundredth of the next one
 
   // Loss
   PixelLoss pixel_loss = PixelLoss::kL1;
