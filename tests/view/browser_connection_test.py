@@ -55,8 +55,10 @@ class ConnectionTest(ModelCase):
                 self.assertIn(said, logged)
 
     def test_the_first_picture_is_waited_for_in_words(self):
-        # Kernels of nobody's: they are compiled now.
+        # The page of the program that ends would look for it and say in the console that it is gone.
+        self.page.get("about:blank")
         self.viewer.stop()
+        # Kernels of nobody's: they are compiled now.
         cache = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_cache_"))
         self.enterContext(unittest.mock.patch.dict(os.environ, {"XDG_CACHE_HOME": cache}))
         fresh = Viewer(self.program, self.arguments_given)
