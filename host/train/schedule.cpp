@@ -20,17 +20,17 @@ constexpr double kValidationShare = 0.9;  // of the run; then validation views a
 constexpr int kValidations = 9;
 constexpr double kTimedShare = 0.05;  // of a run, once its steps are alike, that is timed
 
+// Flat Gaussians: they find their shortest axis while they are round, and lose it from one share of
+// the run to the other, at last to so much of the next one.
+constexpr double kFlatFrom = 0.4, kFlatUntil = 0.8;
+constexpr double kFlatness = 0.01;
+
 // What a rate is in a run of 1000 iterations, and between what it stays in others.
 struct FittedRate {
   double usual;
   double least;
   double most;
 };
-
-// Flat Gaussians: they find their shortest axis while they are round, and lose it from one share of
-// the run to the other, at last to so much of the next one.
-constexpr double kFlatFrom = 0.4, kFlatUntil = 0.8;
-constexpr double kFlatness = 0.01;
 
 constexpr double kFittedIterations = 1000;
 constexpr FittedRate kPositionFinalRate{1e-5, 5e-6, 2e-5};
