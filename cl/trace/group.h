@@ -14,6 +14,7 @@
 #ifndef LANES
 #define LANES 1
 #endif
+#include "parallel/wave.h"
 #include "trace/packet.h"
 
 #if LANES != 1
@@ -36,13 +37,16 @@
 #pragma OPENCL EXTENSION cl_khr_subgroup_ballot : enable
 #endif
 #endif
-// Of a kernel: its groups have this size, whatever the host says.
+// Of a kernel: its groups have this size, whatever the host says, and waves of 16 work-items where
+// a group is not one subgroup.
 #if SUBGROUP == 2 && defined(cl_intel_required_subgroup_size) && GROUP <= 32
 #define RS_GROUP_KERNEL                              \
   __attribute__((reqd_work_group_size(GROUP, 1, 1))) \
   __attribute__((intel_reqd_sub_group_size(GROUP)))
-#else
+#elif SUBGROUP || GROUP < 16
 #define RS_GROUP_KERNEL __attribute__((reqd_work_group_size(GROUP, 1, 1)))
+#else
+#define RS_GROUP_KERNEL RS_WAVE_OF_16 __attribute__((reqd_work_group_size(GROUP, 1, 1)))
 #endif
 
 // Rows of hits that are open at once, at most 32.

@@ -8,7 +8,6 @@
 #define TILE 16
 #endif
 
-#include "parallel/wave.h"
 #include "trace/arguments.h"
 // Rows of less than the forward pass keeps: more of them find room in local memory.
 #define OPEN_LOCAL 24
@@ -223,18 +222,13 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
     close_row(memory, &own, lane, rs_lowest_bit(open), &p, T, T_last, sky, lines, sums, &closed);
 }
 
-#if SUBGROUP || GROUP < 16
-#define RS_BACKWARD_KERNEL RS_GROUP_KERNEL
-#else
-#define RS_BACKWARD_KERNEL RS_WAVE_OF_16 RS_GROUP_KERNEL
-#endif
-RS_BACKWARD_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
-                                                      const RsBackward backward_argument,
-                                                      RS_STREAM_ARGUMENTS(const),
-                                                      __global const RsLine* restrict lines,
-                                                      __global const float* restrict image_gradient,
-                                                      __global const float* restrict depth_gradient,
-                                                      __global float* restrict gradients) {
+RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
+                                                   const RsBackward backward_argument,
+                                                   RS_STREAM_ARGUMENTS(const),
+                                                   __global const RsLine* restrict lines,
+                                                   __global const float* restrict image_gradient,
+                                                   __global const float* restrict depth_gradient,
+                                                   __global float* restrict gradients) {
   __local BackwardMemory memory;
   const RsCamera camera = camera_argument;
   const RsBackward backward = backward_argument;
@@ -264,7 +258,7 @@ RS_BACKWARD_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
     }
   }
 #else
-  const int x = (int)(get_global_id(0) / GROUP) * RS_GROUP_WIDTH;
+  const int x = (int)get_group_id(0) * RS_GROUP_WIDTH;
   const int y = (int)get_global_id(1) * RS_GROUP_HEIGHT + tile_row * TILE;
   const bool works = x < camera.width && y < camera.height &&
                      rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE);

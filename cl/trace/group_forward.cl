@@ -68,7 +68,7 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   const float4 background =
       (float4)(forward.background[0], forward.background[1], forward.background[2], 0.0f);
   const int lane = rs_group_lane();
-  const int window_x = (int)(get_global_id(0) / GROUP) * RS_GROUP_WIDTH;
+  const int window_x = (int)get_group_id(0) * RS_GROUP_WIDTH;
   const int window_y = (int)get_global_id(1) * RS_GROUP_HEIGHT;
   const int group_x = window_x + forward.window[0] * TILE;
   const int group_y = window_y + forward.window[1] * TILE;
@@ -112,6 +112,9 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   stream.capacity = forward.pool_capacity;
   stream.cursor = counters;
   stream_restart(&stream);
+#if KEEP_HITS
+  if (lane == 0) memory.stream_end = (uint2)(stream.chunk, stream.used);
+#endif
 #if COUNT_WORK
   tally_clear(stream.tally);
 #endif
@@ -121,14 +124,15 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   int first = 0, part = GROUP;
   while (first < GROUP) {
     const bool mine = lane >= first && lane < first + part;
-    const uint chunk = stream.chunk, used = stream.used;
+#if KEEP_HITS
+    if (lane == 0) memory.stream_begin = memory.stream_end;
+#endif
     bool done = group_in_rows(&memory, &candidates, lane, mine, lines, references, limits,
                               min_transmittance, max_hits, &p, &stream);
-    if (!done) {
-      if (mine) packet_clear(&p);
-      stream.chunk = chunk;
-      stream.used = used;
-    }
+    if (!done && mine) packet_clear(&p);
+#if KEEP_HITS
+    if (!done && lane == 0) memory.stream_end = memory.stream_begin;
+#endif
     const bool alone = !done && part <= RS_LEAST_PART;
     if (group_in_passes(&memory, &candidates, lane, alone && mine && p.valid, lines, references,
                         limits, min_transmittance, max_hits, &p, &stream))
@@ -146,8 +150,7 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   }
 #if KEEP_HITS
   if (works && lane == 0)
-    stream_ends[rs_group_number(camera.width, group_x, group_y)] =
-        (uint2)(stream.chunk, stream.used);
+    stream_ends[rs_group_number(camera.width, group_x, group_y)] = memory.stream_end;
 #else
   (void)stream_ends;
 #endif

@@ -102,7 +102,7 @@ RS_GROUP_INLINE bool group_in_passes(__local GroupMemory* memory,
     rs_group_barrier();
     const uint common = memory->taken;
     rs_group_barrier();
-    if (goes_on && lane == 0) memory->taken = stream_push(stream, common, 0);
+    if (goes_on && lane == 0) memory->taken = group_push(memory, common, 0, stream);
     rs_group_barrier();
     mine = alive && as_uint(hits.reference[next][lane]) == common;
     if (goes_on) group_stream_set(stream, lane, memory->taken, mine ? p->T : 0.0f);

@@ -64,6 +64,10 @@ typedef struct {
   uint words[2];
   uint taken;
   uint alive;
+#if KEEP_HITS
+  // Chunk of the stream and what is used of it, for work-item 0: now, and where a part began.
+  uint2 stream_end, stream_begin;
+#endif
 } GroupMemory;
 
 // The way through the candidate list of the tile; the same in every work-item.
@@ -102,6 +106,11 @@ float group_waiting_key(const __local GroupMemory* memory,
                      : as_float(memory->found_first[i - waiting]);
 }
 
+// The n-th of the `total` rows that a work-item puts in order; never beyond the last.
+int group_waiting_row(const int lane, const int n, const int total) {
+  return max(min(lane + n * GROUP, total - 1), 0);
+}
+
 // Neighbouring work-items write neighbouring words.
 void group_stream_set(const HitStream* stream,
                       const int lane,
@@ -133,14 +142,29 @@ void group_settle(__local OpenRows* rows,
 #endif
 }
 
+#if KEEP_HITS
+// By work-item 0, which alone knows where the stream ends.
+uint group_push(__local GroupMemory* memory,
+                const uint reference,
+                const uint window,
+                HitStream* stream) {
+  stream->chunk = memory->stream_end.x;
+  stream->used = memory->stream_end.y;
+  const uint row = stream_push(stream, reference, window);
+  memory->stream_end = (uint2)(stream->chunk, stream->used);
+  return row;
+}
+
 // By work-item 0: places in the stream for the rows of the slots `closing`, which settle now.
-void group_push_rows(__local OpenRows* rows, uint closing, uint settled, HitStream* stream) {
+void group_push_rows(__local GroupMemory* memory, uint closing, uint settled, HitStream* stream) {
+  __local OpenRows* rows = &memory->open;
   for (; closing != 0; closing &= closing - 1, ++settled) {
     const uint slot = rs_lowest_bit(closing);
     rows->stream_row[slot] =
-        stream_push(stream, rows->reference[slot], settled - rows->settled[slot]);
+        group_push(memory, rows->reference[slot], settled - rows->settled[slot], stream);
   }
 }
+#endif
 
 // Traces the rays that are `traced`. False when they need more rows at once than there is room for,
 // or a ray has more than max_hits hits: fewer rays need less room, and group_passes.h has no such
@@ -232,33 +256,42 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
     RS_TALLY(p, RS_TALLY_FOUND, found - waiting);
     RS_TALLY(p, RS_TALLY_ORDERED, total * (1 + (total + GROUP - 1) / GROUP));
     __local WaitingRows* w = &memory->waiting;
-    float moved_first[RS_WAITING_EACH], moved_last[RS_WAITING_EACH];
-    uint moved_candidate[RS_WAITING_EACH];
-    int moved_to[RS_WAITING_EACH];
+    // One number after the other: a work-item keeps few of them at a time. Those without a row take
+    // part with the last one, which they put nowhere.
+    int to[RS_WAITING_EACH];
+    uint moved[RS_WAITING_EACH];
 #pragma unroll
     for (int n = 0; n < RS_WAITING_EACH; ++n) {
-      const int i = lane + n * GROUP;
-      const float key = i < total ? group_waiting_key(memory, begin, waiting, i) : INFINITY;
-      moved_first[n] = key;
-      if (!(key < INFINITY)) continue;
-      int place = 0;
-      for (int j = 0; j < total; ++j) {
+      const int i = group_waiting_row(lane, n, total);
+      const float key = group_waiting_key(memory, begin, waiting, i);
+      const int others = lane + n * GROUP < total && key < INFINITY ? total : 0;
+      int place = others > 0 ? 0 : -1;
+      for (int j = 0; j < others; ++j) {
         const float other = group_waiting_key(memory, begin, waiting, j);
         place += other < key || (other == key && j < i);
       }
-      const bool old = i < waiting;
-      moved_to[n] = place;
-      moved_last[n] = old ? w->last_key[begin + i] : as_float(memory->found_last[i - waiting]);
-      moved_candidate[n] = old ? w->candidate[begin + i]
-                               : memory->queue[(candidates->taken + i - waiting) % RS_GROUP_QUEUE];
+      to[n] = place;
+      moved[n] = i < waiting ? w->candidate[begin + i]
+                             : memory->queue[(candidates->taken + i - waiting) % RS_GROUP_QUEUE];
     }
     rs_group_barrier();
 #pragma unroll
     for (int n = 0; n < RS_WAITING_EACH; ++n) {
-      if (!(moved_first[n] < INFINITY)) continue;
-      w->first_key[moved_to[n]] = moved_first[n];
-      w->last_key[moved_to[n]] = moved_last[n];
-      w->candidate[moved_to[n]] = moved_candidate[n];
+      const int i = group_waiting_row(lane, n, total);
+      if (to[n] >= 0) w->candidate[to[n]] = moved[n];
+      moved[n] = i < waiting ? as_uint(w->last_key[begin + i]) : memory->found_last[i - waiting];
+    }
+    rs_group_barrier();
+#pragma unroll
+    for (int n = 0; n < RS_WAITING_EACH; ++n) {
+      const int i = group_waiting_row(lane, n, total);
+      if (to[n] >= 0) w->last_key[to[n]] = as_float(moved[n]);
+      moved[n] = as_uint(group_waiting_key(memory, begin, waiting, i));
+    }
+    rs_group_barrier();
+#pragma unroll
+    for (int n = 0; n < RS_WAITING_EACH; ++n) {
+      if (to[n] >= 0) w->first_key[to[n]] = as_float(moved[n]);
     }
     rs_group_barrier();
     candidates->taken += batch;
@@ -297,7 +330,7 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
       const uint settling = (uint)popcount(closing);
       if (lane == 0 && fits) {
 #if KEEP_HITS
-        group_push_rows(rows, closing, settled_rows, stream);
+        group_push_rows(memory, closing, settled_rows, stream);
 #endif
         rows->last_key[slot] = w->last_key[r];
         rows->reference[slot] = reference;
@@ -320,7 +353,7 @@ RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
   }
   RS_TALLY(p, RS_TALLY_BOXES, (candidates->read - candidates->begin + GROUP - 1) / GROUP);
 #if KEEP_HITS
-  if (lane == 0 && fits) group_push_rows(rows, open, settled_rows, stream);
+  if (lane == 0 && fits) group_push_rows(memory, open, settled_rows, stream);
 #endif
   rs_group_barrier();
   for (uint rest = fits ? open : 0; rest != 0; rest &= rest - 1)
