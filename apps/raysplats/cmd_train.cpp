@@ -78,7 +78,7 @@ Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device
 std::int64_t announce(Trainer& trainer, const Options& options, bool quiet) {
   constexpr double kMeasureSeconds = 3;
   const bool fits = !options.time.empty();
-  if (!fits && (quiet || !options.resume.empty())) return options.train.iterations;
+  if (!fits && (quiet || !options.resume.empty())) return trainer.iterations();
   const RunEstimate estimate = fits ? trainer.fit_time(parse_duration("--time", options.time))
                                     : trainer.estimate(kMeasureSeconds);
   spdlog::info("{} iterations, up to {} Gaussians: about {} of training", estimate.iterations,

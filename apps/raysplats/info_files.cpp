@@ -141,7 +141,10 @@ std::optional<Json> describe_toml(const std::filesystem::path& path) {
   std::vector<std::string> given;
   for (const auto& [key, value] : nested != nullptr ? *nested : table)
     given.emplace_back(key.str());
-  return Json{{"type", "configuration"}, {"iterations", options.iterations}, {"given", given}};
+  Json about{{"type", "configuration"}};
+  if (options.iterations != kFittedLength) about["iterations"] = options.iterations;
+  about["given"] = given;
+  return about;
 }
 
 }  // namespace

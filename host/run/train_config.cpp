@@ -251,10 +251,16 @@ std::string to_toml(const TrainOptions& options) {
 void validate(const TrainOptions& options) {
   check_packet_width(options.trace);
   const auto& sizes = options.resolution_schedule;
+  if (options.iterations < 0 && options.iterations != kFittedLength) {
+    throw UsageError(fmt::format(
+        "The option 'iterations' is a number from 0, or {} for what fits the photos, not {}",
+        kFittedLength, options.iterations));
+  }
   const auto earlier = [&options](const ResolutionStep& a, const ResolutionStep& b) {
     return a.until.of(options.iterations) < b.until.of(options.iterations);
   };
-  if (!std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
+  // Trainers ask again once the photos have told the length.
+  if (options.iterations != kFittedLength && !std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
     throw UsageError("The iterations of 'resolution-schedule' have to ascend");
   }
   for (const LearningRate& rate : {options.sky_lr, options.pose_lr}) check_rate(rate);

@@ -159,8 +159,10 @@ class TrainTable : public OptionTable {
 
 void add_run_keys(TrainTable& t, TrainOptions& o) {
   t.section("Run");
-  t.number("iterations", o.iterations, 0, kMaxCount,
-           "training steps, of one view each or of views-per-step");
+  t.number(
+      "iterations", o.iterations, kFittedLength, kMaxCount,
+      "training steps, of one view each or of views-per-step; -1 = 100 for each training photo, "
+      "from 1000 to 10000");
   t.number("end-iteration", o.end_iteration, 0, kMaxCount,
            "iteration that the run ends with, though its schedules are those of iterations; --time "
            "sets it once the last steps are timed; 0 = iterations");
@@ -237,7 +239,8 @@ void add_model_keys(TrainTable& t, TrainOptions& o) {
       {{"exp", ScaleActivation::kExp}, {"sigmoid", ScaleActivation::kSigmoid}},
       "standard deviation from the trained number: exp (3DGS) or sigmoid (the paper; below 1)");
   t.flag("flat", o.flat,
-         "train flat Gaussians: from 0.4 of the run on their shortest axis shrinks, to a hundredth of the next one");
+         "train flat Gaussians: from 0.4 of the run on their shortest axis shrinks, to a hundredth "
+         "of the next one");
 }
 
 void add_loss_keys(TrainTable& t, TrainOptions& o) {

@@ -54,7 +54,16 @@ LearningRate with_end(LearningRate rate, const FittedRate& end, const TrainOptio
   return rate;
 }
 
+// Fewer photos are known by heart sooner: from then on a model gets worse between them.
+constexpr std::int64_t kPasses = 100;
+constexpr std::int64_t kShortestFitted = 1000, kLongestFitted = 10000;
+
 }  // namespace
+
+std::int64_t run_length(const TrainOptions& options, std::size_t photos) {
+  if (options.iterations != kFittedLength) return options.iterations;
+  return std::clamp(kPasses * static_cast<std::int64_t>(photos), kShortestFitted, kLongestFitted);
+}
 
 bool clears_random_start(const TrainOptions& options) {
   return options.init == "random" && options.strategy != DensityStrategy::kMcmc;

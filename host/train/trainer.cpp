@@ -31,6 +31,12 @@ std::vector<View> views_of(const Dataset& dataset, const std::vector<std::size_t
   return views;
 }
 
+TrainOptions with_length(TrainOptions options, const Dataset& dataset) {
+  options.iterations = run_length(options, dataset.indices(Split::kTrain).size());
+  validate(options);
+  return options;
+}
+
 }  // namespace
 
 std::size_t pixels_of(const Camera& camera) {
@@ -46,7 +52,7 @@ Trainer::Impl::Impl(Context& device,
     : context(device),
       ranks(others != nullptr ? *others : alone),
       dataset(std::move(data)),
-      options((validate(train_options), train_options)),
+      options(with_length(train_options, dataset)),
       run(std::move(run_path), ranks.leads()),
       overwrite(replace),
       train_views(dataset.indices(Split::kTrain)),
@@ -207,5 +213,7 @@ void Trainer::set_watcher(RunWatcher* watcher) {
 }
 
 std::int64_t Trainer::iteration() const { return impl_->iteration; }
+
+std::int64_t Trainer::iterations() const { return last_iteration(impl_->options); }
 
 }  // namespace raysplats

@@ -74,6 +74,9 @@ struct Bounds {
 /// has to go farther, or by its start.
 inline constexpr double kFitted = -1;
 
+/// In place of a number of iterations that fits the number of training photos.
+inline constexpr std::int64_t kFittedLength = -1;
+
 /// Learning rate of one parameter group: `initial` decays exponentially to `final_value`.
 struct LearningRate {
   double initial = 0;
@@ -85,7 +88,7 @@ struct LearningRate {
 /// with dashes).
 struct TrainOptions {
   // Run
-  std::int64_t iterations = 10000;
+  std::int64_t iterations = kFittedLength;  ///< as run_length()
   /// Where the run ends, though schedules are those of `iterations`; 0: with them.
   std::int64_t end_iteration = 0;
   int views_per_step = 1;  ///< whose gradients are added

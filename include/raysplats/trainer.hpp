@@ -132,6 +132,8 @@ class Trainer {
   Gaussians model() const;
   /// Completed iterations.
   std::int64_t iteration() const;
+  /// Those of the whole run, as it is planned now.
+  std::int64_t iterations() const;
 
   // What follows serves the library itself; its types are not installed.
 

@@ -212,7 +212,10 @@ void bind_trainer(nb::module_& module) {
           "The model as it is now.")
       .def_prop_ro(
           "iteration", [](HeldTrainer& self) { return self->iteration(); },
-          "Completed iterations.");
+          "Completed iterations.")
+      .def_prop_ro(
+          "iterations", [](HeldTrainer& self) { return self->iterations(); },
+          "Those of the whole run, as it is planned now.");
 }
 
 }  // namespace raysplats::python

@@ -26,6 +26,17 @@ TEST_CASE("learning rates decay to their final value") {
   CHECK(learning_rate({5e-2, 5e-2}, options, 30000) == doctest::Approx(5e-2));
 }
 
+TEST_CASE("a run is as long as it is told, or as its photos ask for") {
+  TrainOptions options;
+  CHECK(run_length(options, 1) == 1000);
+  CHECK(run_length(options, 21) == 2100);
+  CHECK(run_length(options, 500) == 10000);
+  options.iterations = 0;
+  CHECK(run_length(options, 21) == 0);
+  options.iterations = 48000;
+  CHECK(run_length(options, 21) == 48000);
+}
+
 TEST_CASE("rates that fit the run fall with the root of its length, and given ones stay") {
   TrainOptions options;
   const auto rates_of = [&options](std::int64_t iterations) {

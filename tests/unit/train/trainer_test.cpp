@@ -281,6 +281,22 @@ TEST_CASE("training improves held-out views and leaves the files of a run") {
   CHECK(views.at(0).at("sharpness") > 0.0);
 }
 
+TEST_CASE("a run without a length is planned by its photos, and refuses what is none") {
+  Scene scene;
+  TrainOptions options = small_options();
+  options.iterations = kFittedLength;
+  const Trainer fitted(scene.context, scene.dataset, options, scene.folder / "fitted");
+  CHECK(fitted.iterations() == 1000);
+  // In order by itself, but not in 1000 iterations.
+  options.resolution_schedule = {{4, 0.5}, {2, 400}};
+  CHECK_THROWS_AS(Trainer(scene.context, scene.dataset, options, scene.folder / "sizes"),
+                  UsageError);
+  options.resolution_schedule = {};
+  options.iterations = -5;
+  CHECK_THROWS_AS(Trainer(scene.context, scene.dataset, options, scene.folder / "none"),
+                  UsageError);
+}
+
 TEST_CASE("a signal ends the run with everything saved") {
   Scene scene;
   TrainOptions options = small_options();
