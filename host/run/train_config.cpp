@@ -248,7 +248,10 @@ std::string to_toml(const TrainOptions& options) {
   return out;
 }
 
+// Trainers ask again once the photos have told the length; until then shares of a run and numbers
+// of iterations cannot be compared.
 void validate(const TrainOptions& options) {
+  constexpr std::int64_t kSomeLength = 1000000;
   check_packet_width(options.trace);
   const auto& sizes = options.resolution_schedule;
   if (options.iterations < 0 && options.iterations != kFittedLength) {
@@ -256,11 +259,13 @@ void validate(const TrainOptions& options) {
         "The option 'iterations' is a number from 0, or {} for what fits the photos, not {}",
         kFittedLength, options.iterations));
   }
-  const auto earlier = [&options](const ResolutionStep& a, const ResolutionStep& b) {
-    return a.until.of(options.iterations) < b.until.of(options.iterations);
+  const bool told = options.iterations != kFittedLength;
+  const std::int64_t length = told ? options.iterations : kSomeLength;
+  const auto earlier = [told, length](const ResolutionStep& a, const ResolutionStep& b) {
+    const bool comparable = told || (a.until.value < 1) == (b.until.value < 1);
+    return comparable && a.until.of(length) < b.until.of(length);
   };
-  // Trainers ask again once the photos have told the length.
-  if (options.iterations != kFittedLength && !std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
+  if (!std::is_sorted(sizes.begin(), sizes.end(), earlier)) {
     throw UsageError("The iterations of 'resolution-schedule' have to ascend");
   }
   for (const LearningRate& rate : {options.sky_lr, options.pose_lr}) check_rate(rate);

@@ -42,6 +42,7 @@ Gaussians model_of(const std::vector<double>& sizes,
 
 TrainOptions rules() {
   TrainOptions options;
+  options.iterations = 10000;
   options.strategy = DensityStrategy::kAdc;
   options.densify_grad_threshold = 0.5;
   options.densify_size = 0.1;

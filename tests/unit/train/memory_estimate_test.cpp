@@ -128,6 +128,7 @@ TEST_CASE("the state of a training is estimated to two percent") {
       CAPTURE(degree);
       CAPTURE(share);
       TrainOptions options;
+      options.iterations = 10000;
       options.sh_degree = degree;
       options.footprint = share;
       Gaussians model = reference::random_scene(20000, 43, degree);
@@ -141,6 +142,7 @@ TEST_CASE("the state of a training is estimated to two percent") {
 
 TEST_CASE("a run that is too large is told the most Gaussians that fit, to the last one") {
   TrainOptions options;
+  options.iterations = 10000;
   options.trace.memory_budget = std::size_t{256} << 20;
   const MemoryDemand demand{5'000'000, 800 * 800, 100};
   for (const DeviceInfo& device :
@@ -169,6 +171,7 @@ TEST_CASE("hit lists count up to their budget, exact sums where they may be used
   DeviceInfo cpu = gpu;
   cpu.type = DeviceType::kCpu;
   TrainOptions options;
+  options.iterations = 10000;
   const MemoryDemand demand{100'000, 1'000'000, 10};
   options.trace.memory_budget = std::size_t{512} << 20;
   // Copies of gradients have no share on GPUs, and here a small one on CPUs.
@@ -197,6 +200,7 @@ TEST_CASE("what packets take is never more than estimated") {
       CAPTURE(count);
       CAPTURE(width);
       TrainOptions options;
+      options.iterations = 10000;
       options.sh_degree = 0;
       options.trace.gradient_sum = sum;
       options.trace.memory_budget = std::size_t{64} << 20;
@@ -224,6 +228,7 @@ TEST_CASE("what views traced ray by ray take is estimated to an eighth") {
           CAPTURE(mirrored);
           CAPTURE(count);
           TrainOptions options;
+          options.iterations = 10000;
           options.sh_degree = degree;
           options.trace.gradient_sum = sum;
           options.trace.memory_budget = std::size_t{256} << 20;
@@ -250,6 +255,7 @@ TEST_CASE("what views traced ray by ray take is estimated to an eighth") {
 TEST_CASE("rays one by one count where a view needs them, in batches within their budget") {
   DeviceInfo gpu = device_with(std::uint64_t{8} << 30, std::uint64_t{2} << 30);
   TrainOptions options;
+  options.iterations = 10000;
   options.sh_degree = 3;
   const std::size_t gaussians = 100'000, pixels = 10'000'000;
   const MemoryEstimate packets = estimate_memory(options, {gaussians, pixels, 10}, gpu);
