@@ -61,6 +61,17 @@ typedef struct {
   int side[3];  // vector of the near slab along each axis; the far one is 3 further or 3 before
 } RayData;
 
+// What slabs are tested with, from the ray's origin and direction.
+RS_INLINE void ray_slabs(RayData* ray) {
+  // Finite, so that an origin on a slab of a zero component gives about 0 and never NaN.
+  ray->inverse = clamp(1.0f / ray->d, -1e24f, 1e24f);
+  // Finite too: missing children reach to infinity, and the difference would be NaN.
+  ray->shift = clamp(ray->o * ray->inverse, -FLT_MAX, FLT_MAX);
+  ray->side[0] = ray->inverse.x < 0.0f ? 3 : 0;
+  ray->side[1] = ray->inverse.y < 0.0f ? 4 : 1;
+  ray->side[2] = ray->inverse.z < 0.0f ? 5 : 2;
+}
+
 // A ray whose numbers, or their squares, are not finite meets nothing. NaN would meet every box,
 // and those of children that do not exist.
 RS_INLINE RayData ray_data(const Ray ray) {
@@ -70,13 +81,7 @@ RS_INLINE RayData ray_data(const Ray ray) {
   out.o = sound ? ray.origin : (float3)(0.0f, 0.0f, 0.0f);
   out.d = sound ? ray.direction : (float3)(0.0f, 0.0f, 1.0f);
   out.t_min = sound ? fmax(ray.t_min, 0.0f) : INFINITY;
-  // Finite, so that an origin on a slab of a zero component gives about 0 and never NaN.
-  out.inverse = clamp(1.0f / out.d, -1e24f, 1e24f);
-  // Finite too: missing children reach to infinity, and the difference would be NaN.
-  out.shift = clamp(out.o * out.inverse, -FLT_MAX, FLT_MAX);
-  out.side[0] = out.inverse.x < 0.0f ? 3 : 0;
-  out.side[1] = out.inverse.y < 0.0f ? 4 : 1;
-  out.side[2] = out.inverse.z < 0.0f ? 5 : 2;
+  ray_slabs(&out);
   return out;
 }
 

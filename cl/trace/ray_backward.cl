@@ -20,6 +20,7 @@
 //   PRIVATE_COPIES 1: work-item i adds to copy i of `sums`: no atomics, the same sum every time
 //   EXACT_SUMS 1:     one copy of long integers (exact_sum.h): the same sum in any order
 //   otherwise:        one copy of shared floats (float_add.h)
+#include "parallel/wave.h"
 #include "trace/line_sum.h"
 #include "trace/ray_color.h"
 #include "trace/ray_sums.h"
@@ -28,11 +29,18 @@
 #define RAY_SLOPES 0
 #endif
 
-// On GPUs, whose compilers then need no registers for loops.
+// On GPUs: no loop, whose counters would lie in registers during the walk.
 #define RS_ONE_RAY (KEPT && !PRIVATE_COPIES)
 
 // Of functions that every hit takes, whatever the compiler thinks of their size.
 #define RS_SHARE __attribute__((always_inline)) static
+
+// Waves of 16 where their registers are enough.
+#if EXACT_SUMS || RAY_SLOPES
+#define RS_RAY_WAVE
+#else
+#define RS_RAY_WAVE RS_WAVE_OF_16
+#endif
 
 // Lines of sums per Gaussian.
 #define RS_RAY_LINES (RS_RAY_SUMS / 16)
@@ -178,7 +186,6 @@ RS_INLINE void blend_hits(const RayScene* scene,
   (void)ray_basis;
   const float3 gradient = state->gradient.xyz;
   for (int k = 0; k < count && !state->stopped; ++k) {
-    const uint index = pending_index(scene->tree.blocks, pending, k);
     const float alpha = pending_alpha(pending, k);
     float basis[RS_RAY_FUNCTIONS];
     hit_basis(scene, ray, pending, k, basis);
@@ -188,8 +195,6 @@ RS_INLINE void blend_hits(const RayScene* scene,
     state->behind -= before * alpha * projected;
     state->transmittance = before * (1.0f - alpha);
     --state->room;
-    state->last_key = pending_key(pending, k);
-    state->next_index = index + 1;
     state->stopped = state->transmittance < scene->min_transmittance || state->room == 0;
     const float behind =
         state->stopped ? dot(state->background, gradient) : state->behind / state->transmittance;
@@ -291,24 +296,58 @@ RS_INLINE void blend_hits(const RayScene* scene,
 
 #include "trace/ray_walk.h"
 
+// Adds what one ray brings; the arguments are those of the kernel.
+RS_INLINE void add_ray(const RayScene* scene,
+                       __global const RsRay* rays,
+                       __global const RsRayResult* results,
+                       __global const float4* gradients,
+                       const size_t id,
+                       RayState* state,
+                       __global float8* slopes) {
+  const float4 gradient = gradients[id];
+  const RayResult result = load_result(results, id);
+  const int hits = (int)result.hits;
+  if (hits == 0 || !any(gradient != 0.0f)) return;
+  const Ray raw = load_ray(rays, id);
+  RayData ray = ray_data(raw);
+  float basis[RS_RAY_FUNCTIONS];
+  basis_along_ray(scene, &ray, basis);
+  state->gradient = gradient;
+  state->behind = dot(result.color, gradient.xyz) + result.alpha * gradient.w;
+  state->transmittance = 1.0f;
+  state->room = hits;
+  state->stopped = false;
+  state->last_key = -1.0f;
+  state->next_index = 0;
+#if RAY_SLOPES
+  state->by_origin = state->by_direction = (float3)(0.0f);
+#endif
+  walk_ray(scene, raw.t_max, basis, &ray, state);
+#if RAY_SLOPES
+  slopes[id] = (float8)(state->by_origin, 0.0f, state->by_direction, 0.0f);
+#else
+  (void)slopes;
+#endif
+}
+
 // Of the rays [first, last) in their order. results: what trace_rays gave them; gradients:
 // dL/d(R, G, B, alpha) per ray; records: whitening matrix and mean of every Gaussian
 // (ray_gradients.cl); sums: as for LineSums; slopes: with RAY_SLOPES of every ray the gradients of
 // its origin and direction, four floats each, zeros at first.
-RS_RAY_KERNEL __kernel void ray_backward(const uint first,
-                                         const uint last,
-                                         const uint chunk,
-                                         const uint items,
-                                         RS_TREE_ARGUMENTS,
-                                         __global const float* restrict sh,
-                                         const RsRayWalk walk_argument,
-                                         RS_RAY_ARGUMENTS,
-                                         __global const RsRayResult* restrict results,
-                                         __global const float4* restrict gradients,
-                                         __global const float* restrict records,
-                                         const RsRaySums ray_sums,
-                                         __global float* restrict sums,
-                                         __global float8* restrict slopes) {
+RS_RAY_WAVE RS_RAY_KERNEL __kernel void ray_backward(const uint first,
+                                                     const uint last,
+                                                     const uint chunk,
+                                                     const uint items,
+                                                     RS_TREE_ARGUMENTS,
+                                                     __global const float* restrict sh,
+                                                     const RsRayWalk walk_argument,
+                                                     RS_RAY_ARGUMENTS,
+                                                     __global const RsRayResult* restrict results,
+                                                     __global const float4* restrict gradients,
+                                                     __global const float* restrict records,
+                                                     const RsRaySums ray_sums,
+                                                     __global float* restrict sums,
+                                                     __global float8* restrict slopes) {
   const uint item = get_global_id(0);
   if (item >= items) return;
   const RsRayWalk walk = walk_argument;
@@ -324,41 +363,25 @@ RS_RAY_KERNEL __kernel void ray_backward(const uint first,
 #if PRIVATE_COPIES
   sums += (size_t)item * ray_sums.gaussians * RS_RAY_SUMS;
 #endif
-#if !RAY_SLOPES
-  (void)slopes;
-#endif
   state.sums.lines = sums;
   state.sums.limit = ray_sums.limit;
   state.screen_x = (float3)(ray_sums.screen[0], ray_sums.screen[1], ray_sums.screen[2]);
   state.screen_y = (float3)(ray_sums.screen[3], ray_sums.screen[4], ray_sums.screen[5]);
   state.screen_z = (float3)(ray_sums.screen[6], ray_sums.screen[7], ray_sums.screen[8]);
-  for (size_t begin = first + (size_t)item * chunk; begin < last; begin += (size_t)items * chunk) {
-    const size_t end = RS_ONE_RAY ? begin + 1 : min(begin + chunk, (size_t)last);
-    for (size_t position = begin; position < end; ++position) {
-      const size_t id = ordered ? ray_order[position] : position;
-      const float4 gradient = gradients[id];
-      const RayResult result = load_result(results, id);
-      const int hits = (int)result.hits;
-      if (hits == 0 || !any(gradient != 0.0f)) continue;
-      const Ray raw = load_ray(rays, id);
-      RayData ray = ray_data(raw);
-      float basis[RS_RAY_FUNCTIONS];
-      basis_along_ray(&scene, &ray, basis);
-      state.gradient = gradient;
-      state.behind = dot(result.color, gradient.xyz) + result.alpha * gradient.w;
-      state.transmittance = 1.0f;
-      state.room = hits;
-      state.stopped = false;
-      state.last_key = -1.0f;
-      state.next_index = 0;
-#if RAY_SLOPES
-      state.by_origin = state.by_direction = (float3)(0.0f);
-#endif
-      walk_ray(&scene, raw.t_max, basis, &ray, &state);
-#if RAY_SLOPES
-      slopes[id] = (float8)(state.by_origin, 0.0f, state.by_direction, 0.0f);
-#endif
-    }
-    if (RS_ONE_RAY) break;
+#if RS_ONE_RAY
+  (void)chunk;
+  const uint position = first + item;
+  if (position < last) {
+    add_ray(&scene, rays, results, gradients, ordered ? ray_order[position] : position, &state,
+            slopes);
   }
+#else
+  for (size_t begin = first + (size_t)item * chunk; begin < last; begin += (size_t)items * chunk) {
+    const size_t end = min(begin + chunk, (size_t)last);
+    for (size_t position = begin; position < end; ++position) {
+      add_ray(&scene, rays, results, gradients, ordered ? ray_order[position] : position, &state,
+              slopes);
+    }
+  }
+#endif
 }

@@ -19,9 +19,7 @@ typedef struct {
   float peak[KEPT][GROUP];
 #endif
   uint slot[KEPT][GROUP];  // block times LANES plus lane
-#ifdef RS_PARK_END
   float t_max[GROUP];
-#endif
 } HitMemory;
 
 // Of one ray.
@@ -45,26 +43,12 @@ RS_INLINE float pending_peak(const Pending* p, const int k) {
 }
 #endif
 
-// Where the ray ends is needed between its walks only: with RS_PARK_END it lies in local memory
-// meanwhile, for kernels that have no register for it.
+// Where the ray ends is needed between its walks only, and a wave of 16 has no register for it.
 RS_INLINE void park_end(const Pending* p, const float t_max) {
-#ifdef RS_PARK_END
   p->memory->t_max[p->column] = t_max;
-#else
-  (void)p;
-  (void)t_max;
-#endif
 }
 
-RS_INLINE float parked_end(const Pending* p, const float t_max) {
-#ifdef RS_PARK_END
-  (void)t_max;
-  return p->memory->t_max[p->column];
-#else
-  (void)p;
-  return t_max;
-#endif
-}
+RS_INLINE float parked_end(const Pending* p) { return p->memory->t_max[p->column]; }
 
 // Of hit k from the nearest.
 RS_INLINE uint pending_index(__global const fv* blocks, const Pending* p, const int k) {

@@ -3,8 +3,6 @@
 // Launch of trace_rays: one work-item per `rays_per_item` neighbours (1 on GPUs; on CPUs more, in
 // groups of one, so that all rays share one piece of private memory). Cost per ray: nodes and
 // blocks met / LANES lanes, plus hits^2 / LANES for the order (ray_walk.h).
-#define RS_PARK_END  // of ray_nearest.h: a wave of 16 has no register for it
-
 #include "parallel/wave.h"
 #include "trace/ray_color.h"
 

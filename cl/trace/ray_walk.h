@@ -14,8 +14,8 @@
 // Who includes this defines RayState, with at least the members
 //   float transmittance; int room; bool stopped; float last_key; uint next_index;
 // (1, the most hits that count, false, -1, 0 before the walk; what follows the last blended hit has
-// its key and at least this index, or a greater key; with COUNT_WORK also uint nodes and blocks,
-// that were tested) and
+// its key and at least this index, or a greater key; with KEPT the walk tells these two itself;
+// with COUNT_WORK also uint nodes and blocks, that were tested) and
 //   void blend_hits(scene, ray, basis, pending, count, state),
 // which takes the first `count` sorted hits, keeps those members up to date, and ends early, with
 // `stopped`, where the ray does.
@@ -36,13 +36,14 @@ RS_INLINE void walk_ray(
   pending.column = get_local_id(0);
   park_end(&pending, t_max);
   __global const fv* blocks = scene->tree.blocks;
-  float begin = ray->t_min;
+  uint next_index = 0;
   do {
-    float end = parked_end(&pending, t_max);
+    float end = parked_end(&pending);
     pending.size = 0;
     pending.remaining = state->transmittance;
     TreeWalk walk;
     walk_begin(&walk, &scene->tree, ray->t_min);
+    ray_slabs(ray);  // anew, so that they take no registers while hits are blended
     uint bits, first_block;
     while ((bits = walk_next(&walk, &scene->tree, ray, end, &first_block)) != 0) {
       for (; bits != 0; bits &= bits - 1) {
@@ -67,9 +68,9 @@ RS_INLINE void walk_ray(
           if (!(root > 0.0f)) continue;
           const float key = (meeting.origin2.v - 1.0f) / root;
 #endif
-          if (!(key >= begin && key <= end)) continue;
+          if (!(key >= ray->t_min && key <= end)) continue;
           const uint index = block_index(block, lane);
-          if (key == begin && index < state->next_index) continue;
+          if (key == ray->t_min && index < next_index) continue;
 #if ADAPTIVE_RADIUS
           const float exponent = block_half_quantile(block, lane);
 #else
@@ -88,10 +89,11 @@ RS_INLINE void walk_ray(
     state->nodes += walk.nodes;
 #endif
     blend_hits(scene, ray, basis, &pending, pending.size, state);
-    if (state->stopped) break;
+    if (state->stopped || pending.size < KEPT) break;
     // The next walk begins behind the last blended hit.
-    ray->t_min = begin = fmax(ray->t_min, state->last_key);
-  } while (pending.size == KEPT);
+    ray->t_min = fmax(ray->t_min, pending_key(&pending, KEPT - 1));
+    next_index = pending_index(blocks, &pending, KEPT - 1) + 1;
+  } while (true);
 }
 
 #else

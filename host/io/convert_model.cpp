@@ -58,6 +58,8 @@ Conversion convert_model(const std::filesystem::path& input,
   if (trace) trace->sky = transformed(trace->sky, movement(changes));
   write_model(output, result, encoding, trace, origin);
   std::string losses = io::losses(format, result);
+  const bool leaves_out = result.size() < model.size() || result.sh_degree < model.sh_degree;
+  if (leaves_out && losses == io::kNoLoss) losses = "nothing but what was asked for is left out";
   const std::string unsaid = format == io::ModelFormat::kPly ? "" : not_said(origin, trace);
   if (!unsaid.empty() && losses == io::kNoLoss) losses = "no number of the Gaussians is changed";
   return {model.size(), result.size(), result.sh_degree, losses + unsaid};

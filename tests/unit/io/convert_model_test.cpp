@@ -139,6 +139,11 @@ TEST_CASE("conversion refuses what would be lost") {
   CHECK(contains(usage_error([&] { convert("b.splat", {}, false); }), "--overwrite"));
   CHECK(convert("b.splat", {}, true).read == 3);
   CHECK(contains(usage_error([&] { convert("a.ply", {}, true); }), "what is read"));
+  ModelChanges fewer;
+  fewer.max_gaussians = 2;
+  CHECK(convert("c.ply", {}, false).losses == "nothing is lost");
+  CHECK(contains(convert("c.ply", fewer, true).losses, "nothing but what was asked for"));
+  fs::remove(scratch / "c.ply");
   ModelChanges nothing;
   nothing.crop = CropBox{{100, 100, 100}, {101, 101, 101}};
   CHECK(contains(usage_error([&] { convert("c.ply", nothing, false); }), "None of the 3"));
