@@ -8,6 +8,7 @@
 #include <array>
 
 #include "raysplats/error.hpp"
+#include "train/schedule.hpp"
 
 namespace raysplats {
 namespace {
@@ -51,8 +52,10 @@ QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType
   }
   const int side = level.side * (device == DeviceType::kCpu ? 1 : kFasterDevices);
   QualityChoice out;
+  // Few photos are known by heart before the least of a level is over.
+  const std::int64_t least = std::min(level.least, run_length({}, views.size()));
   out.iterations =
-      std::clamp(level.passes * static_cast<std::int64_t>(views.size()), level.least, level.most);
+      std::clamp(level.passes * static_cast<std::int64_t>(views.size()), least, level.most);
   out.downscale = (longest + side - 1) / side;
   return out;
 }

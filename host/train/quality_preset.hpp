@@ -25,8 +25,9 @@ struct QualityChoice {
   int downscale = 1;  ///< by a whole number, so that reduced photos of a data set can be used
 };
 
-/// `dataset` at its full size. Iterations are passes over the training photos within limits; photos
-/// are reduced to a longest side that is half as long on CPUs as elsewhere.
+/// `dataset` at its full size. Iterations are passes over the training photos within limits, the
+/// lower of which gives way to what few photos ask for (run_length()); photos are reduced to a
+/// longest side that is half as long on CPUs as elsewhere.
 QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device);
 
 }  // namespace raysplats

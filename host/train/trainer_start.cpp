@@ -18,6 +18,8 @@ namespace {
 
 constexpr int kSmallPhoto = 200;         // longer side of photos that the start looks at, in pixels
 constexpr std::size_t kFewViews = 3;     // below, photos say next to nothing of depth
+constexpr std::size_t kFewPhotos = 30;   // up to so many are known by heart in long runs
+constexpr std::int64_t kLongRun = 2;     // times as long as they ask for
 constexpr double kSigmoidExtent = 20;    // then one unit is less than 0.05 extents, a usual limit
 constexpr double kPosePrior = 1;         // PoseRefinement: what errors of half a degree can bear
 constexpr std::size_t kSomePhotos = 24;  // that tell what is typical of all
@@ -37,6 +39,18 @@ void warn_of_strays(std::span<const Camera> cameras) {
       "{} of {} training views were taken far from all others, {} among them: learning rates and "
       "sizes leave them out; where their poses are wrong, take the photos out of the data set",
       strays.size(), cameras.size(), cameras[strays.front()].name);
+}
+
+// A length is the user's to choose, and that of a run by time nobody knows beforehand.
+void note_many_passes(const TrainOptions& options, std::size_t photos) {
+  const std::int64_t asked = run_length({}, photos);
+  const std::int64_t views = last_iteration(options) * options.views_per_step;
+  if (photos > kFewPhotos || views <= kLongRun * asked) return;
+  spdlog::info(
+      "{} of few photos show each of {} {} times: models learn them by heart and get worse between "
+      "them; without -n and --time a run has {}",
+      counted(last_iteration(options), "iteration"), photos,
+      views / static_cast<std::int64_t>(photos), asked);
 }
 
 }  // namespace
@@ -191,6 +205,7 @@ void Trainer::Impl::start() {
     spdlog::warn("{} of {}: depth is open, and other views will look wrong",
                  counted(train_views.size(), "training view"), dataset.root.string());
   }
+  note_many_passes(options, train_views.size());
   if (options.scale_activation == ScaleActivation::kSigmoid && extent > kSigmoidExtent) {
     spdlog::warn(
         "scale-activation = sigmoid keeps every axis below one unit of the data set, {:.2g} of the "

@@ -30,5 +30,9 @@ TEST_CASE("higher qualities train longer on larger photos, within the capture's 
   dataset.views.resize(240);
   for (View& view : dataset.views) view.camera.width = 1920, view.camera.height = 1080;
   CHECK(choose_quality(Quality::kLow, dataset, DeviceType::kCpu).iterations == 12 * 239);
+  // Few photos are known by heart early, whatever the level.
+  dataset.views.resize(24);
+  CHECK(choose_quality(Quality::kMedium, dataset, DeviceType::kCpu).iterations == 2400);
+  CHECK(choose_quality(Quality::kHigh, dataset, DeviceType::kCpu).iterations == 120 * 24);
   CHECK_THROWS_AS(parse_quality("best"), UsageError);
 }

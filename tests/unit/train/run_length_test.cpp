@@ -12,6 +12,7 @@
 #include "raysplats/trainer.hpp"
 #include "run/train_config.hpp"
 #include "unit/fixture.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/train/short_training.hpp"
 
 using namespace raysplats;
@@ -158,4 +159,19 @@ TEST_CASE("a run ends where it is told to, with the schedules of its iterations"
   options.iterations = 60;
   Trainer shorter(context(), load_dataset(data), options, folder.path() / "late", true);
   CHECK_THROWS_AS(shorter.resume(folder.path() / "late"), UsageError);
+}
+
+TEST_CASE("a long run of few photos is told how long they ask for") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data";
+  make_photos(data, 16, 8, 1);
+  for (const int iterations : {2000, 2001}) {
+    CAPTURE(iterations);
+    TrainOptions options = short_training(iterations);
+    const LogCapture log;
+    Trainer trainer(context(), load_dataset(data), options,
+                    folder.path() / std::to_string(iterations));
+    trainer.step();
+    CHECK(log.contains("without -n and --time a run has 1000") == (iterations > 2000));
+  }
 }
