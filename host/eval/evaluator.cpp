@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "io/json_file.hpp"
 #include "raysplats/evaluation.hpp"
 
 #include <fmt/format.h>
@@ -68,9 +69,8 @@ struct MeasuredView {
   double psnr, psnr_corrected, psnr_all, ssim, lpips, sharpness, psnr_aligned;
 };
 
-// Masked pixels are equal; they must not count as well reconstructed ones.
 double psnr_of(const Comparison& pair) {
-  return std::min(psnr(pair.render, pair.photo) + 10.0 * std::log10(pair.valid), kMostPsnr);
+  return std::min(weighted_psnr(pair.whole, pair.photo, pair.mask), kMostPsnr);
 }
 
 MeasuredView measure(std::size_t index, const Comparison& pair, Lpips* lpips) {
@@ -213,7 +213,7 @@ std::string EvaluationReport::json() const {
   nlohmann::json json = to_json(mean);
   json["images"] = nlohmann::json::array();
   for (const EvaluationMetrics& image : images) json["images"].push_back(to_json(image));
-  return json.dump(2) + "\n";
+  return io::json_text(json, 2) + "\n";
 }
 
 EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,

@@ -67,7 +67,7 @@ class Smoother {
     for (int y = 0; y < height_; ++y) {
       const double* row = plane.data() + static_cast<std::size_t>(y) * width;
       for (int x = -kRadius; x < width_ + kRadius; ++x)
-        line_[static_cast<std::size_t>(x + kRadius)] = row[reflect(x, width_)];
+        line_[static_cast<std::size_t>(std::ptrdiff_t{x} + kRadius)] = row[reflect(x, width_)];
       double* target = half_.data() + static_cast<std::size_t>(y) * width;
       for (std::size_t x = 0; x < width; ++x) {
         double sum = 0;
@@ -103,6 +103,20 @@ double psnr(const Image& image, const Image& photo) {
   }
   if (sum == 0) return std::numeric_limits<double>::infinity();
   return -10.0 * std::log10(sum / static_cast<double>(image.data.size()));
+}
+
+double weighted_psnr(const Image& image, const Image& photo, const Image& weight) {
+  check_sizes(image, photo, "PSNR");
+  double sum = 0, weights = 0;
+  for (std::size_t i = 0; i < image.data.size(); ++i) {
+    const double difference =
+        static_cast<double>(image.data[i]) - static_cast<double>(photo.data[i]);
+    const auto w = static_cast<double>(weight.data[i / static_cast<std::size_t>(image.channels)]);
+    sum += w * difference * difference;
+    weights += w;
+  }
+  if (sum == 0) return std::numeric_limits<double>::infinity();
+  return -10.0 * std::log10(sum / weights);
 }
 
 double corrected_psnr(const Image& image, const Image& photo, const Image& weight) {

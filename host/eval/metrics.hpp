@@ -13,6 +13,10 @@ constexpr double kMostPsnr = 100.0;
 /// for equal images. Throws UsageError when the sizes differ or there is nothing to compare.
 double psnr(const Image& image, const Image& photo);
 
+/// The same where each pixel counts as much as its weight (one channel), at least one of which is
+/// above 0.
+double weighted_psnr(const Image& image, const Image& photo, const Image& weight);
+
 /// PSNR over the pixels of weight > 0 (`weight`: one channel), each counting as much as its weight,
 /// after the affine map of colours (3 x 4, least squares over the same pixels) that brings the
 /// image closest to the photo, clamped to [0, 1]. Throws UsageError like psnr().

@@ -14,12 +14,14 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/openexr.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <exception>
+#include <initializer_list>
 #include <utility>
 
 #include "io/image_limits.hpp"
@@ -29,6 +31,16 @@ namespace raysplats::io {
 namespace {
 
 constexpr int kPart = 0;
+
+// OpenImageIO's, which its own files never have: the curve has no attribute of OpenEXR's.
+constexpr const char* kColorSpace = "oiio:ColorSpace";
+constexpr const char* kDisplay = "sRGB";
+// Ours. By the format's convention alpha multiplies colours; pictures are stored with theirs as
+// they are, which in those that are drawn have the background in them.
+constexpr const char* kAlpha = "raysplats:alpha";
+constexpr const char* kStraight = "straight";
+
+constexpr std::size_t kNamed = 8;  // channels that a refusal names
 
 // "path: what", without the path.
 std::string reason(const std::string& path, std::string text) {
@@ -93,21 +105,51 @@ void check_header(const std::string& path) {
     fail_to_read(path, fmt::format("it cannot hold {} chunks", chunks));
 }
 
-std::vector<std::string> chosen_channels(const Imf::ChannelList& channels) {
-  std::vector<std::string> names;
-  const auto take = [&](const char* name) {
-    if (channels.findChannel(name) != nullptr) names.emplace_back(name);
+// "ViewLayer.Combined." where the file has R, G and B of such layers; empty where it has none. The
+// first one by name, but what a renderer calls Combined comes before the parts of it.
+std::string chosen_layer(const Imf::ChannelList& channels) {
+  std::string first;
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
+    const std::string name = channel.name();
+    if (!name.ends_with(".R")) continue;
+    std::string layer = name.substr(0, name.size() - 1);
+    if (channels.findChannel(layer + "G") == nullptr ||
+        channels.findChannel(layer + "B") == nullptr) {
+      continue;
+    }
+    if (layer == "Combined." || layer.ends_with(".Combined.")) return layer;
+    if (first.empty()) first = layer;
+  }
+  return first;
+}
+
+std::vector<std::string> chosen_channels(const std::string& path,
+                                         const Imf::ChannelList& channels) {
+  std::vector<std::string> all, names;
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel)
+    all.emplace_back(channel.name());
+  if (all.empty()) fail_to_read(path, "it has no channels");
+  if (all.size() == 1) return all;
+  const auto take = [&](const std::string& layer, std::initializer_list<const char*> wanted) {
+    for (const char* name : wanted) {
+      if (channels.findChannel(layer + name) != nullptr) names.push_back(layer + name);
+    }
   };
   if (channels.findChannel("R") != nullptr || channels.findChannel("G") != nullptr ||
       channels.findChannel("B") != nullptr) {
-    for (const char* name : {"R", "G", "B", "A"}) take(name);
-  } else {
-    for (const char* name : {"Y", "A"}) take(name);
+    take("", {"R", "G", "B", "A"});
+  } else if (channels.findChannel("Y") != nullptr) {
+    take("", {"Y", "A"});
+  } else if (const std::string layer = chosen_layer(channels); !layer.empty()) {
+    take(layer, {"R", "G", "B", "A"});
   }
   if (!names.empty()) return names;
-  for (auto channel = channels.begin(); channel != channels.end() && names.size() < 4; ++channel)
-    names.emplace_back(channel.name());
-  return names;
+  const std::size_t more = all.size() - std::min(all.size(), kNamed);
+  all.resize(all.size() - more);
+  throw DataError(fmt::format(
+      "The image {} has the channels {}{} and none of colours among them: it must have R, G and B, "
+      "of a layer or without, or Y, or one channel alone",
+      path, fmt::join(all, ", "), more > 0 ? fmt::format(" and {} more", more) : ""));
 }
 
 class ExrDecoder : public ImageDecoder {
@@ -119,8 +161,7 @@ class ExrDecoder : public ImageDecoder {
   int height() const override { return window_.max.y - window_.min.y + 1; }
   int sample_bytes() const override { return sizeof(float); }
   RawImage decode() override try {
-    const std::vector<std::string> names = chosen_channels(file_.header().channels());
-    if (names.empty()) fail_to_read(path_, "it has no channels");
+    const std::vector<std::string> names = chosen_channels(path_, file_.header().channels());
     RawImage image{width(), height(), static_cast<int>(names.size()), {}};
     std::vector<float> numbers(image.count());
     const std::size_t pixel = names.size() * sizeof(float);
@@ -176,6 +217,19 @@ std::unique_ptr<ImageDecoder> open_exr(const std::string& path) {
   }
 }
 
+PhotoColors exr_colors(const std::string& path) {
+  try {
+    const Imf::InputFile file(path.c_str());
+    const auto says = [&file](const char* name, const char* value) {
+      const auto* text = file.header().findTypedAttribute<Imf::StringAttribute>(name);
+      return text != nullptr && text->value() == value;
+    };
+    return {!says(kColorSpace, kDisplay), !says(kAlpha, kStraight)};
+  } catch (const std::exception& error) {
+    fail_to_read(path, error.what());
+  }
+}
+
 std::vector<unsigned char> encode_exr(const std::filesystem::path& path,
                                       const Image& image,
                                       const ImageEncoding& encoding) try {
@@ -185,7 +239,8 @@ std::vector<unsigned char> encode_exr(const std::filesystem::path& path,
   // granted, but one that OpenImageIO and what is built on it read.
   Imf::addChromaticities(header, Imf::Chromaticities());
   if (!encoding.color_space.empty())
-    header.insert("oiio:ColorSpace", Imf::StringAttribute(encoding.color_space));
+    header.insert(kColorSpace, Imf::StringAttribute(encoding.color_space));
+  header.insert(kAlpha, Imf::StringAttribute(kStraight));
   Imf::FrameBuffer buffer;
   const std::size_t pixel = static_cast<std::size_t>(image.channels) * sizeof(float);
   for (std::size_t c = 0; c < encoding.channel_names.size(); ++c) {

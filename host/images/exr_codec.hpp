@@ -10,12 +10,17 @@
 
 namespace raysplats::io {
 
-/// An EXR file of scanlines or tiles, its first part: R, G, B and A, or Y and A, or else the first
-/// channels that it has, at most 4, of the data window. Throws DataError.
+/// An EXR file of scanlines or tiles, its first part, of the data window: R, G, B and A, or Y and
+/// A, or those of a layer ("beauty.R"; one called Combined first), or the only channel that it has.
+/// Throws DataError.
 std::unique_ptr<ImageDecoder> open_exr(const std::string& path);
 
-/// The bytes of an EXR file of 32-bit floats with Rec. 709 primaries. Throws DataError that names
-/// `path`.
+/// Of one that decodes: light that alpha multiplies, as the format has it, unless its attributes
+/// say otherwise (encode_exr()). Throws DataError.
+PhotoColors exr_colors(const std::string& path);
+
+/// The bytes of an EXR file of 32-bit floats with Rec. 709 primaries, which says what its colours
+/// are. Throws DataError that names `path`.
 std::vector<unsigned char> encode_exr(const std::filesystem::path& path,
                                       const Image& image,
                                       const ImageEncoding& encoding);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The library raysplats-images: EXR by OpenEXR, other pictures by
 // OpenImageIO.
+#include <OpenEXR/ImfTestFile.h>
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
@@ -9,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -41,6 +43,13 @@ std::vector<std::uint8_t> to_bytes(const Image& image, int channels) {
   return bytes;
 }
 
+// Straight alpha as in the file: OpenImageIO multiplies it into PNG and TIFF colours otherwise.
+OIIO::ImageSpec straight_config() {
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  return config;
+}
+
 class OiioDecoder : public ImageDecoder {
  public:
   OiioDecoder(const std::string& format, std::string name, std::span<const std::byte> memory)
@@ -52,11 +61,8 @@ class OiioDecoder : public ImageDecoder {
       throw DataError(fmt::format("The image {} cannot be read: OpenImageIO is built without {}",
                                   name_, format));
     }
-    // Straight alpha as in the file: OpenImageIO multiplies it into PNG and TIFF colours otherwise.
-    OIIO::ImageSpec config;
-    config.attribute("oiio:UnassociatedAlpha", 1);
     OIIO::ImageSpec spec;
-    if (!input_->open(name_, spec, config)) {
+    if (!input_->open(name_, spec, straight_config())) {
       throw DataError(
           fmt::format("The image {} cannot be read: {}", name_, reason(input_->geterror())));
     }
@@ -83,11 +89,21 @@ class OiioDecoder : public ImageDecoder {
   }
 
  private:
+  // Bands that are neither colours nor alpha (near infrared of drones) are left out.
   template <class T>
   RawImage decode_as(const OIIO::TypeDesc& type) {
-    RawImage image{width(), height(), std::min(input_->spec().nchannels, 4), {}};
+    const int bands = input_->spec().nchannels, alpha = input_->spec().alpha_channel;
+    const int colors = bands - (alpha > 0 ? 1 : 0) < 3 ? 1 : 3;
+    const bool covered = alpha >= colors;
+    RawImage image{width(), height(), colors + (covered ? 1 : 0), {}};
     std::vector<T> numbers(image.count());
-    if (!input_->read_image(0, 0, 0, image.channels, type, numbers.data())) {
+    const bool at_once = alpha == colors;
+    const auto read = [&](int first, int last, T* to) {
+      return input_->read_image(0, 0, first, last, type, to,
+                                static_cast<OIIO::stride_t>(sizeof(T)) * image.channels);
+    };
+    if (!read(0, at_once ? colors + 1 : colors, numbers.data()) ||
+        (covered && !at_once && !read(alpha, alpha + 1, numbers.data() + colors))) {
       throw DataError(
           fmt::format("The image {} cannot be decoded: {}", name_, reason(input_->geterror())));
     }
@@ -139,6 +155,21 @@ class OiioCodec : public ImageCodec {
                                      std::span<const std::byte> memory) const override {
     if (format == "openexr") return open_exr(name);
     return std::make_unique<OiioDecoder>(format, name, memory);
+  }
+  PhotoColors photo_colors(const std::string& path) const override {
+    if (Imf::isOpenExrFile(path.c_str())) return exr_colors(path);
+    const OIIO::ImageSpec config = straight_config();
+    const auto input = OIIO::ImageInput::open(path, &config);
+    if (!input) {
+      throw DataError(
+          fmt::format("The image {} cannot be read: {}", path, reason(OIIO::geterror())));
+    }
+    const std::string_view format = input->format_name();
+    // TIFF tells whether alpha multiplies; that of WebP does not, but OpenImageIO 2.4 multiplies it
+    // in whatever it is asked for.
+    const bool multiplies = format == "tiff" || format == "webp";
+    return {format == "hdr", multiplies && input->spec().alpha_channel >= 0 &&
+                                 input->spec().get_int_attribute("oiio:UnassociatedAlpha") == 0};
   }
   std::vector<unsigned char> encode(const std::filesystem::path& path,
                                     const Image& image,

@@ -11,6 +11,7 @@
 #include "io/image_file.hpp"
 #include "io/mesh_file.hpp"
 #include "raysplats/error.hpp"
+#include "util/srgb.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -47,9 +48,7 @@ double unit(double value) { return std::clamp(value, 0.0, 1.0); }
 
 /// A display value from linear light; the curve goes on above 1.
 float encoded(double linear) {
-  const double value =
-      linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
-  return static_cast<float>(std::min(std::max(value, 0.0), 1e6));
+  return static_cast<float>(std::min(std::max(display_from_light(linear), 0.0), 1e6));
 }
 
 /// Strength of the lobe max(0, <n,h>)^k that stands for a dielectric of this index: its reflectance

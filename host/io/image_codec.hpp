@@ -35,6 +35,13 @@ struct RawImage {
 /// As read_image() gives it; takes the floats of one that has them.
 Image to_image(RawImage raw);
 
+/// What the colours of a photo's file are, beyond their numbers: as a rule display values that
+/// alpha does not multiply.
+struct PhotoColors {
+  bool light = false;       ///< proportional to light
+  bool associated = false;  ///< multiplied by alpha
+};
+
 /// An opened picture.
 class ImageDecoder {
  public:
@@ -85,6 +92,12 @@ class ImageCodec {
   virtual std::unique_ptr<ImageDecoder> open(const std::string& format,
                                              const std::string& name,
                                              std::span<const std::byte> memory) const = 0;
+  /// Of a file that decodes, for photos, which become straight display values: depth maps, masks,
+  /// textures and environments are the numbers of their files. Throws DataError.
+  virtual PhotoColors photo_colors(const std::string& path) const {
+    static_cast<void>(path);
+    return {};
+  }
   /// The bytes of a file, 8-bit for "png" and "jpeg". Throws DataError that names `path`.
   virtual std::vector<unsigned char> encode(const std::filesystem::path& path,
                                             const Image& image,

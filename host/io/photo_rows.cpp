@@ -10,34 +10,52 @@
 #include <utility>
 
 #include "scene/camera_model.hpp"
+#include "util/srgb.hpp"
 
 namespace raysplats::io {
 namespace {
 
 constexpr std::size_t kChannels = 4;
 
-// A number of a file in [0, 1]; written so that NaN becomes 0.
-float to_unit(std::uint8_t value) { return static_cast<float>(value) / 255.0f; }
-float to_unit(std::uint16_t value) { return static_cast<float>(value) / 65535.0f; }
-float to_unit(float value) { return value > 0.0f ? std::min(value, 1.0f) : 0.0f; }
+// A step of integers, as their numbers in [0, 1] have it.
+constexpr float kByteStep = 1.0f / 255.0f;
+constexpr float kShortStep = 1.0f / 65535.0f;
+
+// A number of a file, of which 1 is white.
+float to_float(std::uint8_t value) { return static_cast<float>(value) / 255.0f; }
+float to_float(std::uint16_t value) { return static_cast<float>(value) / 65535.0f; }
+float to_float(float value) { return value; }
+
+// In [0, 1]; written so that NaN becomes 0.
+float clipped(float value) { return value > 0.0f ? std::min(value, 1.0f) : 0.0f; }
+
+template <class T>
+float to_unit(T value) {
+  return clipped(to_float(value));
+}
+
+bool has_alpha(std::size_t channels) { return channels == 2 || channels == 4; }
 
 template <class T>
 class DecodedRows : public PhotoPixels {
  public:
-  DecodedRows(const RawImage& image, const std::vector<T>& numbers, const MaskPlane* mask)
+  DecodedRows(const RawImage& image,
+              const std::vector<T>& numbers,
+              const MaskPlane* mask,
+              PhotoColors colors)
       : PhotoPixels(image.width, image.height),
         numbers_(numbers),
         channels_(static_cast<std::size_t>(image.channels)),
-        mask_(mask) {}
+        mask_(mask),
+        colors_(colors) {}
 
   void pixel(int x, int y, float* rgba) override {
     const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width()) +
                               static_cast<std::size_t>(x);
     const T* number = numbers_.data() + index * channels_;
     const bool grey = channels_ < 3;
-    for (std::size_t c = 0; c < 3; ++c) rgba[c] = to_unit(number[grey ? 0 : c]);
-    const bool covered = channels_ == 2 || channels_ == 4;
-    rgba[3] = covered ? to_unit(number[channels_ - 1]) : 1.0f;
+    rgba[3] = has_alpha(channels_) ? to_unit(number[channels_ - 1]) : 1.0f;
+    for (std::size_t c = 0; c < 3; ++c) rgba[c] = color(number[grey ? 0 : c], rgba[3]);
     if (mask_ != nullptr) rgba[3] *= mask_->at(x, y, width(), height());
   }
   void row(int y, float* rgba) override {
@@ -45,9 +63,18 @@ class DecodedRows : public PhotoPixels {
   }
 
  private:
+  // Alpha multiplies light, so that it is taken out before the curve.
+  float color(T number, float alpha) const {
+    float value = to_float(number);
+    if (colors_.associated && alpha > 0.0f) value /= alpha;
+    if (colors_.light) value = display_from_light(value);
+    return clipped(value);
+  }
+
   const std::vector<T>& numbers_;
   std::size_t channels_;
   const MaskPlane* mask_;
+  PhotoColors colors_;
 };
 
 class MaskRows : public PhotoPixels {
@@ -225,21 +252,39 @@ float MaskPlane::at(int x, int y, int photo_width, int photo_height) const {
 MaskPlane mask_plane(const RawImage& mask) {
   MaskPlane out{mask.width, mask.height, {}};
   const auto channels = static_cast<std::size_t>(mask.channels);
+  const bool covered = has_alpha(channels);
+  const std::size_t colors = covered ? channels - 1 : channels;
+  // Labels are 0 and 1, of 255 or 65535: what their greatest number is to be divided by.
+  const auto whole = [](const std::vector<float>& values) {
+    const float most = values.empty() ? 0.0f : *std::max_element(values.begin(), values.end());
+    return most == kByteStep || most == kShortStep ? most : 1.0f;
+  };
+  std::vector<float> alphas;
   std::visit(
       [&](const auto& numbers) {
         out.values.reserve(numbers.size() / channels);
-        for (std::size_t i = 0; i < numbers.size(); i += channels)
-          out.values.push_back(to_unit(numbers[i]));
+        if (covered) alphas.reserve(numbers.size() / channels);
+        for (std::size_t i = 0; i < numbers.size(); i += channels) {
+          float most = 0.0f;
+          for (std::size_t c = 0; c < colors; ++c) most = std::max(most, to_unit(numbers[i + c]));
+          out.values.push_back(most);
+          if (covered) alphas.push_back(to_unit(numbers[i + colors]));
+        }
       },
       mask.numbers);
+  const float white = whole(out.values), opaque = whole(alphas);
+  for (float& value : out.values) value /= white;
+  for (std::size_t i = 0; i < alphas.size(); ++i) out.values[i] *= alphas[i] / opaque;
   return out;
 }
 
-std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image, const MaskPlane* mask) {
+std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,
+                                          const MaskPlane* mask,
+                                          PhotoColors colors) {
   return std::visit(
       [&](const auto& numbers) -> std::unique_ptr<PhotoPixels> {
         using T = typename std::decay_t<decltype(numbers)>::value_type;
-        return std::make_unique<DecodedRows<T>>(image, numbers, mask);
+        return std::make_unique<DecodedRows<T>>(image, numbers, mask, colors);
       },
       image.numbers);
 }

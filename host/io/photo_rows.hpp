@@ -44,12 +44,15 @@ struct MaskPlane {
   float at(int x, int y, int photo_width, int photo_height) const;
 };
 
-/// The first channel of a mask, in [0, 1].
+/// What is not black in a mask, in [0, 1]: the greatest of its colours, times its alpha. A mask of
+/// 0 and 1 of 8 or 16 bits is one of black and white.
 MaskPlane mask_plane(const RawImage& mask);
 
 /// The photo of a file, grey or colour, with or without alpha, which `mask` (may be null)
 /// multiplies. Refers to both.
-std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image, const MaskPlane* mask);
+std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,
+                                          const MaskPlane* mask,
+                                          PhotoColors colors = {});
 /// White whose alpha is the mask, at the size of a photo.
 std::unique_ptr<PhotoPixels> mask_rows(const MaskPlane& mask, int width, int height);
 

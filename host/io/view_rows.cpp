@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <filesystem>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "io/image_file.hpp"
@@ -28,6 +30,15 @@ MaskPlane load_mask(const View& view) {
   return mask;
 }
 
+// What the file says of the colours of a photo. Only floats are light and only alpha multiplies, so
+// that most photos are not opened for it.
+PhotoColors colors_of(const RawImage& raw, const std::filesystem::path& path) {
+  const bool floats = std::holds_alternative<std::vector<float>>(raw.numbers);
+  const bool covered = raw.channels == 2 || raw.channels == 4;
+  if (!floats && !covered) return {};
+  return image_codec().photo_colors(path.string());
+}
+
 }  // namespace
 
 ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
@@ -41,12 +52,14 @@ ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
                     view.image_path.string(), raw_.width, raw_.height, view.source_camera.width,
                     view.source_camera.height));
   }
+  const PhotoColors colors = colors_of(raw_, view.image_path);
+  unchanged_ = !colors.light && !colors.associated;
   const bool masked = !view.mask_path.empty();
   if (masked) {
     mask_ = load_mask(view);
     unchanged_ = false;
   }
-  rows_ = fitted(decoded_rows(raw_, masked ? &mask_ : nullptr), view);
+  rows_ = fitted(decoded_rows(raw_, masked ? &mask_ : nullptr, colors), view);
   if (masked && view.mask_apart) {
     weights_ = fitted(mask_rows(mask_, raw_.width, raw_.height), view);
   }

@@ -17,16 +17,10 @@
 #include "raysplats/io.hpp"
 #include "render/bands.hpp"
 #include "render/shutter.hpp"
+#include "util/srgb.hpp"
 
 namespace raysplats {
 namespace {
-
-// The inverse of the sRGB curve; numbers below 0 keep their sign, those above 1 follow the curve.
-float linear_from_display(float value) {
-  const float size = std::abs(value);
-  const float linear = size <= 0.04045f ? size / 12.92f : std::pow((size + 0.055f) / 1.055f, 2.4f);
-  return std::copysign(linear, value);
-}
 
 constexpr int kMaxSupersample = 16;
 constexpr float kLeastNormal = 1e-5f;
@@ -263,7 +257,7 @@ void write_frame(const std::filesystem::path& stem,
     for (std::size_t i = 0; i < channels.pixels(); ++i) {
       float* pixel = &channels.data[count * i];
       for (std::size_t c = 0; c < 3 && options.linear_exr; ++c)
-        pixel[c] = linear_from_display(pixel[c]);
+        pixel[c] = light_from_display(pixel[c]);
       pixel += 4;
       for (const Image* layer : more) {
         const auto width = static_cast<std::size_t>(layer->channels);

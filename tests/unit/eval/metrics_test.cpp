@@ -144,4 +144,19 @@ TEST_CASE("corrected PSNR: an affine colour does not count, what it cannot make 
   CHECK_THROWS_AS(corrected_psnr(pair.a, photo, Image(24, 20, 1)), UsageError);
 }
 
+TEST_CASE("PSNR by weights: even ones change nothing, and pixels without one do not count") {
+  const Pair pair = make_pair(20, 24);
+  CHECK(weighted_psnr(pair.a, pair.b, Image(24, 20, 1, 1.0f)) ==
+        doctest::Approx(psnr(pair.a, pair.b)).epsilon(1e-12));
+  CHECK(weighted_psnr(pair.a, pair.b, Image(24, 20, 1, 0.25f)) ==
+        doctest::Approx(psnr(pair.a, pair.b)).epsilon(1e-12));
+  Image photo = pair.a;
+  Image weight(24, 20, 1, 1.0f);
+  photo.at(3, 4, 1) += 0.5f;
+  photo.at(9, 9, 0) += 0.7f;
+  weight.at(9, 9, 0) = 0.0f;
+  CHECK(weighted_psnr(pair.a, photo, weight) ==
+        doctest::Approx(-10 * std::log10(0.25 / (3 * 479))).epsilon(1e-5));
+}
+
 }  // namespace raysplats

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "io/photo_rows.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+template <class T>
+std::vector<float> mask_of(int channels, std::vector<T> numbers) {
+  const int width = static_cast<int>(numbers.size()) / channels;
+  return io::mask_plane({width, 1, channels, std::move(numbers)}).values;
+}
+
+using Bytes = std::vector<std::uint8_t>;
+using Shorts = std::vector<std::uint16_t>;
+using Floats = std::vector<float>;
+
+}  // namespace
+
+TEST_CASE("a mask of 0 and 1 is one of black and white, in 8 bits as in 16") {
+  const Floats binary{0, 1, 1, 0};
+  CHECK(mask_of(1, Bytes{0, 1, 1, 0}) == binary);
+  CHECK(mask_of(1, Shorts{0, 1, 1, 0}) == binary);
+  CHECK(mask_of(1, Shorts{0, 257, 257, 0}) == binary);  // of 8 bits, widened
+  CHECK(mask_of(3, Bytes{0, 0, 0, 0, 1, 0}) == Floats{0, 1});
+  CHECK(mask_of(2, Bytes{1, 1, 1, 0}) == Floats{1, 0});
+  CHECK(mask_of(2, Bytes{1, 255, 1, 0}) == Floats{1, 0});
+  // Floats of a codec that has no others (Python's).
+  CHECK(mask_of(1, Floats{0, 1.0f / 255.0f}) == Floats{0, 1});
+  // Greys are shares, however dark.
+  CHECK(mask_of(1, Bytes{0, 1, 2}) == Floats{0, 1.0f / 255.0f, 2.0f / 255.0f});
+  CHECK(mask_of(1, Bytes{0, 128, 255})[1] == 128.0f / 255.0f);
+  CHECK(mask_of(1, Floats{0, 0.5f, 7.0f}) == Floats{0, 0.5f, 1});
+  CHECK(mask_of(1, Bytes{0, 0}) == Floats{0, 0});
+}
+
+TEST_CASE("a mask is what is not black: the greatest of its colours, times its alpha") {
+  // White with the shape in alpha, green on black, grey with alpha.
+  CHECK(mask_of(4, Bytes{255, 255, 255, 255, 255, 255, 255, 0}) == Floats{1, 0});
+  CHECK(mask_of(3, Bytes{0, 255, 0, 0, 0, 0, 10, 0, 51}) == Floats{1, 0, 51.0f / 255.0f});
+  CHECK(mask_of(2, Shorts{65535, 65535, 65535, 0, 0, 65535}) == Floats{1, 0, 0});
+  CHECK(mask_of(4, Floats{0, 0.5f, 0, 0.5f}) == Floats{0.25f});
+}
