@@ -18,6 +18,7 @@
 #include "info_files.hpp"
 #include "info_parts.hpp"
 #include "io/colmap_model.hpp"
+#include "io/json_file.hpp"
 #include "io/mesh_file.hpp"
 #include "io/model_file.hpp"
 #include "io/model_formats.hpp"
@@ -294,9 +295,7 @@ void print_scene(const Json& scene) {
              counted(scene["max_bounces"].get<std::size_t>(), "bounce"));
 }
 
-void print_json(const Json& json) {
-  fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
-}
+void print_json(const Json& json) { fmt::print("{}\n", io::json_text(json, 2)); }
 
 void info_model(const Options& options) {
   const ModelSource source = find_model(options.path);

@@ -298,6 +298,12 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
       ->group(time)
       ->type_name("FILE");
   command
+      ->add_option("--path-data", options->path_data,
+                   "With it, the transforms.json that the model was trained from, where that has "
+                   "an applied_transform")
+      ->group(time)
+      ->type_name("FILE");
+  command
       ->add_option("--shutter-samples", options->shutter_samples,
                    "Motion blur: moments of every frame that are averaged")
       ->group(time)

@@ -86,11 +86,11 @@ std::optional<Json> describe_points(const fs::path& path) {
       std::any_of(kOfGaussians.begin(), kOfGaussians.end(),
                   [&](std::string_view name) { return file.column(name).has_value(); });
   if (gaussians || file.has_later("face") || !file.column("x")) return std::nullopt;
-  const PointCloud points = io::read_ply_points(path);
+  const io::PlyPoints points = io::read_ply_points(path);
   return Json{{"type", "points"},
-              {"points", points.size()},
-              {"bounds", bounds_of(points.positions)},
-              {"colours", file.column("red").has_value()}};
+              {"points", points.cloud.size()},
+              {"bounds", bounds_of(points.cloud.positions)},
+              {"colours", points.colored}};
 }
 
 std::optional<Json> describe_colmap(const fs::path& path) {

@@ -21,6 +21,7 @@ struct RenderFlags {
   std::optional<int> orbit;
   std::string path;
   std::string path_transform;
+  std::string path_data;
   std::optional<double> seconds;
   std::optional<double> fps;
   bool constant_speed = false;

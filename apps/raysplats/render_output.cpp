@@ -45,6 +45,8 @@ FrameOptions RenderFlags::frame_options() const {
 }
 
 void RenderFlags::check_path_options() const {
+  if (!path_data.empty() && path_transform.empty())
+    throw UsageError("--path-data is about nerfstudio's scaled world: add --path-transform FILE");
   if (!path.empty()) return;
   if (!path_transform.empty() || constant_speed) {
     throw UsageError("--path-transform and --constant-speed shape a camera path: add --path FILE");
@@ -66,6 +68,7 @@ CameraPathFile read_path(const RenderFlags& flags) {
   options.height = flags.height;
   options.constant_speed = flags.constant_speed;
   options.transform = flags.path_transform;
+  options.data_transform = flags.path_data;
   return read_camera_path(flags.path, options);
 }
 

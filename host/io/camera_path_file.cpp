@@ -239,20 +239,51 @@ Stored read_toml(const std::filesystem::path& path) {
   return out;
 }
 
-/// nerfstudio's world is scale * (T x): takes the path back to that of x.
-void undo_transform(const std::filesystem::path& file, CameraPath& path) {
-  const Json json = io::read_json_object(file);
-  const double scale = number(file, json, "scale", 1e-12, 1e12, std::nullopt);
-  const Matrix matrix = matrix_of(file, json, "transform");
-  glm::dmat3 turn;
-  glm::dvec3 shift;
+/// x -> scale * (turn x + shift).
+struct Similarity {
+  double scale = 1.0;
+  glm::dmat3 turn{1.0};
+  glm::dvec3 shift{0.0};
+};
+
+Similarity similarity_of(const std::filesystem::path& file,
+                         const Json& json,
+                         const char* matrix_key,
+                         double scale) {
+  const Matrix matrix = matrix_of(file, json, matrix_key);
+  Similarity out{scale, {}, {}};
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) turn[column][row] = element(matrix, row, column);
-    shift[row] = element(matrix, row, 3);
+    for (int column = 0; column < 3; ++column) out.turn[column][row] = element(matrix, row, column);
+    out.shift[row] = element(matrix, row, 3);
   }
-  const glm::dmat3 back = glm::transpose(orthogonal_factor(turn));
+  out.turn = orthogonal_factor(out.turn);
+  return out;
+}
+
+/// What nerfstudio's dataparser did: from the coordinates before the applied_transform of the data
+/// set, which its file counts in, or with the data set's file from those of that.
+Similarity dataparser_map(const PathOptions& options) {
+  const std::filesystem::path& file = options.transform;
+  const Json json = io::read_json_object(file);
+  Similarity out = similarity_of(file, json, "transform",
+                                 number(file, json, "scale", 1e-12, 1e12, std::nullopt));
+  if (options.data_transform.empty()) return out;
+  const std::filesystem::path& data = options.data_transform;
+  const Json set = io::read_json_object(data);
+  out.scale /= number(data, set, "applied_scale", 1e-12, 1e12, 1.0);
+  if (!set.contains("applied_transform")) return out;
+  const Similarity applied = similarity_of(data, set, "applied_transform", 1.0);
+  out.turn = out.turn * glm::transpose(applied.turn);
+  out.shift -= out.turn * applied.shift;
+  return out;
+}
+
+/// Takes the path from nerfstudio's world back to that of the data.
+void undo_transform(const PathOptions& options, CameraPath& path) {
+  const Similarity map = dataparser_map(options);
+  const glm::dmat3 back = glm::transpose(map.turn);
   for (Keyframe& key : path.keys) {
-    key.eye = back * (key.eye / scale - shift);
+    key.eye = back * (key.eye / map.scale - map.shift);
     key.axes = back * key.axes;
   }
 }
@@ -278,7 +309,7 @@ Camera with_lens(Camera camera, CameraModel model) {
 
 CameraPathFile read_camera_path(const std::filesystem::path& path, const PathOptions& options) {
   Stored stored = path.extension() == ".toml" ? read_toml(path) : read_json(path);
-  if (!options.transform.empty()) undo_transform(options.transform, stored.path);
+  if (!options.transform.empty()) undo_transform(options, stored.path);
   stored.path.constant_speed = stored.path.constant_speed || options.constant_speed;
   CameraPathFile out;
   out.fps = options.fps.value_or(stored.fps);

@@ -17,6 +17,9 @@ struct PathOptions {
   std::optional<int> width, height;  ///< one alone keeps the shape
   bool constant_speed = false;
   std::filesystem::path transform;  ///< a dataparser_transforms.json, or empty
+  /// The transforms.json of a model that was trained from one, whose applied_transform the other
+  /// file has in it; empty for models in the coordinates of COLMAP.
+  std::filesystem::path data_transform;
 };
 
 struct CameraPathFile {

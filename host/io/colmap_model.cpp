@@ -246,7 +246,16 @@ void read_images_text(const fs::path& path, ColmapModel& model) {
     const std::uint64_t camera = reader.unsigned_integer("the camera of an image");
     model.images.push_back(make_image(std::string(reader.rest()), camera, pose, fail));
     model.images.back().id = static_cast<std::uint32_t>(id);
-    reader.next_line();  // the image's points, an empty line when there are none
+    // The image's points, three numbers each, an empty line when there are none.
+    if (!reader.next_line()) return;
+    std::size_t words = 0;
+    while (!reader.word().empty()) ++words;
+    if (words % 3 != 0) {
+      reader.fail(
+          fmt::format("the points of image '{}' (x, y, number), or an empty line, are missing: "
+                      "found other text",
+                      model.images.back().name));
+    }
   }
 }
 

@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+
 #include "io/model_file.hpp"
 #include "io/ply_options.hpp"
 #include "raysplats/error.hpp"
@@ -29,6 +32,11 @@ std::string not_said(const std::array<double, 3>& origin,
   return out;
 }
 
+glm::dvec3 origin_of(const std::filesystem::path& model) {
+  const std::array<double, 3> origin = io::model_origin(model);
+  return {origin[0], origin[1], origin[2]};
+}
+
 }  // namespace
 
 Conversion convert_model(const std::filesystem::path& input,
@@ -48,14 +56,19 @@ Conversion convert_model(const std::filesystem::path& input,
         fmt::format("{} is there already: give another name, or --overwrite", output.string()));
   }
   const Gaussians model = read_model(input, encoding);
-  const Gaussians result = changed(model, changes);
+  const glm::dmat4 map = movement(changes);
+  // Positions are their numbers in the file plus its origin, which scales and turns as they do.
+  const glm::dvec3 moved_origin = glm::dmat3(map) * origin_of(input);
+  const std::array<double, 3> origin{moved_origin.x, moved_origin.y, moved_origin.z};
+  ModelChanges of_numbers = changes;
+  if (of_numbers.crop) of_numbers.crop->low -= moved_origin, of_numbers.crop->high -= moved_origin;
+  const Gaussians result = changed(model, of_numbers);
   if (model.size() > 0 && result.size() == 0) {
     throw UsageError(fmt::format(
         "None of the {} Gaussians of {} is left: choose a larger box or a smaller opacity",
         model.size(), input.string()));
   }
-  const std::array<double, 3> origin = io::model_origin(input);
-  if (trace) trace->sky = transformed(trace->sky, movement(changes));
+  if (trace) trace->sky = transformed(trace->sky, map);
   write_model(output, result, encoding, trace, origin);
   std::string losses = io::losses(format, result);
   const bool leaves_out = result.size() < model.size() || result.sh_degree < model.sh_degree;

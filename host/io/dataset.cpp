@@ -39,19 +39,27 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, error);
 }
 
-/// A mask of the photo `name` in the data set's folder "masks": COLMAP's name.ext.png, stem.png or
-/// the same name.
+/// A mask of the photo `name` in the data set's folder "masks": COLMAP's name.ext.png, or an image
+/// that is called as the photo, with "_mask" or ".mask" behind it or without.
 fs::path find_mask(const fs::path& root, const fs::path& name) {
   const fs::path folder = root / "masks";
   if (!is_folder(folder)) return {};
   fs::path stem = name;
   stem.replace_extension();
-  for (const fs::path& candidate :
-       {fs::path(name.string() + ".png"), fs::path(stem.string() + ".png"),
-        fs::path(stem.string() + ".mask.png"), name}) {
-    if (is_file(folder / candidate)) return folder / candidate;
+  for (const std::string& candidate :
+       {name.string() + ".png", stem.string(), stem.string() + "_mask", stem.string() + ".mask"}) {
+    if (const auto found = io::find_image(folder, candidate)) return *found;
   }
   return {};
+}
+
+/// Photos of nearly the camera's size were not made smaller: most often they are those from before
+/// their distortion was taken out, which leaves another size.
+bool is_stretched(const io::ImageSize& photo, const Camera& nominal) {
+  constexpr double kNearly = 0.15;
+  const int pixels =
+      std::max(std::abs(photo.width - nominal.width), std::abs(photo.height - nominal.height));
+  return pixels > 2 && std::abs(photo.width - nominal.width) < kNearly * nominal.width;
 }
 
 bool has_shape(const io::ImageSize& photo, const Camera& camera) {
@@ -189,6 +197,31 @@ std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name)
   return std::nullopt;
 }
 
+/// Two poses cannot share a photo.
+void require_photos_of_their_own(const std::vector<View>& views) {
+  std::map<fs::path, const View*> owners;
+  for (const View& view : views) {
+    const auto [owner, is_new] = owners.emplace(view.image_path, &view);
+    if (is_new) continue;
+    throw DataError(fmt::format(
+        "The images '{}' and '{}' of the COLMAP model are both the file {}: keep the photos in "
+        "the folders that the model names",
+        owner->second->camera.name, view.camera.name, view.image_path.string()));
+  }
+}
+
+void warn_of_repeated_photos(const std::vector<View>& views) {
+  std::set<fs::path> seen;
+  std::size_t repeated = 0;
+  fs::path first;
+  for (const View& view : views) {
+    if (seen.insert(view.image_path).second) continue;
+    if (repeated++ == 0) first = view.image_path;
+  }
+  if (repeated == 0) return;
+  spdlog::warn("{} photos appear in more than one frame, {} among them", repeated, first.string());
+}
+
 Dataset load_colmap(const fs::path& root,
                     const fs::path& model_folder,
                     const DatasetOptions& options) {
@@ -198,6 +231,7 @@ Dataset load_colmap(const fs::path& root,
   dataset.points = std::move(model.points);
   const PhotoFolder folder = choose_photo_folder(root, options.downscale);
   const double rest = std::max(1.0, options.downscale / folder.factor);
+  std::size_t stretched = 0;
   for (const io::ColmapImage& image : model.images) {
     View view;
     const auto photo = find_photo(folder.path, image.name);
@@ -212,8 +246,18 @@ Dataset load_colmap(const fs::path& root,
     nominal.name = io::inner_name(image.name);
     nominal.rotation = image.rotation;
     nominal.translation = image.translation;
-    set_cameras(view, nominal, io::image_size(view.image_path), rest, options.undistort);
+    const io::ImageSize size = io::image_size(view.image_path);
+    if (is_stretched(size, nominal)) ++stretched;
+    set_cameras(view, nominal, size, rest, options.undistort);
     dataset.views.push_back(std::move(view));
+  }
+  require_photos_of_their_own(dataset.views);
+  if (stretched > 0) {
+    const View& view = dataset.views.front();
+    spdlog::warn(
+        "{} of {} photos have not the size of their camera but nearly ({} x {} pixels, the first) "
+        "and are stretched to it: use the photos that the model was made of",
+        stretched, dataset.views.size(), view.source_camera.width, view.source_camera.height);
   }
   sort_by_name(dataset.views);
   mark_every(dataset.views, options.test_every);
@@ -267,9 +311,22 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
   return views;
 }
 
+/// Gives the data set the points of a PLY; returns their positions as precise as they are there.
+std::vector<double> take_points(Dataset& dataset, const fs::path& path) {
+  io::PlyPoints points = io::read_ply_points(path);
+  dataset.points = std::move(points.cloud);
+  return std::move(points.positions);
+}
+
 Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
   Dataset dataset;
   dataset.kind = DatasetKind::kBlender;
+  // Where 3DGS looks for points, and exporters of Blender leave them.
+  std::vector<double> points;
+  if (const fs::path file = root / "points3d.ply"; is_file(file)) {
+    points = take_points(dataset, file);
+    spdlog::info("{} points are those of {}", dataset.points.size(), file.string());
+  }
   dataset.views = transforms_views(io::read_transforms(root / "transforms_train.json"), options);
   sort_by_name(dataset.views);
   std::optional<fs::path> held_out;
@@ -278,7 +335,7 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
   }
   if (!held_out) {
     mark_every(dataset.views, options.test_every);
-    set_origin(dataset, {}, options);
+    set_origin(dataset, points, options);
     return dataset;
   }
   std::vector<View> test = transforms_views(io::read_transforms(*held_out), options);
@@ -287,8 +344,36 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
     view.test = true;
     dataset.views.push_back(std::move(view));
   }
-  set_origin(dataset, {}, options);
+  set_origin(dataset, points, options);
   return dataset;
+}
+
+/// Says which frames of a nerfstudio file its lists leave out, and which names are of no frame.
+void tell_of_lists(const io::TransformsFile& file,
+                   const std::set<std::string>& train,
+                   const std::set<std::string>& test,
+                   std::size_t used) {
+  std::set<std::string> frames;
+  for (const io::TransformsFrame& frame : file.frames)
+    frames.insert(io::inner_name(frame.file_path));
+  std::size_t unknown = 0;
+  std::string first;
+  for (const std::set<std::string>* list : {&train, &test}) {
+    for (const std::string& name : *list) {
+      if (frames.contains(name)) continue;
+      if (unknown++ == 0) first = name;
+    }
+  }
+  if (unknown > 0) {
+    spdlog::warn(
+        "{}: {} of {} names in train_filenames, val_filenames and test_filenames are of no frame, "
+        "'{}' among them: write them as the frames' file_path",
+        file.path.string(), unknown, train.size() + test.size(), first);
+  }
+  if (used < file.frames.size()) {
+    spdlog::info("{} of {} frames of {} are in none of its lists and left out",
+                 file.frames.size() - used, file.frames.size(), file.path.string());
+  }
 }
 
 Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
@@ -317,11 +402,11 @@ Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
       if (views[i].test || train.empty() || train.contains(name))
         dataset.views.push_back(std::move(views[i]));
     }
+    tell_of_lists(file, train, test, dataset.views.size());
     sort_by_name(dataset.views);
   }
-  if (!file.ply_file_path.empty()) dataset.points = io::read_ply_points(root / file.ply_file_path);
-  const std::vector<double> points(dataset.points.positions.begin(),
-                                   dataset.points.positions.end());
+  std::vector<double> points;
+  if (!file.ply_file_path.empty()) points = take_points(dataset, root / file.ply_file_path);
   set_origin(dataset, points, options);
   return dataset;
 }
@@ -345,9 +430,27 @@ bool shows_cut_outs(const Dataset& dataset, AlphaUse use) {
   return found == io::Transparency::kCutOut;
 }
 
+/// What nerfstudio makes of a capture has COLMAP's model in a folder of its own. Its file says more
+/// (masks, depth maps, lists), and where it names points there is nothing that the model has more.
+bool goes_before(const fs::path& transforms, const fs::path& root, const fs::path& model) {
+  return model.lexically_relative(root / "colmap").begin()->string() != ".." &&
+         !io::read_transforms(transforms).ply_file_path.empty();
+}
+
 Dataset load_any(const fs::path& root, const DatasetOptions& options) {
-  if (const auto model = io::find_colmap_model(root)) return load_colmap(root, *model, options);
-  if (is_file(root / "transforms.json")) return load_nerfstudio(root, options);
+  const fs::path transforms = root / "transforms.json";
+  if (const auto model = io::find_colmap_model(root)) {
+    if (is_file(transforms)) {
+      if (goes_before(transforms, root, *model)) {
+        spdlog::info("{} is read, not the COLMAP model {}", transforms.string(), model->string());
+        return load_nerfstudio(root, options);
+      }
+      spdlog::info("the COLMAP model {} is read, {} beside it is not", model->string(),
+                   transforms.string());
+    }
+    return load_colmap(root, *model, options);
+  }
+  if (is_file(transforms)) return load_nerfstudio(root, options);
   if (is_file(root / "transforms_train.json")) return load_blender(root, options);
   throw DataError(
       fmt::format("{} is no data set: it has neither a COLMAP model (sparse/0) nor transforms.json "
@@ -365,7 +468,7 @@ std::vector<std::size_t> Dataset::indices(Split split) const {
   return out;
 }
 
-Dataset load_dataset(const fs::path& root, const DatasetOptions& options) {
+Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
   if (!(options.downscale >= 1 && options.downscale <= 1024)) {
     throw UsageError(fmt::format("The downscale factor is {}: it must lie between 1 and 1024",
                                  options.downscale));
@@ -374,6 +477,10 @@ Dataset load_dataset(const fs::path& root, const DatasetOptions& options) {
     throw UsageError(
         fmt::format("The test interval is {}: it must be 0 or more", options.test_every));
   }
+  // The file of cameras stands for its folder.
+  const std::string name = path.filename().string();
+  const bool names_cameras = name.starts_with("transforms") && path.extension() == ".json";
+  const fs::path root = names_cameras && is_file(path) ? fs::absolute(path).parent_path() : path;
   if (!is_folder(root)) {
     throw DataError(fmt::format("The data set {} {}: give the folder of a data set", root.string(),
                                 is_file(root) ? "is a file" : "does not exist"));
@@ -384,9 +491,18 @@ Dataset load_dataset(const fs::path& root, const DatasetOptions& options) {
     throw DataError(
         fmt::format("The data set {} has no views: there is nothing to train on", root.string()));
   }
+  warn_of_repeated_photos(dataset.views);
   dataset.alpha_is_background = shows_cut_outs(dataset, options.alpha);
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
+  if (masked == 0 && is_folder(root / "masks")) {
+    spdlog::warn(
+        "No mask in {} has the name of a photo: {} would have {}.png, {}.png or {}_mask.png",
+        (root / "masks").string(), dataset.views.front().camera.name,
+        dataset.views.front().camera.name,
+        fs::path(dataset.views.front().camera.name).replace_extension().string(),
+        fs::path(dataset.views.front().camera.name).replace_extension().string());
+  }
   if (masked > 0) {
     for (const View& view : dataset.views) {
       if (has_mask(view)) check_mask(view);

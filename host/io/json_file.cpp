@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstdint>
+#include <string_view>
 
 #include "io/byte_reader.hpp"
 #include "raysplats/error.hpp"
@@ -12,7 +15,27 @@ namespace raysplats::io {
 namespace {
 constexpr std::uint64_t kMaxBytes = std::uint64_t{256} << 20;
 constexpr int kMaxDepth = 32;
+constexpr std::size_t kMostLetters = 20;  // of a word that is named
+
+/// Where a parser stopped and what is there, as far as it is a word.
+std::string place_of(std::string_view text, std::size_t byte) {
+  const std::string_view before = text.substr(0, byte > 0 ? byte - 1 : 0);
+  const auto line = 1 + std::count(before.begin(), before.end(), '\n');
+  // Parsers stop behind the first letter that does not belong, as in the middle of "nan".
+  const auto part_of_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
+  std::size_t begin = std::min(before.size(), text.size());
+  while (begin > 0 && part_of_word(text[begin - 1])) --begin;
+  std::size_t end = begin;
+  while (end < text.size() && end < begin + kMostLetters && part_of_word(text[end])) ++end;
+  return fmt::format("line {}{}", line,
+                     end > begin ? fmt::format(" by '{}'", text.substr(begin, end - begin)) : "");
+}
+
 }  // namespace
+
+std::string json_text(const nlohmann::json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
 
 nlohmann::json read_json_object(const std::filesystem::path& path) {
   return parse_json_object(read_file(path, kMaxBytes), path);
@@ -32,8 +55,9 @@ nlohmann::json parse_json_object(std::span<const std::byte> bytes,
   try {
     root = nlohmann::json::parse(begin, begin + bytes.size(), check_depth);
   } catch (const nlohmann::json::parse_error& error) {
-    throw DataError(
-        fmt::format("{} is no valid JSON: syntax error at byte {}", path.string(), error.byte));
+    const std::string_view text(begin, bytes.size());
+    throw DataError(fmt::format("{} is no valid JSON: syntax error in {}", path.string(),
+                                place_of(text, error.byte)));
   } catch (const nlohmann::json::exception&) {
     throw DataError(fmt::format("{} is no valid JSON: a number is out of range", path.string()));
   }

@@ -5,11 +5,16 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <string>
 
 namespace raysplats::io {
 
+/// The text of a file that is written. Names of files and words of command lines are any bytes:
+/// what is no UTF-8 in them becomes U+FFFD. `indent`: as of nlohmann::json::dump().
+std::string json_text(const nlohmann::json& json, int indent = -1);
+
 /// Parses a JSON file whose root is an object, of bounded size and depth. Throws DataError with the
-/// byte offset.
+/// line.
 nlohmann::json read_json_object(const std::filesystem::path& path);
 /// The same of what is in memory already; `path` names it in errors.
 nlohmann::json parse_json_object(std::span<const std::byte> bytes,

@@ -6,38 +6,64 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "io/ply_file.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
+namespace {
 
-PointCloud read_ply_points(const std::filesystem::path& path) {
-  const PlyFile file(path);
-  std::array<std::size_t, 3> position;
-  std::array<std::size_t, 3> color{};
-  const std::array<const char*, 3> position_names{"x", "y", "z"};
-  const std::array<const char*, 3> color_names{"red", "green", "blue"};
-  bool colored = true;
-  double scale = 1.0;
+using Names = std::array<const char*, 3>;
+
+/// The columns of all three, or nothing.
+std::optional<std::array<std::size_t, 3>> columns(const PlyFile& file, const Names& names) {
+  std::array<std::size_t, 3> out{};
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto column = file.column(position_names[i]);
-    if (!column) {
-      throw DataError(fmt::format("{} has no property '{}': it holds no points", path.string(),
-                                  position_names[i]));
-    }
-    position[i] = *column;
-    const auto color_column = file.column(color_names[i]);
-    colored = colored && color_column.has_value();
-    if (!color_column) continue;
-    color[i] = *color_column;
-    const PlyType type = file.properties()[color[i]].type;
-    if (type == PlyType::kUint8) scale = 1.0 / 255.0;
-    if (type == PlyType::kUint16) scale = 1.0 / 65535.0;
+    const auto column = file.column(names[i]);
+    if (!column) return std::nullopt;
+    out[i] = *column;
   }
-  PointCloud points;
+  return out;
+}
+
+std::optional<std::array<std::size_t, 3>> color_columns(const PlyFile& file) {
+  for (const Names& names :
+       {Names{"red", "green", "blue"}, Names{"diffuse_red", "diffuse_green", "diffuse_blue"},
+        Names{"r", "g", "b"}}) {
+    if (const auto found = columns(file, names)) return found;
+  }
+  return std::nullopt;
+}
+
+/// The greatest number of an integer type; 1 of others, which state no range.
+double range_of(PlyType type) {
+  if (type == PlyType::kUint8) return 255.0;
+  return type == PlyType::kUint16 ? 65535.0 : 1.0;
+}
+
+}  // namespace
+
+PlyPoints read_ply_points(const std::filesystem::path& path) {
+  const PlyFile file(path);
+  const Names position_names{"x", "y", "z"};
+  for (const char* name : position_names) {
+    if (!file.column(name)) {
+      throw DataError(
+          fmt::format("{} has no property '{}': it holds no points", path.string(), name));
+    }
+  }
+  const std::array<std::size_t, 3> position = *columns(file, position_names);
+  const auto color = color_columns(file);
+  std::array<double, 3> scale{1.0, 1.0, 1.0};
+  for (std::size_t i = 0; color && i < 3; ++i)
+    scale[i] = 1.0 / range_of(file.properties()[(*color)[i]].type);
+  PlyPoints out;
+  out.colored = color.has_value();
+  PointCloud& points = out.cloud;
   points.positions.reserve(3 * file.rows());
   points.colors.reserve(3 * file.rows());
+  out.positions.reserve(3 * file.rows());
   double brightest = 0.0;
   file.for_each_row([&](std::size_t row, std::span<const double> values) {
     for (std::size_t i = 0; i < 3; ++i) {
@@ -47,7 +73,8 @@ PointCloud read_ply_points(const std::filesystem::path& path) {
                                     position_names[i], row));
       }
       points.positions.push_back(coordinate);
-      double value = colored ? values[color[i]] * scale : 0.5;
+      out.positions.push_back(values[position[i]]);
+      double value = color ? values[(*color)[i]] * scale[i] : 0.5;
       if (!std::isfinite(value)) value = 0.5;
       brightest = std::max(brightest, value);
       points.colors.push_back(static_cast<float>(value));
@@ -56,7 +83,7 @@ PointCloud read_ply_points(const std::filesystem::path& path) {
   // Floating-point and int colours state no range: more than 1 means 0 to 255.
   const float divisor = brightest > 1.0 ? 255.0f : 1.0f;
   for (float& value : points.colors) value = std::clamp(value / divisor, 0.0f, 1.0f);
-  return points;
+  return out;
 }
 
 }  // namespace raysplats::io

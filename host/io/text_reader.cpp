@@ -26,7 +26,11 @@ bool parse_number(std::string_view token, double& value) { return parse(token, v
 bool parse_number(std::string_view token, std::uint64_t& value) { return parse(token, value); }
 
 TextReader::TextReader(std::span<const std::byte> bytes, std::filesystem::path path)
-    : text_(reinterpret_cast<const char*>(bytes.data()), bytes.size()), path_(std::move(path)) {}
+    : text_(reinterpret_cast<const char*>(bytes.data()), bytes.size()), path_(std::move(path)) {
+  // Editors of Windows begin UTF-8 with a mark that nobody sees.
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
+}
 
 bool TextReader::next_line() {
   if (at_end()) return false;

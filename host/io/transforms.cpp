@@ -380,8 +380,7 @@ void write_cameras(const std::filesystem::path& path, const std::vector<Camera>&
     frame["transform_matrix"] = std::move(matrix);
     root["frames"].push_back(std::move(frame));
   }
-  // Names with bytes that are not UTF-8 must not stop the writing.
-  write_text_file(path, root.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  write_text_file(path, io::json_text(root, 1) + "\n");
 }
 
 }  // namespace raysplats

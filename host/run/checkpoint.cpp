@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "util/atomic_file.hpp"
 
@@ -141,7 +142,7 @@ Checkpoint parse_header(const std::string& text, std::uint32_t version) {
 }  // namespace
 
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
-  const std::string header = header_of(checkpoint).dump();
+  const std::string header = io::json_text(header_of(checkpoint));
   Preamble preamble{kMagic, kVersion, static_cast<std::uint32_t>(checkpoint.sections.size()),
                     header.size(), hash(header.data(), header.size())};
   std::vector<SectionEntry> table;

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "io/data_origin.hpp"
+#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"
@@ -172,7 +173,7 @@ void RunFolder::write_cameras(std::span<const Camera> cameras) const {
                     {"fy", camera.fy},
                     {"fx", camera.fx}});
   }
-  write_text_file(path_ / "cameras.json", list.dump() + "\n");
+  write_text_file(path_ / "cameras.json", io::json_text(list) + "\n");
 }
 
 void RunFolder::write_exposures(std::span<const Camera> cameras,
@@ -189,7 +190,7 @@ void RunFolder::write_exposures(std::span<const Camera> cameras,
     }
     json[cameras[i].name] = std::move(rows);
   }
-  write_text_file(path_ / "exposures.json", json.dump(1) + "\n");
+  write_text_file(path_ / "exposures.json", io::json_text(json, 1) + "\n");
 }
 
 void RunFolder::write_refined_cameras(std::vector<Camera> cameras,
@@ -314,9 +315,7 @@ void RunFolder::write_metrics(const nlohmann::json& summary) const {
     for (const EvaluationRow& row : validations_) json["validations"].push_back(to_json(row));
   }
   json["note"] = "training_seconds exclude evaluation and compiling kernels";
-  // The words of a command line are any bytes.
-  constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
-  write_text_file(path_ / "metrics.json", json.dump(2, ' ', false, kReplace) + "\n");
+  write_text_file(path_ / "metrics.json", io::json_text(json, 2) + "\n");
 }
 
 void check_no_run(const std::filesystem::path& folder) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "io/json_file.hpp"
+
 namespace raysplats::view {
 namespace {
 
@@ -68,7 +70,7 @@ std::string RunHistory::json() const {
                   {"rows", rows},
                   {"tests", tests},
                   {"left", left}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return io::json_text(json);
 }
 
 }  // namespace raysplats::view

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "io/json_file.hpp"
+
 namespace raysplats::view {
 namespace {
 
@@ -34,8 +36,7 @@ std::vector<std::string> RunView::urls() const { return viewer_.urls(); }
 
 void RunView::finish(const std::string& text) {
   history_.finish(text);
-  viewer_.tell_last(nlohmann::json{{"type", "run"}, {"ended", text}}.dump(
-      -1, ' ', false, nlohmann::json::error_handler_t::replace));
+  viewer_.tell_last(io::json_text({{"type", "run"}, {"ended", text}}));
 }
 
 void RunView::noted(const TrainRow& row) { history_.add(row); }

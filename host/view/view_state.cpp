@@ -9,6 +9,8 @@
 #include <numbers>
 #include <vector>
 
+#include "io/json_file.hpp"
+
 namespace raysplats::view {
 namespace {
 
@@ -112,7 +114,7 @@ std::string state_json(const ViewState& state) {
                   {"has_background", state.has_background},
                   {"takes_meshes", state.takes_meshes},
                   {"trains", state.trains}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return io::json_text(json);
 }
 
 }  // namespace raysplats::view

@@ -21,6 +21,7 @@
 #include <utility>
 #include <variant>
 
+#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
 #include "view/mesh_uploads.hpp"
@@ -252,8 +253,7 @@ struct Viewer::Impl {
   void complain(ClientId id, const std::string& what) { say(id, "error", what); }
   void note(ClientId id, const std::string& what) { say(id, "note", what); }
   void say(ClientId id, const char* type, const std::string& what) {
-    server.send_text(id, nlohmann::json{{"type", type}, {"text", what}}.dump(
-                             -1, ' ', false, nlohmann::json::error_handler_t::replace));
+    server.send_text(id, io::json_text({{"type", type}, {"text", what}}));
   }
 
   /// The page that has waited longest, those that move first; nothing when all have what they want.

@@ -80,10 +80,11 @@ struct DatasetOptions {
   std::optional<std::array<double, 3>> origin;
 };
 
-/// Detects the kind of data set (COLMAP, nerfstudio, Blender) and reads everything but the pixels.
+/// Detects the kind of data set (COLMAP, nerfstudio, Blender) and reads everything but the pixels;
+/// a transforms file stands for its folder.
 /// Throws DataError for a folder that is none, a missing image, an unsupported camera model, no
 /// views, a mask of another shape than its photo.
-Dataset load_dataset(const std::filesystem::path& root, const DatasetOptions& options = {});
+Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
 
 /// The photo of a view as RGBA float at camera.width x camera.height: undistorted where
 /// view.camera is a pinhole and the photo's lens is none, resampled (area average). A is the mask

@@ -151,6 +151,16 @@ TEST_CASE("nerfstudio's transform is undone") {
   CHECK(glm::distance(2.0 * glm::dvec3(-x.y + 1, x.x, x.z - 1), glm::dvec3(4, 2, 3)) < 1e-9);
   CHECK(glm::distance(glm::transpose(camera.rotation)[2], glm::dvec3(0, 0, -1)) < 1e-9);
   CHECK(glm::distance(glm::transpose(camera.rotation)[0], glm::dvec3(0, -1, 0)) < 1e-9);
+  // A data set whose own coordinates are y = 0.5 (A x + (1, 2, 3)), A a quarter turn about x: the
+  // file above is of x, and so is what has been found, so y is where the model of that set has it.
+  options.data_transform = folder.write(
+      "transforms.json",
+      R"({"applied_transform": [[1,0,0,1],[0,0,-1,2],[0,1,0,3]], "applied_scale": 0.5})");
+  const glm::dvec3 y = read_camera_path(path, options).cameras.back().center();
+  // x' = 2 / 0.5 * (T y), where T of (A x + (1, 2, 3)) is R x + t.
+  const glm::dvec3 x4(4.0 / 4 - 1, 2.0 / 4, 3.0 / 4 + 1);  // R x
+  const glm::dvec3 own(x4.y, -x4.x, x4.z);                 // x
+  CHECK(glm::distance(y, glm::dvec3(own.x + 1, -own.z + 2, own.y + 3)) < 1e-9);
 }
 
 TEST_CASE("that nerfstudio's crop is not drawn is said, where a path has one") {

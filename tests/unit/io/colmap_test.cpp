@@ -9,6 +9,7 @@
 #include "data_sets.hpp"
 #include "io/colmap_model.hpp"
 #include "raysplats/dataset.hpp"
+#include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -288,6 +289,95 @@ TEST_CASE("masks beside the photos and test_every are honoured") {
   CHECK(load_dataset(scratch.path(), options).indices(Split::kTest).empty());
   options.test_every = -1;
   CHECK_THROWS_AS(load_dataset(scratch.path(), options), UsageError);
+}
+
+TEST_CASE("masks are found under the names that programs give them, or their absence is told") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  for (const char* name :
+       {"photo 8.png.png", "photo 8.PNG", "photo 8.jpeg", "photo 8_mask.png", "photo 8.mask.png"}) {
+    CAPTURE(name);
+    fs::remove_all(scratch / "masks");
+    write_image(scratch / "masks/m.png", Image(40, 30, 1, 1.0f));
+    const std::string extension = fs::path(name).extension().string();
+    if (extension == ".jpeg") write_image(scratch / "masks/m.jpg", Image(40, 30, 3, 1.0f));
+    fs::rename(scratch / (extension == ".jpeg" ? "masks/m.jpg" : "masks/m.png"),
+               scratch / "masks" / name);
+    const LogCapture log;
+    CHECK(!load_dataset(scratch.path()).views[9].mask_path.empty());
+    CHECK(!log.contains("No mask"));
+  }
+  fs::rename(scratch / "masks/photo 8.mask.png", scratch / "masks/other.png");
+  const LogCapture log;
+  load_dataset(scratch.path());
+  CHECK(log.contains("No mask"));
+}
+
+TEST_CASE("images that would share a photo, and photos of nearly another size") {
+  const Scratch scratch;
+  ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  {
+    const LogCapture log;
+    load_dataset(scratch.path());
+    CHECK(!log.contains("stretched"));
+  }
+  for (const ColmapFixture::ImageLine& image : fixture.images)
+    write_image(scratch / "images" / image.name, Image(44, 33, 3));
+  {
+    const LogCapture log;
+    load_dataset(scratch.path());
+    CHECK(log.contains("stretched"));
+  }
+  fixture.images[0].name = "a/one.png", fixture.images[1].name = "b/one.png";
+  fixture.write_binary(scratch / "sparse/0");
+  write_image(scratch / "images/one.png", Image(40, 30, 3));
+  const std::string shared = data_error([&] { load_dataset(scratch.path()); });
+  CHECK(contains(shared, "a/one.png"));
+  CHECK(contains(shared, "b/one.png"));
+}
+
+TEST_CASE("nerfstudio's file goes before the COLMAP model that it was made from") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "colmap/sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  const auto write_file = [&](const std::string& points) {
+    write_bytes(scratch / "transforms.json",
+                "{" + points +
+                    "\"fl_x\": 40, \"frames\": [{\"file_path\": \"images/photo 8.png\", "
+                    "\"transform_matrix\": " +
+                    matrix_json(1) + "}]}");
+  };
+  write_file("");
+  {
+    const LogCapture log;
+    CHECK(load_dataset(scratch.path()).kind == DatasetKind::kColmap);
+    CHECK(log.contains("beside it is not"));
+  }
+  write_bytes(scratch / "points.ply",
+              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+              "y\nproperty float z\nend_header\n1 2 3\n");
+  write_file("\"ply_file_path\": \"points.ply\", ");
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path()).kind == DatasetKind::kNerfstudio);
+  CHECK(log.contains("is read, not the COLMAP model"));
+}
+
+TEST_CASE("text with a byte order mark is read, and images without their points are refused") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_text(scratch.path());
+  const std::string cameras = read_bytes(scratch / "cameras.txt");
+  write_bytes(scratch / "cameras.txt", "\xEF\xBB\xBF" + cameras);
+  const std::size_t images = io::read_colmap_model(scratch.path()).images.size();
+  CHECK(images == fixture.images.size());
+  CHECK(
+      contains(text_error_with("images.txt", "1 1 0 0 0 0 0 0 1 a.png\n2 1 0 0 0 0 0 0 1 b.png\n"),
+               "the points of image 'a.png'"));
 }
 
 TEST_CASE("a data set without its photos, with foreign photos or without anything is refused") {

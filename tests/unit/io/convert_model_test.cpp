@@ -184,6 +184,27 @@ TEST_CASE("conversion names what only the header of our PLY says") {
   CHECK(!contains(told("b.glb", trace), "--background"));
 }
 
+TEST_CASE("the origin of a model scales and turns with it") {
+  const Scratch scratch;
+  Gaussians model = trained_like(2, 0);
+  for (std::size_t i = 0; i < 6; ++i) model.means[i] = static_cast<float>(i);
+  write_model(scratch / "a.ply", model, {}, std::nullopt, {1000, 200, 0});
+  ModelChanges changes;
+  changes.scale = 10;
+  changes.rotate_degrees = {0, 0, 90};
+  // Around the first one, in the coordinates of the data.
+  changes.crop = CropBox{{-2015, 9995, -5}, {-2005, 10005, 25}};
+  const Conversion done =
+      convert_model(scratch / "a.ply", scratch / "b.ply", changes, {}, std::nullopt, false);
+  CHECK(done.written == 1);
+  const std::array<double, 3> origin = io::model_origin(scratch / "b.ply");
+  CHECK(origin[0] == doctest::Approx(-2000));
+  CHECK(origin[1] == doctest::Approx(10000));
+  const Gaussians moved = read_model(scratch / "b.ply");
+  CHECK(moved.means[0] == doctest::Approx(-10));
+  CHECK(moved.means[2] == doctest::Approx(20));
+}
+
 TEST_CASE("losses are named for the model at hand") {
   const Gaussians flat = trained_like(2, 0);
   CHECK(contains(io::losses(io::ModelFormat::kSplat, trained_like(2, 2)), "SH"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 #include <fmt/format.h>
+#include <sstream>
 
 #include <algorithm>
 #include <cmath>
@@ -316,10 +317,24 @@ TEST_CASE("point clouds have colours of their type's range") {
               "y\nproperty double z\n"
               "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
               "1 2 3 255 0 51\n4 5 6 0 102 255\n");
-  const PointCloud points = io::read_ply_points(scratch / "a.ply");
+  const PointCloud points = io::read_ply_points(scratch / "a.ply").cloud;
   CHECK(points.positions == std::vector<float>{1, 2, 3, 4, 5, 6});
   for (std::size_t i = 0; i < 6; ++i) {
     CHECK(points.colors[i] == doctest::Approx(std::vector<double>{1, 0, 0.2, 0, 0.4, 1}[i]));
+  }
+  // Other programs' names, and places that a float rounds.
+  for (const char* prefix : {"diffuse_red diffuse_green diffuse_blue", "r g b"}) {
+    CAPTURE(prefix);
+    std::istringstream names{prefix};
+    std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty "
+        "double z\n";
+    for (std::string name; names >> name;) header += "property uchar " + name + "\n";
+    write_bytes(scratch / "c.ply", header + "end_header\n5300000.125 2 3 255 0 51\n");
+    const io::PlyPoints read = io::read_ply_points(scratch / "c.ply");
+    CHECK(read.colored);
+    CHECK(read.cloud.colors[2] == doctest::Approx(0.2));
+    CHECK(read.positions[0] == 5300000.125);
   }
   write_bytes(scratch / "b.ply",
               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n");

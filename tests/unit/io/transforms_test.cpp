@@ -9,6 +9,7 @@
 #include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
+#include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -194,15 +195,15 @@ TEST_CASE("small deviations from a rotation are removed, larger ones refused") {
   CHECK(contains(cameras_error(with_matrix("[[1,0,0,0],[0,1,0,0]]")), "4 rows"));
   CHECK(contains(cameras_error(with_matrix("[[1,0,0],[0,1,0],[0,0,1]]")), "4 numbers"));
   CHECK(contains(cameras_error(with_matrix("[[1,0,0,\"x\"],[0,1,0,0],[0,0,1,0]]")), "no number"));
-  CHECK(contains(cameras_error(with_matrix("[[1,0,0,NaN],[0,1,0,0],[0,0,1,0]]")), "byte"));
+  CHECK(contains(cameras_error(with_matrix("[[1,0,0,NaN],[0,1,0,0],[0,0,1,0]]")), "by 'NaN'"));
   CHECK(
       contains(cameras_error(with_matrix("[[1,0,0,1e999],[0,1,0,0],[0,0,1,0]]")), "out of range"));
   CHECK(contains(cameras_error(with_matrix("7")), "4 rows"));
 }
 
-TEST_CASE("malformed camera files are refused with the frame or the byte") {
-  CHECK(contains(cameras_error(""), "byte"));
-  CHECK(contains(cameras_error("{\"frames\": ["), "byte 13"));
+TEST_CASE("malformed camera files are refused with the frame or the line") {
+  CHECK(contains(cameras_error(""), "line 1"));
+  CHECK(contains(cameras_error("{\"frames\":\n["), "line 2"));
   CHECK(contains(cameras_error("[]"), "no JSON object"));
   CHECK(contains(cameras_error("{}"), "no list of frames"));
   CHECK(contains(cameras_error("{\"frames\": []}"), "no frames"));
@@ -430,6 +431,57 @@ TEST_CASE("nerfstudio scenes: distortion, masks, points, lists of names, scaled 
   CHECK(lists.views[2].test);
   fs::remove(scratch / "m.png");
   CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "mask"));
+}
+
+TEST_CASE(
+    "names in the lists of a nerfstudio file that are of no frame are told, and who is left") {
+  const Scratch scratch;
+  std::string frames;
+  for (int i = 0; i < 4; ++i) {
+    write_image(scratch / fmt::format("images/f{}.png", i), Image(10, 10, 3));
+    if (i > 0) frames += ",";
+    frames += frame(fmt::format("images/f{}.png", i), i);
+  }
+  const auto lists = [&](const std::string& train) {
+    write_bytes(scratch / "transforms.json",
+                file_of("\"w\": 10, \"h\": 10, \"fl_x\": 20, \"train_filenames\": [" + train +
+                            "], \"test_filenames\": [\"images/f0.png\"], ",
+                        frames));
+  };
+  lists("\"images/f1.png\", \"f2.png\"");
+  {
+    const LogCapture log;
+    // The file stands for its folder.
+    CHECK(load_dataset(scratch / "transforms.json").views.size() == 2);
+    CHECK(log.contains("1 of 3 names"));
+    CHECK(log.contains("'f2.png'"));
+    CHECK(log.contains("2 of 4 frames"));
+  }
+  lists("\"images/f1.png\", \"images/f2.png\", \"images/f3.png\"");
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path()).views.size() == 4);
+  CHECK(log.lines() == 0);
+}
+
+TEST_CASE("a photo that frames share is told") {
+  const Scratch scratch;
+  write_image(scratch / "a.png", Image(10, 10, 3));
+  write_bytes(scratch / "transforms.json", file_of("\"w\": 10, \"h\": 10, \"fl_x\": 20, ",
+                                                   frame("a.png", 0) + "," + frame("a.png", 1)));
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path()).views.size() == 2);
+  CHECK(log.contains("more than one frame"));
+}
+
+TEST_CASE("points beside Blender's files are taken") {
+  const Scratch scratch;
+  write_image(scratch / "a.png", Image(10, 10, 3));
+  write_bytes(scratch / "transforms_train.json", file_of("\"camera_angle_x\": 1, ", frame("a", 0)));
+  CHECK(load_dataset(scratch.path()).points.size() == 0);
+  write_bytes(scratch / "points3d.ply",
+              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+              "y\nproperty float z\nend_header\n1 2 3\n");
+  CHECK(load_dataset(scratch.path()).points.size() == 1);
 }
 
 TEST_CASE("no cut or flipped byte of a camera file does anything but load or raise DataError") {
