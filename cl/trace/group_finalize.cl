@@ -155,7 +155,8 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   load_offset(i, means, &camera, colour.n);
   colour_direction(&colour);
   for (int j = 0; j < 3; ++j)
-    colour.slope[j] = touched && lines[i].v[13 + j] > 0.0f ? row[5 + j] : 0.0f;
+    colour.slope[j] =
+        touched && RS_COLOR_PASSES(lines[i].v[13 + j], row[5 + j]) ? row[5 + j] : 0.0f;
   ParameterGradient out;
   for (int j = 0; j < 3; ++j) out.mean[j] = 0.0f;
 #if SH_DEGREE > 0

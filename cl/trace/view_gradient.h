@@ -6,6 +6,7 @@
 #ifndef RS_TRACE_VIEW_GRADIENT_H
 #define RS_TRACE_VIEW_GRADIENT_H
 
+#include "shared/color.h"
 #include "trace/view.h"
 
 // The screen gradient of RS_LENS_AROUND counts the angle in which the mean is seen.
@@ -146,7 +147,7 @@ void screen_statistics(const ViewGaussian* g,
 }
 
 // What the colour of a Gaussian depends on: its direction n = (m - c) / |m - c| and max(0, .),
-// which passes nothing where it clamps.
+// which where it clamps passes nothing, or what raises the colour (shared/color.h).
 typedef struct {
   fv n[3];
   fv inverse;  // 1 / |m - c|
@@ -170,7 +171,7 @@ void colour_gradient(
   colour_direction(out);
 #pragma unroll
   for (int j = 0; j < 3; ++j) {
-    out->slope[j] = (touched & (line[13 + j] > 0.0f)) ? v[13 + j] : zero;
+    out->slope[j] = (touched & RS_COLOR_PASSES(line[13 + j], v[13 + j])) ? v[13 + j] : zero;
   }
   rs_sh_basis(SH_DEGREE, out->n[0], out->n[1], out->n[2], out->basis);
 }

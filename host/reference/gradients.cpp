@@ -58,11 +58,13 @@ void backward_ray(const RayTrace& ray,
   }
 }
 
-/// Adds dL/dsh of Gaussian i from dL/dcolour; returns dL/d(mean - centre).
+/// Adds dL/dsh of Gaussian i from dL/dcolour; returns dL/d(mean - centre). `raises`: what raises a
+/// clamped colour passes (TraceOptions::raise_clamped).
 glm::dvec3 color_backward(const Parameters& p,
                           std::size_t i,
                           const glm::dvec3& offset,
                           glm::dvec3 color_gradient,
+                          bool raises,
                           Parameters& out) {
   const double distance = glm::length(offset);
   if (!(distance > 0.0)) return glm::dvec3(0.0);
@@ -73,7 +75,7 @@ glm::dvec3 color_backward(const Parameters& p,
   const auto slopes = sh_basis_gradient(degree, direction);
   const glm::dvec3 clamped = color(p, i, direction);
   for (int k = 0; k < 3; ++k) {
-    if (clamped[k] <= 0.0) color_gradient[k] = 0.0;
+    if (clamped[k] <= 0.0 && !(raises && color_gradient[k] < 0.0)) color_gradient[k] = 0.0;
   }
   glm::dvec3 by_direction(0.0);
   for (std::size_t b = 0; b < static_cast<std::size_t>(sh_coefficients(degree)); ++b) {
@@ -169,7 +171,8 @@ Gradient render_gradient(const Parameters& parameters,
   }
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const glm::dvec3 by_offset =
-        color_backward(parameters, i, prepared[i].mean - center, sums[i].color, out.parameters);
+        color_backward(parameters, i, prepared[i].mean - center, sums[i].color,
+                       options.raise_clamped, out.parameters);
     whitening_backward(parameters, i, prepared[i].whitening, sums[i].whitening, out.parameters);
     const glm::dvec3 by_mean = by_offset - glm::transpose(prepared[i].whitening) * sums[i].whitened;
     for (int k = 0; k < 3; ++k)
@@ -205,7 +208,8 @@ Parameters ray_gradient(const Parameters& parameters,
     for (const Hit& hit : ray.hits) {
       const std::size_t i = hit.index;
       const glm::dvec3 towards = from_origin ? prepared[i].mean - query.origin : query.direction;
-      const glm::dvec3 by_offset = color_backward(parameters, i, towards, sums[i].color, out);
+      const glm::dvec3 by_offset =
+          color_backward(parameters, i, towards, sums[i].color, false, out);
       for (int k = 0; from_origin && k < 3; ++k)
         out.means[3 * i + static_cast<std::size_t>(k)] += by_offset[k];
       sums[i].color = glm::dvec3(0.0);

@@ -127,6 +127,7 @@ GaussianKernel CameraTracer::Impl::finalize_kernel(
       .define("POSE", with_pose ? 1 : 0)
       .define("ACCUMULATE", accumulate ? 1 : 0)
       .define("DEPTH_GRADIENT", with_depth ? 1 : 0)
+      .define("RAISE_CLAMPED", options.raise_clamped ? 1 : 0)
       .define("LENS", lens)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));

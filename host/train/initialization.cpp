@@ -37,6 +37,8 @@ constexpr double kUnsureShare = 0.25;     // of a start from photos alone: point
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
+constexpr double kMostlySeen = 0.5;  // of sparse points
+constexpr double kLeastSeen = 0.01;  // of a given model: what photos of its scene see more of
 
 // Balanced k-d tree laid out in place: the median of a range is its node, its halves are the
 // children.
@@ -214,10 +216,11 @@ std::string match_text(const PointMatch& match) {
 }
 
 // The data set's points to start from: none where a start is free to do without and the photos show
-// something else.
+// something else. `count`: of points that photos would give.
 PointCloud start_points(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const PhotoSource& photos,
+                        std::size_t count,
                         const TrainOptions& options) {
   PointCloud reliable = reliable_points(dataset.points);
   if (options.init == "auto" && dataset.alpha_is_background) {
@@ -230,7 +233,18 @@ PointCloud start_points(const Dataset& dataset,
     reliable = std::move(hull);
   }
   if (options.init == "auto" && reliable.size() > 0) {
-    const PointMatch match = match_points(reliable, cameras, photos(PhotoChoice::kSome));
+    PointMatch match = match_points(reliable, cameras, photos(PhotoChoice::kSome));
+    if (match.seen < kMostlySeen) {
+      // Of a scan or a reconstruction of more than the photos show, those tell where they are.
+      PointCloud seen = seen_points(reliable, cameras);
+      const PointMatch of_seen = match_points(seen, cameras, photos(PhotoChoice::kSome));
+      if (of_seen.difference && plausible(of_seen) && seen.size() >= std::max(kFewPoints, count)) {
+        spdlog::info("{} of {} sparse points lie before a camera, and the start is of these",
+                     seen.size(), reliable.size());
+        reliable = std::move(seen);
+        match = of_seen;
+      }
+    }
     spdlog::debug("sparse points: {}", match_text(match));
     if (!plausible(match)) {
       spdlog::warn(
@@ -241,7 +255,10 @@ PointCloud start_points(const Dataset& dataset,
       return {};
     }
   }
-  return distinct_points(reliable, about_origin(options.bounds, dataset.origin));
+  PointCloud points = distinct_points(reliable, about_origin(options.bounds, dataset.origin));
+  if (!colorless(points)) return points;
+  spdlog::info("the sparse points have no colours of their own: they start with the photos'");
+  return colored_by_photos(std::move(points), photos(PhotoChoice::kSome));
 }
 
 }  // namespace
@@ -342,6 +359,12 @@ Gaussians initial_model(const Dataset& dataset,
                                           (origin[i % 3] - dataset.origin[i % 3]));
     }
     model = inside(model, bounds);
+    if (model.size() > 0 && seen_share(model.means, cameras) < kLeastSeen) {
+      spdlog::warn(
+          "the photos see less than {:.0f} % of the Gaussians of {}: it is in other coordinates "
+          "than the data set",
+          100 * kLeastSeen, options.init);
+    }
     if (model.size() > limit) {
       spdlog::warn(
           "{} has {} Gaussians, but this run may have {}: it starts from an even choice of them "
@@ -362,7 +385,7 @@ Gaussians initial_model(const Dataset& dataset,
                                 : share(clears_random_start(options) ? kStartShare : kPhotoShare);
   PointCloud points;
   if (has_points && (options.init == "auto" || options.init == "colmap")) {
-    points = start_points(dataset, cameras, photos, options);
+    points = start_points(dataset, cameras, photos, count, options);
     const std::size_t most = share(kStartShare);
     if (points.size() > most) {
       spdlog::info(

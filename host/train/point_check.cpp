@@ -2,10 +2,12 @@
 #include "train/point_check.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <utility>
 #include <vector>
 
 #include "scene/camera_model.hpp"
@@ -20,6 +22,7 @@ constexpr double kMostDifference = 0.77;
 constexpr double kClearlyBetter = 0.6;    // at another scale
 constexpr std::size_t kFewerLooks = 500;  // at every scale
 constexpr int kScaleSteps = 20;           // of half an octave, up and down
+constexpr float kOneColor = 0.004f;       // no two of 256 steps apart
 constexpr double kEvenColors = 1e-4;      // squared difference of points that tell nothing
 
 glm::dvec3 triple(const std::vector<float>& values, std::size_t i) {
@@ -77,21 +80,28 @@ std::optional<double> color_difference(const PointCloud& points,
 
 }  // namespace
 
+double seen_share(const std::vector<float>& positions, std::span<const Camera> cameras) {
+  const std::size_t points = positions.size() / 3;
+  const std::size_t count = std::min(kLooks, points);
+  if (count == 0) return 0;
+  std::size_t seen = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const glm::dvec3 world = triple(positions, k * points / count);
+    seen += std::any_of(cameras.begin(), cameras.end(),
+                        [&](const Camera& camera) { return sees(camera, world); })
+                ? 1
+                : 0;
+  }
+  return static_cast<double>(seen) / static_cast<double>(count);
+}
+
 PointMatch match_points(const PointCloud& points,
                         std::span<const Camera> cameras,
                         std::span<const SmallPhoto> photos) {
   PointMatch out;
   const std::size_t count = std::min(kLooks, points.size());
   if (count == 0) return out;
-  std::size_t seen = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const glm::dvec3 world = triple(points.positions, k * points.size() / count);
-    seen += std::any_of(cameras.begin(), cameras.end(),
-                        [&](const Camera& camera) { return sees(camera, world); })
-                ? 1
-                : 0;
-  }
-  out.seen = static_cast<double>(seen) / static_cast<double>(count);
+  out.seen = seen_share(points.positions, cameras);
   out.difference = color_difference(points, photos, count, 1.0);
   if (!out.difference) return out;
   out.scaled_difference = *out.difference;
@@ -104,6 +114,50 @@ PointMatch match_points(const PointCloud& points,
     out.scaled_difference = *other;
   }
   return out;
+}
+
+PointCloud seen_points(const PointCloud& points, std::span<const Camera> cameras) {
+  PointCloud out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const glm::dvec3 world = triple(points.positions, i);
+    if (std::none_of(cameras.begin(), cameras.end(),
+                     [&](const Camera& camera) { return sees(camera, world); }))
+      continue;
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
+      out.positions.push_back(points.positions[k]);
+      out.colors.push_back(points.colors[k]);
+    }
+  }
+  return out;
+}
+
+bool colorless(const PointCloud& points) {
+  for (std::size_t i = 3; i < points.colors.size(); ++i) {
+    if (std::abs(points.colors[i] - points.colors[i % 3]) > kOneColor) return false;
+  }
+  return points.size() > 1;
+}
+
+PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> photos) {
+  std::array<std::vector<double>, 3> shown;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::vector<double>& channel : shown) channel.clear();
+    const glm::dvec3 world = triple(points.positions, i);
+    for (const SmallPhoto& photo : photos) {
+      const std::optional<glm::dvec2> place = photo.sees(world);
+      if (!place || !photo.known(*place)) continue;
+      const glm::dvec4 color = photo.at(*place);
+      if (color.w < 0.5) continue;
+      for (std::size_t k = 0; k < 3; ++k) shown[k].push_back(color[static_cast<int>(k)]);
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto middle = static_cast<std::ptrdiff_t>(shown[k].size() / 2);
+      std::nth_element(shown[k].begin(), shown[k].begin() + middle, shown[k].end());
+      points.colors[3 * i + k] =
+          shown[k].empty() ? 0.5f : static_cast<float>(shown[k][static_cast<std::size_t>(middle)]);
+    }
+  }
+  return points;
 }
 
 bool plausible(const PointMatch& match) {

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "raysplats/camera.hpp"
 #include "raysplats/dataset.hpp"
@@ -23,10 +24,23 @@ struct PointMatch {
   double scaled_difference = 0;
 };
 
+/// The share of the positions (x, y, z each) that some camera sees, of an even choice of them; 0 of
+/// none.
+double seen_share(const std::vector<float>& positions, std::span<const Camera> cameras);
+
 /// Compares an even choice of the points with the cameras, and with photos of some of them.
 PointMatch match_points(const PointCloud& points,
                         std::span<const Camera> cameras,
                         std::span<const SmallPhoto> photos);
+
+/// The points that some camera sees, without their tracks and errors.
+PointCloud seen_points(const PointCloud& points, std::span<const Camera> cameras);
+
+/// Whether all points have one colour, as those of programs that find none (black, grey, white).
+bool colorless(const PointCloud& points);
+
+/// The points in the colours in which photos show them: of each the median, grey where none does.
+PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> photos);
 
 /// Whether points can be where they are: not when they are in other units or axes than the cameras.
 bool plausible(const PointMatch& match);

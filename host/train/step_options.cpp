@@ -9,6 +9,7 @@ namespace raysplats {
 TraceOptions trace_options_of(const TrainOptions& options, const std::array<float, 3>& background) {
   TraceOptions trace = options.trace;
   trace.background = background;
+  trace.raise_clamped = options.raise_clamped;
   trace.sky.clear();
   trace.depth = options.depth_weight > 0;
   if (options.background == "sky") trace.sky = even_sky(options.sky_degree, background);

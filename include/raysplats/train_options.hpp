@@ -143,6 +143,7 @@ struct TrainOptions {
   double adam_beta2 = 0.999;
   double adam_epsilon = 1e-15;
   bool sparse_adam = false;
+  bool raise_clamped = true;  ///< as TraceOptions::raise_clamped, which is not read
   RunShare average_from = 0.85;  ///< the model is the mean of the parameters from here on; 0 = off
 
   // Ray tracing

@@ -126,6 +126,29 @@ TEST_CASE("gradients of every SH degree, the direction's part included") {
   }
 }
 
+TEST_CASE("what raises a clamped colour passes where it is asked for [small]") {
+  Context context = make_test_context();
+  Gaussians dark = reference::random_scene(60, 22, 0);
+  for (std::size_t i = 0; i < dark.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) dark.sh[3 * i + k] = i % 2 == 0 ? -2.5f : 0.5f;
+  }
+  const Camera camera = reference::cube_camera(12, 10);
+  double moved[2] = {};
+  for (const bool raises : {false, true}) {
+    CAPTURE(raises);
+    TraceOptions options;
+    options.raise_clamped = raises;
+    CHECK_ERRORS(compare_gradients(context, dark, options, camera), 1e-3);
+    const HostGradients found = gradients_on_device(
+        context, dark, options, camera, ScaleActivation::kExp,
+        std::vector<float>(4 * static_cast<std::size_t>(camera.width * camera.height), -1.0f));
+    for (std::size_t i = 0; i < dark.size(); i += 2)
+      moved[raises] += std::abs(static_cast<double>(found.sh[3 * i]));
+  }
+  CHECK(moved[0] == 0.0);
+  CHECK(moved[1] > 0.0);
+}
+
 TEST_CASE("gradients of opaque and of vanishing Gaussians") {
   Context context = make_test_context();
   Gaussians model = reference::random_scene(200, 23, 0);

@@ -75,6 +75,52 @@ TEST_CASE("points without colours, or that few photos see, are believed") {
   CHECK(match_points({}, cameras, photos).seen == 0);
 }
 
+TEST_CASE("points of one colour start with the photos' colours") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const std::vector<Camera> cameras = cameras_of(photos);
+  const PointCloud sound = points_of_wall([](const glm::dvec3& p) { return p; });
+  CHECK(!colorless(sound));
+  PointCloud black = sound;
+  black.colors.assign(black.colors.size(), 0.0f);
+  CHECK(colorless(black));
+  const PointCloud found = colored_by_photos(black, photos);
+  double difference = 0;
+  for (std::size_t i = 0; i < sound.colors.size(); ++i) {
+    difference += std::abs(static_cast<double>(found.colors[i] - sound.colors[i])) /
+                  static_cast<double>(sound.colors.size());
+  }
+  CHECK(difference < 0.03);
+  Dataset dataset;
+  dataset.points = black;
+  const Gaussians model = initial_model(
+      dataset, cameras, [&photos](PhotoChoice) -> const auto& { return photos; }, 1000, {});
+  CHECK(*std::max_element(model.sh.begin(), model.sh.end()) > 0.5f);
+}
+
+TEST_CASE("of a cloud that is mostly out of sight the start takes what the photos see") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const std::vector<Camera> cameras = cameras_of(photos);
+  const PointCloud sound = points_of_wall([](const glm::dvec3& p) { return p; });
+  const std::size_t seen = seen_points(sound, cameras).size();
+  CHECK(seen > sound.size() / 2);
+  Dataset dataset;
+  dataset.points = sound;
+  for (int k = 0; k < 9; ++k) {
+    // Behind the cameras.
+    for (std::size_t i = 0; i < sound.positions.size(); i += 3) {
+      dataset.points.positions.push_back(-50.0f - static_cast<float>(k));
+      dataset.points.positions.push_back(sound.positions[i + 1]);
+      dataset.points.positions.push_back(sound.positions[i + 2]);
+      dataset.points.colors.insert(dataset.points.colors.end(), {0.1f, 0.6f, 0.3f});
+    }
+  }
+  CHECK(seen_share(dataset.points.positions, cameras) < 0.2);
+  const Gaussians model = initial_model(
+      dataset, cameras, [&photos](PhotoChoice) -> const auto& { return photos; }, 4000, {});
+  for (std::size_t i = 0; i < model.size(); ++i) REQUIRE(model.means[3 * i] > 0.0f);
+  CHECK(model.size() > 1500);
+}
+
 TEST_CASE("a start leaves points out that the photos contradict, unless it is told not to") {
   const std::vector<SmallPhoto> photos = photos_of_wall();
   const std::vector<Camera> cameras = cameras_of(photos);
