@@ -37,8 +37,9 @@ constexpr double kUnsureShare = 0.25;     // of a start from photos alone: point
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
-constexpr double kMostlySeen = 0.5;  // of sparse points
-constexpr double kLeastSeen = 0.01;  // of a given model: what photos of its scene see more of
+constexpr double kMostlyBare = 0.55;  // of what photos show, with no sparse point near
+constexpr double kMostlySeen = 0.5;   // of sparse points
+constexpr double kLeastSeen = 0.01;   // of a given model: what photos of its scene see more of
 
 // Balanced k-d tree laid out in place: the median of a range is its node, its halves are the
 // children.
@@ -386,7 +387,10 @@ Gaussians initial_model(const Dataset& dataset,
   PointCloud points;
   if (has_points && (options.init == "auto" || options.init == "colmap")) {
     points = start_points(dataset, cameras, photos, count, options);
-    const std::size_t most = share(kStartShare);
+    // Points on one thing alone say nothing of what is around it.
+    const bool bare = options.init == "auto" && points.size() >= kFewPoints &&
+                      bare_share(points, photos(PhotoChoice::kSome)) > kMostlyBare;
+    const std::size_t most = share(bare ? kStartShare - kPhotoShare : kStartShare);
     if (points.size() > most) {
       spdlog::info(
           "the start takes {} of {} sparse points, so that at most {} Gaussians have room to grow "
@@ -394,9 +398,16 @@ Gaussians initial_model(const Dataset& dataset,
           most, points.size(), limit);
     }
     // Sizes follow from the distances between the points that are left.
-    if (options.init == "colmap" || points.size() >= std::min(kFewPoints, count / 2))
+    if (options.init == "colmap" || (!bare && points.size() >= std::min(kFewPoints, count / 2)))
       return start(subset(points, most));
-    if (points.size() > 0) {
+    if (bare) {
+      spdlog::info(
+          "the sparse points lie on a small part of what the photos show: the start takes {} "
+          "points "
+          "from the photos as well",
+          count);
+      points = subset(points, most);
+    } else if (points.size() > 0) {
       spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
                    points.size(), count);
     }

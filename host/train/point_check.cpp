@@ -19,11 +19,12 @@ constexpr std::size_t kLooks = 2000;    // points that are looked at
 constexpr std::size_t kFewLooks = 100;  // that the photos see; fewer tell nothing
 constexpr double kLeastSeen = 0.3;
 constexpr double kMostDifference = 0.77;
-constexpr double kClearlyBetter = 0.6;    // at another scale
-constexpr std::size_t kFewerLooks = 500;  // at every scale
-constexpr int kScaleSteps = 20;           // of half an octave, up and down
-constexpr float kOneColor = 0.004f;       // no two of 256 steps apart
-constexpr double kEvenColors = 1e-4;      // squared difference of points that tell nothing
+constexpr double kClearlyBetter = 0.6;      // at another scale
+constexpr std::size_t kFewerLooks = 500;    // at every scale
+constexpr int kScaleSteps = 20;             // of half an octave, up and down
+constexpr float kOneColor = 0.004f;         // no two of 256 steps apart
+constexpr std::size_t kMostPlaces = 20000;  // of points that fill cells
+constexpr double kEvenColors = 1e-4;        // squared difference of points that tell nothing
 
 glm::dvec3 triple(const std::vector<float>& values, std::size_t i) {
   return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
@@ -158,6 +159,35 @@ PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> phot
     }
   }
   return points;
+}
+
+double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) {
+  const std::size_t looks = std::min(kMostPlaces, points.size());
+  std::size_t shown = 0, bare = 0;
+  for (const SmallPhoto& photo : photos) {
+    const int columns = photo.camera.width / kBareCell, rows = photo.camera.height / kBareCell;
+    const auto cell = [columns](int column, int row) {
+      return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+             static_cast<std::size_t>(column);
+    };
+    std::vector<bool> taken(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+    for (std::size_t k = 0; k < looks; ++k) {
+      const auto place = photo.sees(triple(points.positions, k * points.size() / looks));
+      if (!place) continue;
+      const int column = static_cast<int>(place->x) / kBareCell;
+      const int row = static_cast<int>(place->y) / kBareCell;
+      if (column < columns && row < rows) taken[cell(column, row)] = true;
+    }
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        const glm::dvec2 middle((column + 0.5) * kBareCell, (row + 0.5) * kBareCell);
+        if (!photo.known(middle) || photo.at(middle).w < 0.5) continue;
+        ++shown;
+        bare += taken[cell(column, row)] ? 0 : 1;
+      }
+    }
+  }
+  return shown > 0 ? static_cast<double>(bare) / static_cast<double>(shown) : 0;
 }
 
 bool plausible(const PointMatch& match) {

@@ -42,6 +42,11 @@ bool colorless(const PointCloud& points);
 /// The points in the colours in which photos show them: of each the median, grey where none does.
 PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> photos);
 
+/// The share of what the photos show that lies in places without a point: cells of kBareCell pixels
+/// a side, but for those that are transparent or masked out. 0 where nothing is shown.
+double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos);
+constexpr int kBareCell = 10;
+
 /// Whether points can be where they are: not when they are in other units or axes than the cameras.
 bool plausible(const PointMatch& match);
 

@@ -97,6 +97,38 @@ TEST_CASE("points of one colour start with the photos' colours") {
   CHECK(*std::max_element(model.sh.begin(), model.sh.end()) > 0.5f);
 }
 
+TEST_CASE("points on a small part of what photos show are joined by points of the photos") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const std::vector<Camera> cameras = cameras_of(photos);
+  const PointCloud sound = points_of_wall([](const glm::dvec3& p) { return p; });
+  CHECK(bare_share(sound, photos) < 0.3);
+  CHECK(bare_share({}, photos) == 1.0);
+  const auto place = [](const glm::dvec3& p) { return glm::dvec3(p.x, 0.1 * p.y, 0.1 * p.z); };
+  PointCloud small = points_of_wall(place);
+  for (std::size_t i = 0; i < small.size(); ++i) {
+    const glm::dvec3 p(small.positions[3 * i], small.positions[3 * i + 1],
+                       small.positions[3 * i + 2]);
+    const glm::dvec4 color = wall({{0, 0, 0}, p / 4.0, true});
+    for (int k = 0; k < 3; ++k)
+      small.colors[3 * i + static_cast<std::size_t>(k)] = static_cast<float>(color[k]);
+  }
+  CHECK(bare_share(small, photos) > 0.8);
+  Dataset dataset;
+  dataset.points = small;
+  const auto spread = [&](const char* init) {
+    TrainOptions options;
+    options.init = init;
+    const Gaussians model = initial_model(
+        dataset, cameras, [&photos](PhotoChoice) -> const auto& { return photos; }, 4000, options);
+    double most = 0;
+    for (std::size_t i = 0; i < model.size(); ++i)
+      most = std::max(most, std::abs(static_cast<double>(model.means[3 * i + 1])));
+    return most;
+  };
+  CHECK(spread("colmap") < 0.16);
+  CHECK(spread("auto") > 0.5);
+}
+
 TEST_CASE("of a cloud that is mostly out of sight the start takes what the photos see") {
   const std::vector<SmallPhoto> photos = photos_of_wall();
   const std::vector<Camera> cameras = cameras_of(photos);
