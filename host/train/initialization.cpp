@@ -403,8 +403,7 @@ Gaussians initial_model(const Dataset& dataset,
     if (bare) {
       spdlog::info(
           "the sparse points lie on a small part of what the photos show: the start takes {} "
-          "points "
-          "from the photos as well",
+          "points from the photos as well",
           count);
       points = subset(points, most);
     } else if (points.size() > 0) {

@@ -105,12 +105,12 @@ TEST_CASE("round Gaussians turn their third axis to the nearest camera") {
   }
 }
 
-TEST_CASE("flat Gaussians end flat, and cost about half a decibel before a wall") {
+TEST_CASE("flat Gaussians end flat, and cost at most half a decibel before a wall") {
   const TemporaryDirectory folder;
   Context context{test_device()};
   const fs::path data = folder.path() / "data";
   make_photos(data, 48, 20, 4, SyntheticScene::kForward);
-  TrainOptions options = short_training(400);
+  TrainOptions options = short_training(800);
   const auto trained = [&](bool flat, const fs::path& run) {
     options.flat = flat;
     Trainer trainer(context, load_dataset(data), options, run);
@@ -124,9 +124,9 @@ TEST_CASE("flat Gaussians end flat, and cost about half a decibel before a wall"
     flat += trained(true, folder.path() / ("flat" + std::to_string(seed))) / 5;
   }
   MESSAGE("PSNR " << round << " dB, flat " << flat);
-  CHECK(flat > round - 0.6);
+  CHECK(flat > round - 0.5);
   const Gaussians model =
-      read_model(folder.path() / "flat4/point_cloud/iteration_400/point_cloud.ply");
+      read_model(folder.path() / "flat4/point_cloud/iteration_800/point_cloud.ply");
   for (std::size_t i = 0; i < model.size(); ++i) {
     std::array<float, 3> s{};
     std::copy_n(model.log_scales.begin() + 3 * static_cast<std::ptrdiff_t>(i), 3, s.begin());
