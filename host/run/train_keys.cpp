@@ -285,6 +285,10 @@ void add_optimiser_keys(TrainTable& t, TrainOptions& o) {
   t.fitted_end("scale-lr", o.scale_lr, "0.32 / sqrt(iterations), from 0.005 to 0.02");
   t.number("opacity-lr", o.opacity_lr.initial, 0, 1e3, "learning rate of the opacity parameters");
   t.fitted_end("opacity-lr", o.opacity_lr, "1.9 / sqrt(iterations), from 0.03 to 0.1");
+  t.number("color-range", o.color_range, 0, 1e6,
+           "range of the photos' colours, from the 1st to the 99th percentile of a channel: below "
+           "0.8 the next three rates are as much smaller as it is (in fog, at night); 0 = that of "
+           "the photos, which the run's configuration then names");
   t.number("sh-lr", o.sh_lr.initial, 0, 1e3, "learning rate of colour (SH band 0)");
   t.fitted_end("sh-lr", o.sh_lr, "0.16 / sqrt(iterations), from 0.0025 to 0.01");
   t.number(

@@ -8,12 +8,15 @@
 #include <numeric>
 
 #include "scene/camera_model.hpp"
+#include "scene/statistics.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr std::size_t kColorBins = 32;  // per channel
 constexpr double kSharedColor = 0.2;    // share of the pixels that makes a colour the ground's
+
+constexpr std::array<double, 2> kColorEnds{0.01, 0.99};  // what few pixels show sets no range
 
 // The pixel that contains an image point.
 struct Pixel {
@@ -146,6 +149,25 @@ std::array<float, 3> typical_color(std::span<const SmallPhoto> photos) {
   if (chosen.weight == 0) return out;
   for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<float>(chosen.color[c] / chosen.weight);
   return out;
+}
+
+double color_range(std::span<const SmallPhoto> photos) {
+  std::array<std::vector<double>, 3> channels;
+  for (const SmallPhoto& photo : photos) {
+    for (int y = 0; y < photo.picture->height; ++y) {
+      for (int x = 0; x < photo.picture->width; ++x) {
+        const std::array<float, 4> rgba = photo.color(x, y);
+        if (rgba[3] < 0.5f || photo.picture->weight(x, y) < 0.5f) continue;
+        for (std::size_t c = 0; c < 3; ++c) channels[c].push_back(static_cast<double>(rgba[c]));
+      }
+    }
+  }
+  double range = 1.0 / 255;
+  for (std::vector<double>& channel : channels) {
+    const std::vector<double> ends = quantiles(std::move(channel), kColorEnds);
+    range = std::max(range, ends[1] - ends[0]);
+  }
+  return range;
 }
 
 }  // namespace raysplats

@@ -49,4 +49,8 @@ double opaque_share(std::span<const SmallPhoto> photos);
 /// of a pixel; black when none counts.
 std::array<float, 3> typical_color(std::span<const SmallPhoto> photos);
 
+/// The range that the photos' colours take: from the 1st to the 99th percentile, of the channel
+/// that has the widest. Of pixels that show something and count; at least a step of 8 bits.
+double color_range(std::span<const SmallPhoto> photos);
+
 }  // namespace raysplats

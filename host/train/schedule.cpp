@@ -42,6 +42,8 @@ constexpr FittedRate kShFinalRate{0.005, 0.0025, 0.01};
 constexpr FittedRate kShRestRate{0.003, 0.0005, 0.003};
 constexpr FittedRate kShRestFinalRate{0.001, 0.000125, 0.001};
 
+constexpr double kUsualColorRange = 0.8;  // below, photos lack contrast
+
 // By the root of the number of steps, as far as a walk of that many steps leads.
 double fitted(const FittedRate& rate, const TrainOptions& options) {
   const auto steps = static_cast<double>(std::max<std::int64_t>(options.iterations, 1));
@@ -93,6 +95,10 @@ LearningRate sh_rest_rate(const TrainOptions& options) {
   if (rate.initial == kFitted)
     rate.initial = std::max(fitted(kShRestRate, options), rate.final_value);
   return with_end(rate, kShRestFinalRate, options);
+}
+
+double color_share(const TrainOptions& options) {
+  return options.color_range > 0 ? std::min(options.color_range / kUsualColorRange, 1.0) : 1.0;
 }
 
 LearningRate position_rate(const TrainOptions& options) {

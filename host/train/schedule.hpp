@@ -14,8 +14,8 @@ namespace raysplats {
 /// What changes with the iteration, as pure functions of it, so that a resumed run continues
 /// exactly. Iterations are counted from 0: the first step of a run is iteration 0.
 
-/// Iterations of a run on so many training photos: as they are given, or 100 passes over the photos,
-/// from 1000 to 10 000 iterations.
+/// Iterations of a run on so many training photos: as they are given, or 100 passes over the
+/// photos, from 1000 to 10 000 iterations.
 std::int64_t run_length(const TrainOptions& options, std::size_t photos);
 
 /// Learning rate of a group. With lr-decay = d > 0: initial * exp(-d * iteration) until it meets
@@ -31,6 +31,11 @@ LearningRate scale_rate(const TrainOptions& options);
 LearningRate opacity_rate(const TrainOptions& options);
 LearningRate sh_rate(const TrainOptions& options);
 LearningRate sh_rest_rate(const TrainOptions& options);
+
+/// What rates of colours are multiplied by: photos of a small range (fog, night) are the same scene
+/// in smaller numbers, and steps that do not shrink with them are noise there. 1 where the range is
+/// usual, or not known yet.
+double color_share(const TrainOptions& options);
 
 /// Whether Gaussians begin at random places, where they stand in front of each other, have far to
 /// go, and many are to go altogether. The mcmc strategy moves and revives them by itself.

@@ -32,8 +32,9 @@ AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t
   rates.scales = (options.scale_lr_by_extent ? extent : 1.0) *
                  learning_rate(scale_rate(options), options, iteration);
   rates.opacities = learning_rate(opacity_rate(options), options, iteration);
-  rates.sh_dc = learning_rate(sh_rate(options), options, iteration);
-  rates.sh_rest = learning_rate(sh_rest_rate(options), options, iteration);
+  const double color = color_share(options);
+  rates.sh_dc = color * learning_rate(sh_rate(options), options, iteration);
+  rates.sh_rest = color * learning_rate(sh_rest_rate(options), options, iteration);
   return rates;
 }
 

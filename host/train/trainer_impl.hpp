@@ -89,6 +89,7 @@ struct Trainer::Impl {
   const std::vector<SmallPhoto>& photos(PhotoChoice choice);
   std::vector<SmallPhoto> reduced_photos(std::span<const std::size_t> views) const;
   void choose_background();
+  void choose_color_range();
   void forget_sky();
   void forget_poses();
   std::size_t pass_steps() const;

@@ -215,6 +215,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   // While the start is made: those of the steps that are timed.
   begin_programs({active_sh_degree(options, 0), active_sh_degree(options, options.iterations / 2)});
   choose_background();
+  choose_color_range();
   first_model = initial_model(
       dataset, train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
       most, options);

@@ -189,6 +189,9 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
   if (options.background == "auto" && !checkpoint.config.empty())
     options.background = parse_train_config(checkpoint.config).background;
   background = background_color(options, cut_out);
+  if (options.color_range == 0 && !checkpoint.config.empty())
+    options.color_range = parse_train_config(checkpoint.config).color_range;
+  if (options.color_range == 0) options.color_range = 1;  // of a version that had none
   guard.restore(
       {checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false, checkpoint.capped_rays});
   reported_bad_steps = checkpoint.bad_steps;

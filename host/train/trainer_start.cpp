@@ -107,6 +107,11 @@ void Trainer::Impl::choose_background() {
   background = background_color(options, cut_out);
 }
 
+// The run's configuration names it from then on.
+void Trainer::Impl::choose_color_range() {
+  if (options.color_range == 0) options.color_range = color_range(photos(PhotoChoice::kSome));
+}
+
 // Steps in which every view of the loss is seen once.
 std::size_t Trainer::Impl::pass_steps() const {
   const auto together = static_cast<std::size_t>(options.views_per_step);
@@ -194,6 +199,7 @@ void Trainer::Impl::start() {
   } else {
     upload_start(most);
     choose_background();
+    choose_color_range();
     if (overwrite) run.remove_after(0);
     run.begin_metrics(0);
     started = true;

@@ -93,7 +93,8 @@ void Trainer::Impl::enqueue_step() {
     density.accumulate(gaussians, gradients.gaussians, &guard.mark());
   if (sky) {
     sky->step(several ? gradients.sky : tracer.sky()->gradient(), tracer.sky()->coefficients(),
-              learning_rate(options.sky_lr, options, iteration), guard.mark());
+              color_share(options) * learning_rate(options.sky_lr, options, iteration),
+              guard.mark());
   }
   GaussianGradients& slopes = gradients.gaussians;
   if (mcmc) mcmc->press(gaussians, slopes, guard.mark());

@@ -133,9 +133,10 @@ struct TrainOptions {
   LearningRate rotation_lr{3e-3, kFitted};
   LearningRate scale_lr{kFitted, kFitted};
   LearningRate opacity_lr{1e-1, kFitted};
-  LearningRate sh_lr{1e-2, kFitted};
+  LearningRate sh_lr{1e-2, kFitted};  ///< this and the next two: times color_share()
   LearningRate sh_rest_lr{kFitted, kFitted};
   LearningRate sky_lr{1e-2, 1e-3};
+  double color_range = 0;            ///< of the photos, as color_range(); 0 = measured
   LearningRate pose_lr{5e-3, 5e-4};  ///< radians, and shares of the scene extent
   double lr_decay = 0.0;  ///< per iteration; 0 reaches the final values in the last iteration
   bool scale_lr_by_extent = false;
@@ -143,7 +144,7 @@ struct TrainOptions {
   double adam_beta2 = 0.999;
   double adam_epsilon = 1e-15;
   bool sparse_adam = false;
-  bool raise_clamped = true;  ///< as TraceOptions::raise_clamped, which is not read
+  bool raise_clamped = true;     ///< as TraceOptions::raise_clamped, which is not read
   RunShare average_from = 0.85;  ///< the model is the mean of the parameters from here on; 0 = off
 
   // Ray tracing

@@ -101,6 +101,25 @@ TEST_CASE("sweeping finds a textured wall and its colours") {
   CHECK(near > points.size() * 6 / 10);
 }
 
+TEST_CASE("the range of colours is that of the widest channel, without the few pixels beyond") {
+  const auto ramp = [](double low, double high) {
+    return [low, high](const CameraRay& ray) {
+      const double x = 0.5 * (1 + ray.direction.y / ray.direction.x);
+      if (ray.direction.z > 0.7) return glm::dvec4(0, 0, 1, 0);  // nothing there
+      return glm::dvec4(low + (high - low) * std::clamp(x, 0.0, 1.0), 0.3, 0.3, 1);
+    };
+  };
+  const Camera camera = look_at({0, 0, 0}, {4, 0, 0}, {0, 0, 1}, 100, 100, 50);
+  std::vector<SmallPhoto> photos{photo_of(camera, ramp(0.2, 0.3)),
+                                 photo_of(camera, ramp(0.2, 0.3))};
+  CHECK(color_range(photos) == doctest::Approx(0.098).epsilon(0.03));
+  photos[1].gain = {3.0f, 1.0f, 1.0f};  // as balance() says
+  CHECK(color_range(photos) == doctest::Approx(0.69).epsilon(0.03));
+  CHECK(color_range({}) == doctest::Approx(1.0 / 255));
+  photos = {photo_of(camera, ramp(0.4, 0.4))};
+  CHECK(color_range(photos) == doctest::Approx(1.0 / 255));
+}
+
 TEST_CASE("photos of other exposures agree once they are balanced") {
   std::vector<SmallPhoto> photos;
   for (int i = 0; i < 9; ++i) {

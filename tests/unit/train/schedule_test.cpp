@@ -66,6 +66,24 @@ TEST_CASE("rates that fit the run fall with the root of its length, and given on
   check(rates_of(1000), {0.001, 0.001, 0.0002, 0.0002});
 }
 
+TEST_CASE("rates of colours shrink with the range that photos take, as far as it is small") {
+  TrainOptions options;
+  options.iterations = 1000;
+  const AdamRates usual = adam_rates_of(options, 2.0, 0);
+  for (const double range : {0.8, 1.0, 20.0}) {
+    options.color_range = range;
+    CHECK(adam_rates_of(options, 2.0, 0).sh_dc == usual.sh_dc);
+  }
+  options.color_range = 0.08;
+  const AdamRates fog = adam_rates_of(options, 2.0, 999);
+  options.color_range = 0;
+  const AdamRates last = adam_rates_of(options, 2.0, 999);
+  CHECK(fog.sh_dc == doctest::Approx(0.1 * last.sh_dc));
+  CHECK(fog.sh_rest == doctest::Approx(0.1 * last.sh_rest));
+  CHECK(fog.means == last.means);
+  CHECK(fog.opacities == last.opacities);
+}
+
 TEST_CASE("the last rates fall with the root of the run's length, unless they are given") {
   TrainOptions options;
   const auto check_last = [&options](std::int64_t iterations, double rotation, double opacity,

@@ -259,6 +259,9 @@ TEST_CASE("training leaves the files of a run") {
   // Photos on black ground: that is their background, which the configuration names.
   CHECK(read.background.starts_with("0.00"));
   options.background = read.background;
+  CHECK(read.color_range > 0.5);
+  CHECK(read.color_range <= 1.0);
+  options.color_range = read.color_range;
   options.data.origin = read.data.origin;  // which the run has found
   CHECK(to_toml(read) == to_toml(options));
   CHECK(nlohmann::json::parse(std::ifstream(folder / "cameras.json")).size() == 8);
