@@ -45,6 +45,11 @@
 // Lines of sums per Gaussian.
 #define RS_RAY_LINES (RS_RAY_SUMS / 16)
 
+// dL/dcolour before it is clamped (shared/color.h).
+RS_SHARE float3 passed_to(const float3 color, const float3 gradient) {
+  return RS_COLOR_PASSES(color, gradient) && color < RS_MAX_COLOR ? gradient : (float3)(0.0f);
+}
+
 typedef struct {
   // Read only.
   __global const float* records;
@@ -137,8 +142,7 @@ RS_SHARE void add_coefficients(const LineSums* sums,
 
 #if KEPT
 // Adds what a hit brings, one share after the other: together they would take most of the
-// registers. `basis`: of the hit (ray_color.h); `by_color` = dL/dcolour, zero where the colour is
-// clamped.
+// registers. `basis`: of the hit (ray_color.h); `by_color` = dL/dcolour before it is clamped.
 RS_INLINE void add_hit(const RayScene* scene,
                        const RayData* ray,
                        const float* basis,
@@ -198,15 +202,13 @@ RS_INLINE void blend_hits(const RayScene* scene,
     state->stopped = state->transmittance < scene->min_transmittance || state->room == 0;
     const float behind =
         state->stopped ? dot(state->background, gradient) : state->behind / state->transmittance;
-    // Nothing passes where the colour is clamped.
-    const float3 by_color =
-        color > 0.0f && color < RS_MAX_COLOR ? before * alpha * gradient : (float3)(0.0f);
+    const float3 by_color = passed_to(color, before * alpha * gradient);
     add_hit(scene, ray, basis, pending, k, before * (projected - behind), by_color, state);
   }
 }
 #else
-// Adds what one hit contributes: `by_alpha` = dL/dalpha, `by_color` = dL/dcolour, zero where the
-// colour is clamped.
+// Adds what one hit contributes: `by_alpha` = dL/dalpha, `by_color` = dL/dcolour before it is
+// clamped.
 RS_INLINE void add_hit(const RayScene* scene,
                        const RayData* ray,
                        const float* basis_of_ray,
@@ -284,9 +286,7 @@ RS_INLINE void blend_hits(const RayScene* scene,
     const float alpha = pending->alpha[i];
     const float3 color = pending->color[i].xyz;
     const float projected = dot(color, gradient) + state->gradient.w;
-    // Nothing passes where the colour is clamped.
-    const float3 by_color =
-        color > 0.0f && color < RS_MAX_COLOR ? before[i] * alpha * gradient : (float3)(0.0f);
+    const float3 by_color = passed_to(color, before[i] * alpha * gradient);
     add_hit(scene, ray, basis, pending->index[i], alpha, before[i] * (projected - behind), by_color,
             state);
     behind = alpha * projected + (1.0f - alpha) * behind;

@@ -209,7 +209,7 @@ Parameters ray_gradient(const Parameters& parameters,
       const std::size_t i = hit.index;
       const glm::dvec3 towards = from_origin ? prepared[i].mean - query.origin : query.direction;
       const glm::dvec3 by_offset =
-          color_backward(parameters, i, towards, sums[i].color, false, out);
+          color_backward(parameters, i, towards, sums[i].color, options.raise_clamped, out);
       for (int k = 0; from_origin && k < 3; ++k)
         out.means[3 * i + static_cast<std::size_t>(k)] += by_offset[k];
       sums[i].color = glm::dvec3(0.0);

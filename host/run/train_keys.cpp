@@ -308,8 +308,7 @@ void add_optimiser_keys(TrainTable& t, TrainOptions& o) {
   t.number("adam-epsilon", o.adam_epsilon, 1e-30, 1, "added to the root of the second moment");
   t.flag("sparse-adam", o.sparse_adam, "leave Gaussians alone that no ray of the view met");
   t.flag("raise-clamped", o.raise_clamped,
-         "Gaussians whose colour fell below black are still made brighter where that helps (in "
-         "views traced by tiles)");
+         "Gaussians whose colour fell below black are still made brighter where that helps");
   t.share(
       "average-from", o.average_from, true,
       "share of the run, or iteration, from which on the model is the mean of the parameters of "

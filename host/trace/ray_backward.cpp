@@ -135,7 +135,8 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   const bool cpu = device.type == DeviceType::kCpu;
   const bool ordered = order_.compute(tree, rays, count);
   BuildOptions build = ray_walk_build(device, options, tracer_->near(), tree.lanes(), degree_);
-  sums_.define(build.define("SH_DEGREE", degree_).define("RAY_SLOPES", slopes != nullptr ? 1 : 0));
+  sums_.define(build.define("SH_DEGREE", degree_).define("RAY_SLOPES", slopes != nullptr ? 1 : 0)
+                   .define("RAISE_CLAMPED", options.raise_clamped ? 1 : 0));
   const std::size_t chunk = cpu ? kCpuChunk : 1;
   // Rays that all work-items, or a group of them, take in one turn: bands of whole rows leave every
   // ray with the copy that it would go to without.

@@ -69,7 +69,7 @@ struct TraceOptions {
   GradientSum gradient_sum = GradientSum::kAuto;
   bool deterministic = false;      ///< kAuto gives the same bits every time; on CPUs it always does
   /// The derivative of a colour that is clamped at 0 is 0. With this, gradients that would raise it
-  /// pass all the same, in views that are traced by tiles: training needs them.
+  /// pass all the same: training needs them.
   bool raise_clamped = false;
   double launch_budget_ms = -1.0;  ///< time of one launch; 0 = unbounded, -1 = the device's default
   std::size_t memory_budget = 0;   ///< bytes for hit lists and private gradients; 0 = 1 GiB on

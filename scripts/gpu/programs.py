@@ -23,7 +23,7 @@ SWAP = dict(ATOMIC, FLOAT_ATOMICS=0)
 EXACT = dict(SWAP, EXACT_SUMS=1)
 # ray_launch.cpp, ray_backward.cpp.
 WALK = dict(LANES=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_LIMIT=0, LENS=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
-RAY_BACKWARD = dict(WALK, RAY_SLOPES=0)
+RAY_BACKWARD = dict(WALK, RAY_SLOPES=0, RAISE_CLAMPED=1)
 RAY_GRADIENTS = dict(SIGMOID_SCALE=0, LANES=1, GROUP=64)
 # image_loss.cpp: groups, or what devices get whose groups are smaller.
 LOSS = dict(LANES=1, TILE=16, ROWS=1, PIXEL_L2=0)

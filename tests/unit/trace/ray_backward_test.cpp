@@ -185,6 +185,30 @@ TEST_CASE("gradients of a few arbitrary rays equal the double reference [small]"
   check_every_variant(reference::random_scene(24, 72, 1), random_rays(30, 22));
 }
 
+TEST_CASE("what raises a clamped colour passes to rays where it is asked for [small]") {
+  Context context = make_test_context();
+  Gaussians dark = reference::random_scene(60, 74, 0);
+  for (std::size_t i = 0; i < dark.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) dark.sh[3 * i + k] = i % 2 == 0 ? -2.5f : 0.5f;
+  }
+  const std::vector<Ray> rays = random_rays(100, 25);
+  double moved[2] = {};
+  for (const bool raises : {false, true}) {
+    CAPTURE(raises);
+    TraceOptions options;
+    options.raise_clamped = raises;
+    CHECK_ERRORS(compare_gradients(context, dark, options, rays, ColorDirection::kRay), 1e-3);
+    const Gradients wish(rays.size(), {-1.0f, -1.0f, -1.0f, -1.0f});
+    const HostGradients found =
+        gradients_on_device(context, DeviceGaussians::upload(context, dark, ScaleActivation::kExp),
+                            options, rays, wish, ColorDirection::kRay);
+    for (std::size_t i = 0; i < dark.size(); i += 2)
+      moved[raises] += std::abs(static_cast<double>(found.sh[3 * i]));
+  }
+  CHECK(moved[0] == 0.0);
+  CHECK(moved[1] > 0.0);
+}
+
 TEST_CASE("gradients of arbitrary rays for every SH degree and vector width") {
   Context context = make_test_context();
   for (int degree = 0; degree <= 4; ++degree) {
