@@ -159,14 +159,15 @@ Json describe(const Dataset& dataset) {
   for (const auto& [size, count] : sizes) {
     size_list.push_back({{"width", size.first}, {"height", size.second}, {"views", count}});
   }
-  const bool distorted =
-      std::any_of(dataset.views.begin(), dataset.views.end(),
-                  [](const View& view) { return view.source_camera.distortion.any(); });
+  const auto has_lens = [](const View& view) {
+    return view.source_camera.distortion.any() ||
+           view.source_camera.model == CameraModel::kPhotoLens;
+  };
+  const bool distorted = std::any_of(dataset.views.begin(), dataset.views.end(), has_lens);
   // Loading leaves the lenses that it cannot take out.
-  const bool undistorted =
-      std::any_of(dataset.views.begin(), dataset.views.end(), [](const View& view) {
-        return view.source_camera.distortion.any() && !view.camera.distortion.any();
-      });
+  const bool undistorted = std::any_of(
+      dataset.views.begin(), dataset.views.end(),
+      [&](const View& view) { return has_lens(view) && !view.camera.distortion.any(); });
   std::map<std::string, std::size_t> models;
   for (const View& view : dataset.views) ++models[model_name(view.camera.model)];
   Json model_list = Json::object();

@@ -159,6 +159,8 @@ const char* model_name(CameraModel model) {
       return "equirectangular";
     case CameraModel::kOrthographic:
       return "orthographic";
+    case CameraModel::kPhotoLens:
+      return "of photos alone";
     case CameraModel::kPinhole:
       break;
   }

@@ -21,6 +21,8 @@
 #include "io/image_file.hpp"
 #include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
+#include "scene/photo_lens.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -32,25 +34,25 @@ namespace fs = std::filesystem;
 struct ModelType {
   const char* name;
   std::size_t parameters;
-  bool supported;
+  bool two_focal_lengths;
 };
-constexpr std::array<ModelType, 18> kModels{{{"SIMPLE_PINHOLE", 3, true},
+constexpr std::array<ModelType, 18> kModels{{{"SIMPLE_PINHOLE", 3, false},
                                              {"PINHOLE", 4, true},
-                                             {"SIMPLE_RADIAL", 4, true},
-                                             {"RADIAL", 5, true},
+                                             {"SIMPLE_RADIAL", 4, false},
+                                             {"RADIAL", 5, false},
                                              {"OPENCV", 8, true},
                                              {"OPENCV_FISHEYE", 8, true},
                                              {"FULL_OPENCV", 12, true},
-                                             {"FOV", 5, false},
-                                             {"SIMPLE_RADIAL_FISHEYE", 4, true},
-                                             {"RADIAL_FISHEYE", 5, true},
-                                             {"THIN_PRISM_FISHEYE", 12, false},
-                                             {"RAD_TAN_THIN_PRISM_FISHEYE", 16, false},
+                                             {"FOV", 5, true},
+                                             {"SIMPLE_RADIAL_FISHEYE", 4, false},
+                                             {"RADIAL_FISHEYE", 5, false},
+                                             {"THIN_PRISM_FISHEYE", 12, true},
+                                             {"RAD_TAN_THIN_PRISM_FISHEYE", 16, true},
                                              {"SIMPLE_DIVISION", 4, false},
-                                             {"DIVISION", 5, false},
-                                             {"SIMPLE_FISHEYE", 3, true},
+                                             {"DIVISION", 5, true},
+                                             {"SIMPLE_FISHEYE", 3, false},
                                              {"FISHEYE", 4, true},
-                                             {"EUCM", 6, false},
+                                             {"EUCM", 6, true},
                                              {"EQUIRECTANGULAR", 2, false}}};
 constexpr std::size_t kMaxParameters = 16;
 constexpr std::size_t kMaxNameBytes = 4096;
@@ -60,27 +62,38 @@ using Fail = std::function<void(const std::string&)>;
 
 /// The model or an error that names it.
 const ModelType& checked_model(const ModelType* model, const std::string& name, const Fail& fail) {
-  if (model == nullptr || !model->supported) {
+  if (model == nullptr) {
     fail(fmt::format(
-        "the camera model {} is not supported, undistort the images to PINHOLE first: found",
-        name));
+        "the camera model {} is not known, undistort the images to PINHOLE first: found", name));
   }
   return *model;
 }
 
-/// The distortion in COLMAP's order of parameters `p`, which are those behind the principal point.
-Distortion make_distortion(std::string_view name, std::span<const double> p, const Fail& fail) {
+/// The lens in COLMAP's order of parameters `p`, which are those behind the principal point;
+/// nothing for models that a Distortion says.
+std::optional<PhotoLens> photo_lens(std::string_view name, std::span<const double> p) {
+  using Form = PhotoLens::Form;
+  if (name == "FULL_OPENCV") {
+    if (p[5] == 0 && p[6] == 0 && p[7] == 0) return std::nullopt;
+    return PhotoLens{Form::kPerspective, {p[0], p[1], p[4]}, {p[5], p[6], p[7]}, p[2], p[3]};
+  }
+  if (name == "FOV") return PhotoLens{Form::kFov, {p[0]}};
+  if (name == "SIMPLE_DIVISION" || name == "DIVISION") return PhotoLens{Form::kDivision, {p[0]}};
+  if (name == "EUCM") return PhotoLens{Form::kEucm, {p[0], p[1]}};
+  if (name == "THIN_PRISM_FISHEYE") {
+    return PhotoLens{Form::kFisheye, {p[0], p[1], p[4], p[5]}, {}, p[2],
+                     p[3],           {p[6], 0.0, p[7], 0.0}};
+  }
+  if (name == "RAD_TAN_THIN_PRISM_FISHEYE") return fisheye624(p.first<12>());
+  return std::nullopt;
+}
+
+/// The distortion in the same order.
+Distortion make_distortion(std::string_view name, std::span<const double> p) {
   Distortion d;
   if (name == "OPENCV" || name == "FULL_OPENCV") {
     d = {p[0], p[1], 0.0, p[2], p[3]};
-    if (name == "FULL_OPENCV") {
-      d.k3 = p[4];
-      if (p[5] != 0 || p[6] != 0 || p[7] != 0) {
-        fail(
-            "a FULL_OPENCV camera has the rational terms k4, k5 or k6, which are not supported, "
-            "undistort the images to PINHOLE first: found");
-      }
-    }
+    if (name == "FULL_OPENCV") d.k3 = p[4];
   } else if (name == "OPENCV_FISHEYE") {
     d.k1 = p[0];
     d.k2 = p[1];
@@ -93,7 +106,12 @@ Distortion make_distortion(std::string_view name, std::span<const double> p, con
   return d;
 }
 
+std::string camera_name(const fs::path& path, std::uint64_t id) {
+  return fmt::format("{}: the camera {}", path.string(), id);
+}
+
 Camera make_camera(const ModelType& model,
+                   const std::string& where,
                    std::uint64_t width,
                    std::uint64_t height,
                    std::span<const double> p,
@@ -108,20 +126,26 @@ Camera make_camera(const ModelType& model,
   camera.width = static_cast<int>(width);
   camera.height = static_cast<int>(height);
   const std::string_view name = model.name;
-  const bool two_focal_lengths = name == "PINHOLE" || name == "OPENCV" || name == "FULL_OPENCV" ||
-                                 name == "FISHEYE" || name == "OPENCV_FISHEYE";
-  const std::size_t center = two_focal_lengths ? 2 : 1;
+  if (name == "EQUIRECTANGULAR") {
+    set_equirectangular(camera);
+    return camera;
+  }
+  const std::size_t center = model.two_focal_lengths ? 2 : 1;
   camera.fx = p[0];
   camera.fy = p[center - 1];
   camera.cx = p[center];
   camera.cy = p[center + 1];
-  camera.distortion = make_distortion(name, p.subspan(center + 2), fail);
+  if (!(camera.fx > 0 && camera.fy > 0)) fail("a camera has a focal length that is not positive");
+  if (const std::optional<PhotoLens> lens = photo_lens(name, p.subspan(center + 2))) {
+    set_photo_lens(camera, *lens, fmt::format("{} ({})", where, name));
+    return camera;
+  }
+  camera.distortion = make_distortion(name, p.subspan(center + 2));
   if (name.ends_with("FISHEYE")) {
     camera.model = CameraModel::kFisheye;
   } else if (camera.distortion.any()) {
     camera.model = CameraModel::kOpenCv;
   }
-  if (!(camera.fx > 0 && camera.fy > 0)) fail("a camera has a focal length that is not positive");
   return camera;
 }
 
@@ -184,10 +208,10 @@ void read_cameras_binary(const fs::path& path, ColmapModel& model) {
     for (std::size_t p = 0; p < checked.parameters; ++p) {
       parameters[p] = reader.read<double>("a camera parameter");
     }
-    add_camera(
-        model, id,
-        make_camera(checked, width, height, std::span(parameters).first(checked.parameters), fail),
-        fail);
+    add_camera(model, id,
+               make_camera(checked, camera_name(path, id), width, height,
+                           std::span(parameters).first(checked.parameters), fail),
+               fail);
   }
 }
 
@@ -207,10 +231,10 @@ void read_cameras_text(const fs::path& path, ColmapModel& model) {
     std::array<double, kMaxParameters> parameters{};
     for (std::size_t p = 0; p < checked.parameters; ++p)
       parameters[p] = reader.number("a camera parameter");
-    add_camera(
-        model, id,
-        make_camera(checked, width, height, std::span(parameters).first(checked.parameters), fail),
-        fail);
+    add_camera(model, id,
+               make_camera(checked, camera_name(path, id), width, height,
+                           std::span(parameters).first(checked.parameters), fail),
+               fail);
   }
 }
 

@@ -38,10 +38,12 @@ struct ColmapModel {
 std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root);
 
 /// Reads cameras, images and points3D (.bin, else .txt) of a folder. Points are optional. Throws
-/// DataError with byte offset or line for malformed files, and for camera models other than
-/// SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV without its rational terms
-/// (these become kOpenCv, or kPinhole where nothing is distorted), SIMPLE_FISHEYE, FISHEYE,
-/// SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (kFisheye).
+/// DataError with byte offset or line for malformed files, and for camera models that are none of
+/// COLMAP 4's: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV without its
+/// rational terms (these become kOpenCv, or kPinhole where nothing is distorted), SIMPLE_FISHEYE,
+/// FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (kFisheye), EQUIRECTANGULAR,
+/// and as kPhotoLens FULL_OPENCV, FOV, THIN_PRISM_FISHEYE, RAD_TAN_THIN_PRISM_FISHEYE,
+/// SIMPLE_DIVISION, DIVISION and EUCM.
 ColmapModel read_colmap_model(const std::filesystem::path& folder);
 
 }  // namespace raysplats::io

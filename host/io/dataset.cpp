@@ -23,6 +23,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
+#include "scene/photo_lens.hpp"
 
 namespace raysplats {
 namespace {
@@ -94,7 +95,7 @@ void set_cameras(
   require_believable(view.source_camera,
                      fmt::format("The camera of the image {}", view.image_path.string()));
   view.sample_bytes = photo.sample_bytes;
-  view.camera = downscaled(view.source_camera, factor);
+  view.camera = downscaled(rendered_camera(view.source_camera), factor);
   if (undistort && view.camera.model == CameraModel::kOpenCv) {
     view.camera.model = CameraModel::kPinhole;
     view.camera.distortion = {};

@@ -19,6 +19,7 @@
 #include "io/npy_file.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
+#include "scene/photo_lens.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -61,12 +62,16 @@ DepthMap read_picture(const std::filesystem::path& path) {
   return out;
 }
 
+// Whether depths are counted along the ray.
+bool counts_along_ray(const Camera& camera) {
+  return camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular ||
+         (camera.lens && camera.lens->form == PhotoLens::Form::kFisheye);
+}
+
 // How deep a camera sees a world point.
 double depth_of(const Camera& camera, const glm::dvec3& world) {
   const glm::dvec3 local = camera.rotation * world + camera.translation;
-  const bool around =
-      camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular;
-  return around ? glm::length(local) : local.z;
+  return counts_along_ray(camera) ? glm::length(local) : local.z;
 }
 
 DepthMap from_map(const DepthMap& map, const View& view) {
@@ -82,12 +87,14 @@ DepthMap from_map(const DepthMap& map, const View& view) {
   }
   const Camera& camera = view.camera;
   const bool same_rays = camera.model == photo.model;
+  const bool other_depths = counts_along_ray(camera) && !counts_along_ray(photo);
   DepthMap out{camera.width, camera.height, {}};
   out.values.resize(area(camera.width, camera.height));
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       // As shares of the photo.
       double across = (x + 0.5) / camera.width, down = (y + 0.5) / camera.height;
+      double share = 1.0;
       if (!same_rays) {
         const CameraRay ray = camera_ray(camera, x + 0.5, y + 0.5);
         if (!ray.valid) continue;
@@ -95,12 +102,14 @@ DepthMap from_map(const DepthMap& map, const View& view) {
         if (!point) continue;
         across = point->x / photo.width;
         down = point->y / photo.height;
+        if (other_depths) share = 1.0 / (camera.rotation * ray.direction).z;
       }
       const auto column = static_cast<int>(std::floor(across * map.width));
       const auto row = static_cast<int>(std::floor(down * map.height));
       if (column < 0 || row < 0 || column >= map.width || row >= map.height) continue;
+      const float depth = map.values[area(map.width, row) + static_cast<std::size_t>(column)];
       out.values[area(camera.width, y) + static_cast<std::size_t>(x)] =
-          map.values[area(map.width, row) + static_cast<std::size_t>(column)];
+          static_cast<float>(share * static_cast<double>(depth));
     }
   }
   return out;

@@ -24,8 +24,9 @@ DepthMap read_depth_map(const std::filesystem::path& path, double unit);
 /// What is known of the depths of a view at the size of its camera: from its depth map where it has
 /// one (the nearest pixel, lenses taken out as for its photo), else those of the sparse points that
 /// it is known to show; empty without both. Along the viewing axis, for fisheye and
-/// equirectangular cameras along the ray. Throws DataError as read_depth_map() and for a map of
-/// another shape than its photo.
+/// equirectangular cameras along the ray (maps of wide photos through lenses of planes, which
+/// become fisheye pictures, are turned into that). Throws DataError as read_depth_map() and for a
+/// map of another shape than its photo.
 DepthMap view_depths(const Dataset& dataset, const View& view, double unit);
 
 /// The same with fewer pixels: the median of what is known in the area of each.

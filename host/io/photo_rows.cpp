@@ -5,11 +5,15 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
+#include <numbers>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
 #include "scene/camera_model.hpp"
+#include "scene/photo_lens.hpp"
 #include "util/srgb.hpp"
 
 namespace raysplats::io {
@@ -105,17 +109,16 @@ class UndistortedRows : public PhotoRows {
       : PhotoRows(source->width(), source->height()),
         source_(std::move(source)),
         camera_(camera),
+        target_(rendered_camera(camera)),
         limit_(lens_limit(CameraModel::kOpenCv, camera.distortion)) {}
 
   void row(int y, float* rgba) override {
     for (int x = 0; x < width(); ++x, rgba += kChannels) {
-      const glm::dvec2 p((x + 0.5 - camera_.cx) / camera_.fx, (y + 0.5 - camera_.cy) / camera_.fy);
-      const glm::dvec2 seen = distort(camera_.distortion, p);
-      const double u = seen.x * camera_.fx + camera_.cx;
-      const double v = seen.y * camera_.fy + camera_.cy;
-      const bool inside = p.x * p.x + p.y * p.y <= limit_ * limit_ && u >= 0 && u <= width() &&
-                          v >= 0 && v <= height();
-      if (inside) {
+      const std::optional<glm::dvec2> seen =
+          place({(x + 0.5 - target_.cx) / target_.fx, (y + 0.5 - target_.cy) / target_.fy});
+      const double u = seen ? seen->x * camera_.fx + camera_.cx : -1.0;
+      const double v = seen ? seen->y * camera_.fy + camera_.cy : -1.0;
+      if (u >= 0 && u <= width() && v >= 0 && v <= height()) {
         interpolate(u, v, rgba);
       } else {
         std::fill(rgba, rgba + kChannels, 0.0f);
@@ -124,6 +127,19 @@ class UndistortedRows : public PhotoRows {
   }
 
  private:
+  /// Where the photo shows what the target has at the normalised point p.
+  std::optional<glm::dvec2> place(const glm::dvec2& p) const {
+    if (!camera_.lens) {
+      if (!(glm::dot(p, p) <= limit_ * limit_)) return std::nullopt;
+      return distort(camera_.distortion, p);
+    }
+    if (target_.model == CameraModel::kPinhole) return lens_point(*camera_.lens, {p.x, p.y, 1.0});
+    const double angle = glm::length(p);
+    if (angle > std::numbers::pi) return std::nullopt;
+    const double sine = angle > 0 ? std::sin(angle) / angle : 1.0;
+    return lens_point(*camera_.lens, {sine * p.x, sine * p.y, std::cos(angle)});
+  }
+
   void interpolate(double u, double v, float* rgba) {
     // Between the outermost pixel centres and the border the border pixel goes on.
     const double px = std::clamp(u - 0.5, 0.0, width() - 1.0);
@@ -150,6 +166,7 @@ class UndistortedRows : public PhotoRows {
 
   std::unique_ptr<PhotoPixels> source_;
   Camera camera_;
+  Camera target_;
   double limit_;
 };
 

@@ -56,9 +56,10 @@ std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,
 /// White whose alpha is the mask, at the size of a photo.
 std::unique_ptr<PhotoPixels> mask_rows(const MaskPlane& mask, int width, int height);
 
-/// The picture that a pinhole camera with the intrinsics and size of this kOpenCv camera would have
-/// taken (bilinear, colours weighted by alpha). Pixels whose ray leaves the photo, or lies beyond
-/// lens_limit(), get alpha 0.
+/// The picture that a camera without a lens of its own would have taken in the place of this one:
+/// for kOpenCv a pinhole with its intrinsics and size, for kPhotoLens rendered_camera() (bilinear,
+/// colours weighted by alpha). Pixels whose ray leaves the photo, or lies beyond the limit of the
+/// lens, get alpha 0.
 std::unique_ptr<PhotoRows> undistorted_rows(std::unique_ptr<PhotoPixels> source,
                                             const Camera& camera);
 /// Alpha 0 where the camera's lens (kOpenCv or kFisheye) sees nothing: beyond the image of

@@ -119,6 +119,8 @@ void set_lens(Camera& out, const SceneCamera& camera) {
     case CameraModel::kEquirectangular:
       out.fx = out.width / (2.0 * std::numbers::pi);
       break;
+    case CameraModel::kPhotoLens:
+      break;  // has no name in scene files
   }
   if (camera.focal) out.fx = *camera.focal;
   out.fy = out.fx;

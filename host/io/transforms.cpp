@@ -10,12 +10,15 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
+#include <span>
 
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
+#include "scene/camera_model.hpp"
+#include "scene/photo_lens.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats {
@@ -79,12 +82,13 @@ struct ModelName {
   const char* name;
   CameraModel model;
 };
-constexpr std::array<ModelName, 8> kModelNames{{{"PINHOLE", CameraModel::kPinhole},
+constexpr std::array<ModelName, 9> kModelNames{{{"PINHOLE", CameraModel::kPinhole},
                                                 {"SIMPLE_PINHOLE", CameraModel::kPinhole},
                                                 {"SIMPLE_RADIAL", CameraModel::kPinhole},
                                                 {"RADIAL", CameraModel::kPinhole},
                                                 {"OPENCV", CameraModel::kPinhole},
                                                 {"OPENCV_FISHEYE", CameraModel::kFisheye},
+                                                {"FISHEYE624", CameraModel::kPhotoLens},
                                                 {"EQUIRECTANGULAR", CameraModel::kEquirectangular},
                                                 {"ORTHOPHOTO", CameraModel::kOrthographic}}};
 
@@ -95,14 +99,6 @@ const char* model_name(CameraModel model) {
       ->name;
 }
 
-/// The intrinsics that nerfstudio gives a whole panorama.
-void set_equirectangular(Camera& camera) {
-  camera.fx = 0.5 * camera.width;
-  camera.fy = camera.height;
-  camera.cx = 0.5 * camera.width;
-  camera.cy = 0.5 * camera.height;
-}
-
 void read_model(const Scope& scope, TransformsFrame& frame) {
   const std::string name = scope.text("camera_model");
   if (!name.empty()) {
@@ -111,13 +107,33 @@ void read_model(const Scope& scope, TransformsFrame& frame) {
     if (found == kModelNames.end()) {
       scope.fail(
           fmt::format("the camera_model '{}' is not supported (PINHOLE, OPENCV, OPENCV_FISHEYE, "
-                      "EQUIRECTANGULAR and ORTHOPHOTO are), undistort the images first",
+                      "FISHEYE624, EQUIRECTANGULAR and ORTHOPHOTO are), undistort the images first",
                       name));
     }
     frame.model = found->model;
   }
   const auto fisheye = scope.object.find("is_fisheye");
   if (fisheye != scope.object.end() && *fisheye == true) frame.model = CameraModel::kFisheye;
+}
+
+/// nerfstudio's list of parameters: k1 to k4, p1 and p2, or the twelve of FISHEYE624.
+void read_parameters(const Scope& scope, TransformsFrame& frame) {
+  const auto found = scope.object.find("distortion_params");
+  if (found == scope.object.end() || found->is_null()) return;
+  std::vector<double> values;
+  for (const json& value : *found) {
+    if (!value.is_number() || !std::isfinite(value.get<double>()))
+      scope.fail("'distortion_params' holds something that is no finite number");
+    values.push_back(value.get<double>());
+  }
+  if (values.size() == 12) {
+    frame.fisheye624 = std::move(values);
+  } else if (values.size() == 6) {
+    frame.distortion = {values[0], values[1], values[2], values[4], values[5], values[3]};
+  } else {
+    scope.fail(
+        fmt::format("'distortion_params' has {} numbers, not 6 or 12 (FISHEYE624)", values.size()));
+  }
 }
 
 /// Overrides what is known by the keys of a scope.
@@ -145,6 +161,8 @@ void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
   d.k4 = scope.number("k4").value_or(d.k4);
   d.p1 = scope.number("p1").value_or(d.p1);
   d.p2 = scope.number("p2").value_or(d.p2);
+  read_parameters(scope, frame);
+  if (const auto radius = scope.positive("fisheye_crop_radius")) frame.crop_radius = radius;
 }
 
 void read_pose(const Scope& scope, TransformsFrame& frame) {
@@ -232,9 +250,8 @@ TransformsFile read_transforms(const fs::path& path) {
     if (!object.is_object()) frame_scope.fail("it is no JSON object");
     TransformsFrame frame = common;
     read_intrinsics(frame_scope, frame);
-    if (frame.model == CameraModel::kPinhole && frame.distortion.k4 != 0) {
-      frame_scope.fail("'k4' is supported for OPENCV_FISHEYE only, undistort the images first");
-    }
+    if (frame.model == CameraModel::kPhotoLens && frame.fisheye624.empty())
+      frame_scope.fail("FISHEYE624 needs the twelve numbers of 'distortion_params'");
     read_pose(frame_scope, frame);
     frame.file_path = portable_path(frame_scope.text("file_path"));
     frame.mask_path = portable_path(frame_scope.text("mask_path"));
@@ -243,6 +260,27 @@ TransformsFile read_transforms(const fs::path& path) {
   }
   return file;
 }
+
+namespace {
+
+/// The lens of a frame that a Distortion does not say; `reach` is the image radius of the farthest
+/// corner, `crop` that of crop_radius or 0.
+std::optional<PhotoLens> photo_lens(const TransformsFrame& frame, double reach, double crop) {
+  const Distortion& d = frame.distortion;
+  const bool cropped = crop > 0 && crop < reach;
+  std::optional<PhotoLens> lens;
+  if (frame.model == CameraModel::kPhotoLens) {
+    lens = fisheye624(std::span<const double, 12>(frame.fisheye624));
+  } else if (frame.model == CameraModel::kFisheye && (d.p1 != 0 || d.p2 != 0 || cropped)) {
+    lens = PhotoLens{PhotoLens::Form::kFisheye, {d.k1, d.k2, d.k3, d.k4}, {}, d.p1, d.p2};
+  } else if (frame.model == CameraModel::kPinhole && d.k4 != 0) {
+    lens = PhotoLens{PhotoLens::Form::kPerspective, {d.k1, d.k2, d.k3, d.k4}, {}, d.p1, d.p2};
+  }
+  if (lens && cropped && frame.model != CameraModel::kPinhole) lens->radius = crop;
+  return lens;
+}
+
+}  // namespace
 
 Camera frame_camera(const TransformsFile& file, std::size_t index, int width, int height) {
   const TransformsFrame& frame = file.frames[index];
@@ -276,7 +314,14 @@ Camera frame_camera(const TransformsFile& file, std::size_t index, int width, in
   camera.cy = frame.cy.value_or(0.5 * nominal_height) * scale_y;
   camera.fx *= scale_x;
   camera.fy *= scale_y;
-  if (frame.model != CameraModel::kOrthographic) camera.distortion = frame.distortion;
+  if (frame.model == CameraModel::kOrthographic) return camera;
+  const double crop = frame.crop_radius.value_or(0.0) * scale_x / camera.fx;
+  if (const std::optional<PhotoLens> lens = photo_lens(frame, image_reach(camera), crop)) {
+    set_photo_lens(camera, *lens,
+                   fmt::format("{}: the camera of frame {}", file.path.string(), index));
+    return camera;
+  }
+  camera.distortion = frame.distortion;
   if (frame.model == CameraModel::kPinhole && frame.distortion.any())
     camera.model = CameraModel::kOpenCv;
   return camera;
@@ -329,7 +374,7 @@ std::vector<Camera> read_cameras(const std::filesystem::path& path) {
       if (frame.width) size.width = *frame.width;
       if (frame.height) size.height = *frame.height;
     }
-    cameras.push_back(io::frame_camera(file, i, size.width, size.height));
+    cameras.push_back(rendered_camera(io::frame_camera(file, i, size.width, size.height)));
     cameras.back().name =
         frame.file_path.empty() ? fmt::format("frame_{:04d}", i) : io::inner_name(frame.file_path);
     require_believable(cameras.back(), fmt::format("{}: the camera of frame {}", path.string(), i));
@@ -337,9 +382,12 @@ std::vector<Camera> read_cameras(const std::filesystem::path& path) {
   return cameras;
 }
 
-void write_cameras(const std::filesystem::path& path, const std::vector<Camera>& cameras) {
+void write_cameras(const std::filesystem::path& path, const std::vector<Camera>& written) {
+  std::vector<Camera> cameras;
+  cameras.reserve(written.size());
+  for (const Camera& camera : written) cameras.push_back(rendered_camera(camera));
   const auto intrinsics = [](Camera camera) {
-    if (camera.model == CameraModel::kEquirectangular) io::set_equirectangular(camera);
+    if (camera.model == CameraModel::kEquirectangular) set_equirectangular(camera);
     nlohmann::json out{{"camera_model", io::model_name(camera.model)},
                        {"w", camera.width},
                        {"h", camera.height},

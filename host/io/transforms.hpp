@@ -21,9 +21,11 @@ struct TransformsFrame {
   std::optional<double> fx, fy, cx, cy;       ///< pixels
   std::optional<double> angle_x, angle_y;     ///< field of view, radians
   CameraModel model = CameraModel::kPinhole;  ///< kPinhole with distortion is kOpenCv
-  Distortion distortion;
-  glm::dmat3 rotation{1.0};     ///< world to camera, OpenCV axes
-  glm::dvec3 translation{0.0};  ///< world to camera, OpenCV axes
+  Distortion distortion;                      ///< with k4 of kPinhole and p1, p2 of kFisheye
+  std::vector<double> fisheye624;             ///< twelve parameters where the model is FISHEYE624
+  std::optional<double> crop_radius;          ///< pixels beyond which a fisheye shows nothing
+  glm::dmat3 rotation{1.0};                   ///< world to camera, OpenCV axes
+  glm::dvec3 translation{0.0};                ///< world to camera, OpenCV axes
 };
 
 /// A transforms.json of Blender / NeRF-synthetic, instant-ngp or nerfstudio.
@@ -35,11 +37,13 @@ struct TransformsFile {
 };
 
 /// Throws DataError for malformed JSON, camera models other than pinholes, OPENCV, OPENCV_FISHEYE
-/// (instant-ngp: is_fisheye), EQUIRECTANGULAR and ORTHOPHOTO (named), and matrices that are not
-/// finite or no rigid motion to 1e-3; smaller deviations are orthonormalised.
+/// (instant-ngp: is_fisheye), FISHEYE624, EQUIRECTANGULAR and ORTHOPHOTO (named), and matrices that
+/// are not finite or no rigid motion to 1e-3; smaller deviations are orthonormalised.
 TransformsFile read_transforms(const std::filesystem::path& path);
 
 /// The camera of a frame whose photo has the given size; the file's own size scales its intrinsics.
+/// kPhotoLens for FISHEYE624 and for what nerfstudio reads beyond OpenCV's lenses: k4 of planes, p1
+/// and p2 of fisheyes, fisheye_crop_radius.
 /// Throws DataError when the frame has no focal length or angle (equirectangular frames need none).
 Camera frame_camera(const TransformsFile& file, std::size_t frame, int width, int height);
 

@@ -69,8 +69,9 @@ ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
 std::unique_ptr<PhotoRows> ViewRows::fitted(std::unique_ptr<PhotoPixels> source, const View& view) {
   const PhotoRows* before = source.get();
   std::unique_ptr<PhotoRows> out;
-  if (view.source_camera.model == CameraModel::kOpenCv &&
-      view.camera.model == CameraModel::kPinhole) {
+  const CameraModel lens = view.source_camera.model;
+  if (lens == CameraModel::kPhotoLens ||
+      (lens == CameraModel::kOpenCv && view.camera.model == CameraModel::kPinhole)) {
     out = undistorted_rows(std::move(source), view.source_camera);
   } else {
     out = seen_rows(std::move(source), view.source_camera);

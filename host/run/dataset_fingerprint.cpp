@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "io/byte_reader.hpp"
+#include "scene/photo_lens.hpp"
 
 namespace raysplats {
 namespace {
@@ -30,6 +31,14 @@ std::string description(const View& view, bool with_depths) {
   const Distortion& lens = camera.distortion;
   text += fmt::format(" {} {} {} {} {} {} {}", static_cast<int>(camera.model), lens.k1, lens.k2,
                       lens.k3, lens.p1, lens.p2, lens.k4);
+  if (camera.lens) {
+    const PhotoLens& photo = *camera.lens;
+    text += fmt::format(" {} {} {} {} {} {}", static_cast<int>(photo.form), photo.p1, photo.p2,
+                        photo.decentred_last, photo.radius, photo.limit);
+    for (const double a : photo.radial) text += fmt::format(" {}", a);
+    for (const double b : photo.divisor) text += fmt::format(" {}", b);
+    for (const double s : photo.prism) text += fmt::format(" {}", s);
+  }
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row) text += fmt::format(" {}", camera.rotation[column][row]);
     text += fmt::format(" {}", camera.translation[column]);

@@ -10,6 +10,8 @@
 #include <numbers>
 #include <vector>
 
+#include "scene/photo_lens.hpp"
+
 namespace raysplats {
 namespace {
 
@@ -105,6 +107,14 @@ std::optional<glm::dvec2> undistort(const Distortion& d, const glm::dvec2& targe
 
 }  // namespace
 
+void set_equirectangular(Camera& camera) {
+  camera.model = CameraModel::kEquirectangular;
+  camera.fx = 0.5 * camera.width;
+  camera.fy = camera.height;
+  camera.cx = 0.5 * camera.width;
+  camera.cy = 0.5 * camera.height;
+}
+
 glm::dvec2 distort(const Distortion& d, const glm::dvec2& p) {
   const double s = glm::dot(p, p);
   const double radial = 1 + s * (d.k1 + s * (d.k2 + s * d.k3));
@@ -164,6 +174,13 @@ CameraRay camera_ray(const Camera& camera, double px, double py) {
       origin = {p.x, p.y, 0.0};
       ray.valid = true;
       break;
+    case CameraModel::kPhotoLens: {
+      if (!camera.lens) break;
+      const std::optional<glm::dvec3> found = lens_direction(*camera.lens, p);
+      ray.valid = found.has_value();
+      if (found) direction = *found;
+      break;
+    }
   }
   const glm::dmat3 to_world = glm::transpose(camera.rotation);
   ray.origin = to_world * (origin - camera.translation);
@@ -201,6 +218,11 @@ std::optional<glm::dvec2> project(const Camera& camera, const glm::dvec3& world)
     case CameraModel::kOrthographic:
       if (p.z < 0) return std::nullopt;
       return pixels({p.x, p.y});
+    case CameraModel::kPhotoLens: {
+      if (!camera.lens || glm::length(p) == 0) return std::nullopt;
+      const std::optional<glm::dvec2> q = lens_point(*camera.lens, p);
+      return q ? std::optional(pixels(*q)) : std::nullopt;
+    }
   }
   return std::nullopt;
 }

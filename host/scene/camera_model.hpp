@@ -29,6 +29,9 @@ CameraRay camera_ray(const Camera& camera, double px, double py);
 /// camera cannot see it at all (behind a pinhole, beyond lens_limit(), at the very centre).
 std::optional<glm::dvec2> project(const Camera& camera, const glm::dvec3& world);
 
+/// Makes the camera a panorama with the intrinsics that nerfstudio gives one.
+void set_equirectangular(Camera& camera);
+
 /// Where a kOpenCv lens maps the normalised image point.
 glm::dvec2 distort(const Distortion& distortion, const glm::dvec2& point);
 

@@ -28,6 +28,8 @@ int camera_model_number(CameraModel model) {
       return RS_CAMERA_EQUIRECTANGULAR;
     case CameraModel::kOrthographic:
       return RS_CAMERA_ORTHOGRAPHIC;
+    case CameraModel::kPhotoLens:
+      break;  // refused by require_pixels()
   }
   return RS_CAMERA_PINHOLE;
 }
@@ -69,6 +71,12 @@ RsLensCamera lens_camera(const Camera& camera, const Lens& lens) {
 }
 
 void require_pixels(const Camera& camera) {
+  if (camera.model == CameraModel::kPhotoLens) {
+    throw UsageError(fmt::format(
+        "Camera '{}' has a lens that only photos have: give the camera of the view, not that of "
+        "its photo",
+        camera.name));
+  }
   const bool focal = camera.model != CameraModel::kEquirectangular;
   if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
     throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));

@@ -69,6 +69,8 @@ RsFootprintView footprint_view(const Camera& camera) {
       view.kind = RS_FOOTPRINT_CONSTANT;
       spacing = 1.0 / std::max(camera.fx, camera.fy);
       break;
+    case CameraModel::kPhotoLens:
+      break;  // of no picture that is rendered
   }
   view.spacing = static_cast<float>(spacing);
   return view;

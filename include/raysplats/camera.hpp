@@ -3,6 +3,7 @@
 
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <string>
 
 namespace raysplats {
@@ -14,6 +15,8 @@ struct Distortion {
   bool any() const { return k1 != 0 || k2 != 0 || k3 != 0 || k4 != 0 || p1 != 0 || p2 != 0; }
 };
 
+struct PhotoLens;
+
 /// How pixels become rays. The packet tracer (CameraTracer) knows kPinhole alone.
 enum class CameraModel {
   kPinhole,
@@ -21,6 +24,8 @@ enum class CameraModel {
   kFisheye,          ///< equidistant with a polynomial of the angle (KB4, OPENCV_FISHEYE)
   kEquirectangular,  ///< 360 degrees across, 180 down; fx, fy, cx, cy unused
   kOrthographic,     ///< parallel rays; fx and fy are pixels per world unit
+  kPhotoLens,        ///< of photos on disk alone, which are made pictures of another model when
+                     ///< they are loaded: lenses of COLMAP and nerfstudio that no ray knows
 };
 
 /// A camera with a pose. Camera axes are OpenCV's and COLMAP's: x right, y down, z forward;
@@ -34,7 +39,8 @@ struct Camera {
   glm::dmat3 rotation{1.0};               ///< world to camera
   glm::dvec3 translation{0.0};            ///< world to camera: x_cam = rotation * x + translation
   CameraModel model = CameraModel::kPinhole;
-  Distortion distortion;  ///< of kOpenCv and kFisheye
+  Distortion distortion;                  ///< of kOpenCv and kFisheye
+  std::shared_ptr<const PhotoLens> lens;  ///< of kPhotoLens, which is not without one
 
   glm::dvec3 center() const { return -(glm::transpose(rotation) * translation); }
 };

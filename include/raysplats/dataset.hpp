@@ -71,7 +71,7 @@ struct DatasetOptions {
   int test_every = 8;      ///< every n-th view of a data set without a split of its own; 0 = none
   /// true: photos through lenses with distortion (kOpenCv) become pinhole pictures; false: they
   /// keep their pixels and their model. Other models cannot become pinholes without loss and keep
-  /// theirs either way.
+  /// theirs either way; lenses that no ray knows (kPhotoLens) are taken out either way.
   bool undistort = true;
   MaskUse masks = MaskUse::kIgnore;
   AlphaUse alpha = AlphaUse::kAuto;
@@ -87,7 +87,7 @@ struct DatasetOptions {
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
 
 /// The photo of a view as RGBA float at camera.width x camera.height: undistorted where
-/// view.camera is a pinhole and the photo's lens is none, resampled (area average). A is the mask
+/// view.camera has another model than the photo's lens, resampled (area average). A is the mask
 /// or coverage: 1 where the photo is valid, 0 beyond the limit of a lens; RGB is straight (not
 /// premultiplied). Numbers of float files count within [0, 1].
 Image load_view_image(const View& view);

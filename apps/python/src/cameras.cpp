@@ -131,7 +131,8 @@ void bind_class(nb::module_& module) {
           [](Camera& c, const std::string& name) {
             c.model = value_of(kCameraModels, "model", name);
           },
-          "'pinhole', 'opencv', 'fisheye', 'equirectangular' or 'orthographic'.")
+          "'pinhole', 'opencv', 'fisheye', 'equirectangular' or 'orthographic'; of photos on disk "
+          "also 'photo-lens', which nothing is rendered through.")
       .def_prop_rw("distortion", &lens, &set_lens, "k1, k2, k3, p1, p2, k4 of OpenCV's models.")
       .def(
           "downscaled", [](const Camera& c, double factor) { return downscaled(c, factor); },

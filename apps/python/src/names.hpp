@@ -42,12 +42,13 @@ inline constexpr std::array<Name<GradientSum>, 5> kGradientSums{{{"auto", Gradie
                                                                  {"swap", GradientSum::kSwap}}};
 inline constexpr std::array<Name<ColorDirection>, 2> kColorDirections{
     {{"ray", ColorDirection::kRay}, {"from-origin", ColorDirection::kFromOrigin}}};
-inline constexpr std::array<Name<CameraModel>, 5> kCameraModels{
+inline constexpr std::array<Name<CameraModel>, 6> kCameraModels{
     {{"pinhole", CameraModel::kPinhole},
      {"opencv", CameraModel::kOpenCv},
      {"fisheye", CameraModel::kFisheye},
      {"equirectangular", CameraModel::kEquirectangular},
-     {"orthographic", CameraModel::kOrthographic}}};
+     {"orthographic", CameraModel::kOrthographic},
+     {"photo-lens", CameraModel::kPhotoLens}}};
 inline constexpr std::array<Name<Split>, 3> kSplits{
     {{"train", Split::kTrain}, {"test", Split::kTest}, {"all", Split::kAll}}};
 inline constexpr std::array<Name<MaskUse>, 2> kMaskUses{
