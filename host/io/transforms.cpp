@@ -145,7 +145,7 @@ void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
   const auto fy = scope.positive("fl_y");
   const auto angle_x = scope.angle("camera_angle_x");
   const auto angle_y = scope.angle("camera_angle_y");
-  if (fx || angle_x) {
+  if (fx || fy || angle_x || angle_y) {
     // A focal length of a frame must not be mixed with an angle of the file.
     frame.fx = fx;
     frame.fy = fy;
@@ -263,6 +263,18 @@ TransformsFile read_transforms(const fs::path& path) {
 
 namespace {
 
+/// Focal lengths across and down, as far as the frame has them, in pixels of its own size. Angles
+/// are those of planes alone.
+std::array<std::optional<double>, 2> focal_lengths(const TransformsFrame& frame,
+                                                   double width,
+                                                   double height) {
+  if (frame.fx || frame.fy || frame.model != CameraModel::kPinhole) return {frame.fx, frame.fy};
+  const auto focal = [](double side, const std::optional<double>& angle) {
+    return angle ? std::optional(0.5 * side / std::tan(0.5 * *angle)) : std::nullopt;
+  };
+  return {focal(width, frame.angle_x), focal(height, frame.angle_y)};
+}
+
 /// The lens of a frame that a Distortion does not say; `reach` is the image radius of the farthest
 /// corner, `crop` that of crop_radius or 0.
 std::optional<PhotoLens> photo_lens(const TransformsFrame& frame, double reach, double crop) {
@@ -296,18 +308,16 @@ Camera frame_camera(const TransformsFile& file, std::size_t index, int width, in
     set_equirectangular(camera);
     return camera;
   }
-  if (frame.fx) {
-    camera.fx = *frame.fx;
-    camera.fy = frame.fy.value_or(camera.fx);
-  } else if (frame.angle_x && frame.model == CameraModel::kPinhole) {
-    camera.fx = 0.5 * nominal_width / std::tan(0.5 * *frame.angle_x);
-    camera.fy = frame.angle_y ? 0.5 * nominal_height / std::tan(0.5 * *frame.angle_y) : camera.fx;
-  } else {
+  const auto [fx, fy] = focal_lengths(frame, nominal_width, nominal_height);
+  if (!fx && !fy) {
     throw DataError(fmt::format(
         "{}: frame {} has {}, in it or in the file", file.path.string(), index,
         frame.model == CameraModel::kPinhole ? "neither fl_x nor camera_angle_x"
                                              : "no fl_x, which its camera model needs"));
   }
+  // Pixels are square where one of the two is all that is said.
+  camera.fx = fx ? *fx : *fy;
+  camera.fy = fy ? *fy : *fx;
   const double scale_x = width / nominal_width;
   const double scale_y = height / nominal_height;
   camera.cx = frame.cx.value_or(0.5 * nominal_width) * scale_x;

@@ -41,7 +41,8 @@ struct TransformsFile {
 /// are not finite or no rigid motion to 1e-3; smaller deviations are orthonormalised.
 TransformsFile read_transforms(const std::filesystem::path& path);
 
-/// The camera of a frame whose photo has the given size; the file's own size scales its intrinsics.
+/// The camera of a frame whose photo has the given size; the file's own size scales its intrinsics,
+/// and of one focal length or angle alone it makes square pixels.
 /// kPhotoLens for FISHEYE624 and for what nerfstudio reads beyond OpenCV's lenses: k4 of planes, p1
 /// and p2 of fisheyes, fisheye_crop_radius.
 /// Throws DataError when the frame has no focal length or angle (equirectangular frames need none).

@@ -68,6 +68,26 @@ TEST_CASE("cameras take intrinsics from the file or the frame, as focal lengths 
   CHECK(cameras[3].name == "frame_0003");
 }
 
+TEST_CASE("one focal length or angle alone, across or down, means square pixels") {
+  const auto cameras =
+      cameras_of(file_of("\"w\": 40, \"h\": 30, \"fl_y\": 50, ",
+                         frame("a", 1) + "," + frame("b", 1, "\"camera_angle_y\": 0.5, ") + "," +
+                             frame("c", 1, "\"fl_y\": 60, \"camera_model\": \"OPENCV_FISHEYE\", ") +
+                             "," + frame("d", 1, "\"fl_x\": 70, ") + "," +
+                             frame("e", 1, "\"fl_y\": 80, \"camera_angle_x\": 1, ")));
+  const double focal[] = {50, 15 / std::tan(0.25), 60, 70, 80};
+  REQUIRE(cameras.size() == 5);
+  for (std::size_t i = 0; i < 5; ++i) {
+    CHECK(cameras[i].fx == doctest::Approx(focal[i]).epsilon(1e-12));
+    CHECK(cameras[i].fy == cameras[i].fx);
+  }
+  CHECK(cameras[2].model == CameraModel::kFisheye);
+  // An angle of the file alone.
+  const Camera plain =
+      cameras_of(file_of("\"w\": 40, \"h\": 30, \"camera_angle_y\": 0.5, ", frame("a", 1))).front();
+  CHECK(plain.fx == doctest::Approx(15 / std::tan(0.25)).epsilon(1e-12));
+}
+
 TEST_CASE("OpenGL's camera axes become ours: y down, z forward") {
   const Camera camera =
       cameras_of(file_of("\"w\": 4, \"h\": 4, \"fl_x\": 5, ", frame("a", 7))).front();
