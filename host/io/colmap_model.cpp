@@ -382,7 +382,7 @@ std::optional<fs::path> find_colmap_model(const fs::path& root) {
   const auto add = [&](const fs::path& folder) {
     if (model_file(folder, "cameras") && model_file(folder, "images")) candidates.push_back(folder);
   };
-  for (const fs::path& parent : {root / "sparse", root / "colmap" / "sparse"}) {
+  const auto add_children = [&](const fs::path& parent) {
     std::vector<fs::path> children;
     std::error_code error;
     for (fs::directory_iterator entry(parent, error), end; !error && entry != end;
@@ -392,8 +392,12 @@ std::optional<fs::path> find_colmap_model(const fs::path& root) {
     std::sort(children.begin(), children.end());
     for (const fs::path& child : children) add(child);
     add(parent);
-  }
+  };
+  add_children(root / "sparse");
+  add_children(root / "colmap" / "sparse");
   add(root);
+  // What 3DGS's convert.py leaves before it undistorts.
+  if (candidates.empty()) add_children(root / "distorted" / "sparse");
   if (candidates.size() <= 1) {
     return candidates.empty() ? std::nullopt : std::optional(candidates.front());
   }

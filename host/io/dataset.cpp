@@ -198,6 +198,31 @@ std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name)
   return std::nullopt;
 }
 
+/// Whether the folder has every photo of the model in the size of its camera.
+bool has_photos_of(const fs::path& folder, const io::ColmapModel& model) {
+  return std::all_of(model.images.begin(), model.images.end(), [&](const io::ColmapImage& image) {
+    const auto photo = find_photo(folder, image.name);
+    if (!photo) return false;
+    const Camera& camera = model.cameras.at(image.camera_id);
+    const io::ImageSize size = io::image_size(*photo);
+    const bool upright = size.width == camera.width && size.height == camera.height;
+    return upright || (size.width == camera.height && size.height == camera.width);
+  });
+}
+
+/// The photos that convert.py of 3DGS reads lie in `input`, and those that it makes of them, which
+/// are of another size and without a lens, in `images`: the model tells which are its own.
+PhotoFolder folder_of_model(const fs::path& root, const io::ColmapModel& model, double downscale) {
+  PhotoFolder usual = choose_photo_folder(root, downscale);
+  const fs::path input = root / "input", images = root / "images";
+  if (!is_folder(input)) return usual;
+  // Reduced copies are of `images`.
+  if (is_folder(images) ? has_photos_of(images, model) : usual.path != root) return usual;
+  if (!has_photos_of(input, model)) return usual;
+  spdlog::info("the photos of the model are those in {}", input.string());
+  return {input, 1.0};
+}
+
 /// Two poses cannot share a photo.
 void require_photos_of_their_own(const std::vector<View>& views) {
   std::map<fs::path, const View*> owners;
@@ -230,7 +255,7 @@ Dataset load_colmap(const fs::path& root,
   Dataset dataset;
   dataset.kind = DatasetKind::kColmap;
   dataset.points = std::move(model.points);
-  const PhotoFolder folder = choose_photo_folder(root, options.downscale);
+  const PhotoFolder folder = folder_of_model(root, model, options.downscale);
   const double rest = std::max(1.0, options.downscale / folder.factor);
   std::size_t stretched = 0;
   for (const io::ColmapImage& image : model.images) {
@@ -438,6 +463,21 @@ bool goes_before(const fs::path& transforms, const fs::path& root, const fs::pat
          !io::read_transforms(transforms).ply_file_path.empty();
 }
 
+/// What to do about photos that have no cameras yet.
+std::string way_to_poses(const fs::path& root) {
+  for (const fs::path& folder : {root / "input", root / "images", root}) {
+    std::error_code error;
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+         entry.increment(error)) {
+      if (!io::has_image_extension(entry->path())) continue;
+      return fmt::format(
+          "; find out where its photos were taken: raysplats prepare {} -o NEW_FOLDER",
+          folder.string());
+    }
+  }
+  return "";
+}
+
 Dataset load_any(const fs::path& root, const DatasetOptions& options) {
   const fs::path transforms = root / "transforms.json";
   if (const auto model = io::find_colmap_model(root)) {
@@ -455,8 +495,8 @@ Dataset load_any(const fs::path& root, const DatasetOptions& options) {
   if (is_file(root / "transforms_train.json")) return load_blender(root, options);
   throw DataError(
       fmt::format("{} is no data set: it has neither a COLMAP model (sparse/0) nor transforms.json "
-                  "nor transforms_train.json",
-                  root.string()));
+                  "nor transforms_train.json{}",
+                  root.string(), way_to_poses(root)));
 }
 
 }  // namespace

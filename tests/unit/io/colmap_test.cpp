@@ -268,6 +268,44 @@ TEST_CASE("of several COLMAP models the one with most images is used, in any doc
   CHECK(!io::find_colmap_model(empty.path()));
 }
 
+TEST_CASE("folders of 3DGS's convert.py: the photos in input or in images that the model is of") {
+  const Scratch scratch;
+  ColmapFixture distorted = small_colmap();
+  distorted.images.resize(6);
+  ColmapFixture flat = distorted;
+  for (auto& camera : flat.cameras) camera = {camera.id, 1, "PINHOLE", 42, 31, {47, 46, 21, 15.5}};
+  const auto folder_of = [&] {
+    const View view = load_dataset(scratch.path()).views.front();
+    CHECK(contains(view.image_path.string(), view.camera.name));
+    return view.image_path.lexically_relative(scratch.path()).begin()->string();
+  };
+  const auto refused = [&] { return data_error([&] { load_dataset(scratch.path()); }); };
+  // Not run: photos alone.
+  write_photos(distorted, scratch / "input", 40, 30);
+  CHECK(contains(refused(), "raysplats prepare " + (scratch / "input").string()));
+  // Interrupted before undistortion.
+  distorted.write_binary(scratch / "distorted/sparse/0");
+  CHECK(folder_of() == "input");
+  // Undistorted: another model, of other photos.
+  flat.write_binary(scratch / "sparse/0");
+  write_photos(flat, scratch / "images", 42, 31);
+  CHECK(folder_of() == "images");
+  CHECK(load_dataset(scratch.path()).views.front().camera.width == 42);
+  write_photos(flat, scratch / "images_2", 21, 16);
+  DatasetOptions half;
+  half.downscale = 2;
+  CHECK(contains(load_dataset(scratch.path(), half).views.front().image_path.string(), "images_2"));
+  // A model of the photos in input beside photos of another size.
+  distorted.write_binary(scratch / "sparse/0");
+  CHECK(folder_of() == "input");
+  // The same sizes in both: images, as ever.
+  write_photos(distorted, scratch / "images", 40, 30);
+  CHECK(folder_of() == "images");
+  fs::remove_all(scratch / "images");
+  fs::remove_all(scratch / "images_2");
+  CHECK(folder_of() == "input");
+}
+
 TEST_CASE("masks beside the photos and test_every are honoured") {
   const Scratch scratch;
   const ColmapFixture fixture = small_colmap();
