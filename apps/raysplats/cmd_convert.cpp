@@ -33,6 +33,7 @@ struct Options {
   std::optional<std::string> crop_max;
   std::string spz_axes = "ply";
   int spz_version = ModelEncoding{}.spz_version;
+  bool drop_nonfinite = false;
   bool overwrite = false;
   std::string data;
   DeviceFlags device;
@@ -84,7 +85,7 @@ void run(Options& options) {
   std::optional<TraceOptions> trace;
   if (source.header || source.trained) trace = trace_options(source);
   const ModelEncoding encoding{options.spz_axes == "rub" ? SpzAxes::kRub : SpzAxes::kPly,
-                               options.spz_version};
+                               options.spz_version, options.drop_nonfinite};
   if (changes.max_gaussians) {
     changes.contributions = weights(options, source, encoding);
   } else if (!options.data.empty()) {
@@ -121,6 +122,8 @@ Command add_convert_command(CLI::App& app) {
       ->transform(whole_between(0, 4));
   command->add_option("--min-opacity", changes.min_opacity, "Leave out Gaussians that are fainter")
       ->check(between(0.0, 1.0));
+  command->add_flag("--drop-nonfinite", options->drop_nonfinite,
+                    "Leave out Gaussians of a PLY with numbers that are not finite");
   command
       ->add_option(
           "--max-gaussians", options->max_gaussians,

@@ -18,6 +18,9 @@ constexpr double kSh0 = RS_SH0;
 constexpr double kFloatOpacityMargin = 1e-7;
 constexpr double kByteOpacityMargin = 0.5 / 255.0;
 
+/// Logarithm of the scale that a flat axis, of size 0 in its file, gets.
+constexpr float kFlatLogScale = -20.0f;
+
 inline double opacity_of(float logit) {
   return 1.0 / (1.0 + std::exp(-static_cast<double>(logit)));
 }

@@ -173,7 +173,7 @@ Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& enc
     }
     case io::ModelFormat::kPly:
     case io::ModelFormat::kCompressedPly:
-      return read_ply(path);
+      return read_ply(path, encoding.drop_nonfinite);
     case io::ModelFormat::kUnknown:
       break;
   }

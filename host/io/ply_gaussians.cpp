@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "io/ply_options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/gaussian_selection.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats {
@@ -101,28 +103,71 @@ void widen(float* log_scales, float& opacity, double filter) {
   opacity = io::logit_of(io::opacity_of(opacity) * std::exp(-log_growth), io::kFloatOpacityMargin);
 }
 
+/// Gaussians with numbers that are not finite.
+class Broken {
+ public:
+  void add(std::size_t row, const std::string& name) {
+    if (rows_.empty()) first_ = name;
+    if (rows_.empty() || rows_.back() != row) rows_.push_back(row);
+  }
+
+  /// Refuses them or leaves them out.
+  void settle(Gaussians& model, const std::filesystem::path& path, bool drop) const {
+    if (rows_.empty()) return;
+    const std::string told = fmt::format(
+        "{}: {} of {} Gaussians have a number that is not finite, '{}' of Gaussian {} "
+        "the first",
+        path.string(), rows_.size(), model.size(), first_, rows_.front());
+    if (!drop) {
+      throw DataError(
+          fmt::format("{}: leave them out by raysplats convert {} NEW.ply --drop-nonfinite", told,
+                      path.string()));
+    }
+    std::vector<std::uint32_t> kept;
+    auto next = rows_.begin();
+    for (std::size_t i = 0; i < model.size(); ++i) {
+      if (next != rows_.end() && *next == i) {
+        ++next;
+      } else {
+        kept.push_back(static_cast<std::uint32_t>(i));
+      }
+    }
+    model = gathered(model, kept);
+    spdlog::warn("{}: they are left out", told);
+  }
+
+ private:
+  std::vector<std::size_t> rows_;  ///< ascending
+  std::string first_;
+};
+
 }  // namespace
 
-Gaussians read_ply(const std::filesystem::path& path) {
+Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
   const io::PlyFile file(path);
   if (file.column("packed_position")) return io::read_compressed_ply(path);
   const Columns columns = find_columns(file, path);
   Gaussians model;
   model.sh_degree = columns.sh_degree;
   model.resize(file.rows());
-  std::size_t without_rotation = 0;
+  std::size_t without_rotation = 0, infinite = 0;
+  Broken broken;
   file.for_each_row([&](std::size_t row, std::span<const double> values) {
     const auto number = [&](std::size_t column) {
       const auto value = static_cast<float>(values[column]);
-      if (!std::isfinite(value)) {
-        throw DataError(fmt::format("{}: '{}' of Gaussian {} is not finite", path.string(),
-                                    file.properties()[column].name, row));
-      }
+      if (!std::isfinite(value)) broken.add(row, file.properties()[column].name);
       return value;
+    };
+    // Whole opacities and flat Gaussians, as programs write them that know linear numbers.
+    const auto limited = [&](std::size_t column, float least, float most) {
+      const auto value = static_cast<float>(values[column]);
+      if (!std::isinf(value) || (value > 0 && most == HUGE_VALF)) return number(column);
+      ++infinite;
+      return value > 0 ? most : least;
     };
     for (std::size_t i = 0; i < 3; ++i) {
       model.means[3 * row + i] = number(columns.mean[i]);
-      model.log_scales[3 * row + i] = number(columns.log_scale[i]);
+      model.log_scales[3 * row + i] = limited(columns.log_scale[i], io::kFlatLogScale, HUGE_VALF);
     }
     float* quaternion = &model.quaternions[4 * row];
     double norm = 0;
@@ -134,7 +179,8 @@ Gaussians read_ply(const std::filesystem::path& path) {
       quaternion[0] = 1.0f;
       ++without_rotation;
     }
-    model.opacities[row] = number(columns.opacity);
+    model.opacities[row] = limited(columns.opacity, io::logit_of(0, io::kFloatOpacityMargin),
+                                   io::logit_of(1, io::kFloatOpacityMargin));
     if (columns.filter) {
       widen(&model.log_scales[3 * row], model.opacities[row],
             static_cast<double>(number(*columns.filter)));
@@ -146,6 +192,13 @@ Gaussians read_ply(const std::filesystem::path& path) {
     spdlog::info("{}: the 3D filter of Mip-Splatting is taken into scales and opacities",
                  path.string());
   }
+  if (infinite > 0) {
+    spdlog::warn(
+        "{}: {} infinite opacities and sizes of 0 are taken as the most opaque, the faintest and "
+        "the flattest that there are",
+        path.string(), infinite);
+  }
+  broken.settle(model, path, drop_nonfinite);
   if (without_rotation > 0) {
     spdlog::warn("{}: {} Gaussians have a zero quaternion and are taken as not rotated",
                  path.string(), without_rotation);

@@ -18,8 +18,6 @@ namespace raysplats::io {
 namespace {
 
 constexpr std::size_t kRecord = 32;
-/// Logarithm of the scale that a flat axis (0 in the file) gets.
-constexpr float kFlatLogScale = -20.0f;
 
 void put_float(std::vector<std::byte>& to, float value) {
   std::uint32_t bits = std::bit_cast<std::uint32_t>(value);

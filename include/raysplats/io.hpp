@@ -22,6 +22,9 @@ enum class SpzAxes { kPly, kRub };
 struct ModelEncoding {
   SpzAxes spz_axes = SpzAxes::kPly;
   int spz_version = 3;  ///< to write: 3 or 4
+  /// Of a 3DGS PLY that is read: whether Gaussians with numbers that are not finite are left out,
+  /// with a warning, or the file is refused.
+  bool drop_nonfinite = false;
 };
 
 /// Reads Gaussians from a 3DGS PLY, PlayCanvas' compressed PLY and SOG, .splat, SPZ (1 to 4) or
@@ -40,10 +43,12 @@ void write_model(const std::filesystem::path& path,
                  const std::array<double, 3>& origin = {});
 
 /// Reads a 3DGS PLY (binary of both byte orders or ASCII; SH degree 0..4; the 3D filter of
-/// Mip-Splatting goes into scales and opacities, further properties are ignored) or a compressed
-/// one of PlayCanvas. Throws DataError with the byte offset for anything
-/// malformed, truncated, non-finite or oversized.
-Gaussians read_ply(const std::filesystem::path& path);
+/// Mip-Splatting goes into scales and opacities, infinite opacities and scales of 0 become the
+/// nearest finite ones with a warning, further properties are ignored) or a compressed one of
+/// PlayCanvas. Throws DataError with the byte offset for anything malformed, truncated or
+/// oversized, and for numbers that are not finite unless those Gaussians of a 3DGS PLY are to be
+/// left out.
+Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite = false);
 
 /// Writes an Inria-style binary little-endian 3DGS PLY atomically (temporary file, sync, rename).
 /// `trace` is how the model wants to be traced; the options of it that change the picture (order,

@@ -9,9 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "io/gaussian_codes.hpp"
 #include "io/ply_points.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
+#include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -219,6 +221,41 @@ TEST_CASE("the 3D filter of Mip-Splatting goes into scales and opacities") {
   CHECK(contains(data_error([&] { read(begin + "0 0 0 1 0 0 0 nan"); }), "'filter_3D'"));
 }
 
+TEST_CASE(
+    "Gaussians with numbers that are not finite can be left out, infinite logarithms are read") {
+  const Scratch scratch;
+  const auto file = [&](const std::string& rows, std::size_t count) {
+    write_bytes(scratch / "a.ply", header("ascii", count, kProperties) + rows);
+    return scratch / "a.ply";
+  };
+  const fs::path broken = file(
+      "1 0 0 0 0 0 0 0 0 0 1 0 0 0\n"
+      "2 0 0 0 nan 0 0 0 0 nan 1 0 0 0\n"
+      "3 0 0 0 0 0 0 0 0 0 1 0 0 0\n"
+      "4 0 inf 0 0 0 0 0 0 0 1 0 0 0\n"
+      "5 0 0 0 0 0 nan 0 0 0 1 0 0 0\n"
+      "6 0 0 0 0 0 0 inf 0 0 1 0 0 0\n"
+      "7 0 0 0 0 0 0 0 0 0 1 0 0 0\n",
+      7);
+  CHECK(contains(data_error([&] { read_ply(broken); }),
+                 "4 of 7 Gaussians have a number that is not finite, 'scale_2' of Gaussian 1"));
+  CHECK(contains(data_error([&] { read_model(broken); }), "--drop-nonfinite"));
+  const LogCapture log;
+  const Gaussians left = read_model(broken, {SpzAxes::kPly, 3, true});
+  CHECK(log.contains("4 of 7 Gaussians"));
+  REQUIRE(left.size() == 3);
+  CHECK(left.means == std::vector<float>{1, 0, 0, 3, 0, 0, 7, 0, 0});
+  CHECK(left.sh.size() == 9);
+  // Opacities of 1 and 0 and an axis of size 0.
+  const Gaussians whole =
+      read_ply(file("0 0 0 0 0 0 inf 0 0 -inf 1 0 0 0\n0 0 0 0 0 0 -inf 0 0 0 1 0 0 0\n", 2));
+  CHECK(log.contains("3 infinite opacities"));
+  CHECK(io::opacity_of(whole.opacities[0]) > 0.999999);
+  CHECK(io::opacity_of(whole.opacities[1]) < 1e-6);
+  CHECK(std::isfinite(whole.opacities[0]));
+  CHECK(whole.log_scales == std::vector<float>{0, 0, -20, 0, 0, 0});
+}
+
 TEST_CASE("malformed models are refused with a sentence that says what is wrong") {
   const std::string row(14 * sizeof(float), '\0');
   CHECK(contains(error_of(""), "not a PLY"));
@@ -268,11 +305,13 @@ TEST_CASE("malformed models are refused with a sentence that says what is wrong"
     std::string bytes = header("binary_little_endian", 3, kProperties);
     for (int i = 0; i < 3; ++i) bytes += row;
     std::memcpy(bytes.data() + bytes.size() - row.size() + 2 * sizeof(float), &bad, sizeof(float));
-    CHECK(contains(error_of(bytes), "'z' of Gaussian 2 is not finite"));
+    CHECK(contains(error_of(bytes),
+                   "1 of 3 Gaussians have a number that is not finite, 'z' of Gaussian 2"));
   }
   const std::string overflow =
       header("ascii", 1, kProperties) + "1e300 0 0 0 0 0 0 0 0 0 1 0 0 0\n";
-  CHECK(contains(error_of(overflow), "'x' of Gaussian 0 is not finite"));
+  CHECK(contains(error_of(overflow),
+                 "'x' of Gaussian 0 the first: leave them out by raysplats convert"));
   CHECK(contains(
       error_of(header("binary_little_endian", 0, {"packed_position", "packed_rotation"}, "uint")),
       "no chunk element"));
