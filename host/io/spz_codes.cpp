@@ -2,10 +2,12 @@
 #include "io/spz_codes.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <numeric>
 
@@ -18,6 +20,7 @@ namespace raysplats::io {
 namespace {
 
 constexpr int kMaxShDegree = 4;
+constexpr int kUsualFractionalBits = 12;
 constexpr int kMaxFractionalBits = 24;
 constexpr double kScaleStep = 16.0;
 constexpr double kPositionLimit = 8388607.0;  // 2^23 - 1
@@ -119,11 +122,51 @@ double farthest_position(const Gaussians& model) {
   return largest;
 }
 
+/// The largest standard deviation of every Gaussian, as a logarithm.
+std::vector<float> log_sizes(const Gaussians& model) {
+  std::vector<float> sizes(model.size());
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const float* scale = &model.log_scales[3 * i];
+    sizes[i] = std::max({scale[0], scale[1], scale[2]});
+  }
+  return sizes;
+}
+
+double median_size(const Gaussians& model) {
+  std::vector<float> sizes = log_sizes(model);
+  if (sizes.empty()) return 1.0;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return std::exp(static_cast<double>(*middle));
+}
+
+void warn_of_losses(const Gaussians& model, int bits, const std::filesystem::path& path) {
+  const double size = median_size(model);
+  const std::vector<float> sizes = log_sizes(model);
+  const auto small =
+      std::count_if(sizes.begin(), sizes.end(), [](float s) { return s < kSpzLeastLogScale; });
+  // One in a hundred is seen.
+  if (100 * static_cast<std::size_t>(small) > sizes.size()) {
+    const double larger = std::pow(10.0, std::round(std::log10(0.01 / size)));
+    spdlog::warn(
+        "{}: {} of {} Gaussians are smaller than SPZ can say (4.5e-5) and become as large: scale "
+        "the model up, as by convert --scale {:g}",
+        path.string(), small, sizes.size(), std::max(larger, 10.0));
+  }
+  if (std::ldexp(1.0, -bits) > size) {
+    spdlog::warn(
+        "{}: SPZ keeps positions to {:g}, which is more than half of the Gaussians are large, "
+        "because one is {:.3g} from the origin: leave out what is far away by convert --crop",
+        path.string(), std::ldexp(1.0, -bits), farthest_position(model));
+  }
+}
+
 }  // namespace
 
 int spz_fractional_bits(const Gaussians& model) {
-  const double largest = farthest_position(model);
-  int bits = 12;
+  const double largest = farthest_position(model), finest = 0.25 * median_size(model);
+  int bits = kUsualFractionalBits;
+  while (bits < kMaxFractionalBits && std::ldexp(1.0, -bits) > finest) ++bits;
   while (bits > 0 && std::ldexp(largest, bits) > kPositionLimit) --bits;
   return bits;
 }
@@ -214,6 +257,7 @@ std::array<std::vector<std::byte>, kSpzArrays> pack_spz(const Gaussians& model,
   header.points = static_cast<std::uint32_t>(model.size());
   header.sh_degree = static_cast<std::uint8_t>(model.sh_degree);
   header.fractional_bits = static_cast<std::uint8_t>(spz_fractional_bits(model));
+  warn_of_losses(model, header.fractional_bits, path);
   std::array<std::vector<std::byte>, kSpzArrays> arrays;
   const SpzSizes sizes = spz_sizes(header);
   for (std::size_t i = 0; i < kSpzArrays; ++i) arrays[i].reserve(sizes[i]);

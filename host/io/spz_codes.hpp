@@ -48,10 +48,12 @@ Gaussians unpack_spz(const SpzHeader& header,
                      const std::array<std::span<const std::byte>, kSpzArrays>& arrays,
                      const std::filesystem::path& path);
 
-/// Bits behind the point that the positions of a model leave room for, 12 at most.
+/// Bits behind the point of the positions: 12, as Niantic writes, more (24 at most) where steps of
+/// 1/4096 are no quarter of the median Gaussian, and as many as there is room for.
 int spz_fractional_bits(const Gaussians& model);
 
-/// Arrays of version 3 and later; fills in the header.
+/// Arrays of version 3 and later; fills in the header. Warns where steps are larger than the median
+/// Gaussian, and where Gaussians are smaller than the least scale.
 std::array<std::vector<std::byte>, kSpzArrays> pack_spz(const Gaussians& model,
                                                         SpzHeader& header,
                                                         const std::filesystem::path& path);

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <vector>
 
 #include "io/compression.hpp"
 #include "io/spz_codes.hpp"
 #include "model_bytes.hpp"
+#include "unit/log_capture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -164,6 +167,44 @@ TEST_CASE("SPZ: large scenes get coarser steps, and what fits no step is refused
   CHECK(
       contains(data_error([&] { write_model(scratch / "a.spz", model); }), "scale the model down"));
   CHECK(!fs::exists(scratch / "a.spz"));
+}
+
+TEST_CASE("SPZ: scenes in tiny units get finer steps, and what is too small is told") {
+  const Scratch scratch;
+  Gaussians model;
+  model.resize(200);
+  CounterRng rng(4, 4);
+  const auto scaled = [&](double unit, double size) {
+    for (float& x : model.means) x = static_cast<float>(unit * (2 * rng.uniform() - 1));
+    for (float& s : model.log_scales) s = static_cast<float>(std::log(size));
+    for (std::size_t i = 0; i < model.size(); ++i) model.quaternions[4 * i] = 1.0f;
+    LogCapture log;
+    write_model(scratch / "a.spz", model);
+    const Gaussians read = read_model(scratch / "a.spz");
+    double worst = 0;
+    for (std::size_t i = 0; i < model.means.size(); ++i)
+      worst = std::max(worst, std::abs(static_cast<double>(read.means[i] - model.means[i])));
+    const std::string told = log.contains("convert --scale 100") ? "scale"
+                             : log.contains("convert --crop")    ? "crop"
+                             : log.contains("warning")           ? "other"
+                                                                 : "";
+    return std::pair(worst, told);
+  };
+  CHECK(io::spz_fractional_bits(model) == 12);
+  auto [worst, told] = scaled(3.0, 0.01);
+  CHECK(io::spz_fractional_bits(model) == 12);
+  CHECK(told.empty());
+  // Without finer steps every position would be one of a few dozen.
+  std::tie(worst, told) = scaled(3e-3, 1e-4);
+  CHECK(io::spz_fractional_bits(model) == 16);
+  CHECK(worst <= 0.5 / 65536 * 1.001);
+  CHECK(told.empty());
+  std::tie(worst, told) = scaled(3e-4, 1e-5);
+  CHECK(worst < 1.25e-6);
+  CHECK(told == "scale");
+  std::tie(worst, told) = scaled(2000.0, 1e-4);
+  CHECK(io::spz_fractional_bits(model) == 12);
+  CHECK(told == "crop");
 }
 
 TEST_CASE("SPZ: right, up, back axes are half a turn about x, harmonics included") {
