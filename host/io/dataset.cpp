@@ -102,12 +102,14 @@ void set_cameras(
   }
 }
 
-/// The mask has the photo's shape, not necessarily its size.
+/// The mask has the photo's shape, not necessarily its size, and may be turned as EXIF says.
 void check_mask(const View& view) {
   const io::ImageSize size = io::image_size(view.mask_path);
+  const io::ImageSize turned{size.height, size.width, size.sample_bytes};
   const Camera& photo = view.source_camera;
-  const double expected_height = static_cast<double>(size.width) * photo.height / photo.width;
-  if (std::abs(expected_height - size.height) > std::max(2.0, 0.02 * size.height)) {
+  const bool fits =
+      has_shape(size, photo) || (has_shape(turned, photo) && io::lies_on_its_side(view.image_path));
+  if (!fits) {
     throw DataError(fmt::format(
         "The mask {} has {} x {} pixels but its photo {} x {}, which is another shape: make it of "
         "the photo that it belongs to",

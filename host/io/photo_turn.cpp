@@ -12,15 +12,7 @@ namespace {
 constexpr int kClockwise = 6;
 constexpr int kCounterclockwise = 8;
 
-}  // namespace
-
-bool lies_on_its_side(const std::filesystem::path& path) {
-  const int orientation = image_orientation(path);
-  return orientation == kClockwise || orientation == kCounterclockwise;
-}
-
-RawImage upright(const RawImage& raw, const std::filesystem::path& path) {
-  const bool clockwise = image_orientation(path) == kClockwise;
+RawImage quarter_turned(const RawImage& raw, bool clockwise) {
   RawImage out{raw.height, raw.width, raw.channels, {}};
   const auto width = static_cast<std::size_t>(raw.width);
   const auto height = static_cast<std::size_t>(raw.height);
@@ -40,6 +32,21 @@ RawImage upright(const RawImage& raw, const std::filesystem::path& path) {
       },
       raw.numbers);
   return out;
+}
+
+}  // namespace
+
+bool lies_on_its_side(const std::filesystem::path& path) {
+  const int orientation = image_orientation(path);
+  return orientation == kClockwise || orientation == kCounterclockwise;
+}
+
+RawImage upright(const RawImage& raw, const std::filesystem::path& path) {
+  return quarter_turned(raw, image_orientation(path) == kClockwise);
+}
+
+RawImage laid(const RawImage& raw, const std::filesystem::path& path) {
+  return quarter_turned(raw, image_orientation(path) != kClockwise);
 }
 
 }  // namespace raysplats::io

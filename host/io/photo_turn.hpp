@@ -15,7 +15,10 @@ namespace raysplats::io {
 /// as image_size().
 bool lies_on_its_side(const std::filesystem::path& path);
 
-/// The picture of such a file, turned upright.
+/// The picture of such a file, or one that was made of it, turned upright.
 RawImage upright(const RawImage& raw, const std::filesystem::path& path);
+
+/// The other way round: a picture that was made of it upright, laid as it is stored.
+RawImage laid(const RawImage& raw, const std::filesystem::path& path);
 
 }  // namespace raysplats::io

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <utility>
@@ -17,8 +18,23 @@
 namespace raysplats::io {
 namespace {
 
-MaskPlane load_mask(const View& view) {
-  MaskPlane mask = mask_plane(read_raw_image(view.mask_path));
+bool fits(const RawImage& mask, int width, int height) {
+  const double expected_height = static_cast<double>(mask.width) * height / width;
+  return std::abs(expected_height - mask.height) <= std::max(2.0, 0.02 * mask.height);
+}
+
+// Programs that heed EXIF and others that do not: a mask may lie where its photo is upright, and
+// stand where it lies.
+RawImage mask_of_photo(const View& view, bool turned) {
+  RawImage mask = read_raw_image(view.mask_path);
+  const int width = view.source_camera.width, height = view.source_camera.height;
+  const bool other = !fits(mask, width, height) && fits(mask, height, width);
+  if (!other || !lies_on_its_side(view.image_path)) return mask;
+  return turned ? upright(mask, view.image_path) : laid(mask, view.image_path);
+}
+
+MaskPlane load_mask(const View& view, bool turned) {
+  MaskPlane mask = mask_plane(mask_of_photo(view, turned));
   const bool dark =
       std::none_of(mask.values.begin(), mask.values.end(), [](float value) { return value > 0; });
   if (dark) {
@@ -45,7 +61,8 @@ ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
   // Sizes that differ by a turn alone are of set_cameras() (dataset.cpp).
   const bool across = raw_.width != raw_.height && raw_.width == view.source_camera.height &&
                       raw_.height == view.source_camera.width;
-  if (across && lies_on_its_side(view.image_path)) raw_ = upright(raw_, view.image_path);
+  const bool turned = across && lies_on_its_side(view.image_path);
+  if (turned) raw_ = upright(raw_, view.image_path);
   if (raw_.width != view.source_camera.width || raw_.height != view.source_camera.height) {
     throw DataError(
         fmt::format("The image {} has {} x {} pixels now, but {} x {} when the data set was opened",
@@ -56,7 +73,7 @@ ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
   unchanged_ = !colors.light && !colors.associated;
   const bool masked = !view.mask_path.empty();
   if (masked) {
-    mask_ = load_mask(view);
+    mask_ = load_mask(view, turned);
     unchanged_ = false;
   }
   rows_ = fitted(decoded_rows(raw_, masked ? &mask_ : nullptr, colors), view);

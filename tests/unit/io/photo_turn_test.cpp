@@ -76,6 +76,43 @@ TEST_CASE("photos that lie on their side are turned where cameras have the uprig
   CHECK(255.0 * half.at(39, 0, 0) == doctest::Approx(shade(39, 0)));
 }
 
+TEST_CASE("masks follow their photo, whether they were made of it lying or upright") {
+  // White is the left third of the upright picture.
+  const auto write_mask = [](const fs::path& path, int orientation, bool lying) {
+    Image mask(lying ? kHeight : kWidth, lying ? kWidth : kHeight, 1, 0.0f);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < 13; ++x) {
+        const int row = orientation == 6 ? kWidth - 1 - x : x;
+        const int column = orientation == 6 ? y : kHeight - 1 - y;
+        (lying ? mask.at(column, row, 0) : mask.at(x, y, 0)) = 1.0f;
+      }
+    }
+    write_image(path, mask);
+  };
+  for (const int orientation : {6, 8}) {
+    for (const bool photo_lies : {false, true}) {
+      for (const bool mask_lies : {false, true}) {
+        CAPTURE(orientation);
+        CAPTURE(photo_lies);
+        CAPTURE(mask_lies);
+        const Scratch scratch;
+        write_cameras(scratch.path(), photo_lies ? kHeight : kWidth, photo_lies ? kWidth : kHeight);
+        write_photo(scratch / "p.tif", orientation, kWidth, kHeight);
+        write_mask(scratch / "masks/p.png", orientation, mask_lies);
+        const Image image = load_view_image(load_dataset(scratch.path()).views[0]);
+        std::size_t wrong = 0;
+        for (int y = 0; y < image.height; ++y) {
+          for (int x = 0; x < image.width; ++x) {
+            const int upright_x = !photo_lies ? x : orientation == 6 ? kWidth - 1 - y : y;
+            wrong += (image.at(x, y, 3) == 1.0f) == (upright_x < 13) ? 0 : 1;
+          }
+        }
+        CHECK(wrong == 0);
+      }
+    }
+  }
+}
+
 TEST_CASE("photos of their camera's shape stay as they are stored, others are refused") {
   const Scratch scratch;
   write_cameras(scratch.path(), kHeight, kWidth);
