@@ -293,16 +293,26 @@ Dataset load_colmap(const fs::path& root,
   return dataset;
 }
 
+/// A mask or depth map of a transforms file. Its folder tells it from the photo of the same name.
+fs::path beside_photos(const fs::path& folder, const std::string& path) {
+  if (is_file(folder / path)) return folder / path;
+  return io::find_moved(folder, path, 2).value_or(folder / path);
+}
+
 /// The views of a transforms file, in its order.
 std::vector<View> transforms_views(const io::TransformsFile& file, const DatasetOptions& options) {
   const fs::path folder = file.path.parent_path();
   std::vector<View> views;
+  std::size_t moved = 0;
+  std::string first_moved;
   for (std::size_t i = 0; i < file.frames.size(); ++i) {
     const io::TransformsFrame& frame = file.frames[i];
     if (frame.file_path.empty()) {
       throw DataError(fmt::format("{}: frame {} has no file_path", file.path.string(), i));
     }
-    const auto photo = io::find_image(folder, frame.file_path);
+    auto photo = io::find_image(folder, frame.file_path);
+    const bool is_moved = !photo;
+    if (is_moved) photo = io::find_moved(folder, frame.file_path, 1);
     if (!photo) {
       throw DataError(fmt::format("{}: the image '{}' of frame {} does not exist",
                                   file.path.string(), frame.file_path, i));
@@ -310,9 +320,13 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
     View view;
     view.image_path = *photo;
     fs::path name = frame.file_path;
+    if (is_moved) {
+      name = photo->lexically_relative(folder.lexically_normal());
+      if (moved++ == 0) first_moved = frame.file_path;
+    }
     if (!io::has_image_extension(name)) name += photo->extension();
     if (!frame.mask_path.empty()) {
-      view.mask_path = folder / frame.mask_path;
+      view.mask_path = beside_photos(folder, frame.mask_path);
       if (!is_file(view.mask_path)) {
         throw DataError(fmt::format("{}: the mask '{}' of frame {} does not exist",
                                     file.path.string(), frame.mask_path, i));
@@ -323,7 +337,7 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
       if (view.mask_path.empty()) view.mask_path = find_mask(folder, photo->filename());
     }
     if (!frame.depth_path.empty()) {
-      view.depth_path = folder / frame.depth_path;
+      view.depth_path = beside_photos(folder, frame.depth_path);
       if (!is_file(view.depth_path)) {
         throw DataError(fmt::format("{}: the depth map '{}' of frame {} does not exist",
                                     file.path.string(), frame.depth_path, i));
@@ -335,6 +349,10 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
     nominal.name = io::inner_name(name);
     set_cameras(view, nominal, size, options.downscale, options.undistort);
     views.push_back(std::move(view));
+  }
+  if (moved > 0) {
+    spdlog::info("{} of {} photos are not where {} says ({}) but were found below its folder",
+                 moved, views.size(), file.path.string(), first_moved);
   }
   return views;
 }

@@ -2,6 +2,7 @@
 #include "io/transforms.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -29,6 +30,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr double kRigidTolerance = 1e-3;
+constexpr double kLeastAxis = 1e-6;
 
 /// One scope of keys: the file or a frame of it, with its name for errors.
 struct Scope {
@@ -165,7 +167,9 @@ void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
   if (const auto radius = scope.positive("fisheye_crop_radius")) frame.crop_radius = radius;
 }
 
-void read_pose(const Scope& scope, TransformsFrame& frame) {
+/// Reads the pose; whether its axes had another length than 1, which does not change what a camera
+/// sees: exporters of Blender write cameras that were scaled as objects.
+bool read_pose(const Scope& scope, TransformsFrame& frame) {
   const auto found = scope.object.find("transform_matrix");
   if (found == scope.object.end()) scope.fail("the transform_matrix is missing");
   if (!found->is_array() || (found->size() != 3 && found->size() != 4)) {
@@ -195,6 +199,14 @@ void read_pose(const Scope& scope, TransformsFrame& frame) {
       }
     }
   }
+  bool scaled = false;
+  for (int i = 0; i < 3; ++i) {
+    const double length = glm::length(rotation[i]);
+    if (!(length > kLeastAxis && length < 1.0 / kLeastAxis)) continue;
+    if (std::abs(length - 1.0) <= kRigidTolerance) continue;
+    rotation[i] /= length;
+    scaled = true;
+  }
   const glm::dmat3 gram = glm::transpose(rotation) * rotation;
   double deviation = 0;
   for (int i = 0; i < 3; ++i) {
@@ -203,7 +215,8 @@ void read_pose(const Scope& scope, TransformsFrame& frame) {
   }
   if (deviation > kRigidTolerance || glm::determinant(rotation) < 0) {
     scope.fail(
-        "the transform_matrix is no rotation with a translation (it scales, shears or mirrors)");
+        "the transform_matrix is no rotation with a translation (it shears, mirrors or is "
+        "singular)");
   }
   // Newton's iteration for the nearest rotation (Higham 1986); two steps end at rounding from 1e-3.
   for (int step = 0; step < 3; ++step) {
@@ -214,6 +227,7 @@ void read_pose(const Scope& scope, TransformsFrame& frame) {
   rotation[2] = -rotation[2];
   frame.rotation = glm::transpose(rotation);
   frame.translation = -(frame.rotation * position);
+  return scaled;
 }
 
 std::optional<std::vector<std::string>> read_names(const Scope& scope, const char* key) {
@@ -245,6 +259,7 @@ TransformsFile read_transforms(const fs::path& path) {
   if (frames == root.end() || !frames->is_array()) {
     throw DataError(fmt::format("{} has no list of frames: it is no camera file", path.string()));
   }
+  std::size_t scaled = 0;
   for (const json& object : *frames) {
     const Scope frame_scope{object, path, fmt::format("frame {}", file.frames.size())};
     if (!object.is_object()) frame_scope.fail("it is no JSON object");
@@ -252,11 +267,15 @@ TransformsFile read_transforms(const fs::path& path) {
     read_intrinsics(frame_scope, frame);
     if (frame.model == CameraModel::kPhotoLens && frame.fisheye624.empty())
       frame_scope.fail("FISHEYE624 needs the twelve numbers of 'distortion_params'");
-    read_pose(frame_scope, frame);
+    scaled += read_pose(frame_scope, frame) ? 1 : 0;
     frame.file_path = portable_path(frame_scope.text("file_path"));
     frame.mask_path = portable_path(frame_scope.text("mask_path"));
     frame.depth_path = portable_path(frame_scope.text("depth_file_path"));
     file.frames.push_back(std::move(frame));
+  }
+  if (scaled > 0) {
+    spdlog::info("{} of {} cameras of {} are scaled, which does not change what they see", scaled,
+                 file.frames.size(), path.string());
   }
   return file;
 }
@@ -359,6 +378,20 @@ std::optional<fs::path> find_image(const fs::path& folder, const fs::path& file_
     if (fs::is_regular_file(stem + extension, error)) return stem + extension;
   }
   return std::nullopt;
+}
+
+std::optional<fs::path> find_moved(const fs::path& folder,
+                                   const fs::path& file_path,
+                                   std::size_t least_parts) {
+  std::vector<fs::path> parts;
+  for (const fs::path& part : file_path.lexically_normal().relative_path()) parts.push_back(part);
+  for (std::size_t first = 1; first < parts.size() && parts.size() - first >= least_parts;
+       ++first) {
+    fs::path rest;
+    for (std::size_t i = first; i < parts.size(); ++i) rest /= parts[i];
+    if (auto found = find_image(folder, rest)) return found;
+  }
+  return least_parts > 1 ? std::nullopt : find_image(folder / "images", file_path.filename());
 }
 
 }  // namespace io

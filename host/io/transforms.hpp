@@ -38,7 +38,8 @@ struct TransformsFile {
 
 /// Throws DataError for malformed JSON, camera models other than pinholes, OPENCV, OPENCV_FISHEYE
 /// (instant-ngp: is_fisheye), FISHEYE624, EQUIRECTANGULAR and ORTHOPHOTO (named), and matrices that
-/// are not finite or no rigid motion to 1e-3; smaller deviations are orthonormalised.
+/// are not finite or, but for the lengths of their axes, no rigid motion to 1e-3; smaller
+/// deviations are orthonormalised.
 TransformsFile read_transforms(const std::filesystem::path& path);
 
 /// The camera of a frame whose photo has the given size; the file's own size scales its intrinsics,
@@ -56,5 +57,11 @@ std::string inner_name(const std::filesystem::path& path);
 /// when absent.
 std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
                                                 const std::filesystem::path& file_path);
+
+/// The same by the end of a path that was written elsewhere (C:/captures/fox/images/1.jpg): the
+/// longest that is there, of `least_parts` or more; a name alone also in the folder images.
+std::optional<std::filesystem::path> find_moved(const std::filesystem::path& folder,
+                                                const std::filesystem::path& file_path,
+                                                std::size_t least_parts);
 
 }  // namespace raysplats::io

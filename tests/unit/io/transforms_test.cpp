@@ -206,7 +206,18 @@ TEST_CASE("small deviations from a rotation are removed, larger ones refused") {
     for (int j = 0; j < 3; ++j) CHECK(std::abs(gram[i][j] - (i == j ? 1 : 0)) < 1e-12);
   }
   CHECK(glm::length(camera.center() - glm::dvec3(1, 2, 3)) < 1e-12);
-  CHECK(contains(cameras_error(with_matrix("[[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]")),
+  // A camera that was scaled as an object sees the same.
+  const LogCapture log;
+  const Camera scaled =
+      cameras_of(with_matrix("[[1.6, 0, 1.8, 1], [0, 0.5, 0, 2], [-1.2, 0, 2.4, 3]]")).front();
+  CHECK(log.contains("1 of 1 cameras"));
+  const Camera plain =
+      cameras_of(with_matrix("[[0.8, 0, 0.6, 1], [0, 1, 0, 2], [-0.6, 0, 0.8, 3]]")).front();
+  CHECK(glm::length(scaled.center() - plain.center()) < 1e-12);
+  for (int i = 0; i < 3; ++i) CHECK(glm::length(scaled.rotation[i] - plain.rotation[i]) < 1e-12);
+  CHECK(contains(cameras_error(with_matrix("[[1,0.1,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]")),
+                 "no rotation"));
+  CHECK(contains(cameras_error(with_matrix("[[0,0,0,0],[0,0,0,0],[0,0,0,0],[0,0,0,1]]")),
                  "no rotation"));
   CHECK(contains(cameras_error(with_matrix("[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]")),
                  "no rotation"));
@@ -219,6 +230,36 @@ TEST_CASE("small deviations from a rotation are removed, larger ones refused") {
   CHECK(
       contains(cameras_error(with_matrix("[[1,0,0,1e999],[0,1,0,0],[0,0,1,0]]")), "out of range"));
   CHECK(contains(cameras_error(with_matrix("7")), "4 rows"));
+}
+
+TEST_CASE(
+    "paths of another machine are found by their ends, masks and depth maps in their folders") {
+  const Scratch scratch;
+  const Image photo(20, 10, 3, 0.5f);
+  write_image(scratch / "images/left eye/ä 1.png", photo);
+  write_image(scratch / "images/2.png", photo);
+  write_image(scratch / "3.png", photo);
+  write_image(scratch / "masks/2.png", Image(20, 10, 1, 1.0f));
+  write_bytes(scratch / "transforms.json",
+              file_of("\"w\": 20, \"h\": 10, \"fl_x\": 20, \"train_filenames\": [\"C:/a/2.png\"], ",
+                      frame(R"(C:\\Users\\me\\fox\\images\\left eye\\ä 1.png)", 1) + "," +
+                          frame("C:/a/2.png", 2, "\"mask_path\": \"/home/me/fox/masks/2.png\", ") +
+                          "," + frame("/home/me/images/3.png", 3)));
+  const LogCapture log;
+  const Dataset dataset = load_dataset(scratch.path());
+  CHECK(log.contains("3 of 3 photos are not where"));
+  REQUIRE(dataset.views.size() == 3);
+  const View* second = nullptr;
+  for (const View& view : dataset.views) {
+    CHECK(view.test == (view.camera.name != "images/2.png"));
+    if (!view.test) second = &view;
+  }
+  REQUIRE(second != nullptr);
+  CHECK(fs::equivalent(second->mask_path, scratch / "masks/2.png"));
+  CHECK(dataset.indices(Split::kTest).size() == 2);
+  CHECK(fs::equivalent(dataset.views.front().image_path, scratch / "3.png"));
+  fs::remove(scratch / "images/2.png");
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "'C:/a/2.png' of frame 1"));
 }
 
 TEST_CASE("malformed camera files are refused with the frame or the line") {
