@@ -113,11 +113,7 @@ Trainer::Impl::Impl(Context& device,
         held_out ? "--test-every 1 holds all of them out" : "its files name none to train on"));
   }
   if (options.depth_weight > 0) {
-    if (ray_views() > 0) {
-      throw UsageError(
-          "The option 'depth-weight' is for views that are traced in packets: choose 'traversal' = "
-          "auto or tiles, and cameras with a centre");
-    }
+    require_depth_gradients();
     depths.emplace(device, dataset, train_views, options.depth_weight, options.depth_unit);
   }
   if (apart.size() < static_cast<std::size_t>(options.validate_views)) {

@@ -99,7 +99,8 @@ struct Trainer::Impl {
   std::size_t most_gaussians(std::int64_t iterations);
   std::size_t largest_photo() const;
   std::size_t photo_words() const;
-  std::size_t ray_views() const;
+  std::size_t ray_views(int divisor = 1) const;
+  void require_depth_gradients() const;
 
   // trainer_step.cpp: one step, and what happens between two of them.
   void enqueue_view(std::size_t slot);

@@ -160,10 +160,29 @@ std::size_t Trainer::Impl::photo_words() const {
   return words;
 }
 
-std::size_t Trainer::Impl::ray_views() const {
+std::size_t Trainer::Impl::ray_views(int divisor) const {
   return static_cast<std::size_t>(
-      std::count_if(train_cameras.begin(), train_cameras.end(),
-                    [this](const Camera& camera) { return tracer.by_rays(camera); }));
+      std::count_if(train_cameras.begin(), train_cameras.end(), [&](const Camera& camera) {
+        return tracer.by_rays(divisor > 1 ? downscaled(camera, divisor) : camera);
+      }));
+}
+
+// Those of depths are known in packets alone. Panoramas have none where they are small.
+void Trainer::Impl::require_depth_gradients() const {
+  if (ray_views() > 0) {
+    throw UsageError(
+        "The option 'depth-weight' is for views that are traced in packets: choose 'traversal' = "
+        "auto or tiles, and cameras with a centre (panoramas of some size)");
+  }
+  for (const ResolutionStep& step : options.resolution_schedule) {
+    const std::size_t by_rays = ray_views(step.divisor);
+    if (by_rays == 0) continue;
+    throw UsageError(fmt::format(
+        "The option 'depth-weight' is for views that are traced in packets, and {} of {} are not "
+        "where 'resolution-schedule' makes them {} times smaller: choose 'resolution-schedule' = "
+        "[], which is full size from the beginning, or smaller divisors",
+        by_rays, train_cameras.size(), step.divisor));
+  }
 }
 
 // The first model on the device, with at most that many Gaussians.

@@ -193,6 +193,34 @@ TEST_CASE("maps and points halve the error of depth of six photos") {
   CHECK(points < 0.5 * without);
 }
 
+TEST_CASE(
+    "panoramas that a schedule makes too small for gradients of depth are refused at the start") {
+  const TemporaryDirectory scratch;
+  Context context{test_device()};
+  Dataset data = capture(scratch.path() / "data");
+  for (View& view : data.views) {
+    view.camera.model = CameraModel::kEquirectangular;
+    view.camera.width = 320;
+    view.camera.height = 160;
+    view.source_camera = view.camera;
+    write_image(view.image_path, Image(320, 160, 3, 0.5f));
+  }
+  TrainOptions options;
+  options.depth_weight = 0.5;
+  const auto refused = [&] {
+    try {
+      const Trainer trainer(context, data, options, scratch.path() / "run");
+    } catch (const UsageError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  CHECK(refused().find("6 of 6 are not where 'resolution-schedule' makes them 4 times smaller") !=
+        std::string::npos);
+  options.resolution_schedule.clear();
+  CHECK(refused().find("packets") == std::string::npos);
+}
+
 TEST_CASE("what is not known of a depth map is left out") {
   const TemporaryDirectory folder;
   const Camera camera = look_at({2, 0, 0}, {0, 0, 0}, {0, 0, 1}, 4, 2, 3);
