@@ -260,12 +260,13 @@ Dataset load_colmap(const fs::path& root,
   const PhotoFolder folder = folder_of_model(root, model, options.downscale);
   const double rest = std::max(1.0, options.downscale / folder.factor);
   std::size_t stretched = 0;
+  std::vector<std::string> missing;
   for (const io::ColmapImage& image : model.images) {
     View view;
     const auto photo = find_photo(folder.path, image.name);
     if (!photo) {
-      throw DataError(fmt::format("The image '{}' of the COLMAP model {} does not exist in {}",
-                                  image.name, model_folder.string(), folder.path.string()));
+      missing.push_back(image.name);
+      continue;
     }
     view.image_path = *photo;
     view.mask_path = find_mask(root, image.name);
@@ -278,6 +279,13 @@ Dataset load_colmap(const fs::path& root,
     if (is_stretched(size, nominal)) ++stretched;
     set_cameras(view, nominal, size, rest, options.undistort);
     dataset.views.push_back(std::move(view));
+  }
+  if (!missing.empty()) {
+    throw DataError(fmt::format(
+        "{} of {} images of the COLMAP model {} are not in {}, '{}' among them: put them there, or "
+        "take them out of the model (colmap image_deleter)",
+        missing.size(), model.images.size(), model_folder.string(), folder.path.string(),
+        missing.front()));
   }
   require_photos_of_their_own(dataset.views);
   if (stretched > 0) {
