@@ -491,8 +491,19 @@ bool goes_before(const fs::path& transforms, const fs::path& root, const fs::pat
          !io::read_transforms(transforms).ply_file_path.empty();
 }
 
-/// What to do about photos that have no cameras yet.
-std::string way_to_poses(const fs::path& root) {
+/// What to give in place of a folder that is no data set: archives unpack to a folder in a folder,
+/// and photos may have no cameras yet.
+std::string way_out(const fs::path& root) {
+  std::set<fs::path> inner;
+  std::error_code failure;
+  for (fs::directory_iterator entry(root, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    const fs::path& folder = entry->path();
+    const bool is_data = is_folder(folder / "sparse") || is_file(folder / "transforms.json") ||
+                         is_file(folder / "transforms_train.json");
+    if (is_data) inner.insert(folder);
+  }
+  if (!inner.empty()) return fmt::format("; {} is one", inner.begin()->string());
   for (const fs::path& folder : {root / "input", root / "images", root}) {
     std::error_code error;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
@@ -524,7 +535,7 @@ Dataset load_any(const fs::path& root, const DatasetOptions& options) {
   throw DataError(
       fmt::format("{} is no data set: it has neither a COLMAP model (sparse/0) nor transforms.json "
                   "nor transforms_train.json{}",
-                  root.string(), way_to_poses(root)));
+                  root.string(), way_out(root)));
 }
 
 }  // namespace

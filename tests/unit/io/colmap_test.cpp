@@ -434,6 +434,10 @@ TEST_CASE("a data set without its photos, with foreign photos or without anythin
   const Scratch empty;
   CHECK(contains(data_error([&] { load_dataset(empty.path()); }), "no data set"));
   CHECK(contains(data_error([&] { load_dataset(empty / "none"); }), "does not exist"));
+  // A folder in a folder.
+  fixture.write_binary(empty / "garden/sparse/0");
+  CHECK(contains(data_error([&] { load_dataset(empty.path()); }),
+                 "; " + (empty / "garden").string() + " is one"));
   write_bytes(empty / "file", "");
   CHECK(contains(data_error([&] { load_dataset(empty / "file"); }), "is a file"));
   ColmapFixture nothing = fixture;
