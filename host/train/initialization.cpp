@@ -37,9 +37,10 @@ constexpr double kUnsureShare = 0.25;     // of a start from photos alone: point
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
-constexpr double kMostlyBare = 0.55;  // of what photos show, with no sparse point near
-constexpr double kMostlySeen = 0.5;   // of sparse points
-constexpr double kLeastSeen = 0.01;   // of a given model: what photos of its scene see more of
+constexpr double kMostlyBare = 0.55;    // of what photos show, with no sparse point near
+constexpr double kMostlyAgreed = 0.45;  // of what photos show, in one depth
+constexpr double kMostlySeen = 0.5;     // of sparse points
+constexpr double kLeastSeen = 0.01;     // of a given model: what photos of its scene see more of
 
 // Balanced k-d tree laid out in place: the median of a range is its node, its halves are the
 // children.
@@ -204,6 +205,27 @@ PointCloud photo_points(const Dataset& dataset,
     return scattered_points(photos, region, depths_around(guess), count, seed);
   }
   return swept_points(photos, swept_depths(photos, guess, seed), count, kUnsureShare, seed);
+}
+
+// What of the points that photos tell of goes beside sparse ones.
+enum class Beside { kNothing, kAll, kInTheirPlaces };
+
+Beside photos_beside(const PointCloud& points,
+                     const Dataset& dataset,
+                     std::span<const Camera> cameras,
+                     const PhotoSource& photos,
+                     const TrainOptions& options) {
+  if (options.init != "auto" || points.size() < kFewPoints) return Beside::kNothing;
+  // Points on one thing alone say nothing of what is around it.
+  if (bare_share(points, photos(PhotoChoice::kSome)) > kMostlyBare) return Beside::kAll;
+  if (dataset.alpha_is_background) return Beside::kNothing;
+  // Sparse points crowd where there is texture. What a sweep finds lies more evenly; where photos
+  // are too far apart, or show little, it is wrong too often.
+  const std::vector<SmallPhoto>& many = photos(PhotoChoice::kMany);
+  const double guess = guessed_depth(cameras, visible_region(cameras));
+  const DepthRange depths = swept_depths(many, guess, options.seed);
+  return agreed_share(many, depths, options.seed) > kMostlyAgreed ? Beside::kInTheirPlaces
+                                                                  : Beside::kNothing;
 }
 
 std::string match_text(const PointMatch& match) {
@@ -385,12 +407,12 @@ Gaussians initial_model(const Dataset& dataset,
                                 ? std::min(limit, static_cast<std::size_t>(options.init_count))
                                 : share(clears_random_start(options) ? kStartShare : kPhotoShare);
   PointCloud points;
+  Beside beside = Beside::kNothing;
   if (has_points && (options.init == "auto" || options.init == "colmap")) {
     points = start_points(dataset, cameras, photos, count, options);
-    // Points on one thing alone say nothing of what is around it.
-    const bool bare = options.init == "auto" && points.size() >= kFewPoints &&
-                      bare_share(points, photos(PhotoChoice::kSome)) > kMostlyBare;
-    const std::size_t most = share(bare ? kStartShare - kPhotoShare : kStartShare);
+    beside = photos_beside(points, dataset, cameras, photos, options);
+    const bool alone = beside == Beside::kNothing;
+    const std::size_t most = share(alone ? kStartShare : kStartShare - kPhotoShare);
     if (points.size() > most) {
       spdlog::info(
           "the start takes {} of {} sparse points, so that at most {} Gaussians have room to grow "
@@ -398,14 +420,14 @@ Gaussians initial_model(const Dataset& dataset,
           most, points.size(), limit);
     }
     // Sizes follow from the distances between the points that are left.
-    if (options.init == "colmap" || (!bare && points.size() >= std::min(kFewPoints, count / 2)))
+    if (options.init == "colmap" || (alone && points.size() >= std::min(kFewPoints, count / 2)))
       return start(subset(points, most));
-    if (bare) {
-      spdlog::info(
-          "the sparse points lie on a small part of what the photos show: the start takes {} "
-          "points from the photos as well",
-          count);
-      points = subset(points, most);
+    if (!alone) {
+      spdlog::info("{}: the start takes {} points from the photos as well",
+                   beside == Beside::kAll
+                       ? "the sparse points lie on a small part of what the photos show"
+                       : "most of what the photos show tells its depth",
+                   count);
     } else if (points.size() > 0) {
       spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
                    points.size(), count);
@@ -417,9 +439,13 @@ Gaussians initial_model(const Dataset& dataset,
                                   depths_around(guessed_depth(cameras, region)), count,
                                   options.seed));
   }
+  const bool joined = beside != Beside::kNothing;
+  const std::vector<SmallPhoto>& told = photos(joined ? PhotoChoice::kMany : PhotoChoice::kAll);
+  const PointCloud all = points;
+  if (joined) points = subset(points, share(kStartShare - kPhotoShare));
   const std::size_t room = std::min(count, limit - std::min(limit, points.size()));
-  const PointCloud seen =
-      photo_points(dataset, cameras, region, photos(PhotoChoice::kAll), room, options.seed);
+  PointCloud seen = photo_points(dataset, cameras, region, told, room, options.seed);
+  if (beside == Beside::kInTheirPlaces) seen = beside_points(seen, all, photos(PhotoChoice::kSome));
   for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, points);
   return start(points);
 }

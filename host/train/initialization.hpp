@@ -46,8 +46,8 @@ std::optional<Bounds> about_origin(const std::optional<Bounds>& bounds,
 /// The Gaussians whose mean lies in the box; all of them without one.
 Gaussians inside(const Gaussians& model, const std::optional<Bounds>& bounds);
 
-/// Of the training views: all, or a few that are spread evenly over them.
-enum class PhotoChoice { kAll, kSome };
+/// Of the training views: all, or at most a hundred or two dozen that are spread evenly over them.
+enum class PhotoChoice { kAll, kMany, kSome };
 
 /// Photos of the training views, loaded when they are first asked for.
 using PhotoSource = std::function<const std::vector<SmallPhoto>&(PhotoChoice)>;

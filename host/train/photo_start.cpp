@@ -263,6 +263,7 @@ double unsure_share(const DepthRange& depths) {
 struct Sample {
   glm::dvec3 position, color;
   bool agreed = false;
+  bool shown() const { return position != glm::dvec3(0.0); }
 };
 
 Sample sweep_pixel(std::span<const SmallPhoto> photos,
@@ -282,6 +283,19 @@ Sample sweep_pixel(std::span<const SmallPhoto> photos,
   const double along =
       depth ? *depth : depth_at(jitter + (1.0 - jitter) * unsure_share(depths), depths);
   out.position = pixel.ray.origin + along * pixel.ray.direction;
+  return out;
+}
+
+std::vector<Sample> swept_samples(std::span<const SmallPhoto> photos,
+                                  const DepthRange& depths,
+                                  std::size_t count,
+                                  std::uint64_t seed) {
+  std::vector<std::vector<std::size_t>> neighbours(photos.size());
+  for (std::size_t i = 0; i < photos.size(); ++i)
+    neighbours[i] = neighbours_of(photos, i, depths.typical);
+  std::vector<Sample> out(count);
+  in_parallel(count,
+              [&](std::size_t i) { out[i] = sweep_pixel(photos, neighbours, depths, seed, i); });
   return out;
 }
 
@@ -439,23 +453,31 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
   return depths_around(typical);
 }
 
+double agreed_share(std::span<const SmallPhoto> photos,
+                    const DepthRange& depths,
+                    std::uint64_t seed) {
+  if (photos.empty()) return 0;
+  const std::vector<Sample> samples = swept_samples(photos, depths, kProbes, seed);
+  std::size_t agreed = 0, shown = 0;
+  for (const Sample& sample : samples) {
+    shown += sample.shown() ? 1 : 0;
+    agreed += sample.agreed ? 1 : 0;
+  }
+  return shown > 0 ? static_cast<double>(agreed) / static_cast<double>(shown) : 0;
+}
+
 PointCloud swept_points(std::span<const SmallPhoto> photos,
                         const DepthRange& depths,
                         std::size_t count,
                         double unsure,
                         std::uint64_t seed) {
-  std::vector<std::vector<std::size_t>> neighbours(photos.size());
-  for (std::size_t i = 0; i < photos.size(); ++i)
-    neighbours[i] = neighbours_of(photos, i, depths.typical);
-  const std::size_t tries = kTriesPerSweptPoint * count;
-  std::vector<Sample> samples(tries);
-  in_parallel(
-      tries, [&](std::size_t i) { samples[i] = sweep_pixel(photos, neighbours, depths, seed, i); });
+  const std::vector<Sample> samples =
+      swept_samples(photos, depths, kTriesPerSweptPoint * count, seed);
   const auto sure = static_cast<std::size_t>(std::count_if(
       samples.begin(), samples.end(), [](const Sample& sample) { return sample.agreed; }));
-  const auto vague = static_cast<std::size_t>(std::count_if(
-      samples.begin(), samples.end(),
-      [](const Sample& sample) { return !sample.agreed && sample.position != glm::dvec3(0.0); }));
+  const auto vague = static_cast<std::size_t>(
+      std::count_if(samples.begin(), samples.end(),
+                    [](const Sample& sample) { return !sample.agreed && sample.shown(); }));
   const auto fog = static_cast<std::size_t>(unsure * static_cast<double>(count));
   const std::size_t most_agreed = count - std::min(fog, vague);
   const std::size_t most_random = depths.open ? count - std::min(sure, count - fog) : fog;
@@ -463,8 +485,7 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
   std::size_t agreed = 0, random = 0;
   for (const Sample& sample : samples) {
     std::size_t& number = sample.agreed ? agreed : random;
-    if (number >= (sample.agreed ? most_agreed : most_random) || sample.position == glm::dvec3(0.0))
-      continue;
+    if (number >= (sample.agreed ? most_agreed : most_random) || !sample.shown()) continue;
     ++number;
     append(out, sample.position, sample.color);
   }

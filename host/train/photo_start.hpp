@@ -45,6 +45,12 @@ DepthRange depths_around(double typical);
 /// depth. `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
 
+/// The share of random pixels at which neighbouring photos agree in one depth, of those that show
+/// something: how much a sweep finds. 0 where nothing is shown.
+double agreed_share(std::span<const SmallPhoto> photos,
+                    const DepthRange& depths,
+                    std::uint64_t seed);
+
 /// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
 /// sweep, Collins 1996, over single pixels with their surroundings). Of the pixels that no depth
 /// explains clearly, the share `unsure` of `count` at most (all, where the range is open) get a

@@ -36,6 +36,42 @@ bool sees(const Camera& camera, const glm::dvec3& world) {
          point->y < camera.height;
 }
 
+void copy_point(const PointCloud& from, std::size_t i, PointCloud& to) {
+  for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
+    to.positions.push_back(from.positions[k]);
+    to.colors.push_back(from.colors[k]);
+  }
+}
+
+// Cells of kBareCell pixels a side of a photo, and which of them show points.
+class PointCells {
+ public:
+  PointCells(const PointCloud& points, const SmallPhoto& photo)
+      : columns_((photo.camera.width + kBareCell - 1) / kBareCell),
+        rows_((photo.camera.height + kBareCell - 1) / kBareCell),
+        taken_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {
+    const std::size_t looks = std::min(kMostPlaces, points.size());
+    for (std::size_t k = 0; k < looks; ++k) {
+      const auto place = photo.sees(triple(points.positions, k * points.size() / looks));
+      if (place) taken_[cell(*place)] = true;
+    }
+  }
+
+  /// Whether the cell that contains the image point shows one; the point has to lie inside.
+  bool taken(const glm::dvec2& place) const { return taken_[cell(place)]; }
+
+ private:
+  std::size_t cell(const glm::dvec2& place) const {
+    const auto along = [](double x, int count) {
+      return static_cast<std::size_t>(std::min(static_cast<int>(x) / kBareCell, count - 1));
+    };
+    return along(place.y, rows_) * static_cast<std::size_t>(columns_) + along(place.x, columns_);
+  }
+
+  int columns_, rows_;
+  std::vector<bool> taken_;
+};
+
 // Mean of the lower half, of two at least: something may hide the point from the others.
 double better_half(std::vector<double>& differences) {
   const std::size_t half = std::max<std::size_t>(2, (differences.size() + 1) / 2);
@@ -124,10 +160,7 @@ PointCloud seen_points(const PointCloud& points, std::span<const Camera> cameras
     if (std::none_of(cameras.begin(), cameras.end(),
                      [&](const Camera& camera) { return sees(camera, world); }))
       continue;
-    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
-      out.positions.push_back(points.positions[k]);
-      out.colors.push_back(points.colors[k]);
-    }
+    copy_point(points, i, out);
   }
   return out;
 }
@@ -162,32 +195,38 @@ PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> phot
 }
 
 double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) {
-  const std::size_t looks = std::min(kMostPlaces, points.size());
   std::size_t shown = 0, bare = 0;
   for (const SmallPhoto& photo : photos) {
-    const int columns = photo.camera.width / kBareCell, rows = photo.camera.height / kBareCell;
-    const auto cell = [columns](int column, int row) {
-      return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
-             static_cast<std::size_t>(column);
-    };
-    std::vector<bool> taken(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-    for (std::size_t k = 0; k < looks; ++k) {
-      const auto place = photo.sees(triple(points.positions, k * points.size() / looks));
-      if (!place) continue;
-      const int column = static_cast<int>(place->x) / kBareCell;
-      const int row = static_cast<int>(place->y) / kBareCell;
-      if (column < columns && row < rows) taken[cell(column, row)] = true;
-    }
-    for (int row = 0; row < rows; ++row) {
-      for (int column = 0; column < columns; ++column) {
+    const PointCells cells(points, photo);
+    for (int row = 0; row < photo.camera.height / kBareCell; ++row) {
+      for (int column = 0; column < photo.camera.width / kBareCell; ++column) {
         const glm::dvec2 middle((column + 0.5) * kBareCell, (row + 0.5) * kBareCell);
         if (!photo.known(middle) || photo.at(middle).w < 0.5) continue;
         ++shown;
-        bare += taken[cell(column, row)] ? 0 : 1;
+        bare += cells.taken(middle) ? 0 : 1;
       }
     }
   }
   return shown > 0 ? static_cast<double>(bare) / static_cast<double>(shown) : 0;
+}
+
+PointCloud beside_points(const PointCloud& found,
+                         const PointCloud& points,
+                         std::span<const SmallPhoto> photos) {
+  std::vector<PointCells> cells;
+  for (const SmallPhoto& photo : photos) cells.emplace_back(points, photo);
+  PointCloud out;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    std::size_t seen = 0, taken = 0;
+    for (std::size_t k = 0; k < photos.size(); ++k) {
+      const auto place = photos[k].sees(triple(found.positions, i));
+      if (!place) continue;
+      ++seen;
+      taken += cells[k].taken(*place) ? 1 : 0;
+    }
+    if (seen > 0 && 2 * taken >= seen) copy_point(found, i, out);
+  }
+  return out;
 }
 
 bool plausible(const PointMatch& match) {

@@ -47,6 +47,12 @@ PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> phot
 double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos);
 constexpr int kBareCell = 10;
 
+/// Those of `found` that lie where points are: in the cells of `points` in at least half of the
+/// photos that see them. Without their tracks and errors.
+PointCloud beside_points(const PointCloud& found,
+                         const PointCloud& points,
+                         std::span<const SmallPhoto> photos);
+
 /// Whether points can be where they are: not when they are in other units or axes than the cameras.
 bool plausible(const PointMatch& match);
 

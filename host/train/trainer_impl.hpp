@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
@@ -225,9 +226,9 @@ struct Trainer::Impl {
   StepGradients gradients;      // of the last view, then of the step
   GradientTree sum;
   Buffer<float> image_gradient;
-  std::int64_t iteration = 0;                         // completed
-  std::vector<SmallPhoto> small_photos, some_photos;  // once they are asked for
-  std::optional<Gaussians> first_model;               // that estimate() has made
+  std::int64_t iteration = 0;                                   // completed
+  std::map<std::size_t, std::vector<SmallPhoto>> small_photos;  // so many, once asked for
+  std::optional<Gaussians> first_model;                         // that estimate() has made
   bool started = false;
   bool ended = false;  // before its time, by patience
   bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done

@@ -23,6 +23,7 @@ constexpr std::int64_t kLongRun = 2;     // times as long as they ask for
 constexpr double kSigmoidExtent = 20;    // then one unit is less than 0.05 extents, a usual limit
 constexpr double kPosePrior = 1;         // PoseRefinement: what errors of half a degree can bear
 constexpr std::size_t kSomePhotos = 24;  // that tell what is typical of all
+constexpr std::size_t kManyPhotos = 100;  // that tell of depth
 
 std::vector<std::size_t> evenly_spread(const std::vector<std::size_t>& all, std::size_t most) {
   std::vector<std::size_t> out;
@@ -56,11 +57,13 @@ void note_many_passes(const TrainOptions& options, std::size_t photos) {
 }  // namespace
 
 const std::vector<SmallPhoto>& Trainer::Impl::photos(PhotoChoice choice) {
-  std::vector<SmallPhoto>& out = choice == PhotoChoice::kAll ? small_photos : some_photos;
-  if (!out.empty()) return out;
-  std::vector<std::size_t> views = first_views();
-  if (choice == PhotoChoice::kSome) views = evenly_spread(views, kSomePhotos);
-  return out = reduced_photos(views);
+  const std::vector<std::size_t> views = first_views();
+  const std::size_t most = choice == PhotoChoice::kSome   ? kSomePhotos
+                           : choice == PhotoChoice::kMany ? kManyPhotos
+                                                          : views.size();
+  std::vector<SmallPhoto>& out = small_photos[std::min(most, views.size())];
+  if (out.empty()) out = reduced_photos(evenly_spread(views, most));
+  return out;
 }
 
 std::vector<SmallPhoto> Trainer::Impl::reduced_photos(std::span<const std::size_t> views) const {
@@ -224,7 +227,7 @@ void Trainer::Impl::start() {
     started = true;
     whole = true;
   }
-  small_photos = some_photos = {};
+  small_photos.clear();
   warn_of_strays(train_cameras);
   if (train_views.size() < kFewViews) {
     spdlog::warn("{} of {}: depth is open, and other views will look wrong",
