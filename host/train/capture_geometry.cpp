@@ -106,6 +106,11 @@ Region visible_region(std::span<const Camera> all) {
   return {target, *middle};
 }
 
+double motion_extent(std::span<const Camera> cameras) {
+  constexpr double kMostHalves = 5.0;  // usual lenses have 0.5 to 4.7
+  return std::min(scene_extent(cameras), kMostHalves * visible_region(cameras).half_side);
+}
+
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {
   double least = std::numeric_limits<double>::infinity();
   for (const Camera& camera : cameras)

@@ -31,6 +31,11 @@ struct Region {
 /// cube of three scene extents about the mean camera centre. Stray cameras have no say.
 Region visible_region(std::span<const Camera> cameras);
 
+/// What the learning rate of the means is relative to: the scene extent, or five times half of what
+/// the median camera sees across at the point that most look at, where that is less. Telephoto
+/// lenses stand far apart around something small, which steps by their distance would tear apart.
+double motion_extent(std::span<const Camera> cameras);
+
 /// From the point to the nearest camera; infinite without cameras.
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point);
 

@@ -25,9 +25,12 @@ AdamOptions adam_options_of(const TrainOptions& options) {
   return adam;
 }
 
-AdamRates adam_rates_of(const TrainOptions& options, double extent, std::int64_t iteration) {
+AdamRates adam_rates_of(const TrainOptions& options,
+                        double extent,
+                        double motion,
+                        std::int64_t iteration) {
   AdamRates rates;
-  rates.means = extent * learning_rate(position_rate(options), options, iteration);
+  rates.means = motion * learning_rate(position_rate(options), options, iteration);
   rates.quaternions = learning_rate(rotation_rate(options), options, iteration);
   rates.scales = (options.scale_lr_by_extent ? extent : 1.0) *
                  learning_rate(scale_rate(options), options, iteration);

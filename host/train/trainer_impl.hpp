@@ -197,6 +197,7 @@ struct Trainer::Impl {
   std::vector<std::size_t> test_views;
   std::vector<Camera> train_cameras;
   double extent;
+  double motion;  // motion_extent()
   bool cut_out;
   std::string command;  ///< that started the run
   std::string fingerprint;

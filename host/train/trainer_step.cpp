@@ -100,7 +100,7 @@ void Trainer::Impl::enqueue_step() {
   if (mcmc) mcmc->press(gaussians, slopes, guard.mark());
   const bool measured = density.measures_step(iteration);
   if (measured) density.begin_step(gaussians);
-  adam.step(gaussians, slopes, adam_rates_of(options, extent, iteration), &guard.mark());
+  adam.step(gaussians, slopes, adam_rates_of(options, extent, motion, iteration), &guard.mark());
   if (measured) density.end_step(gaussians, guard.mark());
   if (mcmc) mcmc->disturb(gaussians, iteration, guard.mark());
   const double thickness = flat_thickness(options, iteration);

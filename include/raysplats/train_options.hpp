@@ -129,7 +129,7 @@ struct TrainOptions {
   bool poses = false;              ///< the poses of the training photos are trained too
 
   // Optimiser
-  LearningRate position_lr{kFitted, kFitted};  ///< times the scene extent; as position_rate()
+  LearningRate position_lr{kFitted, kFitted};  ///< times motion_extent(); as position_rate()
   LearningRate rotation_lr{3e-3, kFitted};
   LearningRate scale_lr{kFitted, kFitted};
   LearningRate opacity_lr{1e-1, kFitted};

@@ -37,6 +37,20 @@ TEST_CASE(
   CHECK(scene_extent(std::vector<Camera>(1)) > 0);
 }
 
+TEST_CASE("means move by what cameras see where these stand far away, else by their spread") {
+  const glm::dvec3 target(3, -2, 1);
+  const std::vector<Camera> usual = ring(12, 4.0, target);
+  CHECK(motion_extent(usual) == scene_extent(usual));
+  std::vector<Camera> telephoto = ring(12, 40.0, target);
+  for (Camera& camera : telephoto) camera.fx = camera.fy = 10 * camera.fx;
+  CHECK(motion_extent(telephoto) == doctest::Approx(5 * visible_region(usual).half_side));
+  CHECK(scene_extent(telephoto) == doctest::Approx(44.0));
+  // Without a common target nothing says what they look at.
+  for (Camera& camera : telephoto)
+    camera.translation = -(camera.rotation * (2.0 * target - camera.center()));
+  CHECK(motion_extent(telephoto) == scene_extent(telephoto));
+}
+
 TEST_CASE("cameras far from all others have no say in lengths, as long as they are exceptions") {
   const glm::dvec3 target(3, -2, 1);
   const std::vector<Camera> sound = ring(20, 4.0, target);

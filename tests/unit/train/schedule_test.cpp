@@ -52,8 +52,8 @@ TEST_CASE("rates that fit the run fall with the root of its length, and given on
   check(rates_of(0), {0.12, 0.02, 0.003, 0.001});
   check(rates_of(4000), {0.04, 0.005, 0.0015, 0.0005});
   check(rates_of(1000000), {0.04, 0.005, 0.0005, 0.000125});
-  CHECK(adam_rates_of(options, 2.0, 0).scales == doctest::Approx(0.04));
-  CHECK(adam_rates_of(options, 2.0, 0).sh_rest == doctest::Approx(0.0005));
+  CHECK(adam_rates_of(options, 2.0, 2.0, 0).scales == doctest::Approx(0.04));
+  CHECK(adam_rates_of(options, 2.0, 2.0, 0).sh_rest == doctest::Approx(0.0005));
 
   options.scale_lr = {0.01, 0.002};
   options.sh_rest_lr = {0, kFitted};
@@ -69,15 +69,15 @@ TEST_CASE("rates that fit the run fall with the root of its length, and given on
 TEST_CASE("rates of colours shrink with the range that photos take, as far as it is small") {
   TrainOptions options;
   options.iterations = 1000;
-  const AdamRates usual = adam_rates_of(options, 2.0, 0);
+  const AdamRates usual = adam_rates_of(options, 2.0, 2.0, 0);
   for (const double range : {0.8, 1.0, 20.0}) {
     options.color_range = range;
-    CHECK(adam_rates_of(options, 2.0, 0).sh_dc == usual.sh_dc);
+    CHECK(adam_rates_of(options, 2.0, 2.0, 0).sh_dc == usual.sh_dc);
   }
   options.color_range = 0.08;
-  const AdamRates fog = adam_rates_of(options, 2.0, 999);
+  const AdamRates fog = adam_rates_of(options, 2.0, 2.0, 999);
   options.color_range = 0;
-  const AdamRates last = adam_rates_of(options, 2.0, 999);
+  const AdamRates last = adam_rates_of(options, 2.0, 2.0, 999);
   CHECK(fog.sh_dc == doctest::Approx(0.1 * last.sh_dc));
   CHECK(fog.sh_rest == doctest::Approx(0.1 * last.sh_rest));
   CHECK(fog.means == last.means);
@@ -90,12 +90,12 @@ TEST_CASE("the last rates fall with the root of the run's length, unless they ar
                                      double sh, double position) {
     CAPTURE(iterations);
     options.iterations = iterations;
-    const AdamRates last = adam_rates_of(options, 2.0, iterations - 1);
+    const AdamRates last = adam_rates_of(options, 2.0, 2.0, iterations - 1);
     CHECK(last.quaternions == doctest::Approx(rotation));
     CHECK(last.opacities == doctest::Approx(opacity));
     CHECK(last.sh_dc == doctest::Approx(sh));
     CHECK(last.means == doctest::Approx(2.0 * position));
-    CHECK(adam_rates_of(options, 2.0, 0).opacities == doctest::Approx(0.1));
+    CHECK(adam_rates_of(options, 2.0, 2.0, 0).opacities == doctest::Approx(0.1));
   };
   check_last(100, 0.003, 0.1, 0.01, 2e-5);
   check_last(1000, 0.003, 0.06, 0.005, 1e-5);
@@ -116,7 +116,7 @@ TEST_CASE("a random start has its own rate, opacity and decay unless they are gi
   CHECK(position_rate(options).initial == 2e-3);
   options.iterations = 1000;
   CHECK(position_rate(options).final_value == 1e-5);
-  CHECK(adam_rates_of(options, 3.0, 0).means == doctest::Approx(6e-3));
+  CHECK(adam_rates_of(options, 3.0, 3.0, 0).means == doctest::Approx(6e-3));
   CHECK(start_opacity(options) == 0.02);
   CHECK(pass_decay(options) == 0.01);
   options.strategy = DensityStrategy::kMcmc;
