@@ -217,6 +217,7 @@ void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesyste
   const std::set<std::string> found = read_text(file_text(path), path, options, given);
   if (found.count("origin") == 0 && !given("origin")) options.data.origin.emplace();
   if (found.count("raise-clamped") == 0 && !given("raise-clamped")) options.raise_clamped = false;
+  if (found.count("photo-points") == 0 && !given("photo-points")) options.photo_points = false;
   if (found.count("color-range") == 0 && !given("color-range")) options.color_range = 1;
   if (found.count("strategy") > 0) return;
   // The run is older than these keys: it goes on as it began.

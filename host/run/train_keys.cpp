@@ -218,6 +218,10 @@ void add_start_keys(TrainTable& t, TrainOptions& o) {
       "photos)");
   t.number("init-count", o.init_count, 0, 1e9,
            "Gaussians of a start without points, or beside few; 0 = a share of max-gaussians");
+  t.flag(
+      "photo-points", o.photo_points,
+      "put points of the photos beside sparse ones where photos tell of depth (init auto; not in "
+      "runs by a time below a minute)");
   t.number(
       "init-opacity", o.init_opacity, kFitted, 0.9999,
       "opacity of the first Gaussians (not of a model), at least 0.0001; -1 = 0.1, or 0.02 of a "

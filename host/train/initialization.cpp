@@ -37,10 +37,11 @@ constexpr double kUnsureShare = 0.25;     // of a start from photos alone: point
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
-constexpr double kMostlyBare = 0.55;    // of what photos show, with no sparse point near
-constexpr double kMostlyAgreed = 0.45;  // of what photos show, in one depth
-constexpr double kMostlySeen = 0.5;     // of sparse points
-constexpr double kLeastSeen = 0.01;     // of a given model: what photos of its scene see more of
+constexpr double kMostlyBare = 0.55;        // of what photos show, with no sparse point near
+constexpr double kMostlyAgreed = 0.45;      // of what photos show, in one depth
+constexpr std::size_t kMostBeside = 10000;  // points of photos, of which more take seconds to find
+constexpr double kMostlySeen = 0.5;         // of sparse points
+constexpr double kLeastSeen = 0.01;  // of a given model: what photos of its scene see more of
 
 // Balanced k-d tree laid out in place: the median of a range is its node, its halves are the
 // children.
@@ -218,7 +219,7 @@ Beside photos_beside(const PointCloud& points,
   if (options.init != "auto" || points.size() < kFewPoints) return Beside::kNothing;
   // Points on one thing alone say nothing of what is around it.
   if (bare_share(points, photos(PhotoChoice::kSome)) > kMostlyBare) return Beside::kAll;
-  if (dataset.alpha_is_background) return Beside::kNothing;
+  if (!options.photo_points || dataset.alpha_is_background) return Beside::kNothing;
   // Sparse points crowd where there is texture. What a sweep finds lies more evenly; where photos
   // are too far apart, or show little, it is wrong too often.
   const std::vector<SmallPhoto>& many = photos(PhotoChoice::kMany);
@@ -403,16 +404,19 @@ Gaussians initial_model(const Dataset& dataset,
     return inside(gaussians_from_points(points, options.sh_degree, start_opacity(options), cameras),
                   bounds);
   };
-  const std::size_t count = options.init_count > 0
-                                ? std::min(limit, static_cast<std::size_t>(options.init_count))
-                                : share(clears_random_start(options) ? kStartShare : kPhotoShare);
-  PointCloud points;
+  std::size_t count = options.init_count > 0
+                          ? std::min(limit, static_cast<std::size_t>(options.init_count))
+                          : share(clears_random_start(options) ? kStartShare : kPhotoShare);
+  PointCloud points, sparse;  // of `sparse` an even choice is taken
   Beside beside = Beside::kNothing;
   if (has_points && (options.init == "auto" || options.init == "colmap")) {
     points = start_points(dataset, cameras, photos, count, options);
     beside = photos_beside(points, dataset, cameras, photos, options);
     const bool alone = beside == Beside::kNothing;
-    const std::size_t most = share(alone ? kStartShare : kStartShare - kPhotoShare);
+    if (beside == Beside::kInTheirPlaces) count = std::min(count, kMostBeside);
+    const std::size_t others = share(kStartShare) - std::min(count, share(kStartShare));
+    const std::size_t most =
+        alone ? share(kStartShare) : std::max(share(kStartShare - kPhotoShare), others);
     if (points.size() > most) {
       spdlog::info(
           "the start takes {} of {} sparse points, so that at most {} Gaussians have room to grow "
@@ -428,6 +432,8 @@ Gaussians initial_model(const Dataset& dataset,
                        ? "the sparse points lie on a small part of what the photos show"
                        : "most of what the photos show tells its depth",
                    count);
+      sparse = points;
+      points = subset(points, most);
     } else if (points.size() > 0) {
       spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
                    points.size(), count);
@@ -439,13 +445,12 @@ Gaussians initial_model(const Dataset& dataset,
                                   depths_around(guessed_depth(cameras, region)), count,
                                   options.seed));
   }
-  const bool joined = beside != Beside::kNothing;
-  const std::vector<SmallPhoto>& told = photos(joined ? PhotoChoice::kMany : PhotoChoice::kAll);
-  const PointCloud all = points;
-  if (joined) points = subset(points, share(kStartShare - kPhotoShare));
+  const std::vector<SmallPhoto>& told =
+      photos(beside == Beside::kNothing ? PhotoChoice::kAll : PhotoChoice::kMany);
   const std::size_t room = std::min(count, limit - std::min(limit, points.size()));
   PointCloud seen = photo_points(dataset, cameras, region, told, room, options.seed);
-  if (beside == Beside::kInTheirPlaces) seen = beside_points(seen, all, photos(PhotoChoice::kSome));
+  if (beside == Beside::kInTheirPlaces)
+    seen = beside_points(seen, sparse, photos(PhotoChoice::kSome));
   for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, points);
   return start(points);
 }

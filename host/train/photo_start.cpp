@@ -286,18 +286,40 @@ Sample sweep_pixel(std::span<const SmallPhoto> photos,
   return out;
 }
 
-std::vector<Sample> swept_samples(std::span<const SmallPhoto> photos,
-                                  const DepthRange& depths,
-                                  std::size_t count,
-                                  std::uint64_t seed) {
-  std::vector<std::vector<std::size_t>> neighbours(photos.size());
-  for (std::size_t i = 0; i < photos.size(); ++i)
-    neighbours[i] = neighbours_of(photos, i, depths.typical);
-  std::vector<Sample> out(count);
-  in_parallel(count,
-              [&](std::size_t i) { out[i] = sweep_pixel(photos, neighbours, depths, seed, i); });
-  return out;
-}
+// What pixels tell, one after the other.
+class Sweep {
+ public:
+  Sweep(std::span<const SmallPhoto> photos, const DepthRange& depths, std::uint64_t seed)
+      : photos_(photos), depths_(depths), seed_(seed), neighbours_(photos.size()) {
+    for (std::size_t i = 0; i < photos.size(); ++i)
+      neighbours_[i] = neighbours_of(photos, i, depths.typical);
+  }
+
+  void take(std::size_t count) {
+    const std::size_t before = samples_.size();
+    samples_.resize(before + count);
+    in_parallel(count, [&](std::size_t i) {
+      samples_[before + i] = sweep_pixel(photos_, neighbours_, depths_, seed_, before + i);
+    });
+    for (std::size_t i = before; i < samples_.size(); ++i) {
+      agreed_ += samples_[i].agreed ? 1 : 0;
+      vague_ += !samples_[i].agreed && samples_[i].shown() ? 1 : 0;
+    }
+  }
+
+  const std::vector<Sample>& samples() const { return samples_; }
+  std::size_t agreed() const { return agreed_; }
+  /// Those that show something, in no clear depth.
+  std::size_t vague() const { return vague_; }
+
+ private:
+  std::span<const SmallPhoto> photos_;
+  DepthRange depths_;
+  std::uint64_t seed_;
+  std::vector<std::vector<std::size_t>> neighbours_;
+  std::vector<Sample> samples_;
+  std::size_t agreed_ = 0, vague_ = 0;
+};
 
 // Photos that look the same way, those farthest apart first.
 std::vector<std::size_t> distant_neighbours(std::span<const SmallPhoto> photos,
@@ -457,13 +479,10 @@ double agreed_share(std::span<const SmallPhoto> photos,
                     const DepthRange& depths,
                     std::uint64_t seed) {
   if (photos.empty()) return 0;
-  const std::vector<Sample> samples = swept_samples(photos, depths, kProbes, seed);
-  std::size_t agreed = 0, shown = 0;
-  for (const Sample& sample : samples) {
-    shown += sample.shown() ? 1 : 0;
-    agreed += sample.agreed ? 1 : 0;
-  }
-  return shown > 0 ? static_cast<double>(agreed) / static_cast<double>(shown) : 0;
+  Sweep sweep(photos, depths, seed);
+  sweep.take(kProbes);
+  const std::size_t shown = sweep.agreed() + sweep.vague();
+  return shown > 0 ? static_cast<double>(sweep.agreed()) / static_cast<double>(shown) : 0;
 }
 
 PointCloud swept_points(std::span<const SmallPhoto> photos,
@@ -471,19 +490,19 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
                         std::size_t count,
                         double unsure,
                         std::uint64_t seed) {
-  const std::vector<Sample> samples =
-      swept_samples(photos, depths, kTriesPerSweptPoint * count, seed);
-  const auto sure = static_cast<std::size_t>(std::count_if(
-      samples.begin(), samples.end(), [](const Sample& sample) { return sample.agreed; }));
-  const auto vague = static_cast<std::size_t>(
-      std::count_if(samples.begin(), samples.end(),
-                    [](const Sample& sample) { return !sample.agreed && sample.shown(); }));
   const auto fog = static_cast<std::size_t>(unsure * static_cast<double>(count));
-  const std::size_t most_agreed = count - std::min(fog, vague);
-  const std::size_t most_random = depths.open ? count - std::min(sure, count - fog) : fog;
+  Sweep sweep(photos, depths, seed);
+  // Until there are enough of both kinds; where depths are open, or few agree, not before all
+  // tries.
+  const auto enough = [&] {
+    return !depths.open && sweep.agreed() >= count - fog && sweep.vague() >= fog;
+  };
+  for (std::size_t tried = 0; tried < kTriesPerSweptPoint && !enough(); ++tried) sweep.take(count);
+  const std::size_t most_agreed = count - std::min(fog, sweep.vague());
+  const std::size_t most_random = depths.open ? count - std::min(sweep.agreed(), count - fog) : fog;
   PointCloud out;
   std::size_t agreed = 0, random = 0;
-  for (const Sample& sample : samples) {
+  for (const Sample& sample : sweep.samples()) {
     std::size_t& number = sample.agreed ? agreed : random;
     if (number >= (sample.agreed ? most_agreed : most_random) || !sample.shown()) continue;
     ++number;

@@ -17,6 +17,7 @@
 namespace raysplats {
 namespace {
 
+constexpr double kBriefRun = 60;         // seconds
 constexpr double kMeasuredShare = 0.05;  // of the time of a run that timed steps may take
 constexpr int kLeastSteps = 3;           // of a kind that are timed
 constexpr int kViews = 6;                // that they show
@@ -254,6 +255,8 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
   if (!(seconds > 0)) {
     throw UsageError(fmt::format("A run of {} s trains nothing: give it more time", seconds));
   }
+  // What finds them takes seconds.
+  if (seconds < kBriefRun) options.photo_points = false;
   const Pilot pilot = run_pilot(kMeasuredShare * seconds, seconds);
   const double left = seconds - pilot.seconds;
   const auto duration = [&](std::int64_t iterations) {

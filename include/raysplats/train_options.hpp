@@ -110,6 +110,7 @@ struct TrainOptions {
   // Start
   std::string init = "auto";      ///< "auto", "colmap", "random" or the path of a PLY
   std::int64_t init_count = 0;    ///< 0 = a share of max_gaussians
+  bool photo_points = true;       ///< "auto" may put points of the photos beside sparse ones
   double init_opacity = kFitted;  ///< as start_opacity()
   std::optional<Bounds> bounds;   ///< where Gaussians may be
 
