@@ -12,11 +12,13 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "io/colmap_model.hpp"
 #include "io/cut_out.hpp"
 #include "io/data_origin.hpp"
 #include "io/image_file.hpp"
+#include "io/photo_folder.hpp"
 #include "io/photo_turn.hpp"
 #include "io/ply_points.hpp"
 #include "io/transforms.hpp"
@@ -24,21 +26,12 @@
 #include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
 #include "scene/photo_lens.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool is_folder(const fs::path& path) {
-  std::error_code error;
-  return fs::is_directory(path, error);
-}
-
-bool is_file(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
 
 /// A mask of the photo `name` in the data set's folder "masks": COLMAP's name.ext.png, or an image
 /// that is called as the photo, with "_mask" or ".mask" behind it or without.
@@ -63,23 +56,17 @@ bool is_stretched(const io::ImageSize& photo, const Camera& nominal) {
   return pixels > 2 && std::abs(photo.width - nominal.width) < kNearly * nominal.width;
 }
 
-bool has_shape(const io::ImageSize& photo, const Camera& camera) {
-  const double expected_height = static_cast<double>(camera.height) * photo.width / camera.width;
-  return std::abs(expected_height - photo.height) <= std::max(2.0, 0.02 * photo.height);
-}
-
 /// Sets the cameras of a view: `nominal` is the camera at the size that its model states, the photo
 /// may have another (reduced copies, rounding by a pixel) or lie on its side (photo_turn.hpp), and
 /// is used reduced by `factor`.
 void set_cameras(
     View& view, const Camera& nominal, io::ImageSize photo, double factor, bool undistort) {
-  if (!has_shape(photo, nominal)) {
-    const io::ImageSize turned{photo.height, photo.width, photo.sample_bytes};
-    if (has_shape(turned, nominal) && io::lies_on_its_side(view.image_path)) photo = turned;
-  }
+  if (!io::has_shape(photo.width, photo.height, nominal) &&
+      io::has_shape(photo.height, photo.width, nominal) && io::lies_on_its_side(view.image_path))
+    std::swap(photo.width, photo.height);
   const double scale_x = static_cast<double>(photo.width) / nominal.width;
   const double scale_y = static_cast<double>(photo.height) / nominal.height;
-  if (!has_shape(photo, nominal)) {
+  if (!io::has_shape(photo.width, photo.height, nominal)) {
     throw DataError(fmt::format(
         "The image {} has {} x {} pixels but its camera {} x {}, which is another shape: use the "
         "photos that the cameras belong to",
@@ -105,10 +92,10 @@ void set_cameras(
 /// The mask has the photo's shape, not necessarily its size, and may be turned as EXIF says.
 void check_mask(const View& view) {
   const io::ImageSize size = io::image_size(view.mask_path);
-  const io::ImageSize turned{size.height, size.width, size.sample_bytes};
   const Camera& photo = view.source_camera;
   const bool fits =
-      has_shape(size, photo) || (has_shape(turned, photo) && io::lies_on_its_side(view.image_path));
+      io::has_shape(size.width, size.height, photo) ||
+      (io::has_shape(size.height, size.width, photo) && io::lies_on_its_side(view.image_path));
   if (!fits) {
     throw DataError(fmt::format(
         "The mask {} has {} x {} pixels but its photo {} x {}, which is another shape: make it of "
@@ -154,77 +141,6 @@ void sort_by_name(std::vector<View>& views) {
                    [](const View& a, const View& b) { return a.camera.name < b.camera.name; });
 }
 
-/// A folder of photos and the factor by which they are smaller than the model's cameras.
-struct PhotoFolder {
-  fs::path path;
-  double factor = 1.0;
-};
-
-PhotoFolder choose_photo_folder(const fs::path& root, double downscale) {
-  const auto reduced = [&](int factor) { return root / fmt::format("images_{}", factor); };
-  if (downscale > 1 && downscale <= 1024 && downscale == std::floor(downscale) &&
-      is_folder(reduced(static_cast<int>(downscale)))) {
-    return {reduced(static_cast<int>(downscale)), downscale};
-  }
-  if (is_folder(root / "images")) return {root / "images", 1.0};
-  std::optional<PhotoFolder> chosen;
-  for (const int factor : {2, 4, 8}) {
-    // The most reduced copy that is large enough, or else the largest copy.
-    if (is_folder(reduced(factor)) && (!chosen || factor <= downscale)) {
-      chosen = PhotoFolder{reduced(factor), static_cast<double>(factor)};
-    }
-  }
-  if (!chosen) {
-    // Photos beside the model, for example when their names in the model include a folder.
-    return {root, 1.0};
-  }
-  if (chosen->factor > downscale) {
-    spdlog::info("{} has no folder images: {} is used at its own size, as with --downscale {}",
-                 root.string(), chosen->path.filename().string(), chosen->factor);
-  } else {
-    spdlog::info("{} has no folder images: {} is used", root.string(),
-                 chosen->path.filename().string());
-  }
-  return *chosen;
-}
-
-/// The photo of a COLMAP image: by its whole name, by its last part, or with another extension
-/// (reduced copies are often stored in another format).
-std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name) {
-  for (const fs::path& candidate : {name, name.filename()}) {
-    if (is_file(folder / candidate)) return folder / candidate;
-    fs::path stem = candidate;
-    stem.replace_extension();
-    if (auto found = io::find_image(folder, stem)) return found;
-  }
-  return std::nullopt;
-}
-
-/// Whether the folder has every photo of the model in the size of its camera.
-bool has_photos_of(const fs::path& folder, const io::ColmapModel& model) {
-  return std::all_of(model.images.begin(), model.images.end(), [&](const io::ColmapImage& image) {
-    const auto photo = find_photo(folder, image.name);
-    if (!photo) return false;
-    const Camera& camera = model.cameras.at(image.camera_id);
-    const io::ImageSize size = io::image_size(*photo);
-    const bool upright = size.width == camera.width && size.height == camera.height;
-    return upright || (size.width == camera.height && size.height == camera.width);
-  });
-}
-
-/// The photos that convert.py of 3DGS reads lie in `input`, and those that it makes of them, which
-/// are of another size and without a lens, in `images`: the model tells which are its own.
-PhotoFolder folder_of_model(const fs::path& root, const io::ColmapModel& model, double downscale) {
-  PhotoFolder usual = choose_photo_folder(root, downscale);
-  const fs::path input = root / "input", images = root / "images";
-  if (!is_folder(input)) return usual;
-  // Reduced copies are of `images`.
-  if (is_folder(images) ? has_photos_of(images, model) : usual.path != root) return usual;
-  if (!has_photos_of(input, model)) return usual;
-  spdlog::info("the photos of the model are those in {}", input.string());
-  return {input, 1.0};
-}
-
 /// Two poses cannot share a photo.
 void require_photos_of_their_own(const std::vector<View>& views) {
   std::map<fs::path, const View*> owners;
@@ -257,13 +173,13 @@ Dataset load_colmap(const fs::path& root,
   Dataset dataset;
   dataset.kind = DatasetKind::kColmap;
   dataset.points = std::move(model.points);
-  const PhotoFolder folder = folder_of_model(root, model, options.downscale);
+  const io::PhotoFolder folder = io::photo_folder(root, model, options.downscale);
   const double rest = std::max(1.0, options.downscale / folder.factor);
   std::size_t stretched = 0;
   std::vector<std::string> missing;
   for (const io::ColmapImage& image : model.images) {
     View view;
-    const auto photo = find_photo(folder.path, image.name);
+    const auto photo = io::find_photo(folder.path, image.name);
     if (!photo) {
       missing.push_back(image.name);
       continue;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/photo_turn.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <variant>
 
 #include "io/image_file.hpp"
@@ -39,6 +41,11 @@ RawImage quarter_turned(const RawImage& raw, bool clockwise) {
 bool lies_on_its_side(const std::filesystem::path& path) {
   const int orientation = image_orientation(path);
   return orientation == kClockwise || orientation == kCounterclockwise;
+}
+
+bool has_shape(int width, int height, const Camera& camera) {
+  const double expected_height = static_cast<double>(camera.height) * width / camera.width;
+  return std::abs(expected_height - height) <= std::max(2.0, 0.02 * height);
 }
 
 RawImage upright(const RawImage& raw, const std::filesystem::path& path) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "io/image_codec.hpp"
+#include "raysplats/camera.hpp"
 
 namespace raysplats::io {
 
@@ -14,6 +15,9 @@ namespace raysplats::io {
 /// Whether the file says that its photo lies on its side: EXIF orientation 6 or 8. Throws DataError
 /// as image_size().
 bool lies_on_its_side(const std::filesystem::path& path);
+
+/// Whether a picture of that size has the camera's shape, to rounding; it may be larger or smaller.
+bool has_shape(int width, int height, const Camera& camera);
 
 /// The picture of such a file, or one that was made of it, turned upright.
 RawImage upright(const RawImage& raw, const std::filesystem::path& path);

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <utility>
@@ -18,17 +17,13 @@
 namespace raysplats::io {
 namespace {
 
-bool fits(const RawImage& mask, int width, int height) {
-  const double expected_height = static_cast<double>(mask.width) * height / width;
-  return std::abs(expected_height - mask.height) <= std::max(2.0, 0.02 * mask.height);
-}
-
 // Programs that heed EXIF and others that do not: a mask may lie where its photo is upright, and
 // stand where it lies.
 RawImage mask_of_photo(const View& view, bool turned) {
   RawImage mask = read_raw_image(view.mask_path);
-  const int width = view.source_camera.width, height = view.source_camera.height;
-  const bool other = !fits(mask, width, height) && fits(mask, height, width);
+  const Camera& photo = view.source_camera;
+  const bool other =
+      !has_shape(mask.width, mask.height, photo) && has_shape(mask.height, mask.width, photo);
   if (!other || !lies_on_its_side(view.image_path)) return mask;
   return turned ? upright(mask, view.image_path) : laid(mask, view.image_path);
 }

@@ -136,12 +136,6 @@ class KdTree {
   std::vector<std::uint8_t> axis_;
 };
 
-void append_point(const PointCloud& from, std::size_t i, PointCloud& to) {
-  to.positions.insert(to.positions.end(), from.positions.data() + 3 * i,
-                      from.positions.data() + 3 * i + 3);
-  to.colors.insert(to.colors.end(), from.colors.data() + 3 * i, from.colors.data() + 3 * i + 3);
-}
-
 // The finite points within the box, each place once: equal neighbours would leave a point no size.
 PointCloud distinct_points(const PointCloud& points, const std::optional<Bounds>& bounds) {
   const auto place = [&points](std::uint32_t i) {
@@ -191,11 +185,13 @@ double guessed_depth(std::span<const Camera> cameras, const Region& region) {
   return middle > 1e-3 * extent ? middle : extent;
 }
 
-// Points that the photos tell of: of a body that is cut out, else of what a sweep finds.
+// Points that the photos tell of: of a body that is cut out, else of what a sweep finds in
+// `depths`, which are looked for where they are not known.
 PointCloud photo_points(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const Region& region,
                         const std::vector<SmallPhoto>& photos,
+                        std::optional<DepthRange> depths,
                         std::size_t count,
                         std::uint64_t seed) {
   const double guess = guessed_depth(cameras, region);
@@ -205,28 +201,34 @@ PointCloud photo_points(const Dataset& dataset,
     spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
     return scattered_points(photos, region, depths_around(guess), count, seed);
   }
-  return swept_points(photos, swept_depths(photos, guess, seed), count, kUnsureShare, seed);
+  if (!depths) depths = swept_depths(photos, guess, seed);
+  return swept_points(photos, *depths, count, kUnsureShare, seed);
 }
 
-// What of the points that photos tell of goes beside sparse ones.
-enum class Beside { kNothing, kAll, kInTheirPlaces };
+// What of the points that photos tell of goes beside sparse ones, and where those that tell it
+// look.
+struct Beside {
+  enum class Part { kNothing, kAll, kInTheirPlaces };
+  Part part = Part::kNothing;
+  std::optional<DepthRange> depths;
+};
 
 Beside photos_beside(const PointCloud& points,
                      const Dataset& dataset,
                      std::span<const Camera> cameras,
                      const PhotoSource& photos,
                      const TrainOptions& options) {
-  if (options.init != "auto" || points.size() < kFewPoints) return Beside::kNothing;
+  if (options.init != "auto" || points.size() < kFewPoints) return {};
   // Points on one thing alone say nothing of what is around it.
-  if (bare_share(points, photos(PhotoChoice::kSome)) > kMostlyBare) return Beside::kAll;
-  if (!options.photo_points || dataset.alpha_is_background) return Beside::kNothing;
+  if (bare_share(points, photos(PhotoChoice::kSome)) > kMostlyBare) return {Beside::Part::kAll, {}};
+  if (!options.photo_points || dataset.alpha_is_background) return {};
   // Sparse points crowd where there is texture. What a sweep finds lies more evenly; where photos
   // are too far apart, or show little, it is wrong too often.
   const std::vector<SmallPhoto>& many = photos(PhotoChoice::kMany);
   const double guess = guessed_depth(cameras, visible_region(cameras));
   const DepthRange depths = swept_depths(many, guess, options.seed);
-  return agreed_share(many, depths, options.seed) > kMostlyAgreed ? Beside::kInTheirPlaces
-                                                                  : Beside::kNothing;
+  if (agreed_share(many, depths, options.seed) <= kMostlyAgreed) return {};
+  return {Beside::Part::kInTheirPlaces, depths};
 }
 
 std::string match_text(const PointMatch& match) {
@@ -408,12 +410,12 @@ Gaussians initial_model(const Dataset& dataset,
                           ? std::min(limit, static_cast<std::size_t>(options.init_count))
                           : share(clears_random_start(options) ? kStartShare : kPhotoShare);
   PointCloud points, sparse;  // of `sparse` an even choice is taken
-  Beside beside = Beside::kNothing;
+  Beside beside;
   if (has_points && (options.init == "auto" || options.init == "colmap")) {
     points = start_points(dataset, cameras, photos, count, options);
     beside = photos_beside(points, dataset, cameras, photos, options);
-    const bool alone = beside == Beside::kNothing;
-    if (beside == Beside::kInTheirPlaces) count = std::min(count, kMostBeside);
+    const bool alone = beside.part == Beside::Part::kNothing;
+    if (beside.part == Beside::Part::kInTheirPlaces) count = std::min(count, kMostBeside);
     const std::size_t others = share(kStartShare) - std::min(count, share(kStartShare));
     const std::size_t most =
         alone ? share(kStartShare) : std::max(share(kStartShare - kPhotoShare), others);
@@ -428,7 +430,7 @@ Gaussians initial_model(const Dataset& dataset,
       return start(subset(points, most));
     if (!alone) {
       spdlog::info("{}: the start takes {} points from the photos as well",
-                   beside == Beside::kAll
+                   beside.part == Beside::Part::kAll
                        ? "the sparse points lie on a small part of what the photos show"
                        : "most of what the photos show tells its depth",
                    count);
@@ -446,10 +448,10 @@ Gaussians initial_model(const Dataset& dataset,
                                   options.seed));
   }
   const std::vector<SmallPhoto>& told =
-      photos(beside == Beside::kNothing ? PhotoChoice::kAll : PhotoChoice::kMany);
+      photos(beside.part == Beside::Part::kNothing ? PhotoChoice::kAll : PhotoChoice::kMany);
   const std::size_t room = std::min(count, limit - std::min(limit, points.size()));
-  PointCloud seen = photo_points(dataset, cameras, region, told, room, options.seed);
-  if (beside == Beside::kInTheirPlaces)
+  PointCloud seen = photo_points(dataset, cameras, region, told, beside.depths, room, options.seed);
+  if (beside.part == Beside::Part::kInTheirPlaces)
     seen = beside_points(seen, sparse, photos(PhotoChoice::kSome));
   for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, points);
   return start(points);

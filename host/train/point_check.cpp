@@ -36,13 +36,6 @@ bool sees(const Camera& camera, const glm::dvec3& world) {
          point->y < camera.height;
 }
 
-void copy_point(const PointCloud& from, std::size_t i, PointCloud& to) {
-  for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
-    to.positions.push_back(from.positions[k]);
-    to.colors.push_back(from.colors[k]);
-  }
-}
-
 // Cells of kBareCell pixels a side of a photo, and which of them show points.
 class PointCells {
  public:
@@ -117,6 +110,13 @@ std::optional<double> color_difference(const PointCloud& points,
 
 }  // namespace
 
+void append_point(const PointCloud& from, std::size_t i, PointCloud& to) {
+  for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
+    to.positions.push_back(from.positions[k]);
+    to.colors.push_back(from.colors[k]);
+  }
+}
+
 double seen_share(const std::vector<float>& positions, std::span<const Camera> cameras) {
   const std::size_t points = positions.size() / 3;
   const std::size_t count = std::min(kLooks, points);
@@ -160,7 +160,7 @@ PointCloud seen_points(const PointCloud& points, std::span<const Camera> cameras
     if (std::none_of(cameras.begin(), cameras.end(),
                      [&](const Camera& camera) { return sees(camera, world); }))
       continue;
-    copy_point(points, i, out);
+    append_point(points, i, out);
   }
   return out;
 }
@@ -224,7 +224,7 @@ PointCloud beside_points(const PointCloud& found,
       ++seen;
       taken += cells[k].taken(*place) ? 1 : 0;
     }
-    if (seen > 0 && 2 * taken >= seen) copy_point(found, i, out);
+    if (seen > 0 && 2 * taken >= seen) append_point(found, i, out);
   }
   return out;
 }

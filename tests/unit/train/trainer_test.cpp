@@ -229,9 +229,8 @@ TrainOptions measured_options() {
 TEST_CASE("training improves held-out views") {
   Scene scene;
   TrainOptions options = measured_options();
-  // Single runs of eight tiny photos differ by decibels, twelve of them from 3.1 to 3.9 in the mean
-  // where next to nothing changes.
-  constexpr std::uint64_t kSeeds = 12;
+  // Single runs of eight tiny photos differ by decibels.
+  constexpr std::uint64_t kSeeds = 24;
   double gain = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     options.seed = seed;
@@ -241,7 +240,7 @@ TEST_CASE("training improves held-out views") {
     gain += (summary.evaluations[1].psnr - summary.evaluations[0].psnr) / kSeeds;
   }
   MESSAGE("PSNR rises by " << gain << " dB");
-  CHECK(gain > 2.5);
+  CHECK(gain > 3.0);
 }
 
 TEST_CASE("training leaves the files of a run") {

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "io/colmap_model.hpp"
+
+namespace raysplats::io {
+
+/// A folder of photos and the factor by which they are smaller than the model's cameras.
+struct PhotoFolder {
+  std::filesystem::path path;
+  double factor = 1.0;
+};
+
+/// Where the photos of a COLMAP model below the data set `root` lie: reduced copies of 3DGS
+/// (images_4) where they fit `downscale`, `images`, or beside the model. The photos that convert.py
+/// of 3DGS reads lie in `input`, and those that it makes of them, which are of another size and
+/// without a lens, in `images`: the model tells which are its own.
+PhotoFolder photo_folder(const std::filesystem::path& root,
+                         const ColmapModel& model,
+                         double downscale);
+
+/// The photo of a COLMAP image: by its whole name, by its last part, or with another extension
+/// (reduced copies are often stored in another format).
+std::optional<std::filesystem::path> find_photo(const std::filesystem::path& folder,
+                                                const std::filesystem::path& name);
+
+}  // namespace raysplats::io
