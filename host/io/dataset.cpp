@@ -17,6 +17,7 @@
 #include "io/colmap_model.hpp"
 #include "io/cut_out.hpp"
 #include "io/data_origin.hpp"
+#include "io/find_image.hpp"
 #include "io/image_file.hpp"
 #include "io/photo_folder.hpp"
 #include "io/photo_turn.hpp"
@@ -166,6 +167,16 @@ void warn_of_repeated_photos(const std::vector<View>& views) {
   spdlog::warn("{} photos appear in more than one frame, {} among them", repeated, first.string());
 }
 
+/// Photos whose names another system wrote, to which letter case is all the same.
+void tell_of_case(std::size_t respelt,
+                  std::size_t all,
+                  const fs::path& cameras,
+                  const std::string& first) {
+  if (respelt == 0) return;
+  spdlog::info("{} of {} photos are spelt otherwise than in {} ('{}') and differ in letter case",
+               respelt, all, cameras.string(), first);
+}
+
 Dataset load_colmap(const fs::path& root,
                     const fs::path& model_folder,
                     const DatasetOptions& options) {
@@ -175,11 +186,14 @@ Dataset load_colmap(const fs::path& root,
   dataset.points = std::move(model.points);
   const io::PhotoFolder folder = io::photo_folder(root, model, options.downscale);
   const double rest = std::max(1.0, options.downscale / folder.factor);
-  std::size_t stretched = 0;
+  std::size_t stretched = 0, respelt = 0;
+  std::string first_respelt;
   std::vector<std::string> missing;
   for (const io::ColmapImage& image : model.images) {
     View view;
-    const auto photo = io::find_photo(folder.path, image.name);
+    auto photo = io::find_photo(folder.path, image.name);
+    if (!photo && (photo = io::find_respelt(folder.path, image.name)) && respelt++ == 0)
+      first_respelt = image.name;
     if (!photo) {
       missing.push_back(image.name);
       continue;
@@ -204,6 +218,7 @@ Dataset load_colmap(const fs::path& root,
         missing.front()));
   }
   require_photos_of_their_own(dataset.views);
+  tell_of_case(respelt, dataset.views.size(), model_folder, first_respelt);
   if (stretched > 0) {
     const View& view = dataset.views.front();
     spdlog::warn(
@@ -223,51 +238,87 @@ fs::path beside_photos(const fs::path& folder, const std::string& path) {
   return io::find_moved(folder, path, 2).value_or(folder / path);
 }
 
-/// The views of a transforms file, in its order.
-std::vector<View> transforms_views(const io::TransformsFile& file, const DatasetOptions& options) {
+/// The photo of a frame.
+struct FramePhoto {
+  fs::path path;
+  bool moved = false;    ///< found by the end of its name
+  bool respelt = false;  ///< in other letter case
+};
+
+std::optional<FramePhoto> frame_photo(const io::TransformsFile& file,
+                                      const io::TransformsFrame& frame) {
   const fs::path folder = file.path.parent_path();
+  if (frame.file_path.empty()) {
+    throw DataError(fmt::format("{}: frame {} has no file_path", file.path.string(), frame.number));
+  }
+  if (auto photo = io::find_image(folder, frame.file_path)) return FramePhoto{*photo};
+  if (auto photo = io::find_respelt(folder, frame.file_path))
+    return FramePhoto{*photo, false, true};
+  if (auto photo = io::find_moved(folder, frame.file_path, 1)) return FramePhoto{*photo, true};
+  return std::nullopt;
+}
+
+/// The photos of a file's frames. Frames whose photos were taken out of the data set, as blurred
+/// ones are, leave the file; where most are not there, it is the folder that is wrong.
+std::vector<FramePhoto> frame_photos(io::TransformsFile& file) {
+  std::vector<FramePhoto> photos;
+  std::vector<io::TransformsFrame> found, missing;
+  for (io::TransformsFrame& frame : file.frames) {
+    const auto photo = frame_photo(file, frame);
+    (photo ? found : missing).push_back(std::move(frame));
+    if (photo) photos.push_back(*photo);
+  }
+  file.frames = std::move(found);
+  if (missing.empty()) return photos;
+  const std::string what =
+      fmt::format("{}: the photos of {} of {} frames do not exist, '{}' of frame {} among them",
+                  file.path.string(), missing.size(), missing.size() + photos.size(),
+                  missing.front().file_path, missing.front().number);
+  if (missing.size() > photos.size()) {
+    throw DataError(what + ": put them where file_path says, counted from the file's folder");
+  }
+  spdlog::warn("{}; these frames are left out", what);
+  return photos;
+}
+
+/// The views of a transforms file, in its order; takes the frames out of it that have none.
+std::vector<View> transforms_views(io::TransformsFile& file, const DatasetOptions& options) {
+  const fs::path folder = file.path.parent_path();
+  const std::vector<FramePhoto> photos = frame_photos(file);
   std::vector<View> views;
-  std::size_t moved = 0;
-  std::string first_moved;
+  std::size_t moved = 0, respelt = 0;
+  std::string first_moved, first_respelt;
   for (std::size_t i = 0; i < file.frames.size(); ++i) {
     const io::TransformsFrame& frame = file.frames[i];
-    if (frame.file_path.empty()) {
-      throw DataError(fmt::format("{}: frame {} has no file_path", file.path.string(), i));
-    }
-    auto photo = io::find_image(folder, frame.file_path);
-    const bool is_moved = !photo;
-    if (is_moved) photo = io::find_moved(folder, frame.file_path, 1);
-    if (!photo) {
-      throw DataError(fmt::format("{}: the image '{}' of frame {} does not exist",
-                                  file.path.string(), frame.file_path, i));
-    }
+    const fs::path& photo = photos[i].path;
     View view;
-    view.image_path = *photo;
+    view.image_path = photo;
     fs::path name = frame.file_path;
-    if (is_moved) {
-      name = photo->lexically_relative(folder.lexically_normal());
+    if (photos[i].moved) {
+      name = photo.lexically_relative(folder.lexically_normal());
       if (moved++ == 0) first_moved = frame.file_path;
     }
-    if (!io::has_image_extension(name)) name += photo->extension();
+    if (photos[i].respelt && respelt++ == 0) first_respelt = frame.file_path;
+    if (!io::has_image_extension(name)) name += photo.extension();
     if (!frame.mask_path.empty()) {
       view.mask_path = beside_photos(folder, frame.mask_path);
       if (!is_file(view.mask_path)) {
         throw DataError(fmt::format("{}: the mask '{}' of frame {} does not exist",
-                                    file.path.string(), frame.mask_path, i));
+                                    file.path.string(), frame.mask_path, frame.number));
       }
     } else {
       // Names may repeat in several folders (train/r_0, test/r_0).
       view.mask_path = find_mask(folder, io::inner_name(name));
-      if (view.mask_path.empty()) view.mask_path = find_mask(folder, photo->filename());
+      if (view.mask_path.empty()) view.mask_path = find_mask(folder, photo.filename());
     }
     if (!frame.depth_path.empty()) {
       view.depth_path = beside_photos(folder, frame.depth_path);
       if (!is_file(view.depth_path)) {
         throw DataError(fmt::format("{}: the depth map '{}' of frame {} does not exist",
-                                    file.path.string(), frame.depth_path, i));
+                                    file.path.string(), frame.depth_path, frame.number));
       }
     }
-    const io::ImageSize size = io::image_size(*photo);
+    const io::ImageSize size = io::image_size(photo);
     Camera nominal = io::frame_camera(file, i, frame.width.value_or(size.width),
                                       frame.height.value_or(size.height));
     nominal.name = io::inner_name(name);
@@ -278,6 +329,7 @@ std::vector<View> transforms_views(const io::TransformsFile& file, const Dataset
     spdlog::info("{} of {} photos are not where {} says ({}) but were found below its folder",
                  moved, views.size(), file.path.string(), first_moved);
   }
+  tell_of_case(respelt, views.size(), file.path, first_respelt);
   return views;
 }
 
@@ -297,7 +349,8 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
     points = take_points(dataset, file);
     spdlog::info("{} points are those of {}", dataset.points.size(), file.string());
   }
-  dataset.views = transforms_views(io::read_transforms(root / "transforms_train.json"), options);
+  io::TransformsFile train = io::read_transforms(root / "transforms_train.json");
+  dataset.views = transforms_views(train, options);
   sort_by_name(dataset.views);
   std::optional<fs::path> held_out;
   for (const char* name : {"transforms_val.json", "transforms_test.json"}) {
@@ -308,7 +361,8 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
     set_origin(dataset, points, options);
     return dataset;
   }
-  std::vector<View> test = transforms_views(io::read_transforms(*held_out), options);
+  io::TransformsFile test_file = io::read_transforms(*held_out);
+  std::vector<View> test = transforms_views(test_file, options);
   sort_by_name(test);
   for (View& view : test) {
     view.test = true;
@@ -318,14 +372,13 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
   return dataset;
 }
 
-/// Says which frames of a nerfstudio file its lists leave out, and which names are of no frame.
+/// Says which frames of a nerfstudio file its lists leave out, and which names are of none of its
+/// `frames`, with or without a photo.
 void tell_of_lists(const io::TransformsFile& file,
+                   const std::set<std::string>& frames,
                    const std::set<std::string>& train,
                    const std::set<std::string>& test,
                    std::size_t used) {
-  std::set<std::string> frames;
-  for (const io::TransformsFrame& frame : file.frames)
-    frames.insert(io::inner_name(frame.file_path));
   std::size_t unknown = 0;
   std::string first;
   for (const std::set<std::string>* list : {&train, &test}) {
@@ -347,9 +400,12 @@ void tell_of_lists(const io::TransformsFile& file,
 }
 
 Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
-  const io::TransformsFile file = io::read_transforms(root / "transforms.json");
+  io::TransformsFile file = io::read_transforms(root / "transforms.json");
   Dataset dataset;
   dataset.kind = DatasetKind::kNerfstudio;
+  std::set<std::string> frames;
+  for (const io::TransformsFrame& frame : file.frames)
+    frames.insert(io::inner_name(frame.file_path));
   std::vector<View> views = transforms_views(file, options);
   const auto names = [&](const std::optional<std::vector<std::string>>& list) {
     std::set<std::string> set;
@@ -372,7 +428,7 @@ Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
       if (views[i].test || train.empty() || train.contains(name))
         dataset.views.push_back(std::move(views[i]));
     }
-    tell_of_lists(file, train, test, dataset.views.size());
+    tell_of_lists(file, frames, train, test, dataset.views.size());
     sort_by_name(dataset.views);
   }
   std::vector<double> points;

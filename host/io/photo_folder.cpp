@@ -5,16 +5,21 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "io/find_image.hpp"
 #include "io/image_file.hpp"
-#include "io/transforms.hpp"
 #include "util/file_kind.hpp"
 
 namespace raysplats::io {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// What programs call the folder of their photos, the usual name first.
+constexpr std::array<const char*, 7> kFolderNames{"images", "image", "photos", "rgb",
+                                                  "color",  "input", "frames"};
 
 PhotoFolder choose_photo_folder(const fs::path& root, double downscale) {
   const auto reduced = [&](int factor) { return root / fmt::format("images_{}", factor); };
@@ -56,6 +61,16 @@ bool has_photos_of(const fs::path& folder, const ColmapModel& model) {
   });
 }
 
+/// A folder of another name that has the model's first photo, where that is not beside the model.
+std::optional<fs::path> other_folder(const fs::path& root, const ColmapModel& model) {
+  if (model.images.empty() || find_photo(root, model.images.front().name)) return std::nullopt;
+  for (const char* name : kFolderNames) {
+    const auto folder = find_folder(root, name);
+    if (folder && find_photo(*folder, model.images.front().name)) return folder;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name) {
@@ -71,12 +86,14 @@ std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name)
 PhotoFolder photo_folder(const fs::path& root, const ColmapModel& model, double downscale) {
   PhotoFolder usual = choose_photo_folder(root, downscale);
   const fs::path input = root / "input", images = root / "images";
-  if (!is_folder(input)) return usual;
   // Reduced copies are of `images`.
-  if (is_folder(images) ? has_photos_of(images, model) : usual.path != root) return usual;
-  if (!has_photos_of(input, model)) return usual;
-  spdlog::info("the photos of the model are those in {}", input.string());
-  return {input, 1.0};
+  const bool has_usual = is_folder(images) ? has_photos_of(images, model) : usual.path != root;
+  std::optional<fs::path> found;
+  if (!has_usual && is_folder(input) && has_photos_of(input, model)) found = input;
+  if (!found && usual.path == root) found = other_folder(root, model);
+  if (!found) return usual;
+  spdlog::info("the photos of the model are those in {}", found->string());
+  return {*found, 1.0};
 }
 
 }  // namespace raysplats::io

@@ -17,7 +17,8 @@ struct PhotoFolder {
 /// Where the photos of a COLMAP model below the data set `root` lie: reduced copies of 3DGS
 /// (images_4) where they fit `downscale`, `images`, or beside the model. The photos that convert.py
 /// of 3DGS reads lie in `input`, and those that it makes of them, which are of another size and
-/// without a lens, in `images`: the model tells which are its own.
+/// without a lens, in `images`: the model tells which are its own. Where neither is there, a folder
+/// that other programs name (Images, rgb, color) and that has the model's first photo.
 PhotoFolder photo_folder(const std::filesystem::path& root,
                          const ColmapModel& model,
                          double downscale);

@@ -12,9 +12,12 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 #include <span>
+#include <string_view>
 
+#include "io/find_image.hpp"
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
+#include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
@@ -31,6 +34,15 @@ using nlohmann::json;
 
 constexpr double kRigidTolerance = 1e-3;
 constexpr double kLeastAxis = 1e-6;
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// A number, also one that was written as a text ("500").
+std::optional<double> number_of(const json& value) {
+  if (value.is_number()) return value.get<double>();
+  double out = 0;
+  if (value.is_string() && parse_number(value.get_ref<const std::string&>(), out)) return out;
+  return std::nullopt;
+}
 
 /// One scope of keys: the file or a frame of it, with its name for errors.
 struct Scope {
@@ -44,10 +56,9 @@ struct Scope {
   std::optional<double> number(const char* key) const {
     const auto found = object.find(key);
     if (found == object.end() || found->is_null()) return std::nullopt;
-    if (!found->is_number())
-      fail(fmt::format("'{}' is not a number, it is a {}", key, found->type_name()));
-    const auto value = found->get<double>();
-    if (!std::isfinite(value)) fail(fmt::format("'{}' is not finite", key));
+    const std::optional<double> value = number_of(*found);
+    if (!value) fail(fmt::format("'{}' is not a number, it is a {}", key, found->type_name()));
+    if (!std::isfinite(*value)) fail(fmt::format("'{}' is not finite", key));
     return value;
   }
   std::string text(const char* key) const {
@@ -77,6 +88,15 @@ struct Scope {
     }
     return value;
   }
+  /// Of radians, else of degrees.
+  std::optional<double> angle(const char* radians, const char* degrees) const {
+    if (const auto value = angle(radians)) return value;
+    const auto value = number(degrees);
+    if (value && !(*value > 0 && *value < 180)) {
+      fail(fmt::format("'{}' is {}, which is no angle between 0 and 180 degrees", degrees, *value));
+    }
+    return value ? std::optional(*value * kDegree) : std::nullopt;
+  }
 };
 
 /// Names of nerfstudio; what a lens distorts decides between kPinhole and kOpenCv.
@@ -101,11 +121,25 @@ const char* model_name(CameraModel model) {
       ->name;
 }
 
+/// Whether two names differ in nothing but letter case, and in what separates their words.
+bool same_name(std::string_view a, std::string_view b) {
+  const auto plain = [](std::string_view name) {
+    std::string out;
+    for (const char c : name) {
+      if (c != '_' && c != '-' && c != ' ')
+        out += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    }
+    return out;
+  };
+  return plain(a) == plain(b);
+}
+
 void read_model(const Scope& scope, TransformsFrame& frame) {
   const std::string name = scope.text("camera_model");
   if (!name.empty()) {
-    const auto* found = std::find_if(kModelNames.begin(), kModelNames.end(),
-                                     [&](const ModelName& known) { return known.name == name; });
+    const auto* found =
+        std::find_if(kModelNames.begin(), kModelNames.end(),
+                     [&](const ModelName& known) { return same_name(known.name, name); });
     if (found == kModelNames.end()) {
       scope.fail(
           fmt::format("the camera_model '{}' is not supported (PINHOLE, OPENCV, OPENCV_FISHEYE, "
@@ -124,9 +158,10 @@ void read_parameters(const Scope& scope, TransformsFrame& frame) {
   if (found == scope.object.end() || found->is_null()) return;
   std::vector<double> values;
   for (const json& value : *found) {
-    if (!value.is_number() || !std::isfinite(value.get<double>()))
+    const std::optional<double> parameter = number_of(value);
+    if (!parameter || !std::isfinite(*parameter))
       scope.fail("'distortion_params' holds something that is no finite number");
-    values.push_back(value.get<double>());
+    values.push_back(*parameter);
   }
   if (values.size() == 12) {
     frame.fisheye624 = std::move(values);
@@ -145,8 +180,8 @@ void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
   if (const auto height = scope.side("h")) frame.height = height;
   const auto fx = scope.positive("fl_x");
   const auto fy = scope.positive("fl_y");
-  const auto angle_x = scope.angle("camera_angle_x");
-  const auto angle_y = scope.angle("camera_angle_y");
+  const auto angle_x = scope.angle("camera_angle_x", "x_fov");
+  const auto angle_y = scope.angle("camera_angle_y", "y_fov");
   if (fx || fy || angle_x || angle_y) {
     // A focal length of a frame must not be mixed with an angle of the file.
     frame.fx = fx;
@@ -167,37 +202,74 @@ void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
   if (const auto radius = scope.positive("fisheye_crop_radius")) frame.crop_radius = radius;
 }
 
-/// Reads the pose; whether its axes had another length than 1, which does not change what a camera
-/// sees: exporters of Blender write cameras that were scaled as objects.
-bool read_pose(const Scope& scope, TransformsFrame& frame) {
+/// The signs that make the columns of the file's matrices right, down and forward. As a rule these
+/// are right, up and backward, as OpenGL has them.
+glm::dvec3 axis_signs(const json& root, const fs::path& path) {
+  const auto from_na = root.find("from_na");
+  if (from_na != root.end() && *from_na == true) {
+    spdlog::info("{} has from_na, as NeuS2 writes it: its cameras have y down and z forward",
+                 path.string());
+    return {1, 1, 1};
+  }
+  if (root.contains("normal_mts_args")) {
+    spdlog::info(
+        "{} has normal_mts_args, as instant-ngp reads it: its cameras are Mitsuba's, with x to the "
+        "left and z forward",
+        path.string());
+    return {-1, -1, 1};
+  }
+  return {1, -1, -1};
+}
+
+/// Rows of four numbers: three or four of them, each a list or all in one.
+std::vector<std::array<double, 4>> matrix_rows(const Scope& scope) {
+  constexpr std::size_t kColumns = 4;
   const auto found = scope.object.find("transform_matrix");
   if (found == scope.object.end()) scope.fail("the transform_matrix is missing");
-  if (!found->is_array() || (found->size() != 3 && found->size() != 4)) {
-    scope.fail("the transform_matrix has not 4 rows");
+  const bool flat = found->is_array() && !found->empty() && !found->front().is_array();
+  const std::size_t count = found->is_array() ? found->size() / (flat ? kColumns : 1) : 0;
+  if (count < 3 || count > 4 || (flat && found->size() % kColumns != 0)) {
+    scope.fail("the transform_matrix has not 4 rows of 4 numbers");
   }
+  std::vector<std::array<double, 4>> rows(count);
+  for (std::size_t row = 0; row < count; ++row) {
+    const json& line = flat ? *found : (*found)[row];
+    if (!flat && (!line.is_array() || line.size() != kColumns))
+      scope.fail("a row of the transform_matrix has not 4 numbers");
+    for (std::size_t column = 0; column < kColumns; ++column) {
+      const auto value = number_of(line[flat ? kColumns * row + column : column]);
+      if (!value) scope.fail("the transform_matrix holds something that is no number");
+      if (!std::isfinite(*value)) scope.fail("the transform_matrix is not finite");
+      rows[row][column] = *value;
+    }
+  }
+  return rows;
+}
+
+void check_last_row(const Scope& scope, const std::vector<std::array<double, 4>>& rows) {
+  if (rows.size() < 4) return;
+  const auto is_last = [](const std::array<double, 4>& numbers) {
+    constexpr std::array<double, 4> kLast{0, 0, 0, 1};
+    return std::equal(numbers.begin(), numbers.end(), kLast.begin(),
+                      [](double a, double b) { return std::abs(a - b) <= 1e-6; });
+  };
+  if (is_last(rows[3])) return;
+  const bool turned = is_last({rows[0][3], rows[1][3], rows[2][3], rows[3][3]});
+  scope.fail(fmt::format("the last row of the transform_matrix is not 0 0 0 1{}",
+                         turned ? ", but its last column is: transpose the matrices" : ""));
+}
+
+/// Reads the pose; whether its axes had another length than 1, which does not change what a camera
+/// sees: exporters of Blender write cameras that were scaled as objects.
+bool read_pose(const Scope& scope, const glm::dvec3& signs, TransformsFrame& frame) {
+  const std::vector<std::array<double, 4>> rows = matrix_rows(scope);
+  check_last_row(scope, rows);
   glm::dmat3 rotation;
   glm::dvec3 position;
-  for (std::size_t row = 0; row < found->size(); ++row) {
-    const json& line = (*found)[row];
-    if (!line.is_array() || line.size() != 4)
-      scope.fail("a row of the transform_matrix has not 4 numbers");
-    for (std::size_t column = 0; column < 4; ++column) {
-      if (!line[column].is_number())
-        scope.fail("the transform_matrix holds something that is no number");
-      const auto value = line[column].get<double>();
-      if (!std::isfinite(value)) scope.fail("the transform_matrix is not finite");
-      const int i = static_cast<int>(row);
-      const int j = static_cast<int>(column);
-      if (row == 3) {
-        if (std::abs(value - (column == 3 ? 1.0 : 0.0)) > 1e-6) {
-          scope.fail("the last row of the transform_matrix is not 0 0 0 1");
-        }
-      } else if (column == 3) {
-        position[i] = value;
-      } else {
-        rotation[j][i] = value;
-      }
-    }
+  for (int i = 0; i < 3; ++i) {
+    const std::array<double, 4>& row = rows[static_cast<std::size_t>(i)];
+    for (int j = 0; j < 3; ++j) rotation[j][i] = row[static_cast<std::size_t>(j)];
+    position[i] = row[3];
   }
   bool scaled = false;
   for (int i = 0; i < 3; ++i) {
@@ -222,9 +294,7 @@ bool read_pose(const Scope& scope, TransformsFrame& frame) {
   for (int step = 0; step < 3; ++step) {
     rotation = 0.5 * (rotation + glm::transpose(glm::inverse(rotation)));
   }
-  // OpenGL's camera looks along -z with y up.
-  rotation[1] = -rotation[1];
-  rotation[2] = -rotation[2];
+  for (int i = 0; i < 3; ++i) rotation[i] *= signs[i];
   frame.rotation = glm::transpose(rotation);
   frame.translation = -(frame.rotation * position);
   return scaled;
@@ -259,15 +329,17 @@ TransformsFile read_transforms(const fs::path& path) {
   if (frames == root.end() || !frames->is_array()) {
     throw DataError(fmt::format("{} has no list of frames: it is no camera file", path.string()));
   }
+  const glm::dvec3 signs = axis_signs(root, path);
   std::size_t scaled = 0;
   for (const json& object : *frames) {
     const Scope frame_scope{object, path, fmt::format("frame {}", file.frames.size())};
     if (!object.is_object()) frame_scope.fail("it is no JSON object");
     TransformsFrame frame = common;
+    frame.number = file.frames.size();
     read_intrinsics(frame_scope, frame);
     if (frame.model == CameraModel::kPhotoLens && frame.fisheye624.empty())
       frame_scope.fail("FISHEYE624 needs the twelve numbers of 'distortion_params'");
-    scaled += read_pose(frame_scope, frame) ? 1 : 0;
+    scaled += read_pose(frame_scope, signs, frame) ? 1 : 0;
     frame.file_path = portable_path(frame_scope.text("file_path"));
     frame.mask_path = portable_path(frame_scope.text("mask_path"));
     frame.depth_path = portable_path(frame_scope.text("depth_file_path"));
@@ -330,8 +402,8 @@ Camera frame_camera(const TransformsFile& file, std::size_t index, int width, in
   const auto [fx, fy] = focal_lengths(frame, nominal_width, nominal_height);
   if (!fx && !fy) {
     throw DataError(fmt::format(
-        "{}: frame {} has {}, in it or in the file", file.path.string(), index,
-        frame.model == CameraModel::kPinhole ? "neither fl_x nor camera_angle_x"
+        "{}: frame {} has {}, in it or in the file", file.path.string(), frame.number,
+        frame.model == CameraModel::kPinhole ? "neither fl_x nor camera_angle_x (nor x_fov)"
                                              : "no fl_x, which its camera model needs"));
   }
   // Pixels are square where one of the two is all that is said.
@@ -347,7 +419,7 @@ Camera frame_camera(const TransformsFile& file, std::size_t index, int width, in
   const double crop = frame.crop_radius.value_or(0.0) * scale_x / camera.fx;
   if (const std::optional<PhotoLens> lens = photo_lens(frame, image_reach(camera), crop)) {
     set_photo_lens(camera, *lens,
-                   fmt::format("{}: the camera of frame {}", file.path.string(), index));
+                   fmt::format("{}: the camera of frame {}", file.path.string(), frame.number));
     return camera;
   }
   camera.distortion = frame.distortion;
@@ -362,36 +434,6 @@ std::string inner_name(const fs::path& path) {
     if (part != ".." && part != ".") name /= part;
   }
   return name.generic_string();
-}
-
-std::optional<fs::path> find_image(const fs::path& folder, const fs::path& file_path) {
-  const fs::path exact = (folder / file_path).lexically_normal();
-  std::error_code error;
-  if (fs::is_regular_file(exact, error)) return exact;
-  // Without an extension any will do; with one only its case may differ.
-  const bool named = has_image_extension(exact);
-  const std::string stem = named ? fs::path(exact).replace_extension().string() : exact.string();
-  for (std::string extension : kImageExtensions) {
-    if (named && lower_extension(exact) != extension) continue;
-    if (fs::is_regular_file(stem + extension, error)) return stem + extension;
-    for (char& c : extension) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    if (fs::is_regular_file(stem + extension, error)) return stem + extension;
-  }
-  return std::nullopt;
-}
-
-std::optional<fs::path> find_moved(const fs::path& folder,
-                                   const fs::path& file_path,
-                                   std::size_t least_parts) {
-  std::vector<fs::path> parts;
-  for (const fs::path& part : file_path.lexically_normal().relative_path()) parts.push_back(part);
-  for (std::size_t first = 1; first < parts.size() && parts.size() - first >= least_parts;
-       ++first) {
-    fs::path rest;
-    for (std::size_t i = first; i < parts.size(); ++i) rest /= parts[i];
-    if (auto found = find_image(folder, rest)) return found;
-  }
-  return least_parts > 1 ? std::nullopt : find_image(folder / "images", file_path.filename());
 }
 
 }  // namespace io

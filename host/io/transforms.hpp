@@ -14,6 +14,7 @@ namespace raysplats::io {
 
 /// Intrinsics of one frame, as far as the file states them.
 struct TransformsFrame {
+  std::size_t number = 0;  ///< in the file
   std::string file_path;   ///< as in the file; may be empty
   std::string mask_path;   ///< as in the file; usually empty
   std::string depth_path;  ///< likewise
@@ -36,6 +37,8 @@ struct TransformsFile {
   std::optional<std::vector<std::string>> train_filenames, val_filenames, test_filenames;
 };
 
+/// Numbers may be texts ("500"), matrices of 3 x 4, 4 x 4 or as many numbers in one list. Cameras
+/// of NeuS2 (from_na) and Mitsuba (normal_mts_args) have axes of their own, which an info says.
 /// Throws DataError for malformed JSON, camera models other than pinholes, OPENCV, OPENCV_FISHEYE
 /// (instant-ngp: is_fisheye), FISHEYE624, EQUIRECTANGULAR and ORTHOPHOTO (named), and matrices that
 /// are not finite or, but for the lengths of their axes, no rigid motion to 1e-3; smaller
@@ -52,16 +55,5 @@ Camera frame_camera(const TransformsFile& file, std::size_t frame, int width, in
 /// A name without root, "." and ".." components, so that files named after it stay inside their
 /// folder.
 std::string inner_name(const std::filesystem::path& path);
-
-/// The image that `file_path` means, relative to `folder` and possibly without extension; nothing
-/// when absent.
-std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
-                                                const std::filesystem::path& file_path);
-
-/// The same by the end of a path that was written elsewhere (C:/captures/fox/images/1.jpg): the
-/// longest that is there, of `least_parts` or more; a name alone also in the folder images.
-std::optional<std::filesystem::path> find_moved(const std::filesystem::path& folder,
-                                                const std::filesystem::path& file_path,
-                                                std::size_t least_parts);
 
 }  // namespace raysplats::io

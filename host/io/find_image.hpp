@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+
+namespace raysplats::io {
+
+/// The image that `file_path` means, relative to `folder` and possibly without extension; nothing
+/// when absent.
+std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
+                                                const std::filesystem::path& file_path);
+
+/// The single image that differs from that path in letter case alone, in folders or name: systems
+/// that do not tell them apart have written the path. Reads the folder from end to end.
+std::optional<std::filesystem::path> find_respelt(const std::filesystem::path& folder,
+                                                  const std::filesystem::path& file_path);
+
+/// The image by the end of a path that was written elsewhere (C:/captures/fox/images/1.jpg): the
+/// longest that is there, of `least_parts` or more; a name alone also in the folder images.
+std::optional<std::filesystem::path> find_moved(const std::filesystem::path& folder,
+                                                const std::filesystem::path& file_path,
+                                                std::size_t least_parts);
+
+/// The folder of that name in another, in any letter case, the exact one first.
+std::optional<std::filesystem::path> find_folder(const std::filesystem::path& folder,
+                                                 std::string_view name);
+
+}  // namespace raysplats::io

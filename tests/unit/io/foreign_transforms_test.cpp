@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// Camera files in the dialects and with the flaws of programs that write them.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "data_sets.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/io.hpp"
+#include "unit/log_capture.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+std::string file_of(const std::string& keys, const std::string& frames) {
+  return fmt::format("{{{}\"frames\": [{}]}}", keys, frames);
+}
+
+std::string frame_with(const std::string& matrix, const std::string& more = "") {
+  return fmt::format("{{\"file_path\": \"a\", {}\"transform_matrix\": {}}}", more, matrix);
+}
+
+std::vector<Camera> cameras_of(const std::string& json) {
+  const Scratch scratch;
+  write_bytes(scratch / "cameras.json", json);
+  return read_cameras(scratch / "cameras.json");
+}
+
+std::string cameras_error(const std::string& json) {
+  return data_error([&] { cameras_of(json); });
+}
+
+const std::string kKeys = "\"w\": 40, \"h\": 30, \"fl_x\": 50, ";
+
+void check_same_pose(const Camera& a, const Camera& b) {
+  CHECK(glm::length(a.translation - b.translation) < 1e-12);
+  for (int i = 0; i < 3; ++i) CHECK(glm::length(a.rotation[i] - b.rotation[i]) < 1e-12);
+}
+
+/// A data set of these photos, which are written but for those that are to be missing.
+void write_scene(const Scratch& scratch,
+                 const std::vector<std::string>& names,
+                 const std::vector<std::string>& written,
+                 const std::string& keys = "") {
+  for (const std::string& name : written) write_image(scratch / name, Image(40, 30, 3, 0.5f));
+  std::string frames;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    frames += fmt::format("{}{{\"file_path\": \"{}\", \"transform_matrix\": {}}}",
+                          i > 0 ? ", " : "", names[i], matrix_json(static_cast<double>(i)));
+  }
+  write_bytes(scratch / "transforms.json", file_of(kKeys + keys, frames));
+}
+
+}  // namespace
+
+TEST_CASE("names of camera models may be spelt in any case and with any separator") {
+  const auto model = [](const std::string& name) {
+    return cameras_of(file_of(kKeys + "\"k1\": 0.01, \"camera_model\": \"" + name + "\", ",
+                              frame_with(matrix_json(1))))
+        .front()
+        .model;
+  };
+  CHECK(model("opencv") == CameraModel::kOpenCv);
+  CHECK(model("OpenCV Fisheye") == CameraModel::kFisheye);
+  CHECK(model("simple-radial") == CameraModel::kOpenCv);
+  CHECK(model("equirectangular") == CameraModel::kEquirectangular);
+  CHECK(contains(cameras_error(file_of("\"camera_model\": \"open_gl\", ", "")), "'open_gl'"));
+}
+
+TEST_CASE("numbers that were written as texts are numbers, other texts are none") {
+  const Camera camera =
+      cameras_of(file_of("\"w\": \"40\", \"h\": \"30\", \"fl_x\": \"5e1\", \"cx\": \"-1.5\", ",
+                         frame_with("[[\"0.8\", 0, 0.6, \"7\"], [0, 1, 0, 2], [-0.6, 0, 0.8, 3]]")))
+          .front();
+  CHECK(camera.width == 40);
+  CHECK(camera.fx == 50);
+  CHECK(camera.cx == -1.5);
+  CHECK(glm::length(camera.center() - glm::dvec3(7, 2, 3)) < 1e-12);
+  for (const char* text : {"50 px", "", "nan", "inf"}) {
+    CHECK(contains(
+        cameras_error(file_of(fmt::format("\"fl_x\": \"{}\", ", text), frame_with(matrix_json(1)))),
+        "'fl_x' is not"));
+  }
+}
+
+TEST_CASE("angles of view are read in degrees too, of the file or the frame") {
+  const auto cameras = cameras_of(
+      file_of("\"w\": 40, \"h\": 30, \"x_fov\": 60, ",
+              frame_with(matrix_json(1)) + "," + frame_with(matrix_json(1), "\"y_fov\": 90, ") +
+                  "," + frame_with(matrix_json(1), "\"x_fov\": 90, \"y_fov\": 60, ") + "," +
+                  frame_with(matrix_json(1), "\"fl_x\": 33, ")));
+  REQUIRE(cameras.size() == 4);
+  CHECK(cameras[0].fx == doctest::Approx(20 * std::numbers::sqrt3).epsilon(1e-12));
+  CHECK(cameras[0].fy == cameras[0].fx);
+  CHECK(cameras[1].fx == doctest::Approx(15).epsilon(1e-12));
+  CHECK(cameras[2].fx == doctest::Approx(20).epsilon(1e-12));
+  CHECK(cameras[2].fy == doctest::Approx(15 * std::numbers::sqrt3).epsilon(1e-12));
+  CHECK(cameras[3].fy == 33);
+  CHECK(contains(cameras_error(file_of("\"x_fov\": 180, ", frame_with(matrix_json(1)))),
+                 "180 degrees"));
+}
+
+TEST_CASE("matrices may be three rows, or one list; transposed ones are refused by name") {
+  const Camera expected = cameras_of(file_of(kKeys, frame_with(matrix_json(7)))).front();
+  for (const char* matrix : {"[[0.8, 0, 0.6, 7], [0, 1, 0, 2], [-0.6, 0, 0.8, 3]]",
+                             "[0.8, 0, 0.6, 7, 0, 1, 0, 2, -0.6, 0, 0.8, 3]",
+                             "[0.8, 0, 0.6, 7, 0, 1, 0, 2, -0.6, 0, 0.8, 3, 0, 0, 0, 1]"}) {
+    check_same_pose(cameras_of(file_of(kKeys, frame_with(matrix))).front(), expected);
+  }
+  for (const char* matrix : {"[[0.8, 0, -0.6, 0], [0, 1, 0, 0], [0.6, 0, 0.8, 0], [7, 2, 3, 1]]",
+                             "[0.8, 0, -0.6, 0, 0, 1, 0, 0, 0.6, 0, 0.8, 0, 7, 2, 3, 1]"}) {
+    CHECK(contains(cameras_error(file_of(kKeys, frame_with(matrix))), "transpose"));
+  }
+  for (const char* matrix : {"[1, 2, 3]", "[]", "[0.8, 0, 0.6, 7, 0, 1, 0, 2, -0.6, 0, 0.8, 3, 0]",
+                             "[[1, 0, 0, 0], 1, 2, 3]"}) {
+    CHECK(contains(cameras_error(file_of(kKeys, frame_with(matrix))), "4 numbers"));
+  }
+}
+
+TEST_CASE("keys of other programs: scales of the scene do nothing, axes of the cameras do") {
+  const Camera expected = cameras_of(file_of(kKeys, frame_with(matrix_json(7)))).front();
+  check_same_pose(cameras_of(file_of(kKeys + "\"aabb_scale\": 16, \"scale\": 0.33, "
+                                             "\"offset\": [0.5, 0.5, 0.5], \"from_na\": false, ",
+                                     frame_with(matrix_json(7))))
+                      .front(),
+                  expected);
+  const LogCapture log;
+  // NeuS2's second and third axis, Mitsuba's first and third are the other way round.
+  check_same_pose(
+      cameras_of(file_of(kKeys + "\"from_na\": true, ",
+                         frame_with("[[0.8, 0, -0.6, 7], [0, -1, 0, 2], [-0.6, 0, -0.8, 3]]")))
+          .front(),
+      expected);
+  CHECK(log.contains("from_na"));
+  check_same_pose(
+      cameras_of(file_of(kKeys + "\"normal_mts_args\": [], ",
+                         frame_with("[[-0.8, 0, -0.6, 7], [0, 1, 0, 2], [0.6, 0, -0.8, 3]]")))
+          .front(),
+      expected);
+  CHECK(log.contains("Mitsuba"));
+}
+
+TEST_CASE("frames without a photo are left out and told, where most have one") {
+  const Scratch scratch;
+  const std::vector<std::string> names{"a.png", "b.png", "c.png", "d"};
+  write_scene(scratch, names, {"a.png", "c.png"},
+              "\"train_filenames\": [\"a.png\", \"b.png\"], \"test_filenames\": [\"c.png\"], ");
+  {
+    const LogCapture log;
+    const Dataset dataset = load_dataset(scratch.path());
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("2 of 4 frames do not exist, 'b.png' of frame 1"));
+    REQUIRE(dataset.views.size() == 2);
+    CHECK(dataset.views[1].camera.name == "c.png");
+    CHECK(dataset.views[1].test);
+    CHECK(dataset.views[1].camera.center().x == doctest::Approx(2));
+  }
+  fs::remove(scratch / "a.png");
+  const std::string message = data_error([&] { load_dataset(scratch.path()); });
+  CHECK(contains(message, "3 of 4 frames do not exist, 'a.png' of frame 0"));
+  CHECK(contains(message, "put them"));
+  fs::remove(scratch / "c.png");
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "4 of 4 frames"));
+}
+
+TEST_CASE("photos are found in another letter case, unless two differ in nothing else") {
+  const Scratch scratch;
+  write_scene(scratch, {"images/A.jpg", "images/b", ".\\\\Images\\\\c.PNG"},
+              {"Images/a.Jpg", "Images/B.Png", "Images/c.png"});
+  {
+    const LogCapture log;
+    const Dataset dataset = load_dataset(scratch.path());
+    REQUIRE(dataset.views.size() == 3);
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("2 of 3 photos are spelt otherwise"));
+    CHECK(log.contains("'images/A.jpg'"));
+    CHECK(fs::equivalent(dataset.views[1].image_path, scratch / "Images/a.Jpg"));
+  }
+  write_image(scratch / "Images/a.jpG", Image(40, 30, 3, 0.5f));
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path()).views.size() == 2);
+  CHECK(log.contains("'images/A.jpg' of frame 0"));
+}
