@@ -58,8 +58,10 @@ class OiioDecoder : public ImageDecoder {
       memory_ = std::make_unique<OIIO::Filesystem::IOMemReader>(memory.data(), memory.size());
     }
     if (!input_ || (memory_ && !input_->set_ioproxy(memory_.get()))) {
-      throw DataError(fmt::format("The image {} cannot be read: OpenImageIO is built without {}",
-                                  name_, format));
+      throw DataError(
+          fmt::format("The image {} cannot be read: OpenImageIO is built without {}, convert it to "
+                      "PNG or JPEG",
+                      name_, format));
     }
     OIIO::ImageSpec spec;
     if (!input_->open(name_, spec, straight_config())) {
@@ -68,6 +70,12 @@ class OiioDecoder : public ImageDecoder {
     }
     const bool flat = spec.nchannels >= 1 && spec.depth <= 1 && !spec.deep;
     require_bearable_size(name_, flat ? spec.width : 0, spec.height);
+    // OpenImageIO gives the numbers of L*a*b* as if they were red, green and blue.
+    const std::string space(spec.get_string_attribute("tiff:ColorSpace"));
+    if (space == "CIELAB" || space == "ICCLAB" || space == "ITULAB" || space == "LOGLUV") {
+      throw DataError(fmt::format(
+          "The image {} holds {} colours, which are not read: convert it to RGB", name_, space));
+    }
   }
 
   int width() const override { return input_->spec().width; }
@@ -77,6 +85,9 @@ class OiioDecoder : public ImageDecoder {
     return type == OIIO::TypeDesc::UINT8 ? 1 : type == OIIO::TypeDesc::UINT16 ? 2 : 4;
   }
   int orientation() const override { return input_->spec().get_int_attribute("Orientation", 1); }
+  std::string color_profile() const override {
+    return std::string(input_->spec().get_string_attribute("ICCProfile:profile_description"));
+  }
   RawImage decode() override {
     switch (sample_bytes()) {
       case 1:
@@ -92,7 +103,9 @@ class OiioDecoder : public ImageDecoder {
   // Bands that are neither colours nor alpha (near infrared of drones) are left out.
   template <class T>
   RawImage decode_as(const OIIO::TypeDesc& type) {
-    const int bands = input_->spec().nchannels, alpha = input_->spec().alpha_channel;
+    const int bands = input_->spec().nchannels;
+    // OpenImageIO 2.4 says that the fourth of a GIF's four channels is number 4.
+    const int alpha = std::min(input_->spec().alpha_channel, bands - 1);
     const int colors = bands - (alpha > 0 ? 1 : 0) < 3 ? 1 : 3;
     const bool covered = alpha >= colors;
     RawImage image{width(), height(), colors + (covered ? 1 : 0), {}};

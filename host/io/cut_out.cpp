@@ -58,7 +58,9 @@ Places transparent_places(const RawImage& photo) {
 
 Places transparent_places(const View& view) {
   const std::string extension = lower_extension(view.image_path);
-  if (extension == ".jpg" || extension == ".jpeg" || extension == ".hdr") return {};
+  for (const char* opaque : {".jpg", ".jpeg", ".jfif", ".hdr"}) {
+    if (extension == opaque) return {};
+  }
   try {
     return transparent_places(read_raw_image(view.image_path));
   } catch (const Error&) {

@@ -52,6 +52,8 @@ class ImageDecoder {
   virtual int sample_bytes() const = 0;
   /// As EXIF counts; 1 is upright.
   virtual int orientation() const { return 1; }
+  /// The name of the ICC profile that says what its colours are; "" where the file has none.
+  virtual std::string color_profile() const { return {}; }
   /// Throws DataError.
   virtual RawImage decode() = 0;
 };
@@ -86,7 +88,8 @@ class MovieEncoder {
 class ImageCodec {
  public:
   virtual ~ImageCodec() = default;
-  /// `format`: "png", "jpeg", "openexr", "webp", "bmp", "hdr" or "tiff". `name` is the path, or
+  /// `format`: "png", "jpeg", "openexr", "webp", "bmp", "hdr", "tiff", "gif", "targa" or "heif", of
+  /// which the first picture counts. `name` is the path, or
   /// stands for it in errors where `memory` (not of "openexr"), which has to outlive the decoder,
   /// is not empty. Throws DataError for what is no flat picture of a bearable size.
   virtual std::unique_ptr<ImageDecoder> open(const std::string& format,

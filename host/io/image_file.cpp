@@ -24,7 +24,27 @@ namespace raysplats {
 namespace {
 
 constexpr std::string_view kPngStart = "\x89PNG\r\n\x1a\n";
-constexpr const char* kFormats = "PNG, JPEG, EXR, HDR, TIFF, WebP or BMP";
+constexpr const char* kFormats = "PNG, JPEG, EXR, HDR, TIFF, WebP, BMP, GIF, TGA, HEIF or AVIF";
+
+/// The file type box of ISO base media (ISO/IEC 14496-12, 4.3), with a brand of still pictures
+/// (ISO/IEC 23008-12; AVIF): videos begin alike.
+bool is_heif(std::string_view magic) {
+  if (magic.size() < 12 || magic.substr(4, 4) != "ftyp") return false;
+  static constexpr std::array<std::string_view, 9> kBrands{"heic", "heix", "heim", "heis", "mif1",
+                                                           "msf1", "avif", "avis", "miaf"};
+  return std::find(kBrands.begin(), kBrands.end(), magic.substr(8, 4)) != kBrands.end();
+}
+
+/// TGA has no magic number: whether these can be the kinds of palette and picture, and the bits of
+/// a pixel, of its header (Truevision, version 2.0).
+bool is_targa(std::string_view start) {
+  if (start.size() < 18) return false;
+  const auto byte_at = [&](std::size_t i) { return static_cast<std::uint8_t>(start[i]); };
+  const unsigned kind = byte_at(2), bits = byte_at(16);
+  const bool known = (kind >= 1 && kind <= 3) || (kind >= 9 && kind <= 11);
+  return known && byte_at(1) <= 1 &&
+         (bits == 8 || bits == 15 || bits == 16 || bits == 24 || bits == 32);
+}
 
 /// OpenImageIO's name of the format that the first bytes belong to; "" for any other.
 std::string_view format_of(std::string_view magic) {
@@ -32,6 +52,8 @@ std::string_view format_of(std::string_view magic) {
   if (magic.starts_with("\xff\xd8\xff")) return "jpeg";
   if (magic.starts_with("\x76\x2f\x31\x01")) return "openexr";
   if (magic.starts_with("BM")) return "bmp";
+  if (magic.starts_with("GIF8")) return "gif";
+  if (is_heif(magic)) return "heif";
   if (magic.starts_with("#?RADIANCE") || magic.starts_with("#?RGBE")) return "hdr";
   if (magic.starts_with("RIFF") &&
       magic.substr(std::min<std::size_t>(8, magic.size())).starts_with("WEBP"))
@@ -134,7 +156,8 @@ std::string checked_format(const std::filesystem::path& path, bool for_pixels) {
   stream.read(magic.data(), magic.size());
   if (stream.gcount() == 0) throw DataError(fmt::format("The image {} is empty", path.string()));
   const std::string_view start(magic.data(), static_cast<std::size_t>(stream.gcount()));
-  const std::string_view format = format_of(start);
+  std::string_view format = format_of(start);
+  if (format.empty() && io::lower_extension(path) == ".tga" && is_targa(start)) format = "targa";
   if (format.empty()) {
     throw DataError(fmt::format("The image {} is corrupt: it does not start as a {} file",
                                 path.string(), kFormats));

@@ -32,8 +32,9 @@ RawImage read_raw_image(const std::filesystem::path& path);
 Image decode_image(std::span<const std::byte> bytes, const std::string& name);
 
 /// The extensions that read_image() knows; it takes them in any case.
-constexpr std::array<const char*, 9> kImageExtensions{".png",  ".jpg",  ".jpeg", ".exr", ".tif",
-                                                      ".tiff", ".webp", ".bmp",  ".hdr"};
+constexpr std::array<const char*, 15> kImageExtensions{".png", ".jpg",  ".jpeg", ".jfif", ".exr",
+                                                       ".tif", ".tiff", ".webp", ".bmp",  ".hdr",
+                                                       ".gif", ".tga",  ".heic", ".heif", ".avif"};
 
 /// The extension in small letters.
 std::string lower_extension(const std::filesystem::path& path);

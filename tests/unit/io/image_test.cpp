@@ -281,8 +281,8 @@ TEST_CASE("missing, empty, foreign and truncated images are refused with one sen
   CHECK(contains(read_error(scratch / "empty.png"), "empty"));
   write_bytes(scratch / "text.png", "this is text");
   CHECK(contains(read_error(scratch / "text.png"), "corrupt"));
-  write_bytes(scratch / "a.gif", "GIF89a");
-  CHECK(contains(read_error(scratch / "a.gif"), "extension"));
+  write_bytes(scratch / "a.psd", "8BPS");
+  CHECK(contains(read_error(scratch / "a.psd"), "extension"));
   const Image image = gradient(200, 150, 3);
   for (const char* name : {"a.png", "a.jpg", "a.exr"}) {
     write_image(scratch / name, image);
