@@ -35,7 +35,12 @@ std::size_t area(int width, int height) {
 
 DepthMap read_array(const std::filesystem::path& path) {
   NpyArray array = read_npy(path);
-  if (array.shape.size() == 3 && array.shape[2] == 1) array.shape.pop_back();
+  // One channel, as OpenCV or as PyTorch counts it.
+  if (array.shape.size() == 3 && array.shape.back() == 1) {
+    array.shape.pop_back();
+  } else if (array.shape.size() == 3 && array.shape.front() == 1) {
+    array.shape.erase(array.shape.begin());
+  }
   if (array.shape.size() != 2 || array.data.empty()) {
     throw DataError(
         fmt::format("The depth map {} has {} dimensions: give an array of height x width",

@@ -16,9 +16,9 @@ struct DepthMap {
 };
 
 /// Reads depths: a picture of one channel with 16 bits or floats, or a .npy file of height x width
-/// floats, each number times `unit`. Numbers that are not finite or not above 0 are unknown; those
-/// that are not finite are counted in a warning. Throws DataError for another format or shape, and
-/// for a map that knows nothing.
+/// numbers (read_npy(); one channel more is fine), each number times `unit`. Numbers that are not
+/// finite or not above 0 are unknown; those that are not finite are counted in a warning. Throws
+/// DataError for another format or shape, and for a map that knows nothing.
 DepthMap read_depth_map(const std::filesystem::path& path, double unit);
 
 /// What is known of the depths of a view at the size of its camera: from its depth map where it has

@@ -6,8 +6,11 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <charconv>
-#include <cstring>
+#include <cstdint>
+#include <glm/gtc/packing.hpp>
 #include <limits>
 #include <optional>
 #include <string_view>
@@ -110,18 +113,65 @@ class HeaderParser {
   throw DataError(fmt::format("{} {}", path.string(), what));
 }
 
-/// Bytes of a number of the type; only little-endian floats are taken.
-std::size_t float_bytes(const std::filesystem::path& path, const std::string& type) {
-  if (type == "<f4") return 4;
-  if (type == "<f8") return 8;
-  if (type == ">f4" || type == ">f8") {
-    fail(path, fmt::format("holds big-endian numbers ('{}'): save it little-endian, as "
-                           "array.astype('<f4')",
-                           type));
+/// How the numbers of a file are stored.
+struct NumberType {
+  bool big_endian = false;
+  char kind = 'f';        ///< NumPy's: f, i or u
+  std::size_t bytes = 4;  ///< 2, 4 or 8, and 1 of whole numbers
+};
+
+NumberType number_type(const std::filesystem::path& path, const std::string& name) {
+  static constexpr std::array<std::string_view, 11> kKnown{"f2", "f4", "f8", "i1", "i2", "i4",
+                                                           "i8", "u1", "u2", "u4", "u8"};
+  const std::string_view type =
+      std::string_view(name).substr(std::min<std::size_t>(1, name.size()));
+  const bool ordered = name.starts_with('<') || name.starts_with('>') || type.ends_with('1');
+  if (!ordered || std::find(kKnown.begin(), kKnown.end(), type) == kKnown.end()) {
+    fail(path, fmt::format("holds numbers of the type '{}', neither floats of 2 to 8 bytes nor "
+                           "whole numbers: save array.astype('<f4')",
+                           name));
   }
-  fail(path, fmt::format("holds numbers of the type '{}', not 32-bit or 64-bit floats: save "
-                         "array.astype('<f4')",
-                         type));
+  return {name.front() == '>', type[0], static_cast<std::size_t>(type[1] - '0')};
+}
+
+/// The number of these bytes, the lowest first.
+float to_float(std::uint64_t bits, const NumberType& type) {
+  if (type.kind == 'u') return static_cast<float>(bits);
+  if (type.kind == 'i') {
+    const auto unused = static_cast<int>(64 - 8 * type.bytes);
+    return static_cast<float>(static_cast<std::int64_t>(bits << unused) >> unused);
+  }
+  if (type.bytes == 2) return glm::unpackHalf1x16(static_cast<std::uint16_t>(bits));
+  if (type.bytes == 4) return std::bit_cast<float>(static_cast<std::uint32_t>(bits));
+  return static_cast<float>(std::bit_cast<double>(bits));
+}
+
+std::vector<float> numbers_of(std::span<const std::byte> bytes, const NumberType& type) {
+  std::vector<float> out(bytes.size() / type.bytes);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    std::uint64_t bits = 0;
+    for (std::size_t k = 0; k < type.bytes; ++k) {
+      const std::size_t place = type.big_endian ? type.bytes - 1 - k : k;
+      bits |= std::to_integer<std::uint64_t>(bytes[i * type.bytes + place]) << (8 * k);
+    }
+    out[i] = to_float(bits, type);
+  }
+  return out;
+}
+
+/// Numbers of which the first index runs fastest, so that the last one does.
+std::vector<float> in_c_order(const std::vector<float>& numbers,
+                              const std::vector<std::size_t>& shape) {
+  std::vector<float> out(numbers.size());
+  std::vector<std::size_t> index(shape.size());
+  for (float& value : out) {
+    std::size_t place = 0;
+    for (std::size_t axis = shape.size(); axis-- > 0;) place = place * shape[axis] + index[axis];
+    value = numbers[place];
+    for (std::size_t axis = shape.size(); axis-- > 0 && ++index[axis] == shape[axis];)
+      index[axis] = 0;
+  }
+  return out;
 }
 
 std::string header_of(const NpzMember& member) {
@@ -188,25 +238,18 @@ NpyArray read_npy(const std::filesystem::path& path) {
       HeaderParser(text.substr(reader.offset(), length)).parse();
   if (!description) fail(path, "has a damaged .npy header: save it again with numpy.save()");
   reader.skip(length, "the header");
-  const std::size_t width = float_bytes(path, *description->type);
-  if (*description->fortran) {
-    fail(path, "is in Fortran order: save numpy.ascontiguousarray(array)");
-  }
+  const NumberType type = number_type(path, *description->type);
   NpyArray out;
   out.shape = *description->shape;
   std::uint64_t count = 1;
   for (const std::size_t size : out.shape) count = saturating_product(count, size);
-  if (saturating_product(count, width) != reader.remaining()) {
+  if (saturating_product(count, type.bytes) != reader.remaining()) {
     fail(path, fmt::format("has {} bytes of numbers where its shape ({}) needs {} of {} bytes: it "
                            "is damaged, save it again",
-                           reader.remaining(), fmt::join(out.shape, ", "), count, width));
+                           reader.remaining(), fmt::join(out.shape, ", "), count, type.bytes));
   }
-  out.data.resize(count);
-  if (width == 4) {
-    for (float& value : out.data) value = reader.read<float>("a number");
-  } else {
-    for (float& value : out.data) value = static_cast<float>(reader.read<double>("a number"));
-  }
+  out.data = numbers_of(std::span(bytes).subspan(reader.offset()), type);
+  if (*description->fortran) out.data = in_c_order(out.data, out.shape);
   return out;
 }
 

@@ -10,16 +10,16 @@
 
 namespace raysplats::io {
 
-/// Numbers of a .npy file in C order: the last index of `shape` runs fastest.
+/// Numbers of a .npy file, rounded to floats, in C order: the last index of `shape` runs fastest.
 struct NpyArray {
   std::vector<std::size_t> shape;
   std::vector<float> data;
 };
 
-/// Reads a .npy file (NumPy Enhancement Proposal 1, versions 1 to 3) of little-endian 32-bit or
-/// 64-bit floats in C order; 64-bit numbers are rounded. Throws DataError that names the file and
-/// what is wrong: another type or byte order, Fortran order, a damaged header, a file that is
-/// shorter or longer than its shape says.
+/// Reads a .npy file (NumPy Enhancement Proposal 1, versions 1 to 3) of floats of 16, 32 or 64 bits
+/// or whole numbers, of either byte order, in C or Fortran order. Throws DataError that names the
+/// file and what is wrong: another type, a damaged header, a file that is shorter or longer than
+/// its shape says.
 NpyArray read_npy(const std::filesystem::path& path);
 
 /// An array of a .npz file.
