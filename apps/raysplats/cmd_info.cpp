@@ -60,6 +60,10 @@ const char* kind_name(DatasetKind kind) {
       return "COLMAP";
     case DatasetKind::kBlender:
       return "Blender";
+    case DatasetKind::kLlff:
+      return "LLFF";
+    case DatasetKind::kPolycam:
+      return "Polycam";
     case DatasetKind::kNerfstudio:
       break;
   }

@@ -19,9 +19,11 @@
 #include "io/data_origin.hpp"
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
+#include "io/llff.hpp"
 #include "io/photo_folder.hpp"
 #include "io/photo_turn.hpp"
 #include "io/ply_points.hpp"
+#include "io/polycam.hpp"
 #include "io/transforms.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -437,6 +439,24 @@ Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
   return dataset;
 }
 
+/// A data set of frames that are all there is.
+Dataset load_frames(DatasetKind kind, io::TransformsFile file, const DatasetOptions& options) {
+  Dataset dataset;
+  dataset.kind = kind;
+  dataset.views = transforms_views(file, options);
+  sort_by_name(dataset.views);
+  mark_every(dataset.views, options.test_every);
+  set_origin(dataset, {}, options);
+  return dataset;
+}
+
+Dataset load_llff(const fs::path& root, DatasetOptions options) {
+  const io::PhotoFolder folder = io::usual_photo_folder(root, options.downscale);
+  options.downscale = std::max(1.0, options.downscale / folder.factor);
+  return load_frames(DatasetKind::kLlff, io::read_llff(root / io::kLlffPoses, folder.path),
+                     options);
+}
+
 /// Whether what is transparent in the photos is background.
 bool shows_cut_outs(const Dataset& dataset, AlphaUse use) {
   if (use != AlphaUse::kAuto) return use == AlphaUse::kCutout;
@@ -463,8 +483,25 @@ bool goes_before(const fs::path& transforms, const fs::path& root, const fs::pat
          !io::read_transforms(transforms).ply_file_path.empty();
 }
 
+/// What makes something that is read of another program's folder; "" for any that is not known.
+std::string way_out_of_others(const fs::path& root) {
+  if (is_file(root / "metadata.json") && is_folder(root / "rgbd")) {
+    return "; it is an export of Record3D, of which nerfstudio's \"ns-process-data record3d\" "
+           "makes "
+           "one";
+  }
+  for (const fs::path& folder : {root / "dslr", root}) {
+    const fs::path cameras = folder / "nerfstudio" / "transforms.json";
+    if (is_file(cameras) && is_folder(folder / "resized_images")) {
+      return fmt::format("; it is a scene of ScanNet++: copy {} to {} and give that folder",
+                         cameras.string(), (folder / "resized_images").string());
+    }
+  }
+  return "";
+}
+
 /// What to give in place of a folder that is no data set: archives unpack to a folder in a folder,
-/// and photos may have no cameras yet.
+/// other programs have folders of their own, and photos may have no cameras yet.
 std::string way_out(const fs::path& root) {
   std::set<fs::path> inner;
   std::error_code failure;
@@ -472,9 +509,11 @@ std::string way_out(const fs::path& root) {
        entry.increment(failure)) {
     const fs::path& folder = entry->path();
     const bool is_data = is_folder(folder / "sparse") || is_file(folder / "transforms.json") ||
-                         is_file(folder / "transforms_train.json");
+                         is_file(folder / "transforms_train.json") ||
+                         is_file(folder / io::kLlffPoses) || io::find_polycam(folder);
     if (is_data) inner.insert(folder);
   }
+  if (const std::string other = way_out_of_others(root); !other.empty()) return other;
   if (!inner.empty()) return fmt::format("; {} is one", inner.begin()->string());
   for (const fs::path& folder : {root / "input", root / "images", root}) {
     std::error_code error;
@@ -504,9 +543,13 @@ Dataset load_any(const fs::path& root, const DatasetOptions& options) {
   }
   if (is_file(transforms)) return load_nerfstudio(root, options);
   if (is_file(root / "transforms_train.json")) return load_blender(root, options);
+  if (is_file(root / io::kLlffPoses)) return load_llff(root, options);
+  if (const auto polycam = io::find_polycam(root))
+    return load_frames(DatasetKind::kPolycam, io::read_polycam(*polycam, root), options);
   throw DataError(
       fmt::format("{} is no data set: it has neither a COLMAP model (sparse/0) nor transforms.json "
-                  "nor transforms_train.json{}",
+                  "nor transforms_train.json nor poses_bounds.npy (LLFF) nor keyframes/cameras "
+                  "(Polycam){}",
                   root.string(), way_out(root)));
 }
 

@@ -21,34 +21,6 @@ namespace fs = std::filesystem;
 constexpr std::array<const char*, 7> kFolderNames{"images", "image", "photos", "rgb",
                                                   "color",  "input", "frames"};
 
-PhotoFolder choose_photo_folder(const fs::path& root, double downscale) {
-  const auto reduced = [&](int factor) { return root / fmt::format("images_{}", factor); };
-  if (downscale > 1 && downscale <= 1024 && downscale == std::floor(downscale) &&
-      is_folder(reduced(static_cast<int>(downscale)))) {
-    return {reduced(static_cast<int>(downscale)), downscale};
-  }
-  if (is_folder(root / "images")) return {root / "images", 1.0};
-  std::optional<PhotoFolder> chosen;
-  for (const int factor : {2, 4, 8}) {
-    // The most reduced copy that is large enough, or else the largest copy.
-    if (is_folder(reduced(factor)) && (!chosen || factor <= downscale)) {
-      chosen = PhotoFolder{reduced(factor), static_cast<double>(factor)};
-    }
-  }
-  if (!chosen) {
-    // Photos beside the model, for example when their names in the model include a folder.
-    return {root, 1.0};
-  }
-  if (chosen->factor > downscale) {
-    spdlog::info("{} has no folder images: {} is used at its own size, as with --downscale {}",
-                 root.string(), chosen->path.filename().string(), chosen->factor);
-  } else {
-    spdlog::info("{} has no folder images: {} is used", root.string(),
-                 chosen->path.filename().string());
-  }
-  return *chosen;
-}
-
 /// Whether the folder has every photo of the model in the size of its camera.
 bool has_photos_of(const fs::path& folder, const ColmapModel& model) {
   return std::all_of(model.images.begin(), model.images.end(), [&](const ColmapImage& image) {
@@ -83,8 +55,36 @@ std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name)
   return std::nullopt;
 }
 
+PhotoFolder usual_photo_folder(const fs::path& root, double downscale) {
+  const auto reduced = [&](int factor) { return root / fmt::format("images_{}", factor); };
+  if (downscale > 1 && downscale <= 1024 && downscale == std::floor(downscale) &&
+      is_folder(reduced(static_cast<int>(downscale)))) {
+    return {reduced(static_cast<int>(downscale)), downscale};
+  }
+  if (is_folder(root / "images")) return {root / "images", 1.0};
+  std::optional<PhotoFolder> chosen;
+  for (const int factor : {2, 4, 8}) {
+    // The most reduced copy that is large enough, or else the largest copy.
+    if (is_folder(reduced(factor)) && (!chosen || factor <= downscale)) {
+      chosen = PhotoFolder{reduced(factor), static_cast<double>(factor)};
+    }
+  }
+  if (!chosen) {
+    // Photos beside the model, for example when their names in the model include a folder.
+    return {root, 1.0};
+  }
+  if (chosen->factor > downscale) {
+    spdlog::info("{} has no folder images: {} is used at its own size, as with --downscale {}",
+                 root.string(), chosen->path.filename().string(), chosen->factor);
+  } else {
+    spdlog::info("{} has no folder images: {} is used", root.string(),
+                 chosen->path.filename().string());
+  }
+  return *chosen;
+}
+
 PhotoFolder photo_folder(const fs::path& root, const ColmapModel& model, double downscale) {
-  PhotoFolder usual = choose_photo_folder(root, downscale);
+  PhotoFolder usual = usual_photo_folder(root, downscale);
   const fs::path input = root / "input", images = root / "images";
   // Reduced copies are of `images`.
   const bool has_usual = is_folder(images) ? has_photos_of(images, model) : usual.path != root;

@@ -14,8 +14,12 @@ struct PhotoFolder {
   double factor = 1.0;
 };
 
-/// Where the photos of a COLMAP model below the data set `root` lie: reduced copies of 3DGS
-/// (images_4) where they fit `downscale`, `images`, or beside the model. The photos that convert.py
+/// Where photos below `root` lie: reduced copies of 3DGS and LLFF (images_4) where they fit
+/// `downscale` or are all there is, `images`, or `root` itself.
+PhotoFolder usual_photo_folder(const std::filesystem::path& root, double downscale);
+
+/// Where the photos of a COLMAP model below the data set `root` lie: as usual_photo_folder(),
+/// `root` being where they lie beside the model. The photos that convert.py
 /// of 3DGS reads lie in `input`, and those that it makes of them, which are of another size and
 /// without a lens, in `images`: the model tells which are its own. Where neither is there, a folder
 /// that other programs name (Images, rgb, color) and that has the model's first photo.

@@ -315,7 +315,10 @@ std::optional<std::vector<std::string>> read_names(const Scope& scope, const cha
 }  // namespace
 
 TransformsFile read_transforms(const fs::path& path) {
-  const json root = read_json_object(path);
+  return parse_transforms(read_json_object(path), path);
+}
+
+TransformsFile parse_transforms(const json& root, const fs::path& path) {
   const Scope scope{root, path, "the file"};
   TransformsFile file;
   file.path = path;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,6 +45,8 @@ struct TransformsFile {
 /// are not finite or, but for the lengths of their axes, no rigid motion to 1e-3; smaller
 /// deviations are orthonormalised.
 TransformsFile read_transforms(const std::filesystem::path& path);
+/// The same of what is in memory; `path` names it in errors, and files lie beside it.
+TransformsFile parse_transforms(const nlohmann::json& root, const std::filesystem::path& path);
 
 /// The camera of a frame whose photo has the given size; the file's own size scales its intrinsics,
 /// and of one focal length or angle alone it makes square pixels.

@@ -65,14 +65,15 @@ void bind_datasets(nb::module_& module) {
   bind_view(module);
   using Self = nb::handle_t<Dataset>;
   nb::class_<Dataset>(module, "Dataset", "Photos, cameras and points of one scene.")
-      .def_static("load", &load, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1.0,
-                  nb::arg("test_every") = 8, nb::arg("undistort") = true,
-                  nb::arg("masks") = "ignore", nb::arg("alpha") = "auto",
-                  nb::arg("origin") = nb::none(), nb::call_guard<nb::gil_scoped_release>(),
-                  "Reads a COLMAP, nerfstudio or Blender folder, everything but the pixels.")
+      .def_static(
+          "load", &load, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1.0,
+          nb::arg("test_every") = 8, nb::arg("undistort") = true, nb::arg("masks") = "ignore",
+          nb::arg("alpha") = "auto", nb::arg("origin") = nb::none(),
+          nb::call_guard<nb::gil_scoped_release>(),
+          "Reads a COLMAP, nerfstudio, Blender, LLFF or Polycam folder, everything but the pixels.")
       .def_prop_ro(
           "kind", [](const Dataset& self) { return name_of(kDatasetKinds, self.kind); },
-          "'colmap', 'blender' or 'nerfstudio'.")
+          "'colmap', 'blender', 'nerfstudio', 'llff' or 'polycam'.")
       .def_ro("root", &Dataset::root)
       .def_ro("origin", &Dataset::origin,
               "What was taken off all positions of the files: 0, but near the cameras where the "

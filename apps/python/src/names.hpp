@@ -57,10 +57,12 @@ inline constexpr std::array<Name<AlphaUse>, 3> kAlphaUses{
     {{"auto", AlphaUse::kAuto}, {"ignore", AlphaUse::kIgnore}, {"cutout", AlphaUse::kCutout}}};
 inline constexpr std::array<Name<SpzAxes>, 2> kSpzAxes{
     {{"ply", SpzAxes::kPly}, {"rub", SpzAxes::kRub}}};
-inline constexpr std::array<Name<DatasetKind>, 3> kDatasetKinds{
+inline constexpr std::array<Name<DatasetKind>, 5> kDatasetKinds{
     {{"colmap", DatasetKind::kColmap},
      {"blender", DatasetKind::kBlender},
-     {"nerfstudio", DatasetKind::kNerfstudio}}};
+     {"nerfstudio", DatasetKind::kNerfstudio},
+     {"llff", DatasetKind::kLlff},
+     {"polycam", DatasetKind::kPolycam}}};
 inline constexpr std::array<Name<DeviceType>, 4> kDeviceTypes{
     {{"cpu", DeviceType::kCpu},
      {"gpu", DeviceType::kGpu},
