@@ -86,7 +86,9 @@ class OiioDecoder : public ImageDecoder {
   }
   int orientation() const override { return input_->spec().get_int_attribute("Orientation", 1); }
   std::string color_profile() const override {
-    return std::string(input_->spec().get_string_attribute("ICCProfile:profile_description"));
+    const OIIO::ImageSpec& spec = input_->spec();
+    if (spec.get_string_attribute("ICCProfile:color_space") != "RGB") return {};
+    return std::string(spec.get_string_attribute("ICCProfile:profile_description"));
   }
   RawImage decode() override {
     switch (sample_bytes()) {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "io/colmap_model.hpp"
+#include "io/color_profiles.hpp"
 #include "io/cut_out.hpp"
 #include "io/data_origin.hpp"
 #include "io/find_image.hpp"
@@ -587,6 +588,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
         fmt::format("The data set {} has no views: there is nothing to train on", root.string()));
   }
   warn_of_repeated_photos(dataset.views);
+  io::warn_of_color_profiles(dataset.views);
   dataset.alpha_is_background = shows_cut_outs(dataset, options.alpha);
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);

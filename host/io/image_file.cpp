@@ -230,6 +230,12 @@ int image_orientation(const std::filesystem::path& path) {
   return image_codec().open(checked_format(path, false), path.string(), {})->orientation();
 }
 
+std::string color_profile(const std::filesystem::path& path) {
+  const std::string format = checked_format(path, false);
+  if (!may_have_profile(path, format)) return {};
+  return image_codec().open(format, path.string(), {})->color_profile();
+}
+
 Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const std::string_view format = format_of(text);

@@ -25,6 +25,10 @@ ImageSize image_size(const std::filesystem::path& path);
 /// The EXIF orientation of such an image; 1 (upright) where it says none. Throws DataError.
 int image_orientation(const std::filesystem::path& path);
 
+/// The name of the ICC profile of its red, green and blue, as far as the library of pictures tells
+/// (JPEG, PNG, TIFF); "" without one. Throws DataError.
+std::string color_profile(const std::filesystem::path& path);
+
 /// read_image() without a conversion of its numbers.
 RawImage read_raw_image(const std::filesystem::path& path);
 

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <fstream>
 #include <istream>
+#include <string>
+#include <string_view>
 
 namespace raysplats::io {
 namespace {
@@ -38,27 +40,69 @@ std::optional<ImageSize> png_size(std::istream& stream) {
   return size_of(width, height, stream.get() == 16 ? 2 : 1);
 }
 
-// The segment that begins the frame has both (ITU-T T.81, B.2.2); a height of 0 comes later.
-std::optional<ImageSize> jpeg_size(std::istream& stream) {
+// Calls `take` with the marker and the length of every segment before the picture, the stream being
+// at its content, until it returns true (ITU-T T.81, B.1.1.4).
+template <class Take>
+void walk_jpeg(std::istream& stream, const Take& take) {
   stream.seekg(2);
   for (;;) {
-    if (stream.get() != 0xff) return std::nullopt;
+    if (stream.get() != 0xff) return;
     int marker = 0xff;
     while (marker == 0xff) marker = stream.get();  // fill bytes
+    const bool bare = marker <= 0x01 || (marker >= 0xd0 && marker <= 0xda);
+    if (bare) return;  // the picture begins, or the file ends
+    const auto length = big_endian(stream, 2);
+    if (!length || *length < 2) return;
+    const auto content = stream.tellg();
+    if (take(marker, *length - 2)) return;
+    stream.clear();
+    stream.seekg(content + static_cast<std::streamoff>(*length - 2));
+  }
+}
+
+// The segment that begins the frame has both (ITU-T T.81, B.2.2); a height of 0 comes later.
+std::optional<ImageSize> jpeg_size(std::istream& stream) {
+  std::optional<ImageSize> size;
+  walk_jpeg(stream, [&](int marker, unsigned) {
     const bool frame =
         marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
-    const bool bare = marker <= 0x01 || (marker >= 0xd0 && marker <= 0xda);
-    if (bare) return std::nullopt;  // the picture begins, or the file ends
-    const auto length = big_endian(stream, 2);
-    if (!length || *length < 2) return std::nullopt;
-    if (!frame) {
-      stream.seekg(*length - 2, std::ios::cur);
-      continue;
-    }
+    if (!frame) return false;
     stream.get();  // bits per sample
     const auto height = big_endian(stream, 2);
-    return size_of(big_endian(stream, 2), height, 1);
+    size = size_of(big_endian(stream, 2), height, 1);
+    return true;
+  });
+  return size;
+}
+
+std::string text(std::istream& stream, std::size_t letters) {
+  std::string out(letters, '\0');
+  stream.read(out.data(), static_cast<std::streamsize>(letters));
+  return out;
+}
+
+// Application segments 2 of that name (ICC.1, B.4).
+bool jpeg_has_profile(std::istream& stream) {
+  constexpr int kApplication2 = 0xe2;
+  constexpr std::string_view kName = "ICC_PROFILE";
+  bool found = false;
+  walk_jpeg(stream, [&](int marker, unsigned) {
+    found = marker == kApplication2 && text(stream, kName.size()) == kName;
+    return found;
+  });
+  return found;
+}
+
+// The chunk iCCP comes before the picture's (PNG specification, section 11.3.2.3).
+bool png_has_profile(std::istream& stream) {
+  stream.seekg(8);
+  while (const auto length = big_endian(stream, 4)) {
+    const std::string type = text(stream, 4);
+    if (type == "iCCP") return true;
+    if (type == "IDAT") return false;
+    stream.seekg(std::streamoff{*length} + 4, std::ios::cur);
   }
+  return false;
 }
 
 }  // namespace
@@ -69,6 +113,13 @@ std::optional<ImageSize> size_in_header(const std::filesystem::path& path,
   if (format == "png") return png_size(stream);
   if (format == "jpeg") return jpeg_size(stream);
   return std::nullopt;
+}
+
+bool may_have_profile(const std::filesystem::path& path, std::string_view format) {
+  std::ifstream stream(path, std::ios::binary);
+  if (format == "png") return png_has_profile(stream);
+  if (format == "jpeg") return jpeg_has_profile(stream);
+  return true;
 }
 
 }  // namespace raysplats::io

@@ -14,4 +14,8 @@ namespace raysplats::io {
 /// that only that library may understand. Reads a few bytes, not the picture.
 std::optional<ImageSize> size_in_header(const std::filesystem::path& path, std::string_view format);
 
+/// Whether a file may hold an ICC profile: for "png" and "jpeg" what their headers say, for other
+/// formats yes.
+bool may_have_profile(const std::filesystem::path& path, std::string_view format);
+
 }  // namespace raysplats::io

@@ -2,6 +2,7 @@
 // What the files of photos say of their colours: light, alpha that multiplies, bands.
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -10,10 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "data_sets.hpp"
 #include "io/image_file.hpp"
 #include "io/photo.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -75,6 +78,40 @@ void check_near(const std::vector<float>& got,
     CAPTURE(i);
     CHECK(std::abs(static_cast<double>(got[i]) - expected[i]) <= tolerance);
   }
+}
+
+/// The least of an ICC profile (ICC.1:2001, clauses 6.1 and 6.4.32): a header, and a description.
+std::string icc_profile(const std::string& name, const std::string& colors = "RGB ") {
+  const auto big_endian = [](std::size_t value) {
+    std::string out;
+    for (int shift = 24; shift >= 0; shift -= 8) out += static_cast<char>(value >> shift & 0xff);
+    return out;
+  };
+  std::string description = "desc" + big_endian(0) + big_endian(name.size() + 1) + name;
+  description += std::string(1 + 4 + 4 + 2 + 1 + 67, '\0');
+  description.resize((description.size() + 3) / 4 * 4, '\0');
+  constexpr std::size_t kHeader = 128, kTable = 16;
+  std::string header = big_endian(kHeader + kTable + description.size());
+  header += "none" + big_endian(0x02400000) + "mntr" + colors + "XYZ " + std::string(12, '\0');
+  header += "acsp" + std::string(28, '\0');
+  header += big_endian(0xf6d6) + big_endian(0x10000) + big_endian(0xd32d);  // D50
+  header.resize(kHeader, '\0');
+  return header + big_endian(1) + "desc" + big_endian(kHeader + kTable) +
+         big_endian(description.size()) + description;
+}
+
+void write_with_profile(const fs::path& path, const std::string& profile) {
+  const auto output = OIIO::ImageOutput::create(path.string());
+  REQUIRE(output);
+  OIIO::ImageSpec spec(40, 30, 3, OIIO::TypeUInt8);
+  if (!profile.empty()) {
+    spec.attribute("ICCProfile",
+                   OIIO::TypeDesc(OIIO::TypeDesc::UINT8, static_cast<int>(profile.size())),
+                   profile.data());
+  }
+  REQUIRE(output->open(path.string(), spec));
+  REQUIRE(output->write_image(OIIO::TypeUInt8, std::vector<std::uint8_t>(3600, 90).data()));
+  REQUIRE(output->close());
 }
 
 double light_of(double display) {
@@ -202,4 +239,44 @@ TEST_CASE("a band that is no alpha is left out, where an alpha lies behind it or
   CHECK(load_view_image(view_of(write_row(scratch / "n.tif", {"R", "G", "B", "NIR"},
                                           std::vector<std::uint8_t>{10, 20, 30, 0})))
             .at(0, 0, 3) == 1.0f);
+}
+
+TEST_CASE("colours of another profile than sRGB are told once, of whatever format") {
+  const std::string wide = icc_profile("Display P3");
+  const auto lines = [](const std::string& extension, const std::string& profile) {
+    CAPTURE(extension);
+    const Scratch scratch;
+    std::string frames;
+    for (int i = 0; i < 7; ++i) {
+      const std::string name = fmt::format("p{}{}", i, extension);
+      // The first of the five that are looked at has none.
+      write_with_profile(scratch / name, i == 0 ? "" : profile);
+      frames += fmt::format("{}{{\"file_path\": \"{}\", \"transform_matrix\": {}}}",
+                            i > 0 ? ", " : "", name, matrix_json(i));
+    }
+    write_bytes(scratch / "transforms.json",
+                fmt::format("{{\"fl_x\": 50, \"frames\": [{}]}}", frames));
+    const LogCapture log;
+    CHECK(load_dataset(scratch.path()).views.size() == 7);
+    if (log.lines() > 0) CHECK(log.contains("'Display P3'"));
+    return log.lines();
+  };
+  for (const char* extension : {".jpg", ".png", ".tif"}) {
+    CHECK(lines(extension, wide) == 1);
+    CHECK(lines(extension, icc_profile("sRGB IEC61966-2.1")) == 0);
+    CHECK(lines(extension, "") == 0);
+  }
+}
+
+TEST_CASE("the size of a JPEG is found behind a profile of many segments") {
+  const Scratch scratch;
+  write_with_profile(scratch / "a.jpg", icc_profile(std::string(150000, 'x')));
+  CHECK(io::image_size(scratch / "a.jpg").width == 40);
+  CHECK(io::image_size(scratch / "a.jpg").height == 30);
+  const std::string whole = read_bytes(scratch / "a.jpg");
+  for (const std::size_t length : {3u, 20u, 30u, 1000u, 70000u}) {
+    write_bytes(scratch / "b.jpg", whole.substr(0, length));
+    data_error([&] { io::image_size(scratch / "b.jpg"); });
+    data_error([&] { io::color_profile(scratch / "b.jpg"); });
+  }
 }
