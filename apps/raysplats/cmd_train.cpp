@@ -212,7 +212,9 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
 Command add_train_command(CLI::App& app, const GlobalOptions& global) {
   CLI::App* command = app.add_subcommand("train", "Train a model from the photos of a data set");
   auto options = std::make_shared<Options>();
-  command->add_option("-d,--data,DATA", options->data, "Data set: COLMAP, nerfstudio or Blender")
+  command
+      ->add_option("-d,--data,DATA", options->data,
+                   "Data set: COLMAP, nerfstudio, Blender, LLFF or Polycam")
       ->required()
       ->type_name("DATA");
   command->add_option("-o,--output", options->output, "Folder for the run")

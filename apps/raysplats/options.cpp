@@ -189,10 +189,9 @@ void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOp
 
 CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags, const std::string& split) {
   const std::string group = "Data set";
-  CLI::Option* data =
-      app.add_option("-d,--data", flags.data,
-                     "COLMAP, nerfstudio or Blender data set whose cameras to use; what is not "
-                     "said of it is as in the run of the model, else the default");
+  CLI::Option* data = app.add_option("-d,--data", flags.data,
+                                     "Data set (as of train) whose cameras to use; what is not "
+                                     "said of it is as in the run of the model, else the default");
   data->group(group)->type_name("DATASET");
   app.add_option("--split", flags.split, split)
       ->group(group)

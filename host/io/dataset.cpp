@@ -145,6 +145,16 @@ void sort_by_name(std::vector<View>& views) {
                    [](const View& a, const View& b) { return a.camera.name < b.camera.name; });
 }
 
+/// Poses without a photo, as those of blurred photos that were deleted, are left out with a
+/// warning; where most have none, it is the folder that is wrong.
+void leave_out_missing(std::size_t missing,
+                       std::size_t all,
+                       const std::string& what,
+                       const std::string& advice) {
+  if (2 * missing > all) throw DataError(fmt::format("{}: {}", what, advice));
+  spdlog::warn("{}: they are left out", what);
+}
+
 /// Two poses cannot share a photo.
 void require_photos_of_their_own(const std::vector<View>& views) {
   std::map<fs::path, const View*> owners;
@@ -214,11 +224,12 @@ Dataset load_colmap(const fs::path& root,
     dataset.views.push_back(std::move(view));
   }
   if (!missing.empty()) {
-    throw DataError(fmt::format(
-        "{} of {} images of the COLMAP model {} are not in {}, '{}' among them: put them there, or "
-        "take them out of the model (colmap image_deleter)",
-        missing.size(), model.images.size(), model_folder.string(), folder.path.string(),
-        missing.front()));
+    leave_out_missing(
+        missing.size(), model.images.size(),
+        fmt::format("{} of {} images of the COLMAP model {} are not in {}, '{}' among them",
+                    missing.size(), model.images.size(), model_folder.string(),
+                    folder.path.string(), missing.front()),
+        "put them there");
   }
   require_photos_of_their_own(dataset.views);
   tell_of_case(respelt, dataset.views.size(), model_folder, first_respelt);
@@ -261,8 +272,7 @@ std::optional<FramePhoto> frame_photo(const io::TransformsFile& file,
   return std::nullopt;
 }
 
-/// The photos of a file's frames. Frames whose photos were taken out of the data set, as blurred
-/// ones are, leave the file; where most are not there, it is the folder that is wrong.
+/// The photos of a file's frames; frames without one leave the file.
 std::vector<FramePhoto> frame_photos(io::TransformsFile& file) {
   std::vector<FramePhoto> photos;
   std::vector<io::TransformsFrame> found, missing;
@@ -277,10 +287,8 @@ std::vector<FramePhoto> frame_photos(io::TransformsFile& file) {
       fmt::format("{}: the photos of {} of {} frames do not exist, '{}' of frame {} among them",
                   file.path.string(), missing.size(), missing.size() + photos.size(),
                   missing.front().file_path, missing.front().number);
-  if (missing.size() > photos.size()) {
-    throw DataError(what + ": put them where file_path says, counted from the file's folder");
-  }
-  spdlog::warn("{}; these frames are left out", what);
+  leave_out_missing(missing.size(), missing.size() + photos.size(), what,
+                    "put them where file_path says, counted from the file's folder");
   return photos;
 }
 

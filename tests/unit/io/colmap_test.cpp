@@ -423,10 +423,19 @@ TEST_CASE("a data set without its photos, with foreign photos or without anythin
   const ColmapFixture fixture = small_colmap();
   fixture.write_binary(scratch / "sparse/0");
   write_photos(fixture, scratch / "images", 40, 30);
-  fs::remove(scratch / "images" / "left/photo 5.png");
+  for (const char* name : {"left/photo 5.png", "photo 0.png", "photo 2.png", "photo 4.png"})
+    fs::remove(scratch / "images" / name);
+  {
+    const LogCapture log;
+    CHECK(load_dataset(scratch.path()).views.size() == 6);
+    CHECK(log.contains("4 of 10 images"));
+    CHECK(log.contains("'left/photo 5.png' among them: they are left out"));
+  }
+  for (const char* name : {"photo 6.png", "photo 8.png"}) fs::remove(scratch / "images" / name);
   const std::string missing = data_error([&] { load_dataset(scratch.path()); });
-  CHECK(contains(missing, "left/photo 5.png"));
-  CHECK(contains(missing, "1 of 10 images"));
+  CHECK(contains(missing, "6 of 10 images"));
+  CHECK(contains(missing, "'left/photo 5.png' among them: put them there"));
+  write_photos(fixture, scratch / "images", 40, 30);
   write_image(scratch / "images/left/photo 5.png", Image(30, 40, 3));
   CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "30 x 40"));
   write_bytes(scratch / "images/left/photo 5.png", "");

@@ -157,6 +157,7 @@ TEST_CASE("frames without a photo are left out and told, where most have one") {
     const Dataset dataset = load_dataset(scratch.path());
     CHECK(log.lines() == 1);
     CHECK(log.contains("2 of 4 frames do not exist, 'b.png' of frame 1"));
+    CHECK(log.contains("left out"));
     REQUIRE(dataset.views.size() == 2);
     CHECK(dataset.views[1].camera.name == "c.png");
     CHECK(dataset.views[1].test);

@@ -59,5 +59,7 @@ TEST_CASE("photos of a COLMAP model are found in another letter case, which is t
   CHECK(load_dataset(scratch.path()).views.size() == 10);
   // Which of two is meant cannot be told.
   fs::copy(scratch / "images/PHOTO 8.png", scratch / "images/pHOTO 8.png");
-  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "'photo 8.png' among them"));
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path()).views.size() == 9);
+  CHECK(log.contains("'photo 8.png' among them: they are left out"));
 }
