@@ -122,8 +122,9 @@ Command add_convert_command(CLI::App& app) {
       ->transform(whole_between(0, 4));
   command->add_option("--min-opacity", changes.min_opacity, "Leave out Gaussians that are fainter")
       ->check(between(0.0, 1.0));
-  command->add_flag("--drop-nonfinite", options->drop_nonfinite,
-                    "Leave out Gaussians of a PLY with numbers that are not finite");
+  command->add_flag(
+      "--drop-nonfinite", options->drop_nonfinite,
+      "Leave out Gaussians of a PLY, .splat or glTF with numbers that are not finite");
   command
       ->add_option(
           "--max-gaussians", options->max_gaussians,

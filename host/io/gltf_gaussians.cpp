@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "io/broken_gaussians.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/gltf_model.hpp"
@@ -60,11 +61,14 @@ int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
   return found == primitive.attributes.end() ? -1 : found->second;
 }
 
-Gaussians read_primitive(const GltfReader& reader, const tinygltf::Primitive& primitive) {
+Gaussians read_primitive(const GltfReader& reader,
+                         const tinygltf::Primitive& primitive,
+                         bool drop_nonfinite) {
   check_kind(reader, *splatting(primitive));
   if (primitive.mode != TINYGLTF_MODE_POINTS) reader.fail("Gaussians are not of the mode POINTS");
   if (primitive.indices >= 0) reader.fail("Gaussians have indices");
   std::size_t count = 0;
+  BrokenGaussians broken;
   const auto numbers = [&](const std::string& name, std::size_t width) {
     const int accessor = attribute(primitive, name);
     if (accessor < 0) reader.fail(fmt::format("Gaussians have no {}", name));
@@ -73,8 +77,8 @@ Gaussians read_primitive(const GltfReader& reader, const tinygltf::Primitive& pr
     if (values.size() != width * count) {
       reader.fail(fmt::format("{} Gaussians have {} of {}", count, values.size() / width, name));
     }
-    if (!std::all_of(values.begin(), values.end(), [](float x) { return std::isfinite(x); })) {
-      reader.fail(fmt::format("{} is not finite", name));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!std::isfinite(values[i])) broken.add(i / width, name);
     }
     return values;
   };
@@ -109,6 +113,7 @@ Gaussians read_primitive(const GltfReader& reader, const tinygltf::Primitive& pr
       }
     }
   }
+  broken.settle(model, reader.path(), drop_nonfinite);
   return model;
 }
 
@@ -129,7 +134,7 @@ bool has_gltf_gaussians(const std::filesystem::path& path) {
   return std::any_of(model.meshes.begin(), model.meshes.end(), has_gaussians);
 }
 
-Gaussians read_gltf_gaussians(const std::filesystem::path& path) {
+Gaussians read_gltf_gaussians(const std::filesystem::path& path, bool drop_nonfinite) {
   const tinygltf::Model file = parse_gltf(path);
   const GltfReader reader(file, path);
   std::vector<std::optional<Gaussians>> meshes(file.meshes.size());
@@ -143,7 +148,8 @@ Gaussians read_gltf_gaussians(const std::filesystem::path& path) {
     if (!meshes[index]) {
       std::vector<Gaussians> parts;
       for (const tinygltf::Primitive& primitive : mesh.primitives) {
-        if (splatting(primitive) != nullptr) parts.push_back(read_primitive(reader, primitive));
+        if (splatting(primitive) != nullptr)
+          parts.push_back(read_primitive(reader, primitive, drop_nonfinite));
       }
       meshes[index] = joined(parts);
       own += meshes[index]->size();

@@ -162,9 +162,9 @@ std::string losses(ModelFormat format, const Gaussians& model) {
 Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding) {
   switch (io::model_format(path)) {
     case io::ModelFormat::kSplat:
-      return io::read_splat(path);
+      return io::read_splat(path, encoding.drop_nonfinite);
     case io::ModelFormat::kGltf:
-      return io::read_gltf_gaussians(path);
+      return io::read_gltf_gaussians(path, encoding.drop_nonfinite);
     case io::ModelFormat::kSog:
       return io::read_sog(path);
     case io::ModelFormat::kSpz: {

@@ -10,12 +10,13 @@
 
 /// Formats of Gaussians other than 3DGS PLY; read_model() and write_model() choose among them. All
 /// readers throw DataError, one sentence with the path, for whatever is malformed, truncated or not
-/// finite, and allocate nothing that the file's size does not bear out. Writers are atomic.
+/// finite (but for Gaussians that are to be dropped), and allocate nothing that the file's size
+/// does not bear out. Writers are atomic.
 namespace raysplats::io {
 
 /// The records of 32 bytes of antimatter15/splat (convert.py): position and scale as floats, colour
 /// and opacity as four bytes, rotation as four bytes, real part first.
-Gaussians read_splat(const std::filesystem::path& path);
+Gaussians read_splat(const std::filesystem::path& path, bool drop_nonfinite = false);
 /// Most important (largest times most opaque) first, as streams want them. SH is left out.
 void write_splat(const std::filesystem::path& path, const Gaussians& model);
 
@@ -29,7 +30,7 @@ void write_spz(const std::filesystem::path& path, const Gaussians& model, int ve
 
 /// glTF 2.0, JSON or GLB, with KHR_gaussian_splatting (Khronos, release candidate of 2026): all
 /// Gaussians of its scene, turned from y up to the y down of captures.
-Gaussians read_gltf_gaussians(const std::filesystem::path& path);
+Gaussians read_gltf_gaussians(const std::filesystem::path& path, bool drop_nonfinite = false);
 /// Whether a glTF file holds Gaussians; it may hold meshes too. Throws as read_gltf().
 bool has_gltf_gaussians(const std::filesystem::path& path);
 /// GLB with floats: nothing is lost up to SH degree 3, what is above is left out. Throws DataError

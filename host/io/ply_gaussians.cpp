@@ -12,13 +12,13 @@
 #include <string>
 #include <vector>
 
+#include "io/broken_gaussians.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
 #include "io/ply_options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "scene/gaussian_selection.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats {
@@ -103,44 +103,6 @@ void widen(float* log_scales, float& opacity, double filter) {
   opacity = io::logit_of(io::opacity_of(opacity) * std::exp(-log_growth), io::kFloatOpacityMargin);
 }
 
-/// Gaussians with numbers that are not finite.
-class Broken {
- public:
-  void add(std::size_t row, const std::string& name) {
-    if (rows_.empty()) first_ = name;
-    if (rows_.empty() || rows_.back() != row) rows_.push_back(row);
-  }
-
-  /// Refuses them or leaves them out.
-  void settle(Gaussians& model, const std::filesystem::path& path, bool drop) const {
-    if (rows_.empty()) return;
-    const std::string told = fmt::format(
-        "{}: {} of {} Gaussians have a number that is not finite, '{}' of Gaussian {} "
-        "the first",
-        path.string(), rows_.size(), model.size(), first_, rows_.front());
-    if (!drop) {
-      throw DataError(
-          fmt::format("{}: leave them out by raysplats convert {} NEW.ply --drop-nonfinite", told,
-                      path.string()));
-    }
-    std::vector<std::uint32_t> kept;
-    auto next = rows_.begin();
-    for (std::size_t i = 0; i < model.size(); ++i) {
-      if (next != rows_.end() && *next == i) {
-        ++next;
-      } else {
-        kept.push_back(static_cast<std::uint32_t>(i));
-      }
-    }
-    model = gathered(model, kept);
-    spdlog::warn("{}: they are left out", told);
-  }
-
- private:
-  std::vector<std::size_t> rows_;  ///< ascending
-  std::string first_;
-};
-
 }  // namespace
 
 Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
@@ -151,7 +113,7 @@ Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
   model.sh_degree = columns.sh_degree;
   model.resize(file.rows());
   std::size_t without_rotation = 0, infinite = 0;
-  Broken broken;
+  io::BrokenGaussians broken;
   file.for_each_row([&](std::size_t row, std::span<const double> values) {
     const auto number = [&](std::size_t column) {
       const auto value = static_cast<float>(values[column]);

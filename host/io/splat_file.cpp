@@ -8,6 +8,7 @@
 #include <numeric>
 #include <vector>
 
+#include "io/broken_gaussians.hpp"
 #include "io/byte_reader.hpp"
 #include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"
@@ -26,7 +27,7 @@ void put_float(std::vector<std::byte>& to, float value) {
 
 }  // namespace
 
-Gaussians read_splat(const std::filesystem::path& path) {
+Gaussians read_splat(const std::filesystem::path& path, bool drop_nonfinite) {
   const std::vector<std::byte> bytes = read_file(path);
   if (bytes.size() % kRecord != 0) {
     throw DataError(fmt::format(
@@ -37,14 +38,16 @@ Gaussians read_splat(const std::filesystem::path& path) {
   ByteReader reader(bytes, path);
   Gaussians model;
   model.resize(bytes.size() / kRecord);
+  BrokenGaussians broken;
   for (std::size_t i = 0; i < model.size(); ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
       model.means[3 * i + k] = reader.read<float>("a position");
-      if (!std::isfinite(model.means[3 * i + k])) reader.fail("a position is not finite");
+      if (!std::isfinite(model.means[3 * i + k])) broken.add(i, "position");
     }
     for (std::size_t k = 0; k < 3; ++k) {
       const auto scale = reader.read<float>("a scale");
-      if (!std::isfinite(scale) || scale < 0.0f) reader.fail("a scale is not finite or negative");
+      if (!std::isfinite(scale)) broken.add(i, "scale");
+      if (std::isfinite(scale) && scale < 0.0f) reader.fail("a scale is negative");
       model.log_scales[3 * i + k] = scale > 0.0f ? std::log(scale) : kFlatLogScale;
     }
     for (std::size_t k = 0; k < 3; ++k) {
@@ -60,6 +63,7 @@ Gaussians read_splat(const std::filesystem::path& path) {
     const std::array<double, 4> unit = unit_quaternion(q);
     for (std::size_t k = 0; k < 4; ++k) model.quaternions[4 * i + k] = static_cast<float>(unit[k]);
   }
+  broken.settle(model, path, drop_nonfinite);
   return model;
 }
 

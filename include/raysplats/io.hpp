@@ -22,15 +22,16 @@ enum class SpzAxes { kPly, kRub };
 struct ModelEncoding {
   SpzAxes spz_axes = SpzAxes::kPly;
   int spz_version = 3;  ///< to write: 3 or 4
-  /// Of a 3DGS PLY that is read: whether Gaussians with numbers that are not finite are left out,
-  /// with a warning, or the file is refused.
+  /// Of a 3DGS PLY, .splat or glTF that is read (other formats hold only finite ones): whether
+  /// Gaussians with numbers that are not finite are left out, with a warning, or the file is
+  /// refused.
   bool drop_nonfinite = false;
 };
 
 /// Reads Gaussians from a 3DGS PLY, PlayCanvas' compressed PLY and SOG, .splat, SPZ (1 to 4) or
 /// glTF with KHR_gaussian_splatting, recognised by their first bytes, .splat by its name. glTF is
-/// turned to the y down of captures. Throws DataError for anything malformed, truncated, non-finite
-/// or oversized.
+/// turned to the y down of captures. Throws DataError for anything malformed, truncated, oversized
+/// or, unless `encoding` drops them, with numbers that are not finite.
 Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding = {});
 
 /// Writes atomically what the name's extension says: .ply, .compressed.ply, .splat, .spz, .sog or
@@ -68,7 +69,8 @@ std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path);
 /// three numbers.
 std::array<double, 3> read_ply_origin(const std::filesystem::path& path);
 
-/// Reads PNG, JPEG, EXR, Radiance HDR, TIFF, WebP or BMP as float; 1 to 4 channels as in the file
+/// Reads PNG, JPEG, EXR, Radiance HDR, TIFF, WebP, BMP, GIF, TGA, HEIF or AVIF, of several pictures
+/// the first, as float; 1 to 4 channels as in the file
 /// (grey stays 1 channel).
 Image read_image(const std::filesystem::path& path);
 

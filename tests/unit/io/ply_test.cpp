@@ -256,6 +256,41 @@ TEST_CASE(
   CHECK(whole.log_scales == std::vector<float>{0, 0, -20, 0, 0, 0});
 }
 
+TEST_CASE("Gaussians of .splat and glTF with numbers that are not finite can be left out too") {
+  Gaussians model;
+  model.resize(3);
+  model.means = {1, 2, 3, 4, 5.125f, 6, 7, 8, 9};
+  model.quaternions = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+  for (const char* name : {"a.splat", "a.glb"}) {
+    CAPTURE(name);
+    const Scratch scratch;
+    write_model(scratch / name, model);
+    // The second Gaussian's y, which the glTF may have turned.
+    std::string bytes = read_bytes(scratch / name);
+    std::size_t replaced = 0;
+    for (const float value : {5.125f, -5.125f}) {
+      std::string from, to;
+      put(from, value);
+      put(to, std::numeric_limits<float>::quiet_NaN());
+      const std::size_t at = bytes.find(from);
+      if (at == std::string::npos) continue;
+      bytes.replace(at, from.size(), to);
+      ++replaced;
+    }
+    REQUIRE(replaced == 1);
+    write_bytes(scratch / name, bytes);
+    const std::string message = data_error([&] { read_model(scratch / name); });
+    CHECK(contains(message, "1 of 3 Gaussians have a number that is not finite"));
+    CHECK(contains(message, "of Gaussian 1 the first"));
+    CHECK(contains(message, "--drop-nonfinite"));
+    const LogCapture log;
+    const Gaussians left = read_model(scratch / name, {SpzAxes::kPly, 3, true});
+    CHECK(log.contains("left out"));
+    REQUIRE(left.size() == 2);
+    CHECK(left.means == std::vector<float>{1, 2, 3, 7, 8, 9});
+  }
+}
+
 TEST_CASE("malformed models are refused with a sentence that says what is wrong") {
   const std::string row(14 * sizeof(float), '\0');
   CHECK(contains(error_of(""), "not a PLY"));
