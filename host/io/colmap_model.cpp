@@ -395,6 +395,7 @@ std::optional<fs::path> find_colmap_model(const fs::path& root) {
   };
   add_children(root / "sparse");
   add_children(root / "colmap" / "sparse");
+  add(root / "colmap");
   add(root);
   // What 3DGS's convert.py leaves before it undistorts.
   if (candidates.empty()) add_children(root / "distorted" / "sparse");

@@ -33,9 +33,9 @@ struct ColmapModel {
 };
 
 /// The folder of the model to use below a data set: of sparse/*, sparse, colmap/sparse/*,
-/// colmap/sparse and the root itself the one with most registered images, the first in that order
-/// when several have as many; without any, of distorted/sparse/* and distorted/sparse. Nothing when
-/// there is no model.
+/// colmap/sparse, colmap (ScanNet++) and the root itself the one with most registered images, the
+/// first in that order when several have as many; without any, of distorted/sparse/* and
+/// distorted/sparse. Nothing when there is no model.
 std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root);
 
 /// Reads cameras, images and points3D (.bin, else .txt) of a folder. Points are optional. Throws

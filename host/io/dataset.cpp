@@ -37,10 +37,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A mask of the photo `name` in the data set's folder "masks": COLMAP's name.ext.png, or an image
+/// Where masks lie that nothing names; ScanNet++ has a name of its own.
+fs::path mask_folder(const fs::path& root) {
+  return is_folder(root / "masks") ? root / "masks" : root / "resized_anon_masks";
+}
+
+/// A mask of the photo `name` in mask_folder(): COLMAP's name.ext.png, or an image
 /// that is called as the photo, with "_mask" or ".mask" behind it or without.
 fs::path find_mask(const fs::path& root, const fs::path& name) {
-  const fs::path folder = root / "masks";
+  const fs::path folder = mask_folder(root);
   if (!is_folder(folder)) return {};
   fs::path stem = name;
   stem.replace_extension();
@@ -494,17 +499,12 @@ bool goes_before(const fs::path& transforms, const fs::path& root, const fs::pat
 
 /// What makes something that is read of another program's folder; "" for any that is not known.
 std::string way_out_of_others(const fs::path& root) {
-  if (is_file(root / "metadata.json") && is_folder(root / "rgbd")) {
+  const fs::path sequence = root / "EXR_RGBD";
+  if ((is_file(root / "metadata.json") && is_folder(root / "rgbd")) ||
+      (is_file(sequence / "metadata.json") && is_folder(sequence / "rgb"))) {
     return "; it is an export of Record3D, of which nerfstudio's \"ns-process-data record3d\" "
            "makes "
            "one";
-  }
-  for (const fs::path& folder : {root / "dslr", root}) {
-    const fs::path cameras = folder / "nerfstudio" / "transforms.json";
-    if (is_file(cameras) && is_folder(folder / "resized_images")) {
-      return fmt::format("; it is a scene of ScanNet++: copy {} to {} and give that folder",
-                         cameras.string(), (folder / "resized_images").string());
-    }
   }
   return "";
 }
@@ -519,7 +519,8 @@ std::string way_out(const fs::path& root) {
     const fs::path& folder = entry->path();
     const bool is_data = is_folder(folder / "sparse") || is_file(folder / "transforms.json") ||
                          is_file(folder / "transforms_train.json") ||
-                         is_file(folder / io::kLlffPoses) || io::find_polycam(folder);
+                         is_file(folder / io::kLlffPoses) || io::find_polycam(folder) ||
+                         is_file(folder / "colmap" / "images.txt");
     if (is_data) inner.insert(folder);
   }
   if (const std::string other = way_out_of_others(root); !other.empty()) return other;
@@ -600,11 +601,10 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
   dataset.alpha_is_background = shows_cut_outs(dataset, options.alpha);
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
-  if (masked == 0 && is_folder(root / "masks")) {
+  if (const fs::path masks = mask_folder(root); masked == 0 && is_folder(masks)) {
     spdlog::warn(
         "No mask in {} has the name of a photo: {} would have {}.png, {}.png or {}_mask.png",
-        (root / "masks").string(), dataset.views.front().camera.name,
-        dataset.views.front().camera.name,
+        masks.string(), dataset.views.front().camera.name, dataset.views.front().camera.name,
         fs::path(dataset.views.front().camera.name).replace_extension().string(),
         fs::path(dataset.views.front().camera.name).replace_extension().string());
   }

@@ -24,7 +24,8 @@ namespace {
 
 constexpr std::string_view kMagic = "\x93NUMPY";
 constexpr std::size_t kMostHeader = std::size_t{1} << 16;
-constexpr std::size_t kAlignment = 64;  // of the data behind the header
+constexpr std::size_t kMostDimensions = 64;  // as NumPy 2 has it
+constexpr std::size_t kAlignment = 64;       // of the data behind the header
 
 /// What the header's dictionary says.
 struct Description {
@@ -241,6 +242,10 @@ NpyArray read_npy(const std::filesystem::path& path) {
   const NumberType type = number_type(path, *description->type);
   NpyArray out;
   out.shape = *description->shape;
+  if (out.shape.size() > kMostDimensions) {
+    fail(path,
+         fmt::format("has {} dimensions, more than NumPy's {}", out.shape.size(), kMostDimensions));
+  }
   std::uint64_t count = 1;
   for (const std::size_t size : out.shape) count = saturating_product(count, size);
   if (saturating_product(count, type.bytes) != reader.remaining()) {

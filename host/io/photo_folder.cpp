@@ -18,8 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What programs call the folder of their photos, the usual name first.
-constexpr std::array<const char*, 7> kFolderNames{"images", "image", "photos", "rgb",
-                                                  "color",  "input", "frames"};
+constexpr std::array<const char*, 8> kFolderNames{"images", "image", "photos", "rgb",
+                                                  "color",  "input", "frames", "resized_images"};
 
 /// Whether the folder has every photo of the model in the size of its camera.
 bool has_photos_of(const fs::path& folder, const ColmapModel& model) {

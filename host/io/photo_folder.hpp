@@ -22,7 +22,8 @@ PhotoFolder usual_photo_folder(const std::filesystem::path& root, double downsca
 /// `root` being where they lie beside the model. The photos that convert.py
 /// of 3DGS reads lie in `input`, and those that it makes of them, which are of another size and
 /// without a lens, in `images`: the model tells which are its own. Where neither is there, a folder
-/// that other programs name (Images, rgb, color) and that has the model's first photo.
+/// that other programs name (Images, rgb, resized_images of ScanNet++) and that has the model's
+/// first photo.
 PhotoFolder photo_folder(const std::filesystem::path& root,
                          const ColmapModel& model,
                          double downscale);

@@ -12,6 +12,7 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
 #include "unit/log_capture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -192,6 +193,32 @@ TEST_CASE("Polycam: raw exports are read, the corrected cameras where there are 
   CHECK(contains(message, "1002.json has no number 't_21'"));
 }
 
+TEST_CASE(
+    "no flipped byte of LLFF's or Polycam's cameras does anything but load or raise DataError") {
+  const Scratch scratch;
+  write_ring_photos(scratch / "llff/images", 3);
+  write_llff(scratch / "llff/poses_bounds.npy", ring(3));
+  write_ring_photos(scratch / "polycam/keyframes/images", 1);
+  const fs::path camera = scratch / "polycam/keyframes/cameras/IMG_00.json";
+  write_bytes(camera, polycam_camera(ring(1).front()));
+  CHECK(load_dataset(scratch / "polycam").views.size() == 1);
+  CounterRng rng(12, 13);
+  const LogCapture log;
+  for (const fs::path& file : {scratch / "llff/poses_bounds.npy", camera}) {
+    const std::string whole = read_bytes(file);
+    const fs::path root = file == camera ? scratch / "polycam" : scratch / "llff";
+    for (int trial = 0; trial < 500; ++trial) {
+      std::string bytes = whole;
+      if (trial % 5 == 0) bytes.resize(rng.below(bytes.size()));
+      for (int i = 0; i < 2 && !bytes.empty(); ++i)
+        bytes[rng.below(bytes.size())] = static_cast<char>(rng.below(256));
+      write_bytes(file, bytes);
+      const std::string message = data_error([&] { load_dataset(root); });
+      CHECK(message.find('\n') == std::string::npos);
+    }
+  }
+}
+
 TEST_CASE("folders of programs whose data are not read are named, with the way out") {
   const auto refusal = [](const std::vector<std::string>& files) {
     const Scratch scratch;
@@ -202,7 +229,6 @@ TEST_CASE("folders of programs whose data are not read are named, with the way o
     return message;
   };
   CHECK(contains(refusal({"metadata.json", "rgbd/0.jpg", "rgbd/0.depth"}), "ns-process-data"));
-  CHECK(contains(refusal({"dslr/nerfstudio/transforms.json", "dslr/resized_images/DSC01752.JPG"}),
-                 "resized_images"));
+  CHECK(contains(refusal({"EXR_RGBD/metadata.json", "EXR_RGBD/rgb/0.png"}), "Record3D"));
   CHECK(!contains(refusal({"metadata.json"}), "Record3D"));
 }

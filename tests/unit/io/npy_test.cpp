@@ -199,6 +199,10 @@ TEST_CASE("arrays that are not what they should be are refused in one sentence")
   CHECK(refused(npy("{'descr': [('a', '<f4')], 'fortran_order': False, 'shape': (2, 6)}", data))
             .find("damaged") != std::string::npos);
   CHECK(refused(npy("", data)).find("damaged") != std::string::npos);
+  std::string ones = "(12, ";
+  for (int i = 0; i < 64; ++i) ones += "1, ";
+  CHECK(refused(npy(header("<f4", "True", ones + ")"), data)).find("65 dimensions") !=
+        std::string::npos);
   std::string cut = npy(header("<f4", "False", "(2, 6)"), data);
   CHECK(refused(cut.substr(0, 20)).find("damaged") != std::string::npos);
   CHECK(!refused(cut.substr(0, 9)).empty());

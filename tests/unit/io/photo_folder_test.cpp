@@ -4,6 +4,9 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <string>
+
 #include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
 #include "unit/log_capture.hpp"
@@ -26,6 +29,22 @@ TEST_CASE("photos of a COLMAP model lie in folders of many names, which is told"
     for (const View& view : dataset.views)
       CHECK(contains(view.image_path.string(), std::string("/") + name + "/"));
   }
+}
+
+TEST_CASE("ScanNet++: the folder of the camera's photos is a data set with masks") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_text(scratch / "dslr/colmap");
+  write_photos(fixture, scratch / "dslr/resized_images", 40, 30);
+  write_image(scratch / "dslr/resized_anon_masks/photo 8.png", Image(40, 30, 1, 1.0f));
+  write_bytes(scratch / "dslr/nerfstudio/transforms.json", "{}");
+  const Dataset dataset = load_dataset(scratch / "dslr");
+  CHECK(dataset.kind == DatasetKind::kColmap);
+  CHECK(dataset.views.size() == 10);
+  CHECK(dataset.points.size() == 3);
+  CHECK(std::count_if(dataset.views.begin(), dataset.views.end(),
+                      [](const View& view) { return !view.mask_path.empty(); }) == 1);
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "/dslr is one"));
 }
 
 TEST_CASE("photos beside the model, and those in images, go before folders of other names") {
