@@ -502,8 +502,8 @@ std::string way_out_of_others(const fs::path& root) {
   const fs::path sequence = root / "EXR_RGBD";
   if ((is_file(root / "metadata.json") && is_folder(root / "rgbd")) ||
       (is_file(sequence / "metadata.json") && is_folder(sequence / "rgb"))) {
-    return "; it is an export of Record3D, of which nerfstudio's \"ns-process-data record3d\" "
-           "makes "
+    return "; it is an export of Record3D, which nerfstudio's \"ns-process-data record3d\" turns "
+           "into "
            "one";
   }
   return "";

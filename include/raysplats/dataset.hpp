@@ -80,10 +80,10 @@ struct DatasetOptions {
   std::optional<std::array<double, 3>> origin;
 };
 
-/// Detects the kind of data set (COLMAP, nerfstudio, Blender, LLFF, Polycam) and reads everything but the pixels;
-/// a transforms file stands for its folder.
-/// Poses whose photos are missing are left out with a warning where most are there. Throws DataError for a folder that is none, missing images, an unsupported camera model,
-/// no views, a mask of another shape than its photo.
+/// Detects the kind of data set (COLMAP, nerfstudio, Blender, LLFF, Polycam) and reads everything
+/// but the pixels; a transforms file stands for its folder. Poses whose photos are missing are left
+/// out with a warning where most are there. Throws DataError for a folder that is none, missing
+/// images, an unsupported camera model, no views, a mask of another shape than its photo.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
 
 /// The photo of a view as RGBA float at camera.width x camera.height: undistorted where
