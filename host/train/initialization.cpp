@@ -19,7 +19,9 @@
 #include "scene/gaussian_selection.hpp"
 #include "shared/sh.h"
 #include "train/photo_start.hpp"
+#include "train/plane_sweep.hpp"
 #include "train/point_check.hpp"
+#include "train/point_cloud.hpp"
 #include "train/schedule.hpp"
 
 namespace raysplats {
@@ -33,7 +35,8 @@ constexpr std::size_t kEnoughPoints = 2000;
 constexpr std::size_t kFewPoints = 1000;  // fewer leave most of the photos without a start
 constexpr double kStartShare = 0.5;       // of the limit that points, or random places, may take
 constexpr double kPhotoShare = 0.3;       // of the limit that a start from photos takes
-constexpr double kUnsureShare = 0.25;     // of a start from photos alone: points at a random depth
+constexpr double kUnsureShare = 0.25;     // of a start from photos alone: points in no clear depth
+constexpr double kUnsureBeside = 0.1;     // of those beside sparse ones: more are slower, and no better
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
@@ -186,12 +189,12 @@ double guessed_depth(std::span<const Camera> cameras, const Region& region) {
 }
 
 // Points that the photos tell of: of a body that is cut out, else of what a sweep finds in
-// `depths`, which are looked for where they are not known.
+// `depths`, of points beside sparse ones, or in those that it looks for.
 PointCloud photo_points(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const Region& region,
                         const std::vector<SmallPhoto>& photos,
-                        std::optional<DepthRange> depths,
+                        const std::optional<DepthRange>& depths,
                         std::size_t count,
                         std::uint64_t seed) {
   const double guess = guessed_depth(cameras, region);
@@ -201,8 +204,8 @@ PointCloud photo_points(const Dataset& dataset,
     spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
     return scattered_points(photos, region, depths_around(guess), count, seed);
   }
-  if (!depths) depths = swept_depths(photos, guess, seed);
-  return swept_points(photos, *depths, count, kUnsureShare, seed);
+  if (depths) return swept_points(photos, *depths, count, kUnsureBeside, seed);
+  return swept_points(photos, swept_depths(photos, guess, seed), count, kUnsureShare, seed);
 }
 
 // What of the points that photos tell of goes beside sparse ones, and where those that tell it
@@ -227,7 +230,9 @@ Beside photos_beside(const PointCloud& points,
   const std::vector<SmallPhoto>& many = photos(PhotoChoice::kMany);
   const double guess = guessed_depth(cameras, visible_region(cameras));
   const DepthRange depths = swept_depths(many, guess, options.seed);
-  if (agreed_share(many, depths, options.seed) <= kMostlyAgreed) return {};
+  const double agreed = agreed_share(many, depths, options.seed);
+  spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * agreed);
+  if (agreed <= kMostlyAgreed) return {};
   return {Beside::Part::kInTheirPlaces, depths};
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "scene/camera_model.hpp"
+#include "train/point_cloud.hpp"
 
 namespace raysplats {
 namespace {
@@ -109,13 +110,6 @@ std::optional<double> color_difference(const PointCloud& points,
 }
 
 }  // namespace
-
-void append_point(const PointCloud& from, std::size_t i, PointCloud& to) {
-  for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
-    to.positions.push_back(from.positions[k]);
-    to.colors.push_back(from.colors[k]);
-  }
-}
 
 double seen_share(const std::vector<float>& positions, std::span<const Camera> cameras) {
   const std::size_t points = positions.size() / 3;

@@ -24,9 +24,6 @@ struct PointMatch {
   double scaled_difference = 0;
 };
 
-/// Adds a point of `from`, without its track and error.
-void append_point(const PointCloud& from, std::size_t i, PointCloud& to);
-
 /// The share of the positions (x, y, z each) that some camera sees, of an even choice of them; 0 of
 /// none.
 double seen_share(const std::vector<float>& positions, std::span<const Camera> cameras);

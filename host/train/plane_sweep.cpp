@@ -1,0 +1,459 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/plane_sweep.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "scene/camera_model.hpp"
+#include "scene/statistics.hpp"
+#include "train/point_cloud.hpp"
+#include "train/random_pixel.hpp"
+#include "util/parallel.hpp"
+#include "util/rng.hpp"
+
+namespace raysplats {
+namespace {
+
+// Random streams of one seed are told apart by a constant.
+constexpr std::uint64_t kSweepStream = 0x7377656570;
+constexpr std::uint64_t kProbeStream = 0x70726f6265;
+constexpr std::size_t kTriesPerPoint = 4;
+
+constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
+constexpr double kLeastBase = 1e-3;     // between them, of the distance of what they show
+constexpr std::size_t kDepths = 128;
+constexpr double kAgreement = 0.012;   // largest mean squared difference of what agrees
+constexpr double kClear = 0.5;         // and the best depth's share of the median one
+constexpr double kUnique = 0.7;        // and of the best one elsewhere: patterns repeat
+constexpr double kRounding = 1e-5;     // a difference that 8 bits make of none
+constexpr double kElsewhere = 1.28;    // from the best depth, as a factor
+constexpr double kColourWidths = 0.3;  // of a photo, that black and white in a channel are apart
+constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of a sweep, times the typical one
+
+// The search for the typical depth, from kNearest times the guess on.
+constexpr std::size_t kProbes = 2000;      // pixels that are looked at
+constexpr std::size_t kFewProbes = 40;     // that tell less are no reason to doubt the guess
+constexpr std::size_t kProbeDepths = 112;  // steps to 1000 times the guess
+constexpr double kProbeReach = 1000.0;
+constexpr double kProbeTurn = 0.15;   // 1 - cosine between photos that are compared: 32 degrees
+constexpr double kAsGood = 1.3;       // costs up to that multiple of the best agree as well
+constexpr double kFloorCost = 1e-4;   // of photos' noise
+constexpr double kWrongGuess = 3.0;   // factor
+constexpr double kDoubtShare = 0.25;  // of probes that see no end of the depths: doubts the guess
+constexpr double kOpenShare = 0.5;    // and leaves most depths open
+constexpr int kRounds = 4;            // of looking for nearer depths
+constexpr double kMuchNearer = 0.65;  // than the typical one, as a share of it
+
+glm::dvec3 axis_of(const SmallPhoto& photo) {
+  const Camera& camera = photo.camera;
+  return camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height).direction;
+}
+
+// Of photos with their ranks those of the least, at most kNeighbours.
+std::vector<std::size_t> foremost(std::vector<std::pair<double, std::size_t>> ranked) {
+  const std::size_t count = std::min(kNeighbours, ranked.size());
+  std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count),
+                    ranked.end());
+  std::vector<std::size_t> out(count);
+  for (std::size_t i = 0; i < count; ++i) out[i] = ranked[i].second;
+  return out;
+}
+
+// The photos that see most of what a photo sees from somewhere else: near centres, like axes.
+std::vector<std::size_t> neighbours_of(std::span<const SmallPhoto> photos,
+                                       std::size_t index,
+                                       double distance) {
+  std::vector<std::pair<double, std::size_t>> ranked;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    const double base =
+        glm::distance(photos[i].camera.center(), photos[index].camera.center()) / distance;
+    // Two photos from the same place say nothing about depth.
+    if (i == index || base < kLeastBase) continue;
+    const double turn = 1.0 - glm::dot(axis_of(photos[i]), axis_of(photos[index]));
+    ranked.emplace_back(std::abs(base - 0.15) + 2.0 * turn, i);
+  }
+  return foremost(std::move(ranked));
+}
+
+struct Patch {
+  std::array<glm::dvec3, 9> colors;
+};
+
+Patch patch_at(const SmallPhoto& photo, const glm::dvec2& point) {
+  Patch out;
+  for (int k = 0; k < 9; ++k) {
+    out.colors[static_cast<std::size_t>(k)] =
+        glm::dvec3(photo.at(point + glm::dvec2(k % 3 - 1, k / 3 - 1)));
+  }
+  return out;
+}
+
+double difference(const Patch& a, const Patch& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < a.colors.size(); ++k) {
+    const glm::dvec3 d = a.colors[k] - b.colors[k];
+    sum += glm::dot(d, d);
+  }
+  return sum / static_cast<double>(3 * a.colors.size());
+}
+
+// A shell beyond that depth, and what may stand before it.
+DepthRange open_range(double depth) { return {depth / kFarthest, 2.0 * depth, 3.0 * depth, true}; }
+
+// How much the neighbours differ from the photo if it shows that point, or -1 where few see it.
+double cost_at(std::span<const SmallPhoto> photos,
+               std::span<const std::size_t> neighbours,
+               const glm::dvec3& world,
+               const Patch& reference) {
+  std::array<double, kNeighbours> differences{};
+  std::size_t count = 0;
+  for (const std::size_t i : neighbours) {
+    const auto point = photos[i].sees(world);
+    if (point && photos[i].at(*point).w >= 0.5)
+      differences[count++] = difference(reference, patch_at(photos[i], *point));
+  }
+  if (2 * count < neighbours.size() || count < 2) return -1;
+  // The better half: what hides the point from some photos does not speak against it.
+  const std::size_t half = (count + 1) / 2 + (count > 3 ? 1 : 0);
+  const auto begin = differences.begin();
+  std::partial_sort(begin, begin + static_cast<std::ptrdiff_t>(half),
+                    begin + static_cast<std::ptrdiff_t>(count));
+  double sum = 0;
+  for (std::size_t k = 0; k < half; ++k) sum += differences[k];
+  return sum / static_cast<double>(half);
+}
+
+// The costs at depths of even steps of the logarithm, of which those below 0 are unknown.
+std::vector<double> costs_along(std::span<const SmallPhoto> photos,
+                                std::span<const std::size_t> neighbours,
+                                const CameraRay& ray,
+                                const Patch& reference,
+                                const DepthRange& depths,
+                                std::size_t steps) {
+  std::vector<double> costs(steps);
+  for (std::size_t step = 0; step < steps; ++step) {
+    const double share = static_cast<double>(step) / static_cast<double>(steps - 1);
+    costs[step] =
+        cost_at(photos, neighbours, ray.origin + depths.at(share) * ray.direction, reference);
+  }
+  return costs;
+}
+
+// The step of the least known cost; `costs` has a known one.
+std::size_t best_step(std::span<const double> costs) {
+  std::size_t best = costs.size();
+  for (std::size_t step = 0; step < costs.size(); ++step) {
+    if (costs[step] >= 0 && (best == costs.size() || costs[step] < costs[best])) best = step;
+  }
+  return best;
+}
+
+// The known cost that the share `rank` of the known ones lies below; nothing when less than a
+// quarter is known.
+std::optional<double> known_cost(std::span<const double> costs, double rank) {
+  std::vector<double> known;
+  std::copy_if(costs.begin(), costs.end(), std::back_inserter(known),
+               [](double cost) { return cost >= 0; });
+  if (known.empty() || known.size() < costs.size() / 4) return std::nullopt;
+  const auto place =
+      known.begin() + static_cast<std::ptrdiff_t>(rank * static_cast<double>(known.size()));
+  std::nth_element(known.begin(), place, known.end());
+  return *place;
+}
+
+// The depth along the ray at which the neighbours agree with the photo, if there is one.
+std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
+                                   std::span<const std::size_t> neighbours,
+                                   const CameraRay& ray,
+                                   const Patch& reference,
+                                   const DepthRange& depths) {
+  const std::vector<double> costs =
+      costs_along(photos, neighbours, ray, reference, depths, kDepths);
+  const std::optional<double> middle = known_cost(costs, 0.5);
+  if (!middle) return std::nullopt;
+  const std::size_t best = best_step(costs);
+  if (costs[best] > kAgreement || costs[best] >= kClear * *middle) return std::nullopt;
+  const double step_log = std::log(depths.farthest / depths.nearest) / (kDepths - 1);
+  const auto near = static_cast<std::size_t>(std::log(kElsewhere) / step_log);
+  for (std::size_t step = 0; step < kDepths; ++step) {
+    const bool elsewhere = step + near < best || step > best + near;
+    const bool as_good = costs[best] + kRounding > kUnique * (costs[step] + kRounding);
+    if (elsewhere && costs[step] >= 0 && as_good) return std::nullopt;
+  }
+  return depths.at(static_cast<double>(best) / (kDepths - 1));
+}
+
+// Where in the range what has no clear depth begins: about the typical depth.
+double unsure_share(const DepthRange& depths) {
+  return std::log(depths.typical / depths.nearest) / std::log(depths.farthest / depths.nearest);
+}
+
+struct Sample {
+  RandomPixel pixel;
+  double depth = 0;  // along its ray, at random where photos tell none
+  bool agreed = false;
+  glm::dvec3 color() const { return glm::dvec3(pixel.color); }
+  glm::dvec3 position() const { return pixel.ray.origin + depth * pixel.ray.direction; }
+};
+
+Sample sweep_pixel(std::span<const SmallPhoto> photos,
+                   const std::vector<std::vector<std::size_t>>& neighbours,
+                   const DepthRange& depths,
+                   std::uint64_t seed,
+                   std::size_t index) {
+  CounterRng rng(seed, kSweepStream, 8 * index);
+  const RandomPixel pixel = random_pixel(photos, rng);
+  const double jitter = rng.uniform();
+  Sample out{pixel};
+  if (!pixel.shows()) return out;
+  const auto depth = agreed_depth(photos, neighbours[pixel.view], pixel.ray,
+                                  patch_at(photos[pixel.view], pixel.point), depths);
+  out.agreed = depth.has_value();
+  out.depth = depth ? *depth : depths.at(jitter + (1.0 - jitter) * unsure_share(depths));
+  return out;
+}
+
+// What pixels tell, one after the other.
+class Sweep {
+ public:
+  Sweep(std::span<const SmallPhoto> photos, const DepthRange& depths, std::uint64_t seed)
+      : photos_(photos), depths_(depths), seed_(seed), neighbours_(photos.size()) {
+    for (std::size_t i = 0; i < photos.size(); ++i)
+      neighbours_[i] = neighbours_of(photos, i, depths.typical);
+  }
+
+  void take(std::size_t count) {
+    const std::size_t before = samples_.size();
+    samples_.resize(before + count);
+    in_parallel(count, [&](std::size_t i) {
+      samples_[before + i] = sweep_pixel(photos_, neighbours_, depths_, seed_, before + i);
+    });
+    for (std::size_t i = before; i < samples_.size(); ++i) {
+      agreed_ += samples_[i].agreed ? 1 : 0;
+      vague_ += !samples_[i].agreed && samples_[i].pixel.shows() ? 1 : 0;
+    }
+  }
+
+  const std::vector<Sample>& samples() const { return samples_; }
+  std::size_t agreed() const { return agreed_; }
+  /// Those that show something, in no clear depth.
+  std::size_t vague() const { return vague_; }
+
+ private:
+  std::span<const SmallPhoto> photos_;
+  DepthRange depths_;
+  std::uint64_t seed_;
+  std::vector<std::vector<std::size_t>> neighbours_;
+  std::vector<Sample> samples_;
+  std::size_t agreed_ = 0, vague_ = 0;
+};
+
+// What agreed in a depth, as the photos see it.
+class AgreedPlaces {
+ public:
+  AgreedPlaces(std::span<const SmallPhoto> photos, std::span<const Sample> samples)
+      : photos_(photos), places_(photos.size()) {
+    in_parallel(photos.size(), [&](std::size_t view) {
+      for (const Sample& sample : samples) {
+        if (!sample.agreed) continue;
+        const glm::dvec3 world = sample.position();
+        const auto point = photos[view].sees(world);
+        if (!point) continue;
+        const double depth = glm::distance(world, photos[view].camera.center());
+        places_[view].push_back({*point, sample.color(), depth});
+      }
+    });
+  }
+
+  /// The depth of what is most like the pixel in place and colour, if the photo sees any of it.
+  std::optional<double> depth_near(const RandomPixel& pixel) const {
+    const double width = photos_[pixel.view].camera.width;
+    double least = std::numeric_limits<double>::infinity();
+    std::optional<double> out;
+    for (const Place& place : places_[pixel.view]) {
+      const glm::dvec2 apart = (pixel.point - place.point) / width;
+      const glm::dvec3 other = kColourWidths * (glm::dvec3(pixel.color) - place.color);
+      const double squared = glm::dot(apart, apart) + glm::dot(other, other);
+      if (squared < least) least = squared, out = place.depth;
+    }
+    return out;
+  }
+
+ private:
+  struct Place {
+    glm::dvec2 point;
+    glm::dvec3 color;
+    double depth;
+  };
+  std::span<const SmallPhoto> photos_;
+  std::vector<std::vector<Place>> places_;
+};
+
+// Photos that look the same way, those farthest apart first.
+std::vector<std::size_t> distant_neighbours(std::span<const SmallPhoto> photos,
+                                            std::size_t index,
+                                            double distance) {
+  std::vector<std::pair<double, std::size_t>> ranked;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    const double base = glm::distance(photos[i].camera.center(), photos[index].camera.center());
+    const bool apart = i != index && base >= kLeastBase * distance;
+    if (apart && 1.0 - glm::dot(axis_of(photos[i]), axis_of(photos[index])) < kProbeTurn)
+      ranked.emplace_back(-base, i);
+  }
+  return foremost(std::move(ranked));
+}
+
+// What a pixel tells of its depth.
+struct Probe {
+  double depth = 0;   // 0: nothing
+  bool open = false;  // all greater depths agree as well
+};
+
+Probe probe_pixel(std::span<const SmallPhoto> photos,
+                  const std::vector<std::vector<std::size_t>>& neighbours,
+                  const DepthRange& depths,
+                  std::uint64_t seed,
+                  std::size_t index) {
+  CounterRng rng(seed, kProbeStream, 8 * index);
+  const RandomPixel pixel = random_pixel(photos, rng);
+  if (!pixel.shows()) return {};
+  const std::vector<double> costs =
+      costs_along(photos, neighbours[pixel.view], pixel.ray,
+                  patch_at(photos[pixel.view], pixel.point), depths, kProbeDepths);
+  // Depths at which photos cannot differ any more are as good as the best one, and may be most.
+  const std::optional<double> wrong = known_cost(costs, 0.75);
+  if (!wrong) return {};
+  std::size_t best = best_step(costs);
+  if (costs[best] > kAgreement || costs[best] >= kClear * *wrong) return {};
+  const double enough = kAsGood * costs[best] + kFloorCost;
+  std::size_t last = best;
+  while (last + 1 < costs.size() && costs[last + 1] >= 0 && costs[last + 1] <= enough) ++last;
+  const bool open = last + 1 == costs.size();
+  while (open && best > 0 && costs[best - 1] >= 0 && costs[best - 1] <= enough) --best;
+  // What agrees at every depth has no texture.
+  if (open && (best == 0 || costs[best - 1] < 0)) return {};
+  return {depths.at(static_cast<double>(best) / (kProbeDepths - 1)), open};
+}
+
+// The range about the depth at which pixels agree, where that is much nearer than the range's own:
+// photos to compare with are chosen by it, and those too far apart show little in common.
+DepthRange settled(std::span<const SmallPhoto> photos, DepthRange depths, std::uint64_t seed) {
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::vector<std::size_t>> neighbours(photos.size());
+    for (std::size_t i = 0; i < photos.size(); ++i)
+      neighbours[i] = neighbours_of(photos, i, depths.typical);
+    std::vector<double> found(kProbes);
+    in_parallel(kProbes, [&](std::size_t i) {
+      CounterRng rng(seed, kProbeStream, 8 * i);
+      const RandomPixel pixel = random_pixel(photos, rng);
+      if (!pixel.shows()) return;
+      const auto depth = agreed_depth(photos, neighbours[pixel.view], pixel.ray,
+                                      patch_at(photos[pixel.view], pixel.point), depths);
+      found[i] = depth.value_or(0);
+    });
+    std::erase(found, 0.0);
+    if (found.size() < kFewProbes) return depths;
+    const double typical = quantiles(found, std::array<double, 1>{0.5})[0];
+    if (typical > kMuchNearer * depths.typical) return depths;
+    depths = depths_around(typical);
+  }
+  return depths;
+}
+
+}  // namespace
+
+double DepthRange::at(double share) const { return nearest * std::pow(farthest / nearest, share); }
+
+DepthRange depths_around(double typical) {
+  return {kNearest * typical, typical, kFarthest * typical};
+}
+
+DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed) {
+  const DepthRange around = depths_around(guess);
+  std::vector<std::vector<std::size_t>> neighbours(photos.size());
+  for (std::size_t i = 0; i < photos.size(); ++i)
+    neighbours[i] = distant_neighbours(photos, i, guess);
+  const bool one_place = std::all_of(photos.begin(), photos.end(), [&](const SmallPhoto& photo) {
+    return glm::distance(photo.camera.center(), photos[0].camera.center()) < kLeastBase * guess;
+  });
+  if (photos.size() > 1 && one_place) return open_range(guess);
+  std::vector<Probe> probes(kProbes);
+  in_parallel(kProbes, [&](std::size_t i) {
+    probes[i] =
+        probe_pixel(photos, neighbours, {kNearest * guess, guess, kProbeReach * guess}, seed, i);
+  });
+  std::vector<double> depths;
+  std::size_t open = 0;
+  for (const Probe& probe : probes) {
+    if (probe.depth == 0) continue;
+    depths.push_back(probe.depth);
+    open += probe.open ? 1 : 0;
+  }
+  if (depths.size() < kFewProbes) return settled(photos, around, seed);
+  const std::array<double, 2> ranks{0.5, 0.75};
+  const std::vector<double> found = quantiles(depths, ranks);
+  const double open_share = static_cast<double>(open) / static_cast<double>(depths.size());
+  if (open_share > kOpenShare) return open_range(found[1]);
+  // Photos far apart may agree by chance beyond what they show together, but at an end.
+  const double typical = found[0];
+  if (open_share < kDoubtShare || typical < kWrongGuess * guess)
+    return settled(photos, around, seed);
+  return depths_around(typical);
+}
+
+double agreed_share(std::span<const SmallPhoto> photos,
+                    const DepthRange& depths,
+                    std::uint64_t seed) {
+  if (photos.empty()) return 0;
+  Sweep sweep(photos, depths, seed);
+  sweep.take(kProbes);
+  const std::size_t shown = sweep.agreed() + sweep.vague();
+  return shown > 0 ? static_cast<double>(sweep.agreed()) / static_cast<double>(shown) : 0;
+}
+
+PointCloud swept_points(std::span<const SmallPhoto> photos,
+                        const DepthRange& depths,
+                        std::size_t count,
+                        double unsure,
+                        std::uint64_t seed) {
+  const auto fog = static_cast<std::size_t>(unsure * static_cast<double>(count));
+  Sweep sweep(photos, depths, seed);
+  // Until there are enough of both kinds; where depths are open, or few agree, not before all
+  // tries.
+  const auto enough = [&] {
+    return !depths.open && sweep.agreed() >= count - fog && sweep.vague() >= fog;
+  };
+  for (std::size_t tried = 0; tried < kTriesPerPoint && !enough(); ++tried) sweep.take(count);
+  const std::size_t most_agreed = count - std::min(fog, sweep.vague());
+  const std::size_t most_vague = depths.open ? count - std::min(sweep.agreed(), count - fog) : fog;
+  std::vector<Sample> taken;
+  std::vector<std::size_t> as_deep;  // of those, the ones as deep as what is around them
+  std::size_t agreed = 0, vague = 0;
+  for (const Sample& sample : sweep.samples()) {
+    std::size_t& number = sample.agreed ? agreed : vague;
+    if (number >= (sample.agreed ? most_agreed : most_vague) || !sample.pixel.shows()) continue;
+    ++number;
+    if (!sample.agreed && !depths.open && vague % 2 == 0) as_deep.push_back(taken.size());
+    taken.push_back(sample);
+  }
+  const AgreedPlaces places(photos, sweep.samples());
+  in_parallel(as_deep.size(), [&](std::size_t i) {
+    Sample& sample = taken[as_deep[i]];
+    sample.depth = places.depth_near(sample.pixel).value_or(sample.depth);
+  });
+  PointCloud out;
+  for (const Sample& sample : taken) append_point(out, sample.position(), sample.color());
+  return out;
+}
+
+}  // namespace raysplats

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "raysplats/dataset.hpp"
+#include "train/photo_set.hpp"
+
+namespace raysplats {
+
+/// Where a sweep looks, as distances from the cameras.
+struct DepthRange {
+  double nearest = 0;
+  double typical = 0;  ///< of what most cameras look at
+  double farthest = 0;
+  bool open = false;  ///< the photos are too near to each other to tell any depth
+
+  /// The distance at that share of the way through the range, evenly by the logarithm.
+  double at(double share) const;
+};
+
+/// The range of depths around what most cameras look at, `typical`.
+DepthRange depths_around(double typical);
+
+/// The range of depths around `guess`, unless many photos cannot tell what they show from the
+/// infinitely far, as from a tripod: then it lies around what they do tell, or, where that is less
+/// than half (`open`), beyond the depth up to which they would tell it. Where pixels agree much
+/// nearer than that, as below a drone whose cameras have no common target, it lies around their
+/// depth. `guess` is positive.
+DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
+
+/// The share of random pixels at which neighbouring photos agree in one depth, of those that show
+/// something: how much a sweep finds. 0 where nothing is shown.
+double agreed_share(std::span<const SmallPhoto> photos,
+                    const DepthRange& depths,
+                    std::uint64_t seed);
+
+/// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
+/// sweep, Collins 1996, over single pixels with their surroundings). Of the pixels that no depth
+/// explains clearly, the share `unsure` of `count` at most (all, where the range is open) are taken
+/// as well, so that everything seen has something in front of it: one half at random depths, the
+/// other as deep as what agreed and is most like them in place and colour, unless the range is
+/// open. Colours are the photos'.
+PointCloud swept_points(std::span<const SmallPhoto> photos,
+                        const DepthRange& depths,
+                        std::size_t count,
+                        double unsure,
+                        std::uint64_t seed);
+
+}  // namespace raysplats

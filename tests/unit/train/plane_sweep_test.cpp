@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/plane_sweep.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <vector>
+
+#include "scene/camera_model.hpp"
+#include "test_photos.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+TEST_CASE("sweeping finds a textured wall and its colours") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5);
+  CHECK(points.positions == swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5).positions);
+  REQUIRE(points.size() >= 300);
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    if (std::abs(p[0] - 4.0) > 0.5) continue;
+    ++near;
+  }
+  MESSAGE(near << " of " << points.size() << " points on the wall");
+  CHECK(near > points.size() * 6 / 10);
+}
+
+TEST_CASE("half of the pixels that no depth explains are as deep as what is around them") {
+  // A plain square in the middle of the wall tells no depth, but at its edges.
+  std::vector<SmallPhoto> photos;
+  const auto with_square = [](const CameraRay& ray) {
+    const glm::dvec3 p = ray.origin + (4.0 - ray.origin.x) / ray.direction.x * ray.direction;
+    return std::abs(p.y) < 0.7 && std::abs(p.z) < 0.7 ? glm::dvec4(0.9, 0.9, 0.2, 1.0) : wall(ray);
+  };
+  for (const SmallPhoto& photo : photos_of_wall())
+    photos.push_back(photo_of(photo.camera, with_square));
+  const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 600, 0.25, 5);
+  std::size_t plain = 0, near = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (std::abs(points.colors[3 * i + 2] - 0.2f) > 0.01f) continue;
+    ++plain;
+    near += std::abs(points.positions[3 * i] - 4.0f) < 0.5f ? 1 : 0;
+  }
+  MESSAGE(near << " of " << plain << " plain points on the wall");
+  CHECK(plain > 50);
+  // And some of those at random depths.
+  CHECK(near > plain / 2);
+}
+
+TEST_CASE("photos without a common view give no sure points and do not fail") {
+  std::vector<SmallPhoto> one{photo_of(look_at({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 40, 30, 40), wall)};
+  const PointCloud points = swept_points(one, {0.4, 2.0, 20.0}, 100, 0.25, 1);
+  CHECK(points.size() == 25);
+  for (const float p : points.positions) CHECK(std::isfinite(p));
+}
+
+TEST_CASE("cameras on a tripod look at what is far away") {
+  // Around one point that is 0.01 wide, in a ball of 6 whose pattern has no finer parts than
+  // pixels.
+  const auto ball_around = [](const CameraRay& ray) {
+    const double along = glm::dot(ray.origin, ray.direction);
+    const double t = std::sqrt(36.0 - glm::dot(ray.origin, ray.origin) + along * along) - along;
+    const glm::dvec3 p = ray.origin + t * ray.direction;
+    return glm::dvec4(0.5 + 0.4 * std::sin(2.1 * p.y + 0.7 * p.z) * std::sin(1.3 * p.x),
+                      0.5 + 0.4 * std::cos(2.3 * p.z - 1.1 * p.y + p.x),
+                      0.5 + 0.4 * std::sin(2.7 * p.y - 1.9 * p.x), 1.0);
+  };
+  for (const double radius : {0.0, 0.005}) {
+    std::vector<SmallPhoto> photos;
+    for (int i = 0; i < 16; ++i) {
+      const glm::dvec3 to(std::cos(0.4 * i), std::sin(0.4 * i), 0.2 * (i % 3 - 1));
+      photos.push_back(photo_of(look_at(radius * to, to, {0, 0, 1}, 80, 60, 70), ball_around));
+    }
+    const double guess = radius > 0 ? radius : 1.0;
+    const DepthRange depths = swept_depths(photos, guess, 3);
+    CHECK(depths.open);
+    const PointCloud points = swept_points(photos, depths, 400, 0.25, 3);
+    CHECK(points.size() > 390);
+    std::size_t far = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float* p = points.positions.data() + 3 * i;
+      if (glm::length(glm::dvec3(p[0], p[1], p[2])) > (radius > 0 ? 10 * radius : 1.0)) ++far;
+    }
+    MESSAGE(far << " of " << points.size() << " points beyond 10 radii");
+    CHECK(far > points.size() * 8 / 10);
+  }
+  // Photos that tell depths keep the guess.
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const DepthRange depths = swept_depths(photos, 3.0, 3);
+  CHECK(!depths.open);
+  CHECK(depths.typical == 3.0);
+  // So do those of an object before a white backdrop, which agrees with itself at any depth.
+  std::vector<SmallPhoto> studio;
+  for (const SmallPhoto& photo : photos) {
+    studio.push_back(photo_of(photo.camera, [](const CameraRay& ray) {
+      const glm::dvec3 p = ray.origin + (4.0 - ray.origin.x) / ray.direction.x * ray.direction;
+      return std::abs(p.y) < 0.5 && std::abs(p.z) < 0.5 ? wall(ray) : glm::dvec4(1.0);
+    }));
+  }
+  const DepthRange before_white = swept_depths(studio, 3.0, 3);
+  CHECK(!before_white.open);
+  CHECK(before_white.typical == 3.0);
+}
+
+TEST_CASE("cameras side by side find the depth of the wall, however far away it was guessed") {
+  // As from a drone: axes are parallel, and a photo shares its view with its next neighbours only.
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 25; ++i) {
+    const double y = 1.8 * (i % 5 - 2), z = 1.4 * (i / 5 - 2);
+    photos.push_back(photo_of(look_at({0, y, z}, {4, y, z}, {0, 0, 1}, 96, 72, 90), wall));
+  }
+  for (const double guess : {4.0, 20.0}) {
+    CAPTURE(guess);
+    const DepthRange depths = swept_depths(photos, guess, 3);
+    CHECK(!depths.open);
+    CHECK(depths.typical > 3.5);
+    CHECK(depths.typical < 6.5);
+    const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+    std::size_t near = 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      near += std::abs(points.positions[3 * i] - 4.0f) > 0.5f ? 0 : 1;
+    MESSAGE(near << " of " << points.size() << " points on the wall");
+    CHECK(near > points.size() * 6 / 10);
+  }
+}
