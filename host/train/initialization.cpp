@@ -36,11 +36,12 @@ constexpr std::size_t kFewPoints = 1000;  // fewer leave most of the photos with
 constexpr double kStartShare = 0.5;       // of the limit that points, or random places, may take
 constexpr double kPhotoShare = 0.3;       // of the limit that a start from photos takes
 constexpr double kUnsureShare = 0.25;     // of a start from photos alone: points in no clear depth
-constexpr double kUnsureBeside = 0.1;     // of those beside sparse ones: more are slower, and no better
+constexpr double kUnsureBeside = 0.1;     // of those beside sparse ones: more are only slower
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
 constexpr double kMostlyBare = 0.55;        // of what photos show, with no sparse point near
+constexpr double kMostlyShown = 0.75;       // of the photos, where masks leave out the rest
 constexpr double kMostlyAgreed = 0.45;      // of what photos show, in one depth
 constexpr std::size_t kMostBeside = 10000;  // points of photos, of which more take seconds to find
 constexpr double kMostlySeen = 0.5;         // of sparse points
@@ -228,6 +229,10 @@ Beside photos_beside(const PointCloud& points,
   // Sparse points crowd where there is texture. What a sweep finds lies more evenly; where photos
   // are too far apart, or show little, it is wrong too often.
   const std::vector<SmallPhoto>& many = photos(PhotoChoice::kMany);
+  // A body that masks leave is covered by its sparse points, and a sweep errs at its outline.
+  const double shown = opaque_share(many);
+  spdlog::debug("{:.1f} % of the photos count", 100 * shown);
+  if (shown < kMostlyShown) return {};
   const double guess = guessed_depth(cameras, visible_region(cameras));
   const DepthRange depths = swept_depths(many, guess, options.seed);
   const double agreed = agreed_share(many, depths, options.seed);
