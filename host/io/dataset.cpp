@@ -523,7 +523,7 @@ std::string way_out(const fs::path& root) {
                          is_file(folder / "colmap" / "images.txt");
     if (is_data) inner.insert(folder);
   }
-  if (const std::string other = way_out_of_others(root); !other.empty()) return other;
+  if (std::string other = way_out_of_others(root); !other.empty()) return other;
   if (!inner.empty()) return fmt::format("; {} is one", inner.begin()->string());
   for (const fs::path& folder : {root / "input", root / "images", root}) {
     std::error_code error;
