@@ -22,10 +22,12 @@
 #include "io/image_file.hpp"
 #include "io/llff.hpp"
 #include "io/photo_folder.hpp"
+#include "io/photo_mask.hpp"
 #include "io/photo_turn.hpp"
 #include "io/ply_points.hpp"
 #include "io/polycam.hpp"
 #include "io/transforms.hpp"
+#include "io/way_out.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
@@ -36,25 +38,6 @@ namespace raysplats {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Where masks lie that nothing names; ScanNet++ has a name of its own.
-fs::path mask_folder(const fs::path& root) {
-  return is_folder(root / "masks") ? root / "masks" : root / "resized_anon_masks";
-}
-
-/// A mask of the photo `name` in mask_folder(): COLMAP's name.ext.png, or an image
-/// that is called as the photo, with "_mask" or ".mask" behind it or without.
-fs::path find_mask(const fs::path& root, const fs::path& name) {
-  const fs::path folder = mask_folder(root);
-  if (!is_folder(folder)) return {};
-  fs::path stem = name;
-  stem.replace_extension();
-  for (const std::string& candidate :
-       {name.string() + ".png", stem.string(), stem.string() + "_mask", stem.string() + ".mask"}) {
-    if (const auto found = io::find_image(folder, candidate)) return *found;
-  }
-  return {};
-}
 
 /// Photos of nearly the camera's size were not made smaller: most often they are those from before
 /// their distortion was taken out, which leaves another size.
@@ -95,21 +78,6 @@ void set_cameras(
   if (undistort && view.camera.model == CameraModel::kOpenCv) {
     view.camera.model = CameraModel::kPinhole;
     view.camera.distortion = {};
-  }
-}
-
-/// The mask has the photo's shape, not necessarily its size, and may be turned as EXIF says.
-void check_mask(const View& view) {
-  const io::ImageSize size = io::image_size(view.mask_path);
-  const Camera& photo = view.source_camera;
-  const bool fits =
-      io::has_shape(size.width, size.height, photo) ||
-      (io::has_shape(size.height, size.width, photo) && io::lies_on_its_side(view.image_path));
-  if (!fits) {
-    throw DataError(fmt::format(
-        "The mask {} has {} x {} pixels but its photo {} x {}, which is another shape: make it of "
-        "the photo that it belongs to",
-        view.mask_path.string(), size.width, size.height, photo.width, photo.height));
   }
 }
 
@@ -217,7 +185,7 @@ Dataset load_colmap(const fs::path& root,
       continue;
     }
     view.image_path = *photo;
-    view.mask_path = find_mask(root, image.name);
+    view.mask_path = io::find_mask(root, image.name);
     view.points = image.points;
     Camera nominal = model.cameras.at(image.camera_id);
     nominal.name = io::inner_name(image.name);
@@ -324,8 +292,8 @@ std::vector<View> transforms_views(io::TransformsFile& file, const DatasetOption
       }
     } else {
       // Names may repeat in several folders (train/r_0, test/r_0).
-      view.mask_path = find_mask(folder, io::inner_name(name));
-      if (view.mask_path.empty()) view.mask_path = find_mask(folder, photo.filename());
+      view.mask_path = io::find_mask(folder, io::inner_name(name));
+      if (view.mask_path.empty()) view.mask_path = io::find_mask(folder, photo.filename());
     }
     if (!frame.depth_path.empty()) {
       view.depth_path = beside_photos(folder, frame.depth_path);
@@ -497,47 +465,6 @@ bool goes_before(const fs::path& transforms, const fs::path& root, const fs::pat
          !io::read_transforms(transforms).ply_file_path.empty();
 }
 
-/// What makes something that is read of another program's folder; "" for any that is not known.
-std::string way_out_of_others(const fs::path& root) {
-  const fs::path sequence = root / "EXR_RGBD";
-  if ((is_file(root / "metadata.json") && is_folder(root / "rgbd")) ||
-      (is_file(sequence / "metadata.json") && is_folder(sequence / "rgb"))) {
-    return "; it is an export of Record3D, which nerfstudio's \"ns-process-data record3d\" turns "
-           "into "
-           "one";
-  }
-  return "";
-}
-
-/// What to give in place of a folder that is no data set: archives unpack to a folder in a folder,
-/// other programs have folders of their own, and photos may have no cameras yet.
-std::string way_out(const fs::path& root) {
-  std::set<fs::path> inner;
-  std::error_code failure;
-  for (fs::directory_iterator entry(root, failure), end; !failure && entry != end;
-       entry.increment(failure)) {
-    const fs::path& folder = entry->path();
-    const bool is_data = is_folder(folder / "sparse") || is_file(folder / "transforms.json") ||
-                         is_file(folder / "transforms_train.json") ||
-                         is_file(folder / io::kLlffPoses) || io::find_polycam(folder) ||
-                         is_file(folder / "colmap" / "images.txt");
-    if (is_data) inner.insert(folder);
-  }
-  if (std::string other = way_out_of_others(root); !other.empty()) return other;
-  if (!inner.empty()) return fmt::format("; {} is one", inner.begin()->string());
-  for (const fs::path& folder : {root / "input", root / "images", root}) {
-    std::error_code error;
-    for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-         entry.increment(error)) {
-      if (!io::has_image_extension(entry->path())) continue;
-      return fmt::format(
-          "; find out where its photos were taken: raysplats prepare {} -o NEW_FOLDER",
-          folder.string());
-    }
-  }
-  return "";
-}
-
 Dataset load_any(const fs::path& root, const DatasetOptions& options) {
   const fs::path transforms = root / "transforms.json";
   if (const auto model = io::find_colmap_model(root)) {
@@ -560,7 +487,7 @@ Dataset load_any(const fs::path& root, const DatasetOptions& options) {
       fmt::format("{} is no data set: it has neither a COLMAP model (sparse/0) nor transforms.json "
                   "nor transforms_train.json nor poses_bounds.npy (LLFF) nor keyframes/cameras "
                   "(Polycam){}",
-                  root.string(), way_out(root)));
+                  root.string(), io::way_out(root)));
 }
 
 }  // namespace
@@ -601,7 +528,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
   dataset.alpha_is_background = shows_cut_outs(dataset, options.alpha);
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
-  if (const fs::path masks = mask_folder(root); masked == 0 && is_folder(masks)) {
+  if (const fs::path masks = io::mask_folder(root); masked == 0 && is_folder(masks)) {
     spdlog::warn(
         "No mask in {} has the name of a photo: {} would have {}.png, {}.png or {}_mask.png",
         masks.string(), dataset.views.front().camera.name, dataset.views.front().camera.name,
@@ -610,7 +537,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
   }
   if (masked > 0) {
     for (const View& view : dataset.views) {
-      if (has_mask(view)) check_mask(view);
+      if (has_mask(view)) io::check_mask(view);
     }
     const bool ignores = options.masks == MaskUse::kIgnore;
     if (!ignores) dataset.alpha_is_background = true;

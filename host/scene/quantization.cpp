@@ -6,8 +6,8 @@
 #include <functional>
 #include <limits>
 #include <numeric>
-#include <thread>
 
+#include "util/parallel.hpp"
 #include "util/rng.hpp"
 
 namespace raysplats {
@@ -108,15 +108,9 @@ std::vector<std::size_t> best_cuts(const Sums& sums,
 /// Calls work(begin, end) for all chunks of 0 to count, on several threads.
 void for_chunks(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
   const std::size_t chunks = (count + kChunk - 1) / kChunk;
-  const std::size_t threads =
-      std::min<std::size_t>(std::max(1u, std::thread::hardware_concurrency()), chunks);
-  std::vector<std::jthread> workers;
-  for (std::size_t t = 0; t < threads; ++t) {
-    workers.emplace_back([&, t] {
-      for (std::size_t chunk = t; chunk < chunks; chunk += threads)
-        work(chunk * kChunk, std::min(count, (chunk + 1) * kChunk));
-    });
-  }
+  in_parallel(chunks, [&](std::size_t chunk) {
+    work(chunk * kChunk, std::min(count, (chunk + 1) * kChunk));
+  });
 }
 
 /// k-means over some of many vectors.

@@ -210,8 +210,9 @@ Sample sweep_pixel(std::span<const SmallPhoto> photos,
                    const std::vector<std::vector<std::size_t>>& neighbours,
                    const DepthRange& depths,
                    std::uint64_t seed,
+                   std::uint64_t stream,
                    std::size_t index) {
-  CounterRng rng(seed, kSweepStream, 8 * index);
+  CounterRng rng(seed, stream, 8 * index);
   const RandomPixel pixel = random_pixel(photos, rng);
   const double jitter = rng.uniform();
   Sample out{pixel};
@@ -226,8 +227,11 @@ Sample sweep_pixel(std::span<const SmallPhoto> photos,
 // What pixels tell, one after the other.
 class Sweep {
  public:
-  Sweep(std::span<const SmallPhoto> photos, const DepthRange& depths, std::uint64_t seed)
-      : photos_(photos), depths_(depths), seed_(seed), neighbours_(photos.size()) {
+  Sweep(std::span<const SmallPhoto> photos,
+        const DepthRange& depths,
+        std::uint64_t seed,
+        std::uint64_t stream = kSweepStream)
+      : photos_(photos), depths_(depths), seed_(seed), stream_(stream), neighbours_(photos.size()) {
     for (std::size_t i = 0; i < photos.size(); ++i)
       neighbours_[i] = neighbours_of(photos, i, depths.typical);
   }
@@ -236,7 +240,7 @@ class Sweep {
     const std::size_t before = samples_.size();
     samples_.resize(before + count);
     in_parallel(count, [&](std::size_t i) {
-      samples_[before + i] = sweep_pixel(photos_, neighbours_, depths_, seed_, before + i);
+      samples_[before + i] = sweep_pixel(photos_, neighbours_, depths_, seed_, stream_, before + i);
     });
     for (std::size_t i = before; i < samples_.size(); ++i) {
       agreed_ += samples_[i].agreed ? 1 : 0;
@@ -252,7 +256,7 @@ class Sweep {
  private:
   std::span<const SmallPhoto> photos_;
   DepthRange depths_;
-  std::uint64_t seed_;
+  std::uint64_t seed_, stream_;
   std::vector<std::vector<std::size_t>> neighbours_;
   std::vector<Sample> samples_;
   std::size_t agreed_ = 0, vague_ = 0;
@@ -349,19 +353,12 @@ Probe probe_pixel(std::span<const SmallPhoto> photos,
 // photos to compare with are chosen by it, and those too far apart show little in common.
 DepthRange settled(std::span<const SmallPhoto> photos, DepthRange depths, std::uint64_t seed) {
   for (int round = 0; round < kRounds; ++round) {
-    std::vector<std::vector<std::size_t>> neighbours(photos.size());
-    for (std::size_t i = 0; i < photos.size(); ++i)
-      neighbours[i] = neighbours_of(photos, i, depths.typical);
-    std::vector<double> found(kProbes);
-    in_parallel(kProbes, [&](std::size_t i) {
-      CounterRng rng(seed, kProbeStream, 8 * i);
-      const RandomPixel pixel = random_pixel(photos, rng);
-      if (!pixel.shows()) return;
-      const auto depth = agreed_depth(photos, neighbours[pixel.view], pixel.ray,
-                                      patch_at(photos[pixel.view], pixel.point), depths);
-      found[i] = depth.value_or(0);
-    });
-    std::erase(found, 0.0);
+    Sweep sweep(photos, depths, seed, kProbeStream);
+    sweep.take(kProbes);
+    std::vector<double> found;
+    for (const Sample& sample : sweep.samples()) {
+      if (sample.agreed) found.push_back(sample.depth);
+    }
     if (found.size() < kFewProbes) return depths;
     const double typical = quantiles(found, std::array<double, 1>{0.5})[0];
     if (typical > kMuchNearer * depths.typical) return depths;
@@ -446,11 +443,13 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
     if (!sample.agreed && !depths.open && vague % 2 == 0) as_deep.push_back(taken.size());
     taken.push_back(sample);
   }
-  const AgreedPlaces places(photos, sweep.samples());
-  in_parallel(as_deep.size(), [&](std::size_t i) {
-    Sample& sample = taken[as_deep[i]];
-    sample.depth = places.depth_near(sample.pixel).value_or(sample.depth);
-  });
+  if (!as_deep.empty()) {
+    const AgreedPlaces places(photos, sweep.samples());
+    in_parallel(as_deep.size(), [&](std::size_t i) {
+      Sample& sample = taken[as_deep[i]];
+      sample.depth = places.depth_near(sample.pixel).value_or(sample.depth);
+    });
+  }
   PointCloud out;
   for (const Sample& sample : taken) append_point(out, sample.position(), sample.color());
   return out;

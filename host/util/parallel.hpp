@@ -11,7 +11,8 @@ namespace raysplats {
 /// Calls work(i) for every i below `count` once, on all cores; `work` does not throw.
 template <class Work>
 void in_parallel(std::size_t count, const Work& work) {
-  const std::size_t threads = std::max(1u, std::thread::hardware_concurrency());
+  const std::size_t threads =
+      std::min<std::size_t>(std::max(1u, std::thread::hardware_concurrency()), count);
   std::vector<std::jthread> workers;
   for (std::size_t t = 0; t < threads; ++t) {
     workers.emplace_back([&, t] {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/image_file.hpp"
+#include "photo_view.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
@@ -42,16 +43,6 @@ bool write_two_colors(const fs::path& path, const char* format, bool alpha) {
   spec.attribute("oiio:UnassociatedAlpha", 1);
   return output->open(path.string(), spec) &&
          output->write_image(OIIO::TypeUInt8, two_colors(alpha).data()) && output->close();
-}
-
-View view_of(const fs::path& path) {
-  const io::ImageSize size = io::image_size(path);
-  View view;
-  view.image_path = path;
-  view.camera.width = view.source_camera.width = size.width;
-  view.camera.height = view.source_camera.height = size.height;
-  view.sample_bytes = size.sample_bytes;
-  return view;
 }
 
 void check_photo(const fs::path& path, bool alpha, double tolerance) {

@@ -14,6 +14,7 @@
 #include "data_sets.hpp"
 #include "io/image_file.hpp"
 #include "io/photo.hpp"
+#include "photo_view.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
 #include "unit/log_capture.hpp"
@@ -43,16 +44,6 @@ fs::path write_row(const fs::path& path,
   REQUIRE(output->write_image(type, numbers.data()));
   REQUIRE(output->close());
   return path;
-}
-
-View view_of(const fs::path& path) {
-  const io::ImageSize size = io::image_size(path);
-  View view;
-  view.image_path = path;
-  view.camera.width = view.source_camera.width = size.width;
-  view.camera.height = view.source_camera.height = size.height;
-  view.sample_bytes = size.sample_bytes;
-  return view;
 }
 
 /// The numbers of the photo of a file, which are the same for both who ask for them.
