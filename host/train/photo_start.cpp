@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "train/photo_pixel.hpp"
 #include "train/point_cloud.hpp"
-#include "train/random_pixel.hpp"
 #include "util/parallel.hpp"
 #include "util/rng.hpp"
 
@@ -108,7 +108,7 @@ PointCloud scattered_points(std::span<const SmallPhoto> photos,
     for (int a = 0; a < 3; ++a)
       world[a] = region.center[a] + region.half_side * (2.0 * rng.uniform() - 1.0);
     if (!photos.empty() && i % 2 == 1) {
-      const RandomPixel pixel = random_pixel(photos, rng);
+      const PhotoPixel pixel = random_pixel(photos, rng);
       if (pixel.shows()) world = pixel.ray.origin + depths.at(rng.uniform()) * pixel.ray.direction;
     }
     std::vector<glm::dvec3> colors;

@@ -31,14 +31,16 @@ DepthRange depths_around(double typical);
 /// depth. `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
 
-/// The share of random pixels at which neighbouring photos agree in one depth, of those that show
-/// something: how much a sweep finds. 0 where nothing is shown.
+/// The share of random pixels at which neighbouring photos agree in one depth, which one of them
+/// finds as well, of those that show something: how much a sweep finds. 0 where nothing is shown.
 double agreed_share(std::span<const SmallPhoto> photos,
                     const DepthRange& depths,
                     std::uint64_t seed);
 
 /// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
-/// sweep, Collins 1996, over single pixels with their surroundings). Of the pixels that no depth
+/// sweep, Collins 1996, over single pixels with their surroundings, which photos are looked up for
+/// turned and scaled as they see them) and which one of two of these photos, swept from its side,
+/// finds as well (the check of consistency of multi-view stereo). Of the pixels that no depth
 /// explains clearly, the share `unsure` of `count` at most (all, where the range is open) are taken
 /// as well, so that everything seen has something in front of it: one half at random depths, the
 /// other as deep as what agreed and is most like them in place and colour, unless the range is

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
@@ -50,6 +51,45 @@ TEST_CASE("half of the pixels that no depth explains are as deep as what is arou
   CHECK(plain > 50);
   // And some of those at random depths.
   CHECK(near > plain / 2);
+}
+
+TEST_CASE("photos turned against each other tell as much of depth") {
+  const std::array<glm::dvec3, 4> ups{{{0, 0, 1}, {0, 1, 0}, {0, 0, -1}, {0, -1, 0}}};
+  const auto fine = [](const CameraRay& ray) {
+    const glm::dvec3 p = ray.origin + (4.0 - ray.origin.x) / ray.direction.x * ray.direction;
+    return glm::dvec4(0.5 + 0.4 * std::sin(23 * p.y + 5 * p.z),
+                      0.5 + 0.4 * std::cos(19 * p.z - 7 * p.y),
+                      0.5 + 0.4 * std::sin(17 * p.y - 13 * p.z), 1.0);
+  };
+  std::vector<SmallPhoto> upright, turned;
+  for (int i = 0; i < 9; ++i) {
+    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
+    const glm::dvec3 eye(0, y, z), target(4, 0.5 * y, 0.5 * z);
+    upright.push_back(photo_of(look_at(eye, target, ups[0], 80, 80, 90), fine));
+    turned.push_back(
+        photo_of(look_at(eye, target, ups[static_cast<std::size_t>(i % 4)], 80, 80, 90), fine));
+  }
+  const double plain = agreed_share(upright, {0.6, 3.0, 30.0}, 5);
+  const double other = agreed_share(turned, {0.6, 3.0, 30.0}, 5);
+  MESSAGE(plain << " of the pixels upright, " << other << " turned");
+  CHECK(plain > 0.3);
+  CHECK(other > 0.8 * plain);
+}
+
+TEST_CASE("photos of different things agree in next to no depth") {
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 9; ++i) {
+    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
+    photos.push_back(photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90),
+                              [i](const CameraRay& ray) {
+                                CameraRay elsewhere = ray;
+                                elsewhere.origin += glm::dvec3(0, 9.7 * i, 13.1 * i);
+                                return wall(elsewhere);
+                              }));
+  }
+  const double share = agreed_share(photos, {0.6, 3.0, 30.0}, 5);
+  MESSAGE(share << " of the pixels agree");
+  CHECK(share < 0.012);
 }
 
 TEST_CASE("photos without a common view give no sure points and do not fail") {

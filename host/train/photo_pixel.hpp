@@ -12,8 +12,8 @@
 
 namespace raysplats {
 
-/// A random place in a random photo, and what is there.
-struct RandomPixel {
+/// A place in a photo, and what is there.
+struct PhotoPixel {
   std::size_t view = 0;
   glm::dvec2 point;  ///< in pixels
   CameraRay ray;
@@ -23,7 +23,10 @@ struct RandomPixel {
   bool shows() const { return ray.valid && color.w >= 0.5; }
 };
 
-/// Draws three numbers; `photos` is not empty.
-RandomPixel random_pixel(std::span<const SmallPhoto> photos, CounterRng& rng);
+/// What a photo shows at a point inside it.
+PhotoPixel pixel_at(std::span<const SmallPhoto> photos, std::size_t view, const glm::dvec2& point);
+
+/// A random place in a random photo. Draws three numbers; `photos` is not empty.
+PhotoPixel random_pixel(std::span<const SmallPhoto> photos, CounterRng& rng);
 
 }  // namespace raysplats
