@@ -8,7 +8,7 @@
 #include "raysplats/dataset.hpp"
 #include "train/initialization.hpp"
 #include "train/photo_set.hpp"
-#include "train/plane_sweep.hpp"
+#include "train/depth_range.hpp"
 
 namespace raysplats {
 

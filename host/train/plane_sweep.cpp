@@ -8,7 +8,6 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -16,6 +15,7 @@
 
 #include "scene/camera_model.hpp"
 #include "scene/statistics.hpp"
+#include "train/photo_match.hpp"
 #include "train/photo_pixel.hpp"
 #include "train/point_cloud.hpp"
 #include "util/parallel.hpp"
@@ -29,18 +29,8 @@ constexpr std::uint64_t kSweepStream = 0x7377656570;
 constexpr std::uint64_t kProbeStream = 0x70726f6265;
 constexpr std::size_t kTriesPerPoint = 4;
 
-constexpr std::size_t kNeighbours = 5;  // photos that a sweep compares with
-constexpr double kLeastBase = 1e-3;     // between them, of the distance of what they show
-constexpr std::size_t kDepths = 128;
-constexpr double kAgreement = 0.012;    // largest mean squared difference of what agrees
-constexpr double kClear = 0.5;          // and the best depth's share of the median one
-constexpr double kUnique = 0.7;         // and of the best one elsewhere: patterns repeat
-constexpr double kSameDepth = 1.1;      // that another photo finds, as a factor
-constexpr std::size_t kWitnesses = 2;   // photos that are asked for it
-constexpr double kRounding = 1e-5;      // a difference that 8 bits make of none
-constexpr double kElsewhere = 1.28;     // from the best depth, as a factor
-constexpr double kMostStretched = 8.0;  // pixels that one spans elsewhere: more is a picture's seam
-constexpr double kColourWidths = 0.3;   // of a photo, that black and white in a channel are apart
+constexpr double kLeastBase = 1e-3;    // between them, of the distance of what they show
+constexpr double kColourWidths = 0.3;  // of a photo, that black and white in a channel are apart
 constexpr double kNearest = 0.2, kFarthest = 10.0;  // depths of a sweep, times the typical one
 
 // The search for the typical depth, from kNearest times the guess on.
@@ -62,9 +52,9 @@ glm::dvec3 axis_of(const SmallPhoto& photo) {
   return camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height).direction;
 }
 
-// Of photos with their ranks those of the least, at most kNeighbours.
+// Of photos with their ranks those of the least, at most kMostCompared.
 std::vector<std::size_t> foremost(std::vector<std::pair<double, std::size_t>> ranked) {
-  const std::size_t count = std::min(kNeighbours, ranked.size());
+  const std::size_t count = std::min(kMostCompared, ranked.size());
   std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count),
                     ranked.end());
   std::vector<std::size_t> out(count);
@@ -88,148 +78,8 @@ std::vector<std::size_t> neighbours_of(std::span<const SmallPhoto> photos,
   return foremost(std::move(ranked));
 }
 
-struct Patch {
-  std::array<glm::dvec3, 9> colors;
-};
-
-// The pixels around a point, those to the right of each other `right` apart.
-Patch patch_at(const SmallPhoto& photo,
-               const glm::dvec2& point,
-               const glm::dvec2& right = {1, 0},
-               const glm::dvec2& down = {0, 1}) {
-  Patch out;
-  for (int k = 0; k < 9; ++k) {
-    const int row = k / 3;
-    const glm::dvec2 offset = (k % 3 - 1.0) * right + (row - 1.0) * down;
-    out.colors[static_cast<std::size_t>(k)] = glm::dvec3(photo.at(point + offset));
-  }
-  return out;
-}
-
-// A pixel with those around it, as a photo shows them, and where other photos look for them.
-class PatchRays {
- public:
-  PatchRays(const SmallPhoto& photo, const PhotoPixel& pixel)
-      : ray_(pixel.ray),
-        right_(camera_ray(photo.camera, pixel.point.x + 1, pixel.point.y)),
-        down_(camera_ray(photo.camera, pixel.point.x, pixel.point.y + 1)),
-        patch_(patch_at(photo, pixel.point)) {}
-
-  const Patch& patch() const { return patch_; }
-
-  /// What the other photo shows of them if they are at that depth; nothing where it does not see
-  /// it.
-  std::optional<Patch> seen_by(const SmallPhoto& other, double depth) const {
-    const auto point = other.sees(at(ray_, depth));
-    if (!point || other.at(*point).w < 0.5) return std::nullopt;
-    // Photos are turned against each other, as of a drone that flies back beside where it came.
-    const auto right = project(other.camera, at(right_, depth));
-    const auto down = project(other.camera, at(down_, depth));
-    if (!right_.valid || !down_.valid || !right || !down) return patch_at(other, *point);
-    const glm::dvec2 to_right = *right - *point, to_down = *down - *point;
-    const bool torn =
-        glm::length(to_right) > kMostStretched || glm::length(to_down) > kMostStretched;
-    return torn ? patch_at(other, *point) : patch_at(other, *point, to_right, to_down);
-  }
-
- private:
-  static glm::dvec3 at(const CameraRay& ray, double depth) {
-    return ray.origin + depth * ray.direction;
-  }
-  CameraRay ray_, right_, down_;
-  Patch patch_;
-};
-
-double difference(const Patch& a, const Patch& b) {
-  double sum = 0;
-  for (std::size_t k = 0; k < a.colors.size(); ++k) {
-    const glm::dvec3 d = a.colors[k] - b.colors[k];
-    sum += glm::dot(d, d);
-  }
-  return sum / static_cast<double>(3 * a.colors.size());
-}
-
 // A shell beyond that depth, and what may stand before it.
 DepthRange open_range(double depth) { return {depth / kFarthest, 2.0 * depth, 3.0 * depth, true}; }
-
-// How much the neighbours differ from the photo if what it shows is at that depth, or -1 where few
-// see it.
-double cost_at(std::span<const SmallPhoto> photos,
-               std::span<const std::size_t> neighbours,
-               const PatchRays& pixel,
-               double depth) {
-  std::array<double, kNeighbours> differences{};
-  std::size_t count = 0;
-  for (const std::size_t i : neighbours) {
-    const auto seen = pixel.seen_by(photos[i], depth);
-    if (seen) differences[count++] = difference(pixel.patch(), *seen);
-  }
-  if (2 * count < neighbours.size() || count < 2) return -1;
-  // The better half: what hides the point from some photos does not speak against it.
-  const std::size_t half = (count + 1) / 2 + (count > 3 ? 1 : 0);
-  const auto begin = differences.begin();
-  std::partial_sort(begin, begin + static_cast<std::ptrdiff_t>(half),
-                    begin + static_cast<std::ptrdiff_t>(count));
-  double sum = 0;
-  for (std::size_t k = 0; k < half; ++k) sum += differences[k];
-  return sum / static_cast<double>(half);
-}
-
-// The costs at depths of even steps of the logarithm, of which those below 0 are unknown.
-std::vector<double> costs_along(std::span<const SmallPhoto> photos,
-                                std::span<const std::size_t> neighbours,
-                                const PatchRays& pixel,
-                                const DepthRange& depths,
-                                std::size_t steps) {
-  std::vector<double> costs(steps);
-  for (std::size_t step = 0; step < steps; ++step) {
-    const double share = static_cast<double>(step) / static_cast<double>(steps - 1);
-    costs[step] = cost_at(photos, neighbours, pixel, depths.at(share));
-  }
-  return costs;
-}
-
-// The step of the least known cost; `costs` has a known one.
-std::size_t best_step(std::span<const double> costs) {
-  std::size_t best = costs.size();
-  for (std::size_t step = 0; step < costs.size(); ++step) {
-    if (costs[step] >= 0 && (best == costs.size() || costs[step] < costs[best])) best = step;
-  }
-  return best;
-}
-
-// The known cost that the share `rank` of the known ones lies below; nothing when less than a
-// quarter is known.
-std::optional<double> known_cost(std::span<const double> costs, double rank) {
-  std::vector<double> known;
-  std::copy_if(costs.begin(), costs.end(), std::back_inserter(known),
-               [](double cost) { return cost >= 0; });
-  if (known.empty() || known.size() < costs.size() / 4) return std::nullopt;
-  const auto place =
-      known.begin() + static_cast<std::ptrdiff_t>(rank * static_cast<double>(known.size()));
-  std::nth_element(known.begin(), place, known.end());
-  return *place;
-}
-
-// The depth along the ray at which the neighbours agree with the photo, if there is one.
-std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
-                                   std::span<const std::size_t> neighbours,
-                                   const PatchRays& pixel,
-                                   const DepthRange& depths) {
-  const std::vector<double> costs = costs_along(photos, neighbours, pixel, depths, kDepths);
-  const std::optional<double> middle = known_cost(costs, 0.5);
-  if (!middle) return std::nullopt;
-  const std::size_t best = best_step(costs);
-  if (costs[best] > kAgreement || costs[best] >= kClear * *middle) return std::nullopt;
-  const double step_log = std::log(depths.farthest / depths.nearest) / (kDepths - 1);
-  const auto near = static_cast<std::size_t>(std::log(kElsewhere) / step_log);
-  for (std::size_t step = 0; step < kDepths; ++step) {
-    const bool elsewhere = step + near < best || step > best + near;
-    const bool as_good = costs[best] + kRounding > kUnique * (costs[step] + kRounding);
-    if (elsewhere && costs[step] >= 0 && as_good) return std::nullopt;
-  }
-  return depths.at(static_cast<double>(best) / (kDepths - 1));
-}
 
 // Where in the range what has no clear depth begins: about the typical depth.
 double unsure_share(const DepthRange& depths) {
@@ -244,28 +94,6 @@ struct Sample {
   glm::dvec3 position() const { return pixel.ray.origin + depth * pixel.ray.direction; }
 };
 
-// Whether another photo that shows what the pixel does finds the depth too: photos agree by chance
-// at many a wrong one, but seldom from both sides.
-bool confirmed(std::span<const SmallPhoto> photos,
-               const std::vector<std::vector<std::size_t>>& neighbours,
-               const PhotoPixel& pixel,
-               double depth,
-               const DepthRange& depths) {
-  const glm::dvec3 world = pixel.ray.origin + depth * pixel.ray.direction;
-  std::size_t asked = 0;
-  for (const std::size_t i : neighbours[pixel.view]) {
-    const auto point = photos[i].sees(world);
-    if (!point) continue;
-    const PhotoPixel other = pixel_at(photos, i, *point);
-    if (!other.shows()) continue;
-    const auto found = agreed_depth(photos, neighbours[i], PatchRays(photos[i], other), depths);
-    const double there = glm::distance(world, other.ray.origin);
-    if (found && std::abs(std::log(*found / there)) < std::log(kSameDepth)) return true;
-    if (++asked == kWitnesses) return false;
-  }
-  return false;
-}
-
 Sample sweep_pixel(std::span<const SmallPhoto> photos,
                    const std::vector<std::vector<std::size_t>>& neighbours,
                    const DepthRange& depths,
@@ -277,10 +105,9 @@ Sample sweep_pixel(std::span<const SmallPhoto> photos,
   const double jitter = rng.uniform();
   Sample out{pixel};
   if (!pixel.shows()) return out;
-  const auto depth =
-      agreed_depth(photos, neighbours[pixel.view], PatchRays(photos[pixel.view], pixel), depths);
-  out.agreed = depth && confirmed(photos, neighbours, pixel, *depth, depths);
-  out.depth = out.agreed ? *depth : depths.at(jitter + (1.0 - jitter) * unsure_share(depths));
+  const auto depth = confirmed_depth(photos, neighbours, pixel, depths);
+  out.agreed = depth.has_value();
+  out.depth = depth ? *depth : depths.at(jitter + (1.0 - jitter) * unsure_share(depths));
   return out;
 }
 
@@ -391,13 +218,13 @@ Probe probe_pixel(std::span<const SmallPhoto> photos,
   CounterRng rng(seed, kProbeStream, 8 * index);
   const PhotoPixel pixel = random_pixel(photos, rng);
   if (!pixel.shows()) return {};
-  const std::vector<double> costs = costs_along(
-      photos, neighbours[pixel.view], PatchRays(photos[pixel.view], pixel), depths, kProbeDepths);
+  const std::vector<double> costs =
+      match_costs(photos, neighbours[pixel.view], pixel, depths, kProbeDepths);
   // Depths at which photos cannot differ any more are as good as the best one, and may be most.
   const std::optional<double> wrong = known_cost(costs, 0.75);
   if (!wrong) return {};
   std::size_t best = best_step(costs);
-  if (costs[best] > kAgreement || costs[best] >= kClear * *wrong) return {};
+  if (!agrees(costs[best], *wrong)) return {};
   const double enough = kAsGood * costs[best] + kFloorCost;
   std::size_t last = best;
   while (last + 1 < costs.size() && costs[last + 1] >= 0 && costs[last + 1] <= enough) ++last;
@@ -427,8 +254,6 @@ DepthRange settled(std::span<const SmallPhoto> photos, DepthRange depths, std::u
 }
 
 }  // namespace
-
-double DepthRange::at(double share) const { return nearest * std::pow(farthest / nearest, share); }
 
 DepthRange depths_around(double typical) {
   return {kNearest * typical, typical, kFarthest * typical};

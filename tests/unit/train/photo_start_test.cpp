@@ -14,6 +14,7 @@
 #include "scene/camera_model.hpp"
 #include "test_photos.hpp"
 #include "train/initialization.hpp"
+#include "train/plane_sweep.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

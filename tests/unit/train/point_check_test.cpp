@@ -11,6 +11,7 @@
 #include "test_photos.hpp"
 #include "train/initialization.hpp"
 #include "train/photo_start.hpp"
+#include "train/plane_sweep.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

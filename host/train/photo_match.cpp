@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/photo_match.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <iterator>
+
+#include "scene/camera_model.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kDepths = 128;
+constexpr double kAgreement = 0.012;    // largest mean squared difference of what agrees
+constexpr double kClear = 0.5;          // and the best depth's share of the median one
+constexpr double kUnique = 0.7;         // and of the best one elsewhere: patterns repeat
+constexpr double kRounding = 1e-5;      // a difference that 8 bits make of none
+constexpr double kElsewhere = 1.28;     // from the best depth, as a factor
+constexpr double kMostStretched = 8.0;  // pixels that one spans elsewhere: more is a picture's seam
+constexpr double kSameDepth = 1.1;      // that another photo finds, as a factor
+constexpr std::size_t kWitnesses = 2;   // photos that are asked for it
+
+struct Patch {
+  std::array<glm::dvec3, 9> colors;
+};
+
+// The pixels around a point, those to the right of each other `right` apart.
+Patch patch_at(const SmallPhoto& photo,
+               const glm::dvec2& point,
+               const glm::dvec2& right = {1, 0},
+               const glm::dvec2& down = {0, 1}) {
+  Patch out;
+  for (int k = 0; k < 9; ++k) {
+    const int row = k / 3;
+    const glm::dvec2 offset = (k % 3 - 1.0) * right + (row - 1.0) * down;
+    out.colors[static_cast<std::size_t>(k)] = glm::dvec3(photo.at(point + offset));
+  }
+  return out;
+}
+
+// A pixel with those around it, as a photo shows them, and where other photos look for them.
+class PatchRays {
+ public:
+  PatchRays(const SmallPhoto& photo, const PhotoPixel& pixel)
+      : ray_(pixel.ray),
+        right_(camera_ray(photo.camera, pixel.point.x + 1, pixel.point.y)),
+        down_(camera_ray(photo.camera, pixel.point.x, pixel.point.y + 1)),
+        patch_(patch_at(photo, pixel.point)) {}
+
+  const Patch& patch() const { return patch_; }
+
+  /// What the other photo shows of them if they are at that depth; nothing where it does not see
+  /// it.
+  std::optional<Patch> seen_by(const SmallPhoto& other, double depth) const {
+    const auto point = other.sees(at(ray_, depth));
+    if (!point || other.at(*point).w < 0.5) return std::nullopt;
+    // Photos are turned against each other, as of a drone that flies back beside where it came.
+    const auto right = project(other.camera, at(right_, depth));
+    const auto down = project(other.camera, at(down_, depth));
+    if (!right_.valid || !down_.valid || !right || !down) return patch_at(other, *point);
+    const glm::dvec2 to_right = *right - *point, to_down = *down - *point;
+    const bool torn =
+        glm::length(to_right) > kMostStretched || glm::length(to_down) > kMostStretched;
+    return torn ? patch_at(other, *point) : patch_at(other, *point, to_right, to_down);
+  }
+
+ private:
+  static glm::dvec3 at(const CameraRay& ray, double depth) {
+    return ray.origin + depth * ray.direction;
+  }
+  CameraRay ray_, right_, down_;
+  Patch patch_;
+};
+
+double difference(const Patch& a, const Patch& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < a.colors.size(); ++k) {
+    const glm::dvec3 d = a.colors[k] - b.colors[k];
+    sum += glm::dot(d, d);
+  }
+  return sum / static_cast<double>(3 * a.colors.size());
+}
+
+// How much the neighbours differ from the photo if what it shows is at that depth, or -1 where few
+// see it.
+double cost_at(std::span<const SmallPhoto> photos,
+               std::span<const std::size_t> neighbours,
+               const PatchRays& pixel,
+               double depth) {
+  std::array<double, kMostCompared> differences{};
+  std::size_t count = 0;
+  for (const std::size_t i : neighbours) {
+    const auto seen = pixel.seen_by(photos[i], depth);
+    if (seen) differences[count++] = difference(pixel.patch(), *seen);
+  }
+  if (2 * count < neighbours.size() || count < 2) return -1;
+  // The better half: what hides the point from some photos does not speak against it.
+  const std::size_t half = (count + 1) / 2 + (count > 3 ? 1 : 0);
+  const auto begin = differences.begin();
+  std::partial_sort(begin, begin + static_cast<std::ptrdiff_t>(half),
+                    begin + static_cast<std::ptrdiff_t>(count));
+  double sum = 0;
+  for (std::size_t k = 0; k < half; ++k) sum += differences[k];
+  return sum / static_cast<double>(half);
+}
+
+// The depth along the ray at which the neighbours agree with the photo, if there is one.
+std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
+                                   std::span<const std::size_t> neighbours,
+                                   const PhotoPixel& pixel,
+                                   const DepthRange& depths) {
+  const std::vector<double> costs = match_costs(photos, neighbours, pixel, depths, kDepths);
+  const std::optional<double> middle = known_cost(costs, 0.5);
+  if (!middle) return std::nullopt;
+  const std::size_t best = best_step(costs);
+  if (!agrees(costs[best], *middle)) return std::nullopt;
+  const double step_log = std::log(depths.farthest / depths.nearest) / (kDepths - 1);
+  const auto near = static_cast<std::size_t>(std::log(kElsewhere) / step_log);
+  for (std::size_t step = 0; step < kDepths; ++step) {
+    const bool elsewhere = step + near < best || step > best + near;
+    const bool as_good = costs[best] + kRounding > kUnique * (costs[step] + kRounding);
+    if (elsewhere && costs[step] >= 0 && as_good) return std::nullopt;
+  }
+  return depths.at(static_cast<double>(best) / (kDepths - 1));
+}
+
+// Whether another photo that shows what the pixel does finds the depth too: photos agree by chance
+// at many a wrong one, but seldom from both sides.
+bool confirmed(std::span<const SmallPhoto> photos,
+               std::span<const std::vector<std::size_t>> neighbours,
+               const PhotoPixel& pixel,
+               double depth,
+               const DepthRange& depths) {
+  const glm::dvec3 world = pixel.ray.origin + depth * pixel.ray.direction;
+  std::size_t asked = 0;
+  for (const std::size_t i : neighbours[pixel.view]) {
+    const auto point = photos[i].sees(world);
+    if (!point) continue;
+    const PhotoPixel other = pixel_at(photos, i, *point);
+    if (!other.shows()) continue;
+    const auto found = agreed_depth(photos, neighbours[i], other, depths);
+    const double there = glm::distance(world, other.ray.origin);
+    if (found && std::abs(std::log(*found / there)) < std::log(kSameDepth)) return true;
+    if (++asked == kWitnesses) return false;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<double> match_costs(std::span<const SmallPhoto> photos,
+                                std::span<const std::size_t> neighbours,
+                                const PhotoPixel& pixel,
+                                const DepthRange& depths,
+                                std::size_t steps) {
+  const PatchRays rays(photos[pixel.view], pixel);
+  std::vector<double> costs(steps);
+  for (std::size_t step = 0; step < steps; ++step) {
+    const double share = static_cast<double>(step) / static_cast<double>(steps - 1);
+    costs[step] = cost_at(photos, neighbours, rays, depths.at(share));
+  }
+  return costs;
+}
+
+std::size_t best_step(std::span<const double> costs) {
+  std::size_t best = costs.size();
+  for (std::size_t step = 0; step < costs.size(); ++step) {
+    if (costs[step] >= 0 && (best == costs.size() || costs[step] < costs[best])) best = step;
+  }
+  return best;
+}
+
+std::optional<double> known_cost(std::span<const double> costs, double rank) {
+  std::vector<double> known;
+  std::copy_if(costs.begin(), costs.end(), std::back_inserter(known),
+               [](double cost) { return cost >= 0; });
+  if (known.empty() || known.size() < costs.size() / 4) return std::nullopt;
+  const auto place =
+      known.begin() + static_cast<std::ptrdiff_t>(rank * static_cast<double>(known.size()));
+  std::nth_element(known.begin(), place, known.end());
+  return *place;
+}
+
+bool agrees(double cost, double other) { return cost <= kAgreement && cost < kClear * other; }
+
+std::optional<double> confirmed_depth(std::span<const SmallPhoto> photos,
+                                      std::span<const std::vector<std::size_t>> neighbours,
+                                      const PhotoPixel& pixel,
+                                      const DepthRange& depths) {
+  const auto depth = agreed_depth(photos, neighbours[pixel.view], pixel, depths);
+  return depth && confirmed(photos, neighbours, pixel, *depth, depths) ? depth : std::nullopt;
+}
+
+}  // namespace raysplats
