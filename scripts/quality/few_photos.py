@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A COLMAP data set (images/, sparse/0/*.bin) with few of its photos, for docs/training.md: TRAIN evenly spread training
-photos and a third as many held-out ones, of those that the whole data set holds out (every eighth). They are named so that
+"""A COLMAP data set (images/ or a reduced images_N/, sparse/0/*.bin) with few of its photos, for docs/training.md: TRAIN
+evenly spread training photos and a third as many held-out ones, of those that the whole data set holds out (every eighth). They are named so that
 `raysplats train OUT --test-every 4` holds out the same ones. Of the sparse points those stay that two training photos show.
 
 usage: scripts/quality/few_photos.py DATA OUT TRAIN        (OUT must not exist; its photos are links)"""
@@ -10,6 +10,7 @@ import struct
 import sys
 
 HELD_OUT, TEST_EVERY = 8, 4
+FOLDERS = ("images", "images_2", "images_4", "images_8")
 
 
 class Reader:
@@ -68,12 +69,15 @@ def main():
     train = spread(others, count)
     turns, tests = iter(train), iter(spread(held_out, count // 3))
     order = [next(tests if i % TEST_EVERY == 0 else turns) for i in range(count + count // 3)]
-    (out / "images").mkdir(parents=True)
+    photos = next((data / name for name in FOLDERS if (data / name / images[0][0]).exists()), None)
+    if photos is None:
+        sys.exit(f"{data} has {images[0][0]} in none of {', '.join(FOLDERS)}")
+    (out / photos.name).mkdir(parents=True)
     (out / "sparse/0").mkdir(parents=True)
     rows = []
     for i, (name, _, pose, seen) in enumerate(order):
         renamed = f"{i:03d}_{pathlib.Path(name).name}"
-        (out / "images" / renamed).symlink_to((data / "images" / name).resolve())
+        (out / photos.name / renamed).symlink_to((photos / name).resolve())
         rows.append(pose + renamed.encode() + b"\0" + seen)
     points = kept_points(data / "sparse/0/points3D.bin", {image[1] for image in train})
     for name, parts in (("images.bin", rows), ("points3D.bin", points)):
