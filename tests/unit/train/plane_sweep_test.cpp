@@ -151,7 +151,8 @@ TEST_CASE("cameras side by side find the depth of the wall, however far away it 
   // As from a drone: axes are parallel, and a photo shares its view with its next neighbours only.
   std::vector<SmallPhoto> photos;
   for (int i = 0; i < 25; ++i) {
-    const double y = 1.8 * (i % 5 - 2), z = 1.4 * (i / 5 - 2);
+    const int row = i / 5;
+    const double y = 1.8 * (i % 5 - 2), z = 1.4 * (row - 2);
     photos.push_back(photo_of(look_at({0, y, z}, {4, y, z}, {0, 0, 1}, 96, 72, 90), wall));
   }
   for (const double guess : {4.0, 20.0}) {
