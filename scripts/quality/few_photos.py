@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """A COLMAP data set (images/ or a reduced images_N/, sparse/0/*.bin) with few of its photos, for docs/training.md: TRAIN
-evenly spread training photos and a third as many held-out ones, of those that the whole data set holds out (every eighth). They are named so that
-`raysplats train OUT --test-every 4` holds out the same ones. Of the sparse points those stay that two training photos show.
+evenly spread training photos and a third as many held-out ones, of those that the whole data set holds out (every
+eighth). They are named so that `raysplats train OUT --test-every 4` holds out the same ones. Of the sparse points those
+stay that two training photos show.
 
 usage: scripts/quality/few_photos.py DATA OUT TRAIN        (OUT must not exist; its photos are links)"""
 import pathlib

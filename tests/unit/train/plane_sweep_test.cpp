@@ -78,14 +78,12 @@ TEST_CASE("photos turned against each other tell as much of depth") {
 
 TEST_CASE("photos of different things agree in next to no depth") {
   std::vector<SmallPhoto> photos;
-  for (int i = 0; i < 9; ++i) {
-    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
-    photos.push_back(photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90),
-                              [i](const CameraRay& ray) {
-                                CameraRay elsewhere = ray;
-                                elsewhere.origin += glm::dvec3(0, 9.7 * i, 13.1 * i);
-                                return wall(elsewhere);
-                              }));
+  for (const SmallPhoto& photo : photos_of_wall()) {
+    const glm::dvec3 shift = static_cast<double>(photos.size()) * glm::dvec3(0, 9.7, 13.1);
+    photos.push_back(photo_of(photo.camera, [shift](CameraRay ray) {
+      ray.origin += shift;
+      return wall(ray);
+    }));
   }
   const double share = agreed_share(photos, {0.6, 3.0, 30.0}, 5);
   MESSAGE(share << " of the pixels agree");
