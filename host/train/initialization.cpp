@@ -206,7 +206,13 @@ PointCloud photo_points(const Dataset& dataset,
     return scattered_points(photos, region, depths_around(guess), count, seed);
   }
   if (depths) return swept_points(photos, *depths, count, kUnsureBeside, seed);
-  return swept_points(photos, swept_depths(photos, guess, seed), count, kUnsureShare, seed);
+  const DepthRange found = swept_depths(photos, guess, seed);
+  spdlog::debug(
+      "the photos show what is {:.3g} to {:.3g} away, typically {:.3g} ({:.3g} by the "
+      "cameras){}",
+      found.nearest, found.farthest, found.typical, guess,
+      found.open ? "; they leave depths open" : "");
+  return swept_points(photos, found, count, kUnsureShare, seed);
 }
 
 // What of the points that photos tell of goes beside sparse ones, and where those that tell it

@@ -11,18 +11,21 @@
 #include <iterator>
 
 #include "scene/camera_model.hpp"
+#include "scene/statistics.hpp"
 
 namespace raysplats {
 namespace {
 
-constexpr std::size_t kDepths = 128;
+constexpr std::size_t kDepths = 128;  // that are looked at, more of them where
+constexpr double kMostMoved = 2.0;    // pixels would lie between one and the next
+constexpr std::size_t kMostFiner = 32;
 constexpr double kAgreement = 0.012;    // largest mean squared difference of what agrees
 constexpr double kClear = 0.5;          // and the best depth's share of the median one
 constexpr double kUnique = 0.7;         // and of the best one elsewhere: patterns repeat
 constexpr double kRounding = 1e-5;      // a difference that 8 bits make of none
-constexpr double kElsewhere = 1.28;     // from the best depth, as a factor
+constexpr std::size_t kElsewhere = 8;   // steps from the best depth
 constexpr double kMostStretched = 8.0;  // pixels that one spans elsewhere: more is a picture's seam
-constexpr double kSameDepth = 1.1;      // that another photo finds, as a factor
+constexpr double kSameDepth = 3.1;      // steps, from which another photo finds it
 constexpr std::size_t kWitnesses = 2;   // photos that are asked for it
 
 struct Patch {
@@ -109,24 +112,91 @@ double cost_at(std::span<const SmallPhoto> photos,
   return sum / static_cast<double>(half);
 }
 
+// Depths along a ray, evenly by the logarithm.
+struct DepthSteps {
+  DepthRange depths;
+  std::size_t count = 0;
+  double at(std::size_t step) const {
+    return depths.at(static_cast<double>(step) / static_cast<double>(count - 1));
+  }
+  double log_step() const {
+    return std::log(depths.farthest / depths.nearest) / static_cast<double>(count - 1);
+  }
+};
+
+bool seen_by_enough(std::span<const SmallPhoto> photos,
+                    std::span<const std::size_t> neighbours,
+                    const glm::dvec3& world) {
+  const auto seen = std::count_if(neighbours.begin(), neighbours.end(),
+                                  [&](std::size_t i) { return photos[i].sees(world).has_value(); });
+  return 2 * static_cast<std::size_t>(seen) >= neighbours.size() && seen > 1;
+}
+
+// How many pixels the neighbours would show between two points, in the middle of them.
+double apart(std::span<const SmallPhoto> photos,
+             std::span<const std::size_t> neighbours,
+             const glm::dvec3& from,
+             const glm::dvec3& to) {
+  std::vector<double> found;
+  for (const std::size_t i : neighbours) {
+    const auto a = project(photos[i].camera, from), b = project(photos[i].camera, to);
+    if (a && b) found.push_back(glm::distance(*a, *b));
+  }
+  return found.empty() ? 0 : quantiles(found, std::array<double, 1>{0.5})[0];
+}
+
+// The depths at which a pixel is looked for. Through a long lens photos show together but a small
+// part of the range, which a step of the usual length leaps over: there it is cut into shorter
+// ones.
+DepthSteps steps_of(std::span<const SmallPhoto> photos,
+                    std::span<const std::size_t> neighbours,
+                    const PhotoPixel& pixel,
+                    const DepthRange& depths) {
+  const DepthSteps usual{depths, kDepths};
+  const auto at = [&](double depth) { return pixel.ray.origin + depth * pixel.ray.direction; };
+  const double moved = apart(photos, neighbours, at(depths.typical),
+                             at(depths.typical * std::exp(usual.log_step())));
+  const auto finer = std::min(kMostFiner, static_cast<std::size_t>(std::ceil(moved / kMostMoved)));
+  if (finer <= 1) return usual;
+  std::size_t first = kDepths, last = 0;
+  for (std::size_t step = 0; step < kDepths; ++step) {
+    if (!seen_by_enough(photos, neighbours, at(usual.at(step)))) continue;
+    first = std::min(first, step);
+    last = step;
+  }
+  if (first == kDepths) return usual;
+  first -= first > 0 ? 1 : 0;
+  last += last + 1 < kDepths ? 1 : 0;
+  DepthSteps out{depths, finer * (last - first) + 1};
+  out.depths.nearest = usual.at(first);
+  out.depths.farthest = usual.at(last);
+  return out;
+}
+
+// A depth at which photos agree, and how far apart those are that they were asked for.
+struct AgreedDepth {
+  double depth = 0;
+  double log_step = 0;
+};
+
 // The depth along the ray at which the neighbours agree with the photo, if there is one.
-std::optional<double> agreed_depth(std::span<const SmallPhoto> photos,
-                                   std::span<const std::size_t> neighbours,
-                                   const PhotoPixel& pixel,
-                                   const DepthRange& depths) {
-  const std::vector<double> costs = match_costs(photos, neighbours, pixel, depths, kDepths);
+std::optional<AgreedDepth> agreed_depth(std::span<const SmallPhoto> photos,
+                                        std::span<const std::size_t> neighbours,
+                                        const PhotoPixel& pixel,
+                                        const DepthRange& depths) {
+  const DepthSteps steps = steps_of(photos, neighbours, pixel, depths);
+  const std::vector<double> costs =
+      match_costs(photos, neighbours, pixel, steps.depths, steps.count);
   const std::optional<double> middle = known_cost(costs, 0.5);
   if (!middle) return std::nullopt;
   const std::size_t best = best_step(costs);
   if (!agrees(costs[best], *middle)) return std::nullopt;
-  const double step_log = std::log(depths.farthest / depths.nearest) / (kDepths - 1);
-  const auto near = static_cast<std::size_t>(std::log(kElsewhere) / step_log);
-  for (std::size_t step = 0; step < kDepths; ++step) {
-    const bool elsewhere = step + near < best || step > best + near;
+  for (std::size_t step = 0; step < costs.size(); ++step) {
+    const bool elsewhere = step + kElsewhere < best || step > best + kElsewhere;
     const bool as_good = costs[best] + kRounding > kUnique * (costs[step] + kRounding);
     if (elsewhere && costs[step] >= 0 && as_good) return std::nullopt;
   }
-  return depths.at(static_cast<double>(best) / (kDepths - 1));
+  return AgreedDepth{steps.at(best), steps.log_step()};
 }
 
 // Whether another photo that shows what the pixel does finds the depth too: photos agree by chance
@@ -145,7 +215,8 @@ bool confirmed(std::span<const SmallPhoto> photos,
     if (!other.shows()) continue;
     const auto found = agreed_depth(photos, neighbours[i], other, depths);
     const double there = glm::distance(world, other.ray.origin);
-    if (found && std::abs(std::log(*found / there)) < std::log(kSameDepth)) return true;
+    if (found && std::abs(std::log(found->depth / there)) < kSameDepth * found->log_step)
+      return true;
     if (++asked == kWitnesses) return false;
   }
   return false;
@@ -192,8 +263,9 @@ std::optional<double> confirmed_depth(std::span<const SmallPhoto> photos,
                                       std::span<const std::vector<std::size_t>> neighbours,
                                       const PhotoPixel& pixel,
                                       const DepthRange& depths) {
-  const auto depth = agreed_depth(photos, neighbours[pixel.view], pixel, depths);
-  return depth && confirmed(photos, neighbours, pixel, *depth, depths) ? depth : std::nullopt;
+  const auto found = agreed_depth(photos, neighbours[pixel.view], pixel, depths);
+  const bool sure = found && confirmed(photos, neighbours, pixel, found->depth, depths);
+  return sure ? std::optional(found->depth) : std::nullopt;
 }
 
 }  // namespace raysplats

@@ -42,8 +42,8 @@ constexpr double kProbeTurn = 0.15;   // 1 - cosine between photos that are comp
 constexpr double kAsGood = 1.3;       // costs up to that multiple of the best agree as well
 constexpr double kFloorCost = 1e-4;   // of photos' noise
 constexpr double kWrongGuess = 3.0;   // factor
-constexpr double kDoubtShare = 0.25;  // of probes that see no end of the depths: doubts the guess
-constexpr double kOpenShare = 0.5;    // and leaves most depths open
+constexpr double kOpenShare = 0.5;    // of probes that see no end of the depths: most are open
+constexpr double kClearlyMore = 1.2;  // times as many pixels agree about another depth
 constexpr int kRounds = 4;            // of looking for nearer depths
 constexpr double kMuchNearer = 0.65;  // than the typical one, as a share of it
 
@@ -285,11 +285,13 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
   const std::vector<double> found = quantiles(depths, ranks);
   const double open_share = static_cast<double>(open) / static_cast<double>(depths.size());
   if (open_share > kOpenShare) return open_range(found[1]);
-  // Photos far apart may agree by chance beyond what they show together, but at an end.
   const double typical = found[0];
-  if (open_share < kDoubtShare || typical < kWrongGuess * guess)
-    return settled(photos, around, seed);
-  return depths_around(typical);
+  if (typical < kWrongGuess * guess) return settled(photos, around, seed);
+  // Photos far apart may agree by chance beyond what they show together, where neighbours do not.
+  const DepthRange farther = depths_around(typical);
+  const bool better =
+      agreed_share(photos, farther, seed) > kClearlyMore * agreed_share(photos, around, seed);
+  return settled(photos, better ? farther : around, seed);
 }
 
 double agreed_share(std::span<const SmallPhoto> photos,

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <vector>
@@ -76,6 +77,31 @@ TEST_CASE("photos turned against each other tell as much of depth") {
   CHECK(other > 0.8 * plain);
 }
 
+TEST_CASE("photos through long lenses find a wall that a step of the usual length leaps over") {
+  const auto far_wall = [](const CameraRay& ray) {
+    const glm::dvec3 p = ray.origin - ray.origin.x / ray.direction.x * ray.direction;
+    return glm::dvec4(0.5 + 0.4 * std::sin(9 * p.y + 4 * p.z),
+                      0.5 + 0.4 * std::cos(8 * p.z - 5 * p.y),
+                      0.5 + 0.4 * std::sin(7 * p.y - 6 * p.z), 1.0);
+  };
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 9; ++i) {
+    const double across = 0.12 * (i % 3 - 1), up = 0.12 * (i / 3 - 1);
+    const glm::dvec3 eye(-60 * std::cos(across) * std::cos(up), 60 * std::sin(across),
+                         60 * std::sin(up));
+    photos.push_back(photo_of(look_at(eye, {0, 0, 0}, {0, 0, 1}, 80, 60, 1800), far_wall));
+  }
+  const DepthRange depths = swept_depths(photos, 60, 3);
+  CHECK(depths.typical == 60);
+  CHECK(agreed_share(photos, depths, 5) > 0.3);
+  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    near += std::abs(points.positions[3 * i]) < 0.4f ? 1 : 0;
+  MESSAGE(near << " of " << points.size() << " points on the wall");
+  CHECK(near > points.size() * 6 / 10);
+}
+
 TEST_CASE("photos of different things agree in next to no depth") {
   std::vector<SmallPhoto> photos;
   for (const SmallPhoto& photo : photos_of_wall()) {
@@ -143,6 +169,29 @@ TEST_CASE("cameras on a tripod look at what is far away") {
   const DepthRange before_white = swept_depths(studio, 3.0, 3);
   CHECK(!before_white.open);
   CHECK(before_white.typical == 3.0);
+}
+
+TEST_CASE("cameras turned at arm's length find what is around them") {
+  // Their axes meet where the one who turns stands, which tells nothing of what they look at.
+  const auto room = [](const CameraRay& ray) {
+    const double along = glm::dot(ray.origin, ray.direction);
+    const double t = std::sqrt(36.0 - glm::dot(ray.origin, ray.origin) + along * along) - along;
+    const glm::dvec3 p = ray.origin + t * ray.direction;
+    return glm::dvec4(0.5 + 0.4 * std::sin(6.1 * p.y + 2.7 * p.z) * std::sin(4.3 * p.x),
+                      0.5 + 0.4 * std::cos(5.3 * p.z - 3.1 * p.y + p.x),
+                      0.5 + 0.4 * std::sin(5.7 * p.y - 4.9 * p.x), 1.0);
+  };
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 48; ++i) {
+    const double angle = i * glm::radians(15.0);
+    const glm::dvec3 to(std::cos(angle), std::sin(angle), 0);
+    const glm::dvec3 eye = 0.4 * to + glm::dvec3(0, 0, i < 24 ? 0.2 : -0.2);
+    photos.push_back(photo_of(look_at(eye, eye + to, {0, 0, 1}, 120, 90, 100), room));
+  }
+  const DepthRange depths = swept_depths(photos, 0.4, 3);
+  CHECK(!depths.open);
+  CHECK(depths.typical > 4.0);
+  CHECK(depths.typical < 9.0);
 }
 
 TEST_CASE("cameras side by side find the depth of the wall, however far away it was guessed") {
