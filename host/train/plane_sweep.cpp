@@ -44,8 +44,10 @@ constexpr double kFloorCost = 1e-4;   // of photos' noise
 constexpr double kWrongGuess = 3.0;   // factor
 constexpr double kOpenShare = 0.5;    // of probes that see no end of the depths: most are open
 constexpr double kClearlyMore = 1.2;  // times as many pixels agree about another depth
-constexpr int kRounds = 4;            // of looking for nearer depths
+constexpr int kRounds = 4;            // of looking for other depths
 constexpr double kMuchNearer = 0.65;  // than the typical one, as a share of it
+constexpr double kMuchFarther = 2.0;
+constexpr double kEnd = 1.25;  // times the nearest or farthest depth: an end of a range
 
 glm::dvec3 axis_of(const SmallPhoto& photo) {
   const Camera& camera = photo.camera;
@@ -235,20 +237,49 @@ Probe probe_pixel(std::span<const SmallPhoto> photos,
   return {depths.at(static_cast<double>(best) / (kProbeDepths - 1)), open};
 }
 
-// The range about the depth at which pixels agree, where that is much nearer than the range's own:
-// photos to compare with are chosen by it, and those too far apart show little in common.
+// Of some pixels those that agree in a depth, and in which.
+struct Agreement {
+  std::size_t inside = 0;  // not at an end of the range, where what lies beyond piles up
+  double depth = 0;        // the median; 0 of too few
+};
+
+Agreement agreement(std::span<const SmallPhoto> photos,
+                    const DepthRange& depths,
+                    std::uint64_t seed) {
+  Sweep sweep(photos, depths, seed, kProbeStream);
+  sweep.take(kProbes);
+  Agreement out;
+  std::vector<double> found;
+  for (const Sample& sample : sweep.samples()) {
+    if (!sample.agreed) continue;
+    found.push_back(sample.depth);
+    const bool at_end =
+        sample.depth < kEnd * depths.nearest || kEnd * sample.depth > depths.farthest;
+    out.inside += at_end ? 0 : 1;
+  }
+  if (found.size() >= kFewProbes) out.depth = quantiles(found, std::array<double, 1>{0.5})[0];
+  return out;
+}
+
+bool clearly_more(const Agreement& a, const Agreement& b) {
+  return static_cast<double>(a.inside) > kClearlyMore * static_cast<double>(b.inside);
+}
+
+// The range about the depth at which pixels agree, where that is much nearer than the range's own,
+// or much farther and more of them agree about it: photos to compare with are chosen by it, and
+// those too far apart show little in common, those too near tell little of depth.
 DepthRange settled(std::span<const SmallPhoto> photos, DepthRange depths, std::uint64_t seed) {
+  Agreement here = agreement(photos, depths, seed);
   for (int round = 0; round < kRounds; ++round) {
-    Sweep sweep(photos, depths, seed, kProbeStream);
-    sweep.take(kProbes);
-    std::vector<double> found;
-    for (const Sample& sample : sweep.samples()) {
-      if (sample.agreed) found.push_back(sample.depth);
-    }
-    if (found.size() < kFewProbes) return depths;
-    const double typical = quantiles(found, std::array<double, 1>{0.5})[0];
-    if (typical > kMuchNearer * depths.typical) return depths;
-    depths = depths_around(typical);
+    if (here.depth == 0) return depths;
+    const bool nearer = here.depth < kMuchNearer * depths.typical;
+    const bool farther = here.depth > kMuchFarther * depths.typical;
+    if (!nearer && !farther) return depths;
+    const DepthRange other = depths_around(here.depth);
+    const Agreement there = agreement(photos, other, seed);
+    if (farther && !clearly_more(there, here)) return depths;
+    depths = other;
+    here = there;
   }
   return depths;
 }
@@ -286,12 +317,12 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
   const double open_share = static_cast<double>(open) / static_cast<double>(depths.size());
   if (open_share > kOpenShare) return open_range(found[1]);
   const double typical = found[0];
-  if (typical < kWrongGuess * guess) return settled(photos, around, seed);
+  const DepthRange out = settled(photos, around, seed);
+  if (typical < kWrongGuess * out.typical) return out;
   // Photos far apart may agree by chance beyond what they show together, where neighbours do not.
   const DepthRange farther = depths_around(typical);
-  const bool better =
-      agreed_share(photos, farther, seed) > kClearlyMore * agreed_share(photos, around, seed);
-  return settled(photos, better ? farther : around, seed);
+  const bool better = clearly_more(agreement(photos, farther, seed), agreement(photos, out, seed));
+  return better ? settled(photos, farther, seed) : out;
 }
 
 double agreed_share(std::span<const SmallPhoto> photos,

@@ -14,11 +14,11 @@ namespace raysplats {
 /// The range of depths around what most cameras look at, `typical`.
 DepthRange depths_around(double typical);
 
-/// The range of depths around `guess`, unless many photos cannot tell what they show from the
-/// infinitely far, as from a tripod: then it lies around what they do tell, or, where that is less
-/// than half (`open`), beyond the depth up to which they would tell it. Where pixels agree much
-/// nearer than that, as below a drone whose cameras have no common target, it lies around their
-/// depth. `guess` is positive.
+/// The range of depths around `guess`, unless photos tell of another. Where most pixels cannot tell
+/// what they show from the infinitely far, as from a tripod (`open`), it begins beyond the depth up
+/// to which they would. Where pixels agree much nearer than the guess, as below a drone whose
+/// cameras have no common target, it lies around their depth; likewise where clearly more of them
+/// agree about a farther one, as from cameras turned at arm's length. `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
 
 /// The share of random pixels at which neighbouring photos agree in one depth, which one of them

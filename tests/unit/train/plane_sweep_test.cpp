@@ -190,8 +190,45 @@ TEST_CASE("cameras turned at arm's length find what is around them") {
   }
   const DepthRange depths = swept_depths(photos, 0.4, 3);
   CHECK(!depths.open);
-  CHECK(depths.typical > 4.0);
-  CHECK(depths.typical < 9.0);
+  CHECK(depths.farthest > 9.0);
+  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    near += std::abs(glm::length(glm::dvec3(p[0], p[1], p[2])) - 6.0) < 1.0 ? 1 : 0;
+  }
+  MESSAGE(near << " of " << points.size() << " points where the room ends, typically "
+               << depths.typical);
+  CHECK(near > points.size() * 6 / 10);
+}
+
+TEST_CASE("cameras close together find what is many times their spread away") {
+  // As of a light field: what lies beyond the depths that are guessed piles up at their end.
+  const auto slope = [](const CameraRay& ray) {
+    const glm::dvec3 normal(-0.8, 0.0, 0.6);
+    const double t = (-0.8 - glm::dot(ray.origin, normal)) / glm::dot(ray.direction, normal);
+    const glm::dvec3 p = ray.origin + t * ray.direction;
+    return glm::dvec4(0.5 + 0.4 * std::sin(61 * p.y + 23 * p.z),
+                      0.5 + 0.4 * std::cos(53 * p.z - 31 * p.y),
+                      0.5 + 0.4 * std::sin(47 * p.y - 37 * p.z), 1.0);
+  };
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 25; ++i) {
+    const glm::dvec3 eye(0, 0.05 * (i % 5 - 2), 0.05 * (i / 5 - 2));
+    photos.push_back(
+        photo_of(look_at(eye, eye + glm::dvec3(1, 0, 0), {0, 0, 1}, 96, 72, 110), slope));
+  }
+  const DepthRange depths = swept_depths(photos, 0.14, 3);
+  CHECK(!depths.open);
+  CHECK(depths.typical > 0.5);
+  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    near += std::abs(-0.8 * p[0] + 0.6 * p[2] + 0.8) < 0.1 ? 1 : 0;
+  }
+  MESSAGE(near << " of " << points.size() << " points on the slope, typically " << depths.typical);
+  CHECK(near > points.size() * 6 / 10);
 }
 
 TEST_CASE("cameras side by side find the depth of the wall, however far away it was guessed") {
