@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -24,7 +25,9 @@ constexpr double kClearlyBetter = 0.6;      // at another scale
 constexpr std::size_t kFewerLooks = 500;    // at every scale
 constexpr int kScaleSteps = 20;             // of half an octave, up and down
 constexpr float kOneColor = 0.004f;         // no two of 256 steps apart
-constexpr std::size_t kMostPlaces = 20000;  // of points that fill cells
+constexpr std::size_t kMostPlaces = 20000;  // of points that fill cells, or hide others
+constexpr std::size_t kFewerPlaces = 2000;  // at every scale
+constexpr double kBehind = 1.15;            // times as far as the nearest in a cell: hidden
 constexpr double kEvenColors = 1e-4;        // squared difference of points that tell nothing
 
 glm::dvec3 triple(const std::vector<float>& values, std::size_t i) {
@@ -37,33 +40,88 @@ bool sees(const Camera& camera, const glm::dvec3& world) {
          point->y < camera.height;
 }
 
-// Cells of kBareCell pixels a side of a photo, and which of them show points.
-class PointCells {
+// Cells of kBareCell pixels a side of a photo.
+class Cells {
  public:
-  PointCells(const PointCloud& points, const SmallPhoto& photo)
+  explicit Cells(const SmallPhoto& photo)
       : columns_((photo.camera.width + kBareCell - 1) / kBareCell),
-        rows_((photo.camera.height + kBareCell - 1) / kBareCell),
-        taken_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {
-    const std::size_t looks = std::min(kMostPlaces, points.size());
-    for (std::size_t k = 0; k < looks; ++k) {
-      const auto place = photo.sees(triple(points.positions, k * points.size() / looks));
-      if (place) taken_[cell(*place)] = true;
-    }
+        rows_((photo.camera.height + kBareCell - 1) / kBareCell) {}
+
+  std::size_t count() const {
+    return static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   }
 
-  /// Whether the cell that contains the image point shows one; the point has to lie inside.
-  bool taken(const glm::dvec2& place) const { return taken_[cell(place)]; }
-
- private:
-  std::size_t cell(const glm::dvec2& place) const {
-    const auto along = [](double x, int count) {
-      return static_cast<std::size_t>(std::min(static_cast<int>(x) / kBareCell, count - 1));
+  /// The one that contains the image point, which has to lie inside.
+  std::size_t at(const glm::dvec2& place) const {
+    const auto along = [](double x, int cells) {
+      return static_cast<std::size_t>(std::min(static_cast<int>(x) / kBareCell, cells - 1));
     };
     return along(place.y, rows_) * static_cast<std::size_t>(columns_) + along(place.x, columns_);
   }
 
+ private:
   int columns_, rows_;
+};
+
+// Which cells of a photo show points.
+class PointCells {
+ public:
+  PointCells(const PointCloud& points, const SmallPhoto& photo)
+      : cells_(photo), taken_(cells_.count()) {
+    const std::size_t looks = std::min(kMostPlaces, points.size());
+    for (std::size_t k = 0; k < looks; ++k) {
+      const auto place = photo.sees(triple(points.positions, k * points.size() / looks));
+      if (place) taken_[cells_.at(*place)] = true;
+    }
+  }
+
+  /// Whether the cell that contains the image point shows one; the point has to lie inside.
+  bool taken(const glm::dvec2& place) const { return taken_[cells_.at(place)]; }
+
+ private:
+  Cells cells_;
   std::vector<bool> taken_;
+};
+
+// A photo, and how far away the nearest of `looks` of the points is in each of its cells: those of
+// a scan lie on all sides of things, and a photo shows what is before them.
+class PhotoBeforePoints {
+ public:
+  PhotoBeforePoints(const PointCloud& points,
+                    const SmallPhoto& photo,
+                    std::size_t looks,
+                    double scale)
+      : photo_(&photo),
+        cells_(photo),
+        nearest_(cells_.count(), std::numeric_limits<double>::infinity()) {
+    looks = std::min(looks, points.size());
+    for (std::size_t k = 0; k < looks; ++k) {
+      const glm::dvec3 world = scale * triple(points.positions, k * points.size() / looks);
+      const auto place = photo.sees(world);
+      if (!place) continue;
+      double& nearest = nearest_[cells_.at(*place)];
+      nearest = std::min(nearest, distance(world));
+    }
+  }
+
+  /// What the photo shows where the point is, unless another hides it.
+  std::optional<glm::dvec3> color(const glm::dvec3& world) const {
+    const auto place = photo_->sees(world);
+    if (!place || !photo_->known(*place)) return std::nullopt;
+    const glm::dvec4 shown = photo_->at(*place);
+    if (shown.w < 0.5 || distance(world) > kBehind * nearest_[cells_.at(*place)])
+      return std::nullopt;
+    return glm::dvec3(shown);
+  }
+
+ private:
+  double distance(const glm::dvec3& world) const {
+    return glm::distance(world, photo_->camera.center());
+  }
+
+  const SmallPhoto* photo_;
+  Cells cells_;
+  std::vector<double> nearest_;
 };
 
 // Mean of the lower half, of two at least: something may hide the point from the others.
@@ -76,11 +134,15 @@ double better_half(std::vector<double>& differences) {
   return sum / static_cast<double>(half);
 }
 
-// PointMatch::difference of `count` of the points, moved by a factor about the world's origin.
+// PointMatch::difference of `count` of the points, moved by a factor about the world's origin;
+// `hiding`: as many may hide others.
 std::optional<double> color_difference(const PointCloud& points,
                                        std::span<const SmallPhoto> photos,
                                        std::size_t count,
+                                       std::size_t hiding,
                                        double scale) {
+  std::vector<PhotoBeforePoints> shown;
+  for (const SmallPhoto& photo : photos) shown.emplace_back(points, photo, hiding, scale);
   std::size_t looks = 0;
   double own_sum = 0, other_sum = 0, apart = 0;
   std::vector<double> own, other;
@@ -91,12 +153,10 @@ std::optional<double> color_difference(const PointCloud& points,
     const std::size_t j = (k + count / 2) % count * points.size() / count;
     const glm::dvec3 color = triple(points.colors, i), wrong = triple(points.colors, j);
     own.clear(), other.clear();
-    for (const SmallPhoto& photo : photos) {
-      const std::optional<glm::dvec2> place = photo.sees(world);
-      if (!place || !photo.known(*place)) continue;
-      const glm::dvec4 shown = photo.at(*place);
-      if (shown.w < 0.5) continue;
-      const glm::dvec3 a = color - glm::dvec3(shown), b = wrong - glm::dvec3(shown);
+    for (const PhotoBeforePoints& photo : shown) {
+      const std::optional<glm::dvec3> there = photo.color(world);
+      if (!there) continue;
+      const glm::dvec3 a = color - *there, b = wrong - *there;
       own.push_back(glm::dot(a, a)), other.push_back(glm::dot(b, b));
     }
     // Along the ray of one photo every depth fits.
@@ -133,13 +193,13 @@ PointMatch match_points(const PointCloud& points,
   const std::size_t count = std::min(kLooks, points.size());
   if (count == 0) return out;
   out.seen = seen_share(points.positions, cameras);
-  out.difference = color_difference(points, photos, count, 1.0);
+  out.difference = color_difference(points, photos, count, kMostPlaces, 1.0);
   if (!out.difference) return out;
   out.scaled_difference = *out.difference;
   const std::size_t few = std::min(kFewerLooks, count);
   for (int step = -kScaleSteps; step <= kScaleSteps; ++step) {
     const double scale = std::exp2(0.5 * step);
-    const std::optional<double> other = color_difference(points, photos, few, scale);
+    const std::optional<double> other = color_difference(points, photos, few, kFewerPlaces, scale);
     if (step == 0 || !other || *other >= out.scaled_difference) continue;
     out.scale = scale;
     out.scaled_difference = *other;

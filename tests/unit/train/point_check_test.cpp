@@ -12,6 +12,7 @@
 #include "train/initialization.hpp"
 #include "train/photo_start.hpp"
 #include "train/plane_sweep.hpp"
+#include "train/point_cloud.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -79,6 +80,23 @@ TEST_CASE("points without colours, or that few photos see, are believed") {
   CHECK(!match_points(sound, cameras, {}).difference);
   CHECK(plausible(match_points(sound, cameras, {})));
   CHECK(match_points({}, cameras, photos).seen == 0);
+}
+
+TEST_CASE("points of a scan that lie behind what photos show are believed") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const std::vector<Camera> cameras = cameras_of(photos);
+  PointCloud scan = points_of_wall([](const glm::dvec3& p) { return p; });
+  CounterRng rng(7, 1);
+  for (int i = 0; i < 9000; ++i) {
+    const glm::dvec3 p(5.0 + 4.0 * rng.uniform(), 4.0 * rng.uniform() - 2.0,
+                       3.0 * rng.uniform() - 1.5);
+    append_point(scan, p, {rng.uniform(), rng.uniform(), rng.uniform()});
+  }
+  const PointMatch match = match_points(scan, cameras, photos);
+  REQUIRE(match.difference);
+  MESSAGE("differs by " << *match.difference);
+  CHECK(*match.difference < 0.3);
+  CHECK(plausible(match));
 }
 
 TEST_CASE("points of one colour start with the photos' colours") {
