@@ -17,7 +17,7 @@ namespace raysplats {
 namespace {
 
 constexpr std::size_t kDepths = 128;  // that are looked at, more of them where
-constexpr double kMostMoved = 2.0;    // pixels would lie between one and the next
+constexpr double kMostMoved = 1.0;    // pixel would lie between one and the next
 constexpr std::size_t kMostFiner = 32;
 constexpr double kAgreement = 0.012;    // largest mean squared difference of what agrees
 constexpr double kClear = 0.5;          // and the best depth's share of the median one
