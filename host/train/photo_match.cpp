@@ -16,9 +16,10 @@
 namespace raysplats {
 namespace {
 
-constexpr std::size_t kDepths = 128;  // that are looked at, more of them where
-constexpr double kMostMoved = 1.0;    // pixel would lie between one and the next
-constexpr std::size_t kMostFiner = 32;
+constexpr std::size_t kDepths = 128;    // that are looked at
+constexpr double kMostMoved = 1.0;      // pixels in other photos between two of them
+constexpr std::size_t kMostFiner = 32;  // times more of them, where that would be more
+
 constexpr double kAgreement = 0.012;    // largest mean squared difference of what agrees
 constexpr double kClear = 0.5;          // and the best depth's share of the median one
 constexpr double kUnique = 0.7;         // and of the best one elsewhere: patterns repeat
