@@ -17,7 +17,7 @@ namespace raysplats {
 namespace {
 
 constexpr std::size_t kDepths = 128;    // that are looked at
-constexpr double kMostMoved = 1.0;      // pixels in other photos between two of them
+constexpr double kMostMoved = 2.0;      // pixels in other photos between two of them
 constexpr std::size_t kMostFiner = 32;  // times more of them, where that would be more
 
 constexpr double kAgreement = 0.012;    // largest mean squared difference of what agrees
