@@ -64,7 +64,8 @@ TEST_CASE("photos turned against each other tell as much of depth") {
   };
   std::vector<SmallPhoto> upright, turned;
   for (int i = 0; i < 9; ++i) {
-    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (i / 3 - 1);
+    const int row = i / 3;
+    const double y = 0.4 * (i % 3 - 1), z = 0.4 * (row - 1);
     const glm::dvec3 eye(0, y, z), target(4, 0.5 * y, 0.5 * z);
     upright.push_back(photo_of(look_at(eye, target, ups[0], 80, 80, 90), fine));
     turned.push_back(
@@ -86,7 +87,8 @@ TEST_CASE("photos through long lenses find a wall that a step of the usual lengt
   };
   std::vector<SmallPhoto> photos;
   for (int i = 0; i < 9; ++i) {
-    const double across = 0.12 * (i % 3 - 1), up = 0.12 * (i / 3 - 1);
+    const int row = i / 3;
+    const double across = 0.12 * (i % 3 - 1), up = 0.12 * (row - 1);
     const glm::dvec3 eye(-60 * std::cos(across) * std::cos(up), 60 * std::sin(across),
                          60 * std::sin(up));
     photos.push_back(photo_of(look_at(eye, {0, 0, 0}, {0, 0, 1}, 80, 60, 1800), far_wall));
@@ -160,6 +162,7 @@ TEST_CASE("cameras on a tripod look at what is far away") {
   CHECK(depths.typical == 3.0);
   // So do those of an object before a white backdrop, which agrees with itself at any depth.
   std::vector<SmallPhoto> studio;
+  studio.reserve(photos.size());
   for (const SmallPhoto& photo : photos) {
     studio.push_back(photo_of(photo.camera, [](const CameraRay& ray) {
       const glm::dvec3 p = ray.origin + (4.0 - ray.origin.x) / ray.direction.x * ray.direction;
@@ -214,7 +217,8 @@ TEST_CASE("cameras close together find what is many times their spread away") {
   };
   std::vector<SmallPhoto> photos;
   for (int i = 0; i < 25; ++i) {
-    const glm::dvec3 eye(0, 0.05 * (i % 5 - 2), 0.05 * (i / 5 - 2));
+    const int row = i / 5;
+    const glm::dvec3 eye(0, 0.05 * (i % 5 - 2), 0.05 * (row - 2));
     photos.push_back(
         photo_of(look_at(eye, eye + glm::dvec3(1, 0, 0), {0, 0, 1}, 96, 72, 110), slope));
   }

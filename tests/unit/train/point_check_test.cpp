@@ -22,6 +22,7 @@ namespace {
 
 std::vector<Camera> cameras_of(const std::vector<SmallPhoto>& photos) {
   std::vector<Camera> out;
+  out.reserve(photos.size());
   for (const SmallPhoto& photo : photos) out.push_back(photo.camera);
   return out;
 }
