@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 namespace raysplats {
 
@@ -14,6 +15,11 @@ struct DepthRange {
 
   /// The distance at that share of the way through the range, evenly by the logarithm.
   double at(double share) const { return nearest * std::pow(farthest / nearest, share); }
+
+  /// The first, second, ... of `count` distances from the nearest to the farthest; at least two.
+  double at(std::size_t step, std::size_t count) const {
+    return at(static_cast<double>(step) / static_cast<double>(count - 1));
+  }
 };
 
 }  // namespace raysplats

@@ -47,6 +47,10 @@ Patch patch_at(const SmallPhoto& photo,
   return out;
 }
 
+glm::dvec3 point_on(const CameraRay& ray, double depth) {
+  return ray.origin + depth * ray.direction;
+}
+
 // A pixel with those around it, as a photo shows them, and where other photos look for them.
 class PatchRays {
  public:
@@ -61,11 +65,11 @@ class PatchRays {
   /// What the other photo shows of them if they are at that depth; nothing where it does not see
   /// it.
   std::optional<Patch> seen_by(const SmallPhoto& other, double depth) const {
-    const auto point = other.sees(at(ray_, depth));
+    const auto point = other.sees(point_on(ray_, depth));
     if (!point || other.at(*point).w < 0.5) return std::nullopt;
     // Photos are turned against each other, as of a drone that flies back beside where it came.
-    const auto right = project(other.camera, at(right_, depth));
-    const auto down = project(other.camera, at(down_, depth));
+    const auto right = project(other.camera, point_on(right_, depth));
+    const auto down = project(other.camera, point_on(down_, depth));
     if (!right_.valid || !down_.valid || !right || !down) return patch_at(other, *point);
     const glm::dvec2 to_right = *right - *point, to_down = *down - *point;
     const bool torn =
@@ -74,9 +78,6 @@ class PatchRays {
   }
 
  private:
-  static glm::dvec3 at(const CameraRay& ray, double depth) {
-    return ray.origin + depth * ray.direction;
-  }
   CameraRay ray_, right_, down_;
   Patch patch_;
 };
@@ -88,6 +89,11 @@ double difference(const Patch& a, const Patch& b) {
     sum += glm::dot(d, d);
   }
   return sum / static_cast<double>(3 * a.colors.size());
+}
+
+// Whether so many of the neighbours see something that what they show of it counts.
+bool enough(std::size_t seen, std::span<const std::size_t> neighbours) {
+  return seen > 1 && 2 * seen >= neighbours.size();
 }
 
 // How much the neighbours differ from the photo if what it shows is at that depth, or -1 where few
@@ -102,7 +108,7 @@ double cost_at(std::span<const SmallPhoto> photos,
     const auto seen = pixel.seen_by(photos[i], depth);
     if (seen) differences[count++] = difference(pixel.patch(), *seen);
   }
-  if (2 * count < neighbours.size() || count < 2) return -1;
+  if (!enough(count, neighbours)) return -1;
   // The better half: what hides the point from some photos does not speak against it.
   const std::size_t half = (count + 1) / 2 + (count > 3 ? 1 : 0);
   const auto begin = differences.begin();
@@ -117,21 +123,11 @@ double cost_at(std::span<const SmallPhoto> photos,
 struct DepthSteps {
   DepthRange depths;
   std::size_t count = 0;
-  double at(std::size_t step) const {
-    return depths.at(static_cast<double>(step) / static_cast<double>(count - 1));
-  }
+  double at(std::size_t step) const { return depths.at(step, count); }
   double log_step() const {
     return std::log(depths.farthest / depths.nearest) / static_cast<double>(count - 1);
   }
 };
-
-bool seen_by_enough(std::span<const SmallPhoto> photos,
-                    std::span<const std::size_t> neighbours,
-                    const glm::dvec3& world) {
-  const auto seen = std::count_if(neighbours.begin(), neighbours.end(),
-                                  [&](std::size_t i) { return photos[i].sees(world).has_value(); });
-  return 2 * static_cast<std::size_t>(seen) >= neighbours.size() && seen > 1;
-}
 
 // How many pixels the neighbours would show between two points, in the middle of them.
 double apart(std::span<const SmallPhoto> photos,
@@ -154,14 +150,18 @@ DepthSteps steps_of(std::span<const SmallPhoto> photos,
                     const PhotoPixel& pixel,
                     const DepthRange& depths) {
   const DepthSteps usual{depths, kDepths};
-  const auto at = [&](double depth) { return pixel.ray.origin + depth * pixel.ray.direction; };
-  const double moved = apart(photos, neighbours, at(depths.typical),
-                             at(depths.typical * std::exp(usual.log_step())));
+  const double next = depths.typical * std::exp(usual.log_step());
+  const double moved =
+      apart(photos, neighbours, point_on(pixel.ray, depths.typical), point_on(pixel.ray, next));
   const auto finer = std::min(kMostFiner, static_cast<std::size_t>(std::ceil(moved / kMostMoved)));
   if (finer <= 1) return usual;
   std::size_t first = kDepths, last = 0;
   for (std::size_t step = 0; step < kDepths; ++step) {
-    if (!seen_by_enough(photos, neighbours, at(usual.at(step)))) continue;
+    const glm::dvec3 world = point_on(pixel.ray, usual.at(step));
+    const auto seen = std::count_if(neighbours.begin(), neighbours.end(), [&](std::size_t i) {
+      return photos[i].sees(world).has_value();
+    });
+    if (!enough(static_cast<std::size_t>(seen), neighbours)) continue;
     first = std::min(first, step);
     last = step;
   }
@@ -207,7 +207,7 @@ bool confirmed(std::span<const SmallPhoto> photos,
                const PhotoPixel& pixel,
                double depth,
                const DepthRange& depths) {
-  const glm::dvec3 world = pixel.ray.origin + depth * pixel.ray.direction;
+  const glm::dvec3 world = point_on(pixel.ray, depth);
   std::size_t asked = 0;
   for (const std::size_t i : neighbours[pixel.view]) {
     const auto point = photos[i].sees(world);
@@ -233,8 +233,7 @@ std::vector<double> match_costs(std::span<const SmallPhoto> photos,
   const PatchRays rays(photos[pixel.view], pixel);
   std::vector<double> costs(steps);
   for (std::size_t step = 0; step < steps; ++step) {
-    const double share = static_cast<double>(step) / static_cast<double>(steps - 1);
-    costs[step] = cost_at(photos, neighbours, rays, depths.at(share));
+    costs[step] = cost_at(photos, neighbours, rays, depths.at(step, steps));
   }
   return costs;
 }

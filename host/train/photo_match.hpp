@@ -39,7 +39,8 @@ bool agrees(double cost, double other);
 /// The depth along the pixel's ray at which neighbouring photos agree with it, and which one of two
 /// of these finds as well from its side (the check of consistency of multi-view stereo); nothing
 /// where there is none, or where another depth, far from it, explains the pixel as well. Depths are
-/// so near to each other that the pixel moves by at most two pixels in the middle of those photos.
+/// so near to each other that, about the typical one, the pixel moves by at most two pixels in the
+/// middle of those photos.
 /// `neighbours`: for every photo those that it is compared with.
 std::optional<double> confirmed_depth(std::span<const SmallPhoto> photos,
                                       std::span<const std::vector<std::size_t>> neighbours,

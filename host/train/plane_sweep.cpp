@@ -234,7 +234,7 @@ Probe probe_pixel(std::span<const SmallPhoto> photos,
   while (open && best > 0 && costs[best - 1] >= 0 && costs[best - 1] <= enough) --best;
   // What agrees at every depth has no texture.
   if (open && (best == 0 || costs[best - 1] < 0)) return {};
-  return {depths.at(static_cast<double>(best) / (kProbeDepths - 1)), open};
+  return {depths.at(best, kProbeDepths), open};
 }
 
 // Of some pixels those that agree in a depth, and in which.
@@ -265,23 +265,28 @@ bool clearly_more(const Agreement& a, const Agreement& b) {
   return static_cast<double>(a.inside) > kClearlyMore * static_cast<double>(b.inside);
 }
 
+struct Settled {
+  DepthRange depths;
+  Agreement agreement;
+};
+
 // The range about the depth at which pixels agree, where that is much nearer than the range's own,
 // or much farther and more of them agree about it: photos to compare with are chosen by it, and
 // those too far apart show little in common, those too near tell little of depth.
-DepthRange settled(std::span<const SmallPhoto> photos, DepthRange depths, std::uint64_t seed) {
+Settled settled(std::span<const SmallPhoto> photos, DepthRange depths, std::uint64_t seed) {
   Agreement here = agreement(photos, depths, seed);
   for (int round = 0; round < kRounds; ++round) {
-    if (here.depth == 0) return depths;
+    if (here.depth == 0) break;
     const bool nearer = here.depth < kMuchNearer * depths.typical;
     const bool farther = here.depth > kMuchFarther * depths.typical;
-    if (!nearer && !farther) return depths;
+    if (!nearer && !farther) break;
     const DepthRange other = depths_around(here.depth);
     const Agreement there = agreement(photos, other, seed);
-    if (farther && !clearly_more(there, here)) return depths;
+    if (farther && !clearly_more(there, here)) break;
     depths = other;
     here = there;
   }
-  return depths;
+  return {depths, here};
 }
 
 }  // namespace
@@ -311,18 +316,18 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
     depths.push_back(probe.depth);
     open += probe.open ? 1 : 0;
   }
-  if (depths.size() < kFewProbes) return settled(photos, around, seed);
+  if (depths.size() < kFewProbes) return settled(photos, around, seed).depths;
   const std::array<double, 2> ranks{0.5, 0.75};
   const std::vector<double> found = quantiles(depths, ranks);
   const double open_share = static_cast<double>(open) / static_cast<double>(depths.size());
   if (open_share > kOpenShare) return open_range(found[1]);
   const double typical = found[0];
-  const DepthRange out = settled(photos, around, seed);
-  if (typical < kWrongGuess * out.typical) return out;
+  const Settled near = settled(photos, around, seed);
+  if (typical < kWrongGuess * near.depths.typical) return near.depths;
   // Photos far apart may agree by chance beyond what they show together, where neighbours do not.
   const DepthRange farther = depths_around(typical);
-  const bool better = clearly_more(agreement(photos, farther, seed), agreement(photos, out, seed));
-  return better ? settled(photos, farther, seed) : out;
+  const bool better = clearly_more(agreement(photos, farther, seed), near.agreement);
+  return better ? settled(photos, farther, seed).depths : near.depths;
 }
 
 double agreed_share(std::span<const SmallPhoto> photos,

@@ -14,9 +14,10 @@ namespace raysplats {
 /// How sparse points and photos go together.
 struct PointMatch {
   double seen = 0;  ///< share of the points that some camera sees
-  /// Difference between the points' colours and the photos' where the points show, over that of
-  /// colours of other points: far below 1 where points lie on what the photos show. Nothing where
-  /// that cannot be told: points of one colour, or too few that the photos see.
+  /// Difference between the points' colours and the photos' where the points show and no other lies
+  /// clearly before them, over that of colours of other points: far below 1 where points lie on
+  /// what the photos show. Nothing where that cannot be told: points of one colour, or too few that
+  /// the photos see.
   std::optional<double> difference;
   /// Factor about the world's origin, and the difference of points so moved, where that is least;
   /// 1 and `difference` where they are best as they are.

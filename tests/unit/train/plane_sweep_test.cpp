@@ -17,6 +17,21 @@
 using namespace raysplats;
 using namespace raysplats::test;
 
+namespace {
+
+// A ball of 6 around the world's origin, seen from inside; its pattern is the finer the greater
+// `fineness` is.
+glm::dvec4 ball(const CameraRay& ray, double fineness) {
+  const double along = glm::dot(ray.origin, ray.direction);
+  const double t = std::sqrt(36.0 - glm::dot(ray.origin, ray.origin) + along * along) - along;
+  const glm::dvec3 p = fineness * (ray.origin + t * ray.direction);
+  return glm::dvec4(0.5 + 0.4 * std::sin(2.1 * p.y + 0.7 * p.z) * std::sin(1.3 * p.x),
+                    0.5 + 0.4 * std::cos(2.3 * p.z - 1.1 * p.y + p.x),
+                    0.5 + 0.4 * std::sin(2.7 * p.y - 1.9 * p.x), 1.0);
+}
+
+}  // namespace
+
 TEST_CASE("sweeping finds a textured wall and its colours") {
   const std::vector<SmallPhoto> photos = photos_of_wall();
   const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5);
@@ -126,16 +141,8 @@ TEST_CASE("photos without a common view give no sure points and do not fail") {
 }
 
 TEST_CASE("cameras on a tripod look at what is far away") {
-  // Around one point that is 0.01 wide, in a ball of 6 whose pattern has no finer parts than
-  // pixels.
-  const auto ball_around = [](const CameraRay& ray) {
-    const double along = glm::dot(ray.origin, ray.direction);
-    const double t = std::sqrt(36.0 - glm::dot(ray.origin, ray.origin) + along * along) - along;
-    const glm::dvec3 p = ray.origin + t * ray.direction;
-    return glm::dvec4(0.5 + 0.4 * std::sin(2.1 * p.y + 0.7 * p.z) * std::sin(1.3 * p.x),
-                      0.5 + 0.4 * std::cos(2.3 * p.z - 1.1 * p.y + p.x),
-                      0.5 + 0.4 * std::sin(2.7 * p.y - 1.9 * p.x), 1.0);
-  };
+  // Around one point that is 0.01 wide, in a ball whose pattern has no finer parts than pixels.
+  const auto ball_around = [](const CameraRay& ray) { return ball(ray, 1.0); };
   for (const double radius : {0.0, 0.005}) {
     std::vector<SmallPhoto> photos;
     for (int i = 0; i < 16; ++i) {
@@ -176,14 +183,7 @@ TEST_CASE("cameras on a tripod look at what is far away") {
 
 TEST_CASE("cameras turned at arm's length find what is around them") {
   // Their axes meet where the one who turns stands, which tells nothing of what they look at.
-  const auto room = [](const CameraRay& ray) {
-    const double along = glm::dot(ray.origin, ray.direction);
-    const double t = std::sqrt(36.0 - glm::dot(ray.origin, ray.origin) + along * along) - along;
-    const glm::dvec3 p = ray.origin + t * ray.direction;
-    return glm::dvec4(0.5 + 0.4 * std::sin(6.1 * p.y + 2.7 * p.z) * std::sin(4.3 * p.x),
-                      0.5 + 0.4 * std::cos(5.3 * p.z - 3.1 * p.y + p.x),
-                      0.5 + 0.4 * std::sin(5.7 * p.y - 4.9 * p.x), 1.0);
-  };
+  const auto room = [](const CameraRay& ray) { return ball(ray, 2.5); };
   std::vector<SmallPhoto> photos;
   for (int i = 0; i < 48; ++i) {
     const double angle = i * glm::radians(15.0);

@@ -81,23 +81,36 @@ TEST_CASE(
   CHECK_THROWS_AS(adam.restore({{0}, {0}, {0}}), DataError);
 }
 
-TEST_CASE("a sky pays outdoors") {
-  const TemporaryDirectory folder;
+namespace {
+
+struct Outdoors {
+  TemporaryDirectory folder;
   Context context{test_device()};
-  make_photos(folder.path() / "data", 40, 12, 3, SyntheticScene::kOutdoor);
-  const Dataset dataset = load_dataset(folder.path() / "data");
+  Dataset dataset;
   TrainOptions options = short_training(200);
-  options.max_gaussians = 300;         // more of them show most of the sky themselves
-  options.trace.deterministic = true;  // elsewhere than on CPUs gradients are atomic sums otherwise
+
+  Outdoors() {
+    make_photos(folder.path() / "data", 40, 12, 3, SyntheticScene::kOutdoor);
+    dataset = load_dataset(folder.path() / "data");
+    options.max_gaussians = 300;  // more of them show most of the sky themselves
+    // Elsewhere than on CPUs gradients are atomic sums otherwise.
+    options.trace.deterministic = true;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a sky pays outdoors") {
+  Outdoors scene;
   // Single runs differ by more than a sky is worth.
   constexpr std::uint64_t kSeeds = 6;
   double gain = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    options.seed = seed;
+    scene.options.seed = seed;
     const auto psnr = [&](const char* background) {
-      options.background = background;
-      const auto run = folder.path() / (background + std::to_string(seed));
-      return trained(context, dataset, options, run).psnr;
+      scene.options.background = background;
+      const auto run = scene.folder.path() / (background + std::to_string(seed));
+      return trained(scene.context, scene.dataset, scene.options, run).psnr;
     };
     gain += (psnr("sky") - psnr("auto")) / kSeeds;
   }
@@ -106,13 +119,8 @@ TEST_CASE("a sky pays outdoors") {
 }
 
 TEST_CASE("a run with a sky can be looked at, moved and resumed bit for bit") {
-  const TemporaryDirectory folder;
-  Context context{test_device()};
-  make_photos(folder.path() / "data", 40, 12, 3, SyntheticScene::kOutdoor);
-  const Dataset dataset = load_dataset(folder.path() / "data");
-  TrainOptions options = short_training(200);
-  options.max_gaussians = 300;
-  options.trace.deterministic = true;
+  Outdoors scene;
+  auto& [folder, context, dataset, options] = scene;
   options.background = "sky";
   const Trained sky = trained(context, dataset, options, folder.path() / "sky");
   const double with = sky.psnr;
