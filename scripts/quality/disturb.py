@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A data set (transforms_train.json, as of `raysplats generate`) with training photos made worse, for docs/training.md:
+"""A data set (transforms_train.json, as of `raysplats generate`) with training photos made worse, for
+docs/training.md (poses) and docs/experiments.md (box):
 
 poses  every camera turned by 0.5 degrees and moved by 1 % of the extent (1.1 times the largest distance of a camera from
        their mean) in directions drawn at random, less the motion and the scale that all have in common
