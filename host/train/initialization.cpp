@@ -40,7 +40,8 @@ constexpr double kUnsureBeside = 0.1;     // of those beside sparse ones: more a
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
-constexpr double kMostlyBare = 0.55;        // of what photos show, with no sparse point near
+constexpr double kMostlyBare = 0.31;        // of what photos show, with no sparse point far around
+constexpr double kMostlyCovered = 0.72;     // of what agrees in one depth, with sparse points near
 constexpr double kMostlyShown = 0.75;       // of the photos, where masks leave out the rest
 constexpr double kMostlyAgreed = 0.21;      // of what photos show, in one depth
 constexpr std::size_t kMostBeside = 10000;  // points of photos, of which more take seconds to find
@@ -230,7 +231,10 @@ Beside photos_beside(const PointCloud& points,
                      const TrainOptions& options) {
   if (options.init != "auto" || points.size() < kFewPoints) return {};
   // Points on one thing alone say nothing of what is around it.
-  if (bare_share(points, photos(PhotoChoice::kSome)) > kMostlyBare) return {Beside::Part::kAll, {}};
+  const std::vector<SmallPhoto>& some = photos(PhotoChoice::kSome);
+  const double bare = bare_share(points, some);
+  spdlog::debug("{:.1f} % of what photos show has no sparse points", 100 * bare);
+  if (bare > kMostlyBare) return {Beside::Part::kAll, {}};
   if (!options.photo_points || dataset.alpha_is_background) return {};
   // Sparse points crowd where there is texture. What a sweep finds lies more evenly; where photos
   // are too far apart, or show little, it is wrong too often.
@@ -241,9 +245,15 @@ Beside photos_beside(const PointCloud& points,
   if (shown < kMostlyShown) return {};
   const double guess = guessed_depth(cameras, visible_region(cameras));
   const DepthRange depths = swept_depths(many, guess, options.seed);
-  const double agreed = agreed_share(many, depths, options.seed);
-  spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * agreed);
-  if (agreed <= kMostlyAgreed) return {};
+  const SweepProbe probe = probe_sweep(many, depths, options.seed);
+  spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * probe.agreed);
+  if (probe.agreed <= kMostlyAgreed) return {};
+  // What has texture enough for a depth has sparse points too, unless they are of another part.
+  const PointCloud near = beside_points(probe.points, points, some);
+  const double covered =
+      static_cast<double>(near.size()) / static_cast<double>(probe.points.size());
+  spdlog::debug("{:.1f} % of that has sparse points", 100 * covered);
+  if (covered < kMostlyCovered) return {Beside::Part::kAll, {}};
   return {Beside::Part::kInTheirPlaces, depths};
 }
 

@@ -330,14 +330,19 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
   return better ? settled(photos, farther, seed).depths : near.depths;
 }
 
-double agreed_share(std::span<const SmallPhoto> photos,
-                    const DepthRange& depths,
-                    std::uint64_t seed) {
-  if (photos.empty()) return 0;
+SweepProbe probe_sweep(std::span<const SmallPhoto> photos,
+                       const DepthRange& depths,
+                       std::uint64_t seed) {
+  SweepProbe out;
+  if (photos.empty()) return out;
   Sweep sweep(photos, depths, seed);
   sweep.take(kProbes);
   const std::size_t shown = sweep.agreed() + sweep.vague();
-  return shown > 0 ? static_cast<double>(sweep.agreed()) / static_cast<double>(shown) : 0;
+  if (shown > 0) out.agreed = static_cast<double>(sweep.agreed()) / static_cast<double>(shown);
+  for (const Sample& sample : sweep.samples()) {
+    if (sample.agreed) append_point(out.points, sample.position(), sample.color());
+  }
+  return out;
 }
 
 PointCloud swept_points(std::span<const SmallPhoto> photos,

@@ -21,11 +21,17 @@ DepthRange depths_around(double typical);
 /// agree about a farther one, as from cameras turned at arm's length. `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
 
-/// The share of random pixels at which neighbouring photos agree in one depth, which one of them
-/// finds as well, of those that show something: how much a sweep finds. 0 where nothing is shown.
-double agreed_share(std::span<const SmallPhoto> photos,
-                    const DepthRange& depths,
-                    std::uint64_t seed);
+/// What a sweep over a few random pixels finds.
+struct SweepProbe {
+  /// The share of the pixels, of those that show something, at which neighbouring photos agree in
+  /// one depth, which one of them finds as well. 0 where nothing is shown.
+  double agreed = 0;
+  PointCloud points;  ///< where they agree
+};
+
+SweepProbe probe_sweep(std::span<const SmallPhoto> photos,
+                       const DepthRange& depths,
+                       std::uint64_t seed);
 
 /// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
 /// sweep, Collins 1996, over single pixels with their surroundings, which photos are looked up for

@@ -27,6 +27,8 @@ constexpr int kScaleSteps = 20;             // of half an octave, up and down
 constexpr float kOneColor = 0.004f;         // no two of 256 steps apart
 constexpr std::size_t kMostPlaces = 20000;  // of points that fill cells, or hide others
 constexpr std::size_t kFewerPlaces = 2000;  // at every scale
+constexpr int kNearCell = 10;               // pixels a side of what is near a point
+constexpr int kBareCells = 7;               // along a photo's longer side
 constexpr double kBehind = 1.15;            // times as far as the nearest in a cell: hidden
 constexpr double kEvenColors = 1e-4;        // squared difference of points that tell nothing
 
@@ -40,12 +42,13 @@ bool sees(const Camera& camera, const glm::dvec3& world) {
          point->y < camera.height;
 }
 
-// Cells of kBareCell pixels a side of a photo.
+// Square cells of a photo, as far as they lie inside.
 class Cells {
  public:
-  explicit Cells(const SmallPhoto& photo)
-      : columns_((photo.camera.width + kBareCell - 1) / kBareCell),
-        rows_((photo.camera.height + kBareCell - 1) / kBareCell) {}
+  Cells(const SmallPhoto& photo, int side)
+      : side_(side),
+        columns_((photo.camera.width + side - 1) / side),
+        rows_((photo.camera.height + side - 1) / side) {}
 
   std::size_t count() const {
     return static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
@@ -53,21 +56,21 @@ class Cells {
 
   /// The one that contains the image point, which has to lie inside.
   std::size_t at(const glm::dvec2& place) const {
-    const auto along = [](double x, int cells) {
-      return static_cast<std::size_t>(std::min(static_cast<int>(x) / kBareCell, cells - 1));
+    const auto along = [this](double x, int cells) {
+      return static_cast<std::size_t>(std::min(static_cast<int>(x) / side_, cells - 1));
     };
     return along(place.y, rows_) * static_cast<std::size_t>(columns_) + along(place.x, columns_);
   }
 
  private:
-  int columns_, rows_;
+  int side_, columns_, rows_;
 };
 
 // Which cells of a photo show points.
 class PointCells {
  public:
-  PointCells(const PointCloud& points, const SmallPhoto& photo)
-      : cells_(photo), taken_(cells_.count()) {
+  PointCells(const PointCloud& points, const SmallPhoto& photo, int side)
+      : cells_(photo, side), taken_(cells_.count()) {
     const std::size_t looks = std::min(kMostPlaces, points.size());
     for (std::size_t k = 0; k < looks; ++k) {
       const auto place = photo.sees(triple(points.positions, k * points.size() / looks));
@@ -92,7 +95,7 @@ class PhotoBeforePoints {
                     std::size_t looks,
                     double scale)
       : photo_(&photo),
-        cells_(photo),
+        cells_(photo, kNearCell),
         nearest_(cells_.count(), std::numeric_limits<double>::infinity()) {
     looks = std::min(looks, points.size());
     for (std::size_t k = 0; k < looks; ++k) {
@@ -251,10 +254,12 @@ PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> phot
 double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) {
   std::size_t shown = 0, bare = 0;
   for (const SmallPhoto& photo : photos) {
-    const PointCells cells(points, photo);
-    for (int row = 0; row < photo.camera.height / kBareCell; ++row) {
-      for (int column = 0; column < photo.camera.width / kBareCell; ++column) {
-        const glm::dvec2 middle((column + 0.5) * kBareCell, (row + 0.5) * kBareCell);
+    const int width = photo.camera.width, height = photo.camera.height;
+    const int side = std::max(1, std::max(width, height) / kBareCells);
+    const PointCells cells(points, photo, side);
+    for (double y = 0.5 * side; y < height; y += side) {
+      for (double x = 0.5 * side; x < width; x += side) {
+        const glm::dvec2 middle(x, y);
         if (!photo.known(middle) || photo.at(middle).w < 0.5) continue;
         ++shown;
         bare += cells.taken(middle) ? 0 : 1;
@@ -268,7 +273,7 @@ PointCloud beside_points(const PointCloud& found,
                          const PointCloud& points,
                          std::span<const SmallPhoto> photos) {
   std::vector<PointCells> cells;
-  for (const SmallPhoto& photo : photos) cells.emplace_back(points, photo);
+  for (const SmallPhoto& photo : photos) cells.emplace_back(points, photo, kNearCell);
   PointCloud out;
   for (std::size_t i = 0; i < found.size(); ++i) {
     std::size_t seen = 0, taken = 0;

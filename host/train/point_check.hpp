@@ -43,13 +43,13 @@ bool colorless(const PointCloud& points);
 /// The points in the colours in which photos show them: of each the median, grey where none does.
 PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> photos);
 
-/// The share of what the photos show that lies in places without a point: cells of kBareCell pixels
-/// a side, but for those that are transparent or masked out. 0 where nothing is shown.
+/// The share of what the photos show that lies in wide places without a point: square cells of a
+/// seventh of a photo's longer side, but for those that are transparent or masked out. 0 where
+/// nothing is shown.
 double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos);
-constexpr int kBareCell = 10;
 
-/// Those of `found` that lie where points are: in the cells of `points` in at least half of the
-/// photos that see them. Without their tracks and errors.
+/// Those of `found` that lie near points: in cells of 10 pixels a side that show some of `points`,
+/// in at least half of the photos that see them. Without their tracks and errors.
 PointCloud beside_points(const PointCloud& found,
                          const PointCloud& points,
                          std::span<const SmallPhoto> photos);

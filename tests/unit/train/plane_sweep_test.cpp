@@ -86,8 +86,8 @@ TEST_CASE("photos turned against each other tell as much of depth") {
     turned.push_back(
         photo_of(look_at(eye, target, ups[static_cast<std::size_t>(i % 4)], 80, 80, 90), fine));
   }
-  const double plain = agreed_share(upright, {0.6, 3.0, 30.0}, 5);
-  const double other = agreed_share(turned, {0.6, 3.0, 30.0}, 5);
+  const double plain = probe_sweep(upright, {0.6, 3.0, 30.0}, 5).agreed;
+  const double other = probe_sweep(turned, {0.6, 3.0, 30.0}, 5).agreed;
   MESSAGE(plain << " of the pixels upright, " << other << " turned");
   CHECK(plain > 0.3);
   CHECK(other > 0.8 * plain);
@@ -110,7 +110,7 @@ TEST_CASE("photos through long lenses find a wall that a step of the usual lengt
   }
   const DepthRange depths = swept_depths(photos, 60, 3);
   CHECK(depths.typical == 60);
-  CHECK(agreed_share(photos, depths, 5) > 0.3);
+  CHECK(probe_sweep(photos, depths, 5).agreed > 0.3);
   const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
   std::size_t near = 0;
   for (std::size_t i = 0; i < points.size(); ++i)
@@ -128,7 +128,7 @@ TEST_CASE("photos of different things agree in next to no depth") {
       return wall(ray);
     }));
   }
-  const double share = agreed_share(photos, {0.6, 3.0, 30.0}, 5);
+  const double share = probe_sweep(photos, {0.6, 3.0, 30.0}, 5).agreed;
   MESSAGE(share << " of the pixels agree");
   CHECK(share < 0.012);
 }

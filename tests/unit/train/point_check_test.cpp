@@ -27,6 +27,17 @@ std::vector<Camera> cameras_of(const std::vector<SmallPhoto>& photos) {
   return out;
 }
 
+// Points on the wall wherever photos show it below `top`.
+PointCloud points_below(double top) {
+  CounterRng rng(4, 1);
+  PointCloud out;
+  while (out.size() < 4000) {
+    const glm::dvec3 p(4.0, 6.0 * rng.uniform() - 3.0, 6.0 * rng.uniform() - 3.0);
+    if (p.z < top) append_point(out, p, glm::dvec3(wall({{0, 0, 0}, p / 4.0, true})));
+  }
+  return out;
+}
+
 // Points on the wall with its colours, moved by `moved` from (x, y, z) afterwards.
 template <class Moved>
 PointCloud points_of_wall(const Moved& moved) {
@@ -157,43 +168,50 @@ TEST_CASE("points on a small part of what photos show are joined by points of th
 TEST_CASE("points of photos that tell of depth stand beside sparse ones, in their places") {
   std::vector<SmallPhoto> photos = photos_of_wall();
   const std::vector<Camera> cameras = cameras_of(photos);
-  // Sparse points on a part of the wall, so crowded that an even choice of them stays so.
-  const PointCloud part = points_of_wall(
-      [](const glm::dvec3& p) { return glm::dvec3(p.x, p.y, p.z > 0.2 ? 0.2 : p.z); });
-  CHECK(bare_share(part, photos) < 0.54);
   const PointCloud found = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.0, 5);
-  const PointCloud beside = beside_points(found, part, photos);
-  const auto count_above = [](const std::vector<float>& positions) {
+  const auto count_above = [](double height, const PointCloud& points) {
     std::size_t above = 0;
-    for (std::size_t i = 2; i < positions.size(); i += 3) above += positions[i] > 0.5f ? 1 : 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      above += points.positions[3 * i + 2] > height ? 1 : 0;
     return above;
   };
-  CHECK(count_above(found.positions) > 40);
-  CHECK(count_above(beside.positions) * 5 < count_above(found.positions));
-  CHECK(beside.size() > found.size() / 3);
+  const PointCloud most = points_below(1.0);
+  const PointCloud near = beside_points(found, most, photos);
+  CHECK(count_above(1.4, found) > 10);
+  CHECK(count_above(1.4, near) == 0);
+  CHECK(near.size() > found.size() * 3 / 4);
 
-  Dataset dataset;
-  dataset.points = part;
-  const auto off_the_sparse = [&](const std::string& init) {
+  // What a start has that is no sparse point.
+  const auto added = [&](const PointCloud& sparse, const std::string& init) {
+    Dataset dataset;
+    dataset.points = sparse;
     TrainOptions options;
     options.init = init;
     const Gaussians model = initial_model(
         dataset, cameras, [&photos](PhotoChoice) -> const auto& { return photos; }, 2000, options);
-    std::size_t off = 0;
-    for (std::size_t i = 0; i < model.size(); ++i) off += model.means[3 * i] != 4.0f ? 1 : 0;
-    return off;
+    PointCloud out;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+      const float* p = model.means.data() + 3 * i;
+      if (p[0] != 4.0f) append_point(out, {p[0], p[1], p[2]}, {});
+    }
+    return out;
   };
-  CHECK(off_the_sparse("colmap") == 0);
-  CHECK(off_the_sparse("auto") > 200);
+  CHECK(added(most, "colmap").size() == 0);
+  CHECK(added(most, "auto").size() > 200);
+  CHECK(count_above(1.4, added(most, "auto")) < 15);
+  // Much of what the photos tell of has no sparse points at all: they are of another part.
+  const PointCloud half = points_below(0.4);
+  CHECK(bare_share(half, photos) < 0.3);
+  CHECK(count_above(1.4, added(half, "auto")) > 30);
   // Where neighbours show something else nothing agrees.
   for (std::size_t i = 0; i < photos.size(); ++i)
     photos[i] = photo_of(cameras[i], [i](const CameraRay& ray) {
       const double shift = 1.7 * static_cast<double>(i);
       return wall({ray.origin + glm::dvec3(0, shift, -shift), ray.direction, true});
     });
-  CHECK(agreed_share(photos, {0.6, 3.0, 30.0}, 5) < 0.4);
-  CHECK(agreed_share(photos_of_wall(), {0.6, 3.0, 30.0}, 5) > 0.6);
-  CHECK(agreed_share({}, {0.6, 3.0, 30.0}, 5) == 0.0);
+  CHECK(probe_sweep(photos, {0.6, 3.0, 30.0}, 5).agreed < 0.4);
+  CHECK(probe_sweep(photos_of_wall(), {0.6, 3.0, 30.0}, 5).agreed > 0.6);
+  CHECK(probe_sweep({}, {0.6, 3.0, 30.0}, 5).agreed == 0.0);
 }
 
 TEST_CASE("of a cloud that is mostly out of sight the start takes what the photos see") {
