@@ -191,13 +191,14 @@ double guessed_depth(std::span<const Camera> cameras, const Region& region) {
 }
 
 // Points that the photos tell of: of a body that is cut out, else of what a sweep finds in
-// `depths`, of points beside sparse ones, or in those that it looks for.
+// `depths`, or in those that it looks for. `unsure`: as of swept_points().
 PointCloud photo_points(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const Region& region,
                         const std::vector<SmallPhoto>& photos,
                         const std::optional<DepthRange>& depths,
                         std::size_t count,
+                        double unsure,
                         std::uint64_t seed) {
   const double guess = guessed_depth(cameras, region);
   if (dataset.alpha_is_background) {
@@ -206,14 +207,14 @@ PointCloud photo_points(const Dataset& dataset,
     spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
     return scattered_points(photos, region, depths_around(guess), count, seed);
   }
-  if (depths) return swept_points(photos, *depths, count, kUnsureBeside, seed);
+  if (depths) return swept_points(photos, *depths, count, unsure, seed);
   const DepthRange found = swept_depths(photos, guess, seed);
   spdlog::debug(
       "the photos show what is {:.3g} to {:.3g} away, typically {:.3g} ({:.3g} by the "
       "cameras){}",
       found.nearest, found.farthest, found.typical, guess,
       found.open ? "; they leave depths open" : "");
-  return swept_points(photos, found, count, kUnsureShare, seed);
+  return swept_points(photos, found, count, unsure, seed);
 }
 
 // What of the points that photos tell of goes beside sparse ones, and where those that tell it
@@ -253,8 +254,7 @@ Beside photos_beside(const PointCloud& points,
   const double covered =
       static_cast<double>(near.size()) / static_cast<double>(probe.points.size());
   spdlog::debug("{:.1f} % of that has sparse points", 100 * covered);
-  if (covered < kMostlyCovered) return {Beside::Part::kAll, {}};
-  return {Beside::Part::kInTheirPlaces, depths};
+  return {covered < kMostlyCovered ? Beside::Part::kAll : Beside::Part::kInTheirPlaces, depths};
 }
 
 std::string match_text(const PointMatch& match) {
@@ -476,9 +476,10 @@ Gaussians initial_model(const Dataset& dataset,
   const std::vector<SmallPhoto>& told =
       photos(beside.part == Beside::Part::kNothing ? PhotoChoice::kAll : PhotoChoice::kMany);
   const std::size_t room = std::min(count, limit - std::min(limit, points.size()));
-  PointCloud seen = photo_points(dataset, cameras, region, told, beside.depths, room, options.seed);
-  if (beside.part == Beside::Part::kInTheirPlaces)
-    seen = beside_points(seen, sparse, photos(PhotoChoice::kSome));
+  const bool in_their_places = beside.part == Beside::Part::kInTheirPlaces;
+  PointCloud seen = photo_points(dataset, cameras, region, told, beside.depths, room,
+                                 in_their_places ? kUnsureBeside : kUnsureShare, options.seed);
+  if (in_their_places) seen = beside_points(seen, sparse, photos(PhotoChoice::kSome));
   for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, points);
   return start(points);
 }
