@@ -298,73 +298,84 @@ __kernel void add_light(const uint count,
   surface_light[i] += (float8)(diffuse, 1.0f, specular, 0.0f);
 }
 
-// A path behind a surface, with the ray it takes.
+// A way that a path takes from a surface.
 typedef struct {
-  RsPath path;
-  Ray ray;
-} Continuation;
+  float3 throughput;
+  float3 direction;  // unit; of no meaning straight on
+  Media media;
+  bool straight;  // in the same direction: the ray keeps its origin and looks behind the surface
+} Way;
 
-// On in the same direction: the ray keeps its origin and looks behind the surface.
-Continuation straight_on(const RsPath* path, Ray ray, const RsSurface* s, float3 throughput) {
-  Continuation out;
-  out.path = *path;
-  out.path.begin = as_float(as_uint(s->t) + 1u);
-  out.path.skip = s->triangle;
-  vstore3(throughput, 0, out.path.throughput);
-  ray.t_min = s->t;
+Way way_along(float3 direction, float3 throughput, Media media) {
+  const Way way = {throughput, normalize(direction), media, false};
+  return way;
+}
+
+Way way_straight_on(float3 throughput, Media media) {
+  const Way way = {throughput, (float3)(0.0f), media, true};
+  return way;
+}
+
+// The path that takes way `number` of `ways`, and its ray: into slot `at`.
+void take_way(const Way way,
+              uint number,
+              uint ways,
+              __global const RsPath* path,
+              __global const RsSurface* s,
+              Ray ray,
+              size_t at,
+              __global RsPath* next_paths,
+              __global RsRay* next_rays) {
+  RsPath next = *path;
+  next.skip = s->triangle;
+  next.lineage += number << next.splits;
+  next.splits += ways - 1;
+  vstore3(way.throughput, 0, next.throughput);
+  store_media(way.media, &next);
   ray.t_max = FLT_MAX;
-  out.ray = ray;
-  return out;
+  if (way.straight) {
+    next.begin = as_float(as_uint(s->t) + 1u);
+    ray.t_min = s->t;
+  } else {
+    const float3 d = way.direction, normal = vload3(0, s->normal), from = vload3(0, s->position);
+    const bool back = dot(d, normal) >= 0.0f;  // to where it came from
+    next.begin = 0.0f;
+    next.direct = 0;
+    ray.origin = back ? start_off_surface(from, normal, d, s->offset) : from - s->offset * normal;
+    ray.direction = d;
+    ray.t_min = 0.0f;
+  }
+  next_paths[at] = next;
+  store_ray(ray, next_rays, at);
 }
 
-Continuation new_direction(const RsPath* path,
-                           const RsSurface* s,
-                           float3 throughput,
-                           float3 direction) {
-  Continuation out;
-  out.path = *path;
-  out.path.begin = 0.0f;
-  out.path.direct = 0;
-  out.path.skip = s->triangle;
-  vstore3(throughput, 0, out.path.throughput);
-  const float3 normal = load3(s->normal);
-  const float3 d = normalize(direction), from = load3(s->position);
-  const bool back = dot(d, normal) >= 0.0f;  // to where it came from
-  const float3 p = back ? start_off_surface(from, normal, d, s->offset) : from - s->offset * normal;
-  const Ray ray = {p, d, 0.0f, FLT_MAX};
-  out.ray = ray;
-  return out;
-}
-
-// Both rays of a glass surface, or the one that is left of them; returns how many.
-int pass_glass(const RsPath* path,
-               Ray ray,
-               const RsSurface* s,
-               float3 throughput,
-               __global const RsMaterial* materials,
-               float choice,
-               Continuation* out) {
+// Both ways of a ray along d from a glass surface, or the one that is left of them; returns how
+// many.
+uint pass_glass(__global const RsPath* path,
+                float3 d,
+                __global const RsSurface* s,
+                float3 throughput,
+                __global const RsMaterial* materials,
+                float choice,
+                Way* first,
+                Way* second) {
   const uint body = (uint)s->material + 1;
   const float own = materials[s->material].ior;
-  Media after = media_of(path);
-  float before_ior = innermost_ior(&after, materials), after_ior;
-  if (s->entering) {
-    after_ior = own;
-    media_enter(&after, body);
-  } else {
-    if (!media_leave(&after, body)) before_ior = own;
-    after_ior = innermost_ior(&after, materials);
+  const Media before = media_of(path);
+  const Media after = s->entering ? media_enter(before, body) : media_leave(before, body);
+  float before_ior = innermost_ior(before, materials), after_ior = own;
+  if (!s->entering) {
+    if (after == before) before_ior = own;
+    after_ior = innermost_ior(after, materials);
   }
-  RsPath inside = *path;
-  store_media(&after, &inside);
-  const float3 color = load3(s->color);
+  const float3 into = throughput * vload3(0, s->color);
   if (before_ior == after_ior) {
-    out[0] = straight_on(&inside, ray, s, throughput * color);
+    *first = way_straight_on(into, after);
     return 1;
   }
-  const float3 d = ray.direction, normal = load3(s->normal);
+  const float3 normal = vload3(0, s->normal);
   const float ratio = before_ior / after_ior;
-  float3 n = load3(s->shading);
+  float3 n = vload3(0, s->shading);
   float cosine = -dot(d, n), cosine_out = 0.0f, F = 1.0f;
   float3 reflection = d, refraction = d;
   bool sound = false;
@@ -380,23 +391,14 @@ int pass_glass(const RsPath* path,
     refraction = ratio * d + (ratio * cosine - cosine_out) * n;
     sound = dot(reflection, normal) > 0.0f && (F >= 1.0f || dot(refraction, normal) < 0.0f);
   }
-  const float3 into = throughput * color;
-  if (F >= 1.0f) {
-    out[0] = new_direction(path, s, throughput, reflection);
-    return 1;
+  if (F < 1.0f && path->splits < 2) {
+    *first = way_along(reflection, throughput * F, before);
+    *second = way_along(refraction, into * (1.0f - F), after);
+    return 2;
   }
-  if (path->splits >= 2) {
-    out[0] = choice < F ? new_direction(path, s, throughput, reflection)
-                        : new_direction(&inside, s, into, refraction);
-    return 1;
-  }
-  out[0] = new_direction(path, s, throughput * F, reflection);
-  out[1] = new_direction(&inside, s, into * (1.0f - F), refraction);
-  for (int k = 0; k < 2; ++k) {
-    out[k].path.splits = path->splits + 1;
-    out[k].path.lineage = path->lineage + ((uint)k << path->splits);
-  }
-  return 2;
+  *first = F >= 1.0f || choice < F ? way_along(reflection, throughput, before)
+                                   : way_along(refraction, into, after);
+  return 1;
 }
 
 // gained[i]: colour that path i has gained, and the share of its light that left the scene.
@@ -420,23 +422,23 @@ __kernel void advance(const uint count,
                       __global uint4* restrict tallies) {
   const uint i = get_global_id(0);
   if (i >= count) return;
-  const RsPath path = paths[i];
+  __global const RsPath* path = paths + i;
+  __global const RsSurface* s = surfaces + i;
   counts[i] = 0;
   tallies[i] = (uint4)(0);
-  if (path.blind) {
+  if (path->blind) {
     gained[i] = (float4)(0.0f, 0.0f, 0.0f, 1.0f);
     return;
   }
   const Ray ray = load_ray(rays, i);
   const RayResult result = load_result(results, i);
-  const RsSurface s = surfaces[i];
   const float4 light = gaussian_light[i];
-  const float8 direct = surface_light[i];
-  uint4 tally = (uint4)((uint)light.z + (uint)direct.s3, result.capped, 0, 0);
-  float3 throughput = load3(path.throughput);
+  uint4 tally = (uint4)((uint)light.z + (uint)surface_light[i].s3, result.capped, 0, 0);
+  float3 throughput = vload3(0, path->throughput);
   float3 to_gaussians = throughput;
-  if (path.media[0] & 0xffffu) {
-    const float3 sigma = vload3(0, materials[(path.media[0] & 0xffffu) - 1].absorption);
+  const uint around = innermost(media_of(path));
+  if (around != 0) {
+    const float3 sigma = vload3(0, materials[around - 1].absorption);
     const float depth = gaussian_depth(result, ray);
     // Nothing is left after an infinite way, but clear glass stays clear.
     const float3 way = fmin((float3)(ray.t_max - ray.t_min), (float3)(1e30f));
@@ -446,61 +448,65 @@ __kernel void advance(const uint count,
   const float shade = light.y > 0.0f ? light.x / light.y : 1.0f;
   float3 sum = to_gaussians * shade * result.color;
   throughput *= 1.0f - result.alpha;
-  if (s.material < 0) {
+  if (s->material < 0) {
     sum += throughput * environment_color(environment, picture, ray.direction);
     gained[i] = (float4)(sum, (throughput.x + throughput.y + throughput.z) / 3.0f);
     tallies[i] = tally;
     return;
   }
-  __global const RsMaterial* material = materials + s.material;
+  __global const RsMaterial* material = materials + s->material;
   const int kind = material->kind;
-  const float3 color = load3(s.color), n = load3(s.shading), normal = load3(s.normal);
+  const float3 color = vload3(0, s->color), n = vload3(0, s->shading);
   sum += throughput * vload3(0, material->emission);
-  const uint block = (uint)(wave.bounce * 4 + path.lineage) << 16 | 1u;
-  const RsRandom4 random =
-      rs_random4(wave.seed_lo, wave.seed_hi, wave.first_pixel + path.pixel, wave.sample, block);
-  Continuation on[2];
-  int ways = 0;
+  const float weight = kind == RS_TRANSPARENT ? material->opacity : 1.0f;
   if (kind == RS_DIFFUSE || kind == RS_TRANSPARENT) {
-    float3 around = direct.s012;
+    const float8 direct = surface_light[i];
+    float3 diffuse = direct.s012;
     if (!wave.indirect || kind == RS_TRANSPARENT) {
-      around += load3(wave.ambient) + environment_light(environment, n);
+      diffuse += load3(wave.ambient) + environment_light(environment, n);
     }
-    const float weight = kind == RS_TRANSPARENT ? material->opacity : 1.0f;
-    sum += throughput * weight * (color * around + direct.s456);
-    if (kind == RS_TRANSPARENT) {
-      on[0] = straight_on(&path, ray, &s, throughput * (1.0f - weight));
-      ways = 1;
-    } else if (wave.indirect) {
-      const float3 direction = cosine_direction(n, random.x, random.y);
-      on[0] = new_direction(&path, &s, throughput * color, direction);
-      ways = dot(direction, normal) > 0.0f ? 1 : 0;
-    }
+    sum += throughput * weight * (color * diffuse + direct.s456);
+  }
+  gained[i] = (float4)(sum, 0.0f);
+  const uint block = (uint)(wave.bounce * 4 + path->lineage) << 16 | 1u;
+  const RsRandom4 random =
+      rs_random4(wave.seed_lo, wave.seed_hi, wave.first_pixel + path->pixel, wave.sample, block);
+  Way first, second;
+  uint ways = 0;
+  if (kind == RS_TRANSPARENT) {
+    first = way_straight_on(throughput * (1.0f - weight), media_of(path));
+    ways = 1;
+  } else if (kind == RS_DIFFUSE && wave.indirect) {
+    const float3 direction = cosine_direction(n, random.x, random.y);
+    first = way_along(direction, throughput * color, media_of(path));
+    ways = dot(direction, vload3(0, s->normal)) > 0.0f ? 1 : 0;
   } else if (kind == RS_MIRROR) {
     float3 facet = n;
     if (material->roughness > 0.0f && wave.scatter) {
       facet = ggx_normal(n, material->roughness, random.x, random.y);
     }
+    const float3 normal = vload3(0, s->normal);
     float3 direction = reflected(ray.direction, facet);
     if (dot(direction, normal) <= 0.0f) direction = reflected(ray.direction, normal);
-    on[0] = new_direction(&path, &s, throughput * color, direction);
+    first = way_along(direction, throughput * color, media_of(path));
     ways = 1;
   } else if (kind == RS_GLASS) {
-    ways = pass_glass(&path, ray, &s, throughput, materials, random.z, on);
+    ways = pass_glass(path, ray.direction, s, throughput, materials, random.z, &first, &second);
   }
+  const bool last = wave.bounce + 1 >= wave.max_bounces;
   uint kept = 0;
-  for (int k = 0; k < ways; ++k) {
-    if (max3(load3(on[k].path.throughput)) < wave.min_throughput) continue;
-    if (wave.bounce + 1 >= wave.max_bounces) {
-      ++tally.z;
-      continue;
+  for (uint k = 0; k < ways; ++k) {
+    if (max3(first.throughput) >= wave.min_throughput) {
+      if (last) {
+        ++tally.z;
+      } else {
+        take_way(first, k, ways, path, s, ray, 2 * (size_t)i + kept, next_paths, next_rays);
+        ++kept;
+      }
     }
-    next_paths[2 * (size_t)i + kept] = on[k].path;
-    store_ray(on[k].ray, next_rays, 2 * (size_t)i + kept);
-    ++kept;
+    first = second;
   }
   counts[i] = kept;
-  gained[i] = (float4)(sum, 0.0f);
   tallies[i] = tally;
 }
 

@@ -70,45 +70,35 @@ float3 cosine_direction(float3 n, float u, float v) {
                    sqrt(fmax(1.0f - u, 0.0f)) * n);
 }
 
-// The glass bodies that a path is in, the innermost first; entries are material + 1.
-typedef struct {
-  uint body[4];
-} Media;
+// The glass bodies that a path is in: material + 1 in 16 bits each, the innermost lowest.
+typedef ulong Media;
 
-Media media_of(const RsPath* path) {
-  Media out;
-  out.body[0] = path->media[0] & 0xffffu;
-  out.body[1] = path->media[0] >> 16;
-  out.body[2] = path->media[1] & 0xffffu;
-  out.body[3] = path->media[1] >> 16;
-  return out;
+Media media_of(__global const RsPath* path) {
+  return (Media)path->media[0] | (Media)path->media[1] << 32;
 }
 
-void store_media(const Media* media, RsPath* path) {
-  path->media[0] = media->body[0] | media->body[1] << 16;
-  path->media[1] = media->body[2] | media->body[3] << 16;
+void store_media(Media media, RsPath* path) {
+  path->media[0] = (uint)media;
+  path->media[1] = (uint)(media >> 32);
 }
 
-// False when four bodies are nested already.
-bool media_enter(Media* media, uint body) {
-  if (media->body[3] != 0) return false;
-  for (int i = 3; i > 0; --i) media->body[i] = media->body[i - 1];
-  media->body[0] = body;
-  return true;
+uint innermost(Media media) { return (uint)media & 0xffffu; }
+
+// Nothing changes when four bodies are nested already.
+Media media_enter(Media media, uint body) { return media >> 48 ? media : media << 16 | body; }
+
+// Without the innermost entry of `body`; the same when there is none.
+Media media_leave(Media media, uint body) {
+  for (uint bits = 0; bits < 64; bits += 16) {
+    if (innermost(media >> bits) != body) continue;
+    const Media inside = ((Media)1 << bits) - 1;
+    return (media & inside) | (media >> 16 & ~inside);
+  }
+  return media;
 }
 
-// Takes the innermost entry of `body` out; false when there is none.
-bool media_leave(Media* media, uint body) {
-  int i = 0;
-  while (i < 4 && media->body[i] != body) ++i;
-  if (i == 4) return false;
-  for (; i < 3; ++i) media->body[i] = media->body[i + 1];
-  media->body[3] = 0;
-  return true;
-}
-
-float innermost_ior(const Media* media, __global const RsMaterial* materials) {
-  return media->body[0] != 0 ? materials[media->body[0] - 1].ior : 1.0f;
+float innermost_ior(Media media, __global const RsMaterial* materials) {
+  return innermost(media) != 0 ? materials[innermost(media) - 1].ior : 1.0f;
 }
 
 float largest(float3 v) { return fmax(fmax(fabs(v.x), fabs(v.y)), fabs(v.z)); }

@@ -37,7 +37,12 @@ std::vector<Block> blocks_of(const fs::path& document) {
   bool fenced = false;
   bool after_text = false;
   bool indented = false;
-  while (std::getline(text, line)) {
+  for (std::string more; std::getline(text, line);) {
+    // A command goes on behind a backslash.
+    while (line.ends_with('\\') && std::getline(text, more)) {
+      line.pop_back();
+      line += more.substr(std::min(more.size(), more.find_first_not_of(' ')));
+    }
     if (line.starts_with("```")) {
       if (!fenced) blocks.push_back({document.filename().string(), line.substr(3), {}});
       fenced = !fenced;
@@ -110,6 +115,9 @@ const std::vector<std::pair<std::string, std::string>> kNotRun{
      "needs a network that the user supplies"},
     {"ctest --preset", "runs this test"},
     {"scripts/figures.sh", "measures for minutes; the test 'figures' compares its parts with docs"},
+    {"scripts/ablation.sh", "trains for minutes; its plots: tests/report/pages_test.py"},
+    {"scripts/quality/few_photos.py", "needs a capture of COLMAP"},
+    {"raysplats train DATA --downscale D --test-every 4 -n N", "its numbers stand below it"},
     {"scripts/reliability/fuzz.sh", "needs a build by clang and 20 minutes"},
     {"build/release/bin/fuzz_seeds", "writes into the source tree"},
     {"cmake --preset asan-ubsan", "another build"},
