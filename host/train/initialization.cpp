@@ -231,25 +231,26 @@ Beside photos_beside(const PointCloud& points,
                      const PhotoSource& photos,
                      const TrainOptions& options) {
   if (options.init != "auto" || points.size() < kFewPoints) return {};
-  // Points on one thing alone say nothing of what is around it.
   const std::vector<SmallPhoto>& some = photos(PhotoChoice::kSome);
   const double bare = bare_share(points, some);
   spdlog::debug("{:.1f} % of what photos show has no sparse points", 100 * bare);
-  if (bare > kMostlyBare) return {Beside::Part::kAll, {}};
-  if (!options.photo_points || dataset.alpha_is_background) return {};
+  // Points on one thing alone say nothing of what is around it.
+  const Beside by_points = {bare > kMostlyBare ? Beside::Part::kAll : Beside::Part::kNothing, {}};
+  if (!options.photo_points || dataset.alpha_is_background) return by_points;
   // Sparse points crowd where there is texture. What a sweep finds lies more evenly; where photos
   // are too far apart, or show little, it is wrong too often.
   const std::vector<SmallPhoto>& many = photos(PhotoChoice::kMany);
   // A body that masks leave is covered by its sparse points, and a sweep errs at its outline.
   const double shown = opaque_share(many);
   spdlog::debug("{:.1f} % of the photos count", 100 * shown);
-  if (shown < kMostlyShown) return {};
+  if (shown < kMostlyShown) return by_points;
   const double guess = guessed_depth(cameras, visible_region(cameras));
   const DepthRange depths = swept_depths(many, guess, options.seed);
   const SweepProbe probe = probe_sweep(many, depths, options.seed);
   spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * probe.agreed);
-  if (probe.agreed <= kMostlyAgreed) return {};
-  // What has texture enough for a depth has sparse points too, unless they are of another part.
+  if (probe.agreed <= kMostlyAgreed) return by_points;
+  // What has texture enough for a depth has sparse points too, unless they are of another part; a
+  // sky has neither.
   const PointCloud near = beside_points(probe.points, points, some);
   const double covered =
       static_cast<double>(near.size()) / static_cast<double>(probe.points.size());
