@@ -458,7 +458,7 @@ Gaussians initial_model(const Dataset& dataset,
     if (!alone) {
       spdlog::info("{}: the start takes {} points from the photos as well",
                    beside.part == Beside::Part::kAll
-                       ? "the sparse points lie on a small part of what the photos show"
+                       ? "the sparse points lie on a part of what the photos show"
                        : "most of what the photos show tells its depth",
                    count);
       sparse = points;
