@@ -436,14 +436,14 @@ __kernel void advance(const uint count,
   uint4 tally = (uint4)((uint)light.z + (uint)surface_light[i].s3, result.capped, 0, 0);
   float3 throughput = vload3(0, path->throughput);
   float3 to_gaussians = throughput;
-  const uint around = innermost(media_of(path));
-  if (around != 0) {
-    const float3 sigma = vload3(0, materials[around - 1].absorption);
+  const uint body = innermost(media_of(path));
+  if (body != 0) {
+    const float3 sigma = vload3(0, materials[body - 1].absorption);
     const float depth = gaussian_depth(result, ray);
     // Nothing is left after an infinite way, but clear glass stays clear.
-    const float3 way = fmin((float3)(ray.t_max - ray.t_min), (float3)(1e30f));
+    const float3 length = fmin((float3)(ray.t_max - ray.t_min), (float3)(1e30f));
     to_gaussians *= exp(-sigma * (depth - ray.t_min));
-    throughput *= exp(-sigma * way);
+    throughput *= exp(-sigma * length);
   }
   const float shade = light.y > 0.0f ? light.x / light.y : 1.0f;
   float3 sum = to_gaussians * shade * result.color;
@@ -504,7 +504,7 @@ __kernel void advance(const uint count,
         ++kept;
       }
     }
-    first = second;
+    if (k + 1 < ways) first = second;
   }
   counts[i] = kept;
   tallies[i] = tally;

@@ -35,15 +35,15 @@ constexpr std::size_t kEnoughPoints = 2000;
 constexpr std::size_t kFewPoints = 1000;  // fewer leave most of the photos without a start
 constexpr double kStartShare = 0.5;       // of the limit that points, or random places, may take
 constexpr double kPhotoShare = 0.3;       // of the limit that a start from photos takes
-constexpr double kUnsureShare = 0.25;     // of a start from photos alone: points in no clear depth
-constexpr double kUnsureBeside = 0.1;     // of those beside sparse ones: more are only slower
+constexpr double kUnsureShare = 0.25;     // of points of photos everywhere: those in no clear depth
+constexpr double kUnsureBeside = 0.1;     // of those in places of sparse ones: more are only slower
 constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
 constexpr std::size_t kLeastLimit = 2000;
 constexpr std::size_t kNeighbours = 3;
-constexpr double kMostlyBare = 0.31;        // of what photos show, with no sparse point far around
-constexpr double kMostlyCovered = 0.72;     // of what agrees in one depth, with sparse points near
-constexpr double kMostlyShown = 0.75;       // of the photos, where masks leave out the rest
-constexpr double kMostlyAgreed = 0.21;      // of what photos show, in one depth
+constexpr double kMostlyBare = 0.31;     // of what photos show, in wide cells with no sparse point
+constexpr double kMostlyCovered = 0.72;  // of what agrees in one depth, with sparse points near
+constexpr double kMostlyShown = 0.75;    // of the photos, where masks leave out the rest
+constexpr double kMostlyAgreed = 0.21;   // of what photos show, in one depth
 constexpr std::size_t kMostBeside = 10000;  // points of photos, of which more take seconds to find
 constexpr double kMostlySeen = 0.5;         // of sparse points
 constexpr double kLeastSeen = 0.01;  // of a given model: what photos of its scene see more of
@@ -231,11 +231,11 @@ Beside photos_beside(const PointCloud& points,
                      const PhotoSource& photos,
                      const TrainOptions& options) {
   if (options.init != "auto" || points.size() < kFewPoints) return {};
-  const std::vector<SmallPhoto>& some = photos(PhotoChoice::kSome);
-  const double bare = bare_share(points, some);
+  const double bare = bare_share(points, photos(PhotoChoice::kSome));
   spdlog::debug("{:.1f} % of what photos show has no sparse points", 100 * bare);
-  // Points on one thing alone say nothing of what is around it.
-  const Beside by_points = {bare > kMostlyBare ? Beside::Part::kAll : Beside::Part::kNothing, {}};
+  // Points on one thing alone say nothing of what is around it, unless that is not wanted.
+  const bool part = bare > kMostlyBare && !options.bounds;
+  const Beside by_points = {part ? Beside::Part::kAll : Beside::Part::kNothing, {}};
   if (!options.photo_points || dataset.alpha_is_background) return by_points;
   // Sparse points crowd where there is texture. What a sweep finds lies more evenly; where photos
   // are too far apart, or show little, it is wrong too often.
@@ -248,12 +248,14 @@ Beside photos_beside(const PointCloud& points,
   const DepthRange depths = swept_depths(many, guess, options.seed);
   const SweepProbe probe = probe_sweep(many, depths, options.seed);
   spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * probe.agreed);
-  if (probe.agreed <= kMostlyAgreed) return by_points;
+  if (probe.agreed <= kMostlyAgreed) return {by_points.part, depths};
   // What has texture enough for a depth has sparse points too, unless they are of another part; a
   // sky has neither.
-  const PointCloud near = beside_points(probe.points, points, some);
+  const PointCloud told =
+      distinct_points(probe.points, about_origin(options.bounds, dataset.origin));
+  const std::size_t near = beside_points(told, points, many).size();
   const double covered =
-      static_cast<double>(near.size()) / static_cast<double>(probe.points.size());
+      told.size() > 0 ? static_cast<double>(near) / static_cast<double>(told.size()) : 1;
   spdlog::debug("{:.1f} % of that has sparse points", 100 * covered);
   return {covered < kMostlyCovered ? Beside::Part::kAll : Beside::Part::kInTheirPlaces, depths};
 }

@@ -257,8 +257,8 @@ double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) 
     const int width = photo.camera.width, height = photo.camera.height;
     const int side = std::max(1, std::max(width, height) / kBareCells);
     const PointCells cells(points, photo, side);
-    for (double y = 0.5 * side; y < height; y += side) {
-      for (double x = 0.5 * side; x < width; x += side) {
+    for (double y = 0.5 * std::min(side, height); y < height; y += side) {
+      for (double x = 0.5 * std::min(side, width); x < width; x += side) {
         const glm::dvec2 middle(x, y);
         if (!photo.known(middle) || photo.at(middle).w < 0.5) continue;
         ++shown;

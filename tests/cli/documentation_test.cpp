@@ -329,7 +329,7 @@ TEST_CASE("every command and TOML block of the documents is run") {
           run_command(place, std::move(words));
           ++commands;
         } else if (block.document != "architecture.md" && block.language != "text") {
-          // The others hold lists of folders.
+          // The others hold no commands.
           FAIL_CHECK("this line is neither run nor listed with its reason: " << line);
         }
       }
