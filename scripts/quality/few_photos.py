@@ -87,4 +87,5 @@ def main():
     print(f"{out}: {len(train)} training and {count // 3} held-out photos, {len(points)} points")
 
 
-main()
+if __name__ == "__main__":
+    main()

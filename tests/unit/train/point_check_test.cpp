@@ -151,18 +151,27 @@ TEST_CASE("points on a small part of what photos show are joined by points of th
   CHECK(bare_share(small, photos) > 0.8);
   Dataset dataset;
   dataset.points = small;
-  const auto spread = [&](const char* init) {
-    TrainOptions options;
-    options.init = init;
-    const Gaussians model = initial_model(
+  TrainOptions options;
+  const auto model = [&] {
+    return initial_model(
         dataset, cameras, [&photos](PhotoChoice) -> const auto& { return photos; }, 4000, options);
+  };
+  const auto spread = [](const Gaussians& of) {
     double most = 0;
-    for (std::size_t i = 0; i < model.size(); ++i)
-      most = std::max(most, std::abs(static_cast<double>(model.means[3 * i + 1])));
+    for (std::size_t i = 0; i < of.size(); ++i)
+      most = std::max(most, std::abs(static_cast<double>(of.means[3 * i + 1])));
     return most;
   };
-  CHECK(spread("colmap") < 0.16);
-  CHECK(spread("auto") > 0.5);
+  CHECK(spread(model()) > 0.5);
+  // Where photos are not asked what they tell of depth, their bare places say it.
+  options.photo_points = false;
+  CHECK(spread(model()) > 0.5);
+  // What a box leaves out lacks no points: the start is of the sparse ones alone.
+  options.bounds = Bounds{{3.0, -0.2, -0.2}, {5.0, 0.2, 0.2}};
+  CHECK(model().size() == 2000);
+  options = {};
+  options.init = "colmap";
+  CHECK(spread(model()) < 0.16);
 }
 
 TEST_CASE("points of photos that tell of depth stand beside sparse ones, in their places") {

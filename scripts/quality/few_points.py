@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A COLMAP data set (sparse/0/*.bin) with a share of its sparse points, for docs/experiments.md: those next to their
+middle (the median of each coordinate), or with `scattered` a random choice. All else is that of DATA.
+
+usage: scripts/quality/few_points.py DATA OUT SHARE [scattered]        (OUT must not exist; its other files are links)"""
+import math
+import pathlib
+import random
+import statistics
+import struct
+import sys
+
+from few_photos import Reader
+
+
+def read_points(file):
+    """(position, the point's bytes) of each."""
+    reader, points = Reader(file), []
+    for _ in range(reader.numbers("Q")[0]):
+        point = reader.skip(8 + 3 * 8 + 3 + 8)
+        count = reader.numbers("Q")[0]
+        points.append((struct.unpack_from("<3d", point, 8), point + struct.pack("<Q", count) + reader.skip(8 * count)))
+    return points
+
+
+def main():
+    scattered = sys.argv[4:] == ["scattered"]
+    if len(sys.argv) != 4 and not scattered:
+        sys.exit(__doc__)
+    data, out, share = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), float(sys.argv[3])
+    if not 0 < share <= 1:
+        sys.exit(f"a share is above 0 and at most 1, not {share}")
+    points = read_points(data / "sparse/0/points3D.bin")
+    if scattered:
+        random.Random(1).shuffle(points)
+    else:
+        middle = [statistics.median(axis) for axis in zip(*(position for position, _ in points))]
+        points.sort(key=lambda point: math.dist(point[0], middle))
+    kept = [point for _, point in points[:int(share * len(points))]]
+    (out / "sparse/0").mkdir(parents=True)
+    for folder, others in ((".", "sparse"), ("sparse/0", "points3D.bin")):
+        for file in (data / folder).iterdir():
+            if file.name != others:
+                (out / folder / file.name).symlink_to(file)
+    (out / "sparse/0/points3D.bin").write_bytes(struct.pack("<Q", len(kept)) + b"".join(kept))
+    print(f"{out}: {len(kept)} of {len(points)} points")
+
+
+if __name__ == "__main__":
+    main()
