@@ -59,9 +59,10 @@ class PageCase(BrowserCase):
         return self.page.find_element(By.ID, "status").text
 
     def download(self, name):
-        """A file that the page has saved, which is then out of its way."""
+        """A file that the page has saved, which is then out of its way. Chromium keeps the name with an empty file, and
+        puts the whole one in its place."""
         saved, taken = os.path.join(self.downloads, name), os.path.join(self.viewer.folder.name, f"{time.time()}_{name}")
-        self.wait(name, lambda: os.path.exists(saved))
+        self.wait(name, lambda: os.path.exists(saved) and os.path.getsize(saved) > 0)
         os.rename(saved, taken)
         return taken
 
