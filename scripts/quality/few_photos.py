@@ -3,9 +3,8 @@
 """A COLMAP data set (images/ or a reduced images_N/, sparse/0/*.bin) with few of its photos, for docs/training.md: TRAIN
 evenly spread training photos and a third as many held-out ones, of those that the whole data set holds out (every
 eighth). They are named so that `raysplats train OUT --test-every 4` holds out the same ones. Of the sparse points those
-stay that two training photos show.
-
-usage: scripts/quality/few_photos.py DATA OUT TRAIN        (OUT must not exist; its photos are links)"""
+stay that two training photos show. OUT must not exist; its photos are links."""
+import argparse
 import pathlib
 import struct
 import sys
@@ -59,9 +58,12 @@ def spread(images, count):
 
 
 def main():
-    if len(sys.argv) != 4:
-        sys.exit(__doc__)
-    data, out, count = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), int(sys.argv[3])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", metavar="DATA", type=pathlib.Path)
+    parser.add_argument("out", metavar="OUT", type=pathlib.Path)
+    parser.add_argument("train", metavar="TRAIN", type=int)
+    arguments = parser.parse_args()
+    data, out, count = arguments.data, arguments.out, arguments.train
     images = read_images(data / "sparse/0/images.bin")
     held_out = images[::HELD_OUT]
     others = [image for i, image in enumerate(images) if i % HELD_OUT]
@@ -88,4 +90,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except OSError as error:
+        sys.exit(str(error))

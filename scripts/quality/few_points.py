@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """A COLMAP data set (sparse/0/*.bin) with a share of its sparse points, for docs/experiments.md: those next to their
-middle (the median of each coordinate), or with `scattered` a random choice. All else is that of DATA.
-
-usage: scripts/quality/few_points.py DATA OUT SHARE [scattered]        (OUT must not exist; its other files are links)"""
+middle (the median of each coordinate), or with `scattered` a random choice. All else is that of DATA. OUT must not exist; its other files are links."""
+import argparse
 import math
 import pathlib
 import random
@@ -25,14 +24,17 @@ def read_points(file):
 
 
 def main():
-    scattered = sys.argv[4:] == ["scattered"]
-    if len(sys.argv) != 4 and not scattered:
-        sys.exit(__doc__)
-    data, out, share = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), float(sys.argv[3])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", metavar="DATA", type=pathlib.Path)
+    parser.add_argument("out", metavar="OUT", type=pathlib.Path)
+    parser.add_argument("share", metavar="SHARE", type=float)
+    parser.add_argument("choice", nargs="?", choices=["nearest", "scattered"], default="nearest")
+    arguments = parser.parse_args()
+    data, out, share = arguments.data.resolve(), arguments.out, arguments.share
     if not 0 < share <= 1:
         sys.exit(f"a share is above 0 and at most 1, not {share}")
     points = read_points(data / "sparse/0/points3D.bin")
-    if scattered:
+    if arguments.choice == "scattered":
         random.Random(1).shuffle(points)
     else:
         middle = [statistics.median(axis) for axis in zip(*(position for position, _ in points))]
@@ -48,4 +50,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except OSError as error:
+        sys.exit(str(error))
