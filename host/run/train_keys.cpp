@@ -375,8 +375,8 @@ void add_density_keys(TrainTable& t, TrainOptions& o) {
       "hard limit of the count; the strongest candidates win; 0 = from the photos' pixels, the "
       "iterations and the device's memory");
   t.number("opacity-decay", o.opacity_decay, kFitted, 0.5,
-           "taken off every opacity in each pass of the budget strategy; -1 = 0, or 0.01 after a "
-           "random start");
+           "taken off every opacity in each pass of the budget strategy; -1 = 0.01 after a random "
+           "start, else 0 up to 100 steps for each photo, rising to 0.01 at 200");
   t.number("opacity-reg", o.opacity_reg, 0, 1e3,
            "weight of the mean opacity in the loss of the mcmc strategy");
   t.number("scale-reg", o.scale_reg, 0, 1e3,

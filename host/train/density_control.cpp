@@ -63,6 +63,7 @@ void DensityControl::follow(const TrainOptions& options, std::size_t views) {
   period_ = options.densify_every.of(options.iterations);
   const auto pass = static_cast<std::int64_t>(std::max<std::size_t>(views, 1));
   if (period_ == 0) period_ = fitted_period(options.iterations, pass);
+  decay_ = options.strategy == DensityStrategy::kBudget ? pass_decay(options, pass) : 0;
   whole_passes_ = period_ % pass == 0;
   if (options.strategy != DensityStrategy::kAdc && growth_end_ > 0)
     last_ = std::max(last_, options.replace_until.of(options.iterations));
@@ -187,8 +188,7 @@ DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iter
   }
   if (plan.changes()) gather(gaussians, plan, iteration);
   if (moves && plan.changes()) apply_shares(context_, relocation.shares, gaussians);
-  if (options_.strategy == DensityStrategy::kBudget && pass_decay(options_) > 0)
-    fade_opacities(gaussians);
+  if (decay_ > 0) fade_opacities(gaussians);
   // Without changes the statistics start anew all the same, as in 3DGS.
   if (statistics_.size() == 2 * gaussians.count) {
     statistics_.clear();
@@ -241,8 +241,7 @@ void DensityControl::gather(DeviceGaussians& gaussians,
 void DensityControl::fade_opacities(DeviceGaussians& gaussians) {
   context_.kernel(kProgram, "fade_opacity")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
-              static_cast<float>(pass_decay(options_)), static_cast<float>(kLeastOpacity),
-              gaussians.opacities);
+              static_cast<float>(decay_), static_cast<float>(kLeastOpacity), gaussians.opacities);
 }
 
 void DensityControl::reset_opacities(DeviceGaussians& gaussians) {

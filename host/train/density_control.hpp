@@ -17,7 +17,7 @@ namespace raysplats {
 class DensityControl {
  public:
   /// `extent` is the scene extent that the relative sizes of the options refer to, `views` the
-  /// number of training views.
+  /// steps that show every training view once.
   DensityControl(Context& context, const TrainOptions& options, double extent, std::size_t views);
 
   /// Goes on by other options, as if made with them: the length of a run may be fixed late.
@@ -79,6 +79,7 @@ class DensityControl {
   std::size_t limit_ = 0;
   std::int64_t first_ = 0, growth_end_ = 0, last_ = 0, period_ = 0;  // iterations
   bool whole_passes_ = false;                                        // a period sees every view
+  double decay_ = 0;  // of opacities, as pass_decay()
   Buffer<float> statistics_;
   Buffer<float> old_means_;  // before a step that is measured
   Buffer<std::uint32_t> open_guard_;

@@ -59,6 +59,7 @@ LearningRate with_end(LearningRate rate, const FittedRate& end, const TrainOptio
 // Fewer photos are known by heart sooner: from then on a model gets worse between them.
 constexpr std::int64_t kPasses = 100;
 constexpr std::int64_t kShortestFitted = 1000, kLongestFitted = 10000;
+constexpr double kUsualDecay = 0.01;  // after twice as many
 
 }  // namespace
 
@@ -113,9 +114,11 @@ double start_opacity(const TrainOptions& options) {
   return clears_random_start(options) ? 0.02 : 0.1;
 }
 
-double pass_decay(const TrainOptions& options) {
+double pass_decay(const TrainOptions& options, std::int64_t pass) {
   if (options.opacity_decay != kFitted) return options.opacity_decay;
-  return clears_random_start(options) ? 0.01 : 0.0;
+  if (clears_random_start(options)) return kUsualDecay;
+  const double passes = static_cast<double>(options.iterations) / static_cast<double>(pass);
+  return kUsualDecay * std::clamp(passes / static_cast<double>(kPasses) - 1.0, 0.0, 1.0);
 }
 
 double learning_rate(const LearningRate& rate,

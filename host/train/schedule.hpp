@@ -41,12 +41,15 @@ double color_share(const TrainOptions& options);
 /// go, and many are to go altogether. The mcmc strategy moves and revives them by itself.
 bool clears_random_start(const TrainOptions& options);
 
-/// The rate of the means (its end as above), the opacity of the first Gaussians and what passes of
-/// density control take off opacities, as they are given, with what the start asks for in place of
-/// kFitted.
+/// The rate of the means (its end as above) and the opacity of the first Gaussians, as they are
+/// given, with what the start asks for in place of kFitted.
 LearningRate position_rate(const TrainOptions& options);
 double start_opacity(const TrainOptions& options);
-double pass_decay(const TrainOptions& options);
+
+/// What each refinement of density control takes off opacities, as given. In place of kFitted what
+/// a random start asks for, or a run that is longer than the default for its photos: 0 up to that
+/// length, all from twice that on. `pass`: the steps that show every photo once, at least 1.
+double pass_decay(const TrainOptions& options, std::int64_t pass);
 
 /// What the shortest axis of a flat Gaussian may have of the next one after this step; 1 where all
 /// are round.

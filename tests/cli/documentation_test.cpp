@@ -117,7 +117,7 @@ const std::vector<std::pair<std::string, std::string>> kNotRun{
     {"scripts/figures.sh", "measures for minutes; the test 'figures' compares its parts with docs"},
     {"scripts/ablation.sh", "trains for minutes; its plots: tests/report/pages_test.py"},
     {"scripts/quality/few_photos.py", "needs a capture of COLMAP"},
-    {"raysplats train DATA --downscale D --test-every 4 -n N", "its numbers stand below it"},
+    {"raysplats train DATA --downscale D --test-every 4", "its numbers stand below it"},
     {"scripts/reliability/fuzz.sh", "needs a build by clang and 20 minutes"},
     {"build/release/bin/fuzz_seeds", "writes into the source tree"},
     {"cmake --preset asan-ubsan", "another build"},

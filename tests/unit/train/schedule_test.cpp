@@ -107,22 +107,36 @@ TEST_CASE("the last rates fall with the root of the run's length, unless they ar
   check_last(30000, 0.002, 0.002, 0.0001, 0.0001);
 }
 
+TEST_CASE("a run that is long for its photos takes off opacities") {
+  TrainOptions options;
+  for (const auto& [steps, decay] :
+       {std::pair{0, 0.0}, {1000, 0.0}, {2100, 0.0}, {3150, 0.005}, {4200, 0.01}, {48000, 0.01}}) {
+    options.iterations = steps;
+    CHECK(pass_decay(options, 21) == doctest::Approx(decay));
+  }
+  CHECK(pass_decay(options, 480) == 0.0);
+  options.init = "random";
+  CHECK(pass_decay(options, 480) == 0.01);
+  options.opacity_decay = 0.02;
+  CHECK(pass_decay(options, 21) == 0.02);
+}
+
 TEST_CASE("a random start has its own rate, opacity and decay unless they are given") {
   TrainOptions options;
   CHECK(position_rate(options).initial == 5e-4);
   CHECK(start_opacity(options) == 0.1);
-  CHECK(pass_decay(options) == 0.0);
+  CHECK(pass_decay(options, 50) == 0.0);
   options.init = "random";
   CHECK(position_rate(options).initial == 2e-3);
   options.iterations = 1000;
   CHECK(position_rate(options).final_value == 1e-5);
   CHECK(adam_rates_of(options, 3.0, 3.0, 0).means == doctest::Approx(6e-3));
   CHECK(start_opacity(options) == 0.02);
-  CHECK(pass_decay(options) == 0.01);
+  CHECK(pass_decay(options, 50) == 0.01);
   options.strategy = DensityStrategy::kMcmc;
   CHECK(position_rate(options).initial == 5e-4);
   CHECK(start_opacity(options) == 0.1);
-  CHECK(pass_decay(options) == 0.0);
+  CHECK(pass_decay(options, 50) == 0.0);
   options.strategy = DensityStrategy::kAdc;
   CHECK(start_opacity(options) == 0.02);
   options.position_lr = {1e-3, 1e-4};
@@ -130,7 +144,7 @@ TEST_CASE("a random start has its own rate, opacity and decay unless they are gi
   options.opacity_decay = 0;
   CHECK(position_rate(options).initial == 1e-3);
   CHECK(start_opacity(options) == 0.3);
-  CHECK(pass_decay(options) == 0.0);
+  CHECK(pass_decay(options, 50) == 0.0);
   options.position_lr = {kFitted, 0.01};
   CHECK(position_rate(options).initial == 0.01);
 }
@@ -194,6 +208,7 @@ TEST_CASE("every pass sees every view once, in another order, and a new object c
   CHECK(resumed.at(27) == second[7]);
   ViewOrder other(2, 20);
   std::vector<std::size_t> seeded;
+  seeded.reserve(20);
   for (int i = 0; i < 20; ++i) seeded.push_back(other.at(i));
   CHECK(seeded != first);
 }
