@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """A COLMAP data set (sparse/0/*.bin) with a share of its sparse points, for docs/experiments.md: those next to their
-middle (the median of each coordinate), or with `scattered` a random choice. All else is that of DATA. OUT must not exist; its other files are links."""
+middle (the median of each coordinate), or with `scattered` a random choice. All else is that of DATA. OUT must not
+exist; its other files are links."""
 import argparse
 import math
 import pathlib
