@@ -47,8 +47,8 @@ LearningRate position_rate(const TrainOptions& options);
 double start_opacity(const TrainOptions& options);
 
 /// What each refinement of density control takes off opacities, as given. In place of kFitted what
-/// a random start asks for, or a run that is longer than the default for its photos: 0 up to that
-/// length, all from twice that on. `pass`: the steps that show every photo once, at least 1.
+/// a random start asks for, or a run that is long for its photos: 0 up to 100 steps for each of
+/// them, all from 200 on. `pass`: the steps that show every photo once, at least 1.
 double pass_decay(const TrainOptions& options, std::int64_t pass);
 
 /// What the shortest axis of a flat Gaussian may have of the next one after this step; 1 where all
