@@ -66,9 +66,13 @@ Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device
   Dataset dataset = load_dataset(options.data, options.train.data);
   if (options.quality.empty()) return dataset;
   const QualityChoice choice = choose_quality(parse_quality(options.quality), dataset, device.type);
+  // On the command line, or by a --config.
+  const TrainOptions usual;
   const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
-  if (!given("--iterations")) options.train.iterations = choice.iterations;
-  if (given("--downscale") || choice.downscale == 1) return dataset;
+  if (!given("--iterations") && options.train.iterations == usual.iterations)
+    options.train.iterations = choice.iterations;
+  const bool sized = given("--downscale") || options.train.data.downscale != usual.data.downscale;
+  if (sized || choice.downscale == 1) return dataset;
   options.train.data.downscale = choice.downscale;
   return load_dataset(options.data, options.train.data);
 }

@@ -29,12 +29,8 @@ glm::dvec3 mean_center(std::span<const Camera> cameras) {
 }
 
 std::vector<Camera> usual(std::span<const Camera> cameras) {
-  const std::vector<std::size_t> strays = stray_cameras(cameras);
   std::vector<Camera> out;
-  out.reserve(cameras.size());
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    if (!std::binary_search(strays.begin(), strays.end(), i)) out.push_back(cameras[i]);
-  }
+  for (const std::size_t i : usual_cameras(cameras)) out.push_back(cameras[i]);
   return out;
 }
 
@@ -61,6 +57,15 @@ std::vector<std::size_t> stray_cameras(std::span<const Camera> cameras) {
     if (values[i] > kStrayFactor * reach) out.push_back(i);
   }
   if (out.size() > std::max<std::size_t>(1, cameras.size() / kOneStrayIn)) out.clear();
+  return out;
+}
+
+std::vector<std::size_t> usual_cameras(std::span<const Camera> cameras) {
+  const std::vector<std::size_t> strays = stray_cameras(cameras);
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (!std::binary_search(strays.begin(), strays.end(), i)) out.push_back(i);
+  }
   return out;
 }
 

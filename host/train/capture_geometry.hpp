@@ -13,6 +13,8 @@ namespace raysplats {
 /// median centre than eight times what 9 of 10 cameras keep. At most one in 20 (or a single one of
 /// eight or more): beyond that they are no exceptions, and there are none.
 std::vector<std::size_t> stray_cameras(std::span<const Camera> cameras);
+/// Numbers of all others.
+std::vector<std::size_t> usual_cameras(std::span<const Camera> cameras);
 
 /// Radius of the camera centres about their mean, times 1.1, as in 3DGS, without the stray ones:
 /// the length that learning rates and size thresholds are relative to. Never below a small positive

@@ -29,16 +29,20 @@ constexpr double kLeastOpacity = 0.004;     // that fading leaves
 constexpr double kMcmcGrowth = 1.05;        // of the count in a pass of 3DGS-MCMC, at least
 
 // Iterations between two passes when the options leave them open.
-std::int64_t fitted_period(std::int64_t iterations, std::int64_t views) {
+std::int64_t fitted_period(std::int64_t iterations, std::int64_t views, std::int64_t together) {
   const auto share = [iterations](double s) {
     return std::llround(s * static_cast<double>(iterations));
   };
   const std::int64_t usual =
       std::clamp<std::int64_t>(share(kShortRunShare), kShortPeriod, kLeastPeriod);
   const std::int64_t least = std::max<std::int64_t>(usual, share(kPeriodShare));
-  const std::int64_t whole = (least + views - 1) / views * views;
-  return whole <= std::max(2 * least, static_cast<std::int64_t>(share(kLongestPassShare))) ? whole
-                                                                                           : least;
+  const std::int64_t most =
+      std::max(2 * least, static_cast<std::int64_t>(share(kLongestPassShare)));
+  const std::int64_t pass = pass_steps(views, together);
+  for (std::int64_t whole = (least + pass - 1) / pass * pass; whole <= most; whole += pass) {
+    if (shows_all(whole, views, together)) return whole;
+  }
+  return least;
 }
 
 std::uint32_t low_word(std::uint64_t bits) { return static_cast<std::uint32_t>(bits); }
@@ -61,10 +65,12 @@ void DensityControl::follow(const TrainOptions& options, std::size_t views) {
   growth_end_ = options.densify_until.of(options.iterations);
   last_ = growth_end_;
   period_ = options.densify_every.of(options.iterations);
-  const auto pass = static_cast<std::int64_t>(std::max<std::size_t>(views, 1));
-  if (period_ == 0) period_ = fitted_period(options.iterations, pass);
-  decay_ = options.strategy == DensityStrategy::kBudget ? pass_decay(options, pass) : 0;
-  whole_passes_ = period_ % pass == 0;
+  const auto all = static_cast<std::int64_t>(std::max<std::size_t>(views, 1));
+  if (period_ == 0) period_ = fitted_period(options.iterations, all, options.views_per_step);
+  decay_ = options.strategy == DensityStrategy::kBudget
+               ? pass_decay(options, pass_steps(all, options.views_per_step))
+               : 0;
+  whole_passes_ = shows_all(period_, all, options.views_per_step);
   if (options.strategy != DensityStrategy::kAdc && growth_end_ > 0)
     last_ = std::max(last_, options.replace_until.of(options.iterations));
 }

@@ -17,7 +17,7 @@ namespace raysplats {
 class DensityControl {
  public:
   /// `extent` is the scene extent that the relative sizes of the options refer to, `views` the
-  /// steps that show every training view once.
+  /// number of training views, which steps show in passes over all of them.
   DensityControl(Context& context, const TrainOptions& options, double extent, std::size_t views);
 
   /// Goes on by other options, as if made with them: the length of a run may be fixed late.

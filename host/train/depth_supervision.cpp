@@ -62,6 +62,7 @@ void DepthSupervision::backward(std::size_t view,
                                 int height,
                                 const Buffer<float>& image,
                                 const Buffer<float>& depth,
+                                const DevicePhoto& photo,
                                 Buffer<float>& image_gradient) {
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const Target& known = target(view, width, height);
@@ -70,9 +71,9 @@ void DepthSupervision::backward(std::size_t view,
     gradient_.clear();
     return;
   }
-  slopes_.launch(Range::linear(pixels, kGroup), image, depth, known.depths, image_gradient,
-                 gradient_, static_cast<std::uint32_t>(pixels),
-                 static_cast<float>(weight_) / known.known);
+  slopes_.launch(Range::linear(pixels, kGroup), image, depth, known.depths, photo.words,
+                 image_gradient, gradient_, static_cast<std::uint32_t>(pixels), photo.planes,
+                 photo.weighted ? 1 : 0, static_cast<float>(weight_) / known.known);
 }
 
 }  // namespace raysplats

@@ -280,7 +280,7 @@ PointCloud start_points(const Dataset& dataset,
   PointCloud reliable = reliable_points(dataset.points);
   if (options.init == "auto" && dataset.alpha_is_background) {
     // Points were often found before the photos were cut out.
-    PointCloud hull = hull_points(reliable, photos(PhotoChoice::kSome));
+    PointCloud hull = hull_points(reliable, photos(PhotoChoice::kAll));
     if (hull.size() < reliable.size()) {
       spdlog::info("{} of {} sparse points lie outside of what the cut-out photos show",
                    reliable.size() - hull.size(), reliable.size());

@@ -28,6 +28,9 @@
 namespace raysplats {
 namespace {
 
+// Of a pixel: the nine planes of SSIM's slopes in one buffer (train/image_loss.cpp).
+constexpr std::size_t kSlopeBytes = 9 * sizeof(float);
+
 // Whether gradients of packets may be added in long integers. Copies that do not fit their share
 // of memory-budget become that, too.
 bool may_sum_exactly(const TrainOptions& options, std::size_t gaussians, const DeviceInfo& device) {
@@ -145,7 +148,8 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                mesh_bytes(demand.triangles, ray_lanes(device, 0));
     largest = std::max(largest, share.largest);
   }
-  out.largest_buffer = demand.gaussians * largest;
+  out.largest_buffer =
+      std::max(demand.gaussians * largest, demand.pixels * std::max(kSlopeBytes, photo));
   return out;
 }
 

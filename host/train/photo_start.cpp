@@ -2,6 +2,7 @@
 #include "train/photo_start.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
@@ -23,12 +24,13 @@ constexpr std::uint64_t kScatterStream = 0x73636174746572;
 constexpr std::size_t kTriesPerPoint = 200;
 
 constexpr std::size_t kColourPhotos = 24;  // that tell the colour of a scattered point
+constexpr double kLeastAlpha = 0.02;       // mattes that programs make are seldom 0 all over
 
 // Whether the photo shows something at the point or next to it.
 bool shows_something(const SmallPhoto& photo, const glm::dvec2& point) {
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
-      if (photo.at(point + glm::dvec2(dx, dy)).w > 0) return true;
+      if (photo.at(point + glm::dvec2(dx, dy)).w > kLeastAlpha) return true;
     }
   }
   return false;
@@ -76,10 +78,9 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
 }
 
 PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> photos) {
-  PointCloud out;
-  for (std::size_t i = 0; i < points.size(); ++i) {
+  std::vector<std::uint8_t> inside(points.size());
+  in_parallel(points.size(), [&](std::size_t i) {
     const float* p = points.positions.data() + 3 * i;
-    const float* c = points.colors.data() + 3 * i;
     std::size_t looked = 0, shown = 0;
     for (const SmallPhoto& photo : photos) {
       const auto point = photo.sees({p[0], p[1], p[2]});
@@ -87,7 +88,13 @@ PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> pho
       ++looked;
       shown += shows_something(photo, *point) ? 1 : 0;
     }
-    if (2 * shown > looked) append_point(out, {p[0], p[1], p[2]}, {c[0], c[1], c[2]});
+    inside[i] = 2 * shown > looked;
+  });
+  PointCloud out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    const float* c = points.colors.data() + 3 * i;
+    if (inside[i]) append_point(out, {p[0], p[1], p[2]}, {c[0], c[1], c[2]});
   }
   return out;
 }

@@ -6,9 +6,9 @@
 #include <span>
 
 #include "raysplats/dataset.hpp"
+#include "train/depth_range.hpp"
 #include "train/initialization.hpp"
 #include "train/photo_set.hpp"
-#include "train/depth_range.hpp"
 
 namespace raysplats {
 
@@ -23,9 +23,9 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
                          std::size_t count,
                          std::uint64_t seed);
 
-/// Those of a data set's points that lie in the visual hull of some of its cut-out photos, with
-/// room for errors of poses and outlines: most of the photos that see a point's place show
-/// something there. Points that no photo sees are left out.
+/// Those of a data set's points that lie in the visual hull of its cut-out photos, with room for
+/// errors of poses and outlines: most of the photos that see a point's place show something there.
+/// Points that none of `photos` sees are left out, so these have to be all.
 PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> photos);
 
 /// Points in random places, half of them evenly in `region`, half on the rays of random pixels of

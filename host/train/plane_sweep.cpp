@@ -151,30 +151,27 @@ class Sweep {
   std::size_t agreed_ = 0, vague_ = 0;
 };
 
-// What agreed in a depth, as the photos see it.
+// What agreed in a depth, as a photo sees it.
 class AgreedPlaces {
  public:
-  AgreedPlaces(std::span<const SmallPhoto> photos, std::span<const Sample> samples)
-      : photos_(photos), places_(photos.size()) {
-    in_parallel(photos.size(), [&](std::size_t view) {
-      for (const Sample& sample : samples) {
-        if (!sample.agreed) continue;
-        const glm::dvec3 world = sample.position();
-        const auto point = photos[view].sees(world);
-        if (!point) continue;
-        const double depth = glm::distance(world, photos[view].camera.center());
-        places_[view].push_back({*point, sample.color(), depth});
-      }
-    });
+  AgreedPlaces(const SmallPhoto& photo, std::span<const Sample> samples)
+      : width_(photo.camera.width) {
+    for (const Sample& sample : samples) {
+      if (!sample.agreed) continue;
+      const glm::dvec3 world = sample.position();
+      const auto point = photo.sees(world);
+      if (!point) continue;
+      const double depth = glm::distance(world, photo.camera.center());
+      places_.push_back({*point, sample.color(), depth});
+    }
   }
 
-  /// The depth of what is most like the pixel in place and colour, if the photo sees any of it.
+  /// The depth of what is most like the photo's pixel in place and colour, if it sees any of it.
   std::optional<double> depth_near(const PhotoPixel& pixel) const {
-    const double width = photos_[pixel.view].camera.width;
     double least = std::numeric_limits<double>::infinity();
     std::optional<double> out;
-    for (const Place& place : places_[pixel.view]) {
-      const glm::dvec2 apart = (pixel.point - place.point) / width;
+    for (const Place& place : places_) {
+      const glm::dvec2 apart = (pixel.point - place.point) / width_;
       const glm::dvec3 other = kColourWidths * (glm::dvec3(pixel.color) - place.color);
       const double squared = glm::dot(apart, apart) + glm::dot(other, other);
       if (squared < least) least = squared, out = place.depth;
@@ -188,8 +185,8 @@ class AgreedPlaces {
     glm::dvec3 color;
     double depth;
   };
-  std::span<const SmallPhoto> photos_;
-  std::vector<std::vector<Place>> places_;
+  double width_;
+  std::vector<Place> places_;
 };
 
 // Photos that look the same way, those farthest apart first.
@@ -361,22 +358,24 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
   const std::size_t most_agreed = count - std::min(fog, sweep.vague());
   const std::size_t most_vague = depths.open ? count - std::min(sweep.agreed(), count - fog) : fog;
   std::vector<Sample> taken;
-  std::vector<std::size_t> as_deep;  // of those, the ones as deep as what is around them
+  // Of those, by photo, the ones as deep as what is around them.
+  std::vector<std::vector<std::size_t>> as_deep(photos.size());
   std::size_t agreed = 0, vague = 0;
   for (const Sample& sample : sweep.samples()) {
     std::size_t& number = sample.agreed ? agreed : vague;
     if (number >= (sample.agreed ? most_agreed : most_vague) || !sample.pixel.shows()) continue;
     ++number;
-    if (!sample.agreed && !depths.open && vague % 2 == 0) as_deep.push_back(taken.size());
+    if (!sample.agreed && !depths.open && vague % 2 == 0)
+      as_deep[sample.pixel.view].push_back(taken.size());
     taken.push_back(sample);
   }
-  if (!as_deep.empty()) {
-    const AgreedPlaces places(photos, sweep.samples());
-    in_parallel(as_deep.size(), [&](std::size_t i) {
-      Sample& sample = taken[as_deep[i]];
-      sample.depth = places.depth_near(sample.pixel).value_or(sample.depth);
-    });
-  }
+  // One photo after the other, because many photos see most of what agreed.
+  in_parallel(photos.size(), [&](std::size_t view) {
+    if (as_deep[view].empty()) return;
+    const AgreedPlaces places(photos[view], sweep.samples());
+    for (const std::size_t i : as_deep[view])
+      taken[i].depth = places.depth_near(taken[i].pixel).value_or(taken[i].depth);
+  });
   PointCloud out;
   for (const Sample& sample : taken) append_point(out, sample.position(), sample.color());
   return out;

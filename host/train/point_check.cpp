@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -13,6 +14,7 @@
 
 #include "scene/camera_model.hpp"
 #include "train/point_cloud.hpp"
+#include "util/parallel.hpp"
 
 namespace raysplats {
 namespace {
@@ -211,13 +213,15 @@ PointMatch match_points(const PointCloud& points,
 }
 
 PointCloud seen_points(const PointCloud& points, std::span<const Camera> cameras) {
+  std::vector<std::uint8_t> seen(points.size());
+  in_parallel(points.size(), [&](std::size_t i) {
+    const glm::dvec3 world = triple(points.positions, i);
+    seen[i] = std::any_of(cameras.begin(), cameras.end(),
+                          [&](const Camera& camera) { return sees(camera, world); });
+  });
   PointCloud out;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const glm::dvec3 world = triple(points.positions, i);
-    if (std::none_of(cameras.begin(), cameras.end(),
-                     [&](const Camera& camera) { return sees(camera, world); }))
-      continue;
-    append_point(points, i, out);
+    if (seen[i]) append_point(points, i, out);
   }
   return out;
 }

@@ -12,6 +12,7 @@
 #include "raysplats/error.hpp"
 #include "scene/orbit.hpp"
 #include "scene/statistics.hpp"
+#include "train/capture_geometry.hpp"
 
 namespace raysplats {
 namespace {
@@ -41,7 +42,8 @@ PoseRefinement::PoseRefinement(std::vector<Camera> cameras,
     : cameras_(std::move(cameras)),
       extent_(extent),
       distances_(std::move(distances)),
-      prior_(prior) {
+      prior_(prior),
+      usual_(usual_cameras(cameras_)) {
   const std::size_t numbers = kNumbers * cameras_.size();
   state_.deltas.resize(numbers);
   state_.first.resize(numbers);
@@ -102,9 +104,9 @@ glm::dmat3 PoseRefinement::turn_back(std::size_t view) const {
 }
 
 void PoseRefinement::remove_common_motion() {
-  const auto count = static_cast<double>(cameras_.size());
+  const auto count = static_cast<double>(usual_.size());
   glm::dvec3 middle(0.0), shift(0.0);
-  for (std::size_t view = 0; view < cameras_.size(); ++view) {
+  for (const std::size_t view : usual_) {
     middle += cameras_[view].center() / count;
     shift += shift_of(state_.deltas, view) / count;
   }
@@ -113,7 +115,7 @@ void PoseRefinement::remove_common_motion() {
   glm::dmat3 sum(0.0);
   glm::dvec3 right(0.0);
   double along = 0.0, square = 0.0;
-  for (std::size_t view = 0; view < cameras_.size(); ++view) {
+  for (const std::size_t view : usual_) {
     const glm::dvec3 r = (cameras_[view].center() - middle) / extent_;
     const glm::dvec3 d = (shift_of(state_.deltas, view) - shift) / extent_;
     sum += glm::dmat3(1.0 + glm::dot(r, r)) - glm::outerProduct(r, r);

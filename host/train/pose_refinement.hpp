@@ -17,8 +17,9 @@ namespace raysplats {
 /// (phones, rigs, few matches): a turn about the camera's axes and a shift of its centre each, by
 /// Adam (0.9, 0.999) on the gradients of the pictures. Moving all cameras and the scene together
 /// changes no picture, so the motion that the cameras have in common (turn, shift and scale, by
-/// least squares) is taken off after every step: the model stays where the data set has it, and so
-/// do cameras that are not trained. On the host; equal inputs give equal bits.
+/// least squares, without stray_cameras()) is taken off after every step: the model stays where the
+/// data set has it, and so do cameras that are not trained. On the host; equal inputs give equal
+/// bits.
 ///
 /// A camera that moves sideways and turns back to what it looked at changes its picture far less
 /// than one that does either, so that gradients of centre and turn alone creep along that valley.
@@ -63,6 +64,8 @@ class PoseRefinement {
   double extent_;
   std::vector<double> distances_;
   double prior_;
+  // Tell what motion all have in common: the distance of stray cameras would outweigh it.
+  std::vector<std::size_t> usual_;
   State state_;
 };
 

@@ -114,6 +114,14 @@ double start_opacity(const TrainOptions& options) {
   return clears_random_start(options) ? 0.02 : 0.1;
 }
 
+std::int64_t pass_steps(std::int64_t views, std::int64_t together) {
+  return (views + together - 1) / together;
+}
+
+bool shows_all(std::int64_t steps, std::int64_t views, std::int64_t together) {
+  return steps * together % views == 0 || steps * together >= 2 * views - 1;
+}
+
 double pass_decay(const TrainOptions& options, std::int64_t pass) {
   if (options.opacity_decay != kFitted) return options.opacity_decay;
   if (clears_random_start(options)) return kUsualDecay;

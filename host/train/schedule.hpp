@@ -46,6 +46,14 @@ bool clears_random_start(const TrainOptions& options);
 LearningRate position_rate(const TrainOptions& options);
 double start_opacity(const TrainOptions& options);
 
+/// Steps of so many views `together` that show each of `views` once.
+std::int64_t pass_steps(std::int64_t views, std::int64_t together);
+
+/// Whether every stretch of so many steps, one behind the other from the first step on, shows each
+/// of `views`, whose order is drawn anew for each pass over them: stretches of other lengths begin
+/// within a pass and may end before what the next one shows last.
+bool shows_all(std::int64_t steps, std::int64_t views, std::int64_t together);
+
 /// What each refinement of density control takes off opacities, as given. In place of kFitted what
 /// a random start asks for, or a run that is long for its photos: 0 up to 100 steps for each of
 /// them, all from 200 on. `pass`: the steps that show every photo once, at least 1.

@@ -93,7 +93,7 @@ struct Trainer::Impl {
   void choose_color_range();
   void forget_sky();
   void forget_poses();
-  std::size_t pass_steps() const;
+  std::size_t loss_views() const { return train_views.size() - apart.size(); }
   std::int64_t turn_of(std::size_t slot) const;
   std::int64_t last_turn() const;
   std::size_t limit() { return most_gaussians(options.iterations); }

@@ -76,7 +76,7 @@ void Trainer::Impl::check_not_begun(const char* function) const {
 void Trainer::Impl::follow_options() {
   TrainOptions centred = options;
   centred.bounds = about_origin(options.bounds, dataset.origin);
-  density.follow(centred, pass_steps());
+  density.follow(centred, loss_views());
   order = ViewOrder(options.seed, train_views.size(), apart,
                     validation_end(options) * options.views_per_step);
 }

@@ -115,12 +115,6 @@ void Trainer::Impl::choose_color_range() {
   if (options.color_range == 0) options.color_range = color_range(photos(PhotoChoice::kSome));
 }
 
-// Steps in which every view of the loss is seen once.
-std::size_t Trainer::Impl::pass_steps() const {
-  const auto together = static_cast<std::size_t>(options.views_per_step);
-  return (train_views.size() - apart.size() + together - 1) / together;
-}
-
 // The number of the view of a slot of the next step among all that steps take.
 std::int64_t Trainer::Impl::turn_of(std::size_t slot) const {
   return iteration * options.views_per_step + static_cast<std::int64_t>(slot);

@@ -48,7 +48,7 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
     exposure->backward(image_gradient, view, camera.width, camera.height);
   }
   if (depths) {
-    depths->backward(view, camera.width, camera.height, tracer.image(), tracer.depth(),
+    depths->backward(view, camera.width, camera.height, tracer.image(), tracer.depth(), photo,
                      image_gradient);
   }
   tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr,

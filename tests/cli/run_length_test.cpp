@@ -2,6 +2,7 @@
 // Runs whose length is not given in iterations.
 #include <doctest/doctest.h>
 
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -54,4 +55,15 @@ TEST_CASE("the length of a run follows from a time or a quality, and is said bef
   succeed({"train", data, "-o", look, "--quality", "preview", "--downscale", "4", "-q"});
   CHECK(value_of(look, "iterations") == "300");
   CHECK(value_of(look, "downscale") == "4");
+}
+
+TEST_CASE("a quality leaves what a configuration says of length and size") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", look = folder / "look";
+  succeed({"generate", data, "--size", "48", "--train-views", "5", "--test-views", "1", "-q"});
+  std::ofstream(folder / "my.toml") << "iterations = 12\ndownscale = 3\n";
+  succeed(
+      {"train", data, "-o", look, "--quality", "preview", "--config", folder / "my.toml", "-q"});
+  CHECK(value_of(look, "iterations") == "12");
+  CHECK(value_of(look, "downscale") == "3");
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <utility>
 
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
@@ -388,6 +389,26 @@ TEST_CASE("the budget's count follows its curve to the limit and stays there [sm
   }
   CHECK(!control.refines_at(900));
   CHECK(!control.accumulates_at(800));
+}
+
+TEST_CASE("what no ray met goes once every photo was looked at [small] [tiny]") {
+  Context context(test_device());
+  TrainOptions options;
+  options.iterations = 100;
+  options.densify_from = 0;
+  options.densify_until = 60;
+  options.max_gaussians = 2;
+  options.views_per_step = 2;
+  // Three photos, two in a step: two steps show four, which may leave one out.
+  for (const auto& [period, unseen] : {std::pair{2, 0u}, {3, 1u}}) {
+    CAPTURE(period);
+    options.densify_every = period;
+    DeviceGaussians gaussians =
+        DeviceGaussians::upload(context, model_of({0.1, 0.1}, {0.9, 0.9}), ScaleActivation::kExp);
+    DensityControl control(context, options, 1.0, 3);
+    accumulate(context, control, gaussians, {{1, 10, 1, 0, 0, 0}});
+    CHECK(control.refine(gaussians, 90).unseen == unseen);
+  }
 }
 
 TEST_CASE("growth that has one pass alone reaches the limit in it [small] [tiny]") {

@@ -124,6 +124,25 @@ TEST_CASE("a motion that all cameras have in common is taken off, and nothing el
   for (std::size_t i = 0; i < 6; ++i) CHECK(std::abs(kept.state().deltas[6 * 8 + i]) < 0.01f);
 }
 
+TEST_CASE("a camera far from all others does not hide the motion that they have in common") {
+  std::vector<Camera> start = ring(40);
+  start.push_back(look_at({300 * kExtent, 0, 0}, {0, 0, 0}, {0, 0, 1}, 64, 48, 60.0));
+  const glm::dvec3 turn(0.001, -0.002, 0.0015);
+  PoseRefinement::State state = refinement(start).state();
+  for (std::size_t view = 0; view + 1 < start.size(); ++view) {
+    const glm::dvec3 turned = -(start[view].rotation * turn);
+    const glm::dvec3 moved = glm::cross(turn, start[view].center()) + 0.002 * start[view].center();
+    for (int k = 0; k < 3; ++k) {
+      const std::size_t i = PoseRefinement::kNumbers * view + static_cast<std::size_t>(k);
+      state.deltas[i] = static_cast<float>(turned[k]);
+      state.deltas[i + 3] = static_cast<float>(moved[k]);
+    }
+  }
+  const PoseRefinement after = settled(start, state);
+  for (std::size_t i = 0; i < PoseRefinement::kNumbers * 40; ++i)
+    CHECK(std::abs(after.state().deltas[i]) < 1e-6f);
+}
+
 TEST_CASE("a prior holds poses back as far as it outweighs what photos tell") {
   const std::vector<Camera> start = ring(24);
   PoseRefinement::State state = refinement(start).state();

@@ -4,10 +4,13 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <numeric>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "train/step_options.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 
@@ -105,6 +108,40 @@ TEST_CASE("the last rates fall with the root of the run's length, unless they ar
   options.rotation_lr.final_value = options.opacity_lr.final_value = 0.002;
   options.sh_lr.final_value = options.position_lr.final_value = 0.0001;
   check_last(30000, 0.002, 0.002, 0.0001, 0.0001);
+}
+
+TEST_CASE("stretches of steps show all views where they are passes, or as long as two") {
+  CounterRng rng(3, 0);
+  for (std::int64_t views = 1; views <= 9; ++views) {
+    std::vector<std::int64_t> turns;
+    for (int pass = 0; pass < 800; ++pass) {
+      std::vector<std::int64_t> order(static_cast<std::size_t>(views));
+      std::iota(order.begin(), order.end(), 0);
+      for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[rng.below(i)]);
+      turns.insert(turns.end(), order.begin(), order.end());
+    }
+    for (std::int64_t together = 1; together <= 4; ++together) {
+      CHECK(pass_steps(views, together) * together >= views);
+      CHECK((pass_steps(views, together) - 1) * together < views);
+      for (std::int64_t steps = 1; steps <= 20; ++steps) {
+        const auto length = static_cast<std::size_t>(steps * together);
+        bool all = true;
+        for (std::size_t at = 0; at + length <= turns.size(); at += length) {
+          const auto begin = turns.begin() + static_cast<std::ptrdiff_t>(at);
+          const std::set<std::int64_t> seen(begin, begin + static_cast<std::ptrdiff_t>(length));
+          all = all && seen.size() == static_cast<std::size_t>(views);
+        }
+        CAPTURE(views);
+        CAPTURE(together);
+        CAPTURE(steps);
+        CHECK((all || !shows_all(steps, views, together)));
+      }
+    }
+  }
+  CHECK(shows_all(150, 300, 2));
+  CHECK(!shows_all(151, 301, 2));
+  CHECK(shows_all(302, 301, 2));
+  CHECK(!shows_all(2, 3, 1));
 }
 
 TEST_CASE("a run that is long for its photos takes off opacities") {
