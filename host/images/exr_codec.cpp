@@ -93,10 +93,13 @@ void check_header(const std::string& path) {
   file.check(exr_get_storage(file.get(), kPart, &storage));
   if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED)
     throw DataError(fmt::format("The image {} is not a flat picture with pixels", path));
-  exr_attr_box2i_t window{};
-  file.check(exr_get_data_window(file.get(), kPart, &window));
-  require_bearable_size(path, std::int64_t{window.max.x} - window.min.x + 1,
-                        std::int64_t{window.max.y} - window.min.y + 1);
+  exr_attr_box2i_t data{}, display{};
+  file.check(exr_get_data_window(file.get(), kPart, &data));
+  file.check(exr_get_display_window(file.get(), kPart, &display));
+  for (const exr_attr_box2i_t& window : {data, display}) {
+    require_bearable_size(path, std::int64_t{window.max.x} - window.min.x + 1,
+                          std::int64_t{window.max.y} - window.min.y + 1);
+  }
   // The table of chunks is read, so that its length is known to be in the file.
   std::int32_t chunks = 0;
   file.check(exr_get_chunk_count(file.get(), kPart, &chunks));
@@ -152,28 +155,41 @@ std::vector<std::string> chosen_channels(const std::string& path,
       path, fmt::join(all, ", "), more > 0 ? fmt::format(" and {} more", more) : ""));
 }
 
+int width_of(const Imath::Box2i& window) { return window.max.x - window.min.x + 1; }
+int height_of(const Imath::Box2i& window) { return window.max.y - window.min.y + 1; }
+
+// "red 0.713 0.293, ..." where a file has other primaries or another white than Rec. 709; "" where
+// it says those, or nothing, which means the same.
+std::string foreign_chromaticities(const Imf::Header& header) {
+  if (!Imf::hasChromaticities(header)) return {};
+  constexpr float kNear = 2e-3f;  // D65 is rounded in several ways
+  const Imf::Chromaticities own, &c = Imf::chromaticities(header);
+  if (c.red.equalWithAbsError(own.red, kNear) && c.green.equalWithAbsError(own.green, kNear) &&
+      c.blue.equalWithAbsError(own.blue, kNear) && c.white.equalWithAbsError(own.white, kNear)) {
+    return {};
+  }
+  return fmt::format(
+      "red {:.4g} {:.4g}, green {:.4g} {:.4g}, blue {:.4g} {:.4g}, white {:.4g} {:.4g}", c.red.x,
+      c.red.y, c.green.x, c.green.y, c.blue.x, c.blue.y, c.white.x, c.white.y);
+}
+
 class ExrDecoder : public ImageDecoder {
  public:
   explicit ExrDecoder(const std::string& path)
-      : path_(path), file_(path.c_str()), window_(file_.header().dataWindow()) {}
+      : path_(path),
+        file_(path.c_str()),
+        data_(file_.header().dataWindow()),
+        display_(file_.header().displayWindow()) {}
 
-  int width() const override { return window_.max.x - window_.min.x + 1; }
-  int height() const override { return window_.max.y - window_.min.y + 1; }
+  int width() const override { return width_of(display_); }
+  int height() const override { return height_of(display_); }
   int sample_bytes() const override { return sizeof(float); }
+  std::string color_profile() const override { return foreign_chromaticities(file_.header()); }
   RawImage decode() override try {
     const std::vector<std::string> names = chosen_channels(path_, file_.header().channels());
     RawImage image{width(), height(), static_cast<int>(names.size()), {}};
-    std::vector<float> numbers(image.count());
-    const std::size_t pixel = names.size() * sizeof(float);
-    const std::size_t row = pixel * static_cast<std::size_t>(image.width);
-    Imf::FrameBuffer buffer;
-    for (std::size_t c = 0; c < names.size(); ++c) {
-      buffer.insert(names[c],
-                    Imf::Slice::Make(Imf::FLOAT, numbers.data() + c, window_, pixel, row));
-    }
-    file_.setFrameBuffer(buffer);
-    file_.readPixels(window_.min.y, window_.max.y);
-    image.numbers = std::move(numbers);
+    std::vector<float> numbers = data_numbers(names);
+    image.numbers = data_ == display_ ? std::move(numbers) : placed(numbers, names.size());
     return image;
   } catch (const Error&) {
     throw;
@@ -183,9 +199,43 @@ class ExrDecoder : public ImageDecoder {
   }
 
  private:
+  // The pixels of the data window.
+  std::vector<float> data_numbers(const std::vector<std::string>& names) {
+    const std::size_t pixel = names.size() * sizeof(float);
+    const std::size_t row = pixel * static_cast<std::size_t>(width_of(data_));
+    std::vector<float> numbers(row / sizeof(float) * static_cast<std::size_t>(height_of(data_)));
+    Imf::FrameBuffer buffer;
+    for (std::size_t c = 0; c < names.size(); ++c) {
+      buffer.insert(names[c], Imf::Slice::Make(Imf::FLOAT, numbers.data() + c, data_, pixel, row));
+    }
+    file_.setFrameBuffer(buffer);
+    file_.readPixels(data_.min.y, data_.max.y);
+    return numbers;
+  }
+  // The same in the display window: 0, also of alpha, where the file has no pixels (a renderer that
+  // trims what is empty).
+  std::vector<float> placed(const std::vector<float>& numbers, std::size_t channels) const {
+    std::vector<float> out(channels * static_cast<std::size_t>(width()) *
+                           static_cast<std::size_t>(height()));
+    const int left = std::max(data_.min.x, display_.min.x);
+    const int right = std::min(data_.max.x, display_.max.x);
+    if (left > right) return out;
+    const auto at = [&](const Imath::Box2i& window, int y) {
+      return static_cast<std::ptrdiff_t>(channels) *
+             (std::ptrdiff_t{y - window.min.y} * width_of(window) + left - window.min.x);
+    };
+    const std::ptrdiff_t count = static_cast<std::ptrdiff_t>(channels) * (right - left + 1);
+    for (int y = std::max(data_.min.y, display_.min.y); y <= std::min(data_.max.y, display_.max.y);
+         ++y) {
+      const auto from = numbers.begin() + at(data_, y);
+      std::copy(from, from + count, out.begin() + at(display_, y));
+    }
+    return out;
+  }
+
   std::string path_;
   Imf::InputFile file_;
-  Imath::Box2i window_;
+  Imath::Box2i data_, display_;
 };
 
 class MemoryStream : public Imf::OStream {

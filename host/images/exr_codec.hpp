@@ -10,9 +10,10 @@
 
 namespace raysplats::io {
 
-/// An EXR file of scanlines or tiles, its first part, of the data window: R, G, B and A, or Y and
-/// A, or those of a layer ("beauty.R"; one called Combined first), or the only channel that it has.
-/// Throws DataError.
+/// An EXR file of scanlines or tiles, its first part, of the display window, 0 where that has no
+/// data: R, G, B and A, or Y and A, or those of a layer ("beauty.R"; one called Combined first), or
+/// the only channel that it has. Its profile is what it says of primaries and white other than
+/// those of Rec. 709. Throws DataError.
 std::unique_ptr<ImageDecoder> open_exr(const std::string& path);
 
 /// Of one that decodes: light that alpha multiplies, as the format has it, unless its attributes

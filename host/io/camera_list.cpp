@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/camera_list.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "io/byte_reader.hpp"
+#include "io/data_origin.hpp"
 #include "io/json_file.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
+#include "scene/camera_model.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -78,9 +86,9 @@ std::optional<Camera> camera_of(const Json& view) {
   camera.height = *height;
   camera.fx = focal(view, "fx");
   camera.fy = focal(view, "fy");
-  if (!(camera.fx > 0.0 && camera.fy > 0.0)) camera.model = CameraModel::kEquirectangular;
   camera.cx = 0.5 * *width;
   camera.cy = 0.5 * *height;
+  if (!(camera.fx > 0.0 && camera.fy > 0.0)) set_equirectangular(camera);
   camera.rotation = *rotation;
   camera.translation = -(*rotation * *center);
   return camera;
@@ -97,6 +105,37 @@ std::vector<std::optional<Camera>> read_camera_list(const std::filesystem::path&
   const Json json = parse_json_object(std::as_bytes(std::span(text)), path);
   std::vector<std::optional<Camera>> out;
   for (const Json& view : json.at("cameras")) out.push_back(camera_of(view));
+  return out;
+}
+
+bool is_camera_list(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  char first = 0;
+  return stream >> first && first == '[';
+}
+
+std::vector<Camera> read_listed_views(const std::filesystem::path& path) {
+  std::vector<Camera> out;
+  for (std::optional<Camera>& camera : read_camera_list(path)) {
+    if (!camera) {
+      throw DataError(
+          fmt::format("{}: entry {} is no view with position, rotation, width and height",
+                      path.string(), out.size()));
+    }
+    if (camera->name.empty()) camera->name = fmt::format("frame_{:04d}", out.size());
+    require_believable(*camera,
+                       fmt::format("{}: the camera of entry {}", path.string(), out.size()));
+    out.push_back(std::move(*camera));
+  }
+  if (out.empty()) throw DataError(fmt::format("{} lists no cameras", path.string()));
+  return out;
+}
+
+std::vector<Camera> read_model_cameras(const std::filesystem::path& path,
+                                       const glm::dvec3& origin) {
+  std::vector<Camera> out = read_cameras(path);
+  if (is_camera_list(path)) return out;
+  for (Camera& camera : out) move_origin(camera, origin);
   return out;
 }
 

@@ -15,4 +15,16 @@ namespace raysplats::io {
 /// rotation, width and height. Throws DataError for a file that is no JSON.
 std::vector<std::optional<Camera>> read_camera_list(const std::filesystem::path& path);
 
+/// Whether a file begins as a JSON list, as cameras.json does and a transforms.json does not; not
+/// when it cannot be read.
+bool is_camera_list(const std::filesystem::path& path);
+
+/// The same list where every entry has to be a view: throws DataError that names the first that is
+/// none, and for an empty list. Views without a name are called frame_0000 and so on.
+std::vector<Camera> read_listed_views(const std::filesystem::path& path);
+
+/// read_cameras() for a model that counts from `origin`: those of a transforms file count from the
+/// world's and are moved, a list lies beside its model and counts as that does.
+std::vector<Camera> read_model_cameras(const std::filesystem::path& path, const glm::dvec3& origin);
+
 }  // namespace raysplats::io

@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <map>
+#include <set>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -184,13 +185,21 @@ void add_point(ColmapModel& model,
 }
 
 void add_camera(ColmapModel& model, std::uint64_t id, Camera camera, const Fail& fail) {
-  if (id > UINT32_MAX) fail(fmt::format("the camera number {} is too large", id));
   if (!model.cameras.emplace(static_cast<std::uint32_t>(id), std::move(camera)).second) {
     fail(fmt::format("the camera {} appears twice", id));
   }
 }
 
+/// The cameras that images name: others may have wrong lenses, or in a text file, where a line ends
+/// them, such as are not known.
+std::set<std::uint64_t> used_cameras(const ColmapModel& model) {
+  std::set<std::uint64_t> used;
+  for (const ColmapImage& image : model.images) used.insert(image.camera_id);
+  return used;
+}
+
 void read_cameras_binary(const fs::path& path, ColmapModel& model) {
+  const std::set<std::uint64_t> used = used_cameras(model);
   const auto bytes = read_file(path);
   ByteReader reader(bytes, path);
   const Fail fail = [&](const std::string& message) { reader.fail(message); };
@@ -208,6 +217,7 @@ void read_cameras_binary(const fs::path& path, ColmapModel& model) {
     for (std::size_t p = 0; p < checked.parameters; ++p) {
       parameters[p] = reader.read<double>("a camera parameter");
     }
+    if (!used.contains(id)) continue;
     add_camera(model, id,
                make_camera(checked, camera_name(path, id), width, height,
                            std::span(parameters).first(checked.parameters), fail),
@@ -216,11 +226,13 @@ void read_cameras_binary(const fs::path& path, ColmapModel& model) {
 }
 
 void read_cameras_text(const fs::path& path, ColmapModel& model) {
+  const std::set<std::uint64_t> used = used_cameras(model);
   const auto bytes = read_file(path);
   TextReader reader(bytes, path);
   const Fail fail = [&](const std::string& message) { reader.fail(message); };
   while (reader.next_content_line()) {
     const std::uint64_t id = reader.unsigned_integer("the camera number");
+    if (!used.contains(id)) continue;
     const std::string name(reader.word().substr(0, 64));
     const auto found = std::find_if(kModels.begin(), kModels.end(),
                                     [&](const ModelType& type) { return type.name == name; });
@@ -371,8 +383,57 @@ std::optional<fs::path> model_file(const fs::path& folder, const char* stem) {
 
 bool is_binary(const fs::path& path) { return path.extension() == ".bin"; }
 
-void read_images(const fs::path& path, ColmapModel& model) {
-  is_binary(path) ? read_images_binary(path, model) : read_images_text(path, model);
+/// The images of a folder's model, sorted by name, and their cameras.
+ColmapModel read_poses(const fs::path& folder) {
+  const std::optional<fs::path> cameras = model_file(folder, "cameras");
+  const std::optional<fs::path> images = model_file(folder, "images");
+  if (!cameras || !images) {
+    throw DataError(fmt::format(
+        "{} is no COLMAP model: cameras or images (.bin or .txt) are missing", folder.string()));
+  }
+  ColmapModel model;
+  is_binary(*images) ? read_images_binary(*images, model) : read_images_text(*images, model);
+  is_binary(*cameras) ? read_cameras_binary(*cameras, model) : read_cameras_text(*cameras, model);
+  for (const ColmapImage& image : model.images) {
+    if (!model.cameras.contains(image.camera_id)) {
+      throw DataError(fmt::format("{}: the image '{}' uses the camera {}, which {} does not have",
+                                  images->string(), image.name, image.camera_id,
+                                  cameras->string()));
+    }
+  }
+  std::sort(model.images.begin(), model.images.end(),
+            [](const ColmapImage& a, const ColmapImage& b) { return a.name < b.name; });
+  const auto twice = std::adjacent_find(
+      model.images.begin(), model.images.end(),
+      [](const ColmapImage& a, const ColmapImage& b) { return a.name == b.name; });
+  if (twice != model.images.end()) {
+    throw DataError(fmt::format("{}: the image '{}' appears twice", images->string(), twice->name));
+  }
+  return model;
+}
+
+/// The folder whose model has most images, the first of several. Those that cannot be read are left
+/// out with a warning where another can. Throws the first one's DataError where none can.
+fs::path largest_model(const std::vector<fs::path>& folders) {
+  std::optional<fs::path> best;
+  std::size_t most = 0;
+  std::vector<std::string> errors;
+  for (const fs::path& folder : folders) {
+    try {
+      const std::size_t images = read_poses(folder).images.size();
+      if (best && images <= most) continue;
+      best = folder;
+      most = images;
+    } catch (const DataError& error) {
+      errors.emplace_back(error.what());
+    }
+  }
+  if (!best) throw DataError(errors.front());
+  for (const std::string& error : errors)
+    spdlog::warn("One of the COLMAP models cannot be read and is not used: {}", error);
+  spdlog::info("Of {} COLMAP models {} is used: it has most images ({})", folders.size(),
+               best->string(), most);
+  return *best;
 }
 
 }  // namespace
@@ -402,46 +463,11 @@ std::optional<fs::path> find_colmap_model(const fs::path& root) {
   if (candidates.size() <= 1) {
     return candidates.empty() ? std::nullopt : std::optional(candidates.front());
   }
-  std::size_t best = 0;
-  std::size_t most = 0;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    ColmapModel model;
-    read_images(*model_file(candidates[i], "images"), model);
-    if (model.images.size() > most) {
-      most = model.images.size();
-      best = i;
-    }
-  }
-  spdlog::info("Of {} COLMAP models {} is used: it has most images ({})", candidates.size(),
-               candidates[best].string(), most);
-  return candidates[best];
+  return largest_model(candidates);
 }
 
 ColmapModel read_colmap_model(const fs::path& folder) {
-  ColmapModel model;
-  const std::optional<fs::path> cameras = model_file(folder, "cameras");
-  const std::optional<fs::path> images = model_file(folder, "images");
-  if (!cameras || !images) {
-    throw DataError(fmt::format(
-        "{} is no COLMAP model: cameras or images (.bin or .txt) are missing", folder.string()));
-  }
-  is_binary(*cameras) ? read_cameras_binary(*cameras, model) : read_cameras_text(*cameras, model);
-  read_images(*images, model);
-  for (const ColmapImage& image : model.images) {
-    if (!model.cameras.contains(image.camera_id)) {
-      throw DataError(fmt::format("{}: the image '{}' uses the camera {}, which {} does not have",
-                                  images->string(), image.name, image.camera_id,
-                                  cameras->string()));
-    }
-  }
-  std::sort(model.images.begin(), model.images.end(),
-            [](const ColmapImage& a, const ColmapImage& b) { return a.name < b.name; });
-  const auto twice = std::adjacent_find(
-      model.images.begin(), model.images.end(),
-      [](const ColmapImage& a, const ColmapImage& b) { return a.name == b.name; });
-  if (twice != model.images.end()) {
-    throw DataError(fmt::format("{}: the image '{}' appears twice", images->string(), twice->name));
-  }
+  ColmapModel model = read_poses(folder);
   if (const std::optional<fs::path> points = model_file(folder, "points3D")) {
     is_binary(*points) ? read_points_binary(*points, model) : read_points_text(*points, model);
   } else {

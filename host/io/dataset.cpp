@@ -6,80 +6,34 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <map>
 #include <optional>
 #include <set>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "io/colmap_model.hpp"
+#include "io/colmap_views.hpp"
 #include "io/color_profiles.hpp"
 #include "io/cut_out.hpp"
 #include "io/data_origin.hpp"
 #include "io/find_image.hpp"
-#include "io/image_file.hpp"
 #include "io/llff.hpp"
 #include "io/photo_folder.hpp"
 #include "io/photo_mask.hpp"
-#include "io/photo_turn.hpp"
 #include "io/ply_points.hpp"
 #include "io/polycam.hpp"
 #include "io/transforms.hpp"
+#include "io/transforms_views.hpp"
 #include "io/way_out.hpp"
 #include "raysplats/error.hpp"
-#include "raysplats/io.hpp"
-#include "scene/camera_check.hpp"
-#include "scene/photo_lens.hpp"
 #include "util/file_kind.hpp"
 
 namespace raysplats {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Photos of nearly the camera's size were not made smaller: most often they are those from before
-/// their distortion was taken out, which leaves another size.
-bool is_stretched(const io::ImageSize& photo, const Camera& nominal) {
-  constexpr double kNearly = 0.15;
-  const int pixels =
-      std::max(std::abs(photo.width - nominal.width), std::abs(photo.height - nominal.height));
-  return pixels > 2 && std::abs(photo.width - nominal.width) < kNearly * nominal.width;
-}
-
-/// Sets the cameras of a view: `nominal` is the camera at the size that its model states, the photo
-/// may have another (reduced copies, rounding by a pixel) or lie on its side (photo_turn.hpp), and
-/// is used reduced by `factor`.
-void set_cameras(
-    View& view, const Camera& nominal, io::ImageSize photo, double factor, bool undistort) {
-  if (!io::has_shape(photo.width, photo.height, nominal) &&
-      io::has_shape(photo.height, photo.width, nominal) && io::lies_on_its_side(view.image_path))
-    std::swap(photo.width, photo.height);
-  const double scale_x = static_cast<double>(photo.width) / nominal.width;
-  const double scale_y = static_cast<double>(photo.height) / nominal.height;
-  if (!io::has_shape(photo.width, photo.height, nominal)) {
-    throw DataError(fmt::format(
-        "The image {} has {} x {} pixels but its camera {} x {}, which is another shape: use the "
-        "photos that the cameras belong to",
-        view.image_path.string(), photo.width, photo.height, nominal.width, nominal.height));
-  }
-  view.source_camera = nominal;
-  view.source_camera.width = photo.width;
-  view.source_camera.height = photo.height;
-  view.source_camera.fx *= scale_x;
-  view.source_camera.cx *= scale_x;
-  view.source_camera.fy *= scale_y;
-  view.source_camera.cy *= scale_y;
-  require_believable(view.source_camera,
-                     fmt::format("The camera of the image {}", view.image_path.string()));
-  view.sample_bytes = photo.sample_bytes;
-  view.camera = downscaled(rendered_camera(view.source_camera), factor);
-  if (undistort && view.camera.model == CameraModel::kOpenCv) {
-    view.camera.model = CameraModel::kPinhole;
-    view.camera.distortion = {};
-  }
-}
 
 void mark_every(std::vector<View>& views, int test_every) {
   if (test_every <= 0) return;
@@ -118,29 +72,6 @@ void sort_by_name(std::vector<View>& views) {
                    [](const View& a, const View& b) { return a.camera.name < b.camera.name; });
 }
 
-/// Poses without a photo, as those of blurred photos that were deleted, are left out with a
-/// warning; where most have none, it is the folder that is wrong.
-void leave_out_missing(std::size_t missing,
-                       std::size_t all,
-                       const std::string& what,
-                       const std::string& advice) {
-  if (2 * missing > all) throw DataError(fmt::format("{}: {}", what, advice));
-  spdlog::warn("{}: they are left out", what);
-}
-
-/// Two poses cannot share a photo.
-void require_photos_of_their_own(const std::vector<View>& views) {
-  std::map<fs::path, const View*> owners;
-  for (const View& view : views) {
-    const auto [owner, is_new] = owners.emplace(view.image_path, &view);
-    if (is_new) continue;
-    throw DataError(fmt::format(
-        "The images '{}' and '{}' of the COLMAP model are both the file {}: keep the photos in "
-        "the folders that the model names",
-        owner->second->camera.name, view.camera.name, view.image_path.string()));
-  }
-}
-
 void warn_of_repeated_photos(const std::vector<View>& views) {
   std::set<fs::path> seen;
   std::size_t repeated = 0;
@@ -153,14 +84,11 @@ void warn_of_repeated_photos(const std::vector<View>& views) {
   spdlog::warn("{} photos appear in more than one frame, {} among them", repeated, first.string());
 }
 
-/// Photos whose names another system wrote, to which letter case is all the same.
-void tell_of_case(std::size_t respelt,
-                  std::size_t all,
-                  const fs::path& cameras,
-                  const std::string& first) {
-  if (respelt == 0) return;
-  spdlog::info("{} of {} photos are spelt otherwise than in {} ('{}') and differ in letter case",
-               respelt, all, cameras.string(), first);
+/// Gives the data set the points of a PLY; returns their positions as precise as they are there.
+std::vector<double> take_points(Dataset& dataset, const fs::path& path) {
+  io::PlyPoints points = io::read_ply_points(path);
+  dataset.points = std::move(points.cloud);
+  return std::move(points.positions);
 }
 
 Dataset load_colmap(const fs::path& root,
@@ -170,158 +98,26 @@ Dataset load_colmap(const fs::path& root,
   Dataset dataset;
   dataset.kind = DatasetKind::kColmap;
   dataset.points = std::move(model.points);
-  const io::PhotoFolder folder = io::photo_folder(root, model, options.downscale);
-  const double rest = std::max(1.0, options.downscale / folder.factor);
-  std::size_t stretched = 0, respelt = 0;
-  std::string first_respelt;
-  std::vector<std::string> missing;
-  for (const io::ColmapImage& image : model.images) {
-    View view;
-    auto photo = io::find_photo(folder.path, image.name);
-    if (!photo && (photo = io::find_respelt(folder.path, image.name)) && respelt++ == 0)
-      first_respelt = image.name;
-    if (!photo) {
-      missing.push_back(image.name);
-      continue;
-    }
-    view.image_path = *photo;
-    view.mask_path = io::find_mask(root, image.name);
-    view.points = image.points;
-    Camera nominal = model.cameras.at(image.camera_id);
-    nominal.name = io::inner_name(image.name);
-    nominal.rotation = image.rotation;
-    nominal.translation = image.translation;
-    const io::ImageSize size = io::image_size(view.image_path);
-    if (is_stretched(size, nominal)) ++stretched;
-    set_cameras(view, nominal, size, rest, options.undistort);
-    dataset.views.push_back(std::move(view));
-  }
-  if (!missing.empty()) {
-    leave_out_missing(
-        missing.size(), model.images.size(),
-        fmt::format("{} of {} images of the COLMAP model {} are not in {}, '{}' among them",
-                    missing.size(), model.images.size(), model_folder.string(),
-                    folder.path.string(), missing.front()),
-        "put them there");
-  }
-  require_photos_of_their_own(dataset.views);
-  tell_of_case(respelt, dataset.views.size(), model_folder, first_respelt);
-  if (stretched > 0) {
-    const View& view = dataset.views.front();
-    spdlog::warn(
-        "{} of {} photos have not the size of their camera but nearly ({} x {} pixels, the first) "
-        "and are stretched to it: use the photos that the model was made of",
-        stretched, dataset.views.size(), view.source_camera.width, view.source_camera.height);
-  }
+  dataset.views = io::colmap_views(model, model_folder, root, options);
   sort_by_name(dataset.views);
   mark_every(dataset.views, options.test_every);
   set_origin(dataset, model.positions, options);
   return dataset;
 }
 
-/// A mask or depth map of a transforms file. Its folder tells it from the photo of the same name.
-fs::path beside_photos(const fs::path& folder, const std::string& path) {
-  if (is_file(folder / path)) return folder / path;
-  return io::find_moved(folder, path, 2).value_or(folder / path);
-}
-
-/// The photo of a frame.
-struct FramePhoto {
-  fs::path path;
-  bool moved = false;    ///< found by the end of its name
-  bool respelt = false;  ///< in other letter case
-};
-
-std::optional<FramePhoto> frame_photo(const io::TransformsFile& file,
-                                      const io::TransformsFrame& frame) {
-  const fs::path folder = file.path.parent_path();
-  if (frame.file_path.empty()) {
-    throw DataError(fmt::format("{}: frame {} has no file_path", file.path.string(), frame.number));
+/// The held-out views of a Blender data set; nothing where it has none. The file of a part that was
+/// not copied may be left over.
+std::optional<std::vector<View>> held_out_views(const fs::path& root,
+                                                const DatasetOptions& options) {
+  for (const char* name : {"transforms_test.json", "transforms_val.json"}) {
+    const fs::path path = root / name;
+    if (!is_file(path)) continue;
+    io::TransformsFile file = io::read_transforms(path);
+    if (file.frames.empty() || io::has_photos(file)) return io::transforms_views(file, options);
+    spdlog::warn("{}: none of its {} photos exist, '{}' the first: it is not used", path.string(),
+                 file.frames.size(), file.frames.front().file_path);
   }
-  if (auto photo = io::find_image(folder, frame.file_path)) return FramePhoto{*photo};
-  if (auto photo = io::find_respelt(folder, frame.file_path))
-    return FramePhoto{*photo, false, true};
-  if (auto photo = io::find_moved(folder, frame.file_path, 1)) return FramePhoto{*photo, true};
   return std::nullopt;
-}
-
-/// The photos of a file's frames; frames without one leave the file.
-std::vector<FramePhoto> frame_photos(io::TransformsFile& file) {
-  std::vector<FramePhoto> photos;
-  std::vector<io::TransformsFrame> found, missing;
-  for (io::TransformsFrame& frame : file.frames) {
-    const auto photo = frame_photo(file, frame);
-    (photo ? found : missing).push_back(std::move(frame));
-    if (photo) photos.push_back(*photo);
-  }
-  file.frames = std::move(found);
-  if (missing.empty()) return photos;
-  const std::string what =
-      fmt::format("{}: the photos of {} of {} frames do not exist, '{}' of frame {} among them",
-                  file.path.string(), missing.size(), missing.size() + photos.size(),
-                  missing.front().file_path, missing.front().number);
-  leave_out_missing(missing.size(), missing.size() + photos.size(), what,
-                    "put them where file_path says, counted from the file's folder");
-  return photos;
-}
-
-/// The views of a transforms file, in its order; takes the frames out of it that have none.
-std::vector<View> transforms_views(io::TransformsFile& file, const DatasetOptions& options) {
-  const fs::path folder = file.path.parent_path();
-  const std::vector<FramePhoto> photos = frame_photos(file);
-  std::vector<View> views;
-  std::size_t moved = 0, respelt = 0;
-  std::string first_moved, first_respelt;
-  for (std::size_t i = 0; i < file.frames.size(); ++i) {
-    const io::TransformsFrame& frame = file.frames[i];
-    const fs::path& photo = photos[i].path;
-    View view;
-    view.image_path = photo;
-    fs::path name = frame.file_path;
-    if (photos[i].moved) {
-      name = photo.lexically_relative(folder.lexically_normal());
-      if (moved++ == 0) first_moved = frame.file_path;
-    }
-    if (photos[i].respelt && respelt++ == 0) first_respelt = frame.file_path;
-    if (!io::has_image_extension(name)) name += photo.extension();
-    if (!frame.mask_path.empty()) {
-      view.mask_path = beside_photos(folder, frame.mask_path);
-      if (!is_file(view.mask_path)) {
-        throw DataError(fmt::format("{}: the mask '{}' of frame {} does not exist",
-                                    file.path.string(), frame.mask_path, frame.number));
-      }
-    } else {
-      // Names may repeat in several folders (train/r_0, test/r_0).
-      view.mask_path = io::find_mask(folder, io::inner_name(name));
-      if (view.mask_path.empty()) view.mask_path = io::find_mask(folder, photo.filename());
-    }
-    if (!frame.depth_path.empty()) {
-      view.depth_path = beside_photos(folder, frame.depth_path);
-      if (!is_file(view.depth_path)) {
-        throw DataError(fmt::format("{}: the depth map '{}' of frame {} does not exist",
-                                    file.path.string(), frame.depth_path, frame.number));
-      }
-    }
-    const io::ImageSize size = io::image_size(photo);
-    Camera nominal = io::frame_camera(file, i, frame.width.value_or(size.width),
-                                      frame.height.value_or(size.height));
-    nominal.name = io::inner_name(name);
-    set_cameras(view, nominal, size, options.downscale, options.undistort);
-    views.push_back(std::move(view));
-  }
-  if (moved > 0) {
-    spdlog::info("{} of {} photos are not where {} says ({}) but were found below its folder",
-                 moved, views.size(), file.path.string(), first_moved);
-  }
-  tell_of_case(respelt, views.size(), file.path, first_respelt);
-  return views;
-}
-
-/// Gives the data set the points of a PLY; returns their positions as precise as they are there.
-std::vector<double> take_points(Dataset& dataset, const fs::path& path) {
-  io::PlyPoints points = io::read_ply_points(path);
-  dataset.points = std::move(points.cloud);
-  return std::move(points.positions);
 }
 
 Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
@@ -334,23 +130,16 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
     spdlog::info("{} points are those of {}", dataset.points.size(), file.string());
   }
   io::TransformsFile train = io::read_transforms(root / "transforms_train.json");
-  dataset.views = transforms_views(train, options);
+  dataset.views = io::transforms_views(train, options);
   sort_by_name(dataset.views);
-  std::optional<fs::path> held_out;
-  for (const char* name : {"transforms_val.json", "transforms_test.json"}) {
-    if (is_file(root / name)) held_out = root / name;
-  }
-  if (!held_out) {
+  if (std::optional<std::vector<View>> test = held_out_views(root, options)) {
+    sort_by_name(*test);
+    for (View& view : *test) {
+      view.test = true;
+      dataset.views.push_back(std::move(view));
+    }
+  } else {
     mark_every(dataset.views, options.test_every);
-    set_origin(dataset, points, options);
-    return dataset;
-  }
-  io::TransformsFile test_file = io::read_transforms(*held_out);
-  std::vector<View> test = transforms_views(test_file, options);
-  sort_by_name(test);
-  for (View& view : test) {
-    view.test = true;
-    dataset.views.push_back(std::move(view));
   }
   set_origin(dataset, points, options);
   return dataset;
@@ -383,14 +172,25 @@ void tell_of_lists(const io::TransformsFile& file,
   }
 }
 
-Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
-  io::TransformsFile file = io::read_transforms(root / "transforms.json");
+/// The points that a file of cameras names, also where another machine has them elsewhere.
+fs::path points_of(const io::TransformsFile& file) {
+  const fs::path folder = file.path.parent_path();
+  fs::path path = io::find_beside(folder, file.ply_file_path, 1);
+  if (path != folder / file.ply_file_path) {
+    spdlog::info("{} is not where {} says: the points are those of {}", file.ply_file_path,
+                 file.path.string(), path.string());
+  }
+  return path;
+}
+
+Dataset load_nerfstudio(const fs::path& path, const DatasetOptions& options) {
+  io::TransformsFile file = io::read_transforms(path);
   Dataset dataset;
   dataset.kind = DatasetKind::kNerfstudio;
   std::set<std::string> frames;
   for (const io::TransformsFrame& frame : file.frames)
     frames.insert(io::inner_name(frame.file_path));
-  std::vector<View> views = transforms_views(file, options);
+  std::vector<View> views = io::transforms_views(file, options);
   const auto names = [&](const std::optional<std::vector<std::string>>& list) {
     std::set<std::string> set;
     for (const std::string& name : list.value_or(std::vector<std::string>{}))
@@ -416,7 +216,7 @@ Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
     sort_by_name(dataset.views);
   }
   std::vector<double> points;
-  if (!file.ply_file_path.empty()) points = take_points(dataset, root / file.ply_file_path);
+  if (!file.ply_file_path.empty()) points = take_points(dataset, points_of(file));
   set_origin(dataset, points, options);
   return dataset;
 }
@@ -425,7 +225,7 @@ Dataset load_nerfstudio(const fs::path& root, const DatasetOptions& options) {
 Dataset load_frames(DatasetKind kind, io::TransformsFile file, const DatasetOptions& options) {
   Dataset dataset;
   dataset.kind = kind;
-  dataset.views = transforms_views(file, options);
+  dataset.views = io::transforms_views(file, options);
   sort_by_name(dataset.views);
   mark_every(dataset.views, options.test_every);
   set_origin(dataset, {}, options);
@@ -471,14 +271,14 @@ Dataset load_any(const fs::path& root, const DatasetOptions& options) {
     if (is_file(transforms)) {
       if (goes_before(transforms, root, *model)) {
         spdlog::info("{} is read, not the COLMAP model {}", transforms.string(), model->string());
-        return load_nerfstudio(root, options);
+        return load_nerfstudio(transforms, options);
       }
       spdlog::info("the COLMAP model {} is read, {} beside it is not", model->string(),
                    transforms.string());
     }
     return load_colmap(root, *model, options);
   }
-  if (is_file(transforms)) return load_nerfstudio(root, options);
+  if (is_file(transforms)) return load_nerfstudio(transforms, options);
   if (is_file(root / "transforms_train.json")) return load_blender(root, options);
   if (is_file(root / io::kLlffPoses)) return load_llff(root, options);
   if (const auto polycam = io::find_polycam(root))
@@ -488,6 +288,21 @@ Dataset load_any(const fs::path& root, const DatasetOptions& options) {
                   "nor transforms_train.json nor poses_bounds.npy (LLFF) nor keyframes/cameras "
                   "(Polycam){}",
                   root.string(), io::way_out(root)));
+}
+
+bool is_transforms(const fs::path& path) {
+  return path.filename().string().starts_with("transforms") && path.extension() == ".json" &&
+         is_file(path);
+}
+
+/// The data set of a transforms file that was named, whatever else lies beside it: those of Blender
+/// belong together, any other is the only one that is read.
+Dataset load_named(const fs::path& file, const DatasetOptions& options) {
+  const fs::path root = file.parent_path(), name = file.filename();
+  const bool is_part = name == "transforms_train.json" || name == "transforms_val.json" ||
+                       name == "transforms_test.json";
+  if (is_part && is_file(root / "transforms_train.json")) return load_blender(root, options);
+  return load_nerfstudio(file, options);
 }
 
 }  // namespace
@@ -509,15 +324,14 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
     throw UsageError(
         fmt::format("The test interval is {}: it must be 0 or more", options.test_every));
   }
-  // The file of cameras stands for its folder.
-  const std::string name = path.filename().string();
-  const bool names_cameras = name.starts_with("transforms") && path.extension() == ".json";
-  const fs::path root = names_cameras && is_file(path) ? fs::absolute(path).parent_path() : path;
+  const bool is_named = is_transforms(path);
+  const fs::path root = is_named ? fs::absolute(path).parent_path() : path;
   if (!is_folder(root)) {
     throw DataError(fmt::format("The data set {} {}: give the folder of a data set", root.string(),
                                 is_file(root) ? "is a file" : "does not exist"));
   }
-  Dataset dataset = load_any(root, options);
+  Dataset dataset =
+      is_named ? load_named(root / path.filename(), options) : load_any(root, options);
   dataset.root = root;
   if (dataset.views.empty()) {
     throw DataError(
@@ -541,8 +355,10 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
     }
     const bool ignores = options.masks == MaskUse::kIgnore;
     if (!ignores) dataset.alpha_is_background = true;
-    for (View& view : dataset.views)
+    for (View& view : dataset.views) {
       view.mask_apart = ignores && dataset.alpha_is_background && has_mask(view);
+      view.mask_cuts = !ignores && has_mask(view);
+    }
     const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_mask);
     spdlog::info("{} of {} photos have a mask, as {}: what is black there {}", masked,
                  dataset.views.size(), first->mask_path.string(),

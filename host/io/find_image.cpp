@@ -84,6 +84,11 @@ std::optional<fs::path> find_moved(const fs::path& folder,
   return least_parts > 1 ? std::nullopt : find_image(folder / "images", file_path.filename());
 }
 
+fs::path find_beside(const fs::path& folder, const fs::path& file_path, std::size_t least_parts) {
+  if (is_file(folder / file_path)) return folder / file_path;
+  return find_moved(folder, file_path, least_parts).value_or(folder / file_path);
+}
+
 std::optional<fs::path> find_folder(const fs::path& folder, std::string_view name) {
   if (is_folder(folder / name)) return folder / name;
   return only_entry(folder, [&](const fs::path& entry) {

@@ -24,6 +24,12 @@ std::optional<std::filesystem::path> find_moved(const std::filesystem::path& fol
                                                 const std::filesystem::path& file_path,
                                                 std::size_t least_parts);
 
+/// A file that a data set in `folder` names: where the name says, else as find_moved() finds it,
+/// else where the name says although nothing is there.
+std::filesystem::path find_beside(const std::filesystem::path& folder,
+                                  const std::filesystem::path& file_path,
+                                  std::size_t least_parts);
+
 /// The folder of that name in another, in any letter case, the exact one first.
 std::optional<std::filesystem::path> find_folder(const std::filesystem::path& folder,
                                                  std::string_view name);

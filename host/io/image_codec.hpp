@@ -52,8 +52,8 @@ class ImageDecoder {
   virtual int sample_bytes() const = 0;
   /// As EXIF counts; 1 is upright.
   virtual int orientation() const { return 1; }
-  /// The name of the ICC profile that says what its red, green and blue are; "" where the file has
-  /// none.
+  /// The name of the ICC profile that says what its red, green and blue are, of an EXR their
+  /// chromaticities where those are not sRGB's; "" where the file has none.
   virtual std::string color_profile() const { return {}; }
   /// Throws DataError.
   virtual RawImage decode() = 0;

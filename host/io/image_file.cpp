@@ -19,6 +19,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "util/atomic_file.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats {
 namespace {
@@ -212,6 +213,10 @@ bool has_image_extension(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
   return std::find(kImageExtensions.begin(), kImageExtensions.end(), extension) !=
          kImageExtensions.end();
+}
+
+bool is_photo_name(const std::filesystem::path& path) {
+  return has_image_extension(path) && !is_apple_double(path);
 }
 
 ImageSize image_size(const std::filesystem::path& path) {

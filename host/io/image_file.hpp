@@ -26,7 +26,8 @@ ImageSize image_size(const std::filesystem::path& path);
 int image_orientation(const std::filesystem::path& path);
 
 /// The name of the ICC profile of its red, green and blue, as far as the library of pictures tells
-/// (JPEG, PNG, TIFF); "" without one. Throws DataError.
+/// (JPEG, PNG, TIFF), of an EXR its chromaticities where they are not sRGB's; "" without one.
+/// Throws DataError.
 std::string color_profile(const std::filesystem::path& path);
 
 /// read_image() without a conversion of its numbers.
@@ -44,6 +45,9 @@ constexpr std::array<const char*, 15> kImageExtensions{".png", ".jpg",  ".jpeg",
 std::string lower_extension(const std::filesystem::path& path);
 /// Whether read_image() knows the extension.
 bool has_image_extension(const std::filesystem::path& path);
+/// The same of a file that a listing of photos may count: none that macOS has left beside one
+/// (is_apple_double()).
+bool is_photo_name(const std::filesystem::path& path);
 
 /// A path of a data set's files, which may have been written on Windows.
 std::filesystem::path portable_path(std::string text);

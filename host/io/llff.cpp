@@ -27,7 +27,7 @@ std::vector<std::string> photo_names(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (has_image_extension(entry->path())) names.push_back(entry->path().filename().string());
+    if (is_photo_name(entry->path())) names.push_back(entry->path().filename().string());
   }
   std::sort(names.begin(), names.end());
   return names;

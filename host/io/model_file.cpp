@@ -88,11 +88,13 @@ std::string spz_losses(const Gaussians& model) {
 
 ModelFormat model_format(const std::filesystem::path& path) {
   const std::string start = first_bytes(path);
+  const std::string extension = lower_extension(path);
   if (start.starts_with("ply")) return ModelFormat::kPly;
-  if (start.starts_with("\x1f\x8b") || start == "NGSP") return ModelFormat::kSpz;
+  // A .splat begins with a number, whose bytes may be the two of gzip.
+  const bool is_gzip = start.starts_with("\x1f\x8b") && extension != ".splat";
+  if (is_gzip || start == "NGSP") return ModelFormat::kSpz;
   if (start == "glTF") return ModelFormat::kGltf;
   if (start == "PK\x03\x04") return ModelFormat::kSog;
-  const std::string extension = lower_extension(path);
   if (extension == ".splat") return ModelFormat::kSplat;
   if (extension == ".spz") return ModelFormat::kSpz;
   if (extension == ".glb" || extension == ".gltf") return ModelFormat::kGltf;

@@ -33,6 +33,27 @@ bool has_photos_of(const fs::path& folder, const ColmapModel& model) {
   });
 }
 
+/// Whether the folder has any photo of the model.
+bool has_photo_of(const fs::path& folder, const ColmapModel& model) {
+  const auto is_there = [&](const ColmapImage& image) {
+    return find_photo(folder, image.name).has_value();
+  };
+  return std::any_of(model.images.begin(), model.images.end(), is_there) ||
+         (!model.images.empty() && find_respelt(folder, model.images.front().name));
+}
+
+/// Where the photos are if the usual folder has none of them: reduced copies may have other names
+/// (NeRF-LLFF), and names of the model may begin with a folder of the root.
+std::optional<fs::path> fuller_folder(const fs::path& root,
+                                      const fs::path& usual,
+                                      const ColmapModel& model) {
+  if (usual == root || has_photo_of(usual, model)) return std::nullopt;
+  for (const fs::path& folder : {root / "images", root}) {
+    if (folder != usual && has_photo_of(folder, model)) return folder;
+  }
+  return std::nullopt;
+}
+
 /// A folder of another name that has the model's first photo, where that is not beside the model.
 std::optional<fs::path> other_folder(const fs::path& root, const ColmapModel& model) {
   if (model.images.empty() || find_photo(root, model.images.front().name)) return std::nullopt;
@@ -91,6 +112,11 @@ PhotoFolder photo_folder(const fs::path& root, const ColmapModel& model, double 
   std::optional<fs::path> found;
   if (!has_usual && is_folder(input) && has_photos_of(input, model)) found = input;
   if (!found && usual.path == root) found = other_folder(root, model);
+  if (!found && (found = fuller_folder(root, usual.path, model))) {
+    spdlog::info("{} has no photo of the names in the model: those in {} are used",
+                 usual.path.string(), found->string());
+    return {*found, 1.0};
+  }
   if (!found) return usual;
   spdlog::info("the photos of the model are those in {}", found->string());
   return {*found, 1.0};

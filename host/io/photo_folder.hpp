@@ -23,7 +23,8 @@ PhotoFolder usual_photo_folder(const std::filesystem::path& root, double downsca
 /// of 3DGS reads lie in `input`, and those that it makes of them, which are of another size and
 /// without a lens, in `images`: the model tells which are its own. Where neither is there, a folder
 /// that other programs name (Images, rgb, resized_images of ScanNet++) and that has the model's
-/// first photo.
+/// first photo. Where the usual folder has none of the photos (reduced copies of other names), but
+/// `images` or the root has: that.
 PhotoFolder photo_folder(const std::filesystem::path& root,
                          const ColmapModel& model,
                          double downscale);

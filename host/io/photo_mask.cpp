@@ -8,6 +8,7 @@
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
 #include "io/photo_turn.hpp"
+#include "io/transforms.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
 
@@ -22,10 +23,10 @@ fs::path mask_folder(const fs::path& root) {
 fs::path find_mask(const fs::path& root, const fs::path& name) {
   const fs::path folder = mask_folder(root);
   if (!is_folder(folder)) return {};
-  fs::path stem = name;
-  stem.replace_extension();
-  for (const std::string& candidate :
-       {name.string() + ".png", stem.string(), stem.string() + "_mask", stem.string() + ".mask"}) {
+  // Absolute names and those with ".." would lead to the photo itself.
+  const std::string whole = inner_name(name);
+  const std::string stem = fs::path(whole).replace_extension().string();
+  for (const std::string& candidate : {whole + ".png", stem, stem + "_mask", stem + ".mask"}) {
     if (const auto found = find_image(folder, candidate)) return *found;
   }
   return {};

@@ -10,8 +10,9 @@ namespace raysplats::io {
 /// Where masks lie that nothing names; ScanNet++ has a name of its own.
 std::filesystem::path mask_folder(const std::filesystem::path& root);
 
-/// A mask of the photo `name` in mask_folder(): COLMAP's name.ext.png, or an image that is called
-/// as the photo, with "_mask" or ".mask" behind it or without; empty where there is none.
+/// A mask of the photo `name` in mask_folder(), and nowhere else: COLMAP's name.ext.png, or an
+/// image that is called as the photo, with "_mask" or ".mask" behind it or without; empty where
+/// there is none. Of a name that is absolute or leads upwards inner_name() counts.
 std::filesystem::path find_mask(const std::filesystem::path& root,
                                 const std::filesystem::path& name);
 

@@ -32,10 +32,12 @@ std::size_t coefficients(int degree) { return static_cast<std::size_t>(sh_coeffi
 struct Columns {
   int sh_degree = 0;
   std::array<std::size_t, 3> mean{}, log_scale{};
+  bool flat = false;  ///< without a third scale: a model of 2D Gaussian Splatting
   std::array<std::size_t, 4> quaternion{};
   std::size_t opacity = 0;
   std::optional<std::size_t> filter;  ///< of Mip-Splatting
   std::vector<std::size_t> sh;        ///< coefficients x 3
+  bool bytes = false;                 ///< the first three are colours from 0 to 255
 };
 
 int degree_of_rest(std::size_t count, const std::filesystem::path& path) {
@@ -46,6 +48,17 @@ int degree_of_rest(std::size_t count, const std::filesystem::path& path) {
       fmt::format("{} has {} f_rest properties, which is no spherical-harmonics degree from 0 to 4 "
                   "(0, 9, 24, 45 or 72)",
                   path.string(), count));
+}
+
+constexpr std::array<const char*, 3> kColorNames{"red", "green", "blue"};
+
+/// Whether colours are bytes in place of harmonics, as splatfacto's export writes them on request.
+bool has_byte_colors(const io::PlyFile& file) {
+  return !file.column("f_dc_0") &&
+         std::all_of(kColorNames.begin(), kColorNames.end(), [&](const char* name) {
+           const auto column = file.column(name);
+           return column && file.properties()[*column].type == io::PlyType::kUint8;
+         });
 }
 
 Columns find_columns(const io::PlyFile& file, const std::filesystem::path& path) {
@@ -59,10 +72,14 @@ Columns find_columns(const io::PlyFile& file, const std::filesystem::path& path)
   const std::array<const char*, 3> axes{"x", "y", "z"};
   for (std::size_t i = 0; i < 3; ++i) columns.mean[i] = find(axes[i]);
   columns.sh.resize(3);
-  for (std::size_t i = 0; i < 3; ++i) columns.sh[i] = find(fmt::format("f_dc_{}", i));
+  columns.bytes = has_byte_colors(file);
+  for (std::size_t i = 0; i < 3; ++i)
+    columns.sh[i] = find(columns.bytes ? kColorNames[i] : fmt::format("f_dc_{}", i));
   columns.opacity = find("opacity");
   columns.filter = file.column("filter_3D");
-  for (std::size_t i = 0; i < 3; ++i) columns.log_scale[i] = find(fmt::format("scale_{}", i));
+  columns.flat = file.column("scale_1") && !file.column("scale_2");
+  for (std::size_t i = 0; i < (columns.flat ? 2 : 3); ++i)
+    columns.log_scale[i] = find(fmt::format("scale_{}", i));
   for (std::size_t i = 0; i < 4; ++i) columns.quaternion[i] = find(fmt::format("rot_{}", i));
   if (!missing.empty()) {
     throw DataError(fmt::format("{} is no 3D Gaussian model: it has no {}", path.string(),
@@ -103,6 +120,24 @@ void widen(float* log_scales, float& opacity, double filter) {
   opacity = io::logit_of(io::opacity_of(opacity) * std::exp(-log_growth), io::kFloatOpacityMargin);
 }
 
+/// Says what of a file is not 3DGS's own.
+void tell_of_form(const Columns& columns, const std::filesystem::path& path) {
+  if (columns.filter) {
+    spdlog::info("{}: the 3D filter of Mip-Splatting is taken into scales and opacities",
+                 path.string());
+  }
+  if (columns.flat) {
+    spdlog::info("{} has no scale_2: its Gaussians are flat, as those of 2D Gaussian Splatting",
+                 path.string());
+  }
+  if (columns.bytes) {
+    spdlog::info(
+        "{} has red, green and blue in place of harmonics: its colours do not change with "
+        "the view",
+        path.string());
+  }
+}
+
 }  // namespace
 
 Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
@@ -129,7 +164,9 @@ Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
     };
     for (std::size_t i = 0; i < 3; ++i) {
       model.means[3 * row + i] = number(columns.mean[i]);
-      model.log_scales[3 * row + i] = limited(columns.log_scale[i], io::kFlatLogScale, HUGE_VALF);
+      model.log_scales[3 * row + i] =
+          columns.flat && i == 2 ? io::kFlatLogScale
+                                 : limited(columns.log_scale[i], io::kFlatLogScale, HUGE_VALF);
     }
     float* quaternion = &model.quaternions[4 * row];
     double norm = 0;
@@ -149,11 +186,10 @@ Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
     }
     float* sh = &model.sh[columns.sh.size() * row];
     for (std::size_t k = 0; k < columns.sh.size(); ++k) sh[k] = number(columns.sh[k]);
+    for (std::size_t k = 0; columns.bytes && k < 3; ++k)
+      sh[k] = static_cast<float>((values[columns.sh[k]] / 255.0 - 0.5) / io::kSh0);
   });
-  if (columns.filter) {
-    spdlog::info("{}: the 3D filter of Mip-Splatting is taken into scales and opacities",
-                 path.string());
-  }
+  tell_of_form(columns, path);
   if (infinite > 0) {
     spdlog::warn(
         "{}: {} infinite opacities and sizes of 0 are taken as the most opaque, the faintest and "

@@ -24,7 +24,8 @@ std::vector<fs::path> camera_files(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (lower_extension(entry->path()) == ".json") files.push_back(entry->path());
+    const fs::path& path = entry->path();
+    if (lower_extension(path) == ".json" && !is_apple_double(path)) files.push_back(path);
   }
   std::sort(files.begin(), files.end());
   return files;

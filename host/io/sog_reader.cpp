@@ -67,6 +67,12 @@ class Reader {
   }
 
   Gaussians read() {
+    if (is_first_version()) {
+      throw DataError(fmt::format(
+          "{} is a SOG of version 1, but only {} is known: write it again with SplatTransform or "
+          "SuperSplat",
+          files_.path().string(), kSogVersion));
+    }
     if (whole(meta_, "version") != kSogVersion) {
       fail(fmt::format("its version is {}, but only {} is known", whole(meta_, "version"),
                        kSogVersion));
@@ -119,6 +125,12 @@ class Reader {
     throw DataError(fmt::format("{} is no valid SOG: {}", files_.path().string(), what));
   }
 
+  /// It had no number of its version, but the shapes of its textures.
+  bool is_first_version() const {
+    const auto means = meta_.find("means");
+    return !meta_.contains("version") && means != meta_.end() && means->is_object() &&
+           means->contains("shape");
+  }
   const Json& member(const Json& object, const char* name) const {
     const auto found = object.find(name);
     if (found == object.end()) fail(fmt::format("'{}' is missing in {}", name, kMeta));

@@ -14,6 +14,7 @@
 #include <span>
 #include <string_view>
 
+#include "io/camera_list.hpp"
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
@@ -442,6 +443,7 @@ std::string inner_name(const fs::path& path) {
 }  // namespace io
 
 std::vector<Camera> read_cameras(const std::filesystem::path& path) {
+  if (io::is_camera_list(path)) return io::read_listed_views(path);
   const io::TransformsFile file = io::read_transforms(path);
   if (file.frames.empty()) throw DataError(fmt::format("{} has no frames", path.string()));
   std::vector<Camera> cameras;

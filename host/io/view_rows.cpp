@@ -32,7 +32,8 @@ MaskPlane load_mask(const View& view, bool turned) {
   MaskPlane mask = mask_plane(mask_of_photo(view, turned));
   const bool dark =
       std::none_of(mask.values.begin(), mask.values.end(), [](float value) { return value > 0; });
-  if (dark) {
+  // A photo that shows nothing of a body that was cut out tells where that is not.
+  if (dark && !view.mask_cuts) {
     throw DataError(fmt::format(
         "The mask {} is black everywhere and leaves nothing of its photo {}: remove the "
         "photo from the data set, or the mask",

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <set>
+#include <system_error>
 
 #include "io/image_file.hpp"
 #include "io/llff.hpp"
@@ -26,27 +27,46 @@ std::string way_out_of_others(const fs::path& root) {
   return "";
 }
 
+/// Whether a folder looks like a data set.
+bool is_data_set(const fs::path& folder) {
+  return is_folder(folder / "sparse") || is_file(folder / "transforms.json") ||
+         is_file(folder / "transforms_train.json") || is_file(folder / kLlffPoses) ||
+         find_polycam(folder) || is_folder(folder / "colmap" / "sparse") ||
+         is_file(folder / "colmap" / "images.txt");
+}
+
 }  // namespace
+
+std::optional<fs::path> enclosing_data_set(const fs::path& root) {
+  constexpr int kLevels = 3;  // colmap/sparse/0
+  std::error_code error;
+  // A slash at the end would count as a level.
+  fs::path folder = (fs::absolute(root, error) / "").lexically_normal().parent_path();
+  for (int level = 0; level < kLevels && folder.has_relative_path(); ++level) {
+    folder = folder.parent_path();
+    // What these hold is a part of the data set that they lie in.
+    const bool is_part = folder.filename() == "colmap" || folder.filename() == "distorted";
+    if (!is_part && is_data_set(folder)) return folder;
+  }
+  return std::nullopt;
+}
 
 std::string way_out(const fs::path& root) {
   std::set<fs::path> inner;
   std::error_code failure;
   for (fs::directory_iterator entry(root, failure), end; !failure && entry != end;
        entry.increment(failure)) {
-    const fs::path& folder = entry->path();
-    const bool is_data = is_folder(folder / "sparse") || is_file(folder / "transforms.json") ||
-                         is_file(folder / "transforms_train.json") ||
-                         is_file(folder / kLlffPoses) || find_polycam(folder) ||
-                         is_file(folder / "colmap" / "images.txt");
-    if (is_data) inner.insert(folder);
+    if (is_data_set(entry->path())) inner.insert(entry->path());
   }
   if (std::string other = way_out_of_others(root); !other.empty()) return other;
   if (!inner.empty()) return fmt::format("; {} is one", inner.begin()->string());
+  if (const std::optional<fs::path> whole = enclosing_data_set(root))
+    return fmt::format("; it is a part of one: give {}", whole->string());
   for (const fs::path& folder : {root / "input", root / "images", root}) {
     std::error_code error;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
          entry.increment(error)) {
-      if (!has_image_extension(entry->path())) continue;
+      if (!is_photo_name(entry->path())) continue;
       return fmt::format(
           "; find out where its photos were taken: raysplats prepare {} -o NEW_FOLDER",
           folder.string());

@@ -11,6 +11,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/sharpness.hpp"
+#include "util/file_kind.hpp"
 #include "util/number_text.hpp"
 #include "util/program.hpp"
 
@@ -32,7 +33,8 @@ bool is_photo(const fs::path& path) {
   const std::string extension = lower_extension(path);
   constexpr std::array<const char*, 7> kKnown{".jpg",  ".jpeg", ".png", ".tif",
                                               ".tiff", ".bmp",  ".webp"};
-  return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end();
+  return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end() &&
+         !is_apple_double(path);
 }
 
 double seconds_of(const fs::path& video, const fs::path& log, const std::function<bool()>& stop) {

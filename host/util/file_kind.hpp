@@ -16,4 +16,10 @@ inline bool is_file(const std::filesystem::path& path) {
   return std::filesystem::is_regular_file(path, error);
 }
 
+/// Whether the name is that of an AppleDouble file, "._NAME", in which macOS keeps what other file
+/// systems have no place for: it ends as NAME does but holds none of it.
+inline bool is_apple_double(const std::filesystem::path& path) {
+  return path.filename().string().starts_with("._");
+}
+
 }  // namespace raysplats

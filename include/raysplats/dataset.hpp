@@ -39,6 +39,7 @@ struct View {
   std::filesystem::path depth_path;  ///< optional depth map (PNG or .npy); empty when there is none
   std::vector<std::uint32_t> points;  ///< numbers of the sparse points that it is known to show
   bool mask_apart = false;  ///< alpha is coverage, and what the mask ignores is a plane of its own
+  bool mask_cuts = false;   ///< what the mask leaves out is background (MaskUse::kCutout)
   Camera source_camera;     ///< of the photo on disk, with its lens
   int sample_bytes = 1;     ///< of a number in the photo on disk: 1, 2 or 4 (floats)
   bool test = false;
@@ -81,9 +82,10 @@ struct DatasetOptions {
 };
 
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender, LLFF, Polycam) and reads everything
-/// but the pixels; a transforms file stands for its folder. Poses whose photos are missing are left
-/// out with a warning where most are there. Throws DataError for a folder that is none, missing
-/// images, an unsupported camera model, no views, a mask of another shape than its photo.
+/// but the pixels. A transforms file is read itself, whatever lies beside it; those of Blender
+/// stand for their folder. Poses whose photos are missing are left out with a warning where most
+/// are there. Throws DataError for a folder that is none, missing images, an unsupported camera
+/// model, no views, a mask of another shape than its photo.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
 
 /// The photo of a view as RGBA float at camera.width x camera.height: undistorted where

@@ -472,10 +472,10 @@ TEST_CASE("malformed COLMAP models are refused with the place of the fault") {
   fixture = small_colmap();
   fixture.cameras[1].model_name = "MEI";
   CHECK(contains(text_error_with("cameras.txt", fixture.cameras_text()), "'MEI' is not known"));
-  CHECK(contains(text_error_with("cameras.txt", "1 PINHOLE 40 30 1 2 3\n"),
+  CHECK(contains(text_error_with("cameras.txt", "7 PINHOLE 40 30 1 2 3\n"),
                  "parameter is missing in line 1"));
-  CHECK(contains(text_error_with("cameras.txt", "1 PINHOLE -40 30 1 2 3 4\n"), "'-40'"));
-  CHECK(contains(text_error_with("cameras.txt", "1 PINHOLE 40 30 1 nan 3 4\n"), "not finite"));
+  CHECK(contains(text_error_with("cameras.txt", "7 PINHOLE -40 30 1 2 3 4\n"), "'-40'"));
+  CHECK(contains(text_error_with("cameras.txt", "7 PINHOLE 40 30 1 nan 3 4\n"), "not finite"));
   fixture.cameras[1].parameters[0] = -1;
   CHECK(contains(error_with("cameras.bin", fixture.cameras_binary()), "not positive"));
   fixture = small_colmap();

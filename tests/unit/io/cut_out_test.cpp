@@ -8,6 +8,7 @@
 
 #include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
+#include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
 using namespace raysplats;
@@ -115,4 +116,18 @@ TEST_CASE("a mask of cut-out photos is a plane of its own, whoever wrote the dat
   CHECK(picture.weight.at(20, 9, 0) == 1.0f);
   CHECK(picture.rgba.at(10, 9, 3) == 1.0f);
   CHECK(picture.rgba.at(2, 9, 3) == 0.0f);
+}
+
+TEST_CASE("a black mask is of a photo without the body, but leaves nothing where it ignores") {
+  const Scratch scratch;
+  write_photos(scratch, [](int, int, int) { return 1.0f; });
+  write_image(scratch / "masks/photo_3.png", Image(kWidth, kHeight, 1, 0.0f));
+  DatasetOptions options;
+  CHECK_THROWS_AS(load_view_picture(load_dataset(scratch.path(), options).views[3]), DataError);
+  options.masks = MaskUse::kCutout;
+  const Dataset dataset = load_dataset(scratch.path(), options);
+  CHECK(dataset.alpha_is_background);
+  const ViewPicture picture = load_view_picture(dataset.views[3]);
+  CHECK(picture.rgba.at(20, 9, 3) == 0.0f);
+  CHECK(picture.rgba.at(2, 1, 3) == 0.0f);
 }

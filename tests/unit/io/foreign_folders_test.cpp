@@ -232,3 +232,17 @@ TEST_CASE("folders of programs whose data are not read are named, with the way o
   CHECK(contains(refusal({"EXR_RGBD/metadata.json", "EXR_RGBD/rgb/0.png"}), "Record3D"));
   CHECK(!contains(refusal({"metadata.json"}), "Record3D"));
 }
+
+TEST_CASE("what macOS leaves beside files (._NAME) is neither a photo nor a camera") {
+  const Scratch scratch;
+  write_llff(scratch / "llff/poses_bounds.npy", ring(3));
+  write_ring_photos(scratch / "llff/images", 3);
+  write_bytes(scratch / "llff/images/._IMG_00.JPG", "Mac OS X");
+  CHECK(load_dataset(scratch / "llff").views.size() == 3);
+  write_ring_photos(scratch / "polycam/keyframes/images", 1);
+  write_bytes(scratch / "polycam/keyframes/cameras/IMG_00.json", polycam_camera(ring(1).front()));
+  write_bytes(scratch / "polycam/keyframes/cameras/._IMG_00.json", "Mac OS X");
+  CHECK(load_dataset(scratch / "polycam").views.size() == 1);
+  write_bytes(scratch / "other/._a.jpg", "Mac OS X");
+  CHECK(!contains(data_error([&] { load_dataset(scratch / "other"); }), "raysplats prepare"));
+}

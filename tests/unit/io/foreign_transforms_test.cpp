@@ -189,3 +189,55 @@ TEST_CASE("photos are found in another letter case, unless two differ in nothing
   CHECK(load_dataset(scratch.path()).views.size() == 2);
   CHECK(log.contains("'images/A.jpg' of frame 0"));
 }
+
+TEST_CASE("points that another machine has elsewhere are found beside the file, which is told") {
+  const Scratch scratch;
+  write_bytes(scratch / "sparse_pc.ply",
+              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+              "y\nproperty float z\nend_header\n1 2 3\n");
+  const auto points = [&](const std::string& path) {
+    write_scene(scratch, {"a.png"}, {"a.png"}, fmt::format("\"ply_file_path\": \"{}\", ", path));
+    return load_dataset(scratch.path()).points.size();
+  };
+  {
+    const LogCapture log;
+    CHECK(points("sparse_pc.ply") == 1);
+    CHECK(log.lines() == 0);
+  }
+  for (const char* path : {R"(C:\\caps\\fox\\sparse_pc.ply)", "/home/u/fox/sparse_pc.ply"}) {
+    CAPTURE(path);
+    const LogCapture log;
+    CHECK(points(path) == 1);
+    CHECK(log.contains("the points are those of"));
+  }
+  CHECK(contains(data_error([&] { points("/home/u/fox/other.ply"); }), "other.ply"));
+}
+
+TEST_CASE("cameras.json of trainers of 3DGS is read as cameras without lenses") {
+  const std::string pose =
+      "\"width\": 40, \"height\": 30, \"position\": [1, 2, 3], \"rotation\": [[0.8, 0, 0.6], "
+      "[0, 1, 0], [-0.6, 0, 0.8]]";
+  const auto cameras = cameras_of("\n [{\"id\": 0, \"img_name\": \"00001\", " + pose +
+                                  ", \"fy\": 51, \"fx\": 50}, {\"id\": 1, " + pose + "}]");
+  REQUIRE(cameras.size() == 2);
+  CHECK(cameras[0].name == "00001");
+  CHECK(cameras[0].model == CameraModel::kPinhole);
+  CHECK(cameras[0].fx == 50);
+  CHECK(cameras[0].fy == 51);
+  CHECK(cameras[0].cx == 20);
+  CHECK(cameras[0].cy == 15);
+  CHECK(glm::length(cameras[0].center() - glm::dvec3(1, 2, 3)) < 1e-12);
+  // The columns of its matrix are right, down and forward.
+  CHECK(glm::length(cameras[0].rotation * glm::dvec3(0.6, 0, 0.8) - glm::dvec3(0, 0, 1)) < 1e-12);
+  // Without focal lengths: a panorama.
+  CHECK(cameras[1].name == "frame_0001");
+  CHECK(cameras[1].model == CameraModel::kEquirectangular);
+  CHECK(cameras[1].fx == 20);
+  CHECK(cameras[1].fy == 30);
+  CHECK(contains(cameras_error("[]"), "lists no cameras"));
+  CHECK(contains(cameras_error("[{" + pose + "}, 3]"), "entry 1 is no view"));
+  CHECK(contains(cameras_error("[{"), "no valid JSON"));
+  std::string far = pose;
+  far.replace(far.find("[1, 2"), 5, "[1e30, 2");
+  CHECK(contains(cameras_error("[{" + far + "}]"), "from the origin"));
+}

@@ -153,7 +153,13 @@ TEST_CASE("EXR of other programs is read in every compression, as halves, in til
   window.x = -7, window.y = 11;
   window.full_width = 100, window.full_height = 90;
   write(window);
-  CHECK(largest_difference(read_image(path), image) == 0.0);
+  Image whole(100, 90, 4);
+  for (int y = 11; y < 11 + image.height; ++y) {
+    for (int x = 0; x < image.width - 7; ++x) {
+      for (int c = 0; c < 4; ++c) whole.at(x, y, c) = image.at(x + 7, y - 11, c);
+    }
+  }
+  CHECK(largest_difference(read_image(path), whole) == 0.0);
   // Channels that are no colours are left out where there are colours.
   OIIO::ImageSpec mixed(image.width, image.height, 4, OIIO::TypeFloat);
   mixed.channelnames = {"Z", "R", "G", "B"};

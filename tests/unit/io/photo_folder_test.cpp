@@ -82,3 +82,68 @@ TEST_CASE("photos of a COLMAP model are found in another letter case, which is t
   CHECK(load_dataset(scratch.path()).views.size() == 9);
   CHECK(log.contains("'photo 8.png' among them: they are left out"));
 }
+
+TEST_CASE("reduced copies of other names than the model's are left for images, which is told") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  // As NeRF-LLFF has them.
+  for (int i = 0; i < 10; ++i)
+    write_image(scratch / "images_4" / ("image00" + std::to_string(i) + ".png"), Image(10, 8, 3));
+  DatasetOptions options;
+  options.downscale = 4;
+  const auto first = [&] { return load_dataset(scratch.path(), options).views.front(); };
+  {
+    const LogCapture log;
+    CHECK(contains(first().image_path.string(), "/images/"));
+    CHECK(first().camera.width == 10);
+    CHECK(log.contains("images_4 has no photo of the names in the model"));
+  }
+  write_photos(fixture, scratch / "images_4", 10, 8);
+  CHECK(contains(first().image_path.string(), "/images_4/"));
+}
+
+TEST_CASE("names of a COLMAP model may begin with a folder of the data set") {
+  const Scratch scratch;
+  ColmapFixture fixture = small_colmap();
+  for (std::size_t i = 0; i < fixture.images.size(); ++i)
+    fixture.images[i].name =
+        (i % 2 == 0 ? "images/cam1/" : "images/cam2/") + std::to_string(i / 2) + ".png";
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch.path(), 40, 30);
+  const LogCapture log;
+  const Dataset dataset = load_dataset(scratch.path());
+  REQUIRE(dataset.views.size() == 10);
+  CHECK(log.contains("images has no photo of the names in the model: those in"));
+  for (const View& view : dataset.views) CHECK(view.image_path == scratch / view.camera.name);
+}
+
+TEST_CASE("parts of a data set are refused with the data set that they are of") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "scene/sparse/0");
+  write_photos(fixture, scratch / "scene/images", 40, 30);
+  const std::string scene = (scratch / "scene").lexically_normal().string();
+  const auto refusal = [&](const char* part) {
+    const std::string message = data_error([&] { load_dataset(scratch / part); });
+    CHECK(!contains(message, "raysplats prepare"));
+    return message;
+  };
+  for (const char* part : {"scene/images", "scene/images/", "scene/images/left", "scene/sparse"}) {
+    CAPTURE(part);
+    CHECK(contains(refusal(part), "it is a part of one: give " + scene));
+  }
+  CHECK(contains(refusal("scene/sparse/0"), "put them there, or give " + scene + ", which is"));
+  // The model of nerfstudio's captures lies a folder deeper.
+  fixture.write_binary(scratch / "studio/colmap/sparse/0");
+  write_photos(fixture, scratch / "studio/images", 40, 30);
+  const std::string studio = (scratch / "studio").lexically_normal().string();
+  for (const char* part : {"studio/colmap", "studio/colmap/sparse/0"}) {
+    CAPTURE(part);
+    CHECK(contains(refusal(part), "or give " + studio + ", which is"));
+  }
+  // Photos that lie in no data set have no poses yet.
+  write_image(scratch / "walk/a.jpg", Image(40, 30, 3));
+  CHECK(contains(data_error([&] { load_dataset(scratch / "walk"); }), "raysplats prepare"));
+}

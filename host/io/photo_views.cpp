@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/photo_views.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "io/photo_turn.hpp"
+#include "raysplats/error.hpp"
+#include "scene/camera_check.hpp"
+#include "scene/photo_lens.hpp"
+
+namespace raysplats::io {
+
+namespace fs = std::filesystem;
+
+void set_cameras(
+    View& view, const Camera& nominal, ImageSize photo, double factor, bool undistort) {
+  if (!has_shape(photo.width, photo.height, nominal) &&
+      has_shape(photo.height, photo.width, nominal) && lies_on_its_side(view.image_path))
+    std::swap(photo.width, photo.height);
+  const double scale_x = static_cast<double>(photo.width) / nominal.width;
+  const double scale_y = static_cast<double>(photo.height) / nominal.height;
+  if (!has_shape(photo.width, photo.height, nominal)) {
+    throw DataError(fmt::format(
+        "The image {} has {} x {} pixels but its camera {} x {}, which is another shape: use the "
+        "photos that the cameras belong to",
+        view.image_path.string(), photo.width, photo.height, nominal.width, nominal.height));
+  }
+  view.source_camera = nominal;
+  view.source_camera.width = photo.width;
+  view.source_camera.height = photo.height;
+  view.source_camera.fx *= scale_x;
+  view.source_camera.cx *= scale_x;
+  view.source_camera.fy *= scale_y;
+  view.source_camera.cy *= scale_y;
+  require_believable(view.source_camera,
+                     fmt::format("The camera of the image {}", view.image_path.string()));
+  view.sample_bytes = photo.sample_bytes;
+  view.camera = downscaled(rendered_camera(view.source_camera), factor);
+  if (undistort && view.camera.model == CameraModel::kOpenCv) {
+    view.camera.model = CameraModel::kPinhole;
+    view.camera.distortion = {};
+  }
+}
+
+void leave_out_missing(std::size_t missing,
+                       std::size_t all,
+                       const std::string& what,
+                       const std::string& advice) {
+  if (2 * missing > all) throw DataError(fmt::format("{}: {}", what, advice));
+  spdlog::warn("{}: they are left out", what);
+}
+
+void tell_of_case(std::size_t respelt,
+                  std::size_t all,
+                  const fs::path& cameras,
+                  const std::string& first) {
+  if (respelt == 0) return;
+  spdlog::info("{} of {} photos are spelt otherwise than in {} ('{}') and differ in letter case",
+               respelt, all, cameras.string(), first);
+}
+
+}  // namespace raysplats::io

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+#include "io/image_file.hpp"
+#include "raysplats/dataset.hpp"
+
+/// What views of every kind of data set share.
+namespace raysplats::io {
+
+/// Sets the cameras of a view: `nominal` is the camera at the size that its model states, the photo
+/// may have another (reduced copies, rounding by a pixel) or lie on its side (photo_turn.hpp), and
+/// is used reduced by `factor`. Throws DataError for a photo of another shape.
+void set_cameras(View& view, const Camera& nominal, ImageSize photo, double factor, bool undistort);
+
+/// Poses without a photo, as those of blurred photos that were deleted, are left out with a
+/// warning; where most of `all` have none, it is the folder that is wrong: DataError with `advice`.
+void leave_out_missing(std::size_t missing,
+                       std::size_t all,
+                       const std::string& what,
+                       const std::string& advice);
+
+/// Tells of photos whose names another system wrote, to which letter case is all the same: so many
+/// of `all`, `first` as the file of cameras has it.
+void tell_of_case(std::size_t respelt,
+                  std::size_t all,
+                  const std::filesystem::path& cameras,
+                  const std::string& first);
+
+}  // namespace raysplats::io

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/transforms_views.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "io/find_image.hpp"
+#include "io/image_file.hpp"
+#include "io/photo_mask.hpp"
+#include "io/photo_views.hpp"
+#include "raysplats/error.hpp"
+#include "util/file_kind.hpp"
+
+namespace raysplats::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The photo of a frame.
+struct FramePhoto {
+  fs::path path;
+  bool moved = false;    ///< found by the end of its name
+  bool respelt = false;  ///< in other letter case
+};
+
+std::optional<FramePhoto> frame_photo(const TransformsFile& file, const TransformsFrame& frame) {
+  const fs::path folder = file.path.parent_path();
+  if (frame.file_path.empty()) {
+    throw DataError(fmt::format("{}: frame {} has no file_path", file.path.string(), frame.number));
+  }
+  if (auto photo = find_image(folder, frame.file_path)) return FramePhoto{*photo};
+  if (auto photo = find_respelt(folder, frame.file_path)) return FramePhoto{*photo, false, true};
+  if (auto photo = find_moved(folder, frame.file_path, 1)) return FramePhoto{*photo, true};
+  return std::nullopt;
+}
+
+/// The photos of a file's frames; frames without one leave the file.
+std::vector<FramePhoto> frame_photos(TransformsFile& file) {
+  std::vector<FramePhoto> photos;
+  std::vector<TransformsFrame> found, missing;
+  for (TransformsFrame& frame : file.frames) {
+    const auto photo = frame_photo(file, frame);
+    (photo ? found : missing).push_back(std::move(frame));
+    if (photo) photos.push_back(*photo);
+  }
+  file.frames = std::move(found);
+  if (missing.empty()) return photos;
+  const std::string what =
+      fmt::format("{}: the photos of {} of {} frames do not exist, '{}' of frame {} among them",
+                  file.path.string(), missing.size(), missing.size() + photos.size(),
+                  missing.front().file_path, missing.front().number);
+  leave_out_missing(missing.size(), missing.size() + photos.size(), what,
+                    "put them where file_path says, counted from the file's folder");
+  return photos;
+}
+
+/// The mask or depth map `path` of a frame. Its folder tells it from the photo of the same name.
+fs::path named_by(const TransformsFile& file,
+                  const TransformsFrame& frame,
+                  const char* what,
+                  const std::string& path) {
+  fs::path found = find_beside(file.path.parent_path(), path, 2);
+  if (!is_file(found)) {
+    throw DataError(fmt::format("{}: the {} '{}' of frame {} does not exist", file.path.string(),
+                                what, path, frame.number));
+  }
+  return found;
+}
+
+}  // namespace
+
+bool has_photos(const TransformsFile& file) {
+  return std::any_of(file.frames.begin(), file.frames.end(), [&](const TransformsFrame& frame) {
+    return frame_photo(file, frame).has_value();
+  });
+}
+
+std::vector<View> transforms_views(TransformsFile& file, const DatasetOptions& options) {
+  const fs::path folder = file.path.parent_path();
+  const std::vector<FramePhoto> photos = frame_photos(file);
+  std::vector<View> views;
+  std::size_t moved = 0, respelt = 0;
+  std::string first_moved, first_respelt;
+  for (std::size_t i = 0; i < file.frames.size(); ++i) {
+    const TransformsFrame& frame = file.frames[i];
+    const fs::path& photo = photos[i].path;
+    View view;
+    view.image_path = photo;
+    fs::path name = frame.file_path;
+    if (photos[i].moved) {
+      name = photo.lexically_relative(folder.lexically_normal());
+      if (moved++ == 0) first_moved = frame.file_path;
+    }
+    if (photos[i].respelt && respelt++ == 0) first_respelt = frame.file_path;
+    if (!has_image_extension(name)) name += photo.extension();
+    if (!frame.mask_path.empty()) {
+      view.mask_path = named_by(file, frame, "mask", frame.mask_path);
+    } else {
+      // Names may repeat in several folders (train/r_0, test/r_0).
+      view.mask_path = find_mask(folder, name);
+      if (view.mask_path.empty()) view.mask_path = find_mask(folder, photo.filename());
+    }
+    if (!frame.depth_path.empty())
+      view.depth_path = named_by(file, frame, "depth map", frame.depth_path);
+    const ImageSize size = image_size(photo);
+    Camera nominal =
+        frame_camera(file, i, frame.width.value_or(size.width), frame.height.value_or(size.height));
+    nominal.name = inner_name(name);
+    set_cameras(view, nominal, size, options.downscale, options.undistort);
+    views.push_back(std::move(view));
+  }
+  if (moved > 0) {
+    spdlog::info("{} of {} photos are not where {} says ({}) but were found below its folder",
+                 moved, views.size(), file.path.string(), first_moved);
+  }
+  tell_of_case(respelt, views.size(), file.path, first_respelt);
+  return views;
+}
+
+}  // namespace raysplats::io
