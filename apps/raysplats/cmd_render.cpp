@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "frame_progress.hpp"
+#include "io/camera_list.hpp"
 #include "io/data_origin.hpp"
 #include "io/scene_camera.hpp"
 #include "options.hpp"
@@ -113,6 +114,7 @@ std::vector<Camera> orbit(const RenderFlags& options,
   }
   SceneExtent extent = scene_extent(model);
   extent.center = common_target(photos).value_or(extent.center);
+  shape.model = camera_model(options.camera_model.value_or("pinhole"));
   // Check the direction before the photos are measured along it.
   orbit_cameras(extent, shape);
   shape = orbit_like(photos, extent.center, shape);
@@ -120,9 +122,8 @@ std::vector<Camera> orbit(const RenderFlags& options,
     const Camera& first = photos.front();
     shape.width = first.width;
     shape.height = first.height;
-    shape.fov_degrees = field_of_view(first);
+    shape.fov_degrees = field_of_view(first, shape.model);
   }
-  shape.model = camera_model(options.camera_model.value_or("pinhole"));
   if (shape.model == CameraModel::kEquirectangular) shape.width = 2 * shape.height;
   // One side alone keeps the picture's shape.
   const double aspect = static_cast<double>(shape.width) / shape.height;
@@ -163,18 +164,18 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   } else if (options.ellipse || options.spiral || options.interpolate) {
     cameras = along(options, cameras_of(dataset, Split::kAll));
   } else if (!options.cameras.empty() || !options.path.empty()) {
+    const glm::dvec3 origin(source.origin[0], source.origin[1], source.origin[2]);
     if (!options.path.empty()) {
       CameraPathFile path = read_path(options);
       cameras = std::move(path.cameras);
       fps = path.fps;
       closed = path.closed;
+      for (Camera& camera : cameras) io::move_origin(camera, origin);
     } else {
-      cameras = read_cameras(options.cameras);
+      cameras = io::read_model_cameras(options.cameras, origin);
     }
-    for (Camera& camera : cameras) {
-      camera = downscaled(camera, options.data.settings.over({}).downscale);
-      io::move_origin(camera, {source.origin[0], source.origin[1], source.origin[2]});
-    }
+    const double factor = options.data.settings.over({}).downscale;
+    for (Camera& camera : cameras) camera = downscaled(camera, factor);
   } else {
     cameras = cameras_of(dataset, options.data.chosen_split());
   }
@@ -244,7 +245,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
 
   add_data_flags(*command, options->data);
   const std::string where = "Other cameras";
-  command->add_option("--cameras", options->cameras, "transforms.json with cameras")
+  command->add_option("--cameras", options->cameras, "transforms.json or cameras.json with cameras")
       ->group(where)
       ->type_name("FILE");
   command

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -10,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "io/data_origin.hpp"
+#include "io/camera_list.hpp"
 #include "io/scene_loader.hpp"
 #include "options.hpp"
 #include "raysplats/io.hpp"
@@ -67,10 +68,8 @@ std::vector<Camera> cameras_of(const Options& options,
                                const ModelSource& source) {
   std::vector<Camera> cameras;
   if (!options.cameras.empty()) {
-    cameras = read_cameras(options.cameras);
-    for (Camera& camera : cameras)
-      io::move_origin(camera, {source.origin[0], source.origin[1], source.origin[2]});
-    return cameras;
+    return io::read_model_cameras(options.cameras,
+                                  {source.origin[0], source.origin[1], source.origin[2]});
   }
   if (options.data.data.empty()) return trained_cameras(source);
   for (const View& each : views) cameras.push_back(each.camera);
@@ -161,11 +160,19 @@ void view_scene(const Options& options) {
   find_models(file);
   file.trained = options.trace.over(file.trace.over(file.trained));
   file.trace = {};
-  const LoadedScene loaded = load_scene(file);
   std::optional<glm::dvec3> up = up_of(options);
   if (!up) up = file.camera.up;
-  view::ViewState state =
-      view::first_look(scene_extent(loaded.scene.gaussians), loaded.cameras, up);
+  if (file.camera.source == SceneCamera::Source::kNone) {
+    // The page begins where it does with a model. An eye above the centre does not tell what is up.
+    up = up.value_or(glm::dvec3(0, -1, 0));
+    file.camera.source = SceneCamera::Source::kOrbit;
+    file.camera.up = up;
+    file.frames = 1;
+  }
+  const LoadedScene loaded = load_scene(file);
+  view::ViewState state = view::first_look(loaded.extent, loaded.cameras, up);
+  const std::array<double, 3> origin = file.trained_data.origin.value_or(std::array<double, 3>{});
+  state.origin = {origin[0], origin[1], origin[2]};
   state.about = fmt::format("{}, {}, {}", counted(loaded.scene.gaussians.size(), "Gaussian"),
                             counted(loaded.scene.meshes.size(), "mesh", "meshes"),
                             counted(loaded.scene.lights.size(), "light"));
@@ -247,7 +254,7 @@ Command add_view_command(CLI::App& app) {
   add_data_flags(*command, options->data, "test, train or all (default)");
   command
       ->add_option("--cameras", options->cameras,
-                   "Cameras of a transforms.json, for the page's list")
+                   "Cameras of a transforms.json or cameras.json, for the page's list")
       ->type_name("FILE");
   add_viewer_flags(*command, options->viewer);
   command

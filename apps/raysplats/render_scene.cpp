@@ -106,7 +106,7 @@ Pace override_camera(const RenderFlags& flags, SceneFile& scene) {
     }
     camera.file = flags.data.data;
     camera.split = flags.data.chosen_split();
-    camera.data_options = flags.data.settings.over({});
+    camera.data_settings = flags.data.settings;
   } else if (!flags.path.empty()) {
     CameraPathFile path = read_path(flags);
     camera = {};

@@ -93,13 +93,18 @@ std::uint64_t Context::host_waits() const { return impl_->host_waits; }
 FaultInjection& Context::faults() { return impl_->faults; }
 
 Profiler& Context::profiler() {
+  const auto turn = lock();
   impl_->collect_profile();
   return impl_->profiler;
 }
 
-std::string Context::profile_table() { return profiler().table(); }
+std::string Context::profile_table() {
+  const auto turn = lock();
+  return profiler().table();
+}
 
 std::vector<LaunchTime> Context::take_launches() {
+  const auto turn = lock();
   impl_->collect_profile();
   return std::exchange(impl_->launches, {});
 }

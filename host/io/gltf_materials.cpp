@@ -9,7 +9,6 @@
 #include <limits>
 
 #include "io/image_file.hpp"
-#include "io/mesh_file.hpp"
 #include "raysplats/error.hpp"
 #include "util/srgb.hpp"
 
@@ -151,6 +150,7 @@ double GltfMaterials::mean(int texture, int channel) {
 Material GltfMaterials::map_material(const tinygltf::Material& from, int number_in_file) {
   Material material;
   material.name = from.name.empty() ? fmt::format("material {}", number_in_file) : from.name;
+  if (seen_ && !seen_(material.name)) return material;
   const tinygltf::PbrMetallicRoughness& pbr = from.pbrMetallicRoughness;
   for (std::size_t c = 0; c < 3; ++c) material.color[c] = encoded(unit(pbr.baseColorFactor[c]));
   material.texture = texture(pbr.baseColorTexture.index);

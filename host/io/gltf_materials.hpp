@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/gltf_model.hpp"
+#include "io/mesh_file.hpp"
 #include "raysplats/image.hpp"
 #include "raysplats/scene.hpp"
 
@@ -39,7 +41,9 @@ struct GltfTextureUse {
 /// textures are encoded already. Textures of other properties count with their mean.
 class GltfMaterials {
  public:
-  explicit GltfMaterials(const GltfReader& reader) : reader_(reader) {}
+  /// Materials that are not `seen` have a name alone.
+  explicit GltfMaterials(const GltfReader& reader, SeenMaterials seen = {})
+      : reader_(reader), seen_(std::move(seen)) {}
 
   /// Index in `materials` of a material of the file; -1 is the default one. Throws DataError for
   /// references to what the file lacks and for textures that cannot be decoded.
@@ -58,6 +62,7 @@ class GltfMaterials {
   /// Mean of a channel of a texture; 1 without one.
   double mean(int texture, int channel);
   const GltfReader& reader_;
+  SeenMaterials seen_;
   std::map<int, std::uint32_t> used_;
   std::map<int, int> loaded_;
   std::map<int, std::array<double, 3>> means_;

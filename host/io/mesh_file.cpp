@@ -35,7 +35,7 @@ MeshFile read_format(MeshFormat format, MeshBytes bytes) {
 
 }  // namespace
 
-MeshFile read_mesh(const std::filesystem::path& path) {
+MeshFile read_mesh(const std::filesystem::path& path, const SeenMaterials& seen) {
   std::string extension = path.extension().string();
   for (char& c : extension) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
@@ -50,7 +50,7 @@ MeshFile read_mesh(const std::filesystem::path& path) {
         fmt::format("The mesh {} has an unknown extension: it must be .obj, .ply, .gltf or .glb",
                     path.string()));
   }
-  return read_format(format, {path, read_file(path)});
+  return read_format(format, {path, read_file(path), false, seen});
 }
 
 Mesh read_mesh_alone(MeshFormat format, std::vector<std::byte> bytes, const std::string& name) {

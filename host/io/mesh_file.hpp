@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -18,11 +19,15 @@ struct MeshFile {
   std::vector<Image> textures;      ///< 3 channels
 };
 
+/// Whether a material of a mesh file, by its name, will be seen; an empty one says so of all.
+using SeenMaterials = std::function<bool(const std::string& name)>;
+
 /// Reads a triangle mesh by its extension: .obj (Wavefront, with its .mtl files), .ply, .gltf or
 /// .glb (glTF 2.0). docs/meshes.md says what of each format is read and how materials map. Normals
-/// are those of the file, unit vectors, or none. Throws DataError with the file's name for anything
+/// are those of the file, unit vectors, or none. Of materials that are not `seen` only the name is
+/// of use: their pictures are not looked for. Throws DataError with the file's name for anything
 /// missing, malformed, truncated or oversized; a missing .mtl file is only logged.
-MeshFile read_mesh(const std::filesystem::path& path);
+MeshFile read_mesh(const std::filesystem::path& path, const SeenMaterials& seen = {});
 
 enum class MeshFormat { kObj, kPly, kGltf };
 
@@ -39,6 +44,7 @@ struct MeshBytes {
   std::filesystem::path path;  ///< that messages name; beside it is what the file names
   std::vector<std::byte> bytes;
   bool alone = false;  ///< as read_mesh_alone()
+  SeenMaterials seen = {};
 };
 
 /// read_mesh() of one format whatever the extension, without the final validate().

@@ -46,9 +46,9 @@ std::vector<std::uint32_t> separate(const std::vector<std::uint32_t>& corners,
 /// Walks the scene and puts its primitives together.
 class SceneWalk {
  public:
-  SceneWalk(const GltfReader& reader, std::size_t most)
+  SceneWalk(const GltfReader& reader, std::size_t most, SeenMaterials seen)
       : reader_(reader),
-        materials_(reader),
+        materials_(reader, std::move(seen)),
         builder_(reader.path(), most),
         parts_(reader.model().meshes.size()) {}
 
@@ -150,7 +150,7 @@ MeshFile read_gltf(MeshBytes file) {
       for (tinygltf::Primitive& primitive : mesh.primitives) primitive.material = -1;
   }
   const GltfReader reader(model, file.path);
-  return SceneWalk(reader, file.alone ? kMostAlone : kMostTogether).run();
+  return SceneWalk(reader, file.alone ? kMostAlone : kMostTogether, std::move(file.seen)).run();
 }
 
 }  // namespace raysplats::io

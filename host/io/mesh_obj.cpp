@@ -13,6 +13,7 @@
 #include <streambuf>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "io/mesh_builder.hpp"
@@ -226,7 +227,7 @@ MeshFile read_obj(MeshBytes source) {
   std::vector<std::byte>& bytes = source.bytes;
   const std::filesystem::path& path = source.path;
   normalize(bytes, path);
-  MtlMaterials materials(path);
+  MtlMaterials materials(path, std::move(source.seen));
   check_lines(bytes, path, source.alone, materials);
   Collector collector(path, source.alone, materials);
   ByteStream buffer(bytes);

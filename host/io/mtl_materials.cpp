@@ -11,7 +11,6 @@
 #include <sstream>
 
 #include "io/byte_reader.hpp"
-#include "io/mesh_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -152,7 +151,8 @@ std::uint32_t MtlMaterials::index(std::string_view name) {
   if (found != known_.end()) {
     Material material = found->second;
     const auto path = texture_paths_.find(key);
-    if (path != texture_paths_.end()) material.texture = texture(path->second, key);
+    if (path != texture_paths_.end() && (!seen_ || seen_(key)))
+      material.texture = texture(path->second, key);
     materials.push_back(std::move(material));
   } else {
     if (!key.empty() && !known_.empty()) {

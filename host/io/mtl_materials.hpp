@@ -6,8 +6,10 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "io/mesh_file.hpp"
 #include "raysplats/image.hpp"
 #include "raysplats/scene.hpp"
 
@@ -25,8 +27,10 @@ namespace raysplats::io {
 /// | Ke | emission; emissive where Kd is 0 too |
 class MtlMaterials {
  public:
-  /// `obj` is the path of the OBJ file; names of .mtl files are relative to its folder.
-  explicit MtlMaterials(const std::filesystem::path& obj) : obj_(obj) {}
+  /// `obj` is the path of the OBJ file; names of .mtl files are relative to its folder. Textures
+  /// are read of materials that are `seen`.
+  explicit MtlMaterials(std::filesystem::path obj, SeenMaterials seen = {})
+      : obj_(std::move(obj)), seen_(std::move(seen)) {}
 
   /// Reads the file of an mtllib line: one name, or several that are separated by blanks. A file
   /// that is missing is logged. Throws DataError when one cannot be read.
@@ -46,6 +50,7 @@ class MtlMaterials {
   void read_library(const std::filesystem::path& path);
   int texture(const std::filesystem::path& path, const std::string& material);
   std::filesystem::path obj_;
+  SeenMaterials seen_;
   std::map<std::string, Material, std::less<>> known_;  ///< mapped, without textures
   std::map<std::string, std::filesystem::path, std::less<>> texture_paths_;  ///< by material
   std::map<std::string, std::uint32_t, std::less<>> used_;

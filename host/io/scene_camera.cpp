@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "io/data_rows.hpp"
+#include "io/camera_list.hpp"
+#include "io/data_origin.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -75,8 +77,8 @@ void read_orbit(io::TomlTable table, SceneCamera& camera) {
 
 // A key of [camera] that is an option of data sets.
 void read_data_row(io::TomlTable& table, const char* key, SceneCamera& camera) {
-  const std::vector<OptionRow> rows = data_rows(camera.data_options);
-  table.option(key, find_row(rows, key)->set);
+  table.option(
+      key, [&](const std::vector<std::string>& values) { camera.data_settings.set(key, values); });
 }
 
 void read_views(io::TomlTable& table, SceneCamera& camera) {
@@ -171,20 +173,28 @@ std::vector<Camera> chosen(const SceneCamera& camera, std::vector<Camera> camera
   return cameras;
 }
 
-std::vector<Camera> on_orbit(const SceneCamera& camera, const SceneExtent& extent, int frames) {
+glm::dvec3 origin_of(const DatasetOptions& trained) {
+  const std::array<double, 3> origin = trained.origin.value_or(std::array<double, 3>{});
+  return {origin[0], origin[1], origin[2]};
+}
+
+std::vector<Camera> on_orbit(const SceneCamera& camera,
+                             const SceneExtent& extent,
+                             int frames,
+                             const DatasetOptions& trained) {
   SceneExtent around = extent;
   if (camera.target) around.center = *camera.target;
   OrbitOptions shape;
   shape.frames = camera.frames.value_or(frames);
   if (!camera.file.empty()) {
     const std::vector<Camera> photos =
-        views_of(load_dataset(camera.file, camera.data_options), Split::kAll);
+        views_of(load_dataset(camera.file, camera.data_settings.over(trained)), Split::kAll);
     if (!camera.target) around.center = common_target(photos).value_or(extent.center);
     shape.up = camera.up.value_or(estimate_up(photos));
     shape = orbit_like(photos, around.center, shape);
     shape.width = photos.front().width;
     shape.height = photos.front().height;
-    shape.fov_degrees = field_of_view(photos.front());
+    shape.fov_degrees = field_of_view(photos.front(), camera.model);
   }
   if (camera.up) shape.up = *camera.up;
   if (camera.width) shape.width = *camera.width;
@@ -269,21 +279,28 @@ SceneCamera read_scene_camera(io::TomlTable& table) {
 
 std::vector<Camera> scene_cameras(const SceneCamera& camera,
                                   const SceneExtent& extent,
-                                  int frames) {
+                                  int frames,
+                                  const DatasetOptions& trained) {
   switch (camera.source) {
     case Source::kPlaced:
       return placed(camera);
     case Source::kFile: {
-      std::vector<Camera> cameras = chosen(camera, read_cameras(camera.file));
-      for (Camera& each : cameras) each = downscaled(each, camera.data_options.downscale);
+      std::vector<Camera> cameras =
+          chosen(camera, io::read_model_cameras(camera.file, origin_of(trained)));
+      const double factor = camera.data_settings.over({}).downscale;
+      for (Camera& each : cameras) each = downscaled(each, factor);
       return cameras;
     }
     case Source::kData:
-      return chosen(camera, views_of(load_dataset(camera.file, camera.data_options), camera.split));
-    case Source::kGiven:
-      return camera.given;
+      return chosen(camera, views_of(load_dataset(camera.file, camera.data_settings.over(trained)),
+                                     camera.split));
+    case Source::kGiven: {
+      std::vector<Camera> cameras = camera.given;
+      for (Camera& each : cameras) io::move_origin(each, origin_of(trained));
+      return cameras;
+    }
     case Source::kOrbit:
-      return on_orbit(camera, extent, frames);
+      return on_orbit(camera, extent, frames, trained);
     case Source::kNone:
       break;
   }

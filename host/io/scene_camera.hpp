@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "io/data_rows.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/dataset.hpp"
 #include "scene/orbit.hpp"
@@ -41,7 +42,7 @@ struct SceneCamera {
   std::optional<int> width, height;
   std::filesystem::path file;  ///< of kFile, kData, and of kOrbit like a data set
   Split split = Split::kTest;
-  DatasetOptions data_options;
+  DataSettings data_settings;      ///< that were given; of kFile the size of its pictures
   std::vector<std::size_t> views;  ///< of kFile and kData: these only; empty = all
   std::vector<Camera> given;       ///< of kGiven
   std::optional<int> frames;       ///< of kOrbit
@@ -51,9 +52,15 @@ struct SceneCamera {
 /// Reads and checks the table [camera]. Throws UsageError and DataError with file and line.
 SceneCamera read_scene_camera(io::TomlTable& table);
 
-/// The cameras that `camera` means, in order; `frames` is the length of an orbit that states none.
-/// Throws UsageError where there is no camera or a value makes none, DataError for files.
-std::vector<Camera> scene_cameras(const SceneCamera& camera, const SceneExtent& extent, int frames);
+/// The cameras that `camera` means, in order; `frames` is the length of an orbit that states none,
+/// `trained` what its settings for data sets go over. Cameras of files and given ones are in the
+/// coordinates of the data set's files, and count from the origin of `trained` (none = 0)
+/// afterwards. Throws UsageError where there is no camera or a value makes none, DataError for
+/// files.
+std::vector<Camera> scene_cameras(const SceneCamera& camera,
+                                  const SceneExtent& extent,
+                                  int frames,
+                                  const DatasetOptions& trained);
 
 /// The same view in another size: focal lengths follow the smaller side. With one number given, the
 /// other keeps the shape of the picture.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "io/scene_camera.hpp"
+#include "raysplats/dataset.hpp"
 #include "raysplats/scene.hpp"
 #include "raysplats/trace_options.hpp"
 #include "scene/trace_rows.hpp"
@@ -76,8 +77,11 @@ struct SceneFile {
   SceneEnvironment environment;
   SceneCamera camera;
   RenderSettings render;
-  TraceSettings trace;        ///< that were given; the others are as the models were trained
-  TraceOptions trained;       ///< what `trace` goes over
+  TraceSettings trace;   ///< that were given; the others are as the models were trained
+  TraceOptions trained;  ///< what `trace` goes over
+  /// What the settings of [camera] for data sets go over. Its origin is where positions of the
+  /// scene count from in the coordinates of files with cameras.
+  DatasetOptions trained_data{.origin = std::array<double, 3>{}};
   std::optional<int> frames;  ///< [animation]
   /// Size of the pictures whatever the camera says, then divided by `downscale`.
   std::optional<int> width, height;

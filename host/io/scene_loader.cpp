@@ -17,7 +17,6 @@
 #include "scene/gaussian_transform.hpp"
 #include "scene/mesh.hpp"
 #include "scene/morton_order.hpp"
-#include "scene/orbit.hpp"
 #include "util/nearest_name.hpp"
 
 namespace raysplats {
@@ -91,6 +90,15 @@ std::vector<std::uint32_t> material_map(const SceneMesh& entry,
   return map;
 }
 
+/// Whether a mesh file's own material of that name is seen anywhere in the scene.
+bool is_seen(const SceneFile& file, const std::filesystem::path& mesh, const std::string& name) {
+  return std::any_of(file.meshes.begin(), file.meshes.end(), [&](const SceneMesh& entry) {
+    return entry.file == mesh && entry.material.empty() &&
+           std::none_of(entry.materials.begin(), entry.materials.end(),
+                        [&](const auto& replaced) { return replaced.first == name; });
+  });
+}
+
 void load_meshes(const SceneFile& file, LoadedScene& out) {
   for (const SceneMaterial& each : file.materials) {
     std::vector<Image> textures;
@@ -106,11 +114,11 @@ void load_meshes(const SceneFile& file, LoadedScene& out) {
   for (const SceneMesh& entry : file.meshes) {
     auto found = read.find(entry.file);
     if (found == read.end()) {
-      io::MeshFile source = io::read_mesh(entry.file);
+      io::MeshFile source = io::read_mesh(
+          entry.file, [&](const std::string& name) { return is_seen(file, entry.file, name); });
       Loaded loaded;
       loaded.mesh = std::move(source.mesh);
       for (const Material& each : source.materials) loaded.material_names.push_back(each.name);
-      // Materials that the scene file replaces altogether need not be in the scene.
       loaded.first = append(out.scene, std::move(source.materials), std::move(source.textures));
       found = read.emplace(entry.file, std::move(loaded)).first;
     }
@@ -163,7 +171,7 @@ Environment load_environment(const SceneFile& file, const TraceOptions& trace) {
 std::vector<Camera> frame_cameras(const SceneFile& file, const SceneExtent& extent) {
   constexpr int kOrbitFrames = 60;
   const std::vector<Camera> cameras =
-      scene_cameras(file.camera, extent, file.frames.value_or(kOrbitFrames));
+      scene_cameras(file.camera, extent, file.frames.value_or(kOrbitFrames), file.trained_data);
   const std::size_t frames = file.frames ? static_cast<std::size_t>(*file.frames) : cameras.size();
   std::vector<Camera> out;
   out.reserve(frames);
@@ -203,7 +211,8 @@ LoadedScene load_scene(const SceneFile& file) {
   out.scene.render = file.render;
   out.scene.trace = file.trace.over(file.trained);
   out.scene.environment = load_environment(file, out.scene.trace);
-  out.cameras = frame_cameras(file, extent_of(out.scene));
+  out.extent = extent_of(out.scene);
+  out.cameras = frame_cameras(file, out.extent);
   return out;
 }
 

@@ -6,12 +6,14 @@
 #include "io/scene_file.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/scene.hpp"
+#include "scene/orbit.hpp"
 
 namespace raysplats {
 
 /// A scene file with everything it names, for any frame of its animation.
 struct LoadedScene {
   Scene scene;                        ///< meshes where they are in frame 0
+  SceneExtent extent;                 ///< of the Gaussians, of the meshes where there are none
   std::vector<Camera> cameras;        ///< one per frame, with the name of its picture
   std::vector<Mesh> still;            ///< meshes in the files' coordinates, in the scene's order
   std::vector<SceneMesh> placements;  ///< of `still`

@@ -20,6 +20,7 @@
 #include "scene/pixel_places.hpp"
 #include "scene/render_rows.hpp"
 #include "scene/row_share.hpp"
+#include "scene/shadow_bias.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/model_impl.hpp"
@@ -61,29 +62,6 @@ PathMemory memory_of(const Scene& scene, const DeviceInfo& device) {
   return memory;
 }
 
-struct Box {
-  std::array<float, 3> lo, hi;
-
-  Box() {
-    lo.fill(std::numeric_limits<float>::max());
-    hi.fill(std::numeric_limits<float>::lowest());
-  }
-  void add(const std::vector<float>& points) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      lo[i % 3] = std::min(lo[i % 3], points[i]);
-      hi[i % 3] = std::max(hi[i % 3], points[i]);
-    }
-  }
-  double diagonal() const {
-    double sum = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double extent = std::max(0.0, static_cast<double>(hi[k]) - static_cast<double>(lo[k]));
-      sum += extent * extent;
-    }
-    return std::sqrt(sum);
-  }
-};
-
 // Leaves packets without a watch when it goes, whatever was thrown in between: what a watch refers
 // to ends before they do.
 class Unwatched {
@@ -104,12 +82,6 @@ std::size_t pixels_of(const Camera& camera) {
   return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
 }
 
-Box box_of(const Gaussians& gaussians) {
-  Box box;
-  box.add(gaussians.means);
-  return box;
-}
-
 }  // namespace
 
 struct PathTracer::Impl {
@@ -124,12 +96,10 @@ struct PathTracer::Impl {
         lights(scene.lights),
         camera_rays(context_in),
         scan(context_in),
-        means_box(box_of(scene.gaussians)) {
-    choose_bias(scene.meshes);
+        bias(shadow_bias(scene)) {
     tracer.update(gaussians);
   }
 
-  void choose_bias(const std::vector<Mesh>& meshes);
   void render(const Camera& camera, const std::function<bool(double)>& within, Image& out);
   PathTracer::FirstHits first_hits(const Camera& camera, const std::function<bool(double)>& within);
   std::optional<glm::dvec3> first_point(const Camera& camera);
@@ -173,7 +143,6 @@ struct PathTracer::Impl {
   std::vector<Light> lights;
   CameraRays camera_rays;
   Scan scan;
-  Box means_box;
   float bias = 0;
   Statistics statistics;
 
@@ -191,13 +160,6 @@ struct PathTracer::Impl {
   Buffer<std::uint32_t> offsets;
   Buffer<std::array<std::uint32_t, 4>> tallies, partials;
 };
-
-// A thousandth of the scene unless the settings say otherwise.
-void PathTracer::Impl::choose_bias(const std::vector<Mesh>& meshes) {
-  Box box = means_box;
-  for (const Mesh& mesh : meshes) box.add(mesh.positions);
-  bias = settings.bias > 0 ? settings.bias : static_cast<float>(1e-3 * box.diagonal());
-}
 
 RsWave PathTracer::Impl::wave_record(std::uint32_t sample, std::size_t first_pixel) const {
   RsWave wave{};
@@ -407,7 +369,6 @@ void PathTracer::set_meshes(const std::vector<Mesh>& meshes) {
   impl_->memory.set_meshes(triangles);
   impl_->memory.check(0);
   impl_->surfaces.set_meshes(meshes);
-  impl_->choose_bias(meshes);
 }
 
 Image PathTracer::render(const Camera& camera, const std::function<bool(double)>& within) {

@@ -13,6 +13,7 @@
 #include "raysplats/error.hpp"
 #include "reference/light_shading.hpp"
 #include "reference/optics.hpp"
+#include "scene/shadow_bias.hpp"
 
 namespace raysplats::reference {
 namespace {
@@ -280,20 +281,6 @@ void Walk::glass(const State& state,
   go_on(refraction, point.color);
 }
 
-double default_bias(const Scene& scene) {
-  glm::dvec3 low(kInfinity), high(-kInfinity);
-  const auto add = [&](const std::vector<float>& points) {
-    for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
-      const glm::dvec3 p(points[i], points[i + 1], points[i + 2]);
-      low = glm::min(low, p);
-      high = glm::max(high, p);
-    }
-  };
-  add(scene.gaussians.means);
-  for (const Mesh& mesh : scene.meshes) add(mesh.positions);
-  return low.x <= high.x ? glm::length(high - low) / 1000.0 : 0.0;
-}
-
 }  // namespace
 
 LightScene::LightScene(const Scene& source)
@@ -302,7 +289,7 @@ LightScene::LightScene(const Scene& source)
       triangles(triangles_of(source.meshes)),
       environment(source.environment),
       options(source.trace),
-      bias(source.render.bias > 0.0f ? source.render.bias : default_bias(source)) {
+      bias(shadow_bias(source)) {
   if (source.render.indirect) {
     throw UsageError("the reference of light has no indirect light, switch it off");
   }

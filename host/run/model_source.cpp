@@ -188,6 +188,7 @@ void find_models(SceneFile& scene) {
   if (!first) return;
   scene.trained = trace_options(*first);
   scene.trained.sky = transformed(scene.trained.sky, first_transform);
+  scene.trained_data = dataset_options(*first);
 }
 
 }  // namespace raysplats

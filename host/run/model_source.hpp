@@ -51,7 +51,8 @@ DatasetOptions dataset_options(const ModelSource& source);
 TraceOptions trace_options(const ModelSource& source);
 
 /// Replaces run folders among a scene's models by their newest PLY, and makes the options of the
-/// first model that tells them what the scene's [trace] goes over. Throws as find_model().
+/// first model that tells them what the scene's [trace] and the data sets of its [camera] go over.
+/// Throws as find_model().
 void find_models(SceneFile& scene);
 
 }  // namespace raysplats

@@ -164,14 +164,17 @@ void RunFolder::write_cameras(std::span<const Camera> cameras) const {
     for (int r = 0; r < 3; ++r) {
       rotation.push_back({camera.rotation[r][0], camera.rotation[r][1], camera.rotation[r][2]});
     }
-    list.push_back({{"id", i},
-                    {"img_name", camera.name},
-                    {"width", camera.width},
-                    {"height", camera.height},
-                    {"position", {center.x, center.y, center.z}},
-                    {"rotation", rotation},
-                    {"fy", camera.fy},
-                    {"fx", camera.fx}});
+    nlohmann::json entry{{"id", i},
+                         {"img_name", camera.name},
+                         {"width", camera.width},
+                         {"height", camera.height},
+                         {"position", {center.x, center.y, center.z}},
+                         {"rotation", rotation}};
+    if (camera.model != CameraModel::kEquirectangular) {
+      entry["fy"] = camera.fy;
+      entry["fx"] = camera.fx;
+    }
+    list.push_back(std::move(entry));
   }
   write_text_file(path_ / "cameras.json", io::json_text(list) + "\n");
 }

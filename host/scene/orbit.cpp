@@ -15,6 +15,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/camera_check.hpp"
+#include "scene/camera_model.hpp"
 #include "scene/statistics.hpp"
 
 namespace raysplats {
@@ -133,10 +134,18 @@ glm::dvec3 estimate_up(std::span<const Camera> cameras) {
   return length > least && std::isfinite(length) ? sum / length : glm::dvec3(0.0, -1.0, 0.0);
 }
 
-double field_of_view(const Camera& camera) {
+double field_of_view(const Camera& camera, CameraModel as) {
   const bool portrait = camera.width < camera.height;
   const double half = 0.5 * (portrait ? camera.width : camera.height);
-  return 2.0 * std::atan(half / (portrait ? camera.fx : camera.fy)) / kRadians;
+  double angle = std::atan(half / (portrait ? camera.fx : camera.fy));
+  if (camera.model == CameraModel::kFisheye && as == CameraModel::kFisheye) {
+    const CameraRay axis = camera_ray(camera, camera.cx, camera.cy);
+    const CameraRay side = camera_ray(camera, camera.cx + (portrait ? half : 0.0),
+                                      camera.cy + (portrait ? 0.0 : half));
+    angle = side.valid ? std::acos(std::clamp(glm::dot(axis.direction, side.direction), -1.0, 1.0))
+                       : lens_limit(camera.model, camera.distortion);
+  }
+  return 2.0 * angle / kRadians;
 }
 
 std::optional<glm::dvec3> common_target(std::span<const Camera> cameras) {

@@ -30,8 +30,10 @@ SceneExtent scene_extent(const Gaussians& model);
 /// 3DGS' worlds points down.
 glm::dvec3 estimate_up(std::span<const Camera> cameras);
 
-/// Field of view along the smaller image side, in degrees.
-double field_of_view(const Camera& camera);
+/// Field of view along the smaller image side that a camera of the model `as` takes from this one,
+/// in degrees: of a fisheye from a fisheye what its lens sees there, up to its limit, else that of
+/// a pinhole with its focal length.
+double field_of_view(const Camera& camera, CameraModel as);
 
 struct OrbitOptions {
   int frames = 60;

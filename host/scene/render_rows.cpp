@@ -18,7 +18,7 @@ std::vector<OptionRow> render_rows(RenderSettings& s) {
            "radius of the lens in world units; 0 = everything is sharp");
   t.number("focus-distance", s.focus_distance, 1e-9, kNoBound, "depth of what is sharp");
   t.number("bias", s.bias, 0, kNoBound,
-           "start of shadow rays from Gaussians; 0 = 1/1000 of the scene's size");
+           "start of shadow rays from Gaussians; 0 = 1/1000 of their size");
   return t.take();
 }
 

@@ -77,8 +77,11 @@ Verdict Access::judge(const Credentials& credentials) const {
   return Verdict::kForbidden;
 }
 
+// Lax: with Strict no browser sends it along the redirection that takes the token off the address,
+// where the address is a link on another page. What other pages may do with it is GET and HEAD
+// alone, which change nothing.
 std::string Access::cookie() const {
-  return fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", cookie_name_, token_);
+  return fmt::format("{}={}; HttpOnly; SameSite=Lax; Path=/", cookie_name_, token_);
 }
 
 }  // namespace raysplats::view

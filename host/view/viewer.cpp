@@ -24,6 +24,7 @@
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
+#include "view/mesh_line.hpp"
 #include "view/mesh_uploads.hpp"
 #include "view/pace.hpp"
 #include "view/page.hpp"
@@ -46,9 +47,6 @@ constexpr std::chrono::nanoseconds kWishTime{1'000'000'000 / 60};
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
-
-/// What pages say about meshes, in the order in which they say it.
-using MeshMessage = std::variant<SentMesh, PlaceMesh, RemoveMesh, MeshQuestion, SceneQuestion>;
 
 /// Pictures are sent at 1, 2, 4, 8, ... samples, and at the last one.
 bool worth_sending(std::uint64_t samples, std::uint64_t most) {
@@ -197,7 +195,7 @@ struct Viewer::Impl {
         } else if (auto* offer = std::get_if<MeshOffer>(&message)) {
           uploads.begin(id, *offer, Clock::now());
         } else {
-          wait(id, std::move(message));
+          about_meshes.put(id, about_mesh(message));
         }
       }
       news.notify_one();
@@ -212,11 +210,7 @@ struct Viewer::Impl {
         const std::lock_guard<std::mutex> guard(mutex);
         std::optional<SentMesh> sent = uploads.take(id, bytes, Clock::now());
         if (!sent) return;
-        const bool room = std::none_of(about_meshes.begin(), about_meshes.end(), [](const auto& m) {
-          return std::holds_alternative<SentMesh>(m.second);
-        });
-        if (!room) throw UsageError("A mesh is being read already: drop this one again");
-        about_meshes.emplace_back(id, std::move(*sent));
+        about_meshes.put(id, std::move(*sent));
       }
       news.notify_one();
     } catch (const std::exception& error) {
@@ -224,23 +218,11 @@ struct Viewer::Impl {
     }
   }
 
-  /// Puts a message about meshes in line; of a mesh that moves only the newest place stays.
-  void wait(ClientId id, Message message) {
-    MeshMessage next;
-    if (auto* place = std::get_if<PlaceMesh>(&message)) {
-      if (!about_meshes.empty()) {
-        auto* last = std::get_if<PlaceMesh>(&about_meshes.back().second);
-        if (last != nullptr && last->mesh == place->mesh) about_meshes.pop_back();
-      }
-      next = *place;
-    } else if (auto* remove = std::get_if<RemoveMesh>(&message)) {
-      next = *remove;
-    } else if (std::holds_alternative<MeshQuestion>(message)) {
-      next = MeshQuestion{};
-    } else {
-      next = std::get<SceneQuestion>(message);
-    }
-    if (about_meshes.size() < kMostWaiting) about_meshes.emplace_back(id, std::move(next));
+  static MeshMessage about_mesh(const Message& message) {
+    if (const auto* place = std::get_if<PlaceMesh>(&message)) return *place;
+    if (const auto* remove = std::get_if<RemoveMesh>(&message)) return *remove;
+    if (std::holds_alternative<MeshQuestion>(message)) return MeshQuestion{};
+    return std::get<SceneQuestion>(message);
   }
 
   /// A page's message has failed. What is not its own fault is said here as well.
@@ -327,7 +309,7 @@ struct Viewer::Impl {
   std::map<ClientId, PickRequest> picks;  ///< the newest of each page
   std::deque<RunCommand> commands;
   MeshUploads uploads;
-  std::deque<std::pair<ClientId, MeshMessage>> about_meshes;
+  MeshLine about_meshes;
   std::uint64_t wishes = 0;
   std::uint64_t turns = 0;
   double hurry = 0.0;  ///< seconds for a picture of a page that rests; 0 = as long as it takes
@@ -568,13 +550,12 @@ bool Viewer::work(PictureSource& source,
       self.news.wait_until(lock, std::min(end, self.next_due(now)));
     }
     commands.swap(self.commands);
-    if (!self.about_meshes.empty()) {
-      about_mesh = std::move(self.about_meshes.front());
-      self.about_meshes.pop_front();
-    } else if (const std::optional<ClientId> asks = self.next_pick(now)) {
+    about_mesh = self.about_meshes.take();
+    const std::optional<ClientId> asks = about_mesh ? std::nullopt : self.next_pick(now);
+    if (asks) {
       pick.emplace(*asks, std::move(self.picks.extract(*asks).mapped()));
       self.clients.at(*asks).due = now + kWishTime;
-    } else {
+    } else if (!about_mesh) {
       client = self.next(source.samples(), now);
     }
   }

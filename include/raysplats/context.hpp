@@ -50,10 +50,11 @@ struct LaunchTime {
 /// One device with an in-order queue and its compiled programs. Models and tracers are made with a
 /// context, belong to it alone, and have to go before it does.
 ///
-/// Threads: Model, Tracer, PathTracer and Trainer lock their context while they work, so threads
-/// that share one take turns; what several calls do together (forward and backward) is held
-/// together by lock(). For work at the same time take a context per thread. Everything else here,
-/// and the making of contexts from the same device, is for one thread at a time.
+/// Threads: Model, Tracer, PathTracer and Trainer lock their context while they work, as do
+/// profile_table() and take_launches(), so threads that share one take turns; what several calls do
+/// together (forward and backward) is held together by lock(). For work at the same time take a
+/// context per thread. Everything else here, and the making of contexts from the same device, is
+/// for one thread at a time.
 class Context {
  public:
   /// Opens a device of list_devices() or select_device(). Throws DeviceError when the driver does

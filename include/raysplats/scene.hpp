@@ -97,7 +97,7 @@ struct RenderSettings {
   int light_samples = 4;          ///< shadow rays per sphere light, surface and sample
   float aperture = 0.0f;          ///< radius of the lens in world units; 0 = everything is sharp
   float focus_distance = 1.0f;    ///< depth of what is sharp
-  float bias = 0.0f;              ///< start of shadow rays from Gaussians; 0 = 1/1000 of the scene
+  float bias = 0.0f;              ///< start of shadow rays from Gaussians; 0 = 1/1000 of their size
   ShadowSettings shadows;
 };
 

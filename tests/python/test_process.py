@@ -2,6 +2,8 @@
 """Threads, forks and the interpreter's lock."""
 
 import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -50,6 +52,29 @@ def test_threads_share_a_context(context):
     for thread in threads:
         thread.join()
     assert len(found) == 15 and all(np.array_equal(each, expected) for each in found)
+
+
+def test_counts_of_rays_wait_for_a_picture_of_another_thread():
+    # In a process of its own, which ends: the two would wait for each other.
+    code = """
+import threading
+import numpy as np
+import raysplats as rs
+
+context = rs.Context()
+corners = np.array([[-9, -9, 3], [9, -9, 3], [9, 9, 3]], np.float32)
+scene = rs.Scene(meshes=[rs.Mesh(corners, np.array([[0, 1, 2]], np.uint32))], materials=[rs.Material()],
+                 render=rs.RenderSettings(samples=64))
+tracer = rs.PathTracer(context, scene)
+camera = rs.Camera(64, 48, 50.0)
+thread = threading.Thread(target=tracer.render, args=(camera,))
+thread.start()
+while thread.is_alive():
+    tracer.statistics
+thread.join()
+assert tracer.statistics.camera_rays == 64 * 64 * 48
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
 
 
 def test_a_fork_is_refused(context):

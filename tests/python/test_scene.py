@@ -55,6 +55,23 @@ def test_a_scene_file(context, tmp_path):
         rs.LoadedScene.load(tmp_path / "scene.toml")
 
 
+def test_a_scene_file_traces_a_run_as_it_was_trained(tmp_path):
+    saved = tmp_path / "run" / "point_cloud" / "iteration_7"
+    saved.mkdir(parents=True)
+    white_ball(0).save(saved / "point_cloud.ply")
+    (tmp_path / "run" / "config.toml").write_text(
+        'background = "0.25,0.5,1"\nhit-order = "peak"\nquantile = 9\n'
+    )
+    (tmp_path / "scene.toml").write_text(
+        '[[model]]\nfile = "run"\n[trace]\nmax-hits = 99\n'
+        "[camera]\nposition = [0, 0, -4]\ntarget = [0, 0, 0]\nwidth = 16\nheight = 12\n"
+    )
+    scene = rs.LoadedScene.load(tmp_path / "scene.toml").scene
+    assert len(scene.gaussians) == 1
+    assert (scene.trace.hit_order, scene.trace.quantile, scene.trace.max_hits) == ("peak", 9, 99)
+    assert tuple(scene.environment.color) == (0.25, 0.5, 1)
+
+
 def test_records_check_what_they_are_given():
     settings = rs.RenderSettings(samples=4, shadows=rs.ShadowSettings(strength=0.0))
     assert settings.samples == 4 and settings.shadows.strength == 0.0

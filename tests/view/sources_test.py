@@ -112,6 +112,41 @@ class OriginTest(unittest.TestCase):
 
 
 class ScenesTest(unittest.TestCase):
+    def state(self, path):
+        with Viewer(PROGRAM, [path]) as viewer:
+            return json.loads(viewer.ask("/api/state", Cookie=viewer.cookie())[2])
+
+    def test_meshes_alone_and_no_camera_are_looked_at(self):
+        with tempfile.TemporaryDirectory(prefix="raysplats_meshes_") as folder:
+            with open(os.path.join(folder, "quad.obj"), "w") as file:
+                file.write("v 40 -3 0\nv 46 -3 0\nv 46 5 0\nv 40 5 0\nf 1 2 3 4\n")
+            path = os.path.join(folder, "scene.toml")
+            with open(path, "w") as file:
+                file.write('[[mesh]]\nfile = "quad.obj"\n[animation]\nframes = 4\n')
+            state = self.state(path)
+            self.assertEqual(state["center"], [43, 1, 0])
+            self.assertAlmostEqual(state["radius"], 5)
+            self.assertEqual(state["up"], [0, -1, 0])
+            self.assertEqual(len(state["cameras"]), 1)
+            eye = [state["start"]["c2w"][i] for i in (3, 7, 11)]
+            self.assertLess(eye[1], 0)  # above
+            self.assertLess(math.dist(eye, (43, 1, 0)), 20)
+
+    def test_a_model_far_from_the_origin_is_met_by_the_cameras_of_files(self):
+        with tempfile.TemporaryDirectory(prefix="raysplats_survey_") as folder:
+            write_model(os.path.join(folder, "model.ply"), ORIGIN)
+            pose = [[1, 0, 0, ORIGIN[0]], [0, -1, 0, ORIGIN[1]], [0, 0, -1, ORIGIN[2] - 6], [0, 0, 0, 1]]
+            with open(os.path.join(folder, "cameras.json"), "w") as file:
+                json.dump({"w": 64, "h": 48, "fl_x": 50, "fl_y": 50,
+                           "frames": [{"file_path": "a.png", "transform_matrix": pose}]}, file)
+            path = os.path.join(folder, "scene.toml")
+            with open(path, "w") as file:
+                file.write('[[model]]\nfile = "model.ply"\n[camera]\nfile = "cameras.json"\n')
+            state = self.state(path)
+            self.assertEqual(state["origin"], list(ORIGIN))
+            eye = [state["cameras"][0]["c2w"][i] for i in (3, 7, 11)]
+            self.assertLess(math.dist(eye, (0, 0, -6)), 1e-6)
+
     def test_rough_mirrors_and_lenses_become_what_render_draws(self):
         with tempfile.TemporaryDirectory(prefix="raysplats_rough_") as folder:
             write_model(os.path.join(folder, "model.ply"))

@@ -148,7 +148,7 @@ void bind_class(nb::module_& module) {
 void bind_cameras(nb::module_& module) {
   bind_class(module);
   module.def("read_cameras", &read_cameras, nb::arg("path"),
-             "Cameras of a transforms.json (Blender or nerfstudio).");
+             "Cameras of a transforms.json (Blender or nerfstudio) or of a cameras.json (3DGS).");
   module.def("write_cameras", &write_cameras, nb::arg("path"), nb::arg("cameras"),
              "Writes a transforms.json that read_cameras() reads back.");
 }

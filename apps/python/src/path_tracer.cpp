@@ -56,7 +56,9 @@ void bind_path_tracer(nb::module_& module) {
           [](HeldPathTracer& self, const std::vector<Mesh>& meshes) { self->set_meshes(meshes); },
           nb::arg("meshes"), nb::call_guard<nb::gil_scoped_release>(),
           "The same materials and Gaussians with other meshes.")
-      .def_prop_ro("statistics", [](HeldPathTracer& self) { return self->statistics(); });
+      .def_prop_ro(
+          "statistics", [](HeldPathTracer& self) { return self->statistics(); },
+          nb::call_guard<nb::gil_scoped_release>());
 }
 
 }  // namespace raysplats::python

@@ -24,6 +24,7 @@
 #include "names.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/mirrors.hpp"
+#include "run/model_source.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -210,8 +211,13 @@ void bind_loaded(nb::module_& module) {
   nb::class_<LoadedScene>(module, "LoadedScene", "A scene file (docs/scene.md) with what it names.")
       .def_static(
           "load",
-          [](const std::filesystem::path& path) { return load_scene(read_scene_file(path)); },
-          nb::arg("path"), nb::call_guard<nb::gil_scoped_release>())
+          [](const std::filesystem::path& path) {
+            SceneFile file = read_scene_file(path);
+            find_models(file);
+            return load_scene(file);
+          },
+          nb::arg("path"), nb::call_guard<nb::gil_scoped_release>(),
+          "With the models, and traced, as `raysplats render` does.")
       .def_ro("scene", &LoadedScene::scene, "Meshes where they are in frame 0.")
       .def_ro("cameras", &LoadedScene::cameras, "One per frame.")
       .def_prop_ro("frames", &LoadedScene::frames)

@@ -5,9 +5,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdio>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "device/buffer.hpp"
@@ -197,6 +200,29 @@ TEST_CASE("profiler: launches are counted and the table has them") {
   CHECK(table.find("kernel") < table.find("long"));
   CHECK(table.find("long") < table.find("short"));
   CHECK(contains(table, "75.0%"));
+}
+
+TEST_CASE("profiler: what asks for times waits for its turn") {
+  ContextOptions options;
+  options.profile = options.keep_launches = true;
+  Context context(test_device(), options);
+  Buffer<float> buffer(context, 64, "filled");
+  buffer.clear(64);
+  for (const bool table : {true, false}) {
+    CAPTURE(table);
+    std::atomic<bool> done = false;
+    std::size_t found = 0;
+    auto turn = context.lock();
+    std::thread other([&] {
+      found = table ? context.profile_table().size() : context.take_launches().size();
+      done = true;
+    });
+    for (int i = 0; i < 20 && !done; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    CHECK_FALSE(done.load());
+    turn.unlock();
+    other.join();
+    CHECK(found > 0);
+  }
 }
 
 TEST_CASE("compilers that warn are not heard") {

@@ -170,6 +170,10 @@ TEST_CASE("glTF materials: textures from a buffer, a data URI and a file") {
 
   fs::remove(scratch / "maps/my t.png");
   CHECK(contains(data_error([&] { io::read_mesh(scratch / "c.glb"); }), "my%20t.png"));
+  const io::MeshFile unseen =
+      io::read_mesh(scratch / "c.glb", [](const std::string&) { return false; });
+  CHECK(unseen.textures.empty());
+  CHECK(unseen.materials.at(0).texture == -1);
   write_bytes(scratch / "maps/my t.png", bytes.substr(0, bytes.size() - 9));
   CHECK(contains(data_error([&] { io::read_mesh(scratch / "c.glb"); }), "truncated or damaged"));
   write_bytes(scratch / "maps/my t.png", "GIF89a");

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "data_sets.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_model.hpp"
 #include "scratch.hpp"
@@ -295,7 +296,7 @@ TEST_CASE("scene file: placed cameras of every model") {
   const SceneExtent extent{{1, 0, 0}, 2.0};
   const auto camera = [&](const std::string& keys) {
     const SceneFile scene = folder.read(kModel + "[camera]\n" + keys);
-    const std::vector<Camera> all = scene_cameras(scene.camera, extent, 5);
+    const std::vector<Camera> all = scene_cameras(scene.camera, extent, 5, {});
     REQUIRE(all.size() == 1);
     return all[0];
   };
@@ -349,9 +350,9 @@ TEST_CASE("scene file: placed cameras of every model") {
 
   const SceneFile folding =
       folder.read(kModel + "[camera]\n" + pose + "model = 'opencv'\nk1 = -1\nfov = 120\n");
-  CHECK_THROWS_AS(scene_cameras(folding.camera, extent, 1), UsageError);
+  CHECK_THROWS_AS(scene_cameras(folding.camera, extent, 1, {}), UsageError);
   const SceneFile none = folder.read(kModel);
-  CHECK_THROWS_AS(scene_cameras(none.camera, extent, 1), UsageError);
+  CHECK_THROWS_AS(scene_cameras(none.camera, extent, 1, {}), UsageError);
 }
 
 TEST_CASE("scene file: cameras of files, data sets and orbits") {
@@ -372,7 +373,7 @@ TEST_CASE("scene file: cameras of files, data sets and orbits") {
 
   const SceneFile file =
       folder.read(kModel + "[camera]\nfile = 'transforms.json'\ndownscale = 2\nviews = [3, 1]\n");
-  const std::vector<Camera> chosen = scene_cameras(file.camera, extent, 1);
+  const std::vector<Camera> chosen = scene_cameras(file.camera, extent, 1, {});
   REQUIRE(chosen.size() == 2);
   CHECK(chosen[0].name == "view_3");
   CHECK(chosen[1].name == "view_1");
@@ -380,7 +381,7 @@ TEST_CASE("scene file: cameras of files, data sets and orbits") {
   CHECK(chosen[0].fx == doctest::Approx(15.0));
   const SceneFile beyond =
       folder.read(kModel + "[camera]\nfile = 'transforms.json'\nviews = [4]\n");
-  CHECK_THROWS_AS(scene_cameras(beyond.camera, extent, 1), UsageError);
+  CHECK_THROWS_AS(scene_cameras(beyond.camera, extent, 1, {}), UsageError);
 
   const SceneFile orbit = folder.read(kModel + R"([camera]
 width = 60
@@ -389,7 +390,7 @@ fov = 50
 up = [0, 0, 1]
 orbit = { frames = 7, elevation = 10, distance = 5, target = [1, 2, 3] }
 )");
-  const std::vector<Camera> ring = scene_cameras(orbit.camera, extent, 3);
+  const std::vector<Camera> ring = scene_cameras(orbit.camera, extent, 3, {});
   REQUIRE(ring.size() == 7);
   for (const Camera& each : ring) {
     CHECK(each.width == 60);
@@ -398,12 +399,57 @@ orbit = { frames = 7, elevation = 10, distance = 5, target = [1, 2, 3] }
   }
   // Without a number the orbit takes as many frames as the animation, around what is there.
   const SceneFile free = folder.read(kModel + "[camera]\norbit = {}\nmodel = 'fisheye'\n");
-  const std::vector<Camera> three = scene_cameras(free.camera, extent, 3);
+  const std::vector<Camera> three = scene_cameras(free.camera, extent, 3, {});
   REQUIRE(three.size() == 3);
   CHECK(three[0].model == CameraModel::kFisheye);
   CHECK(near(three[0].center() + three[1].center() + three[2].center() -
                  3.0 * glm::dvec3(0, three[0].center().y, 0),
              {3, 0, 0}));
+}
+
+TEST_CASE("scene file: cameras count from the model's origin, data sets are as it was trained") {
+  const SceneFolder folder;
+  const SceneExtent extent;
+  DatasetOptions trained;
+  trained.downscale = 4;
+  trained.test_every = 2;
+  trained.origin = {4321012.125, -250000.5, 80.0};
+  const glm::dvec3 origin(4321012.125, -250000.5, 80.0);
+
+  Camera camera = look_at({0, 0, -6}, {0, 0, 0}, {0, -1, 0}, 40, 30, 30.0);
+  camera.translation -= camera.rotation * origin;  // as a survey has it
+  write_cameras(folder.scratch() / "transforms.json", std::vector{camera});
+  const auto cameras = [&](const std::string& keys) {
+    return scene_cameras(folder.read(kModel + "[camera]\n" + keys).camera, extent, 1, trained);
+  };
+  const auto check_file = [&](const std::vector<Camera>& all) {
+    REQUIRE(all.size() == 1);
+    CHECK(glm::length(all[0].center() - glm::dvec3(0, 0, -6)) < 1e-6);
+    CHECK(all[0].width == 40);  // of photos alone is the size that of the training
+  };
+  check_file(cameras("file = 'transforms.json'\n"));
+  SceneCamera given;
+  given.source = SceneCamera::Source::kGiven;
+  given.given = {camera};
+  check_file(scene_cameras(given, extent, 1, trained));
+
+  const ColmapFixture photos = small_colmap();
+  photos.write_binary(folder.scratch() / "data/sparse/0");
+  write_photos(photos, folder.scratch() / "data/images", 40, 30);
+  DatasetOptions halved;
+  halved.test_every = 2;
+  const Dataset data = load_dataset(folder.scratch() / "data", halved);
+  const View& first = data.views.at(data.indices(Split::kTest).at(0));
+  const std::vector<Camera> test = cameras("data = 'data'\n");
+  REQUIRE(test.size() == 5);
+  CHECK(test[0].width == 10);
+  CHECK(test[0].name == first.camera.name);
+  CHECK(glm::length(test[0].center() - first.camera.center() + origin) < 1e-6);
+  // What is given goes over it.
+  const std::vector<Camera> more = cameras("data = 'data'\ndownscale = 2\ntest-every = 5\n");
+  REQUIRE(more.size() == 2);
+  CHECK(more[0].width == 20);
+  CHECK(cameras("data = 'data'\norbit = { frames = 1 }\n").at(0).width == 10);
 }
 
 TEST_CASE("scene file: another size keeps what the smaller side sees") {

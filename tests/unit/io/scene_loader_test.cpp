@@ -136,6 +136,23 @@ texture = "grey.png"
   CHECK(contains(message, "'Plain'"));
 }
 
+TEST_CASE("scene loader: pictures of materials that are replaced everywhere are not looked for") {
+  const Folder folder;
+  fs::remove(folder.scratch() / "print.png");
+  const std::string paper = "[[material]]\nname = 'paper'\nkind = 'diffuse'\n" + kCamera;
+  const std::string whole = "[[mesh]]\nfile = 'sheet.obj'\nmaterial = 'paper'\n";
+  const std::string part = "[[mesh]]\nfile = 'sheet.obj'\nmaterial = { Printed = 'paper' }\n";
+  for (const std::string& replaced : {whole, part, whole + part}) {
+    CAPTURE(replaced);
+    const Scene scene = folder.load(replaced + paper).scene;
+    CHECK(scene.textures.empty());
+    CHECK(scene.materials.at(scene.meshes[0].materials.at(1)).name == "paper");
+  }
+  const std::string other = "[[mesh]]\nfile = 'sheet.obj'\nmaterial = { Plain = 'paper' }\n";
+  for (const std::string& seen : {other, whole + other})
+    CHECK(contains(data_error([&] { folder.load(seen + paper); }), "print.png"));
+}
+
 TEST_CASE("scene loader: normals and placement of meshes") {
   const Folder folder;
   const LoadedScene loaded = folder.load(R"(
@@ -197,6 +214,9 @@ TEST_CASE("scene loader: frames of an animation") {
   CHECK(turns.cameras[4].translation == turns.cameras[1].translation);
   CHECK(turns.cameras[4].name == "frame_0004");
   CHECK(folder.load(orbit).frames() == 3);
+  // Around the sheet, where there are no Gaussians.
+  CHECK(glm::length(turns.extent.center - glm::dvec3(0.5)) < 1e-6);
+  CHECK(turns.extent.radius == doctest::Approx(0.5 * std::sqrt(3.0)));
 }
 
 TEST_CASE("scene loader: environment, sizes and options") {

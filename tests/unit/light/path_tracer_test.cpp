@@ -110,6 +110,39 @@ TEST_CASE("shadows of all four kinds") {
   check_picture(context, scene, kCamera, "all in peak order");
 }
 
+TEST_CASE("a Gaussian far away takes no shadow of a mesh off the others") {
+  Context context = make_test_context();
+  // A wall, a shade before it, and light that comes from the side.
+  Scene scene;
+  Gaussians& wall = scene.gaussians;
+  constexpr std::size_t kSide = 20;
+  wall.resize(kSide * kSide + 1);
+  for (std::size_t i = 0; i < wall.size(); ++i) {
+    wall.means[3 * i] = 0.1f * static_cast<float>(i % kSide) - 0.95f;
+    wall.means[3 * i + 1] = 0.1f * static_cast<float>(i / kSide) - 0.95f;
+    for (std::size_t k = 0; k < 3; ++k)
+      wall.log_scales[3 * i + k] = std::log(k < 2 ? 0.08f : 0.01f);
+    wall.quaternions[4 * i] = 1.0f;
+    wall.opacities[i] = 3.0f;
+    for (std::size_t k = 0; k < 3; ++k) wall.sh[3 * i + k] = 1.7725f;
+  }
+  add_mesh(scene, rectangle({-0.3, 0, -0.3}, {0.2, 0, 0}, {0, 0.4, 0}, 0), diffuse({0, 0, 0}));
+  Light sun;
+  sun.kind = Light::Kind::kDirectional;
+  sun.direction = {0.8f, 0.0f, 1.0f};
+  scene.lights = {sun};
+  scene.render.shadows.strength = 1.0f;
+  const Camera camera = look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, 32, 32, 60.0);
+  wall.means[3 * (wall.size() - 1)] = 30.0f;
+  const Image near = render_on_device(context, scene, camera);
+  wall.means[3 * (wall.size() - 1)] = 1e5f;
+  const Image far = render_on_device(context, scene, camera);
+  scene.render.shadows.strength = 0.0f;
+  const double bare = mean_of(render_on_device(context, scene, camera))[0];
+  CHECK(mean_of(near)[0] < 0.97 * bare);
+  CHECK(mean_of(far)[0] == doctest::Approx(mean_of(near)[0]).epsilon(0.005));
+}
+
 TEST_CASE("a surface of Gaussians throws no speckle on itself, and its dark side is dark") {
   Context context = make_test_context();
   // Flat Gaussians of all sizes on a ball, white.

@@ -130,6 +130,31 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   CHECK(scene.trained.hit_order == HitOrder::kPeak);
 }
 
+TEST_CASE("a scene has the origin and the data settings of its first model that tells") {
+  const TemporaryDirectory folder;
+  const fs::path run = folder.path() / "run";
+  Gaussians model;
+  model.resize(1);
+  const std::array<double, 3> origin{4321012.125, -250000.5, 80.0};
+  RunFolder(run).write_model(model, TraceOptions{}, 12, origin);
+  TrainOptions options;
+  options.data.downscale = 4.0;
+  options.data.test_every = 3;
+  std::ofstream(run / "config.toml") << to_toml(options);
+  const fs::path other = folder.path() / "other.ply";
+  write_ply(other, model);
+
+  SceneFile scene;
+  CHECK(scene.trained_data.origin == std::array<double, 3>{});
+  scene.models.resize(2);
+  scene.models[0].file = other;
+  scene.models[1].file = run;
+  find_models(scene);
+  CHECK(scene.trained_data.origin == origin);
+  CHECK(scene.trained_data.downscale == 4.0);
+  CHECK(scene.trained_data.test_every == 3);
+}
+
 TEST_CASE("options in a PLY that nobody can trace with are named") {
   const TemporaryDirectory folder;
   const fs::path ply = folder.path() / "model.ply";

@@ -9,8 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "io/camera_list.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
 #include "run/run_folder.hpp"
+#include "scene/camera_model.hpp"
 #include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
@@ -32,9 +35,23 @@ TEST_CASE("the cameras of a run come with its model") {
   const fs::path run = folder.path() / "run";
   const std::vector<Camera> cameras{look_at({0.1, -2, 5}, {0, 0, 0}, {0, 0, 1}, 320, 200, 250),
                                     look_at({3, 1, 0.5}, {0, 0, 0}, {0, 0, 1}, 64, 48, 50)};
-  RunFolder(run).write_cameras(cameras);
+  std::vector<Camera> written = cameras;
+  written.push_back(look_at({3, 1, 0.5}, {0, 0, 0}, {0, 0, 1}, 64, 32, 50));
+  set_equirectangular(written.back());
+  RunFolder(run).write_cameras(written);
   const std::vector<Camera> found = run_cameras(model_of(run));
-  REQUIRE(found.size() == 2);
+  REQUIRE(found.size() == 3);
+  CHECK(found[1].model == CameraModel::kPinhole);
+  CHECK(found[2].model == CameraModel::kEquirectangular);
+  // They count as the model does, a transforms.json as the world.
+  const glm::dvec3 origin(100, -20, 7);
+  const auto center_of = [&](const fs::path& path) {
+    return io::read_model_cameras(path, origin).at(0).center();
+  };
+  CHECK(glm::distance(center_of(run / "cameras.json"), cameras[0].center()) < 1e-9);
+  write_cameras(folder.path() / "transforms.json", cameras);
+  CHECK(glm::distance(center_of(folder.path() / "transforms.json"), cameras[0].center() - origin) <
+        1e-6);
   for (std::size_t i = 0; i < 2; ++i) {
     CHECK(found[i].width == cameras[i].width);
     CHECK(found[i].height == cameras[i].height);

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <utility>
 
 #include "raysplats/error.hpp"
+#include "scene/camera_model.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -159,9 +161,32 @@ TEST_CASE("orbit cameras look at the centre from a circle and stay upright") {
             doctest::Approx(std::sqrt(0.5)));
     }
     // The sphere of the extent touches the border of the smaller side.
-    CHECK(field_of_view(cameras[0]) == doctest::Approx(40.0));
+    CHECK(field_of_view(cameras[0], CameraModel::kPinhole) == doctest::Approx(40.0));
     CHECK(cameras[0].fy * std::tan(20.0 * 3.14159265358979 / 180.0) == doctest::Approx(24.0));
   }
+}
+
+TEST_CASE("a fisheye orbit sees what fisheye photos see") {
+  constexpr double kDegrees = 180.0 / 3.14159265358979;
+  Camera photo = look_at({0, 0, -4}, {1, 0, 0}, {0, -1, 0}, 200, 100, 1.0);
+  photo.model = CameraModel::kFisheye;
+  photo.distortion.k1 = 0.02;
+  photo.distortion.k2 = -0.003;
+  photo.fx = photo.fy = 50.0 / radial_image(photo.model, photo.distortion, 1.5);
+  CHECK(field_of_view(photo, CameraModel::kFisheye) == doctest::Approx(3.0 * kDegrees));
+  CHECK(field_of_view(photo, CameraModel::kPinhole) ==
+        doctest::Approx(2.0 * std::atan(50.0 / photo.fx) * kDegrees));
+  std::swap(photo.width, photo.height);
+  std::swap(photo.cx, photo.cy);
+  CHECK(field_of_view(photo, CameraModel::kFisheye) == doctest::Approx(3.0 * kDegrees));
+  // The whole circle of the lens lies within the picture.
+  photo.distortion.k1 = -0.1;
+  photo.fx = photo.fy = 20.0;
+  CHECK(field_of_view(photo, CameraModel::kFisheye) ==
+        doctest::Approx(2.0 * lens_limit(photo.model, photo.distortion) * kDegrees));
+  // Nothing else has that angle.
+  const Camera flat = look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, 200, 100, 50.0);
+  CHECK(field_of_view(flat, CameraModel::kFisheye) == doctest::Approx(90.0));
 }
 
 TEST_CASE("up, distance and elevation come from the cameras") {

@@ -48,7 +48,7 @@ TEST_CASE("only our own page, asked for under our own name with the secret, is l
   CHECK(judge("127.0.0.1:7000", "", "", "nottoken=" + token) == Verdict::kForbidden);
   CHECK(judge("127.0.0.1:7000", "", "", "a=b&token=" + token) == Verdict::kTakeCookie);
   CHECK(access.urls() == std::vector{"http://127.0.0.1:7000/?token=" + token});
-  CHECK(access.cookie().find("HttpOnly; SameSite=Strict") != std::string::npos);
+  CHECK(access.cookie().find("HttpOnly; SameSite=Lax") != std::string::npos);
 }
 
 TEST_CASE("all addresses that reach the server are names of it, and no other is") {
