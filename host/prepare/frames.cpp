@@ -7,6 +7,7 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <optional>
 
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -37,19 +38,65 @@ bool is_photo(const fs::path& path) {
          !is_apple_double(path);
 }
 
-double seconds_of(const fs::path& video, const fs::path& log, const std::function<bool()>& stop) {
-  std::string last;
-  run_program(
-      find_program("ffprobe", "ffmpeg"),
-      {"-v", "error", "-show_entries", "format=duration", "-of", "csv=p=0",
-       fs::absolute(video).string()},
-      log, [&](std::string_view line) { last = line; }, stop);
-  const std::optional<double> seconds = parse_real(last);
-  if (!seconds || !(*seconds > 0.0)) {
-    throw DataError(fmt::format("{} is no video that ffmpeg can read: its length is '{}'",
-                                video.string(), last));
+/// Runs ffprobe with `wanted` for a video; `hear` gets every line.
+void probe(const fs::path& video,
+           std::vector<std::string> wanted,
+           const fs::path& log,
+           const std::function<void(std::string_view)>& hear,
+           const std::function<bool()>& stop) {
+  wanted.insert(wanted.begin(), {"-v", "error"});
+  wanted.insert(wanted.end(),
+                {"-of", "default=noprint_wrappers=1:nokey=1", fs::absolute(video).string()});
+  run_program(find_program("ffprobe", "ffmpeg"), wanted, log, hear, stop);
+}
+
+/// By the times of its packets, for files that state no length, as browsers record them.
+double seconds_of_packets(const fs::path& video,
+                          const fs::path& log,
+                          const std::function<bool()>& stop) {
+  std::size_t packets = 0;
+  std::size_t timed = 0;
+  double first = 0.0;
+  double last = 0.0;
+  probe(
+      video, {"-select_streams", "v:0", "-show_entries", "packet=pts_time"}, log,
+      [&](std::string_view line) {
+        ++packets;
+        const std::optional<double> time = parse_real(line);
+        if (!time) return;
+        // Packets come in the order of decoding, which is not that of their times.
+        first = timed == 0 ? *time : std::min(first, *time);
+        last = timed == 0 ? *time : std::max(last, *time);
+        ++timed;
+      },
+      stop);
+  if (packets == 0)
+    throw DataError(fmt::format("{} is no video that ffmpeg can read", video.string()));
+  if (!(last > first)) {
+    throw DataError(fmt::format(
+        "{} states no length: if it is a video, write it anew with 'ffmpeg -i {} -c copy {}'",
+        video.string(), video.filename().string(), video.stem().string() + "_anew.mp4"));
   }
-  return *seconds;
+  const auto frames = static_cast<double>(timed);
+  return (last - first) * frames / (frames - 1.0);  // the last frame lasts as the others do
+}
+
+double seconds_of(const fs::path& video, const fs::path& log, const std::function<bool()>& stop) {
+  std::optional<double> stated;
+  probe(
+      video, {"-show_entries", "format=duration"}, log,
+      [&](std::string_view line) {
+        if (const std::optional<double> seconds = parse_real(line)) stated = seconds;
+      },
+      stop);
+  return stated && *stated > 0.0 ? *stated : seconds_of_packets(video, log, stop);
+}
+
+/// A path as a part of ffmpeg's patterns of names, in which a % starts a number.
+std::string in_pattern(const fs::path& path) {
+  std::string out;
+  for (const char c : path.string()) out += c == '%' ? "%%" : std::string(1, c);
+  return out;
 }
 
 }  // namespace
@@ -129,8 +176,10 @@ void take_frames(const fs::path& video,
       ffmpeg,
       {"-nostdin", "-hide_banner", "-v", "error", "-progress", "pipe:1", "-i",
        fs::absolute(video).string(), "-vf",
-       fmt::format("fps={:.6f}", static_cast<double>(total) / seconds), "-q:v", "2",
-       (fs::absolute(all) / "frame_%06d.jpg").string()},
+       // A JPEG does not say by which matrix its colours were made: all readers take BT.601's.
+       fmt::format("fps={:.6f},scale=out_color_matrix=bt601:out_range=full",
+                   static_cast<double>(total) / seconds),
+       "-q:v", "2", in_pattern(fs::absolute(all)) + "/frame_%06d.jpg"},
       log,
       [&](std::string_view line) {
         if (line.starts_with("frame="))

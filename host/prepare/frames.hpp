@@ -26,7 +26,8 @@ void copy_photos(const std::filesystem::path& from,
                  const std::vector<std::string>& names,
                  const std::function<void(std::size_t done)>& done);
 
-/// Fills `images` with `count` sharp frames of a video. Throws as run_program().
+/// Fills `images` with `count` sharp frames of a video. Throws as run_program(), and DataError for
+/// a file that is none and for one of unknown length.
 void take_frames(const std::filesystem::path& video,
                  const std::filesystem::path& images,
                  std::size_t count,

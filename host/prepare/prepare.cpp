@@ -41,6 +41,36 @@ std::size_t number_behind(std::string_view line, std::string_view before) {
   return value;
 }
 
+bool contains(std::string_view text, std::string_view part) {
+  return text.find(part) != std::string_view::npos;
+}
+
+/// The photo that a line of COLMAP's mapper is about: "Registering image #12 (15)", or of newer
+/// versions "Registering image #12 (num_reg_frames=15)", is the 15th one.
+std::size_t placed_photos(std::string_view line) {
+  if (!contains(line, "Registering image")) return 0;
+  const std::size_t newer = number_behind(line, "num_reg_frames=");
+  return newer > 0 ? newer : number_behind(line, "(");
+}
+
+/// "Matching block [1/2, 1/2]" or "Processing image [3/9]": newer versions of COLMAP have other
+/// words, and the time before them.
+bool tells_match(std::string_view line) {
+  return contains(line, "block [") || contains(line, "image [");
+}
+
+/// The name that an option has by what COLMAP says of its options: about version 3.13 some have
+/// left Sift*, one after the other.
+std::string option_name(std::string_view help, std::string_view newer, std::string_view older) {
+  return std::string(contains(help, newer) ? newer : older);
+}
+
+/// A file as it is now: one that has changed since has another size or time.
+std::string state_of(const fs::path& file) {
+  return fmt::format("{} {}", fs::file_size(file),
+                     fs::last_write_time(file).time_since_epoch().count());
+}
+
 /// The folder that is made, and which of its steps are done with which settings.
 class Work {
  public:
@@ -74,6 +104,17 @@ class Work {
         [&](std::string_view line) { count(line, done); },
         [&] { return !watch_(step, done, total); });
   }
+  /// What COLMAP says of the options of a command.
+  std::string colmap_help(const std::string& command) const {
+    std::string text;
+    try {
+      run_program(find_program("colmap", "colmap"), {command, "-h"}, log(),
+                  [&](std::string_view line) { text.append(line) += '\n'; }, {});
+    } catch (const Error&) {
+      // Some versions end with an error after it; what else is wrong the command itself will say.
+    }
+    return text;
+  }
   fs::path operator/(const char* name) const { return data_ / name; }
   std::string text(const char* name) const { return (data_ / name).string(); }
   fs::path log() const { return data_ / "prepare.log"; }
@@ -95,10 +136,10 @@ std::vector<std::string> gather_images(const fs::path& input,
                                        Work& work) {
   const bool video = !fs::is_directory(input);
   std::string settings = fs::absolute(input).string() + "\n";
-  if (video) settings += fmt::format("{} frames\n", options.frames);
-  // Photos that have come, gone or changed since are to be seen.
+  // A video and photos that have come, gone or changed since are to be seen.
+  if (video) settings += fmt::format("{} frames\n{}\n", options.frames, state_of(input));
   for (const std::string& name : given)
-    settings += fmt::format("{} {}\n", name, fs::file_size(input / name));
+    settings += fmt::format("{} {}\n", name, state_of(input / name));
   const fs::path images = work / "images";
   work.step("images", settings, [&] {
     write_text_file(work / "prepare/own", "images and sparse are made by raysplats prepare\n");
@@ -152,6 +193,11 @@ void tell_matching(const PrepareOptions& options, const ColmapPlan& plan, const 
 void find_features(const PrepareOptions& options, const ColmapPlan& plan, Work& work) {
   work.step("features", plan.feature_settings, [&] {
     fs::remove(work / "database.db");
+    const std::string help = work.colmap_help("feature_extractor");
+    const std::string use_gpu =
+        option_name(help, "--FeatureExtraction.use_gpu", "--SiftExtraction.use_gpu");
+    const std::string max_size =
+        option_name(help, "--FeatureExtraction.max_image_size", "--SiftExtraction.max_image_size");
     std::size_t before = 0;
     for (const std::vector<std::string>& photos : plan.cameras) {
       // COLMAP shares a camera among all photos that one call is given.
@@ -161,9 +207,8 @@ void find_features(const PrepareOptions& options, const ColmapPlan& plan, Work& 
           {"feature_extractor", "--database_path", work.text("database.db"), "--image_path",
            work.text("images"), "--image_list_path", list.string(), "--ImageReader.single_camera",
            options.cameras == Cameras::kPhoto ? "0" : "1", "--ImageReader.camera_model",
-           options.camera_model, "--SiftExtraction.use_gpu", "0", "--SiftExtraction.max_image_size",
-           std::to_string(options.max_size), "--SiftExtraction.max_num_features",
-           std::to_string(plan.features)},
+           options.camera_model, use_gpu, "0", max_size, std::to_string(options.max_size),
+           "--SiftExtraction.max_num_features", std::to_string(plan.features)},
           "features",
           [&](std::string_view line, std::size_t& done) {
             done = std::max(done, before + number_behind(line, "Processed file ["));
@@ -176,13 +221,14 @@ void find_features(const PrepareOptions& options, const ColmapPlan& plan, Work& 
 
 void match(const ColmapPlan& plan, Work& work) {
   work.step("matches", plan.matcher.front() + "\n", [&] {
+    const std::string use_gpu = option_name(work.colmap_help(plan.matcher.front()),
+                                            "--FeatureMatching.use_gpu", "--SiftMatching.use_gpu");
     std::vector<std::string> arguments = plan.matcher;
-    arguments.insert(arguments.end(),
-                     {"--database_path", work.text("database.db"), "--SiftMatching.use_gpu", "0"});
+    arguments.insert(arguments.end(), {"--database_path", work.text("database.db"), use_gpu, "0"});
     work.colmap(
         arguments, "matches",
         [](std::string_view line, std::size_t& done) {
-          if (line.starts_with("Matching ")) ++done;
+          if (tells_match(line)) ++done;
         },
         plan.match_lines);
   });
@@ -210,9 +256,7 @@ void place(const ColmapPlan& plan, Work& work) {
          "--output_path", part.string()},
         "poses",
         [](std::string_view line, std::size_t& done) {
-          // "Registering image #12 (15)": the 15th one.
-          if (line.find("Registering image") != std::string_view::npos)
-            done = std::max(done, number_behind(line, "("));
+          done = std::max(done, placed_photos(line));
         },
         plan.photos);
     if (!fs::exists(part) || fs::is_empty(part)) {

@@ -51,11 +51,11 @@ using PrepareWatch =
 /// programs colmap and ffmpeg in PATH, whose words are in `data`/prepare.log. Of a video three
 /// times as many frames as wanted are taken, and of each three the sharpest is kept. A line of the
 /// log says beforehand how long COLMAP will take, roughly, and others what was left out or chosen
-/// by the number of photos. Steps that
-/// `data` has already from the same input with the same options are not done again. Throws
-/// UsageError for a missing program and for inputs that are neither; DataError for a folder without
-/// photos, for one that cannot be made, for data made from something else, and when no pose was
-/// found; Error when a program fails or is interrupted.
+/// by the number of photos. Steps that `data` has already from the same input, by its sizes and
+/// times of writing, with the same options are not done again. Throws UsageError for a missing
+/// program and for inputs that are neither; DataError for a folder without photos, for one that
+/// cannot be made, for a video of unknown length, for data made from something else, and when no
+/// pose was found; Error when a program fails or is interrupted.
 Prepared prepare_data(const std::filesystem::path& input,
                       const std::filesystem::path& data,
                       const PrepareOptions& options,

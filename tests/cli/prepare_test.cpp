@@ -3,6 +3,8 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -77,8 +79,9 @@ Apart compare(const fs::path& found, const fs::path& stored) {
   return out;
 }
 
-/// Places a.png and b.png, but not c.png.
+/// Places a.png and b.png, but not c.png. Says nothing of its options.
 constexpr const char* kColmap = R"sh(#!/bin/sh
+case "$*" in *" -h") exit 0 ;; esac
 echo "$@" >> "$CALLS"
 [ -n "$FAIL" ] && [ "$1" = "$FAIL" ] && { echo "the disk is on fire"; exit 7; }
 case $1 in
@@ -91,6 +94,29 @@ mapper)
   printf '1 1 0 0 0 0 0 4 1 a.png\n\n2 1 0 0 0 0.1 0 4 1 b.png\n\n' > "$2/0/images.txt"
   printf '1 0 0 0 255 0 0 0.5 1 0 2 0\n' > "$2/0/points3D.txt" ;;
 esac
+)sh";
+
+/// Knows of Sift* and Feature* the words of $options only, and writes as newer versions do: the
+/// newest end with an error after the help. The rest of the work is bin/colmap3's.
+constexpr const char* kNewerColmap = R"sh(
+log="I20260221 20:49:56.229118 18720 a.cc:1]"
+case "$*" in
+*" -h") echo "$log Options can be specified"; printf '  %s arg (=1)\n' $options; exit 1 ;;
+esac
+for word; do
+  case $word in
+  --Sift* | --Feature*)
+    case " $options " in
+    *" $word "*) ;;
+    *) echo "$log Failed to parse options - unrecognised option '$word'."; exit 1 ;;
+    esac ;;
+  esac
+done
+case $1 in
+exhaustive_matcher) echo "$log Processing block [1/1, 1/1]" ;;
+mapper) echo "$log Registering image #7 (num_reg_frames=2)" ;;
+esac
+exec "$(dirname "$0")/colmap3" "$@"
 )sh";
 
 class Stage {
@@ -107,6 +133,23 @@ class Stage {
     fs::permissions(folder_ / name, fs::perms::owner_all);
   }
   std::string path(const std::string& name) const { return folder_ / name; }
+  /// A COLMAP that knows these options of Sift* and Feature*.
+  void write_newer_colmap(const std::string& options) const {
+    write("bin/colmap3", kColmap);
+    write("bin/colmap", "#!/bin/sh\noptions='" + options + "'\n" + kNewerColmap);
+  }
+  /// walk.mp4, an FFmpeg that takes three frames of it, and an ffprobe that says `length` and, of
+  /// the packets, `packets`.
+  void write_video(const std::string& length, const std::string& packets) const {
+    write_file(path("walk.mp4"), "a video");
+    write("bin/ffprobe", "#!/bin/sh\ncase \"$*\" in\n*format=duration*) printf '" + length +
+                             "\\n' ;;\n*) printf '" + packets + "' ;;\nesac\n");
+    raysplats::write_image(path("flat.jpg"), raysplats::Image(8, 6, 3, 0.5f));
+    write("bin/ffmpeg",
+          "#!/bin/sh\necho \"$@\" >> \"$CALLS\"\nfor last; do :; done\n"
+          "for i in 1 4 7; do cp '" +
+              path("flat.jpg") + "' \"$(dirname \"$last\")/frame_00000$i.jpg\"; done\n");
+  }
 
   Outcome run(const std::vector<std::string>& arguments, const std::string& fail = "") const {
     std::vector<std::string> words{"prepare"};
@@ -282,6 +325,102 @@ TEST_CASE("prepare takes the sharpest of every three frames of a video") {
   CHECK(entries(stage.path("data/images")) == 3);
   for (const char* name : {"frame_000002.jpg", "frame_000004.jpg", "frame_000009.jpg"})
     CHECK(fs::exists(stage.path("data/images/" + std::string(name))));
+}
+
+TEST_CASE("prepare calls the options of COLMAP by the names that its version has") {
+  for (const char* of_size : {"--FeatureExtraction", "--SiftExtraction"}) {
+    const Stage stage;
+    const std::string max_size = std::string(of_size) + ".max_image_size";
+    stage.write_newer_colmap("--FeatureExtraction.use_gpu " + max_size +
+                             " --SiftExtraction.max_num_features --FeatureMatching.use_gpu");
+    const Outcome outcome = stage.run({stage.path("photos"), "-o", stage.path("data")});
+    INFO(outcome.err);
+    CHECK(outcome.code == 0);
+    const std::string calls = stage.calls();
+    CHECK(has(calls, "--FeatureExtraction.use_gpu 0"));
+    CHECK(has(calls, max_size + " 1600"));
+    CHECK(has(calls, "--FeatureMatching.use_gpu 0"));
+    CHECK(has(outcome.err, "] 1/1"));  // pairs
+    CHECK(has(outcome.err, "] 2/3"));  // poses
+  }
+  // Where its help says nothing of them, the names are the old ones.
+  const Stage stage;
+  CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
+  const std::string calls = stage.calls();
+  CHECK(has(calls, "--SiftExtraction.use_gpu 0 --SiftExtraction.max_image_size 1600"));
+  CHECK(has(calls, "--SiftMatching.use_gpu 0"));
+}
+
+TEST_CASE("prepare sees that a photo or a video has become another") {
+  const Stage stage;
+  const auto later = [&](const std::string& name) {
+    fs::last_write_time(stage.path(name),
+                        fs::last_write_time(stage.path(name)) + std::chrono::hours(1));
+  };
+  stage.write_video("12.5", "");
+  for (const auto& [input, data, changed] :
+       {std::array{"photos", "data", "photos/b.png"}, std::array{"walk.mp4", "walk", "walk.mp4"}}) {
+    const std::vector<std::string> words{stage.path(input), "-o", stage.path(data), "--frames",
+                                         "3"};
+    CHECK(stage.run(words).code == 0);
+    CHECK(!stage.calls().empty());
+    CHECK(stage.run(words).code == 0);
+    CHECK(stage.calls().empty());
+    later(changed);
+    CHECK(stage.run(words).code == 0);
+    CHECK(has(stage.calls(), "feature_extractor"));
+  }
+  write_file(stage.path("walk.mp4"), "a longer video");
+  CHECK(stage.run({stage.path("walk.mp4"), "-o", stage.path("walk"), "--frames", "3"}).code == 0);
+  CHECK(has(stage.calls(), "fps="));
+}
+
+TEST_CASE("prepare takes the length of a video that states none from its packets") {
+  const Stage stage;
+  const auto prepared = [&] {
+    return stage.run({stage.path("walk.mp4"), "-o", stage.path("data"), "--frames", "3"});
+  };
+  stage.write_video("N/A", "0.5\\n0.9\\n0.7\\nN/A\\n1.3\\n1.1\\n");
+  const Outcome outcome = prepared();
+  INFO(outcome.err);
+  CHECK(outcome.code == 0);
+  CHECK(has(stage.calls(), "fps=9.000000"));  // 9 frames of five times 0.2 s
+  stage.write_video("N/A", "N/A\\nN/A\\n");
+  const Outcome without = prepared();
+  CHECK(without.code == 3);
+  CHECK(has(without.err, "walk.mp4 states no length"));
+  CHECK(has(without.err, "'ffmpeg -i walk.mp4 -c copy walk_anew.mp4'"));
+  stage.write_video("N/A", "");
+  const Outcome none = prepared();
+  CHECK(none.code == 3);
+  CHECK(has(none.err, "walk.mp4 is no video that ffmpeg can read"));
+}
+
+TEST_CASE("the real FFmpeg keeps the colours of a video, in folders of any name") {
+  const Stage stage;
+  const std::string folder = stage.path("50%d off");
+  fs::create_directories(folder);
+  const std::string clip = folder + "/red.mp4";
+  const std::string make =
+      "ffmpeg -nostdin -v error -f lavfi -i color=0xC8281E:s=64x48:r=10:d=1 -vf "
+      "format=gbrp,scale=out_color_matrix=bt709:flags=accurate_rnd -pix_fmt yuv420p "
+      "-colorspace bt709 -color_primaries bt709 -color_trc bt709 -c:v mpeg4 -q:v 2 '" +
+      clip + "'";
+  if (std::system(make.c_str()) != 0) {
+    MESSAGE("skipped: there is no ffmpeg that writes MPEG-4");
+    return;
+  }
+  const Outcome outcome = stage.run({clip, "-o", folder + "/data", "--frames", "3"});
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  CHECK(entries(folder + "/data/images") == 3);
+  for (const fs::directory_entry& frame : fs::directory_iterator(folder + "/data/images")) {
+    const raysplats::Image image = raysplats::read_image(frame.path());
+    REQUIRE(image.channels == 3);
+    constexpr float kExpected[] = {200, 40, 30};
+    for (int c = 0; c < 3; ++c)
+      CHECK(std::abs(255.0f * image.at(32, 24, c) - kExpected[c]) <= 4.0f);
+  }
 }
 
 TEST_CASE("prepare says which of many photos it compares, and which pictures it leaves out") {
