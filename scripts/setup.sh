@@ -13,17 +13,21 @@ packages=(
   libglm-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libcli11-dev libxxhash-dev doctest-dev
   libbenchmark-dev libtinyobjloader-dev libtinygltf-dev libtomlplusplus-dev
   zlib1g-dev libzstd-dev libwebp-dev libopenimageio-dev openimageio-tools libopenexr-dev libopencv-dnn-dev
-  libboost1.81-dev
 )
+# Of each the first that the system has; 1.81 is the newer Boost of Debian 12.
+alternatives=("libboost1.81-dev libboost-dev")
+# Left out where the system has none of that name: the tests that run on it are skipped.
+optional=()
 
 say() { printf '== %s\n' "$*"; }
 
-targets=(raysplats_cli)
+# The manual is a part of what `cmake --install` installs.
+targets=(raysplats_cli raysplats_manual)
 case "${1:-}" in
   "") ;;
   --tests)
     targets=(all)
-    packages+=(oclgrind)
+    optional+=(oclgrind)
     ;;
   *)
     echo "usage: scripts/setup.sh [--tests]" >&2
@@ -31,14 +35,45 @@ case "${1:-}" in
     ;;
 esac
 
-if command -v dpkg-query >/dev/null; then
+is_installed() { [[ $(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null || true) == installed ]]; }
+is_known() { [[ -n $(apt-cache madison "$1" 2>/dev/null) ]]; }
+
+# Prints the name among its arguments that is installed, else the first that is known, else the last one.
+first_of() {
+  local name
+  for name in "$@"; do
+    if is_installed "$name"; then
+      echo "$name"
+      return
+    fi
+  done
+  for name in "$@"; do
+    if is_known "$name"; then break; fi
+  done
+  echo "$name"
+}
+
+# Fills `missing` with what is not installed.
+find_missing() {
+  local package names
   missing=()
   for package in "${packages[@]}"; do
-    status=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
-    [[ $status == installed ]] || missing+=("$package")
+    is_installed "$package" || missing+=("$package")
   done
+  for names in "${alternatives[@]}"; do
+    # shellcheck disable=SC2086 # a list
+    package=$(first_of $names)
+    is_installed "$package" || missing+=("$package")
+  done
+  for package in "${optional[@]}"; do
+    if ! is_installed "$package" && is_known "$package"; then missing+=("$package"); fi
+  done
+}
+
+if command -v dpkg-query >/dev/null; then
+  find_missing
   if ((${#missing[@]} > 0)); then
-    say "Installing Debian packages: ${missing[*]}"
+    say "Missing Debian packages: ${missing[*]}"
     as_root=()
     if ((EUID != 0)); then
       if ! command -v sudo >/dev/null; then
@@ -48,12 +83,13 @@ if command -v dpkg-query >/dev/null; then
       as_root=(sudo)
     fi
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -q
+    find_missing # what is known may be known since then
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${missing[@]}"
   else
     say "All Debian packages are installed"
   fi
 else
-  say "No Debian package manager; the build needs: ${packages[*]}"
+  say "No Debian package manager; the build needs: ${packages[*]} libboost-dev"
 fi
 
 say "Configuring build/release"

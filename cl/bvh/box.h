@@ -12,21 +12,21 @@ typedef struct {
 } RsBox;
 
 // Finite on purpose: slab tests with it give no NaN, box tests with its centre and extent fail.
-inline RsBox box_empty(void) {
+RsBox box_empty(void) {
   RsBox box;
   box.lo = (float4)(FLT_MAX);
   box.hi = (float4)(-FLT_MAX);
   return box;
 }
 
-inline RsBox box_union(RsBox a, RsBox b) {
+RsBox box_union(RsBox a, RsBox b) {
   RsBox box;
   box.lo = a.lo < b.lo ? a.lo : b.lo;
   box.hi = a.hi > b.hi ? a.hi : b.hi;
   return box;
 }
 
-inline RsBox box_load(__global const RsAabb* boxes, size_t index) {
+RsBox box_load(__global const RsAabb* boxes, size_t index) {
   __global const float* p = (__global const float*)(boxes + index);
   RsBox box;
   box.lo = vload4(0, p);
@@ -37,23 +37,23 @@ inline RsBox box_load(__global const RsAabb* boxes, size_t index) {
 }
 
 // False for an empty box and for one with a NaN or an infinity.
-inline bool box_valid(RsBox box) {
+bool box_valid(RsBox box) {
   return all(box.lo <= box.hi && box.lo >= (float4)(-FLT_MAX) && box.hi <= (float4)(FLT_MAX));
 }
 
 // Anything but a valid box becomes the empty one.
-inline RsBox box_load_clean(__global const RsAabb* boxes, size_t index) {
+RsBox box_load_clean(__global const RsAabb* boxes, size_t index) {
   const RsBox box = box_load(boxes, index);
   return box_valid(box) ? box : box_empty();
 }
 
-inline void box_store(RsBox box, __global RsAabb* boxes, size_t index) {
+void box_store(RsBox box, __global RsAabb* boxes, size_t index) {
   __global float* p = (__global float*)(boxes + index);
   vstore3(box.lo.xyz, 0, p);
   vstore3(box.hi.xyz, 1, p);
 }
 
 // Halves first: no finite box overflows.
-inline float4 box_center(RsBox box) { return 0.5f * box.lo + 0.5f * box.hi; }
+float4 box_center(RsBox box) { return 0.5f * box.lo + 0.5f * box.hi; }
 
 #endif

@@ -31,7 +31,7 @@
 #define RS_CODE_BITS 21
 
 // Union over the work-items of a group, the same for all of them; `scratch` holds 2 GROUP.
-inline RsBox group_union(RsBox own, __local float4* scratch) {
+RsBox group_union(RsBox own, __local float4* scratch) {
 #if GROUP > 1
   const uint lane = get_local_id(0);
   scratch[2 * lane] = own.lo;
@@ -78,12 +78,12 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void center_bounds(
 
 // The power of two, as a float, by which lengths up to `longest` become less than 2^bits; 0 where
 // there is no extent to divide.
-inline float grid_scale(float longest, int bits) {
+float grid_scale(float longest, int bits) {
   const int e = (int)(as_uint(longest) >> 23) - 126;  // longest < 2^e
   return longest > 0x1p-100f ? as_float((uint)(127 + bits - e) << 23) : 0.0f;
 }
 
-inline float longest_side(RsBox box) {
+float longest_side(RsBox box) {
   const float4 side = box.hi - box.lo;
   return max(side.x, max(side.y, side.z));
 }
@@ -174,7 +174,7 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void choose_grid(
 }
 
 // The 21 low bits of x, two zeros after each.
-inline ulong spread_bits(uint x) {
+ulong spread_bits(uint x) {
   ulong v = x & 0x1fffff;
   v = (v | v << 32) & 0x001f00000000ffffUL;
   v = (v | v << 16) & 0x001f0000ff0000ffUL;

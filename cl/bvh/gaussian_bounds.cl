@@ -17,9 +17,9 @@
 #define RS_GROWTH 1.00001f
 #define RS_CENTER_SLACK 2.4e-7f
 
-inline float larger(float a, float b) { return a > b ? a : b; }
+float larger(float a, float b) { return a > b ? a : b; }
 
-inline int finite(float x) { return fabs(x) <= FLT_MAX; }
+int finite(float x) { return fabs(x) <= FLT_MAX; }
 
 __kernel void gaussian_bounds(__global const float* restrict means,
                               __global const float* restrict quaternions,

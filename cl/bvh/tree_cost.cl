@@ -18,7 +18,7 @@
   (min((hi), 2.0f * window[11 + (axis)]) - max((lo), 2.0f * window[8 + (axis)]))
 
 // The sum over a group; the result is that of its first work-item.
-inline float group_sum(float own, __local float* scratch) {
+float group_sum(float own, __local float* scratch) {
 #if GROUP > 1
   const uint lane = get_local_id(0);
   scratch[lane] = own;

@@ -17,7 +17,7 @@
 #define RS_SCAN_STRIDE (RS_SCAN_ROW + 1)
 #define RS_SCAN_WORDS (RS_SCAN_ROWS * RS_SCAN_STRIDE)
 
-inline uint group_scan(uint value, __local uint* scratch, uint* total) {
+uint group_scan(uint value, __local uint* scratch, uint* total) {
   const uint lane = get_local_id(0);
   const uint row = lane / RS_SCAN_ROW;
   const uint place = row * RS_SCAN_STRIDE + lane % RS_SCAN_ROW;

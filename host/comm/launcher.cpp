@@ -73,7 +73,15 @@ Launch find_launch() {
 std::shared_ptr<Transport> launched_transport(const Launch& launch) {
   if (launch.ranks == 1) return nullptr;
 #ifdef RAYSPLATS_HAVE_MPI
-  return load();
+  std::shared_ptr<Transport> transport = load();
+  if (transport->size() != launch.ranks) {
+    // Each would do all of the work.
+    throw Error(ErrorCode::kRuntime,
+                fmt::format("{} processes were started together, but this one has joined {} of "
+                            "them: use the mpirun of the MPI that the program was built with",
+                            launch.ranks, transport->size()));
+  }
+  return transport;
 #else
   throw UsageError(fmt::format(
       "This program was built without MPI, and each of the {} processes that mpirun has started "

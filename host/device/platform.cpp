@@ -114,11 +114,32 @@ DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
   return info;
 }
 
+// One whose driver does not answer (a card that is lost) keeps its place in the list, so that the
+// others keep their numbers.
+DeviceInfo query_or_problem(const cl::Platform& platform, const cl::Device& device) {
+  try {
+    return query(platform, device);
+  } catch (const cl::Error& error) {
+    DeviceInfo info;
+    info.name = "a device that does not answer";
+    info.problems = {
+        fmt::format("its driver does not say what it is ({} {})", error.what(), error.err())};
+    return info;
+  }
+}
+
+bool is_cpu(const cl::Device& device) {
+  try {
+    return type_of(device.getInfo<CL_DEVICE_TYPE>()) == DeviceType::kCpu;
+  } catch (const cl::Error&) {
+    return false;
+  }
+}
+
 // The parts of a device that RAYSPLATS_CPU_PARTS asks for, else itself.
 std::vector<cl::Device> parts_of(const cl::Device& device) {
   const char* text = std::getenv("RAYSPLATS_CPU_PARTS");
-  if (text == nullptr || type_of(device.getInfo<CL_DEVICE_TYPE>()) != DeviceType::kCpu)
-    return {device};
+  if (text == nullptr || !is_cpu(device)) return {device};
   const std::string_view value(text);
   const cl_uint units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
   cl_uint parts = 0;
@@ -166,7 +187,7 @@ std::vector<PlatformDevice> platform_devices() {
     }
     for (const cl::Device& device : devices) {
       for (const cl::Device& part : parts_of(device)) {
-        DeviceInfo info = query(platform, part);
+        DeviceInfo info = query_or_problem(platform, part);
         info.index = found.size();
         found.push_back({std::move(info), part});
       }

@@ -10,9 +10,11 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <thread>
 
 namespace raysplats {
 namespace {
@@ -29,6 +31,12 @@ std::uint64_t checksum(const std::vector<unsigned char>& data) {
   return XXH3_64bits(data.data(), data.size());
 }
 
+// What other processes compile meanwhile need not be compiled again; files are stored whole, so
+// that going on without the lock costs time alone.
+constexpr std::chrono::milliseconds kPoll{20};
+constexpr std::chrono::seconds kToldWait{5};
+constexpr std::chrono::minutes kMostWait{3};
+
 }  // namespace
 
 std::filesystem::path default_cache_directory() {
@@ -44,7 +52,16 @@ std::filesystem::path default_cache_directory() {
 ProgramCache::BuildLock::BuildLock(const std::filesystem::path& directory)
     : descriptor_(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (descriptor_ < 0) return;
-  while (::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
+  const auto start = std::chrono::steady_clock::now();
+  bool told = false;
+  while (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0 && (errno == EWOULDBLOCK || errno == EINTR)) {
+    const auto waited = std::chrono::steady_clock::now() - start;
+    if (waited > kMostWait) return;  // one that was stopped holds it for good
+    if (waited > kToldWait && !told) {
+      told = true;
+      spdlog::info("waiting for another process that compiles kernels for {}", directory.string());
+    }
+    std::this_thread::sleep_for(kPoll);
   }
 }
 

@@ -31,8 +31,8 @@ class ProgramCache {
   const std::filesystem::path& directory() const { return directory_; }
 
   /// Keeps other processes and threads from compiling for this cache; gone with its process. Waits
-  /// for its turn. Without a directory, or where the file system knows no locks, nothing is kept
-  /// from anybody.
+  /// for its turn, and says so when that is long, for three minutes at most. Without a directory,
+  /// or where the file system knows no locks, nothing is kept from anybody.
   class BuildLock {
    public:
     explicit BuildLock(const std::filesystem::path& directory);

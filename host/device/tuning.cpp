@@ -147,6 +147,8 @@ void TuningStore::store(const DeviceInfo& device, const DeviceTuning& tuning) {
   if (path_.empty()) {
     throw DataError("There is no directory for the tuning: set HOME or XDG_CACHE_HOME");
   }
+  // Another process may have measured meanwhile.
+  entries_ = read_entries(path_);
   std::erase_if(entries_, [&](const Entry& entry) { return is_current(entry, device); });
   entries_.push_back(
       {device.name, device.platform, device.driver_version, RAYSPLATS_VERSION, tuning});

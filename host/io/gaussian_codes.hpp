@@ -20,6 +20,9 @@ constexpr double kByteOpacityMargin = 0.5 / 255.0;
 
 /// Logarithm of the scale that a flat axis, of size 0 in its file, gets.
 constexpr float kFlatLogScale = -20.0f;
+/// Of an axis as long as formats that have sizes in place of logarithms can hold, and viewers
+/// square.
+constexpr float kMostLogScale = 40.0f;
 
 inline double opacity_of(float logit) {
   return 1.0 / (1.0 + std::exp(-static_cast<double>(logit)));

@@ -133,7 +133,7 @@ void write_glb(const std::filesystem::path& path, const Gaussians& model) {
     return static_cast<float>(unit_quaternion(&turned.quaternions[4 * i])[(k + 1) % 4]);
   });
   glb.add(kSplattingScale, 3, [&](std::size_t i, std::size_t k) {
-    return static_cast<float>(std::exp(static_cast<double>(turned.log_scales[3 * i + k])));
+    return std::exp(std::min(turned.log_scales[3 * i + k], kMostLogScale));
   });
   glb.add(kSplattingOpacity, 1, [&](std::size_t i, std::size_t) {
     return static_cast<float>(opacity_of(turned.opacities[i]));

@@ -84,7 +84,8 @@ void write_splat(const std::filesystem::path& path, const Gaussians& model) {
   const auto put = [&](double value) { bytes.push_back(std::byte{to_byte(value)}); };
   for (const std::size_t i : order) {
     for (std::size_t k = 0; k < 3; ++k) put_float(bytes, model.means[3 * i + k]);
-    for (std::size_t k = 0; k < 3; ++k) put_float(bytes, std::exp(model.log_scales[3 * i + k]));
+    for (std::size_t k = 0; k < 3; ++k)
+      put_float(bytes, std::exp(std::min(model.log_scales[3 * i + k], kMostLogScale)));
     for (std::size_t k = 0; k < 3; ++k)
       put(255.0 * (0.5 + kSh0 * static_cast<double>(model.sh[stride * i + k])));
     put(255.0 * opacity_of(model.opacities[i]));

@@ -213,6 +213,9 @@ void render_all(const std::filesystem::path& directory,
   for (std::future<void>& worker : workers) worker.get();
 }
 
+/// Tells a data set that is not whole, until its cameras are written.
+constexpr const char* kUnfinished = "unfinished.json";
+
 /// Whether the file is of an earlier data set of ours.
 bool is_ours(const std::filesystem::path& path) {
   std::ifstream stream(path);
@@ -225,16 +228,20 @@ void check_replaceable(const std::filesystem::path& directory) {
   std::error_code error;
   if (!std::filesystem::is_directory(directory, error)) return;
   if (std::filesystem::is_empty(directory, error)) return;
-  if (is_ours(directory / "transforms_train.json") || is_ours(directory / "transforms.json"))
-    return;
+  for (const char* name : {"transforms_train.json", "transforms.json", kUnfinished}) {
+    if (is_ours(directory / name)) return;
+  }
   throw UsageError(fmt::format(
       "The folder {} holds other files: choose a new one, or write there with --overwrite",
       directory.string()));
 }
 
-/// Camera files of the other kind would be taken for those of the data set.
-void remove_own(const std::filesystem::path& path) {
-  if (is_ours(path)) std::filesystem::remove(path);
+/// Camera files of an earlier data set would be taken for those of the pictures that take its
+/// place.
+void remove_cameras(const std::filesystem::path& directory) {
+  for (const char* name : {"transforms.json", "transforms_train.json", "transforms_test.json"}) {
+    if (is_ours(directory / name)) std::filesystem::remove(directory / name);
+  }
 }
 
 }  // namespace
@@ -259,20 +266,20 @@ void generate_dataset(const std::filesystem::path& directory,
   if (!overwrite) check_replaceable(directory);
   make_output_directory(directory / "train");
   make_output_directory(directory / "test");
+  write_text_file(directory / kUnfinished, nlohmann::json{{"generator", kGenerator}}.dump() + "\n");
+  remove_cameras(directory);
   std::vector<Camera> all = train;
   all.insert(all.end(), test.begin(), test.end());
   render_all(directory, synth::make_still_life(options.seed, backdrop_of(options)), all,
              transparent);
   // Last, so that an interrupted run is not taken for a data set.
   if (transparent) {
-    remove_own(directory / "transforms.json");
     write_transforms(directory / "transforms_train.json", train);
     write_transforms(directory / "transforms_test.json", test);
   } else {
-    remove_own(directory / "transforms_train.json");
-    remove_own(directory / "transforms_test.json");
     write_capture(directory / "transforms.json", train, test);
   }
+  std::filesystem::remove(directory / kUnfinished);
 }
 
 }  // namespace raysplats

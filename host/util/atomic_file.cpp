@@ -33,9 +33,23 @@ bool is_temporary_name(const std::string& name) {
   return name.find_first_not_of("0123456789", dot + 1) == mark;
 }
 
+// What a link leads to, so that the link stays. A device or pipe would become a plain file.
+std::filesystem::path real_target(std::filesystem::path target) {
+  constexpr int kMostLinks = 16;  // one after the other; a ring of them is no file
+  std::error_code error;
+  for (int i = 0; i < kMostLinks && std::filesystem::is_symlink(target, error); ++i)
+    target = target.parent_path() / std::filesystem::read_symlink(target, error);
+  const std::filesystem::file_status status = std::filesystem::status(target, error);
+  if (std::filesystem::is_other(status)) {
+    throw DataError(
+        fmt::format("{} is a device or a pipe: give the name of a file", target.string()));
+  }
+  return target;
+}
+
 }  // namespace
 
-AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)) {
+AtomicFile::AtomicFile(std::filesystem::path target) : target_(real_target(std::move(target))) {
   const std::filesystem::path folder = target_.has_parent_path() ? target_.parent_path() : ".";
   std::error_code error;
   for (std::filesystem::path above = folder;

@@ -28,6 +28,12 @@ find_library(RAYSPLATS_ZSTD_ARCHIVE libzstd.a REQUIRED)
 find_library(RAYSPLATS_WEBP_ARCHIVE libwebp.a REQUIRED)
 mark_as_advanced(RAYSPLATS_ZSTD_ARCHIVE RAYSPLATS_WEBP_ARCHIVE)
 target_link_libraries(raysplats_bundle PUBLIC ${RAYSPLATS_ZSTD_ARCHIVE} ${RAYSPLATS_WEBP_ARCHIVE})
+# A part of libwebp before its version 1.3.
+find_library(RAYSPLATS_SHARPYUV_ARCHIVE libsharpyuv.a)
+mark_as_advanced(RAYSPLATS_SHARPYUV_ARCHIVE)
+if(RAYSPLATS_SHARPYUV_ARCHIVE)
+  target_link_libraries(raysplats_bundle PUBLIC ${RAYSPLATS_SHARPYUV_ARCHIVE})
+endif()
 
 # Replaces the names of the bundled libraries in a list of targets.
 function(raysplats_bundle list)

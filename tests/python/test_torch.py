@@ -139,6 +139,29 @@ def test_earlier_passes_are_run_again(renderer):
     assert torch.allclose(together, apart[0] + apart[1], rtol=1e-5, atol=1e-4 * together.abs().max())
 
 
+def test_a_camera_may_be_moved_on_before_the_backward_pass(renderer):
+    single, _ = leaves(random_arrays())
+    views = [rs.Camera.look_at((3 * np.cos(a), 3 * np.sin(a), 1), (0, 0, 0), (0, 0, 1), 12, 10, 14) for a in (0, 2)]
+    total = sum(renderer.render(camera, **single).rgba.sum() for camera in views)
+    (expected,) = torch.autograd.grad(total, [single["means"]])
+    one = views[0].downscaled(1)
+    total = renderer.render(one, **single).rgba.sum()
+    one.rotation, one.translation = views[1].rotation, views[1].translation
+    total = total + renderer.render(one, **single).rgba.sum()
+    (found,) = torch.autograd.grad(total, [single["means"]])
+    assert torch.allclose(found, expected, rtol=1e-5, atol=1e-4 * expected.abs().max())
+
+
+def test_pictures_without_gradients_are_the_same(renderer):
+    single, _ = leaves(random_arrays())
+    camera = rs.Camera.look_at((3, 0, 1), (0, 0, 0), (0, 0, 1), 12, 10, 14)
+    graded = renderer.render(camera, **single).rgba
+    with torch.no_grad():
+        plain = renderer.render(camera, **single).rgba
+    assert graded.requires_grad and not plain.requires_grad
+    assert torch.equal(graded.detach(), plain)
+
+
 def test_gradients_of_gradients_are_refused(renderer):
     single, _ = leaves(random_arrays())
     camera = rs.Camera(4, 4, 4.0, translation=(0, 0, 3))

@@ -85,10 +85,11 @@ def pose_gradient(viewmat, center, rotation):
 
 class _View(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, renderer, camera, viewmat, *parameters):
-        needed = any(ctx.needs_input_grad)
+    def forward(ctx, renderer, camera, graded, viewmat, *parameters):
+        needed = graded and any(ctx.needs_input_grad)
         picture, ticket = renderer._see(camera, viewmat, parameters, needed)
-        ctx.renderer, ctx.camera, ctx.ticket = renderer, camera, ticket
+        # A copy: the camera may be moved on before the backward pass.
+        ctx.renderer, ctx.camera, ctx.ticket = renderer, camera.downscaled(1), ticket
         ctx.save_for_backward(viewmat, *parameters)
         like = parameters[0]
         if picture.expected_depth is None:
@@ -103,17 +104,17 @@ class _View(torch.autograd.Function):
         viewmat, *parameters = ctx.saved_tensors
         found = ctx.renderer._view_slopes(ctx.camera, viewmat, parameters, ctx.ticket, gradient)
         pose = None
-        if viewmat is not None and ctx.needs_input_grad[2]:
+        if viewmat is not None and ctx.needs_input_grad[3]:
             matrix = viewmat.detach().cpu().double().numpy()
             pose = torch.from_numpy(pose_gradient(matrix, found.camera_center, found.camera_rotation))
             pose = pose.to(viewmat)
-        return (None, None, pose, *_parameter_gradients(found.parameters, parameters))
+        return (None, None, None, pose, *_parameter_gradients(found.parameters, parameters))
 
 
 class _Rays(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, renderer, color_direction, origins, directions, *parameters):
-        needed = any(ctx.needs_input_grad)
+    def forward(ctx, renderer, color_direction, graded, origins, directions, *parameters):
+        needed = graded and any(ctx.needs_input_grad)
         traced, ticket = renderer._meet(color_direction, origins, directions, parameters, needed)
         ctx.renderer, ctx.color_direction, ctx.ticket = renderer, color_direction, ticket
         ctx.save_for_backward(origins, directions, *parameters)
@@ -129,6 +130,7 @@ class _Rays(torch.autograd.Function):
             ctx.color_direction, origins, directions, parameters, ctx.ticket, d_color, d_alpha
         )
         return (
+            None,
             None,
             None,
             _tensor(found.origins, origins),
@@ -155,18 +157,17 @@ class Renderer:
     def render(self, camera, means, quaternions, log_scales, opacities, sh, *, viewmat=None):
         """A Rendering of what a raysplats.Camera sees; `viewmat`, a tensor (4, 4) from the world to the camera, takes
         the place of the camera's pose and gets gradients (tangent to rigid motions)."""
-        seen = _View.apply(self, camera, viewmat, means, quaternions, log_scales, opacities, sh)
+        graded = torch.is_grad_enabled()  # within apply() it never is
+        seen = _View.apply(self, camera, graded, viewmat, means, quaternions, log_scales, opacities, sh)
         return Rendering(seen, None, None, None) if isinstance(seen, torch.Tensor) else Rendering(*seen)
 
     def trace(
         self, origins, directions, means, quaternions, log_scales, opacities, sh, *, color_direction="ray"
     ):
         """TracedRays of rays from origins (N, 3) along directions (N, 3) of any length."""
-        return TracedRays(
-            *_Rays.apply(
-                self, color_direction, origins, directions, means, quaternions, log_scales, opacities, sh
-            )
-        )
+        parameters = (means, quaternions, log_scales, opacities, sh)
+        graded = torch.is_grad_enabled()
+        return TracedRays(*_Rays.apply(self, color_direction, graded, origins, directions, *parameters))
 
     def _upload(self, parameters):
         arrays = {name: _array(each, name) for name, each in zip(_NAMES, parameters)}

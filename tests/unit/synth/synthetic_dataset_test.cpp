@@ -158,6 +158,22 @@ TEST_CASE("a folder that cannot be written is a data error") {
   CHECK_FALSE(fs::exists(folder.path() / "half" / "transforms_train.json"));
 }
 
+TEST_CASE("a data set that was not finished in place of another is none, and is made again") {
+  const TemporaryDirectory folder;
+  const fs::path set = folder.path() / "set";
+  generate_dataset(set, kSmall);
+  fs::remove(set / "test" / "r_1.png");
+  fs::create_directories(set / "test" / "r_1.png" / "x");
+  SyntheticOptions seeded = kSmall;
+  seeded.seed = 1;
+  CHECK_THROWS_AS(generate_dataset(set, seeded), DataError);
+  CHECK_THROWS_AS(load_dataset(set), DataError);
+  fs::remove_all(set / "test" / "r_1.png");
+  generate_dataset(set, seeded);
+  CHECK(load_dataset(set).views.size() == 6);
+  CHECK(files_below(set).size() == 8);
+}
+
 TEST_CASE("captures with a backdrop are opaque nerfstudio data sets, each of its kind") {
   SyntheticOptions options;
   options.size = 24;

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -177,4 +178,21 @@ TEST_CASE("atomic file: a full disk keeps the old file and leaves no temporary o
   CHECK(WEXITSTATUS(status) == 0);
   CHECK(read_all(target) == "old");
   CHECK(folder.entries() == 1);
+}
+
+TEST_CASE("atomic file: a link stays one, a pipe stays a pipe") {
+  const Folder folder;
+  const fs::path target = folder / "model.ply", link = folder / "link.ply";
+  write_text_file(target, "old");
+  fs::create_symlink("model.ply", link);
+  write_text_file(link, "new");
+  CHECK(fs::is_symlink(link));
+  CHECK(read_all(target) == "new");
+  fs::create_symlink("later.ply", folder / "ahead.ply");
+  write_text_file(folder / "ahead.ply", "text");
+  CHECK(read_all(folder / "later.ply") == "text");
+  const fs::path pipe = folder / "pipe";
+  REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK_THROWS_AS(AtomicFile{pipe}, DataError);
+  CHECK(fs::is_fifo(pipe));
 }
