@@ -58,7 +58,7 @@ std::optional<fs::path> fuller_folder(const fs::path& root,
 std::optional<fs::path> other_folder(const fs::path& root, const ColmapModel& model) {
   if (model.images.empty() || find_photo(root, model.images.front().name)) return std::nullopt;
   for (const char* name : kFolderNames) {
-    const auto folder = find_folder(root, name);
+    auto folder = find_folder(root, name);
     if (folder && find_photo(*folder, model.images.front().name)) return folder;
   }
   return std::nullopt;
