@@ -43,29 +43,15 @@ Json describe_path(const std::filesystem::path& path) {
 
 /// cameras.json of a run, which viewers of 3DGS read.
 Json describe_views(const std::filesystem::path& path) {
-  std::vector<Camera> cameras;
-  for (const std::optional<Camera>& camera : io::read_camera_list(path)) {
-    if (!camera) {
-      throw DataError(
-          fmt::format("{}: entry {} is no view with position, rotation, width and height",
-                      path.string(), cameras.size()));
-    }
-    cameras.push_back(*camera);
-  }
   Json out{{"type", "cameras of viewers"}};
-  out.update(describe_cameras(cameras));
+  out.update(describe_cameras(io::read_listed_views(path)));
   out.erase("camera_models");
   return out;
 }
 
 std::optional<Json> describe_json(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = io::read_file(path);
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  const auto begin = std::find_if_not(text, text + bytes.size(), [](char c) {
-    return c == ' ' || c == '\n' || c == '\r' || c == '\t';
-  });
-  if (begin != text + bytes.size() && *begin == '[') return describe_views(path);
-  const nlohmann::json json = io::parse_json_object(bytes, path);
+  if (io::is_camera_list(path)) return describe_views(path);
+  const nlohmann::json json = io::parse_json_object(io::read_file(path), path);
   if (json.contains("camera_path") || json.contains("keyframes")) return describe_path(path);
   if (!json.contains("frames")) return describe_record(json, path);
   Json out{{"type", "cameras"}};

@@ -443,7 +443,11 @@ std::string inner_name(const fs::path& path) {
 }  // namespace io
 
 std::vector<Camera> read_cameras(const std::filesystem::path& path) {
-  if (io::is_camera_list(path)) return io::read_listed_views(path);
+  if (io::is_camera_list(path)) {
+    std::vector<Camera> views = io::read_listed_views(path);
+    if (views.empty()) throw DataError(fmt::format("{} lists no cameras", path.string()));
+    return views;
+  }
   const io::TransformsFile file = io::read_transforms(path);
   if (file.frames.empty()) throw DataError(fmt::format("{} has no frames", path.string()));
   std::vector<Camera> cameras;

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run/run_cameras.hpp"
 
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <optional>
 #include <system_error>
-#include <utility>
 
 #include "io/camera_list.hpp"
-#include "raysplats/error.hpp"
 
 namespace raysplats {
 namespace {
@@ -32,16 +28,7 @@ std::vector<Camera> run_cameras(const ModelSource& source) {
   const fs::path path = *run / "cameras.json";
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return {};
-  std::vector<Camera> out;
-  for (std::optional<Camera>& camera : io::read_camera_list(path)) {
-    if (!camera) {
-      throw DataError(fmt::format(
-          "{}: entry {} is no view with position, rotation, width and height: start with --data",
-          path.string(), out.size()));
-    }
-    out.push_back(std::move(*camera));
-  }
-  return out;
+  return io::read_listed_views(path);
 }
 
 }  // namespace raysplats

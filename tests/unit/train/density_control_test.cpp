@@ -53,6 +53,17 @@ TrainOptions rules() {
   return options;
 }
 
+// A run of 100 iterations whose budget grows between two of them, every tenth, up to `most`.
+TrainOptions growth(int from, int until, int most) {
+  TrainOptions options;
+  options.iterations = 100;
+  options.densify_from = from;
+  options.densify_until = until;
+  options.densify_every = 10;
+  options.max_gaussians = most;
+  return options;
+}
+
 struct Views {
   std::vector<float> screen;  // 3 N
 };
@@ -393,11 +404,7 @@ TEST_CASE("the budget's count follows its curve to the limit and stays there [sm
 
 TEST_CASE("what no ray met goes once every photo was looked at [small] [tiny]") {
   Context context(test_device());
-  TrainOptions options;
-  options.iterations = 100;
-  options.densify_from = 0;
-  options.densify_until = 60;
-  options.max_gaussians = 2;
+  TrainOptions options = growth(0, 60, 2);
   options.views_per_step = 2;
   // Three photos, two in a step: two steps show four, which may leave one out.
   for (const auto& [period, unseen] : {std::pair{2, 0u}, {3, 1u}}) {
@@ -413,14 +420,9 @@ TEST_CASE("what no ray met goes once every photo was looked at [small] [tiny]") 
 
 TEST_CASE("growth that has one pass alone reaches the limit in it [small] [tiny]") {
   Context context(test_device());
-  TrainOptions options;
-  options.iterations = 100;
-  options.densify_from = options.densify_until = 50;
-  options.densify_every = 10;
-  options.max_gaussians = 5;
   DeviceGaussians gaussians = DeviceGaussians::upload(
       context, model_of({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}), ScaleActivation::kExp);
-  DensityControl control(context, options, 1.0, 7);
+  DensityControl control(context, growth(50, 50, 5), 1.0, 7);
   accumulate(context, control, gaussians, {std::vector<float>(9, 1.0f)});
   control.refine(gaussians, 50);
   CHECK(gaussians.count == 5);
@@ -428,12 +430,7 @@ TEST_CASE("growth that has one pass alone reaches the limit in it [small] [tiny]
 
 TEST_CASE("halves lie side by side along the longest axis, fainter and smaller [small] [tiny]") {
   Context context(test_device());
-  TrainOptions options;
-  options.iterations = 100;
-  options.densify_from = 10;
-  options.densify_until = 90;
-  options.densify_every = 10;
-  options.max_gaussians = 6;
+  const TrainOptions options = growth(10, 90, 6);
   for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
     const Gaussians before = model_of({0.2, 0.3, 0.25}, {0.5, 0.9, 0.2});
     DeviceGaussians gaussians = DeviceGaussians::upload(context, before, activation);
@@ -475,13 +472,8 @@ TEST_CASE("halves lie side by side along the longest axis, fainter and smaller [
 TEST_CASE(
     "fading takes the same off every opacity but leaves what is faint already [small] [tiny]") {
   Context context(test_device());
-  TrainOptions options;
-  options.iterations = 100;
-  options.densify_from = 10;
-  options.densify_until = 50;
+  TrainOptions options = growth(10, 50, 3);
   options.replace_until = 90;
-  options.densify_every = 10;
-  options.max_gaussians = 3;
   options.prune_opacity = 0;
   options.opacity_decay = 0.1;
   DeviceGaussians gaussians = DeviceGaussians::upload(
