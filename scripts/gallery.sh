@@ -13,13 +13,23 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 is_data() { [[ -e $1/transforms.json || -e $1/transforms_train.json || -d $1/sparse || -d $1/colmap/sparse ]]; }
 
+usage() { sed -n '/^# usage:/,/^[^#]/s/^# //p' "${BASH_SOURCE[0]}"; }
+
 data=
-if [[ ${1:-} == --data ]]; then
+if [[ ${1:-} == --help ]]; then
+  usage
+  exit
+elif [[ ${1:-} == --data ]]; then
   data=$(realpath -- "${2:?--data takes a data set}")
   shift 2
 elif (($# > 0)) && is_data "$1"; then
   data=$(realpath -- "$1")
   shift
+fi
+if [[ ${1:-} == -* ]]; then
+  echo "There is no option $1" >&2
+  usage >&2
+  exit 2
 fi
 output=$(realpath -m -- "${1:-$root/gallery}")
 run=${2:-}

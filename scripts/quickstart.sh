@@ -6,6 +6,11 @@
 # RAYSPLATS_DEVICE chooses the OpenCL device (index or part of its name).
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+if [[ ${1:-} == -* ]]; then
+  sed -n '/^# From/,/^set/s/^# //p' "${BASH_SOURCE[0]}"
+  [[ $1 == --help ]] && exit
+  exit 2
+fi
 output=$(realpath -m -- "${1:-$root/quickstart}")
 cd "$root"
 

@@ -4,6 +4,10 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+if [[ ${1:-} == --help ]]; then
+  sed -n '/^# Sets/s/^# //p' scripts/test.sh
+  exit
+fi
 ./scripts/setup.sh --tests
 printf '== %s\n' "Running the tests"
 ctest --preset release "$@"
