@@ -8,7 +8,7 @@ vector ones; adds: native additions to floats in global memory; swaps: compare-a
 scripts/gpu/baseline.json. Ends with 1 when a kernel does not compile or has unresolved symbols, spills where the baseline
 does not, or takes more than the baseline allows: registers 10 % and 8, private and local memory 10 % and 64 bytes, spills
 and moved registers 25 %, moved ones 8 on top, swaps and barriers 25 %; or where a width is narrower or native additions
-are gone. What the baseline does not know is allowed no spills; and the tables in docs/gpu.md and those of
+are gone. What the baseline does not know is allowed no spills; and the tables in docs/gpu_compilers.md and those of
 the library's model of speed have to be the baseline's: --write-baseline writes them too. Ends with 3 when a compiler cannot be had."""
 import argparse
 import json
@@ -165,7 +165,7 @@ def main():
         with open(BASELINE, "w", encoding="utf-8") as file:
             file.write("{\n" + ",\n".join(lines) + "\n}\n")
         table.write(stored, TARGETS)
-        print(f"Wrote {BASELINE}, the tables in docs/gpu.md and host/bench/compiled_kernels.cpp")
+        print(f"Wrote {BASELINE}, the tables in docs/gpu_compilers.md and host/bench/compiled_kernels.cpp")
     elif not options.write_baseline:
         failures += compare(results, stored, targets, chosen)
         failures += [f"{path} does not hold the baseline's figures: --write-baseline writes both" for path in table.stale(stored, TARGETS)]

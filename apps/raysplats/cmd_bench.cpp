@@ -4,14 +4,19 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <initializer_list>
+#include <map>
 #include <memory>
+#include <system_error>
 #include <tuple>
+#include <utility>
 
 #include "bench/bench.hpp"
 #include "bench/compare.hpp"
 #include "bench/device_report.hpp"
 #include "bench/forecast.hpp"
 #include "bench/kernel_folders.hpp"
+#include "commands.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -19,6 +24,8 @@
 #include "run/model_source.hpp"
 #include "synth/bench_scenes.hpp"
 #include "util/atomic_file.hpp"
+#include "validators.hpp"
+#include "value_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -41,6 +48,7 @@ struct Options {
   std::string json;
   std::string csv;
   std::string html;
+  bool overwrite = false;
   BenchOptions bench;
   TraceSettings trace;
   DeviceFlags device;
@@ -118,20 +126,40 @@ void check_alone(const CLI::App& command, const Options& options) {
     throw UsageError(
         "--kernels and --against name the two folders of kernels to compare: give both");
   }
+  const auto refuse = [&](const char* whole, std::initializer_list<const char*> names) {
+    for (const char* name : names) {
+      if (command.get_option(name)->count() > 0)
+        throw UsageError(fmt::format("{} does not go with {}: leave it out", name, whole));
+    }
+  };
+  // A forecast is text alone.
+  if (options.forecast) refuse("--forecast", {"--json", "--csv", "--html", "--profile"});
   const char* whole = !options.report.empty() ? "--report" : "--kernels";
   if (options.report.empty() && options.kernels.empty()) return;
   if (!options.report.empty() && !options.kernels.empty()) {
     throw UsageError("--report measures the kernels that are built in: leave out --kernels");
   }
-  for (const char* name :
-       {"--model", "--cameras", "--json", "--csv", "--html", "--list", "--profile"}) {
-    if (command.get_option(name)->count() > 0)
-      throw UsageError(fmt::format("{} does not go with {}: leave it out", name, whole));
-  }
+  refuse(whole, {"--model", "--cameras", "--json", "--csv", "--html", "--list", "--profile"});
 }
 
-void check_result_file(const std::string& path) {
-  if (!path.empty()) AtomicFile probe(path);
+/// Refuses results without a place to go, which would be lost: before anything is measured.
+void check_results(const Options& options, const std::filesystem::path& model) {
+  std::map<std::filesystem::path, const char*> taken;
+  for (const auto& [name, file] : {std::pair{"--json", &options.json},
+                                   {"--csv", &options.csv},
+                                   {"--html", &options.html},
+                                   {"--report", &options.report}}) {
+    if (file->empty()) continue;
+    check_output_file(*file, options.overwrite, {model});
+    std::error_code error;
+    const std::filesystem::path place =
+        std::filesystem::weakly_canonical(std::filesystem::absolute(*file, error), error);
+    const auto [other, added] = taken.emplace(place, name);
+    if (!added)
+      throw UsageError(fmt::format("{} and {} both name {}: give each a file of its own",
+                                   other->second, name, *file));
+    const AtomicFile probe(*file);
+  }
 }
 
 void run(const CLI::App& command, const Options& options) {
@@ -149,8 +177,10 @@ void run(const CLI::App& command, const Options& options) {
     std::tie(bench.width, bench.height) = parse_resolution(*options.resolution);
   }
   std::optional<BenchModel> model;
+  std::filesystem::path model_file;
   if (!options.model.empty()) {
     const ModelSource source = find_model(options.model);
+    model_file = source.file;
     model = load_model(options, source);
     bench.trace = trace_options(source);
   } else if (!options.cameras.empty()) {
@@ -165,11 +195,7 @@ void run(const CLI::App& command, const Options& options) {
     for (const std::string& id : bench_ids(bench, chosen)) fmt::print("{}\n", id);
     return;
   }
-  // Before anything is measured: a result without a place to go is lost.
-  check_result_file(options.json);
-  check_result_file(options.csv);
-  check_result_file(options.html);
-  check_result_file(options.report);
+  check_results(options, model_file);
   ContextOptions timed;
   timed.profile = timed.keep_launches = true;
   timed.kernel_cache = !options.device.no_kernel_cache;
@@ -209,68 +235,88 @@ void compare(const CompareOptions& options) {
   fmt::print("{}", comparison_table(compare_reports(before, after)));
 }
 
+/// Options that choose which rows are measured, and on what.
+void add_row_options(CLI::App& command, Options& options) {
+  command.add_option("--sizes", options.sizes, "Numbers of Gaussians, for example 10k,100k,1M")
+      ->capture_default_str()
+      ->type_name("N,...");
+  command.add_flag("--large", options.large, "Also 3M Gaussians");
+  command
+      .add_option(
+          "--scene", options.scenes,
+          fmt::format("{} or all, several with commas", fmt::join(bench_scene_names(), ", ")))
+      ->capture_default_str()
+      ->type_name("NAME,...");
+  command.add_option("--model", options.model, "Measure on a PLY or a run's newest model instead")
+      ->type_name("MODEL");
+  command
+      .add_option("--cameras", options.cameras,
+                  "With --model: transforms.json or folder of a data set")
+      ->type_name("PATH");
+  command.add_option("--view", options.view, "With --model: which of the cameras, from 0")
+      ->transform(whole_between(0, 1e9))
+      ->capture_default_str();
+  command.add_option("--resolution", options.resolution, "Pixels (800x800, or the camera's)")
+      ->type_name("WxH");
+  command.add_option("--sh-degree", options.bench.sh_degree, "Of the generated scenes")
+      ->transform(whole_between(0, 4))
+      ->capture_default_str();
+  command.add_option("--rays", options.bench.rays, "Arbitrary rays, at most")
+      ->transform(whole_between(1, 1e9))
+      ->capture_default_str();
+  command
+      .add_option("--triangles", options.bench.triangles,
+                  "Of the larger mesh; the smaller has a tenth")
+      ->transform(whole_between(100, 1e8))
+      ->capture_default_str();
+  command.add_option("--filter", options.bench.filter, "Only ids row/scene/size that match this")
+      ->type_name("REGEX");
+  command.add_flag("--list", options.list, "Print the ids and stop");
+  command.add_option("--repeat", options.bench.repeat, "Repetitions of every row")
+      ->transform(whole_between(1, 1000))
+      ->capture_default_str();
+}
+
+/// Options for another result than a table of the rows.
+void add_kind_options(CLI::App& command, Options& options) {
+  command.add_flag("--forecast", options.forecast,
+                   "What a model of speed, from counted work, says of this CPU, beside the "
+                   "measurement, and of four graphics cards");
+  command
+      .add_option("--report", options.report,
+                  "Self-test, all rows, frames/s and training iterations/s as one file, in at most "
+                  "8 minutes")
+      ->check(not_empty())
+      ->type_name("FILE");
+  command
+      .add_option("--kernels", options.kernels,
+                  "Compare the kernels of this folder (like cl/ of the source) ...")
+      ->type_name("DIR");
+  command.add_option("--against", options.against, "... with those of this one, in turns")
+      ->type_name("DIR");
+}
+
+void add_result_options(CLI::App& command, Options& options) {
+  command.add_option("--json", options.json, "Also write the result as JSON")
+      ->check(not_empty())
+      ->type_name("FILE");
+  command.add_option("--csv", options.csv, "Also write the result as CSV")
+      ->check(not_empty())
+      ->type_name("FILE");
+  command.add_option("--html", options.html, "Also write the result as a page")
+      ->check(not_empty())
+      ->type_name("FILE");
+  add_overwrite_flag(command, options.overwrite, kOverwriteFile);
+}
+
 }  // namespace
 
 Command add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("bench", "Measure every kernel and stage on a device");
   auto options = std::make_shared<Options>();
-  command->add_option("--sizes", options->sizes, "Numbers of Gaussians, for example 10k,100k,1M")
-      ->capture_default_str()
-      ->type_name("N,...");
-  command->add_flag("--large", options->large, "Also 3M Gaussians");
-  command
-      ->add_option(
-          "--scene", options->scenes,
-          fmt::format("{} or all, several with commas", fmt::join(bench_scene_names(), ", ")))
-      ->capture_default_str()
-      ->type_name("NAME,...");
-  command->add_option("--model", options->model, "Measure on a PLY or a run's newest model instead")
-      ->type_name("MODEL");
-  command
-      ->add_option("--cameras", options->cameras,
-                   "With --model: transforms.json or folder of a data set")
-      ->type_name("PATH");
-  command->add_option("--view", options->view, "With --model: which of the cameras, from 0")
-      ->transform(whole_between(0, 1e9))
-      ->capture_default_str();
-  command->add_option("--resolution", options->resolution, "Pixels (800x800, or the camera's)")
-      ->type_name("WxH");
-  command->add_option("--sh-degree", options->bench.sh_degree, "Of the generated scenes")
-      ->transform(whole_between(0, 4))
-      ->capture_default_str();
-  command->add_option("--rays", options->bench.rays, "Arbitrary rays, at most")
-      ->transform(whole_between(1, 1e9))
-      ->capture_default_str();
-  command
-      ->add_option("--triangles", options->bench.triangles,
-                   "Of the larger mesh; the smaller has a tenth")
-      ->transform(whole_between(100, 1e8))
-      ->capture_default_str();
-  command->add_option("--filter", options->bench.filter, "Only ids row/scene/size that match this")
-      ->type_name("REGEX");
-  command->add_flag("--list", options->list, "Print the ids and stop");
-  command->add_option("--repeat", options->bench.repeat, "Repetitions of every row")
-      ->transform(whole_between(1, 1000))
-      ->capture_default_str();
-  command->add_flag("--forecast", options->forecast,
-                    "What a model of speed, from counted work, says of this CPU, beside the "
-                    "measurement, and of four graphics cards");
-  command
-      ->add_option(
-          "--report", options->report,
-          "Self-test, all rows, frames/s and training iterations/s as one file, in at most "
-          "8 minutes")
-      ->type_name("FILE");
-  command
-      ->add_option("--kernels", options->kernels,
-                   "Compare the kernels of this folder (like cl/ of the source) ...")
-      ->type_name("DIR");
-  command->add_option("--against", options->against, "... with those of this one, in turns")
-      ->type_name("DIR");
-  command->add_option("--json", options->json, "Also write the result as JSON")->type_name("FILE");
-  command->add_option("--csv", options->csv, "Also write the result as CSV")->type_name("FILE");
-  command->add_option("--html", options->html, "Also write the result as a page")
-      ->type_name("FILE");
+  add_row_options(*command, *options);
+  add_kind_options(*command, *options);
+  add_result_options(*command, *options);
   add_trace_flags(*command, options->trace);
   add_device_flags(*command, options->device);
 

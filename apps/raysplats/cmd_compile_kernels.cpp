@@ -2,8 +2,8 @@
 #include <memory>
 #include <string>
 
+#include "commands.hpp"
 #include "device/compiler_process.hpp"
-#include "options.hpp"
 
 namespace raysplats::cli {
 namespace {

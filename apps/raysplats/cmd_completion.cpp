@@ -4,10 +4,11 @@
 #include <filesystem>
 #include <memory>
 
+#include "commands.hpp"
 #include "completion.hpp"
-#include "options.hpp"
 #include "util/atomic_file.hpp"
 #include "util/output_directory.hpp"
+#include "validators.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -53,6 +54,7 @@ Command add_manual_command(CLI::App& app) {
   auto options = std::make_shared<Options>();
   command->add_option("DIR", options->folder, "Folder for raysplats.1 and a page for each command")
       ->required()
+      ->check(not_empty())
       ->type_name("");
   return {command, [&app, options] { write_manual(app, options->folder); }};
 }

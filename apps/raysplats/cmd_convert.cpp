@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "commands.hpp"
 #include "io/convert_model.hpp"
+#include "io/model_file.hpp"
 #include "options.hpp"
 #include "raysplats/contributions.hpp"
 #include "raysplats/error.hpp"
@@ -16,7 +18,10 @@
 #include "run/model_source.hpp"
 #include "run/run_cameras.hpp"
 #include "train/mirror_meshes.hpp"
+#include "util/atomic_file.hpp"
 #include "util/number_text.hpp"
+#include "validators.hpp"
+#include "value_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -82,6 +87,9 @@ void run(Options& options) {
     if (options.crop_max) changes.crop->high = vector_of(*options.crop_max);
   }
   const ModelSource source = find_model(options.input);
+  // Before the views are traced for what is kept.
+  io::output_format(options.output);
+  check_output_file(options.output, options.overwrite, {source.file});
   std::optional<TraceOptions> trace;
   if (source.header || source.trained) trace = trace_options(source);
   const ModelEncoding encoding{options.spz_axes == "rub" ? SpzAxes::kRub : SpzAxes::kPly,
@@ -117,6 +125,7 @@ Command add_convert_command(CLI::App& app) {
           "-o,--output,OUT", options->output,
           "What to write, by its ending: .ply, .compressed.ply, .splat, .spz, .sog or .glb")
       ->required()
+      ->check(not_empty())
       ->type_name("FILE");
   command->add_option("--sh-degree", changes.sh_degree, "Keep or fill up this many SH degrees")
       ->transform(whole_between(0, 4));
@@ -167,14 +176,14 @@ Command add_convert_command(CLI::App& app) {
   command
       ->add_option(
           "--spz-axes", options->spz_axes,
-          "Axes of an SPZ that is read or written: those of the PLY (what most files hold), "
-          "or right, up, back as its specification says (rub)")
+          "Axes of an SPZ that is written, or read and does not declare its own: those of the PLY "
+          "(what most files hold), or right, up, back as its specification says (rub)")
       ->check(one_of({"ply", "rub"}))
       ->capture_default_str();
   command->add_option("--spz-version", options->spz_version, "3 (gzip) or 4 (zstd)")
       ->transform(whole_between(3, 4))
       ->capture_default_str();
-  add_overwrite_flag(*command, options->overwrite);
+  add_overwrite_flag(*command, options->overwrite, kOverwriteFile);
   add_device_flags(*command, options->device);
   return {command, [options] { run(*options); }};
 }

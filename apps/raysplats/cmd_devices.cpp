@@ -4,10 +4,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "commands.hpp"
 #include "device/device_json.hpp"
 #include "device/program_cache.hpp"
 #include "device/tuning.hpp"
-#include "options.hpp"
+#include "raysplats/error.hpp"
+#include "value_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -42,6 +44,7 @@ void print(const DeviceInfo& device) {
 
 void run(const Options& options) {
   if (options.clear_cache) {
+    if (options.json) throw UsageError("--clear-cache lists no devices: leave out --json");
     const std::filesystem::path directory = default_cache_directory();
     fmt::print("{} compiled programs removed from {}\n", clear_program_cache(directory),
                directory.string());

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "bench/doctor.hpp"
+#include "commands.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 

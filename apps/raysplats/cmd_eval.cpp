@@ -2,11 +2,16 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "commands.hpp"
 #include "frame_progress.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
@@ -22,6 +27,7 @@
 #include "train/mirror_meshes.hpp"
 #include "util/number_text.hpp"
 #include "util/output_directory.hpp"
+#include "validators.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -30,6 +36,7 @@ struct Options {
   std::string model;
   std::string output;
   std::string lpips;
+  std::optional<std::size_t> pictures;
   bool align = false;
   bool overwrite = false;
   DataFlags data;
@@ -52,15 +59,18 @@ void run(const Options& options, const GlobalOptions& global) {
         options.output, (std::filesystem::path(options.output) / "eval").string()));
   }
   check_not_data(options.output, dataset);
-  check_leftovers(options.output, evaluated_names(dataset, split), FrameFormat::kPng,
-                  options.overwrite);
+  // Which views are shown is known only at the end where not all are.
+  const bool all_shown = options.pictures.value_or(views) >= views;
+  check_leftovers(options.output,
+                  all_shown ? evaluated_names(dataset, split) : std::vector<std::string>{},
+                  FrameFormat::kPng, options.overwrite);
   const TraceOptions trace = options.trace.over(trace_options(source));
-  make_output_directory(options.output);
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
     const Model on_device(context, model);
     Tracer tracer(context, trace, mirrors_of(source));
     std::unique_ptr<Lpips> lpips;
     if (!options.lpips.empty()) lpips = std::make_unique<Lpips>(options.lpips);
+    make_output_directory(options.output);
     spdlog::info("{} Gaussians of {}, {}", model.size(), source.file.string(),
                  counted(views, "view"));
 
@@ -85,6 +95,7 @@ void run(const Options& options, const GlobalOptions& global) {
       return image;
     };
     EvaluationOptions evaluation;
+    evaluation.max_pictures = options.pictures;
     evaluation.lpips = lpips.get();
     evaluation.align = options.align;
     evaluation.done = [&](std::size_t done) { return progress.done(done); };
@@ -115,8 +126,17 @@ Command add_eval_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("");
   command->add_option("-o,--output", options->output, "Folder for metrics.json and pictures")
       ->required()
+      ->check(not_empty())
       ->type_name("DIR");
-  command->add_option("--lpips", options->lpips, "ONNX network of LPIPS, for that measure too")
+  command
+      ->add_option("--pictures", options->pictures,
+                   "Views shown beside their photos at most: worst, median and best, then the "
+                   "first ones (all)")
+      ->transform(whole_between(0, 1e9))
+      ->type_name("N");
+  command
+      ->add_option("--lpips", options->lpips,
+                   "ONNX network of LPIPS (scripts/quality/export_lpips.py), for that measure too")
       ->type_name("NETWORK");
   command->add_flag("--align", options->align,
                     "Also move each camera to where its render comes closest to the photo, and "

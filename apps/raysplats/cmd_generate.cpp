@@ -8,8 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "commands.hpp"
 #include "options.hpp"
 #include "synth/synthetic_dataset.hpp"
+#include "validators.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -45,6 +47,7 @@ Command add_generate_command(CLI::App& app) {
   SyntheticOptions& data = options->data;
   command->add_option("DIR,-o,--output", options->directory, "Folder for the data set")
       ->required()
+      ->check(not_empty())
       ->type_name("");
   std::vector<std::string> names;
   for (const auto& [name, scene] : kScenes) names.emplace_back(name);

@@ -8,11 +8,15 @@
 #include <optional>
 #include <string>
 
+#include "commands.hpp"
 #include "options.hpp"
 #include "prepare/prepare.hpp"
+#include "raysplats/error.hpp"
+#include "run/model_source.hpp"
 #include "util/interrupt.hpp"
 #include "util/number_text.hpp"
 #include "util/progress.hpp"
+#include "validators.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -57,6 +61,10 @@ void run(Options& options, const GlobalOptions& global) {
   if (options.matching == "sequential") options.prepare.matching = Matching::kSequential;
   if (options.cameras == "folder") options.prepare.cameras = Cameras::kFolder;
   if (options.cameras == "photo") options.prepare.cameras = Cameras::kPhoto;
+  if (is_run_folder(options.output)) {
+    throw UsageError(
+        fmt::format("The output folder {} is a run: choose another with -o", options.output));
+  }
   Steps steps(global.quiet);
   const Prepared made =
       prepare_data(options.input, options.output, options.prepare,
@@ -88,6 +96,7 @@ Command add_prepare_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("");
   command->add_option("-o,--output", options->output, "Folder for the data set")
       ->required()
+      ->check(not_empty())
       ->type_name("DATA");
   command->add_option("--frames", options->prepare.frames, "Frames to take of a video")
       ->transform(whole_between(3, 100000))

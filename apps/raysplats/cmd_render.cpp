@@ -8,10 +8,12 @@
 #include <cstdio>
 #include <memory>
 
+#include "commands.hpp"
 #include "frame_progress.hpp"
 #include "io/camera_list.hpp"
 #include "io/data_origin.hpp"
 #include "io/scene_camera.hpp"
+#include "io/scene_file.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -20,13 +22,13 @@
 #include "render_flags.hpp"
 #include "render_output.hpp"
 #include "run/model_source.hpp"
-#include "scene/camera_check.hpp"
 #include "scene/camera_path.hpp"
 #include "scene/morton_order.hpp"
 #include "scene/orbit.hpp"
 #include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
 #include "util/number_text.hpp"
+#include "validators.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -138,16 +140,64 @@ std::vector<Camera> orbit(const RenderFlags& options,
   return orbit_cameras(extent, shape);
 }
 
-void run(const RenderFlags& options, const GlobalOptions& global) {
-  if (is_scene_file(options.model)) {
-    if (options.camera_model) {
-      throw UsageError(
-          fmt::format("--camera-model is for models: the lens of {} is the [camera] of the file",
-                      options.model));
-    }
-    render_scene(options, global);
-    return;
+/// The cameras of the frames, and how their time goes by.
+struct RenderViews {
+  std::vector<Camera> cameras;
+  std::optional<double> fps;  ///< of a path
+  bool closed = false;        ///< the frame after the last one is the first
+};
+
+/// The cameras of --cameras or --path, from where the model's positions count.
+RenderViews file_views(const RenderFlags& options, const ModelSource& source) {
+  const glm::dvec3 origin(source.origin[0], source.origin[1], source.origin[2]);
+  RenderViews views;
+  if (options.path.empty()) {
+    views.cameras = io::read_model_cameras(options.cameras, origin);
+  } else {
+    CameraPathFile path = read_path(options);
+    for (Camera& camera : path.cameras) io::move_origin(camera, origin);
+    views = {std::move(path.cameras), path.fps, path.closed};
   }
+  const double factor = options.data.settings.over({}).downscale;
+  for (Camera& camera : views.cameras) camera = downscaled(camera, factor);
+  return views;
+}
+
+/// The cameras that the options choose. `dataset` is that of --data, empty without one.
+RenderViews render_views(const RenderFlags& options,
+                         const ModelSource& source,
+                         const Gaussians& model,
+                         const Dataset& dataset) {
+  if (!options.cameras.empty() || !options.path.empty()) return file_views(options, source);
+  RenderViews views;
+  views.closed = options.orbit || options.ellipse || options.spiral;
+  if (options.orbit) {
+    views.cameras = orbit(options, model, cameras_of(dataset, Split::kAll));
+  } else if (options.ellipse || options.spiral || options.interpolate) {
+    views.cameras = along(options, cameras_of(dataset, Split::kAll));
+  } else {
+    views.cameras = cameras_of(dataset, options.data.chosen_split());
+  }
+  return views;
+}
+
+// All ranks: the report of all.
+void add_up(Communicator& ranks, FrameReport& report) {
+  report.frames = sum_over(ranks, report.frames);
+  report.rays = sum_over(ranks, report.rays);
+  report.capped_rays = sum_over(ranks, report.capped_rays);
+  report.trace_seconds = most_of(ranks, report.trace_seconds);
+}
+
+void print_summary(const FrameReport& report, const std::string& output, double compiling) {
+  const std::string speed =
+      fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,
+                  1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
+  fmt::print("{} in {} ({})\n", counted(report.frames, "frame"), output,
+             with_compiling(speed, compiling));
+}
+
+void render_model(const RenderFlags& options, const GlobalOptions& global) {
   check(options);
   const ModelSource source = find_model(options.model);
   const Gaussians model = in_morton_order(read_model(source.file));
@@ -155,34 +205,12 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
   if (!options.data.data.empty()) {
     dataset = load_dataset(options.data.data, options.data.settings.over(dataset_options(source)));
   }
-
-  std::vector<Camera> cameras;
-  std::optional<double> fps;
-  bool closed = options.orbit || options.ellipse || options.spiral;
-  if (options.orbit) {
-    cameras = orbit(options, model, cameras_of(dataset, Split::kAll));
-  } else if (options.ellipse || options.spiral || options.interpolate) {
-    cameras = along(options, cameras_of(dataset, Split::kAll));
-  } else if (!options.cameras.empty() || !options.path.empty()) {
-    const glm::dvec3 origin(source.origin[0], source.origin[1], source.origin[2]);
-    if (!options.path.empty()) {
-      CameraPathFile path = read_path(options);
-      cameras = std::move(path.cameras);
-      fps = path.fps;
-      closed = path.closed;
-      for (Camera& camera : cameras) io::move_origin(camera, origin);
-    } else {
-      cameras = io::read_model_cameras(options.cameras, origin);
-    }
-    const double factor = options.data.settings.over({}).downscale;
-    for (Camera& camera : cameras) camera = downscaled(camera, factor);
-  } else {
-    cameras = cameras_of(dataset, options.data.chosen_split());
-  }
+  const RenderViews views = render_views(options, source, model, dataset);
+  const std::vector<Camera>& cameras = views.cameras;
   if (cameras.empty()) throw no_views(options.data);
   if (!options.data.data.empty() && !options.output.empty())
     check_not_data(options.output, dataset);
-  RenderOutput output(options, cameras, cameras.size(), fps, closed);
+  RenderOutput output(options, cameras, cameras.size(), views.fps, views.closed);
 
   TraceOptions trace = options.trace.over(trace_options(source));
   trace.depth = options.depth || options.hits;
@@ -199,21 +227,26 @@ void run(const RenderFlags& options, const GlobalOptions& global) {
         tracer, on_device, cameras, options.output, share,
         [&](std::size_t done) { return progress.done(done); },
         [&](double share) { return progress.within(share); });
-    report.frames = sum_over(ranks, report.frames);
-    report.rays = sum_over(ranks, report.rays);
-    report.capped_rays = sum_over(ranks, report.capped_rays);
-    report.trace_seconds = most_of(ranks, report.trace_seconds);
+    add_up(ranks, report);
     progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
     if (!ranks.leads()) return;
     output.finish();
     warn_of_capped_rays(report.capped_rays, report.rays, trace);
-    const std::string speed =
-        fmt::format("{:.2f} s of tracing, {:.2f} million rays per second", report.trace_seconds,
-                    1e-6 * static_cast<double>(report.rays) / report.trace_seconds);
-    fmt::print("{} in {} ({})\n", counted(report.frames, "frame"), output.name(),
-               with_compiling(speed, context.build_seconds()));
+    print_summary(report, output.name(), context.build_seconds());
     if (options.device.profile) fmt::print("{}", context.profile_table());
   });
+}
+
+void run(const RenderFlags& options, const GlobalOptions& global) {
+  if (!is_scene_file(options.model)) {
+    render_model(options, global);
+    return;
+  }
+  if (options.camera_model) {
+    throw UsageError(fmt::format(
+        "--camera-model is for models: the lens of {} is the [camera] of the file", options.model));
+  }
+  render_scene(options, global);
 }
 
 }  // namespace
@@ -228,148 +261,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
                    "file (.toml)")
       ->required()
       ->type_name("");
-  command->add_option("-o,--output", options->output, "Folder for the frames")->type_name("DIR");
-  command
-      ->add_option("--video", options->video,
-                   "All frames as one file: .mp4 or .webm (by ffmpeg), .gif or .apng")
-      ->type_name("FILE");
-  add_overwrite_flag(*command, options->overwrite);
-  command->add_option("--format", options->format, "exr (float RGBA), png or jpg (8-bit RGB)")
-      ->check(one_of({"exr", "png", "jpg"}))
-      ->capture_default_str();
-  command
-      ->add_option("--exr", options->exr,
-                   "Numbers of an EXR: linear (default), as other programs expect, or display, the "
-                   "values as trained that PNG and JPG hold")
-      ->check(one_of({"linear", "display"}));
-
-  add_data_flags(*command, options->data);
-  const std::string where = "Other cameras";
-  command->add_option("--cameras", options->cameras, "transforms.json or cameras.json with cameras")
-      ->group(where)
-      ->type_name("FILE");
-  command
-      ->add_option("--orbit", options->orbit,
-                   "N cameras on a circle around the model (with --data: as its cameras)")
-      ->group(where)
-      ->transform(whole_between(1, 1e6))
-      ->type_name("N");
-
-  command
-      ->add_option("--path", options->path,
-                   "Camera path: JSON of nerfstudio or the viewer's page, or keyframes in TOML")
-      ->group(where)
-      ->type_name("FILE");
-  command
-      ->add_option("--ellipse", options->ellipse,
-                   "N cameras on the ellipse along which --data's photos lie")
-      ->group(where)
-      ->transform(whole_between(1, 1e6))
-      ->type_name("N");
-  command
-      ->add_option("--spiral", options->spiral, "N cameras on a spiral about --data's mean photo")
-      ->group(where)
-      ->transform(whole_between(1, 1e6))
-      ->type_name("N");
-  command
-      ->add_option("--interpolate", options->interpolate,
-                   "From photo to photo of --data, N frames each")
-      ->group(where)
-      ->transform(whole_between(1, 1e4))
-      ->type_name("N");
-
-  const std::string time = "Time";
-  command
-      ->add_option("--seconds", options->seconds,
-                   "Of --path (the file's), or in which all frames of --video go by")
-      ->group(time)
-      ->transform(between(1e-3, 86400));
-  command
-      ->add_option("--fps", options->fps,
-                   "Frames a second of --path and --video (the file's, or 30)")
-      ->group(time)
-      ->transform(between(kLeastFps, kMostFps));
-  command
-      ->add_flag("--constant-speed", options->constant_speed,
-                 "The eye of --path moves at one speed, whatever the file says of seconds")
-      ->group(time);
-  command
-      ->add_option("--path-transform", options->path_transform,
-                   "dataparser_transforms.json of nerfstudio, for paths in its scaled world")
-      ->group(time)
-      ->type_name("FILE");
-  command
-      ->add_option("--path-data", options->path_data,
-                   "With it, the transforms.json that the model was trained from, where that has "
-                   "an applied_transform")
-      ->group(time)
-      ->type_name("FILE");
-  command
-      ->add_option("--shutter-samples", options->shutter_samples,
-                   "Motion blur: moments of every frame that are averaged")
-      ->group(time)
-      ->transform(whole_between(1, 1024))
-      ->type_name("N");
-  command
-      ->add_option("--shutter", options->shutter,
-                   "Share of the time to the next frame in which they lie (0.5)")
-      ->group(time)
-      ->transform(between(1e-3, 1));
-
-  const std::string orbit = "Orbit";
-  command
-      ->add_option("--width", options->width,
-                   "Pixels (800, or the data set's; one side alone keeps the shape)")
-      ->group(orbit)
-      ->transform(whole_between(1, kMaxSide));
-  command->add_option("--height", options->height, "Pixels")
-      ->group(orbit)
-      ->transform(whole_between(1, kMaxSide));
-  command
-      ->add_option("--fov", options->fov, "Degrees along the smaller side (45, or the data set's)")
-      ->group(orbit)
-      ->transform(between(kLeastFov, most_fov(CameraModel::kFisheye)));
-  command
-      ->add_option("--elevation", options->elevation,
-                   "Degrees above the centre (20, or the cameras' median)")
-      ->group(orbit)
-      ->transform(between(-89.9, 89.9));
-  command
-      ->add_option("--distance", options->distance,
-                   "Of the eye from the centre (the model fits, or the cameras' median)")
-      ->group(orbit)
-      ->transform(between(1e-9, kNoBound));
-  command
-      ->add_option("--camera-model", options->camera_model,
-                   "pinhole, fisheye, equirectangular (twice as wide as high) or orthographic")
-      ->group(orbit)
-      ->check(one_of({"pinhole", "fisheye", "equirectangular", "orthographic"}));
-  command->add_option("--up", options->up, "World direction that is up (0,-1,0, or the cameras')")
-      ->group(orbit)
-      ->check(triple())
-      ->type_name("X,Y,Z");
-
-  const std::string scene = "Scene files (over what they say)";
-  add_render_flags(*command, options->render, scene);
-  command
-      ->add_option("--frames", options->frames,
-                   "Only the frames from START up to END, which is left out; either may be empty")
-      ->group(scene)
-      ->type_name("START:END");
-
-  command->add_option("--supersample", options->supersample, "S x S rays per pixel, averaged")
-      ->transform(whole_between(1, 16));
-  command->add_flag("--depth", options->depth,
-                    "Also expected depth: channel Z of an EXR, or NAME_depth.png");
-  command->add_flag("--normals", options->normals,
-                    "Also normals: channels N.X, N.Y, N.Z of an EXR in world axes, or "
-                    "NAME_normals.png in the camera's (right red, up green, near blue)");
-  command->add_flag("--hits", options->hits,
-                    "Also the number of blended Gaussians: channel hits of an EXR, or "
-                    "NAME_hits.png (white: the most of the frame)");
-  add_trace_flags(*command, options->trace);
-  add_traversal_flag(*command, options->trace);
-  add_device_flags(*command, options->device);
+  add_render_options(*command, *options);
   return {command, [options, &global] { run(*options, global); }};
 }
 

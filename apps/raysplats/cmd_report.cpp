@@ -4,12 +4,15 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <vector>
 
+#include "commands.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "report/run_report.hpp"
 #include "util/atomic_file.hpp"
+#include "validators.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -17,19 +20,26 @@ namespace {
 struct Options {
   std::vector<std::string> runs;
   std::string output;
+  bool overwrite = false;
 };
 
 void run(const Options& options) {
   if (options.runs.size() > 1) {
     if (options.output.empty())
       throw UsageError("Several runs have no one folder for their page: say where by -o FILE");
+    check_output_file(options.output, options.overwrite);
     write_text_file(options.output, runs_report({options.runs.begin(), options.runs.end()}));
     fmt::print("{}\n", options.output);
     return;
   }
   const std::filesystem::path run = options.runs.front();
+  // A run's own page is made anew.
+  const std::filesystem::path own = run / "report.html";
   const std::filesystem::path file =
-      options.output.empty() ? run / "report.html" : std::filesystem::path(options.output);
+      options.output.empty() ? own : std::filesystem::path(options.output);
+  std::error_code error;
+  if (file != own && !std::filesystem::equivalent(file, own, error))
+    check_output_file(file, options.overwrite);
   write_run_report(run, file);
   fmt::print("{}\n", file.string());
 }
@@ -44,7 +54,9 @@ Command add_report_command(CLI::App& app) {
   command
       ->add_option("-o,--output", options->output,
                    "HTML file (default: report.html in the run; needed for several)")
+      ->check(not_empty())
       ->type_name("FILE");
+  add_overwrite_flag(*command, options->overwrite, kOverwriteFile);
   return {command, [options] { run(*options); }};
 }
 

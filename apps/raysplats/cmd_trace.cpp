@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "commands.hpp"
 #include "io/ray_file.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
@@ -13,6 +14,8 @@
 #include "raysplats/tracer.hpp"
 #include "run/model_source.hpp"
 #include "scene/morton_order.hpp"
+#include "util/atomic_file.hpp"
+#include "validators.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -22,15 +25,22 @@ struct Options {
   std::string rays;
   std::string output;
   std::string color_direction = "ray";
+  bool overwrite = false;
   TraceSettings trace;
   DeviceFlags device;
 };
 
 void run(const Options& options) {
   const ModelSource source = find_model(options.model);
+  check_output_file(options.output, options.overwrite, {source.file, options.rays});
   const io::RayList list = io::read_rays(options.rays);
   const Gaussians gaussians = in_morton_order(read_model(source.file));
   const TraceOptions trace = options.trace.over(trace_options(source));
+  if (trace.near_depth > 0.0f) {
+    throw UsageError(
+        "--near is about cameras, and rays begin at their own t_min: give --near 0, also for a "
+        "model that was trained with another");
+  }
   const std::unique_ptr<Context> context = open_context(options.device);
   const Model model(*context, gaussians);
   Tracer tracer(*context, trace);
@@ -60,13 +70,14 @@ Command add_trace_command(CLI::App& app) {
   command
       ->add_option("--rays", options->rays,
                    "Array (..., 6) of origins and directions, or (..., 8) with t_min and t_max, of "
-                   "32-bit or 64-bit floats")
+                   "floats or whole numbers")
       ->required()
       ->type_name("FILE.npy");
   command
       ->add_option("-o,--output", options->output,
                    "Arrays color, alpha, depth, median_depth and hits, as the rays are shaped")
       ->required()
+      ->check(not_empty())
       ->type_name("FILE.npz");
   command
       ->add_option(
@@ -74,6 +85,7 @@ Command add_trace_command(CLI::App& app) {
           "Colours are seen along the ray, or from its origin as cameras see them (origin)")
       ->check(one_of({"ray", "origin"}))
       ->capture_default_str();
+  add_overwrite_flag(*command, options->overwrite, kOverwriteFile);
   add_trace_flags(*command, options->trace);
   add_device_flags(*command, options->device);
   return {command, [options] { run(*options); }};

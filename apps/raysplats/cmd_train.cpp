@@ -6,8 +6,11 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <system_error>
 
+#include "commands.hpp"
 #include "options.hpp"
+#include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
 #include "render/output_check.hpp"
 #include "report/run_report.hpp"
@@ -17,6 +20,8 @@
 #include "train/quality_preset.hpp"
 #include "util/number_text.hpp"
 #include "util/progress.hpp"
+#include "validators.hpp"
+#include "value_text.hpp"
 #include "view/photos.hpp"
 #include "view/run_view.hpp"
 #include "view/view_state.hpp"
@@ -38,17 +43,6 @@ struct Options {
   DeviceFlags device;
 };
 
-/// A resumed run keeps its options; the command line and a --config go before them.
-void keep_run_options(CLI::App& command, Options& options) {
-  if (options.resume.empty() || command.get_option("--config")->count() > 0) return;
-  std::filesystem::path run = options.resume == "latest" ? options.output : options.resume;
-  if (!std::filesystem::is_directory(run)) run = run.parent_path().parent_path();
-  const std::filesystem::path config = run / "config.toml";
-  if (!std::filesystem::exists(config)) return;
-  apply_run_config(command, options.train, config);
-  validate(options.train);
-}
-
 /// --time and --quality choose for a new run what its configuration then names.
 void check_choices(const CLI::App& command, const Options& options) {
   const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
@@ -56,6 +50,12 @@ void check_choices(const CLI::App& command, const Options& options) {
     throw UsageError(
         "--time and --quality are about new runs: a resumed one has its length, which "
         "--iterations changes");
+  }
+  std::error_code error;
+  if (!options.resume.empty() && options.resume != "latest" &&
+      !std::filesystem::exists(options.resume, error)) {
+    throw DataError(fmt::format("--resume {} does not exist: name a run or a checkpoint of one",
+                                options.resume));
   }
   if (!options.time.empty() && given("--iterations")) {
     throw UsageError("--time and --iterations contradict each other: leave one of them out");
@@ -201,11 +201,13 @@ void train(const CLI::App& command,
 void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   check_choices(command, options);
   if (!options.time.empty()) parse_duration("--time", options.time);  // before anything is loaded
-  keep_run_options(command, options);
-  // The end of a run by time is not that of a run which is given another length.
-  if (command.get_option("--iterations")->count() > 0 &&
-      command.get_option("--end-iteration")->count() == 0)
-    options.train.end_iteration = 0;
+  if (!options.resume.empty()) {
+    apply_resumed_options(command, options.train,
+                          options.resume == "latest" ? options.output : options.resume);
+  } else if (command.get_option("--iterations")->count() > 0 &&
+             command.get_option("--end-iteration")->count() == 0) {
+    options.train.end_iteration = 0;  // of a run by time, whose configuration --config has named
+  }
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
     train(command, options, global, ranks, context);
   });
@@ -223,6 +225,7 @@ Command add_train_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("DATA");
   command->add_option("-o,--output", options->output, "Folder for the run")
       ->required()
+      ->check(not_empty())
       ->type_name("RUN");
   command
       ->add_option("--resume", options->resume,

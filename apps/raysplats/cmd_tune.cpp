@@ -7,10 +7,13 @@
 #include <tuple>
 
 #include "bench/tune.hpp"
+#include "commands.hpp"
 #include "device/tuning.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
+#include "validators.hpp"
+#include "value_text.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -11,12 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "commands.hpp"
 #include "io/camera_list.hpp"
+#include "io/scene_file.hpp"
 #include "io/scene_loader.hpp"
 #include "options.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/model.hpp"
-#include "render_flags.hpp"
 #include "run/model_source.hpp"
 #include "run/run_cameras.hpp"
 #include "scene/morton_order.hpp"
@@ -25,6 +26,7 @@
 #include "train/mirror_meshes.hpp"
 #include "util/interrupt.hpp"
 #include "util/number_text.hpp"
+#include "validators.hpp"
 #include "view/dropped_meshes.hpp"
 #include "view/photos.hpp"
 #include "view/view_state.hpp"
@@ -52,8 +54,8 @@ std::vector<View> views_of(const Options& options, const Dataset& dataset) {
   return views;
 }
 
-/// Those that the model was trained from, where it is a run's: what they show is looked at without
-/// them if their file is damaged.
+/// The cameras that the model was trained from, where it is a run's; none, with a warning, if their
+/// file is damaged.
 std::vector<Camera> trained_cameras(const ModelSource& source) {
   try {
     return run_cameras(source);

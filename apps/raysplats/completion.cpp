@@ -9,7 +9,7 @@
 #include <functional>
 #include <string_view>
 
-#include "options.hpp"
+#include "command_line.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -13,7 +13,7 @@
 #include "util/interrupt.hpp"
 #include "util/progress.hpp"
 
-namespace raysplats {
+namespace raysplats::cli {
 
 /// Draws how far a rank is with its share of the frames and lets signals end them: what
 /// write_frames(), write_scene_frames() and evaluate() tell.
@@ -56,4 +56,4 @@ class FrameProgress {
   std::size_t frames_ = 0;
 };
 
-}  // namespace raysplats
+}  // namespace raysplats::cli

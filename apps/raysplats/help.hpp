@@ -22,7 +22,7 @@ class HelpFormatter : public CLI::Formatter {
   std::string make_option_opts(const CLI::Option* option) const override;
 
  private:
-  // Of the help in work, whose parts CLI11 asks for one after the other.
+  // State of the help in work, whose parts CLI11 asks for one after the other.
   mutable bool whole_ = true;
   mutable bool train_ = false;
   mutable std::size_t left_out_ = 0;

@@ -4,19 +4,19 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <map>
 #include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
 
 #include "bench/report.hpp"
-#include "info_files.hpp"
+#include "info_file.hpp"
 #include "io/colmap_model.hpp"
 #include "io/mtl_materials.hpp"
 #include "io/ply_file.hpp"
 #include "io/ply_points.hpp"
 #include "raysplats/lpips.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -24,25 +24,10 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-bool is_file(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
-
-Json bounds_of(const std::vector<float>& positions) {
-  std::array<float, 3> low{}, high{};
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    low[i % 3] = i < 3 ? positions[i] : std::min(low[i % 3], positions[i]);
-    high[i % 3] = i < 3 ? positions[i] : std::max(high[i % 3], positions[i]);
-  }
-  return {low, high};
-}
-
 /// The folder of photos stands beside a model that lies in a data set's own folder.
 bool has_photos(const fs::path& folder, const io::ColmapModel& model) {
-  std::error_code error;
   for (const char* name : {"images", "images_2", "images_4", "images_8"})
-    if (fs::is_directory(folder / name, error)) return true;
+    if (is_folder(folder / name)) return true;
   return !model.images.empty() && is_file(folder / model.images.front().name);
 }
 
@@ -96,10 +81,10 @@ std::optional<Json> describe_points(const fs::path& path) {
 std::optional<Json> describe_colmap(const fs::path& path) {
   constexpr std::array<std::string_view, 3> kParts{"cameras", "images", "points3D"};
   const std::string extension = path.extension().string(), stem = path.stem().string();
-  std::error_code error;
-  const bool whole = fs::is_directory(path, error);
+  const bool whole = is_folder(path);
   const bool part = (extension == ".bin" || extension == ".txt") &&
                     std::find(kParts.begin(), kParts.end(), stem) != kParts.end();
+  std::error_code error;
   const fs::path folder = whole ? path : fs::absolute(path, error).parent_path();
   if ((!whole && !part) || (!is_file(folder / "cameras.bin") && !is_file(folder / "cameras.txt")))
     return std::nullopt;

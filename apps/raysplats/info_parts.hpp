@@ -5,10 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-/// Files that belong to something larger: a capture, a mesh, a run, a measurement. All say by
-/// "type" what they are; nothing where name and content are something else. They throw what the
-/// readers of the files throw.
 namespace raysplats::cli {
+
+// Descriptions of files that belong to something larger: a capture, a mesh, a run, a measurement.
+// All say by "type" what they are; nothing where name and content are something else. They throw
+// what the readers of the files throw.
 
 /// Points of a PLY without faces and without what Gaussians have.
 std::optional<nlohmann::ordered_json> describe_points(const std::filesystem::path& path);

@@ -14,7 +14,10 @@
 #include <utility>
 #include <vector>
 
+#include "command_line.hpp"
+#include "commands.hpp"
 #include "help.hpp"
+#include "logging.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "shared_work.hpp"
@@ -91,7 +94,7 @@ int run(int argc, char** argv, GlobalOptions& global) {
     if (!command.app->parsed()) continue;
     global.processes = join_processes(command.app->get_name());
     if (!global.processes.leads()) global.quiet = true;
-    start_logging(global);
+    start_logging(global.log_level, global.quiet);
     command.run();
   }
   raysplats::finish_standard_output();

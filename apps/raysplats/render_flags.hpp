@@ -57,8 +57,8 @@ struct RenderFlags {
   void check_path_options() const;
 };
 
-/// Whether the first argument of `render` is a scene file: its name ends in .toml.
-bool is_scene_file(const std::string& model);
+/// All options of `render` but its first argument.
+void add_render_options(CLI::App& command, RenderFlags& options);
 
 /// `render` of a scene file.
 void render_scene(const RenderFlags& flags, const GlobalOptions& global);

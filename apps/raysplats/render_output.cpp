@@ -3,10 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
-
 #include "raysplats/error.hpp"
 #include "render/output_check.hpp"
+#include "util/atomic_file.hpp"
 #include "util/output_directory.hpp"
 
 namespace raysplats::cli {
@@ -15,50 +14,6 @@ namespace {
 constexpr double kFps = 30.0;
 
 }  // namespace
-
-FrameOptions RenderFlags::frame_options() const {
-  FrameOptions out;
-  if (format == "exr") out.format = FrameFormat::kExr;
-  if (format == "jpg") out.format = FrameFormat::kJpg;
-  if (!exr.empty() && format != "exr") {
-    throw UsageError(fmt::format("--exr {} is for --format exr, not {}", exr, format));
-  }
-  out.linear_exr = exr != "display";
-  out.supersample = supersample;
-  out.depth = depth;
-  out.normals = normals;
-  out.hits = hits;
-  out.files = !output.empty();
-  if (output.empty() && video.empty())
-    throw UsageError("There is nowhere to put the frames: give -o DIR, --video FILE or both");
-  if (output.empty() && (depth || normals || hits)) {
-    throw UsageError(
-        "--depth, --normals and --hits are for the files of frames: add -o DIR to --video");
-  }
-  if (fps && path.empty() && video.empty())
-    throw UsageError("--fps is for --path and --video: files of frames have no time");
-  if (shutter && !shutter_samples)
-    throw UsageError("--shutter is for motion blur: add --shutter-samples N");
-  out.shutter = shutter.value_or(out.shutter);
-  out.shutter_samples = shutter_samples.value_or(1);
-  return out;
-}
-
-void RenderFlags::check_path_options() const {
-  if (!path_data.empty() && path_transform.empty())
-    throw UsageError("--path-data is about nerfstudio's scaled world: add --path-transform FILE");
-  if (!path.empty()) return;
-  if (!path_transform.empty() || constant_speed) {
-    throw UsageError("--path-transform and --constant-speed shape a camera path: add --path FILE");
-  }
-  if (seconds && video.empty())
-    throw UsageError("--seconds is for --path and --video: files of frames have no time");
-  if (seconds && fps) {
-    throw UsageError(
-        "The frames are so many as are asked for, so --seconds says how fast they go, or --fps: "
-        "give one");
-  }
-}
 
 CameraPathFile read_path(const RenderFlags& flags) {
   PathOptions options;
@@ -85,11 +40,7 @@ RenderOutput::RenderOutput(const RenderFlags& flags,
     check_leftovers(flags.output, frame_names(cameras), options_.format, flags.overwrite);
   }
   if (flags.video.empty()) return;
-  std::error_code error;
-  if (!flags.overwrite && std::filesystem::exists(flags.video, error)) {
-    throw UsageError(
-        fmt::format("{} is there already: give another name, or --overwrite", flags.video));
-  }
+  check_output_file(flags.video, flags.overwrite);
   for (const Camera& camera : cameras) {
     if (camera.width == cameras.front().width && camera.height == cameras.front().height) continue;
     throw UsageError(fmt::format(

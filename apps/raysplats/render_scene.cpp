@@ -18,6 +18,7 @@
 #include "run/model_source.hpp"
 #include "shared_work.hpp"
 #include "util/number_text.hpp"
+#include "validators.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -180,10 +181,6 @@ void add_up(Communicator& ranks, SceneReport& report) {
 }
 
 }  // namespace
-
-bool is_scene_file(const std::string& model) {
-  return std::filesystem::path(model).extension() == ".toml";
-}
 
 void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   check(flags);

@@ -15,6 +15,7 @@
 #include "comm/launcher.hpp"
 #include "comm/thread_ranks.hpp"
 #include "device/device_list.hpp"
+#include "logging.hpp"
 #include "util/interrupt.hpp"
 
 namespace raysplats::cli {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "options.hpp"
+#include "validators.hpp"
 #include "view/viewer.hpp"
 
 namespace raysplats::cli {

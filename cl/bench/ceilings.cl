@@ -3,11 +3,15 @@
 // multiply-adds in registers, and the bandwidth of reading and writing large buffers; for the model
 // of speed also other instructions, and reading and writing at random (below).
 //   fma_chains   CHAINS independent float16 accumulators per work-item; `rounds` times CHAINS * 16
-//                multiply-adds each                             global: any number of work-items
-//   copy_runs    every work-item copies `run` consecutive float16s (suits CPUs)   global: runs
-//   copy_stride  neighbouring work-items copy neighbouring float4s (suits GPUs)   global: float4s
+//                multiply-adds each
+//                global size: any number of work-items
+//   copy_runs    every work-item copies `run` consecutive float16s (suits CPUs)
+//                global size: runs
+//   copy_stride  neighbouring work-items copy neighbouring float4s (suits GPUs)
+//                global size: float4s
 //   rewrite_runs as copy_runs, but in place: caches that fetch a line before it is written move
-//                half as much again for a copy             global: runs
+//                half as much again for a copy
+//                global size: runs
 // O(rounds) and O(1) per element. Copying as in McCalpin's STREAM (1995): read and write both
 // count.
 
@@ -72,7 +76,8 @@ __kernel void rewrite_runs(__global float16* data, uint run) {
 }
 
 // Instructions that are no fused multiply-adds, as the tracing kernels have them: four chains of
-// four dependent ones a round.                                  global: any number of work-items
+// four dependent ones a round.
+// global size: any number of work-items
 __kernel void vector_steps(__global float16* out, uint rounds, float factor, float bound) {
   const uint i = get_global_id(0);
   const float16 a = (float16)(factor), b = (float16)(bound), c = (float16)(0.25f * bound);
@@ -86,7 +91,8 @@ __kernel void vector_steps(__global float16* out, uint rounds, float factor, flo
   out[i] = x0 + x1 + x2 + x3;
 }
 
-// Divisions and roots: four chains of one each a round.         global: any number of work-items
+// Divisions and roots: four chains of one each a round.
+// global size: any number of work-items
 __kernel void slow_steps(__global float16* out, uint rounds, float factor) {
   const uint i = get_global_id(0);
   const float16 a = (float16)(factor);
@@ -101,7 +107,7 @@ __kernel void slow_steps(__global float16* out, uint rounds, float factor) {
 }
 
 // Vectors that begin at any float of a table of mask + 17 floats, as windows slide over rows.
-//                                                               global: any number of work-items
+// global size: any number of work-items
 __kernel void shifted_reads(__global const float* restrict table,
                             __global float16* restrict out,
                             uint rounds,
@@ -121,7 +127,8 @@ __kernel void shifted_reads(__global const float* restrict table,
 }
 
 // Whole vectors written in turn to the same lines of each work-item's: 4 a round, lines of 4 (mask
-// + 1).                                                         global: any number of work-items
+// + 1).
+// global size: any number of work-items
 __kernel void parked_vectors(__global float16* restrict lines,
                              uint rounds,
                              uint mask,
@@ -138,7 +145,7 @@ __kernel void parked_vectors(__global float16* restrict lines,
 }
 
 // Lines of 64 bytes at random, of a table of mask + 1: no address waits for what was read.
-//                                                               global: any number of work-items
+// global size: any number of work-items
 __kernel void random_lines(__global const float16* restrict table,
                            __global float16* restrict out,
                            uint rounds,
@@ -154,7 +161,7 @@ __kernel void random_lines(__global const float16* restrict table,
 }
 
 // Whole numbers, one at a time: four chains of four dependent instructions a round.
-//                                                               global: any number of work-items
+// global size: any number of work-items
 __kernel void scalar_steps(__global uint* out, uint rounds, uint factor) {
   const uint i = get_global_id(0);
   uint x0 = i, x1 = i + factor, x2 = i ^ factor, x3 = i * factor;
@@ -168,7 +175,7 @@ __kernel void scalar_steps(__global uint* out, uint rounds, uint factor) {
 }
 
 // The same in runs of 16 lines: of a table of 16 (mask + 1).
-//                                                               global: any number of work-items
+// global size: any number of work-items
 __kernel void random_runs(__global const float16* restrict table,
                           __global float16* restrict out,
                           uint rounds,
@@ -185,7 +192,7 @@ __kernel void random_runs(__global const float16* restrict table,
 }
 
 // The same of single lines where every one tells where the next one is: the table holds a cycle.
-//                                                               global: any number of work-items
+// global size: any number of work-items
 __kernel void chased_lines(__global const uint16* restrict table,
                            __global uint* restrict out,
                            uint rounds,
@@ -198,7 +205,8 @@ __kernel void chased_lines(__global const uint16* restrict table,
 
 // Lines of planes of a picture in the order of its tiles, which are two lines wide and four rows
 // high: `planes` planes of get_global_size(0) rows of tiles, `stride` lines a row, read `passes`
-// times.                                                        global: rows of tiles
+// times.
+// global size: rows of tiles
 __kernel void tiled_lines(__global const float16* restrict table,
                           __global float16* restrict out,
                           uint planes,
@@ -221,7 +229,7 @@ __kernel void tiled_lines(__global const float16* restrict table,
 }
 
 // Words of 8 bytes written at random into a table of mask + 1: what a sort's scatter waits for.
-//                                                               global: any number of work-items
+// global size: any number of work-items
 __kernel void random_stores(__global uint2* restrict table, uint rounds, uint mask) {
   const uint i = get_global_id(0);
   uint place = 0x9e3779b9u * (i + 1);

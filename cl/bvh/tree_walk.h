@@ -31,7 +31,7 @@ typedef struct {
 #error "a trail has room for four children a node"
 #endif
 
-// Of children_by_depth().
+// Key that children_by_depth() gives children that the ray does not meet.
 #define RS_NO_CHILD 0xffffffffu
 
 typedef struct {
@@ -65,7 +65,7 @@ RS_INLINE uint child_key(
   const float nx = ray->inverse.x < 0.0f ? x1 : x0, fx = ray->inverse.x < 0.0f ? x0 : x1;
   const float ny = ray->inverse.y < 0.0f ? y1 : y0, fy = ray->inverse.y < 0.0f ? y0 : y1;
   const float nz = ray->inverse.z < 0.0f ? z1 : z0, fz = ray->inverse.z < 0.0f ? z0 : z1;
-  // As in ray_meets_boxes().
+  // The margin is that of ray_meets_boxes().
   const float near = fmax(fmax(nx, ny), fmax(nz, ray->t_min * 0.999999f));
   const float far = fmin(fmin(fx, fy), fmin(fz, t_end)) * 1.0000004f;
   return near <= far ? (as_uint(near) & ~3u) | lane : RS_NO_CHILD;

@@ -110,7 +110,9 @@ __kernel void load_surfaces(const uint count,
   s.material = -1;
   s.entering = 0;
   s.offset = 0.0f;
-  for (int k = 0; k < 3; ++k) s.position[k] = s.shading[k] = s.normal[k] = s.color[k] = 0.0f;
+  for (int k = 0; k < 3; ++k) {
+    s.position[k] = s.shading[k] = s.normal[k] = s.color[k] = s.shadow_origin[k] = 0.0f;
+  }
   if (hit.triangle >= 0 && !paths[i].blind) {
     const SurfacePoint point = surface_point(vertices, &hit, ray.direction);
     s.entering = point.entering;
@@ -129,6 +131,7 @@ __kernel void load_surfaces(const uint count,
     vstore3(point.shading, 0, s.shading);
     vstore3(point.normal, 0, s.normal);
     vstore3(color, 0, s.color);
+    vstore3(shadow_origin(vertices, &hit, &point), 0, s.shadow_origin);
   }
   surfaces[i] = s;
 }
@@ -216,8 +219,8 @@ __kernel void shadow_rays(const uint count,
       p = load3(s.position);
       const float3 e = light_at(lights + number, p, &direction, &distance);
       wanted = max3(e) > 0.0f && dot(load3(s.shading), direction) > 0.0f;
-      const float3 normal = load3(s.normal);
-      p += dot(normal, direction) >= 0.0f ? s.offset * normal : -s.offset * normal;
+      // The side that n says is lit, though the light may be behind the triangle.
+      p = load3(s.shadow_origin) + s.offset * load3(s.normal);
       skipped = s.triangle;
     }
   }

@@ -146,6 +146,28 @@ SurfacePoint surface_point(__global const float* vertices,
   return out;
 }
 
+// Where rays from there to lights start. Where normals of corners say that the surface is round,
+// the flat triangle lies behind it, and a ray from the triangle would meet its neighbours although
+// the normal faces the light. So the point is projected onto the plane of each corner and its
+// normal, where it lies behind that plane, and the projections are weighted as the corners are
+// (Hanika 2021, Hacking the Shadow Terminator). The point itself without normals.
+float3 shadow_origin(__global const float* vertices,
+                     const RsSurfaceHit* hit,
+                     const SurfacePoint* point) {
+  __global const float* v = vertices + (size_t)hit->triangle * RS_TRIANGLE_FLOATS;
+  const float weights[3] = {1.0f - hit->u - hit->v, hit->u, hit->v};
+  float3 out = point->position;
+  for (int k = 0; k < 3; ++k) {
+    const float3 normal = vload3(0, v + 8 * k + 3);
+    const float length2 = dot(normal, normal);
+    if (length2 <= 1e-12f) continue;
+    const float3 n = normal * copysign(rsqrt(length2), dot(normal, point->normal));
+    const float behind = dot(vload3(0, v + 8 * k) - point->position, n);
+    out += weights[k] * fmax(behind, 0.0f) * n;
+  }
+  return out;
+}
+
 // Its texture coordinates.
 float2 surface_uv(__global const float* vertices, const RsSurfaceHit* hit) {
   __global const float* v = vertices + (size_t)hit->triangle * RS_TRIANGLE_FLOATS;

@@ -26,7 +26,7 @@
 #define RS_DIGITS 256
 #define RS_DIGIT(key, shift) (((key) >> (shift)) & (RS_DIGITS - 1))
 
-// On the arguments of both forms.
+// Marks arguments that only one of both forms reads.
 #define RS_EITHER __attribute__((unused))
 
 #if RS_SOURCE_PAIRS

@@ -22,8 +22,8 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void sum_chunks(
   if (get_local_id(0) == 0) sums[get_group_id(0)] = sum;
 }
 
-// In place; bases[g] is what the chunks before g sum to (ignored where there is one group).
-// The last group writes the total behind the values.
+// Scans the values in place; bases[g] is what the chunks before g sum to (ignored where there is
+// one group). The last group writes the total behind the values.
 __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scan_values(
     __global uint* values, __global const uint* bases, uint count, uint chunk) {
   const uint group = get_group_id(0);

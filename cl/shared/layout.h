@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every record that kernels and host share, defined once. Only 4-byte scalars and arrays of them,
-// explicit padding, so that every compiler lays them out alike; the layout_probe kernel and a test
-// compare both sides.
+// Records of views and cameras that kernels and host share; *_layout.h hold the others. Only 4-byte
+// scalars and arrays of them, explicit padding, so that every compiler lays them out alike; the
+// layout_probe kernel and a test compare both sides.
 #ifndef RS_SHARED_LAYOUT_H
 #define RS_SHARED_LAYOUT_H
 
@@ -15,7 +15,7 @@ typedef struct {
 RS_STATIC_ASSERT_SIZE(RsAabb, 24);
 
 // What one view needs of one Gaussian, one cache line (docs/model.md, "The camera line").
-// Projective form: x0 y0 m_z a | b c D0 e_x | e_y C00 C01 C11 | opacity r g b.
+// Projective form: x0 y0 m_z p | q r D0 e_x | e_y C00 C01 C11 | opacity r g b.
 // General form: whitening matrix in camera axes, rows M0 M1 M2 (9), whitened origin o' (3), opacity
 // r g b.
 typedef struct {

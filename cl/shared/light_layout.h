@@ -90,9 +90,10 @@ typedef struct {
   rs_int triangle;
   rs_float color[3];
   rs_float t;
-  rs_float offset;  // of rays that start on it
+  rs_float offset;            // of rays that start on it
+  rs_float shadow_origin[3];  // where those to lights start, without the offset
 } RsSurface;
-RS_STATIC_ASSERT_SIZE(RsSurface, 68);
+RS_STATIC_ASSERT_SIZE(RsSurface, 80);
 
 // What all kernels of a wave must know.
 typedef struct {

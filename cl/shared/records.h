@@ -59,7 +59,7 @@
   RECORD(RsSurface) FIELD(RsSurface, position) FIELD(RsSurface, material) \
     FIELD(RsSurface, shading) FIELD(RsSurface, entering) FIELD(RsSurface, normal) \
     FIELD(RsSurface, triangle) FIELD(RsSurface, color) FIELD(RsSurface, t) \
-    FIELD(RsSurface, offset) \
+    FIELD(RsSurface, offset) FIELD(RsSurface, shadow_origin) \
   RECORD(RsWave) FIELD(RsWave, seed_lo) FIELD(RsWave, seed_hi) FIELD(RsWave, sample) \
     FIELD(RsWave, scatter) FIELD(RsWave, bounce) FIELD(RsWave, max_bounces) \
     FIELD(RsWave, min_throughput) FIELD(RsWave, indirect) FIELD(RsWave, ambient) \

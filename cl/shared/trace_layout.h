@@ -29,7 +29,7 @@ typedef struct {
 } RsBackward;
 RS_STATIC_ASSERT_SIZE(RsBackward, 48);
 
-// From lines to parameters.
+// What finalize_gradients and finalize_group are told, which lead from lines to parameters.
 typedef struct {
   rs_uint gaussians;
   rs_uint copies;

@@ -9,7 +9,7 @@
 // CPUs handle slowly.
 #define RS_TINY_MOMENT 1e-30f
 
-// Of the state of train/step_guard.cl.
+// Words of the state that train/step_guard.cl keeps.
 #define RS_GUARD_WORDS 7
 #define RS_GUARD_POISONED 1u  // bits of its first word
 #define RS_GUARD_REPEATED 2u

@@ -7,11 +7,13 @@
 // hit of a ray can be opaque. The 16 components of a Gaussian's line are summed over the rays of
 // the packet and added to memory once.
 //   PRIVATE_COPIES 1: work-item g of `copies` takes every copies-th tile and adds to its own copy
-//                     of the gradient lines: no atomics, the same sum every time.    global: groups
+//                     of the gradient lines: no atomics, the same sum every time.
+//                     global size: groups
 //   EXACT_SUMS 1:     one long integer per component (exact_sum.h): the same sum whatever the order
-//                     of the packets, with integer atomics only.       global: packets of the band
-//   otherwise:        one copy of shared floats (float_add.h).               global: packets of the
-//   band
+//                     of the packets, with integer atomics only.
+//                     global size: packets of the band
+//   otherwise:        one copy of shared floats (float_add.h).
+//                     global size: packets of the band
 // With DEPTH_GRADIENT depth_gradient is that of the sum of T alpha t of every pixel, t being the
 // depth of a hit; else it is not read.
 // Components of a line's gradient follow the line; slot 2 (m_z, of which order makes no gradient)

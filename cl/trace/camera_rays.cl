@@ -17,7 +17,7 @@ __kernel void camera_rays(const RsLensCamera camera,
   const uint row = pixel / (uint)camera.width;
   const uint column = pixel - row * (uint)camera.width;
   const float2 at = (float2)(0.5f);
-  // In camera axes.
+  // The ray in camera axes.
   float3 origin = (float3)(0.0f);
   float3 direction = (float3)(0.0f, 0.0f, 1.0f);
 #if CAMERA_MODEL == RS_CAMERA_ORTHOGRAPHIC

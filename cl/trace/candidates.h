@@ -79,7 +79,7 @@ void block_candidates_read(BlockCandidates* b, const uint packet) {
   }
 }
 
-// From the first candidate on.
+// Goes back to the first candidate.
 void candidates_restart(Candidates* c) {
   c->block->read[c->packet] = c->block->begin;
   c->block->count[c->packet] = c->taken = 0;

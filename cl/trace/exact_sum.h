@@ -8,13 +8,14 @@
 // Words of one sum lie 16 apart, because 16 sums are updated together. The lowest bit weighs
 // 2^RS_EXACT_LOW; what lies below is cut off, for every addend alike. An addend at or above `limit`
 // in absolute value, or one that is not finite, makes the sum NaN. The sums stay in range when
-// limit times the number of addends is at most 2^RS_EXACT_HIGH.
+// limit times the number of addends is at most 2^RS_EXACT_HIGH: gradients of lines grow with the
+// square of the scene's size, and those of a view of 2^24 pixels of a scene of 10^7 units fit.
 #ifndef RS_TRACE_EXACT_SUM_H
 #define RS_TRACE_EXACT_SUM_H
 
-#define RS_EXACT_WORDS 5
+#define RS_EXACT_WORDS 6
 #define RS_EXACT_LOW (-110)
-#define RS_EXACT_HIGH 45
+#define RS_EXACT_HIGH 77
 #define RS_EXACT_BIAS 0x80000000u
 
 #ifdef __OPENCL_C_VERSION__

@@ -111,6 +111,7 @@ __kernel void finalize_gradients(const uint begin,
 #if DEPTH_GRADIENT
   const fv depth = take_depth_gradient(line, touched, kind, v);
 #endif
+  take_shape_gradient(line, kind, v);
   line_gradient(&g, v, touched, kind, &view);
 #if DEPTH_GRADIENT
   view.m[2] += depth;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // round_exact_lines: the exact sums of the gradients of lines (exact_sum.h), rounded to floats;
 // sums that were touched are made ready for the next pass. One work-item per Gaussian, any local
-// size. Reads 320 bytes per Gaussian, and writes them where a ray has met it.
+// size. Reads 384 bytes per Gaussian, and writes them where a ray has met it.
 #include "trace/exact_sum.h"
 
 __kernel void round_exact_lines(const uint count,

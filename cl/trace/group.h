@@ -37,8 +37,8 @@
 #pragma OPENCL EXTENSION cl_khr_subgroup_ballot : enable
 #endif
 #endif
-// Of a kernel: its groups have this size, whatever the host says, and waves of 16 work-items where
-// a group is not one subgroup.
+// Attributes of a kernel whose groups have this size, whatever the host says, and waves of 16
+// work-items where a group is not one subgroup.
 #if SUBGROUP == 2 && defined(cl_intel_required_subgroup_size) && GROUP <= 32
 #define RS_GROUP_KERNEL                              \
   __attribute__((reqd_work_group_size(GROUP, 1, 1))) \
@@ -77,8 +77,9 @@ void rs_row_set(
   }
 }
 
-// Of functions that are called in one place: what they keep for a ray stays in registers only where
-// they are inlined, which not every compiler does with large ones. (RS_CALLS: as in lbvh_node.h.)
+// Attribute of functions that are called in one place: what they keep for a ray stays in registers
+// only where they are inlined, which not every compiler does with large ones. (RS_CALLS: as in
+// lbvh_node.h.)
 #ifdef RS_CALLS
 #define RS_GROUP_INLINE
 #else

@@ -92,7 +92,7 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
 #endif
 }
 
-// Of the Gaussian of line v in the packet's rays.
+// The alpha of the Gaussian of line v in the packet's rays.
 float group_alpha(__global const float* v, const PacketMeeting* m) {
   return v[12] * rs_exp(-0.5f * m->numerator / m->direction2);
 }

@@ -189,13 +189,15 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   stage_fetch(line_gradients + 16 * first, 16, 0, 13, &staged);
   float v[16];
   for (int k = 0; k < 13; ++k) v[k] = row[k];
-  ViewGaussian g;
-  load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
-#if DEPTH_GRADIENT
+  // Before the Gaussian itself is read, so that less is in registers at once.
   float line[12];
-  for (int k = 3; k < 12; ++k) line[k] = lines[i].v[k];
+  for (int k = 3; k < (DEPTH_GRADIENT ? 12 : 7); ++k) line[k] = lines[i].v[k];
+#if DEPTH_GRADIENT
   const float depth = take_depth_gradient(line, touched, kind, v);
 #endif
+  take_shape_gradient(line, kind, v);
+  ViewGaussian g;
+  load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
   float seen[3];
   screen_statistics(&g, v, touched, kind, finalize.screen_x, finalize.screen_y, seen);
 #if ACCUMULATE

@@ -27,7 +27,8 @@
 #define WAITING (GROUP > 32 ? 128 : 64)
 #endif
 
-// Per ray: the key, alpha, 0 where it misses, and the product over the nearer hits so far.
+// A row has for each ray the key, alpha, 0 where it misses, and the product over the nearer hits so
+// far.
 typedef struct {
   float key[OPEN_LOCAL][GROUP];
   float alpha[OPEN_LOCAL][GROUP];
@@ -52,7 +53,7 @@ typedef struct {
   uint candidate[WAITING];
 } WaitingRows;
 
-// Of them, those that one work-item puts in order.
+// Waiting rows that one work-item puts in order.
 #define RS_WAITING_EACH ((WAITING + GROUP - 1) / GROUP)
 
 typedef struct {
@@ -143,7 +144,7 @@ void group_settle(__local OpenRows* rows,
 }
 
 #if KEEP_HITS
-// By work-item 0, which alone knows where the stream ends.
+// Reserves a place in the stream; for work-item 0, which alone knows where it ends.
 uint group_push(__local GroupMemory* memory,
                 const uint reference,
                 const uint window,
@@ -155,7 +156,8 @@ uint group_push(__local GroupMemory* memory,
   return row;
 }
 
-// By work-item 0: places in the stream for the rows of the slots `closing`, which settle now.
+// Reserves places in the stream, for work-item 0: for the rows of the slots `closing`, which settle
+// now.
 void group_push_rows(__local GroupMemory* memory, uint closing, uint settled, HitStream* stream) {
   __local OpenRows* rows = &memory->open;
   for (; closing != 0; closing &= closing - 1, ++settled) {

@@ -92,9 +92,10 @@ void line_gradient_projective(
   (void)weight;
   const fv gD = -gN * m.numerator * inverse;
 #endif
-  const fv gNx = gN * dx, gNy = gN * dy, gDx = gD * dx, gDy = gD * dy;
-  g[0] = -2.0f * (gNx * v[3] + gNy * v[4] + gD * v[7] + gDx * v[9] + gDy * v[10]);
-  g[1] = -2.0f * (gNx * v[4] + gNy * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
+  // N is the sum of the squares of p dx + q dy and of r dy.
+  const fv gU = gN * (v[3] * dx + v[4] * dy), gV = gN * (v[5] * dy), gDx = gD * dx, gDy = gD * dy;
+  g[0] = -2.0f * (gU * v[3] + gD * v[7] + gDx * v[9] + gDy * v[10]);
+  g[1] = -2.0f * (gU * v[4] + gV * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
 #if DEPTH_GRADIENT
   g[0] -= gE * v[7];
   g[1] -= gE * v[8];
@@ -105,9 +106,9 @@ void line_gradient_projective(
   g[2] =
       sqrt(g[0] * g[0] * (p->screen_x * p->screen_x) + g[1] * g[1] * (p->screen_y * p->screen_y));
 #endif
-  g[3] = gNx * dx;
-  g[4] = 2.0f * gNx * dy;
-  g[5] = gNy * dy;
+  g[3] = 2.0f * gU * dx;
+  g[4] = 2.0f * gU * dy;
+  g[5] = 2.0f * gV * dy;
 #if DEPTH_GRADIENT
   g[6] = g_depth * (v[6] + v[7] * dx + v[8] * dy);
   g[7] = 2.0f * gDx + gE * dx;

@@ -133,7 +133,9 @@ PacketMeeting rs_meet_projective(__global const float* v, float quantile, fv X, 
   const fv dy = Y - v[1];
   const fv twice_dy = 2.0f * dy;
   const fv e = v[7] * dx + v[8] * dy;
-  m.numerator = dx * (v[3] * dx + v[4] * twice_dy) + v[5] * dy * dy;
+  const fv across = v[3] * dx + v[4] * dy;
+  const fv upright = v[5] * dy;
+  m.numerator = across * across + upright * upright;
   m.direction2 = v[6] + 2.0f * e + dx * (v[9] * dx + v[10] * twice_dy) + v[11] * dy * dy;
   m.along = v[2] * (v[6] + e);
   m.inside = RS_MASK(m.numerator <= quantile * m.direction2);

@@ -163,7 +163,7 @@ __attribute__((always_inline)) static void packet_hits(const PacketState* p,
   }
 }
 
-// Of one candidate.
+// What the packet's rays meet of one candidate.
 PacketHit packet_hit(const PacketState* p,
                      __global const RsLine* restrict lines,
                      const uint reference,

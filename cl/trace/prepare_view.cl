@@ -23,7 +23,7 @@
 void write_projective(const ViewGaussian* g, fv* v) {
   const fv mx = g->m[0], my = g->m[1], mz = g->m[2];
   const fv iz = 1.0f / mz;
-  fv a = 0, b = 0, c = 0, d0 = 0, ex = 0, ey = 0, c00 = 0, c01 = 0, c11 = 0;
+  fv a = 0, b = 0, d0 = 0, ex = 0, ey = 0, c00 = 0, c01 = 0, c11 = 0;
   for (int k = 0; k < 3; ++k) {
     const fv rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
     // o' x M_j by the cofactor identity (Ma) x (Mb) = det(M) M^-T (a x b): no cancellation.
@@ -32,7 +32,6 @@ void write_projective(const ViewGaussian* g, fv* v) {
     const fv B = (rz * mx - rx * mz) * P;
     a += A * A;
     b += A * B;
-    c += B * B;
     const fv w = g->w[k];
     const fv q = (rx * mx + ry * my + rz * mz) * w;
     d0 += q * q;
@@ -45,9 +44,11 @@ void write_projective(const ViewGaussian* g, fv* v) {
   v[0] = mx * iz;
   v[1] = my * iz;
   v[2] = mz;
-  v[3] = a;
-  v[4] = b;
-  v[5] = c;
+  // p, q and r. q / p is the slope of a needle: no rounding of the root gets into it.
+  const fv p = sqrt(a);
+  v[3] = p;
+  v[4] = b / a * p;
+  v[5] = sqrt(d0) * g->w[0] * (g->w[1] * g->w[2] * mz / p);
   v[6] = d0 * iz * iz;
   v[7] = ex * iz;
   v[8] = ey * iz;
@@ -56,7 +57,7 @@ void write_projective(const ViewGaussian* g, fv* v) {
   v[11] = c11;
 }
 
-// In place of the projective form in the lanes where `general` holds.
+// Writes the general form in place of the projective one, in the lanes where `general` holds.
 void write_general(const ViewGaussian* g, const iv general, fv* v) {
   for (int k = 0; k < 3; ++k) {
     fv o = 0;
@@ -119,7 +120,7 @@ void add_colour(const int column,
   }
 }
 
-// Of Gaussians whose rows are present, from `sh` of the group's first one on.
+// Writes the colours of the visible Gaussians; `sh` starts at the group's first.
 void write_colour(const ViewGaussian* g,
                   __global const float* sh,
                   __local StagedRows* staged,

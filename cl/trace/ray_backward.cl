@@ -29,10 +29,11 @@
 #define RAY_SLOPES 0
 #endif
 
-// On GPUs: no loop, whose counters would lie in registers during the walk.
+// Whether a work-item has one ray, as on GPUs: no loop, whose counters would lie in registers
+// during the walk.
 #define RS_ONE_RAY (KEPT && !PRIVATE_COPIES)
 
-// Of functions that every hit takes, whatever the compiler thinks of their size.
+// Inlines functions that every hit takes, whatever the compiler thinks of their size.
 #define RS_SHARE __attribute__((always_inline)) static
 
 // Waves of 16 where their registers are enough.
@@ -179,8 +180,8 @@ RS_INLINE void add_hit(const RayScene* scene,
   rs_add_numbers(&state->sums, line, sum, 0, 11);
 }
 
-// From the nearest hit on: what lies behind each is the known result minus what is blended, but for
-// the last of the ray.
+// Blends the hits from the nearest on: what lies behind each is the known result minus what is
+// blended, but for the last of the ray.
 RS_INLINE void blend_hits(const RayScene* scene,
                           const RayData* ray,
                           const float* ray_basis,
@@ -254,7 +255,7 @@ RS_INLINE void blend_hits(const RayScene* scene,
                           Pending* pending,
                           int count,
                           RayState* state) {
-  // Of evaluated entries the opacity is no longer needed: it makes room for the transmittance.
+  // The opacity of evaluated entries is no longer needed: it makes room for the transmittance.
   float* before = pending->opacity;
   int blended = 0;
   while (blended < count && !state->stopped) {
@@ -330,8 +331,8 @@ RS_INLINE void add_ray(const RayScene* scene,
 #endif
 }
 
-// Of the rays [first, last) in their order. results: what trace_rays gave them; gradients:
-// dL/d(R, G, B, alpha) per ray; records: whitening matrix and mean of every Gaussian
+// Gradients of the rays [first, last) in their order. results: what trace_rays gave them;
+// gradients: dL/d(R, G, B, alpha) per ray; records: whitening matrix and mean of every Gaussian
 // (ray_gradients.cl); sums: as for LineSums; slopes: with RAY_SLOPES of every ray the gradients of
 // its origin and direction, four floats each, zeros at first.
 RS_RAY_WAVE RS_RAY_KERNEL __kernel void ray_backward(const uint first,

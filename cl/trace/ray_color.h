@@ -127,7 +127,7 @@ RS_INLINE void basis_along_ray(const RayScene* scene, const RayData* ray, float*
   rs_sh_basis(scene->active_degree, n.x, n.y, n.z, basis);
 }
 
-// Of hit k from the nearest.
+// The colour of the k-th nearest hit.
 RS_INLINE float4 hit_color(const RayScene* scene,
                            const RayData* ray,
                            const float* ray_basis,

@@ -22,7 +22,7 @@ typedef struct {
   float t_max[GROUP];
 } HitMemory;
 
-// Of one ray.
+// The nearest hits of one ray.
 typedef struct {
   __local HitMemory* memory;
   int column;
@@ -50,13 +50,13 @@ RS_INLINE void park_end(const Pending* p, const float t_max) {
 
 RS_INLINE float parked_end(const Pending* p) { return p->memory->t_max[p->column]; }
 
-// Of hit k from the nearest.
+// The number of the Gaussian of the k-th nearest hit.
 RS_INLINE uint pending_index(__global const fv* blocks, const Pending* p, const int k) {
   const uint slot = pending_slot(p, k);
   return block_index(blocks + (size_t)(slot / LANES) * RS_BLOCK_VECTORS, slot % LANES);
 }
 
-// Its colour of SH degree 0.
+// The colour of SH degree 0 of the k-th nearest hit.
 RS_INLINE float4 pending_color(__global const fv* blocks, const Pending* p, const int k) {
   const uint slot = pending_slot(p, k);
   return block_color(blocks + (size_t)(slot / LANES) * RS_BLOCK_VECTORS, slot % LANES);

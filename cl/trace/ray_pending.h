@@ -37,7 +37,7 @@ typedef struct {
 #endif
   uint slot[PENDING];  // block times LANES plus lane
   uint index[PENDING];
-  // Of degree 0, read when the hit is found, so that blending never waits for memory.
+  // The colour of SH degree 0, read when the hit is found, so that blending never waits for memory.
   float4 color[PENDING];
   ushort order[PENDING];  // filled by pending_sort
   int size;
@@ -175,7 +175,7 @@ void pending_sort(Pending* pending) {
   }
 }
 
-// Of hit k from the nearest, after pending_sort.
+// What is kept of the k-th nearest hit; call pending_sort first.
 float pending_key(const Pending* p, const int k) { return p->key.s[p->order[k]]; }
 float pending_alpha(const Pending* p, const int k) { return p->alpha[p->order[k]]; }
 float pending_peak(const Pending* p, const int k) { return p->peak[p->order[k]]; }

@@ -3,17 +3,19 @@
 //   count_tiles        counts[i] = tiles of the window that Gaussian i meets
 //   fill_tiles         key = tile << 16 | quantised least depth, value = Gaussian << 1 | general
 //                      form, written at offsets[i]
-//   gather_candidates  list records in sorted order, first candidate per tile   global: candidates,
-//                      or more
+//   gather_candidates  list records in sorted order, first candidate per tile
+//                      global size: candidates, or more
 // The first two take LANES Gaussians per work-item from number `begin` on, any local size; end -
 // begin is a multiple of LANES. Cost is O(Gaussians + candidates). An outline that the camera
 // plane makes unbounded is replaced by the box of the ellipsoid against the planes of the tile.
 // Quantised depths order the list and are a lower bound of the depth of this and every later hit of
 // the list, which is what the exact order of rays rests on. A window is a rectangle of tiles: first
 // column, first row, columns, rows; its tiles are numbered row by row. live[0] candidates are
-// listed: as many as were counted, or none (view_sizes.cl).
+// listed: as many as were counted, or none (view_sizes.cl); live[1] is the first step of depths
+// (depth_key.h).
 #include "parallel/prefetch.h"
 #include "shared/layout.h"
+#include "trace/depth_key.h"
 #include "trace/gaussian_lanes.h"
 
 #ifndef TILE
@@ -93,7 +95,8 @@ iv tile_ranges(const fv* b, const LensTiles* lens, const int4 window, TileRanges
          (range->y1.v < range->y0.v);
 }
 #else
-// Of Gaussians with bounds b, in the window. Returns the lanes with an empty range.
+// Finds the tiles of the window that Gaussians with bounds b may meet. Returns the lanes with an
+// empty range.
 iv tile_ranges(const fv* b, const RsCamera* camera, const int4 window, TileRanges* range) {
   const fv x0 = within_reach(b[RS_BOUNDS_X0] * camera->fx + camera->cx);
   const fv x1 = within_reach(b[RS_BOUNDS_X1] * camera->fx + camera->cx);
@@ -237,16 +240,9 @@ __kernel void count_tiles(const uint begin,
 
 #endif
 
-// Depths from 2^-10 to 2^22 in 2048 steps an octave: the upper bits of a float.
-#define RS_DEPTH_BITS 12
-#define RS_DEPTH_FIRST ((127 - 10) << (23 - RS_DEPTH_BITS))
-
-iv depth_key(const fv depth) {
-  return lesser(greater((rs_as_int(depth) >> RS_DEPTH_BITS) - RS_DEPTH_FIRST, 0), 65535);
-}
-
-float depth_bound(const uint key) {
-  return key == 0 ? 0.0f : as_float((key + RS_DEPTH_FIRST) << RS_DEPTH_BITS) * 0.9999f;
+iv depth_key(const fv depth, const uint first_step) {
+  const iv step = (rs_as_int(depth) >> RS_DEPTH_BITS) - (iv)((int)first_step);
+  return lesser(greater(step, 0), RS_DEPTH_KEYS - 1);
 }
 
 // What the least depth of Gaussians in a tile needs of their lines.
@@ -325,6 +321,7 @@ __kernel void fill_tiles(const uint begin,
   IntLanes unbounded;
   unbounded.v = b[RS_BOUNDS_X0] == -INFINITY;
 #endif
+  const uint first_step = live[1];
   DepthPlanes planes;
   depth_planes(b, lines + i, &planes);
   IntLanes general;
@@ -359,7 +356,7 @@ __kernel void fill_tiles(const uint begin,
                      most_along(planes.slope_x, low_x, high_x, planes.mean_x, planes.most_x);
     const fv plane = ((along > 0.0f) & (planes.limit > 0.0f)) ? planes.limit / along : zero;
     key.v = ((y.v - window.y) * window.z + (x.v - window.x)) << 16 |
-            depth_key(larger(plane, planes.depth));
+            depth_key(larger(plane, planes.depth), first_step);
     for (int lane = 0; lane < LANES; ++lane) {
       if (left.s[lane] == 0) continue;
 #if LENS
@@ -406,7 +403,7 @@ __kernel void gather_candidates(__global const uint* restrict live,
   boxes[stride + k] = b.y0;
   boxes[2 * (size_t)stride + k] = b.x1;
   boxes[3 * (size_t)stride + k] = b.y1;
-  limits[k] = (float2)(depth_bound(key & 0xffff), b.quantile);
+  limits[k] = (float2)(depth_bound(key & 0xffff, live[1]), b.quantile);
   const uint tile = key >> 16;
   for (uint t = k == 0 ? 0 : (keys[k - 1] >> 16) + 1; t <= tile; ++t) tile_offsets[t] = k;
   if (k == count - 1) {

@@ -25,6 +25,7 @@ typedef struct {
   fv w[3];
 } ViewGradient;
 
+// Takes the gradients of a line after take_shape_gradient().
 void projective_gradient(const ViewGaussian* g, const fv* v, ViewGradient* out) {
   const fv mx = g->m[0], my = g->m[1], mz = g->m[2];
   const fv iz = 1.0f / mz;
@@ -42,9 +43,11 @@ void projective_gradient(const ViewGaussian* g, const fv* v, ViewGradient* out) 
     const fv w = g->w[k];
     const fv A = ry * mz - rz * my;
     const fv B = rz * mx - rx * mz;
-    const fv gA = P[k] * P[k] * (2.0f * v[3] * A + v[4] * B);
-    const fv gB = P[k] * P[k] * (2.0f * v[5] * B + v[4] * A);
-    gP[k] = 2.0f * P[k] * (v[3] * A * A + v[4] * A * B + v[5] * B * B);
+    const fv gx = P[k] * (v[3] * A + v[4] * B);
+    const fv gy = P[k] * (v[4] * A);
+    const fv gA = P[k] * gx;
+    const fv gB = P[k] * gy;
+    gP[k] = A * gx + B * gy;
     const fv along = rx * mx + ry * my + rz * mz;
     const fv q = along * w;
     d0 += q * q;
@@ -68,14 +71,15 @@ void projective_gradient(const ViewGaussian* g, const fv* v, ViewGradient* out) 
     const int i = (k + 1) % 3, j = (k + 2) % 3;
     out->w[i] += gP[k] * g->w[j];
     out->w[j] += gP[k] * g->w[i];
+    out->w[k] += v[5] / g->w[k];
   }
   out->m[0] += v[0] * iz;
   out->m[1] += v[1] * iz;
-  out->m[2] -= (v[0] * x0 + v[1] * y0) * iz + 2.0f * v[6] * d0 * iz * iz * iz +
+  out->m[2] -= (v[0] * x0 + v[1] * y0 - 2.0f * v[5]) * iz + 2.0f * v[6] * d0 * iz * iz * iz +
                (v[7] * ex + v[8] * ey) * iz * iz;
 }
 
-// In place of the projective gradient in the lanes where `general` holds.
+// Writes the general gradient in place of the projective one, in the lanes where `general` holds.
 void general_gradient(const ViewGaussian* g, const fv* v, const iv general, ViewGradient* out) {
   fv m[3] = {0, 0, 0};
 #pragma unroll
@@ -97,7 +101,7 @@ void general_gradient(const ViewGaussian* g, const fv* v, const iv general, View
   for (int j = 0; j < 3; ++j) out->m[j] = general ? m[j] : out->m[j];
 }
 
-// Of a line with gradient v.
+// Gradients of what a line with gradient v, after take_shape_gradient(), was made of.
 void line_gradient(
     const ViewGaussian* g, const fv* v, const iv touched, const iv kind, ViewGradient* out) {
   projective_gradient(g, v, out);
@@ -105,14 +109,31 @@ void line_gradient(
   if (rs_any_of(touched & general)) general_gradient(g, v, general, out);
 }
 
+// Turns the gradients of p, q and r of a projective line, v[3..5], into twice that of a, that of b
+// (prepare_view.cl) and r dL/dr, by p = sqrt(a), q = b / p and r = sqrt(D0) det(M) m_z^2 / p. What
+// a and D0 receive through r is added to theirs here; what det(M) and m_z do, by
+// projective_gradient().
+void take_shape_gradient(const fv* line, const iv kind, fv* v) {
+  const iv projective = kind == RS_LINE_PROJECTIVE;
+  const fv inverse_p = 1.0f / line[3];
+  const fv by_b = v[4] * inverse_p;
+  const fv by_r = v[5] * line[5];
+  const fv by_a = (v[3] - by_b * line[4] - by_r * inverse_p) * inverse_p;
+  v[3] = projective ? by_a : v[3];
+  v[4] = projective ? by_b : v[4];
+  v[5] = projective ? by_r : v[5];
+  v[6] = projective ? v[6] + 0.5f * by_r / line[6] : v[6];
+}
+
 #if DEPTH_GRADIENT
-// Takes the gradient of m_z out of that of a projective line, v[6], and puts that of D0 there: N
-// and D are of first degree in v[3..5] and v[6..11], and squared distance and depth of degree 0 in
-// them all, so that the products of numbers and gradients add up to 0 (Euler).
+// Takes the gradient of m_z out of that of a projective line, v[6], and puts that of D0 there: N is
+// of second degree in v[3..5], D of first in v[6..11], the squared distance is N / D and the depth
+// of degree 0, so that half the products of numbers and gradients of N and those of D add up to 0
+// (Euler).
 fv take_depth_gradient(const fv* line, const iv touched, const iv kind, fv* v) {
   fv sum = 0;
   for (int k = 3; k < 12; ++k) {
-    if (k != 6) sum += line[k] * v[k];
+    if (k != 6) sum += (k < 6 ? 0.5f : 1.0f) * line[k] * v[k];
   }
   const iv counts = touched & (kind == RS_LINE_PROJECTIVE);
   const fv depth = counts ? v[6] : (fv)(0.0f);
@@ -155,7 +176,7 @@ typedef struct {
   fv slope[3];  // of R, G, B before they are clamped
 } ColourGradient;
 
-// From out->n = m - c.
+// Finds the direction of the colour from out->n = m - c.
 void colour_direction(ColourGradient* out) {
   fv* d = out->n;
   out->inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (fv)(1e-30f)));

@@ -3,14 +3,34 @@
 // does not fit is left out as a whole. A view then shows nothing and has no gradients, and so have
 // all views after it, until the host has seen the word `overflow` and cleared it.
 //   admit_candidates   live[0] = candidates that are listed: all of the view's or, without room,
-//                      none. One work-item.
+//                      none. live[1] = the first step of their depths. One work-item.
 //   check_streams      forgets all hits when their chunks had no room. One work-item per packet.
+#include "bvh/box.h"
 #include "parallel/counter.h"
+#include "trace/depth_key.h"
 #include "trace/view_sizes.h"
 
-// offsets[count] is the number of candidates.
+// Gaussians that are asked how far away things are.
+#define RS_ASKED 8
+
+// The distance of the farthest of a few Gaussians, along the axis of the world where it is
+// greatest; 1 where none of them shows anything.
+float farthest_of_few(__global const RsAabb* boxes, const uint count, const float4 center) {
+  float most = -1.0f;
+#pragma unroll
+  for (uint k = 0; k < RS_ASKED && count > 0; ++k) {
+    const RsBox box = box_load(boxes, (size_t)(count / RS_ASKED) * k);
+    const float4 way = fabs(box_center(box) - center);
+    if (box_valid(box)) most = fmax(most, fmax(fmax(way.x, way.y), way.z));
+  }
+  return most < 0.0f ? 1.0f : most;
+}
+
+// offsets[count] is the number of candidates, `boxes` are those of the Gaussians.
 __kernel void admit_candidates(__global const uint* offsets,
                                const uint count,
+                               __global const RsAabb* boxes,
+                               const RsCamera camera,
                                const uint capacity,
                                __global uint* live,
                                volatile __global uint* counters,
@@ -18,6 +38,8 @@ __kernel void admit_candidates(__global const uint* offsets,
   const uint wanted = offsets[count];
   if (wanted > capacity) overflow[0] = 1;
   live[0] = overflow[0] == 0 ? wanted : 0;
+  const float4 center = (float4)(camera.center[0], camera.center[1], camera.center[2], 0.0f);
+  live[1] = first_depth_step(farthest_of_few(boxes, count, center));
   rs_count(counters + RS_COUNT_CANDIDATES, wanted);
 }
 

@@ -3,8 +3,8 @@
 #ifndef RS_TRACE_VIEW_SIZES_H
 #define RS_TRACE_VIEW_SIZES_H
 
-// Of one view: chunks that its hit streams want, rays that the cap on hits stopped, hits and
-// candidates (64 bits each, the low word first).
+// Words that count for one view: chunks that its hit streams want, rays that the cap on hits
+// stopped, hits and candidates (64 bits each, the low word first).
 #define RS_COUNT_CHUNKS 0
 #define RS_COUNT_CAPPED 1
 #define RS_COUNT_HITS 2

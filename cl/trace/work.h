@@ -10,8 +10,8 @@
 // 32 written. SH coefficients come on top, 12 bytes each.
 #define RS_WORK_PREPARE_BYTES 140
 // Rotation 36, axes and mean in camera axes 60, unit quaternion 12, scales and opacity 15, culling
-// 41, line 131, outline 94, direction 10.
-#define RS_WORK_PREPARE_FLOPS 399
+// 41, line 133, outline 94, direction 10.
+#define RS_WORK_PREPARE_FLOPS 401
 // One SH coefficient: three fused multiply-adds.
 #define RS_WORK_SH_FLOPS 6
 #define RS_WORK_SH_BYTES 12
@@ -30,7 +30,7 @@
 #define RS_WORK_FORWARD_CANDIDATE_BYTES 92
 // Per pixel: R, G, B, A.
 #define RS_WORK_FORWARD_PIXEL_BYTES 16
-// Per hit: offsets 2, numerator 8, denominator 14, depth 2, test 1 (27); squared distance and peak
+// Per hit: offsets 2, numerator 7, denominator 15, depth 2, test 1 (27); squared distance and peak
 // 3; response 19; blending 9.
 #define RS_WORK_FORWARD_FLOPS 58
 // Near root in entry order.
@@ -44,13 +44,13 @@
 // geometry 28, chain 50, sum over rays 16.
 #define RS_WORK_BACKWARD_FLOPS 155
 
-// finalize_gradients, per Gaussian: line gradient 64, colours of the line 12, bounds 32, parameters
-// 44 read; gradients 44 and statistics 12 written. SH coefficients come on top, 12 read and 12
-// written each.
-#define RS_WORK_FINALIZE_BYTES 208
-// Parameters as in prepare_view 123, line to camera axes 255, rotation and quaternion 80, scales
+// finalize_gradients, per Gaussian: line gradient 64, shape and colours of the line 28, bounds 32,
+// parameters 44 read; gradients 44 and statistics 12 written. SH coefficients come on top, 12 read
+// and 12 written each.
+#define RS_WORK_FINALIZE_BYTES 224
+// Parameters as in prepare_view 123, line to camera axes 241, rotation and quaternion 80, scales
 // 15, opacity 3, screen statistics 10, direction 20.
-#define RS_WORK_FINALIZE_FLOPS 506
+#define RS_WORK_FINALIZE_FLOPS 492
 // One SH coefficient: its gradient 3, the colour along it 6, direction 6.
 #define RS_WORK_FINALIZE_SH_FLOPS 15
 

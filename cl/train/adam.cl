@@ -12,7 +12,7 @@
 #ifndef BLOCK
 #define BLOCK 64
 #endif
-// Its work-items.
+// Work-items of a group.
 #ifndef GROUP
 #define GROUP 1
 #endif

@@ -9,21 +9,28 @@
 //   and its weight m (`composite` as in train/loss_prepare.cl), partials[24 block + j] are the sums
 //   of m z[a] z[b] (10 for a <= b, row by row) and of m z[a] (y[c] - x[c]) (4 for each c), then two
 //   zeros.
-// exposure_sums: one work-item per sum, 24 in all. Adds the partials in their order, as those of
-//   one view of a step: sums[24 slot + j].
-// exposure_solve: one work-item. The rows d[c] of the photo of a slot become what minimises
+// exposure_sums: one work-group of GROUP work-items per sum, 24 in all. Adds the partials, as those
+//   of one view of a step: sums[24 slot + j].
+// exposure_solve: one work-group of GROUP work-items. The first makes the rows d[c] of the photo of
+//   a slot what minimises
 //   sum m (d[c] z - (y[c] - x[c]))^2 / sum m + damping |d[c] - before|^2 (a step of the proximal
 //   point method, Rockafellar 1976), by Cholesky's factors of a 4 x 4 matrix whose eigenvalues are
-//   at least `damping`; then the mean over the photos is taken off. Does nothing where the guard's
-//   word is not 0, nothing of the photo counts, or a sum is not finite.
-// Complexity: pixels + blocks + photos.
+//   at least `damping`; then all of them take the mean over the photos off. Does nothing where the
+//   guard's word is not 0, nothing of the photo counts, or a sum is not finite.
+// Sums over blocks and photos: a work-item adds every GROUP-th, and what the work-items have is
+// added in a tree, so that their order is the same everywhere.
+// Complexity: pixels + (blocks + photos) / GROUP.
 #define LANES 1
 #include "train/photo.h"
 
 #ifndef BLOCK
 #define BLOCK 256
 #endif
+#ifndef GROUP
+#define GROUP 64  // a power of two
+#endif
 #define SUMS 24
+#define NUMBERS 12
 
 __kernel void apply_exposure(const __global float* image,
                              const __global float* deltas,
@@ -91,31 +98,42 @@ __kernel void exposure_moments(const __global float* image,
   for (int j = 0; j < SUMS; ++j) partials[SUMS * (size_t)block + j] = sum[j];
 }
 
-__kernel void exposure_sums(const __global float* partials,
-                            __global float* sums,
-                            uint blocks,
-                            uint slot) {
-  const uint j = get_global_id(0);
-  if (j >= SUMS) return;
-  float sum = 0.0f;
-  for (uint block = 0; block < blocks; ++block) sum += partials[SUMS * (size_t)block + j];
-  sums[SUMS * (size_t)slot + j] = sum;
+// Adds `count` rows of GROUP numbers, one of each work-item, to their first numbers. Every
+// work-item calls it, and finds the sums when it is back.
+void add_rows(__local float* rows, int count) {
+  const uint lane = get_local_id(0);
+  for (uint half_size = GROUP / 2; half_size > 0; half_size /= 2) {
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (lane < half_size) {
+      for (int k = 0; k < count; ++k) rows[GROUP * k + lane] += rows[GROUP * k + lane + half_size];
+    }
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
 }
 
-__kernel void exposure_solve(const __global float* sums,
-                             const __global uint* guard,
-                             __global float* deltas,
-                             uint slot,
-                             uint views,
-                             uint view,
-                             float damping) {
-  if (get_global_id(0) != 0 || guard[0] != 0) return;
-  const __global float* s = sums + SUMS * (size_t)slot;
+__attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void exposure_sums(
+    const __global float* partials, __global float* sums, uint blocks, uint slot) {
+  __local float row[GROUP];
+  const uint j = get_group_id(0);
+  const uint lane = get_local_id(0);
+  float sum = 0.0f;
+  for (uint block = lane; block < blocks; block += GROUP) sum += partials[SUMS * (size_t)block + j];
+  row[lane] = sum;
+  add_rows(row, 1);
+  if (lane == 0) sums[SUMS * (size_t)slot + j] = row[0];
+}
+
+// Whether the sums of a photo say something.
+int tells(const __global float* s) {
   for (int j = 0; j < SUMS; ++j) {
-    if ((as_uint(s[j]) & 0x7f800000u) == 0x7f800000u) return;
+    if ((as_uint(s[j]) & 0x7f800000u) == 0x7f800000u) return 0;
   }
-  const float all = s[9];  // the sum of the weights
-  if (!(all > 0.0f)) return;
+  return s[9] > 0.0f;  // the sum of the weights
+}
+
+// The numbers d of a photo by its sums s.
+void fit_colors(const __global float* s, __global float* d, float damping) {
+  const float all = s[9];
   float L[4][4];  // the lower factor; its diagonal inverted
   int j = 0;
   for (int a = 0; a < 4; ++a) {
@@ -129,7 +147,6 @@ __kernel void exposure_solve(const __global float* sums,
     }
     L[a][a] = 1.0f / sqrt(fmax(L[a][a], 0.5f * damping));  // rounding may take a little off
   }
-  __global float* d = deltas + 12 * (size_t)view;
   for (int c = 0; c < 3; ++c) {
     float x[4];
     for (int a = 0; a < 4; ++a) {
@@ -143,10 +160,32 @@ __kernel void exposure_solve(const __global float* sums,
     }
     for (int a = 0; a < 4; ++a) d[4 * c + a] = x[a];
   }
-  for (int k = 0; k < 12; ++k) {
-    float sum = 0.0f;
-    for (uint v = 0; v < views; ++v) sum += deltas[12 * (size_t)v + k];
-    const float off = sum / views;
-    for (uint v = 0; v < views; ++v) deltas[12 * (size_t)v + k] -= off;
+}
+
+__attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void exposure_solve(
+    const __global float* sums,
+    const __global uint* guard,
+    __global float* deltas,
+    uint slot,
+    uint views,
+    uint view,
+    float damping) {
+  __local float rows[NUMBERS * GROUP];
+  const uint lane = get_local_id(0);
+  const __global float* s = sums + SUMS * (size_t)slot;
+  const int fits = guard[0] == 0 && tells(s);  // the same for all, as barriers ask for
+  if (fits && lane == 0) fit_colors(s, deltas + NUMBERS * (size_t)view, damping);
+  barrier(CLK_GLOBAL_MEM_FENCE);
+  float sum[NUMBERS];
+  for (int k = 0; k < NUMBERS; ++k) sum[k] = 0.0f;
+  for (uint v = lane; v < views; v += GROUP) {
+    for (int k = 0; k < NUMBERS; ++k) sum[k] += deltas[NUMBERS * (size_t)v + k];
+  }
+  for (int k = 0; k < NUMBERS; ++k) rows[GROUP * k + lane] = sum[k];
+  add_rows(rows, NUMBERS);
+  if (!fits) return;
+  for (int k = 0; k < NUMBERS; ++k) sum[k] = rows[GROUP * k] / views;  // the mean
+  for (uint v = lane; v < views; v += GROUP) {
+    for (int k = 0; k < NUMBERS; ++k) deltas[NUMBERS * (size_t)v + k] -= sum[k];
   }
 }

@@ -18,7 +18,7 @@ typedef struct {
   fv value, e, f, g;
 } Ssim;
 
-// From the windowed means of u, v, u^2 and v^2.
+// SSIM and its slopes from the windowed means of u, v, u^2 and v^2.
 Ssim rs_ssim(fv mu, fv mv, fv square_u, fv square_v) {
   const fv a = mu * mu;
   const fv b = mv * mv;

@@ -25,7 +25,7 @@ struct BenchCase {
 
 /// Throws UsageError when the filter leaves no row.
 void require_rows(const BenchOptions& options, const BenchModel* model);
-/// Of the options, without those that the filter leaves no row; throws as require_rows().
+/// The cases of the options, without those that the filter leaves no row; throws as require_rows().
 std::vector<BenchCase> wanted_cases(const BenchOptions& options);
 /// Its Gaussians and camera.
 BenchModel generated(const BenchCase& one, const BenchOptions& options);

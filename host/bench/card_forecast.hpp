@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/cards.hpp"
 #include "bench/executed_work.hpp"
 #include "bench/speed_model.hpp"
 
@@ -19,7 +20,7 @@ struct CardForecast {
   std::vector<double> frames, iterations;  ///< a second
 };
 
-/// From the work that kernels of their form do.
+/// What the cards would take, from the work that kernels of their form do.
 CardForecast forecast_cards(const ExecutedCounts& groups);
 
 /// Rows on a card: what a picture, or a training iteration, takes.

@@ -188,8 +188,8 @@ double measure_tile_rate(Context& context, std::size_t bytes) {
   return static_cast<double>(passes * lines) / best;
 }
 
-// Of a launch that all processors at once do in kSeconds: what it takes longer is what the others
-// miss, shared among all.
+// How late the other processors begin: what a launch takes longer than kSeconds, which all at once
+// would take, is what the others miss, shared among all.
 double measure_late_seconds(Context& context) {
   constexpr double kSeconds = 2e-4;
   const double units = std::max<double>(1, context.device().compute_units);

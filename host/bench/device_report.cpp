@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/bench_cases.hpp"
+#include "bench/cards.hpp"
 #include "bench/scene_bench.hpp"
 #include "device/device_json.hpp"
 #include "raysplats/error.hpp"
@@ -17,7 +18,7 @@ namespace {
 
 constexpr int kSchemaVersion = 1;
 constexpr int kLargeWidth = 1600, kLargeHeight = 1064;
-// Of the rows that say how fast pictures and steps are.
+// Ids of the rows that say how fast pictures and steps are.
 constexpr const char* kWholeRows = "^(view|iteration)/";
 
 // Time that goes on while kernels are compiled, and without that.

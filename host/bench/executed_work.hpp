@@ -29,8 +29,8 @@ struct ExecutedCounts {
   bool peak_order = false;
 };
 
-/// Of a row of run_bench(), or "forward-train" and "iteration". Throws UsageError for rows that are
-/// not in modelled_rows().
+/// The work of a row of run_bench(), or of "forward-train" and "iteration". Throws UsageError for
+/// rows that are not in modelled_rows().
 KernelWork executed_work(const std::string& row, const ExecutedCounts& counts);
 
 const std::vector<std::string>& modelled_rows();

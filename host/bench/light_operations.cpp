@@ -11,7 +11,7 @@
 namespace raysplats {
 namespace {
 
-// Of the model's half extent.
+// Size of the bodies, as a share of the model's smallest half extent.
 constexpr double kBodySize = 0.5;
 constexpr float kLightDistance = 3.0f;
 

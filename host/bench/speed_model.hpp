@@ -77,21 +77,6 @@ struct Prediction {
 /// one processor does of each before the others come.
 Prediction predict(const KernelWork& work, const DeviceSpeeds& device, double resident = 0);
 
-/// A graphics card that nothing has run on: public figures (docs/gpu.md) and what the vendor's
-/// compiler says of the kernels (scripts/gpu/baseline.json).
-struct Card {
-  DeviceSpeeds speeds;
-  std::string target;    ///< of scripts/gpu_compile.py, or the nearest one
-  double units = 0;      ///< that share registers and local memory
-  double registers = 0;  ///< of a unit, in waves' registers of 32 lanes; Intel: its threads
-  double most = 0;       ///< waves of a unit
-  double local = 0;      ///< bytes of a unit
-  int granule = 1;       ///< registers are given out in
-};
-
-/// Radeon RX 7900 XTX, Arc A770, GeForce RTX 4090, H200 SXM.
-const std::vector<Card>& cards();
-
 /// A kernel as a vendor's compiler left it.
 struct CompiledKernel {
   std::string target;
@@ -104,10 +89,7 @@ struct CompiledKernel {
 
 /// The kernels that decide rows of run_bench() on GPUs, one per target.
 const std::vector<CompiledKernel>& compiled_kernels();
-/// Of a row and target. Throws UsageError where there is none.
+/// The kernel of a row and target. Throws UsageError where there is none.
 const CompiledKernel& compiled_kernel(const std::string& row, const std::string& target);
-
-/// Waves of 32 work-items of a kernel that the card holds at once.
-double resident_waves(const Card& card, const CompiledKernel& kernel);
 
 }  // namespace raysplats

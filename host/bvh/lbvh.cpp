@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "raysplats/error.hpp"
 #include "shared/tree_layout.h"
@@ -92,64 +93,68 @@ void Lbvh::order(const Buffer<RsAabb>& boxes, std::size_t count) {
         fmt::format("A tree over {} boxes needs a buffer of as many and at most 2^31, it has {}",
                     count, boxes.size()));
   }
-  count_ = count;
-  const auto lanes = static_cast<std::size_t>(lanes_);
+  // Where this throws, the tree is empty.
+  count_ = 0;
   level_sizes_.clear();
+  const auto lanes = static_cast<std::size_t>(lanes_);
+  std::vector<std::size_t> level_sizes;
   std::vector<std::uint32_t> begin{0};
   std::size_t nodes = 0;
-  for (std::size_t size = block_count(); count_ > 0;) {
+  for (std::size_t size = ceil_div(count, lanes); count > 0;) {
     size = ceil_div(size, lanes);
-    level_sizes_.push_back(size);
+    level_sizes.push_back(size);
     begin.push_back(u32(nodes));
     nodes += size;
     if (size == 1) break;
   }
   level_begin_.ensure(*context_, begin.size(), "tree levels");
   level_begin_.upload(begin);
-  scene_node_ = u32(nodes);
   nodes_.ensure(*context_, (nodes + 1) * RS_NODE_VECTORS * lanes, "tree nodes");
-  if (count_ > 0) sort_along_curve(boxes);
+  if (count > 0) sort_along_curve(boxes, count);
+  scene_node_ = u32(nodes);
+  level_sizes_ = std::move(level_sizes);
+  count_ = count;
 }
 
-void Lbvh::sort_along_curve(const Buffer<RsAabb>& boxes) {
+void Lbvh::sort_along_curve(const Buffer<RsAabb>& boxes, std::size_t count) {
   const auto lanes = static_cast<std::size_t>(lanes_);
-  high_.ensure(*context_, count_, "tree codes, high words");
-  low_.ensure(*context_, count_, "tree codes, low words");
-  order_.ensure(*context_, count_, "tree order");
-  const std::size_t groups = shape_.used_groups(count_);
+  high_.ensure(*context_, count, "tree codes, high words");
+  low_.ensure(*context_, count, "tree codes, low words");
+  order_.ensure(*context_, count, "tree order");
+  const std::size_t groups = shape_.used_groups(count);
   partials_.ensure(*context_, groups, "tree partial bounds");
   kernel(kCurve, "center_bounds")
       .launch(Range::linear(groups * shape_.group_size, shape_.group_size), boxes, partials_,
-              u32(count_), u32(shape_.chunk(count_)));
+              u32(count), u32(shape_.chunk(count)));
   kernel(kCurve, "choose_grid")
-      .launch(Range::linear(shape_.group_size, shape_.group_size), boxes, partials_, u32(count_),
+      .launch(Range::linear(shape_.group_size, shape_.group_size), boxes, partials_, u32(count),
               u32(groups), grid_);
-  const Range curve = Range::linear(ceil_div(count_, lanes), kGroup);
+  const Range curve = Range::linear(ceil_div(count, lanes), kGroup);
   Kernel codes = kernel(kCurve, "curve_codes");
-  codes.launch(curve, boxes, grid_, high_, low_, order_, u32(count_));
+  codes.launch(curve, boxes, grid_, high_, low_, order_, u32(count));
   // Low words matter only where high words are equal, and there are few of those: half the passes.
-  sort_.sort(high_, order_, count_);
+  sort_.sort(high_, order_, count);
   too_long_.clear();
   const bool cpu = context_->device().type == DeviceType::kCpu;
-  const std::size_t chunk = cpu ? shape_.chunk(count_) : 1;
+  const std::size_t chunk = cpu ? shape_.chunk(count) : 1;
   kernel(kCurve, "sort_runs")
-      .launch(Range::linear(ceil_div(count_, chunk), cpu ? 1 : kGroup), high_, low_, order_,
-              too_long_, u32(count_), u32(chunk));
+      .launch(Range::linear(ceil_div(count, chunk), cpu ? 1 : kGroup), high_, low_, order_,
+              too_long_, u32(count), u32(chunk));
   if (too_long_.read(0) != 0) {
     // Many centres in one cell of the high words: sort by both words, the low one first.
-    scratch_.ensure(*context_, count_, "tree codes");
-    codes.launch(curve, boxes, grid_, scratch_, high_, order_, u32(count_));
-    sort_.sort(high_, order_, count_);
+    scratch_.ensure(*context_, count, "tree codes");
+    codes.launch(curve, boxes, grid_, scratch_, high_, order_, u32(count));
+    sort_.sort(high_, order_, count);
     kernel(kCurve, "gather_words")
-        .launch(Range::linear(count_, kGroup), scratch_, order_, high_, u32(count_));
-    sort_.sort(high_, order_, count_);
+        .launch(Range::linear(count, kGroup), scratch_, order_, high_, u32(count));
+    sort_.sort(high_, order_, count);
   }
   if (cpu) {
     kernel(kOrder, "order_groups")
-        .launch(Range::linear(ceil_div(count_, order_group()), 1), boxes, order_, u32(count_));
+        .launch(Range::linear(ceil_div(count, order_group()), 1), boxes, order_, u32(count));
   } else {
     kernel(kGroupOrder, "order_group")
-        .launch(Range::linear(count_, order_group()), boxes, order_, u32(count_));
+        .launch(Range::linear(count, order_group()), boxes, order_, u32(count));
   }
 }
 

@@ -32,14 +32,15 @@ int ray_lanes(const DeviceInfo& device, int lanes);
 class Lbvh {
  public:
   Lbvh(Context& context, int lanes);
-  /// With an explicit division of the work for ordering.
+  /// A tree with an explicit division of the work for ordering.
   Lbvh(Context& context, int lanes, const ChunkShape& shape);
 
   /// What order() and merge() keep on the device for every box, beside the boxes and the blocks.
   static std::size_t bytes_per_box(int lanes);
 
   /// Order and shape of the tree over boxes[0..count). Boxes that are empty or not finite come
-  /// last. Throws UsageError for 2^31 boxes and when the buffer is shorter.
+  /// last. Throws UsageError for 2^31 boxes and when the buffer is shorter; whatever else it throws
+  /// leaves the tree empty.
   void order(const Buffer<RsAabb>& boxes, std::size_t count);
   /// Boxes of all levels above the first.
   void merge();
@@ -75,7 +76,7 @@ class Lbvh {
   const Buffer<std::uint32_t>& slots() const { return order_; }
 
  private:
-  void sort_along_curve(const Buffer<RsAabb>& boxes);
+  void sort_along_curve(const Buffer<RsAabb>& boxes, std::size_t count);
   Kernel kernel(std::string_view program, const char* name) const;
 
   Context* context_;

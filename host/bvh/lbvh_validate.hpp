@@ -54,7 +54,7 @@ struct LbvhVisits {
   std::size_t blocks = 0;
 };
 
-/// Of the ray origin + t direction, t >= 0; computed in double precision.
+/// What the ray origin + t direction, t >= 0, visits; computed in double precision.
 LbvhVisits count_visits(const LbvhCopy& tree, const double* origin, const double* direction);
 
 }  // namespace raysplats

@@ -41,7 +41,7 @@ class Transport {
   /// Sends and receives all of these messages; blocks. What two ranks send each other arrives in
   /// order; the sizes have to agree. Throws RankLost.
   virtual void exchange(std::span<const Outgoing> out, std::span<const Incoming> in, Wait wait) = 0;
-  /// From any thread: this rank has failed, and an exchange() of it throws an Error soon.
+  /// Tells, from any thread, that this rank has failed: an exchange() of it throws an Error soon.
   virtual void give_up() = 0;
   /// Ends all ranks; `code` is the exit status of a process.
   [[noreturn]] virtual void abort(int code) = 0;

@@ -62,9 +62,11 @@ class Buffer {
 
   std::size_t size() const { return size_; }
 
-  /// Makes room for at least `size` elements; the content is lost when the buffer has to grow.
+  /// Makes room for at least `size` elements; the content is lost when the buffer has to grow, and
+  /// where that throws the buffer is left with a size of 0 and no memory.
   void ensure(Context& context, std::size_t size, const std::string& label) {
     if (raw_.empty() || raw_.bytes() < bytes_for(size, label)) {
+      size_ = 0;
       raw_ = RawBuffer();  // the old memory goes first
       *this = Buffer(context, size, label);
     }
@@ -92,7 +94,7 @@ class Buffer {
   }
   /// Sets every 32-bit word of all elements to zero.
   void clear() { clear(size_); }
-  /// Of the first `count` elements.
+  /// Sets the first `count` elements to zero.
   void clear(std::size_t count) {
     static_assert(sizeof(T) % 4 == 0);
     if (count > 0) raw_.fill(0, count * sizeof(T), 0);

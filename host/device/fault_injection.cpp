@@ -16,7 +16,7 @@ struct Description {
   cl_int status;
 };
 
-// In the order of Fault.
+// What is said of each fault, in the order of Fault.
 constexpr std::array<Description, 5> kFaults{{
     {"RAYSPLATS_FAIL_ALLOC", "clCreateBuffer", CL_MEM_OBJECT_ALLOCATION_FAILURE},
     {"RAYSPLATS_FAIL_BUILD", "", CL_SUCCESS},

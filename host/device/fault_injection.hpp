@@ -19,6 +19,8 @@ class FaultInjection {
  public:
   FaultInjection();
 
+  /// The n-th from now on fails; none where n is 0.
+  void arm(Fault fault, std::size_t n) { left_[static_cast<std::size_t>(fault)] = n; }
   /// Counts one and throws cl::Error when it is the one to fail.
   void check(Fault fault);
   /// Counts one and tells whether it is the one to fail.

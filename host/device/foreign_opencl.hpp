@@ -7,7 +7,7 @@
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 
-// As in the OpenCL headers.
+// Names as the OpenCL headers have them.
 typedef struct _cl_command_queue* cl_command_queue;
 typedef struct _cl_mem* cl_mem;
 

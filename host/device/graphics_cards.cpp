@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the first byte of a PCI class: display controllers and processing accelerators.
+// How PCI classes begin: display controllers and processing accelerators.
 constexpr const char* kDisplay = "0x03";
 constexpr const char* kAccelerator = "0x12";
 

@@ -93,8 +93,8 @@ class Kernel {
   const std::string& name() const;
   std::size_t max_work_group_size() const;
   std::size_t argument_count() const;
-  /// In a work-group of `items` in a row, once the compiler has chosen their size; 0 where the
-  /// device does not tell.
+  /// Number of subgroups of a work-group of `items` in a row, once the compiler has chosen their
+  /// size; 0 where the device does not tell.
   std::size_t subgroups(std::size_t items) const;
 
   struct Impl;

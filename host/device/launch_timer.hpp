@@ -20,8 +20,8 @@ class LaunchTimer {
   void stop();
   /// Whether all of it has run; never blocks. Throws DeviceError when the device failed on the way.
   bool ready() const;
-  /// From the beginning of the first launch to the end of the last; 0 for none. Blocks until they
-  /// have run; what was enqueued later goes on meanwhile.
+  /// Time from the beginning of the first launch to the end of the last; 0 for none. Blocks until
+  /// they have run; what was enqueued later goes on meanwhile.
   double seconds() const;
 
  private:

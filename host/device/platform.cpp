@@ -64,7 +64,7 @@ std::vector<std::string> problems_of(const cl::Device& device, const DeviceInfo&
   return problems;
 }
 
-// Of cl_ext_float_atomics, which some releases of the headers lack.
+// Numbers of cl_ext_float_atomics, which some releases of the headers lack.
 constexpr cl_device_info kFloatAtomicCapabilities = 0x4231;
 constexpr cl_bitfield kGlobalFloatAdd = 1u << 1;
 

@@ -100,13 +100,13 @@ struct ProgramBuilder::Build {
   std::string key;  // of the cache
   bool fails = false;
 
-  // With the builder's mutex.
+  // Read and written with the builder's mutex.
   State state = State::kWaits;
   bool compiles = false;  // the cache did not have it
   cl::Program program;
   std::exception_ptr error;
 
-  // Of threads that ask.
+  // Set by the threads that ask, which alone read them.
   bool announced = false;
   bool concluded = false;
 };
@@ -346,7 +346,7 @@ std::optional<cl::Program> ProgramBuilder::from_cache(const Build& build) const 
     if (arguments_are_checked() && !tells_arguments(program)) return std::nullopt;
     return program;
   } catch (const cl::Error&) {
-    // For example after a driver update with the same version string.
+    // A binary is refused for example after a driver update with the same version string.
     cache_.remove(build.key);
     return std::nullopt;
   }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/json_file.hpp"
 #include "raysplats/evaluation.hpp"
 
 #include <fmt/format.h>
@@ -10,11 +9,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "comm/communicator.hpp"
 #include "eval/error_map.hpp"
 #include "eval/metrics.hpp"
 #include "eval/view_alignment.hpp"
+#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render/frame_writer.hpp"
@@ -25,41 +26,57 @@ namespace raysplats {
 namespace {
 
 struct Comparison {
-  Image render;  // RGB in [0, 1], equal to the photo where that is masked out
+  Image render;  // RGB in [0, 1]
   Image photo;   // RGB
-  Image whole;   // the render as it is, in [0, 1]
   Image mask;    // one channel: how much each pixel counts
   double valid;  // share of the pixels that count
 };
 
-Comparison compare(const Image& traced,
+// RGB in [0, 1], in the memory of what was traced.
+Image displayed(Image traced) {
+  const auto channels = static_cast<std::size_t>(traced.channels);
+  for (std::size_t p = 0; p < traced.pixels(); ++p) {
+    for (std::size_t c = 0; c < 3; ++c)
+      traced.data[3 * p + c] = std::clamp(traced.data[channels * p + c], 0.0f, 1.0f);
+  }
+  traced.channels = 3;
+  traced.data.resize(3 * traced.pixels());
+  return traced;
+}
+
+Image rgb_of(const Image& rgba) {
+  Image out(rgba.width, rgba.height, 3);
+  for (std::size_t p = 0; p < rgba.pixels(); ++p)
+    std::copy_n(rgba.data.data() + 4 * p, 3, out.data.data() + 3 * p);
+  return out;
+}
+
+Comparison compare(Image traced,
                    const ViewPicture& picture,
                    bool alpha_is_background,
                    const std::array<float, 3>& background) {
   const Image& rgba = picture.rgba;
-  const Image empty(rgba.width, rgba.height, 3);
-  Comparison out{empty, empty, empty, Image(rgba.width, rgba.height, 1), 1.0};
-  if (alpha_is_background) out.photo = composite(rgba, background.data());
+  Comparison out{displayed(std::move(traced)),
+                 alpha_is_background ? composite(rgba, background.data()) : rgb_of(rgba),
+                 Image(rgba.width, rgba.height, 1, 1.0f), 1.0};
   const bool weighted = !picture.weight.data.empty();
+  if (!weighted && alpha_is_background) return out;
   double weights = 0;
-  for (int y = 0; y < rgba.height; ++y) {
-    for (int x = 0; x < rgba.width; ++x) {
-      const float mask = weighted              ? picture.weight.at(x, y, 0)
-                         : alpha_is_background ? 1.0f
-                                               : rgba.at(x, y, 3);
-      weights += static_cast<double>(mask);
-      out.mask.at(x, y, 0) = mask;
-      for (int c = 0; c < 3; ++c) {
-        if (!alpha_is_background) out.photo.at(x, y, c) = rgba.at(x, y, c);
-        const float photo = out.photo.at(x, y, c);
-        const float shown = std::clamp(traced.at(x, y, c), 0.0f, 1.0f);
-        out.whole.at(x, y, c) = shown;
-        out.render.at(x, y, c) = photo + mask * (shown - photo);
-      }
-    }
+  for (std::size_t p = 0; p < rgba.pixels(); ++p) {
+    out.mask.data[p] = weighted ? picture.weight.data[p] : rgba.data[4 * p + 3];
+    weights += static_cast<double>(out.mask.data[p]);
   }
   out.valid = weights / static_cast<double>(rgba.pixels());
   return out;
+}
+
+// Makes the render equal to the photo where that is masked out.
+void hide_masked_out(Comparison& pair) {
+  if (pair.valid == 1.0) return;
+  for (std::size_t i = 0; i < pair.render.data.size(); ++i) {
+    const float photo = pair.photo.data[i];
+    pair.render.data[i] = photo + pair.mask.data[i / 3] * (pair.render.data[i] - photo);
+  }
 }
 
 // What ranks tell each other of a view.
@@ -70,19 +87,21 @@ struct MeasuredView {
 };
 
 double psnr_of(const Comparison& pair) {
-  return std::min(weighted_psnr(pair.whole, pair.photo, pair.mask), kMostPsnr);
+  return std::min(weighted_psnr(pair.render, pair.photo, pair.mask), kMostPsnr);
 }
 
-MeasuredView measure(std::size_t index, const Comparison& pair, Lpips* lpips) {
+// Leaves the pair as hide_masked_out() does.
+MeasuredView measure(std::size_t index, Comparison& pair, Lpips* lpips) {
   MeasuredView out{};
   out.index = index;
   out.compared = pair.valid > 0;
   if (!out.compared) return out;
   out.psnr = psnr_of(pair);
-  out.psnr_corrected = std::min(corrected_psnr(pair.whole, pair.photo, pair.mask), kMostPsnr);
+  out.psnr_corrected = std::min(corrected_psnr(pair.render, pair.photo, pair.mask), kMostPsnr);
   out.has_all = pair.valid < 1.0;
-  if (out.has_all) out.psnr_all = std::min(psnr(pair.whole, pair.photo), kMostPsnr);
-  out.ssim = ssim(pair.render, pair.photo);
+  if (out.has_all) out.psnr_all = std::min(psnr(pair.render, pair.photo), kMostPsnr);
+  hide_masked_out(pair);
+  out.ssim = weighted_ssim(pair.render, pair.photo, pair.mask);
   out.has_lpips = lpips != nullptr;
   if (out.has_lpips) out.lpips = lpips->distance(pair.render, pair.photo);
   out.sharpness = sharpness(pair.photo);
@@ -248,25 +267,32 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
       render(dataset.views[views[i]].camera);
       return std::nullopt;
     }
+    Image traced = render(dataset.views[views[i]].camera);
+    if (traced.data.empty()) return std::nullopt;
     const ViewPicture picture = load_view_picture(dataset.views[views[i]]);
     const Image& rgba = picture.rgba;
-    const Image traced = render(dataset.views[views[i]].camera);
-    if (traced.data.empty()) return std::nullopt;
     if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
       throw UsageError(fmt::format(
           "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names[i],
           traced.width, traced.height, traced.channels, rgba.width, rgba.height));
     }
-    return compare(traced, picture, dataset.alpha_is_background, background);
+    return compare(std::move(traced), picture, dataset.alpha_is_background, background);
   };
   // After compare_view(), whose pair that is; none where it was stopped.
   const auto aligned_psnr = [&](std::size_t i, const Comparison& pair) -> std::optional<double> {
     const View& view = dataset.views[views[i]];
-    const std::optional<AlignedView> aligned =
-        align_view(render, view.camera, pair.photo, pair.mask);
+    const ViewPicture picture = load_view_picture(view);
+    const auto compared = [&](Image traced) {
+      return compare(std::move(traced), picture, dataset.alpha_is_background, background);
+    };
+    const auto shown = [&](const Camera& camera) {
+      Image traced = render(camera);
+      if (!options.align_colors || traced.data.empty()) return traced;
+      return color_corrected(compared(std::move(traced)).render, pair.photo, pair.mask);
+    };
+    std::optional<AlignedView> aligned = align_view(shown, view.camera, pair.photo, pair.mask);
     if (!aligned) return std::nullopt;
-    return psnr_of(
-        compare(aligned->render, load_view_picture(view), dataset.alpha_is_background, background));
+    return psnr_of(compared(std::move(aligned->render)));
   };
   // Ranks that render together stop together.
   const auto for_all = [&](bool stop) { return options.together ? ranks.any(stop) : stop; };
@@ -282,7 +308,7 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   const std::size_t rank = options.together ? 0 : static_cast<std::size_t>(ranks.rank());
   const std::size_t step = options.together ? 1 : static_cast<std::size_t>(ranks.size());
   for (std::size_t i = rank; i < views.size() && !stopped; i += step) {
-    const std::optional<Comparison> pair = compare_view(i);
+    std::optional<Comparison> pair = compare_view(i);
     stopped = compares && !pair;
     if (pair) {
       measured.push_back(measure(i, *pair, options.lpips));
@@ -303,26 +329,33 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   const std::vector<MeasuredView> all = of_all_ranks(ranks, measured);
   const std::set<std::size_t> shown = telling(all, pictures);
   // Which views tell most is known only now; tracing them again takes less than keeping all.
+  bool cut_off = false;
   for (const std::size_t i : shown) {
     if (all_shown || i % step != rank) continue;
-    const std::optional<Comparison> pair = compare_view(i);
-    if (for_all(compares && !pair)) break;
-    if (pair) write_picture(i, *pair);
+    std::optional<Comparison> pair = compare_view(i);
+    cut_off = for_all(compares && !pair);
+    if (cut_off) break;
+    if (!pair) continue;
+    hide_masked_out(*pair);
+    write_picture(i, *pair);
   }
+  // Those of other ranks are not known to be there.
+  const bool named = !ranks.any(cut_off);
 
   EvaluationReport report;
+  std::size_t empty = 0;
+  std::string first_empty;
   for (const MeasuredView& view : all) {
     EvaluationMetrics metrics = metrics_of(view);
     const Camera& camera = dataset.views[views[view.index]].camera;
     metrics.name = camera.name.empty() ? names[view.index] : camera.name;
     const glm::dvec3 center = camera.center();
     metrics.center = {center.x, center.y, center.z};
-    if (shown.contains(view.index)) metrics.picture = picture_of(view.index);
+    if (named && shown.contains(view.index)) metrics.picture = picture_of(view.index);
     if (view.compared) {
       report.images.push_back(metrics);
-    } else if (ranks.leads()) {
-      spdlog::warn("nothing of {} can be compared: its mask or its lens leaves no pixel",
-                   metrics.name);
+    } else if (empty++ == 0) {
+      first_empty = metrics.name;
     }
   }
   if (report.images.empty() && stopped) return report;
@@ -330,6 +363,11 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
     throw DataError(
         fmt::format("No view of {} has a pixel to compare: their masks or lenses leave none",
                     dataset.root.string()));
+  }
+  if (empty > 0 && ranks.leads()) {
+    spdlog::warn(
+        "{} of {} views cannot be compared, {} among them: their masks or lenses leave no pixel",
+        empty, all.size(), first_empty);
   }
   report.mean = mean_of(report.images);
   if (!output.empty() && ranks.leads()) write_text_file(output / "metrics.json", report.json());

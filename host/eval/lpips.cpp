@@ -5,6 +5,7 @@
 
 #include "io/image_codec.hpp"
 #include "raysplats/error.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats {
 
@@ -15,9 +16,10 @@ struct Lpips::Impl {
 bool Lpips::available() { return io::image_codec().has_networks(); }
 
 Lpips::Lpips(const std::filesystem::path& network) : impl_(std::make_unique<Impl>()) {
-  if (available() && !std::filesystem::is_regular_file(network)) {
-    throw DataError(fmt::format(
-        "The LPIPS network {} does not exist; give the path of an ONNX file", network.string()));
+  if (available() && !is_file(network)) {
+    throw DataError(fmt::format("The LPIPS network {} {}: give the path of an ONNX file",
+                                network.string(),
+                                is_folder(network) ? "is a folder" : "does not exist"));
   }
   impl_->network = io::image_codec().open_network(network);
 }

@@ -22,13 +22,21 @@ double weighted_psnr(const Image& image, const Image& photo, const Image& weight
 /// image closest to the photo, clamped to [0, 1]. Throws UsageError like psnr().
 double corrected_psnr(const Image& image, const Image& photo, const Image& weight);
 
+/// The image after that map, not clamped.
+Image color_corrected(const Image& image, const Image& photo, const Image& weight);
+
 /// Structural similarity (Wang et al. 2004), mean over pixels and channels, in double precision:
 /// Gaussian window of sigma 1.5 and 11 x 11 pixels, C1 = 0.01^2, C2 = 0.03^2, population
 /// covariance. As scikit-image's structural_similarity(gaussian_weights=True, sigma=1.5,
 /// use_sample_covariance=False, data_range=1), which leaves out the 5 pixels along the borders.
 /// Images smaller than the window, which scikit-image refuses, are reflected at their edges and
 /// averaged over all pixels. (The training loss has zeros beyond the borders instead.) Throws
-/// UsageError like psnr().
+/// UsageError like psnr(). On all cores; their number does not change a bit.
 double ssim(const Image& image, const Image& photo);
+
+/// The same as a mean of the pixels by their weights (one channel, >= 0), at least one of which is
+/// above 0. The windows around them see the other pixels too, so that those should be equal. Where
+/// all weight lies along the borders, these count as in images that are smaller than the window.
+double weighted_ssim(const Image& image, const Image& photo, const Image& weight);
 
 }  // namespace raysplats

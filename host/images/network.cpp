@@ -7,7 +7,10 @@
 
 #ifdef RAYSPLATS_HAVE_OPENCV
 #include <cmath>
+#include <map>
 #include <opencv2/dnn.hpp>
+#include <opencv2/dnn/all_layers.hpp>
+#include <string>
 #endif
 
 namespace raysplats::io {
@@ -29,6 +32,35 @@ cv::Mat to_blob(const Image& image) {
   return blob;
 }
 
+constexpr const char* kRemedy = "export it with scripts/quality/export_lpips.py of the sources";
+
+// Throws DataError for what OpenCV reads without an error but computes wrongly (4.6; later versions
+// in part), both of which an export of LPIPS as it is has.
+void refuse_misread_layers(cv::dnn::Net& net, const std::filesystem::path& path) {
+  std::map<const unsigned char*, std::string> factors;  // the layer that has each
+  for (const std::string& name : net.getLayerNames()) {
+    const cv::Ptr<cv::dnn::Layer> layer = net.getLayer(net.getLayerId(name));
+    // It keeps the shapes that its input had when the file was written.
+    if (layer->type == "Reduce") {
+      throw DataError(
+          fmt::format("The LPIPS network {} takes a mean or a sum ({}) that OpenCV computes for "
+                      "pictures of one size only: {}",
+                      path.string(), name, kRemedy));
+    }
+    // A division becomes a product: the constant is inverted where it lies, once for each division
+    // by it. Constants that are added become layers of this kind too.
+    const auto scale = layer.dynamicCast<cv::dnn::ScaleLayer>();
+    if (!scale || scale->hasBias || scale->blobs.size() != 1) continue;
+    const auto [first, is_new] = factors.try_emplace(scale->blobs[0].data, name);
+    if (!is_new) {
+      throw DataError(
+          fmt::format("The LPIPS network {} divides or multiplies twice by one constant ({}, {}), "
+                      "which OpenCV reads wrongly: {}",
+                      path.string(), first->second, name, kRemedy));
+    }
+  }
+}
+
 class DnnNetwork : public PerceptualNetwork {
  public:
   explicit DnnNetwork(const std::filesystem::path& path) : path_(path) {
@@ -36,10 +68,10 @@ class DnnNetwork : public PerceptualNetwork {
       net_ = cv::dnn::readNetFromONNX(path.string());
       // Inputs are set by position: whatever the file calls them, the first two get these names.
       net_.setInputsNames({"in0", "in1"});
+      refuse_misread_layers(net_, path);
     } catch (const cv::Exception& error) {
-      throw DataError(
-          fmt::format("{} is no network that OpenCV can read ({}); export LPIPS as ONNX",
-                      path.string(), error.err));
+      throw DataError(fmt::format("The LPIPS network {} is none that OpenCV can read ({}): {}",
+                                  path.string(), error.err, kRemedy));
     }
   }
 
@@ -55,10 +87,14 @@ class DnnNetwork : public PerceptualNetwork {
           "(1, 3, height, width)",
           path_.string(), image.width, image.height, error.err));
     }
-    if (out.total() != 1 || out.type() != CV_32F || !std::isfinite(*out.ptr<float>())) {
+    if (out.total() != 1 || out.type() != CV_32F) {
+      throw DataError(fmt::format("The LPIPS network {} yields {} values instead of one float: {}",
+                                  path_.string(), out.total(), kRemedy));
+    }
+    if (!std::isfinite(*out.ptr<float>())) {
       throw DataError(
-          fmt::format("The LPIPS network {} yields {} values instead of one finite number",
-                      path_.string(), out.total()));
+          fmt::format("The LPIPS network {} yields no finite number ({}) for images of {}x{}: {}",
+                      path_.string(), *out.ptr<float>(), image.width, image.height, kRemedy));
     }
     return static_cast<double>(*out.ptr<float>());
   }

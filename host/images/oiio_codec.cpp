@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The library raysplats-images: EXR by OpenEXR, other pictures by
-// OpenImageIO.
+// The library raysplats-images: EXR by OpenEXR, other pictures by OpenImageIO.
 #include <OpenEXR/ImfTestFile.h>
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -12,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "images/exr_codec.hpp"
@@ -23,6 +23,9 @@
 
 namespace raysplats::io {
 namespace {
+
+/// Of the greatest integer of 32 bits: less is no photo's brightest pixel.
+constexpr float kLeastWhite = 1.0f / 256.0f;
 
 std::string reason(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -97,11 +100,34 @@ class OiioDecoder : public ImageDecoder {
       case 2:
         return decode_as<std::uint16_t>(OIIO::TypeUInt16);
       default:
-        return decode_as<float>(OIIO::TypeFloat);
+        RawImage image = decode_as<float>(OIIO::TypeFloat);
+        require_known_white(image);
+        return image;
     }
   }
 
  private:
+  // No file says what is white among integers of 32 bits. OpenImageIO takes the greatest that there
+  // are; beside it counts, labels and numbers of a camera, of 16 bits or less, are all black.
+  void require_known_white(const RawImage& image) const {
+    const unsigned char type = input_->spec().format.basetype;
+    const bool is_signed = type == OIIO::TypeDesc::INT32;
+    if (!is_signed && type != OIIO::TypeDesc::UINT32) return;
+    const auto channels = static_cast<std::size_t>(image.channels);
+    const std::size_t colors = channels - (channels % 2 == 0 ? 1 : 0);
+    const auto& numbers = std::get<std::vector<float>>(image.numbers);
+    float most = 0.0f;
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      if (i % channels < colors) most = std::max(most, numbers[i]);
+    }
+    if (most == 0.0f || most >= kLeastWhite) return;
+    const double greatest = static_cast<double>(most) * (is_signed ? 2147483647.0 : 4294967295.0);
+    throw DataError(
+        fmt::format("The image {} has integers of 32 bits, of which the greatest is {:.0f}: what "
+                    "is white is not known, convert it to 8 or 16 bits, or to floats of 0 to 1",
+                    name_, greatest));
+  }
+
   // Bands that are neither colours nor alpha (near infrared of drones) are left out.
   template <class T>
   RawImage decode_as(const OIIO::TypeDesc& type) {

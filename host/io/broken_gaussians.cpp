@@ -36,6 +36,8 @@ void BrokenGaussians::settle(Gaussians& model, const std::filesystem::path& path
       kept.push_back(static_cast<std::uint32_t>(i));
     }
   }
+  if (kept.empty())
+    throw DataError(fmt::format("{}: no whole one is left, so export the model anew", told));
   model = gathered(model, kept);
   spdlog::warn("{}: they are left out", told);
 }

@@ -16,8 +16,9 @@ class BrokenGaussians {
   /// `name`: of the number.
   void add(std::size_t gaussian, const std::string& name);
 
-  /// Takes them out of the model with a warning, or throws DataError that counts them and says how
-  /// they are left out. Does nothing where there are none.
+  /// Takes them out of the model with a warning. Without `drop` throws DataError that counts them
+  /// and says how they are left out, and with it DataError when no other is left. Does nothing
+  /// where there are none.
   void settle(Gaussians& model, const std::filesystem::path& path, bool drop) const;
 
  private:

@@ -19,11 +19,11 @@
 #include <utility>
 
 #include "io/byte_reader.hpp"
-#include "io/image_file.hpp"
 #include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/photo_lens.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -48,17 +47,6 @@ void require_photos_of_their_own(const std::vector<View>& views) {
   }
 }
 
-/// The file names, without extensions, that one image of a model alone has, whatever its folder.
-std::set<std::string> names_of_one(const std::vector<ColmapImage>& images) {
-  std::set<std::string> once, more;
-  for (const ColmapImage& image : images) {
-    std::string name = fs::path(image.name).stem().string();
-    if (more.contains(name)) continue;
-    if (!once.insert(name).second) more.insert(once.extract(name));
-  }
-  return once;
-}
-
 void tell_of_stretched(std::size_t stretched, const std::vector<View>& views) {
   if (stretched == 0) return;
   const Camera& camera = views.front().source_camera;
@@ -83,7 +71,8 @@ std::vector<View> colmap_views(const ColmapModel& model,
                                const DatasetOptions& options) {
   const PhotoFolder folder = photo_folder(root, model, options.downscale);
   const double rest = std::max(1.0, options.downscale / folder.factor);
-  const std::set<std::string> single = names_of_one(model.images);
+  MaskFinder masks(root);
+  for (const ColmapImage& image : model.images) masks.add(image.name);
   std::vector<View> views;
   std::size_t stretched = 0, respelt = 0;
   std::string first_respelt;
@@ -98,10 +87,7 @@ std::vector<View> colmap_views(const ColmapModel& model,
       continue;
     }
     view.image_path = *photo;
-    view.mask_path = find_mask(root, image.name);
-    const fs::path file_name = fs::path(image.name).filename();
-    if (view.mask_path.empty() && single.contains(file_name.stem().string()))
-      view.mask_path = find_mask(root, file_name);
+    view.mask_path = masks.find(image.name);
     view.points = image.points;
     Camera nominal = model.cameras.at(image.camera_id);
     nominal.name = inner_name(image.name);

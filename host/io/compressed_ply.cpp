@@ -161,7 +161,7 @@ Gaussians read_compressed_ply(const std::filesystem::path& path) {
         const double value = low + part * (chunk.high[6 + k] - low);
         model.sh[3 * row + k] = static_cast<float>((value - 0.5) / kSh0);
       }
-      model.opacities[row] = logit_of(unit(word(color), 0, 8), kByteOpacityMargin);
+      model.opacities[row] = logit_of(unit(word(color), 0, 8));
     });
   }
   if (has_harmonics) read_harmonics(path, model);

@@ -97,9 +97,8 @@ std::string header(std::size_t count, std::size_t chunks, std::size_t harmonics)
 
 void write_compressed_ply(const std::filesystem::path& path, const Gaussians& given) {
   static_assert(std::endian::native == std::endian::little);
-  const Gaussians sorted = in_morton_order(given);
-  const Gaussians model =
-      sorted.sh_degree > kMostDegree ? with_sh_degree(sorted, kMostDegree) : sorted;
+  Gaussians model = in_morton_order(given);
+  if (model.sh_degree > kMostDegree) model = with_sh_degree(model, kMostDegree);
   const std::size_t count = model.size();
   const std::size_t chunks = (count + kChunk - 1) / kChunk;
   const auto coefficients = static_cast<std::size_t>(sh_coefficients(model.sh_degree));

@@ -74,13 +74,15 @@ void GzipReader::read(std::span<std::byte> out) {
   if (inflate_some(out) < out.size()) fail("holds less than its header says");
 }
 
-void GzipReader::finish(std::size_t limit) {
+std::vector<std::byte> GzipReader::finish(std::size_t limit) {
+  std::vector<std::byte> rest;
   std::array<std::byte, 4096> scratch;
-  std::size_t total = 0;
   while (!ended_) {
-    total += inflate_some(scratch);
-    if (total > limit) fail("holds more than its header says");
+    const auto read = static_cast<std::ptrdiff_t>(inflate_some(scratch));
+    rest.insert(rest.end(), scratch.begin(), scratch.begin() + read);
+    if (rest.size() > limit) fail("holds more than its header says");
   }
+  return rest;
 }
 
 std::vector<std::byte> gzip(std::span<const std::span<const std::byte>> parts) {

@@ -19,9 +19,9 @@ class GzipReader {
   GzipReader& operator=(const GzipReader&) = delete;
   /// Fills `out`. Throws DataError for damaged streams and those that end before.
   void read(std::span<std::byte> out);
-  /// Reads over at most `limit` bytes to the end of the stream, whose checksum is then right.
-  /// Throws DataError for damage, missing bytes and for more than that.
-  void finish(std::size_t limit);
+  /// The rest of the stream, at most `limit` bytes, whose checksum is then right. Throws DataError
+  /// for damage, missing bytes and for more than that.
+  std::vector<std::byte> finish(std::size_t limit);
 
  private:
   struct State;

@@ -3,17 +3,23 @@
 
 #include <fmt/format.h>
 
+#include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
+#include <utility>
 
 #include "io/model_file.hpp"
 #include "io/ply_options.hpp"
 #include "raysplats/error.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "scene/model_changes.hpp"
+#include "util/atomic_file.hpp"
 
 namespace raysplats {
 namespace {
+
+// What a translation may leave of the distance of an origin that it takes away.
+constexpr double kLedBack = 0.01;
 
 // What a file without the comments of our PLY does not say of a model.
 std::string not_said(const std::array<double, 3>& origin,
@@ -46,36 +52,39 @@ Conversion convert_model(const std::filesystem::path& input,
                          std::optional<TraceOptions> trace,
                          bool overwrite) {
   const io::ModelFormat format = io::output_format(output);
-  std::error_code error;
-  if (std::filesystem::equivalent(input, output, error)) {
-    throw UsageError(
-        fmt::format("{} is what is read: give another file to write", output.string()));
-  }
-  if (!overwrite && std::filesystem::exists(output, error)) {
-    throw UsageError(
-        fmt::format("{} is there already: give another name, or --overwrite", output.string()));
-  }
-  const Gaussians model = read_model(input, encoding);
+  check_output_file(output, overwrite, {input});
+  Gaussians model = read_model(input, encoding);
+  const std::size_t read = model.size();
+  const int degree = model.sh_degree;
   const glm::dmat4 map = movement(changes);
   // Positions are their numbers in the file plus its origin, which scales and turns as they do.
-  const glm::dvec3 moved_origin = glm::dmat3(map) * origin_of(input);
-  const std::array<double, 3> origin{moved_origin.x, moved_origin.y, moved_origin.z};
+  glm::dvec3 moved_origin = glm::dmat3(map) * origin_of(input);
   ModelChanges of_numbers = changes;
-  if (of_numbers.crop) of_numbers.crop->low -= moved_origin, of_numbers.crop->high -= moved_origin;
-  const Gaussians result = changed(model, of_numbers);
-  if (model.size() > 0 && result.size() == 0) {
-    throw UsageError(fmt::format(
-        "None of the {} Gaussians of {} is left: choose a larger box or a smaller opacity",
-        model.size(), input.string()));
+  // Else the numbers would be as far away as the origin, to the other side.
+  const glm::dvec3 rest = moved_origin + changes.translate;
+  if (glm::length(rest) < kLedBack * glm::length(moved_origin)) {
+    of_numbers.translate = rest;
+    moved_origin = glm::dvec3(0.0);
   }
-  if (trace) trace->sky = transformed(trace->sky, map);
+  const std::array<double, 3> origin{moved_origin.x, moved_origin.y, moved_origin.z};
+  if (of_numbers.crop) of_numbers.crop->low -= moved_origin, of_numbers.crop->high -= moved_origin;
+  const Gaussians result = changed(std::move(model), of_numbers);
+  if (read > 0 && result.size() == 0) {
+    throw UsageError(fmt::format(
+        "None of the {} Gaussians of {} is left: choose a larger box or a smaller opacity", read,
+        input.string()));
+  }
+  if (trace) {
+    trace->sky = transformed(trace->sky, map);
+    trace->near_depth *= static_cast<float>(changes.scale);
+  }
   write_model(output, result, encoding, trace, origin);
   std::string losses = io::losses(format, result);
-  const bool leaves_out = result.size() < model.size() || result.sh_degree < model.sh_degree;
+  const bool leaves_out = result.size() < read || result.sh_degree < degree;
   if (leaves_out && losses == io::kNoLoss) losses = "nothing but what was asked for is left out";
   const std::string unsaid = format == io::ModelFormat::kPly ? "" : not_said(origin, trace);
   if (!unsaid.empty() && losses == io::kNoLoss) losses = "no number of the Gaussians is changed";
-  return {model.size(), result.size(), result.sh_degree, losses + unsaid};
+  return {read, result.size(), result.sh_degree, losses + unsaid};
 }
 
 }  // namespace raysplats

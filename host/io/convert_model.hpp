@@ -18,11 +18,12 @@ struct Conversion {
   std::string losses;                 ///< as io::losses(), and what the file does not say
 };
 
-/// Reads `input` with the encoding, changes it and writes `output`; a sky in `trace` turns with it.
-/// Coordinates are those of the data: what the file holds plus its origin (read_ply_origin()),
-/// which scales and turns with them and stays where they are moved. Throws as read_model(),
-/// changed() and write_model(), and UsageError when both are the same file, when `output` is there
-/// without `overwrite`, and when nothing is left to write.
+/// Reads `input` with the encoding, changes it and writes `output`; of `trace` the sky turns with
+/// it and the near depth scales. Coordinates are those of the data: what the file holds plus its
+/// origin (read_ply_origin()), which scales and turns with them and stays where they are moved;
+/// only a translation that leads it back to 0 takes it away. Throws as read_model(), changed() and
+/// write_model(), and UsageError when both are the same file, when `output` is there without
+/// `overwrite`, and when nothing is left to write.
 Conversion convert_model(const std::filesystem::path& input,
                          const std::filesystem::path& output,
                          const ModelChanges& changes,

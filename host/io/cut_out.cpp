@@ -12,6 +12,7 @@
 
 #include "io/image_file.hpp"
 #include "raysplats/error.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats::io {
 namespace {

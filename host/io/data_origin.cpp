@@ -13,12 +13,29 @@
 namespace raysplats::io {
 namespace {
 
-constexpr double kFarAway = 200.0;   // sizes of the scene; single precision has 7 digits
-constexpr double kLeastSize = 1e-6;  // of the distance: cameras in one place have no size
-constexpr double kNearest = 0.9;     // share of the cameras or points that is the scene
+constexpr double kFarAway = 200.0;     // sizes of the scene; single precision has 7 digits
+constexpr double kLeastSize = 1e-6;    // of the distance: cameras in one place have no size
+constexpr double kNearest = 0.9;       // share of the cameras or points that is the scene
+constexpr double kRounding = 0x1p-24;  // of a number in single precision
+constexpr double kBlur = 0.01;         // of a detail, that is not seen
 
 double quantile(std::vector<double> values, double q) {
   return quantiles(std::move(values), std::span<const double>(&q, 1))[0];
+}
+
+std::vector<double> distances_to(const glm::dvec3& center, std::span<const double> points) {
+  std::vector<double> out(points.size() / 3);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const glm::dvec3 point(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
+    out[i] = glm::distance(point, center);
+  }
+  return out;
+}
+
+// To the power of ten below the size.
+glm::dvec3 rounded(const glm::dvec3& center, double size) {
+  const double unit = std::pow(10.0, std::floor(std::log10(size)));
+  return unit * glm::round(center / unit) + 0.0;  // never -0
 }
 
 }  // namespace
@@ -34,16 +51,24 @@ glm::dvec3 fitting_origin(std::span<const View> views, std::span<const double> p
   std::vector<double> distances;
   for (const View& view : views) distances.push_back(glm::distance(view.camera.center(), center));
   double size = quantile(std::move(distances), kNearest);
-  distances.clear();
-  for (std::size_t i = 0; i + 2 < points.size(); i += 3) {
-    distances.push_back(glm::distance(glm::dvec3(points[i], points[i + 1], points[i + 2]), center));
-  }
-  if (!distances.empty()) size = std::max(size, quantile(std::move(distances), kNearest));
+  // 0 for no points.
+  size = std::max(size, quantile(distances_to(center, points), kNearest));
   const double away = glm::length(center);
   size = std::max(size, kLeastSize * away);
-  if (!(away > kFarAway * size)) return glm::dvec3(0.0);
-  const double unit = std::pow(10.0, std::floor(std::log10(size)));
-  return unit * glm::round(center / unit) + 0.0;  // never -0
+  return away > kFarAway * size ? rounded(center, size) : glm::dvec3(0.0);
+}
+
+glm::dvec3 fitting_origin(std::span<const double> points, double detail) {
+  glm::dvec3 center(0.0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (std::size_t i = axis; i < points.size(); i += 3) values.push_back(points[i]);
+    center[static_cast<int>(axis)] = quantile(std::move(values), 0.5);
+  }
+  const double away = glm::length(center);
+  if (!std::isfinite(away) || !(kRounding * away > kBlur * detail)) return glm::dvec3(0.0);
+  const double size = quantile(distances_to(center, points), kNearest);
+  return rounded(center, std::max(size, kLeastSize * away));
 }
 
 void move_origin(Camera& camera, const glm::dvec3& origin) {

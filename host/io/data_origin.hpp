@@ -15,6 +15,10 @@ namespace raysplats::io {
 /// 200 times as far away as the scene is large, else 0. `points`: x, y, z each, may be empty.
 glm::dvec3 fitting_origin(std::span<const View> views, std::span<const double> points);
 
+/// The same of points alone, x, y, z each, finite: near their median, rounded to how far they
+/// spread, where single precision would shift them by more than a hundredth of `detail`, a length.
+glm::dvec3 fitting_origin(std::span<const double> points, double detail);
+
 /// The same pose counted from `origin`.
 void move_origin(Camera& camera, const glm::dvec3& origin);
 

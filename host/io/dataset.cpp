@@ -105,15 +105,14 @@ Dataset load_colmap(const fs::path& root,
   return dataset;
 }
 
-/// The held-out views of a Blender data set; nothing where it has none. The file of a part that was
-/// not copied may be left over.
-std::optional<std::vector<View>> held_out_views(const fs::path& root,
-                                                const DatasetOptions& options) {
+/// The file of the held-out views of a Blender data set; nothing where it has none. That of a part
+/// that was not copied may be left over.
+std::optional<io::TransformsFile> held_out_file(const fs::path& root) {
   for (const char* name : {"transforms_test.json", "transforms_val.json"}) {
     const fs::path path = root / name;
     if (!is_file(path)) continue;
     io::TransformsFile file = io::read_transforms(path);
-    if (file.frames.empty() || io::has_photos(file)) return io::transforms_views(file, options);
+    if (file.frames.empty() || io::has_photos(file)) return file;
     spdlog::warn("{}: none of its {} photos exist, '{}' the first: it is not used", path.string(),
                  file.frames.size(), file.frames.front().file_path);
   }
@@ -130,11 +129,16 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
     spdlog::info("{} points are those of {}", dataset.points.size(), file.string());
   }
   io::TransformsFile train = io::read_transforms(root / "transforms_train.json");
-  dataset.views = io::transforms_views(train, options);
+  std::optional<io::TransformsFile> held_out = held_out_file(root);
+  io::MaskFinder masks(root);
+  io::add_photos(train, masks);
+  if (held_out) io::add_photos(*held_out, masks);
+  dataset.views = io::transforms_views(train, options, masks);
   sort_by_name(dataset.views);
-  if (std::optional<std::vector<View>> test = held_out_views(root, options)) {
-    sort_by_name(*test);
-    for (View& view : *test) {
+  if (held_out) {
+    std::vector<View> test = io::transforms_views(*held_out, options, masks);
+    sort_by_name(test);
+    for (View& view : test) {
       view.test = true;
       dataset.views.push_back(std::move(view));
     }
@@ -183,6 +187,13 @@ fs::path points_of(const io::TransformsFile& file) {
   return path;
 }
 
+/// The views of a file that is the only one of its data set.
+std::vector<View> views_of(io::TransformsFile& file, const DatasetOptions& options) {
+  io::MaskFinder masks(file.path.parent_path());
+  io::add_photos(file, masks);
+  return io::transforms_views(file, options, masks);
+}
+
 Dataset load_nerfstudio(const fs::path& path, const DatasetOptions& options) {
   io::TransformsFile file = io::read_transforms(path);
   Dataset dataset;
@@ -190,7 +201,7 @@ Dataset load_nerfstudio(const fs::path& path, const DatasetOptions& options) {
   std::set<std::string> frames;
   for (const io::TransformsFrame& frame : file.frames)
     frames.insert(io::inner_name(frame.file_path));
-  std::vector<View> views = io::transforms_views(file, options);
+  std::vector<View> views = views_of(file, options);
   const auto names = [&](const std::optional<std::vector<std::string>>& list) {
     std::set<std::string> set;
     for (const std::string& name : list.value_or(std::vector<std::string>{}))
@@ -225,7 +236,7 @@ Dataset load_nerfstudio(const fs::path& path, const DatasetOptions& options) {
 Dataset load_frames(DatasetKind kind, io::TransformsFile file, const DatasetOptions& options) {
   Dataset dataset;
   dataset.kind = kind;
-  dataset.views = io::transforms_views(file, options);
+  dataset.views = views_of(file, options);
   sort_by_name(dataset.views);
   mark_every(dataset.views, options.test_every);
   set_origin(dataset, {}, options);

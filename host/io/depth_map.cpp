@@ -20,6 +20,7 @@
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/photo_lens.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -141,7 +142,7 @@ DepthMap from_points(const PointCloud& points, const View& view) {
 
 }  // namespace
 
-DepthMap read_depth_map(const std::filesystem::path& path, double unit) {
+DepthMap read_depth_map(const std::filesystem::path& path, double unit, bool again) {
   DepthMap out = lower_extension(path) == ".npy" ? read_array(path) : read_picture(path);
   std::size_t odd = 0, known = 0;
   for (float& value : out.values) {
@@ -154,15 +155,15 @@ DepthMap read_depth_map(const std::filesystem::path& path, double unit) {
         "The depth map {} has no number above 0 and says nothing: remove it from the data set",
         path.string()));
   }
-  if (odd > 0) {
+  if (odd > 0 && !again) {
     spdlog::warn("{} of {} numbers of the depth map {} are not finite: they count as unknown", odd,
                  out.values.size(), path.string());
   }
   return out;
 }
 
-DepthMap view_depths(const Dataset& dataset, const View& view, double unit) {
-  if (!view.depth_path.empty()) return from_map(read_depth_map(view.depth_path, unit), view);
+DepthMap view_depths(const Dataset& dataset, const View& view, double unit, bool again) {
+  if (!view.depth_path.empty()) return from_map(read_depth_map(view.depth_path, unit, again), view);
   if (!view.points.empty()) return from_points(dataset.points, view);
   return {};
 }

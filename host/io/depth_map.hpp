@@ -18,8 +18,9 @@ struct DepthMap {
 /// Reads depths: a picture of one channel with 16 bits or floats, or a .npy file of height x width
 /// numbers (read_npy(); one channel more is fine), each number times `unit`. Numbers that are not
 /// finite or not above 0 are unknown; those that are not finite are counted in a warning. Throws
-/// DataError for another format or shape, and for a map that knows nothing.
-DepthMap read_depth_map(const std::filesystem::path& path, double unit);
+/// DataError for another format or shape, and for a map that knows nothing. `again`: it was read
+/// before, and what was said of it then is not repeated.
+DepthMap read_depth_map(const std::filesystem::path& path, double unit, bool again = false);
 
 /// What is known of the depths of a view at the size of its camera: from its depth map where it has
 /// one (the nearest pixel, lenses taken out as for its photo), else those of the sparse points that
@@ -27,7 +28,7 @@ DepthMap read_depth_map(const std::filesystem::path& path, double unit);
 /// equirectangular cameras along the ray (maps of wide photos through lenses of planes, which
 /// become fisheye pictures, are turned into that). Throws DataError as read_depth_map() and for a
 /// map of another shape than its photo.
-DepthMap view_depths(const Dataset& dataset, const View& view, double unit);
+DepthMap view_depths(const Dataset& dataset, const View& view, double unit, bool again = false);
 
 /// The same with fewer pixels: the median of what is known in the area of each.
 DepthMap reduced(const DepthMap& depths, int width, int height);

@@ -9,6 +9,7 @@
 
 #include "io/image_file.hpp"
 #include "util/file_kind.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -14,9 +14,9 @@ namespace raysplats::io {
 /// The value of the constant spherical harmonic.
 constexpr double kSh0 = RS_SH0;
 
-/// Opacities of floats and of bytes are kept this far from 0 and 1, where the logit is infinite.
-constexpr double kFloatOpacityMargin = 1e-7;
-constexpr double kByteOpacityMargin = 0.5 / 255.0;
+/// Opacities are kept this far from 0 and 1, where the logit is infinite; those of bytes too, whose
+/// ends stand for whole ones.
+constexpr double kOpacityMargin = 1e-7;
 
 /// Logarithm of the scale that a flat axis, of size 0 in its file, gets.
 constexpr float kFlatLogScale = -20.0f;
@@ -28,8 +28,8 @@ inline double opacity_of(float logit) {
   return 1.0 / (1.0 + std::exp(-static_cast<double>(logit)));
 }
 
-inline float logit_of(double opacity, double margin) {
-  const double inside = std::clamp(opacity, margin, 1.0 - margin);
+inline float logit_of(double opacity) {
+  const double inside = std::clamp(opacity, kOpacityMargin, 1.0 - kOpacityMargin);
   return static_cast<float>(std::log(inside / (1.0 - inside)));
 }
 

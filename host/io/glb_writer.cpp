@@ -6,9 +6,12 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <glm/mat4x4.hpp>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/gaussian_codes.hpp"
@@ -27,12 +30,16 @@ static_assert(std::endian::native == std::endian::little, "floats are written as
 constexpr int kPoints = 0;
 constexpr int kFloat = 5126;
 constexpr int kArrayBuffer = 34962;
+constexpr std::size_t kNumbersPerWrite = 1 << 16;
 constexpr std::uint64_t kMostBytes = std::numeric_limits<std::uint32_t>::max();
+
+/// Number k of Gaussian i.
+using Value = std::function<float(std::size_t i, std::size_t k)>;
 
 /// The arrays of the file one after the other, and the JSON that describes them.
 class Glb {
  public:
-  Glb(const Gaussians& model) : count_(model.size()) {
+  explicit Glb(std::size_t count) : count_(count) {
     json_["asset"] = {{"version", "2.0"},
                       {"generator", fmt::format("RaySplats-CL {}", RAYSPLATS_VERSION)}};
     json_["extensionsUsed"] = {kSplattingExtension};
@@ -41,15 +48,10 @@ class Glb {
     json_["nodes"] = {{{"mesh", 0}}};
   }
 
-  /// `value(i, k)` is number k of Gaussian i; `bounds` as glTF wants them of positions.
-  template <class Value>
+  /// `value` is called until the file is written; `bounds` as glTF wants them of positions.
   void add(const std::string& name, std::size_t width, Value value, bool bounds = false) {
-    std::vector<float> numbers(width * count_);
-    for (std::size_t i = 0; i < count_; ++i) {
-      for (std::size_t k = 0; k < width; ++k) numbers[width * i + k] = value(i, k);
-    }
     const std::array<const char*, 5> types{"", "SCALAR", "VEC2", "VEC3", "VEC4"};
-    const std::size_t bytes = numbers.size() * sizeof(float);
+    const std::size_t bytes = width * count_ * sizeof(float);
     json_["bufferViews"].push_back(
         {{"buffer", 0}, {"byteOffset", bytes_}, {"byteLength", bytes}, {"target", kArrayBuffer}});
     Json accessor{{"bufferView", arrays_.size()},
@@ -59,16 +61,17 @@ class Glb {
     if (bounds) {
       std::vector<float> low(width, std::numeric_limits<float>::max());
       std::vector<float> high(width, std::numeric_limits<float>::lowest());
-      for (std::size_t i = 0; i < numbers.size(); ++i) {
-        low[i % width] = std::min(low[i % width], numbers[i]);
-        high[i % width] = std::max(high[i % width], numbers[i]);
+      for (std::size_t i = 0; i < width * count_; ++i) {
+        const float number = value(i / width, i % width);
+        low[i % width] = std::min(low[i % width], number);
+        high[i % width] = std::max(high[i % width], number);
       }
       accessor["min"] = low;
       accessor["max"] = high;
     }
     attributes_[name] = arrays_.size();
     json_["accessors"].push_back(std::move(accessor));
-    arrays_.push_back(std::move(numbers));
+    arrays_.push_back({width, std::move(value)});
     bytes_ += bytes;
   }
 
@@ -104,16 +107,31 @@ class Glb {
     file.write(text);
     word(bytes_);
     file.write(std::string_view("BIN\0", 4));
-    for (const auto& numbers : arrays_) file.write(numbers.data(), numbers.size() * sizeof(float));
+    for (const Array& array : arrays_) write(file, array);
     file.commit();
   }
 
  private:
+  struct Array {
+    std::size_t width;
+    Value value;
+  };
+  /// By parts, as all arrays together are as large as the model.
+  void write(AtomicFile& file, const Array& array) const {
+    std::vector<float> numbers;
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t k = 0; k < array.width; ++k) numbers.push_back(array.value(i, k));
+      if (numbers.size() < kNumbersPerWrite && i + 1 < count_) continue;
+      file.write(numbers.data(), numbers.size() * sizeof(float));
+      numbers.clear();
+    }
+  }
+
   std::size_t count_;
   std::uint64_t bytes_ = 0;
   Json json_;
   Json attributes_;
-  std::vector<std::vector<float>> arrays_;
+  std::vector<Array> arrays_;
 };
 
 }  // namespace
@@ -124,9 +142,11 @@ void write_glb(const std::filesystem::path& path, const Gaussians& model) {
         "{} cannot be written: glTF has no empty arrays, and the model has no Gaussians",
         path.string()));
   }
-  const Gaussians turned = transformed(
-      with_sh_degree(model, std::min(model.sh_degree, kSplattingMaxDegree)), splatting_turn());
-  Glb glb(turned);
+  const glm::dmat4 turn = splatting_turn();
+  const Gaussians turned = model.sh_degree > kSplattingMaxDegree
+                               ? transformed(with_sh_degree(model, kSplattingMaxDegree), turn)
+                               : transformed(model, turn);
+  Glb glb(turned.size());
   glb.add(
       "POSITION", 3, [&](std::size_t i, std::size_t k) { return turned.means[3 * i + k]; }, true);
   glb.add(kSplattingRotation, 4, [&](std::size_t i, std::size_t k) {
@@ -142,7 +162,7 @@ void write_glb(const std::filesystem::path& path, const Gaussians& model) {
   std::size_t coefficient = 0;
   for (int degree = 0; degree <= turned.sh_degree; ++degree) {
     for (int n = 0; n <= 2 * degree; ++n, ++coefficient) {
-      glb.add(splatting_harmonic(degree, n), 3, [&](std::size_t i, std::size_t k) {
+      glb.add(splatting_harmonic(degree, n), 3, [&, coefficient](std::size_t i, std::size_t k) {
         return turned.sh[stride * i + 3 * coefficient + k];
       });
     }

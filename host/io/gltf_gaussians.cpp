@@ -6,6 +6,7 @@
 #include <glm/mat4x4.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/broken_gaussians.hpp"
@@ -35,7 +36,26 @@ bool has_gaussians(const tinygltf::Mesh& mesh) {
                      [](const tinygltf::Primitive& each) { return splatting(each) != nullptr; });
 }
 
-void check_kind(const GltfReader& reader, const tinygltf::Value& extension) {
+int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
+  const auto found = primitive.attributes.find(name);
+  return found == primitive.attributes.end() ? -1 : found->second;
+}
+
+/// Whether all attributes have numbers of their own, beside what an extension may pack.
+bool is_whole(const GltfReader& reader, const tinygltf::Primitive& primitive) {
+  for (const char* name : {"POSITION", kSplattingRotation, kSplattingScale, kSplattingOpacity}) {
+    if (attribute(primitive, name) < 0) return false;
+  }
+  const auto& accessors = reader.model().accessors;
+  return std::all_of(primitive.attributes.begin(), primitive.attributes.end(),
+                     [&](const auto& named) {
+                       const auto index = static_cast<std::size_t>(named.second);
+                       return index >= accessors.size() || accessors[index].bufferView >= 0;
+                     });
+}
+
+void check_kind(const GltfReader& reader, const tinygltf::Primitive& primitive) {
+  const tinygltf::Value& extension = *splatting(primitive);
   const auto refuse = [&](const std::string& what) {
     throw DataError(fmt::format("{} has Gaussians {}, which is not supported: export it otherwise",
                                 reader.path().string(), what));
@@ -49,22 +69,18 @@ void check_kind(const GltfReader& reader, const tinygltf::Value& extension) {
     text("kernel", "ellipse");
     text("colorSpace", "srgb_rec709_display");
     text("projection", "perspective");
-    if (extension.Has("extensions")) {
+    // Else they are there for readers that do not know the packed form.
+    if (extension.Has("extensions") && !is_whole(reader, primitive)) {
       for (const std::string& name : extension.Get("extensions").Keys())
         refuse(fmt::format("packed by {}", name));
     }
   }
 }
 
-int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
-  const auto found = primitive.attributes.find(name);
-  return found == primitive.attributes.end() ? -1 : found->second;
-}
-
 Gaussians read_primitive(const GltfReader& reader,
                          const tinygltf::Primitive& primitive,
                          bool drop_nonfinite) {
-  check_kind(reader, *splatting(primitive));
+  check_kind(reader, primitive);
   if (primitive.mode != TINYGLTF_MODE_POINTS) reader.fail("Gaussians are not of the mode POINTS");
   if (primitive.indices >= 0) reader.fail("Gaussians have indices");
   std::size_t count = 0;
@@ -98,10 +114,14 @@ Gaussians read_primitive(const GltfReader& reader,
     for (std::size_t k = 0; k < 4; ++k) model.quaternions[4 * i + k] = static_cast<float>(unit[k]);
     for (std::size_t k = 0; k < 3; ++k) {
       const float scale = scales[3 * i + k];
-      if (scale < 0.0f) reader.fail("a scale is negative");
+      if (scale < 0.0f) {
+        reader.fail(
+            "a scale is negative, a logarithm perhaps, as splat-transform wrote them until June "
+            "2026: write it again by a newer one");
+      }
       model.log_scales[3 * i + k] = std::log(std::max(scale, kLeastScale));
     }
-    model.opacities[i] = logit_of(static_cast<double>(opacities[i]), kFloatOpacityMargin);
+    model.opacities[i] = logit_of(static_cast<double>(opacities[i]));
   }
   const auto stride = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
   std::size_t coefficient = 0;
@@ -151,7 +171,7 @@ Gaussians read_gltf_gaussians(const std::filesystem::path& path, bool drop_nonfi
         if (splatting(primitive) != nullptr)
           parts.push_back(read_primitive(reader, primitive, drop_nonfinite));
       }
-      meshes[index] = joined(parts);
+      meshes[index] = parts.size() == 1 ? std::move(parts.front()) : joined(parts);
       own += meshes[index]->size();
     }
     total += meshes[index]->size();
@@ -169,7 +189,7 @@ Gaussians read_gltf_gaussians(const std::filesystem::path& path, bool drop_nonfi
     throw DataError(fmt::format("{} is no 3D Gaussian model: no mesh of its scene has {}",
                                 path.string(), kSplattingExtension));
   }
-  return joined(placed);
+  return placed.size() == 1 ? std::move(placed.front()) : joined(placed);
 }
 
 }  // namespace raysplats::io

@@ -36,6 +36,10 @@ struct GltfTextureUse {
 /// | emissive factor > 0, base colour black | emissive |
 /// | else | diffuse with a specular lobe after the roughness and the index of refraction |
 ///
+/// KHR_materials_pbrSpecularGlossiness counts in place of metallic and roughness: its glossiness is
+/// 1 - roughness, and a specular colour F0 whose largest channel is 0.5 or more makes it a metal of
+/// that colour, a smaller one leaves 1 - F0 of the diffuse colour.
+///
 /// The colour is the base colour factor, the texture its texture. glTF's factors are linear light,
 /// whereas colours here are display values, so factors are encoded as sRGB (IEC 61966-2-1);
 /// textures are encoded already. Textures of other properties count with their mean.
@@ -59,13 +63,24 @@ class GltfMaterials {
   Material map_material(const tinygltf::Material& from, int number);
   Image decode(int texture) const;
   int texture(int texture);
-  /// Mean of a channel of a texture; 1 without one.
-  double mean(int texture, int channel);
+  /// Mean of a channel of a texture, red, green, blue or alpha; 1 without one.
+  double mean(int texture, std::size_t channel);
+  /// What a material says of its surface, in linear light.
+  struct Surface {
+    double color[3];
+    double alpha;
+    int texture;  ///< of the colour; -1 for none
+    double metallic;
+    double roughness;
+    double reflectance;  ///< straight on, of what is no metal
+  };
+  Surface metallic_roughness(const tinygltf::Material& from);
+  Surface specular_glossiness(const tinygltf::Value& from);
   const GltfReader& reader_;
   SeenMaterials seen_;
   std::map<int, std::uint32_t> used_;
   std::map<int, int> loaded_;
-  std::map<int, std::array<double, 3>> means_;
+  std::map<int, std::array<double, 4>> means_;
 };
 
 }  // namespace raysplats::io

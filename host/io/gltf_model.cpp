@@ -4,140 +4,34 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <exception>
 #include <limits>
 #include <string>
-#include <string_view>
+#include <utility>
 
 #include "io/byte_reader.hpp"
+#include "io/gltf_document.hpp"
+#include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
 namespace {
 
-constexpr std::uint32_t kGlbMagic = 0x46546c67;  // "glTF"
-/// tinygltf counts bytes in 32 bits.
+/// A GLB counts its bytes in 32 bits, and so does tinygltf.
 constexpr std::uint64_t kMaxBytes = 0xffffffff;
-constexpr int kMaxDepth = 64;
-
-/// The folder of the file, and what has been read from it; many buffers may name one large file.
-struct Folder {
-  std::filesystem::path path;
-  bool closed = false;  ///< nothing of it may be read
-  std::uint64_t bytes = 0;
-};
-
-tinygltf::FsCallbacks file_access(Folder& folder) {
-  tinygltf::FsCallbacks calls{};
-  calls.FileExists = [](const std::string& name, void* data) {
-    if (static_cast<Folder*>(data)->closed) {
-      throw DataError(
-          "The glTF file names other files, which are not read here: export it as one GLB");
-    }
-    std::error_code error;
-    return std::filesystem::is_regular_file(static_cast<Folder*>(data)->path / name, error);
-  };
-  calls.ExpandFilePath = [](const std::string& name, void*) { return name; };
-  calls.ReadWholeFile = [](std::vector<unsigned char>* out, std::string*, const std::string& name,
-                           void* data) {
-    auto& from = *static_cast<Folder*>(data);
-    if (from.closed) return false;
-    const auto bytes = read_file(from.path / name, kMaxBytes - from.bytes);
-    from.bytes += bytes.size();
-    const auto* begin = reinterpret_cast<const unsigned char*>(bytes.data());
-    out->assign(begin, begin + bytes.size());
-    return true;
-  };
-  calls.user_data = &folder;
-  return calls;
-}
-
-/// Keeps the encoded content: only the images that are used get decoded. That of a buffer view is
-/// where it is; tinygltf has not checked its range, so it must not be touched here.
-bool keep_image(tinygltf::Image* image,
-                int,
-                std::string*,
-                std::string*,
-                int,
-                int,
-                const unsigned char* bytes,
-                int size,
-                void*) {
-  if (image->bufferView < 0 && size > 0) image->image.assign(bytes, bytes + size);
-  return true;
-}
-
-/// The JSON chunk of a GLB whose chunks lie within the file (glTF 2.0, section 4.4).
-std::string_view glb_json(std::span<const std::byte> bytes, const std::filesystem::path& path) {
-  ByteReader reader(bytes, path);
-  reader.skip(4, "the magic number");
-  const auto version = reader.read<std::uint32_t>("the version");
-  if (version != 2) {
-    throw DataError(
-        fmt::format("{} is glTF of version {}, but only 2 is known", path.string(), version));
-  }
-  const auto length = reader.read<std::uint32_t>("the length");
-  if (length > bytes.size()) {
-    throw DataError(
-        fmt::format("{} is truncated: it has {} bytes of {}", path.string(), bytes.size(), length));
-  }
-  std::string_view json;
-  while (reader.offset() < length) {
-    const auto size = reader.read<std::uint32_t>("the length of a chunk");
-    const auto type = reader.read<std::uint32_t>("the type of a chunk");
-    if (json.empty()) {
-      if (type != 0x4e4f534a) reader.fail("the first chunk holds no JSON");
-      const std::size_t begin = reader.offset();
-      reader.skip(size, "the JSON");
-      json = {reinterpret_cast<const char*>(bytes.data()) + begin, size};
-    } else {
-      reader.skip(size, "a chunk");
-    }
-  }
-  if (json.empty()) reader.fail("there is no JSON");
-  return json;
-}
-
-/// Parsers of nested values call themselves, so that the depth is limited before they start.
-void check_depth(std::string_view json, const std::filesystem::path& path) {
-  int depth = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    const char c = json[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      if (c == '"') in_string = false;
-      continue;
-    }
-    if (c == '"') in_string = true;
-    if (c == '}' || c == ']') --depth;
-    if ((c == '{' || c == '[') && ++depth > kMaxDepth) {
-      throw DataError(
-          fmt::format("{} is nested more than {} levels deep", path.string(), kMaxDepth));
-    }
-  }
-}
 
 /// The first of tinygltf's messages without its line end and full stop.
 std::string first_sentence(const std::string& messages) {
   std::string line = messages.substr(0, messages.find('\n'));
   while (!line.empty() && (line.back() == '.' || line.back() == ' ')) line.pop_back();
-  return line.empty() ? "its content is damaged" : line;
+  return line.empty() ? "its content is damaged" : excerpt(line, 200);
 }
 
-void check_extensions(const tinygltf::Model& model, const std::filesystem::path& path) {
-  for (const std::string& name : model.extensionsRequired) {
-    if (name.starts_with("KHR_materials_") || name == "KHR_texture_transform" ||
-        name == "KHR_mesh_quantization" || name == "KHR_lights_punctual" ||
-        name == "KHR_gaussian_splatting") {
-      continue;
-    }
-    throw DataError(
-        fmt::format("{} needs the extension {}, which is not supported: export it without",
-                    path.string(), name));
-  }
+void check_size(std::uint64_t bytes, const std::filesystem::path& path) {
+  if (bytes <= kMaxBytes) return;
+  throw DataError(
+      fmt::format("{} has more than {} bytes: make it smaller", path.string(), kMaxBytes));
 }
 
 std::size_t component_size(int type) {
@@ -180,29 +74,24 @@ tinygltf::Model parse_gltf(const std::filesystem::path& path) {
 tinygltf::Model parse_gltf(const std::filesystem::path& path,
                            std::span<const std::byte> bytes,
                            bool alone) {
-  if (bytes.size() > kMaxBytes) {
-    throw DataError(
-        fmt::format("{} has more than {} bytes: make it smaller", path.string(), kMaxBytes));
+  check_size(bytes.size(), path);
+  GltfDocument document = read_gltf_document(bytes, path);
+  // tinygltf would take data: URIs of unknown media types for names of files, and with what is not
+  // read here it finds faults that are none.
+  GltfContent content = take_content(document, path, alone, kMaxBytes);
+  for (const char* unread : {"animations", "cameras", "extensions", "samplers", "skins"}) {
+    document.json.erase(unread);
   }
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  const bool binary = bytes.size() >= 4 && load<std::uint32_t>(bytes.data()) == kGlbMagic;
-  check_depth(binary ? glb_json(bytes, path) : std::string_view(text, bytes.size()), path);
-  Folder folder{path.parent_path(), alone};
+  const std::string text = document.json.dump();
+  check_size(text.size(), path);
   tinygltf::TinyGLTF loader;
-  loader.SetFsCallbacks(file_access(folder));
-  loader.SetImageLoader(keep_image, nullptr);
   tinygltf::Model model;
   std::string errors;
   std::string warnings;
   bool parsed = false;
-  const auto size = static_cast<unsigned>(bytes.size());
   try {
-    parsed = binary
-                 ? loader.LoadBinaryFromMemory(&model, &errors, &warnings,
-                                               reinterpret_cast<const unsigned char*>(text), size)
-                 : loader.LoadASCIIFromString(&model, &errors, &warnings, text, size, "");
-  } catch (const Error&) {
-    throw;
+    parsed = loader.LoadASCIIFromString(&model, &errors, &warnings, text.data(),
+                                        static_cast<unsigned>(text.size()), "");
   } catch (const std::exception& error) {
     errors = error.what();
   }
@@ -211,7 +100,8 @@ tinygltf::Model parse_gltf(const std::filesystem::path& path,
     throw DataError(
         fmt::format("{} is no valid glTF file: {}", path.string(), first_sentence(errors)));
   }
-  check_extensions(model, path);
+  model.buffers = std::move(content.buffers);
+  model.images = std::move(content.images);
   return model;
 }
 
@@ -228,6 +118,7 @@ std::span<const std::byte> GltfReader::view(int buffer_view) const {
     fail(fmt::format("the buffer view {} has no buffer", buffer_view));
   }
   const auto& data = model_.buffers[static_cast<std::size_t>(view.buffer)].data;
+  if (data.empty()) fail(fmt::format("the buffer {} has no bytes", view.buffer));
   if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset) {
     fail(fmt::format("the buffer view {} ends beyond its buffer of {} bytes", buffer_view,
                      data.size()));
@@ -330,8 +221,9 @@ std::span<const std::byte> GltfReader::image(int image) const {
   const tinygltf::Image& from = model_.images[static_cast<std::size_t>(image)];
   if (from.bufferView >= 0) return view(from.bufferView);
   if (from.image.empty()) {
-    throw DataError(
-        fmt::format("The image {} of {} does not exist or is empty", from.uri, path_.string()));
+    throw DataError(fmt::format("The image {} of {} does not exist or is empty",
+                                from.uri.empty() ? std::to_string(image) : excerpt(from.uri),
+                                path_.string()));
   }
   return std::as_bytes(std::span(from.image));
 }

@@ -13,8 +13,8 @@
 namespace raysplats::io {
 
 /// Parses a glTF 2.0 file, JSON or GLB, with its external buffers; images stay encoded
-/// (bytes_of()). Throws DataError for what tinygltf refuses and for what it does not check: the
-/// sizes of the chunks of a GLB, the depth of the JSON, extensions that are required but not known.
+/// (GltfReader::image()), and skins, animations, cameras and samplers are left out. Throws
+/// DataError for what read_gltf_document(), take_content() or tinygltf refuse.
 tinygltf::Model parse_gltf(const std::filesystem::path& path);
 /// The same of a file that has been read. One that stands alone must not name others: no file is
 /// opened.

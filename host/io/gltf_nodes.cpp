@@ -2,6 +2,7 @@
 #include "io/gltf_nodes.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <glm/gtc/quaternion.hpp>
@@ -11,6 +12,8 @@
 
 namespace raysplats::io {
 namespace {
+
+constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
 
 /// The nodes of the default scene, of the first one without a default, or all that are no
 /// children.
@@ -91,6 +94,7 @@ void for_each_placed_mesh(const GltfReader& reader,
   std::vector<std::pair<int, glm::dmat4>> open;
   for (const int root : roots(reader)) open.emplace_back(root, glm::dmat4(1.0));
   std::vector<bool> seen(model.nodes.size(), false);
+  bool copies_left_out = false;
   while (!open.empty()) {
     const auto [number, parent] = open.back();
     open.pop_back();
@@ -104,8 +108,17 @@ void for_each_placed_mesh(const GltfReader& reader,
     seen[static_cast<std::size_t>(number)] = true;
     const tinygltf::Node& node = model.nodes[static_cast<std::size_t>(number)];
     const glm::dmat4 matrix = parent * local(reader, node, number);
-    if (node.mesh >= 0) checked(node.mesh, matrix);
+    if (node.mesh >= 0) {
+      copies_left_out = copies_left_out || node.extensions.count(kInstancing) > 0;
+      checked(node.mesh, matrix);
+    }
     for (const int child : node.children) open.emplace_back(child, matrix);
+  }
+  if (copies_left_out) {
+    spdlog::warn(
+        "{}: the copies of {} are left out: each of these meshes stands once, where its "
+        "node is",
+        reader.path().string(), kInstancing);
   }
 }
 

@@ -41,15 +41,10 @@ constexpr std::array<const char*, 15> kImageExtensions{".png", ".jpg",  ".jpeg",
                                                        ".tif", ".tiff", ".webp", ".bmp",  ".hdr",
                                                        ".gif", ".tga",  ".heic", ".heif", ".avif"};
 
-/// The extension in small letters.
-std::string lower_extension(const std::filesystem::path& path);
 /// Whether read_image() knows the extension.
 bool has_image_extension(const std::filesystem::path& path);
 /// The same of a file that a listing of photos may count: none that macOS has left beside one
 /// (is_apple_double()).
 bool is_photo_name(const std::filesystem::path& path);
-
-/// A path of a data set's files, which may have been written on Windows.
-std::filesystem::path portable_path(std::string text);
 
 }  // namespace raysplats::io

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_header.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <fstream>
 #include <istream>
 #include <string>
@@ -10,6 +12,15 @@
 
 namespace raysplats::io {
 namespace {
+
+// The file type box of ISO base media (ISO/IEC 14496-12, 4.3), with a brand of still pictures
+// (ISO/IEC 23008-12; AVIF): videos begin alike.
+bool is_heif(std::string_view magic) {
+  if (magic.size() < 12 || magic.substr(4, 4) != "ftyp") return false;
+  static constexpr std::array<std::string_view, 9> kBrands{"heic", "heix", "heim", "heis", "mif1",
+                                                           "msf1", "avif", "avis", "miaf"};
+  return std::find(kBrands.begin(), kBrands.end(), magic.substr(8, 4)) != kBrands.end();
+}
 
 // A number of `count` bytes, the most significant first; nothing at the end of the file.
 std::optional<unsigned> big_endian(std::istream& stream, int count) {
@@ -106,6 +117,35 @@ bool png_has_profile(std::istream& stream) {
 }
 
 }  // namespace
+
+std::string_view format_of(std::string_view magic) {
+  if (magic.starts_with("\x89PNG\r\n\x1a\n")) return "png";
+  if (magic.starts_with("\xff\xd8\xff")) return "jpeg";
+  if (magic.starts_with("\x76\x2f\x31\x01")) return "openexr";
+  if (magic.starts_with("BM")) return "bmp";
+  if (magic.starts_with("GIF8")) return "gif";
+  if (is_heif(magic)) return "heif";
+  if (magic.starts_with("#?RADIANCE") || magic.starts_with("#?RGBE")) return "hdr";
+  if (magic.starts_with("RIFF") &&
+      magic.substr(std::min<std::size_t>(8, magic.size())).starts_with("WEBP"))
+    return "webp";
+  const std::array<std::string_view, 4> tiff{
+      std::string_view("II*\0", 4), std::string_view("MM\0*", 4), std::string_view("II+\0", 4),
+      std::string_view("MM\0+", 4)};
+  for (const std::string_view start : tiff) {
+    if (magic.starts_with(start)) return "tiff";
+  }
+  return "";
+}
+
+bool is_targa(std::string_view start) {
+  if (start.size() < 18) return false;
+  const auto byte_at = [&](std::size_t i) { return static_cast<std::uint8_t>(start[i]); };
+  const unsigned kind = byte_at(2), bits = byte_at(16);
+  const bool known = (kind >= 1 && kind <= 3) || (kind >= 9 && kind <= 11);
+  return known && byte_at(1) <= 1 &&
+         (bits == 8 || bits == 15 || bits == 16 || bits == 24 || bits == 32);
+}
 
 std::optional<ImageSize> size_in_header(const std::filesystem::path& path,
                                         std::string_view format) {

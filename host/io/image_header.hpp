@@ -9,6 +9,13 @@
 
 namespace raysplats::io {
 
+/// OpenImageIO's name of the format that the first bytes of a file belong to; "" for any other.
+std::string_view format_of(std::string_view magic);
+
+/// TGA has no magic number: whether these can be the kinds of palette and picture, and the bits of
+/// a pixel, of its header (Truevision, version 2.0).
+bool is_targa(std::string_view start);
+
 /// Width and height as the header of a "png" or "jpeg" file states them, so that thousands of
 /// photos are known without the library of pictures; nothing for other formats and for headers
 /// that only that library may understand. Reads a few bytes, not the picture.

@@ -14,7 +14,6 @@
 namespace raysplats::io {
 namespace {
 constexpr std::uint64_t kMaxBytes = std::uint64_t{256} << 20;
-constexpr int kMaxDepth = 32;
 constexpr std::size_t kMostLetters = 20;  // of a word that is named
 
 /// Where a parser stopped and what is there, as far as it is a word.
@@ -42,12 +41,13 @@ nlohmann::json read_json_object(const std::filesystem::path& path) {
 }
 
 nlohmann::json parse_json_object(std::span<const std::byte> bytes,
-                                 const std::filesystem::path& path) {
+                                 const std::filesystem::path& path,
+                                 int max_depth) {
   const auto* begin = reinterpret_cast<const char*>(bytes.data());
   const auto check_depth = [&](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
-    if (depth > kMaxDepth) {
+    if (depth > max_depth) {
       throw DataError(
-          fmt::format("{} is nested more than {} levels deep", path.string(), kMaxDepth));
+          fmt::format("{} is nested more than {} levels deep", path.string(), max_depth));
     }
     return true;
   };

@@ -13,11 +13,14 @@ namespace raysplats::io {
 /// what is no UTF-8 in them becomes U+FFFD. `indent`: as of nlohmann::json::dump().
 std::string json_text(const nlohmann::json& json, int indent = -1);
 
+constexpr int kMaxJsonDepth = 32;
+
 /// Parses a JSON file whose root is an object, of bounded size and depth. Throws DataError with the
 /// line.
 nlohmann::json read_json_object(const std::filesystem::path& path);
 /// The same of what is in memory already; `path` names it in errors.
 nlohmann::json parse_json_object(std::span<const std::byte> bytes,
-                                 const std::filesystem::path& path);
+                                 const std::filesystem::path& path,
+                                 int max_depth = kMaxJsonDepth);
 
 }  // namespace raysplats::io

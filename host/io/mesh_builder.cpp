@@ -12,7 +12,7 @@
 namespace raysplats::io {
 namespace {
 
-/// Cutting ears takes cubic time on the worst polygons.
+/// Cutting ears takes quadratic time on the worst polygons.
 constexpr std::size_t kMaxPolygon = 4096;
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "io/byte_reader.hpp"
 #include "raysplats/error.hpp"
 #include "scene/mesh.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -36,10 +37,7 @@ MeshFile read_format(MeshFormat format, MeshBytes bytes) {
 }  // namespace
 
 MeshFile read_mesh(const std::filesystem::path& path, const SeenMaterials& seen) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
+  const std::string extension = lower_extension(path);
   MeshFormat format = MeshFormat::kGltf;
   if (extension == ".obj") {
     format = MeshFormat::kObj;

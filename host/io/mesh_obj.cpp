@@ -12,6 +12,7 @@
 #include <span>
 #include <streambuf>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -25,14 +26,28 @@
 namespace raysplats::io {
 namespace {
 
-/// Makes blanks and line ends alike and joins lines that a backslash continues, which
-/// tinyobjloader does not know.
+/// Blanks the slashes that end a word which begins as a corner does ("7/", "7//"): behind them
+/// tinyobjloader takes the next corner for a texture coordinate or a normal.
+void blank_open_slashes(char* text, std::size_t end) {
+  std::size_t begin = end;
+  while (begin > 0 && text[begin - 1] == '/') --begin;
+  if (begin > 0 && text[begin - 1] >= '0' && text[begin - 1] <= '9') {
+    std::fill(text + begin, text + end, ' ');
+  }
+}
+
+/// Brings what tinyobjloader does not know into a form that it does: makes blanks and line ends
+/// alike, joins lines that a backslash continues, and blanks comments, behind numbers too, and a
+/// byte order mark.
 void normalize(std::vector<std::byte>& bytes, const std::filesystem::path& path) {
   auto* text = reinterpret_cast<char*>(bytes.data());
   const std::size_t size = bytes.size();
   const auto is = [&](std::size_t i, char c) { return i < size && text[i] == c; };
+  if (std::string_view(text, size).starts_with(kByteOrderMark)) {
+    std::fill_n(text, kByteOrderMark.size(), ' ');
+  }
   bool comment = false;
-  bool line_start = true;
+  char first = ' ';  // letter of the line
   for (std::size_t i = 0; i < size; ++i) {
     if (is(i, '\0')) {
       throw DataError(
@@ -44,18 +59,38 @@ void normalize(std::vector<std::byte>& bytes, const std::filesystem::path& path)
       const std::size_t end = is(i + 1, '\r') && is(i + 2, '\n') ? i + 2 : i + 1;
       if (is(end, '\n')) std::fill(text + i, text + end + 1, ' ');
     }
-    if (is(i, '\n')) {
-      line_start = true;
+    if (first == ' ') first = text[i];
+    // Elsewhere it may be part of a name.
+    if (is(i, '#') && (first == '#' || first == 'v' || first == 'f')) comment = true;
+    const bool line_end = is(i, '\n');
+    if (comment && !line_end) text[i] = ' ';
+    if (first == 'f' && (line_end || is(i, ' '))) blank_open_slashes(text, i);
+    if (line_end) {
+      first = ' ';
       comment = false;
-    } else if (line_start && !is(i, ' ')) {
-      line_start = false;
-      comment = is(i, '#');
     }
   }
+  if (first == 'f') blank_open_slashes(text, size);
 }
 
-/// Checks the numbers of the lines v, vt and vn: tinyobjloader reads what is no number as 0. Reads
-/// the material files on the way, unless the file stands alone.
+/// Throws unless a word of a face is a corner in one of the forms 1, 1/2, 1//3 and 1/2/3:
+/// tinyobjloader reads what is no number as 0, and large numbers modulo 2^32.
+void check_corner(std::string_view word, const TextReader& reader) {
+  std::string_view left = word;
+  for (int part = 0; part < 3; ++part) {
+    const std::size_t slash = std::min(left.find('/'), left.size());
+    std::int32_t index = 0;
+    // Only the one between two slashes may be absent.
+    const bool absent = part == 1 && slash == 0 && !left.empty();
+    if (!absent && !parse_number(left.substr(0, slash), index)) break;
+    if (slash == left.size()) return;
+    left.remove_prefix(slash + 1);
+  }
+  reader.fail(fmt::format("a corner is '{}', not whole numbers such as 1/2/3", excerpt(word)));
+}
+
+/// Checks the numbers of the lines v, vt, vn and f: tinyobjloader reads what is no number as 0.
+/// Reads the material files on the way, unless the file stands alone.
 void check_lines(std::span<const std::byte> bytes,
                  const std::filesystem::path& path,
                  bool alone,
@@ -78,8 +113,12 @@ void check_lines(std::span<const std::byte> bytes,
       if (const std::string_view v = reader.word(); !v.empty()) {
         double value = 0;
         if (!parse_number(v, value) || !std::isfinite(static_cast<float>(value))) {
-          reader.fail(fmt::format("a texture coordinate is '{}', not a finite number", v));
+          reader.fail(fmt::format("a texture coordinate is '{}', not a finite number", excerpt(v)));
         }
+      }
+    } else if (key == "f") {
+      for (std::string_view word = reader.word(); !word.empty(); word = reader.word()) {
+        check_corner(word, reader);
       }
     } else if (key == "mtllib" && !alone) {
       materials.add_library(reader.rest());

@@ -5,10 +5,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <fstream>
-#include <glm/mat4x4.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,18 +18,11 @@
 #include "io/spz_codes.hpp"
 #include "raysplats/error.hpp"
 #include "scene/gaussian_check.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats {
 namespace io {
 namespace {
-
-std::string lower_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 /// The first bytes of a file, fewer where it is shorter or cannot be read.
 std::string first_bytes(const std::filesystem::path& path) {
@@ -41,13 +32,6 @@ std::string first_bytes(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   stream.read(bytes.data(), bytes.size());
   return std::string(bytes.data(), static_cast<std::size_t>(stream.gcount()));
-}
-
-/// Half a turn about x: from x right, y down, z forward to x right, y up, z back.
-glm::dmat4 rub_turn() {
-  glm::dmat4 turn(1.0);
-  turn[1][1] = turn[2][2] = -1.0;
-  return turn;
 }
 
 /// What of a model lies beyond what SPZ has codes for, and is cut.
@@ -78,7 +62,7 @@ std::string spz_clamped(const Gaussians& model) {
 
 std::string spz_losses(const Gaussians& model) {
   return fmt::format(
-      "positions are kept to 1/{}, scales to 3 %, rotations to 1/400, opacities and colours to 8 "
+      "positions are kept to 1/{}, scales to 3 %, rotations to 1/670, opacities and colours to 8 "
       "bits{}{}",
       1 << spz_fractional_bits(model), model.sh_degree > 0 ? ", SH to 6 bits" : "",
       spz_clamped(model));
@@ -132,7 +116,7 @@ std::string losses(ModelFormat format, const Gaussians& model) {
     case ModelFormat::kCompressedPly:
       return fmt::format(
           "positions, scales, colours and opacities are kept to 1/1000 of their range among 256 "
-          "neighbours (8 bits for colours), rotations to 1/700{}{}",
+          "neighbours (8 bits for colours), rotations to 1/670{}{}",
           model.sh_degree > 0 ? ", SH to 8 bits between -4 and 4" : "",
           model.sh_degree > 3 ? ", SH above degree 3 is left out" : "");
     case ModelFormat::kSplat:
@@ -143,7 +127,8 @@ std::string losses(ModelFormat format, const Gaussians& model) {
       return spz_losses(model);
     case ModelFormat::kSog:
       return fmt::format(
-          "positions are kept to 1/65536 of their range, rotations to 1/360, scales, colours and "
+          "positions are kept to 1/65536 of the range of their logarithm, rotations to 1/170, "
+          "scales, colours and "
           "opacities to 8 bits{}{}",
           model.sh_degree > 0 ? ", SH to an entry of a palette that all share" : "",
           model.sh_degree > kSogMostDegree
@@ -169,10 +154,8 @@ Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& enc
       return io::read_gltf_gaussians(path, encoding.drop_nonfinite);
     case io::ModelFormat::kSog:
       return io::read_sog(path);
-    case io::ModelFormat::kSpz: {
-      Gaussians model = io::read_spz(path);
-      return encoding.spz_axes == SpzAxes::kRub ? transformed(model, io::rub_turn()) : model;
-    }
+    case io::ModelFormat::kSpz:
+      return io::read_spz(path, encoding.spz_axes);
     case io::ModelFormat::kPly:
     case io::ModelFormat::kCompressedPly:
       return read_ply(path, encoding.drop_nonfinite);
@@ -209,9 +192,7 @@ void write_model(const std::filesystem::path& path,
         throw UsageError(
             fmt::format("SPZ is written in version 3 or 4, not {}", encoding.spz_version));
       }
-      io::write_spz(path,
-                    encoding.spz_axes == SpzAxes::kRub ? transformed(model, io::rub_turn()) : model,
-                    encoding.spz_version);
+      io::write_spz(path, model, encoding.spz_version, encoding.spz_axes);
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -11,8 +12,11 @@
 /// Formats of Gaussians other than 3DGS PLY; read_model() and write_model() choose among them. All
 /// readers throw DataError, one sentence with the path, for whatever is malformed, truncated or not
 /// finite (but for Gaussians that are to be dropped), and allocate nothing that the file's size
-/// does not bear out. Writers are atomic.
+/// does not bear out, beyond that of kAlwaysHeld Gaussians. Writers are atomic.
 namespace raysplats::io {
+
+/// Gaussians that any file may hold, however small: equal ones pack to next to nothing.
+constexpr std::uint64_t kAlwaysHeld = std::uint64_t{1} << 18;
 
 /// The records of 32 bytes of antimatter15/splat (convert.py): position and scale as floats, colour
 /// and opacity as four bytes, rotation as four bytes, real part first.
@@ -20,13 +24,18 @@ Gaussians read_splat(const std::filesystem::path& path, bool drop_nonfinite = fa
 /// Most important (largest times most opaque) first, as streams want them. SH is left out.
 void write_splat(const std::filesystem::path& path, const Gaussians& model);
 
-/// Niantic's SPZ, versions 1 to 4 (nianticlabs/spz), SH to degree 4; axes as they are in the file.
+/// Niantic's SPZ, versions 1 to 4 (nianticlabs/spz), SH to degree 4. It is turned to the axes of
+/// the PLY from those that it declares, from the assumed ones where it declares none; a line says
+/// which.
 constexpr float kSpzLeastLogScale = -10.0f;
 constexpr float kSpzMostLogScale = 5.9375f;
-Gaussians read_spz(const std::filesystem::path& path);
-/// Version 3 or 4. Positions keep 12 bits behind the point, fewer where they are beyond +-2048.
-/// Throws DataError for positions beyond +-8388607.
-void write_spz(const std::filesystem::path& path, const Gaussians& model, int version);
+Gaussians read_spz(const std::filesystem::path& path, SpzAxes assumed);
+/// Version 3 or 4, which declares its axes. Positions keep 12 bits behind the point, fewer where
+/// they are beyond +-2048. Throws DataError for positions beyond +-8388607.
+void write_spz(const std::filesystem::path& path,
+               const Gaussians& model,
+               int version,
+               SpzAxes axes);
 
 /// glTF 2.0, JSON or GLB, with KHR_gaussian_splatting (Khronos, release candidate of 2026): all
 /// Gaussians of its scene, turned from y up to the y down of captures.

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "io/byte_reader.hpp"
+#include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 
@@ -109,7 +110,10 @@ void MtlMaterials::add_library(std::string_view names) {
 
 void MtlMaterials::read_library(const std::filesystem::path& path) {
   const std::vector<std::byte> bytes = read_file(path, kMaxLibraryBytes);
-  std::istringstream stream(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  // tinyobjloader would miss the first line.
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  std::istringstream stream{std::string(text)};
   std::map<std::string, int> indices;
   std::vector<tinyobj::material_t> read;
   std::string warnings;

@@ -295,6 +295,23 @@ MaskPlane mask_plane(const RawImage& mask) {
   return out;
 }
 
+bool is_black(const RawImage& mask) {
+  const auto channels = static_cast<std::size_t>(mask.channels);
+  const bool covered = has_alpha(channels);
+  const std::size_t colors = covered ? channels - 1 : channels;
+  return std::visit(
+      [&](const auto& numbers) {
+        for (std::size_t i = 0; i < numbers.size(); i += channels) {
+          if (covered && !(numbers[i + colors] > 0)) continue;
+          for (std::size_t c = 0; c < colors; ++c) {
+            if (numbers[i + c] > 0) return false;
+          }
+        }
+        return true;
+      },
+      mask.numbers);
+}
+
 std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,
                                           const MaskPlane* mask,
                                           PhotoColors colors) {

@@ -48,6 +48,9 @@ struct MaskPlane {
 /// 0 and 1 of 8 or 16 bits is one of black and white.
 MaskPlane mask_plane(const RawImage& mask);
 
+/// Whether mask_plane() is 0 everywhere.
+bool is_black(const RawImage& mask);
+
 /// The photo of a file, grey or colour, with or without alpha, which `mask` (may be null)
 /// multiplies. Refers to both.
 std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,

@@ -17,6 +17,7 @@
 #include "io/model_formats.hpp"
 #include "io/ply_file.hpp"
 #include "io/ply_options.hpp"
+#include "io/ply_origin.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "util/atomic_file.hpp"
@@ -117,7 +118,18 @@ void widen(float* log_scales, float& opacity, double filter) {
     log_scales[axis] = static_cast<float>(after);
     log_growth += after - before;
   }
-  opacity = io::logit_of(io::opacity_of(opacity) * std::exp(-log_growth), io::kFloatOpacityMargin);
+  opacity = io::logit_of(io::opacity_of(opacity) * std::exp(-log_growth));
+}
+
+/// What the positions of a model are to count from because floats would blur them.
+std::array<double, 3> taken_off(const io::PlyFile& file, const std::filesystem::path& path) {
+  // One that the header says has been taken off already.
+  if (!io::lacks_origin(path)) return {};
+  const std::array<double, 3> origin = io::origin_of_doubles(file);
+  if (origin == std::array<double, 3>{}) return origin;
+  spdlog::info("{}: positions are doubles that floats would blur, and count from {}, {}, {}",
+               path.string(), origin[0], origin[1], origin[2]);
+  return origin;
 }
 
 /// Says what of a file is not 3DGS's own.
@@ -144,14 +156,15 @@ Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
   const io::PlyFile file(path);
   if (file.column("packed_position")) return io::read_compressed_ply(path);
   const Columns columns = find_columns(file, path);
+  const std::array<double, 3> origin = taken_off(file, path);
   Gaussians model;
   model.sh_degree = columns.sh_degree;
   model.resize(file.rows());
   std::size_t without_rotation = 0, infinite = 0;
   io::BrokenGaussians broken;
   file.for_each_row([&](std::size_t row, std::span<const double> values) {
-    const auto number = [&](std::size_t column) {
-      const auto value = static_cast<float>(values[column]);
+    const auto number = [&](std::size_t column, double taken = 0.0) {
+      const auto value = static_cast<float>(values[column] - taken);
       if (!std::isfinite(value)) broken.add(row, file.properties()[column].name);
       return value;
     };
@@ -163,7 +176,7 @@ Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
       return value > 0 ? most : least;
     };
     for (std::size_t i = 0; i < 3; ++i) {
-      model.means[3 * row + i] = number(columns.mean[i]);
+      model.means[3 * row + i] = number(columns.mean[i], origin[i]);
       model.log_scales[3 * row + i] =
           columns.flat && i == 2 ? io::kFlatLogScale
                                  : limited(columns.log_scale[i], io::kFlatLogScale, HUGE_VALF);
@@ -178,8 +191,7 @@ Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
       quaternion[0] = 1.0f;
       ++without_rotation;
     }
-    model.opacities[row] = limited(columns.opacity, io::logit_of(0, io::kFloatOpacityMargin),
-                                   io::logit_of(1, io::kFloatOpacityMargin));
+    model.opacities[row] = limited(columns.opacity, io::logit_of(0), io::logit_of(1));
     if (columns.filter) {
       widen(&model.log_scales[3 * row], model.opacities[row],
             static_cast<double>(number(*columns.filter)));

@@ -11,6 +11,8 @@
 #include <functional>
 #include <string_view>
 
+#include "io/ply_file.hpp"
+#include "io/ply_origin.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/trace_rows.hpp"
@@ -95,16 +97,23 @@ bool set_option(std::string_view key, std::string_view value, TraceOptions& out)
   return true;
 }
 
-// Gives every comment of this program in the header of a PLY to `take`, which returns false for one
-// that cannot be.
-void for_each_comment(const std::filesystem::path& path,
-                      const std::function<bool(std::string_view, std::string_view)>& take) {
+// Gives every line of the header of a PLY to `take`.
+void for_each_line(const std::filesystem::path& path,
+                   const std::function<void(const std::string&)>& take) {
   std::ifstream stream(path, std::ios::binary);
   std::string line;
   if (!next_line(stream, line) || line != "ply") return;
   for (std::size_t n = 0; n < kMaxHeaderLines && next_line(stream, line); ++n) {
     if (line == "end_header") break;
-    if (!line.starts_with(kPrefix)) continue;
+    take(line);
+  }
+}
+
+// Gives every comment of this program to `take`, which returns false for one that cannot be.
+void for_each_comment(const std::filesystem::path& path,
+                      const std::function<bool(std::string_view, std::string_view)>& take) {
+  for_each_line(path, [&](const std::string& line) {
+    if (!line.starts_with(kPrefix)) return;
     const std::string_view text = std::string_view(line).substr(kPrefix.size());
     const std::size_t space = text.find(' ');
     const std::string_view value =
@@ -115,7 +124,24 @@ void for_each_comment(const std::filesystem::path& path,
                       "or remove it",
                       path.string(), line));
     }
-  }
+  });
+}
+
+std::optional<std::array<double, 3>> said_origin(const std::filesystem::path& path) {
+  std::optional<std::array<double, 3>> origin;
+  for_each_comment(path, [&](std::string_view key, std::string_view value) {
+    return key != kOrigin || parse_triple(value, origin.emplace());
+  });
+  return origin;
+}
+
+bool names_doubles(const std::filesystem::path& path) {
+  bool found = false;
+  for_each_line(path, [&](const std::string& line) {
+    found = found || (line.starts_with("property") && (line.find("double") != std::string::npos ||
+                                                       line.find("float64") != std::string::npos));
+  });
+  return found;
 }
 
 }  // namespace
@@ -178,12 +204,13 @@ std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path) 
   return out;
 }
 
+bool io::lacks_origin(const std::filesystem::path& path) {
+  return names_doubles(path) && !said_origin(path);
+}
+
 std::array<double, 3> read_ply_origin(const std::filesystem::path& path) {
-  std::array<double, 3> origin{};
-  for_each_comment(path, [&](std::string_view key, std::string_view value) {
-    return key != kOrigin || parse_triple(value, origin);
-  });
-  return origin;
+  if (io::lacks_origin(path)) return io::origin_of_doubles(io::PlyFile(path));
+  return said_origin(path).value_or(std::array<double, 3>{});
 }
 
 }  // namespace raysplats

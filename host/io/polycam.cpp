@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "io/image_file.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats::io {
 namespace {

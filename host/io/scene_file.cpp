@@ -305,6 +305,8 @@ glm::dmat4 SceneMesh::placement(double time) const {
          glm::translate(identity, -center) * transform;
 }
 
+bool is_scene_file(const std::filesystem::path& path) { return path.extension() == ".toml"; }
+
 SceneFile read_scene_file(const std::filesystem::path& path) {
   const toml::table root = io::read_toml(path);
   TomlTable table(root, path, "the scene file");

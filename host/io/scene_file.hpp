@@ -88,6 +88,9 @@ struct SceneFile {
   double downscale = 1.0;
 };
 
+/// Whether it is a scene file that is named, and no model: by its ending, .toml.
+bool is_scene_file(const std::filesystem::path& path);
+
 /// Reads a scene file. Throws UsageError for unknown keys (with the nearest known one), wrong
 /// types, values out of range and scenes with neither model nor mesh, DataError for files that are
 /// not there; all with file and line.

@@ -4,7 +4,8 @@
 #include <array>
 #include <cstddef>
 
-/// What reader and writer of SOG share. Its layout: PlayCanvas, splat-transform, version 2.
+/// What reader and writer of SOG share. Its layout: PlayCanvas, splat-transform, version 2; the
+/// reader knows the first version too, which PlayCanvas's sogs wrote.
 namespace raysplats::io {
 
 constexpr int kSogVersion = 2;

@@ -30,6 +30,9 @@ constexpr std::uint64_t kMostPerByte = 8;
 constexpr std::size_t kMostMeta = std::size_t{1} << 20;
 /// Texels that a texture may have beyond those in use.
 constexpr std::size_t kSlack = 4096;
+/// Texels of a palette of which nothing but the picture tells the size: from a row of degree 1 to
+/// all entries of degree 3.
+constexpr TexelRange kAnyPalette{3 * kSogEntriesPerRow, 15 * kSogMostEntries};
 
 /// The files of a SOG: of a zip archive, or beside a meta.json.
 class Files {
@@ -67,27 +70,19 @@ class Reader {
   }
 
   Gaussians read() {
-    if (is_first_version()) {
-      throw DataError(fmt::format(
-          "{} is a SOG of version 1, but only {} is known: write it again with SplatTransform or "
-          "SuperSplat",
-          files_.path().string(), kSogVersion));
-    }
-    if (whole(meta_, "version") != kSogVersion) {
+    first_ = is_first_version();
+    if (!first_ && whole(meta_, "version") != kSogVersion) {
       fail(fmt::format("its version is {}, but only {} is known", whole(meta_, "version"),
                        kSogVersion));
     }
-    const std::int64_t count = whole(meta_, "count");
+    const std::int64_t count = first_ ? count_by_shape() : whole(meta_, "count");
     if (count < 0) fail(fmt::format("its count is {}", count));
     count_ = static_cast<std::size_t>(count);
     Gaussians model;
     const Json* harmonics = meta_.contains("shN") ? &member(meta_, "shN") : nullptr;
-    if (harmonics != nullptr) {
-      const std::int64_t degree = whole(*harmonics, "bands");
-      if (degree < 1 || degree > kSogMostDegree) fail(fmt::format("it has {} bands", degree));
-      model.sh_degree = static_cast<int>(degree);
-    }
+    if (harmonics != nullptr && !first_) model.sh_degree = degree_by_bands(*harmonics);
     if (count_ == 0) return model;
+    if (first_) require_packed_rotations();
     const Json& means = member(meta_, "means");
     const std::vector<std::byte> low = picture(means, 0), high = picture(means, 1);
     const std::vector<std::byte> scales = picture(member(meta_, "scales"), 0);
@@ -100,23 +95,31 @@ class Reader {
     }
     // A few bytes can stand for any number of equal texels: neither the model nor a texture gets
     // memory before the count is borne out by the disk and by the header of every picture.
-    if (count_ > saturating_product(files_.disk_bytes(), kMostPerByte)) {
+    if (count_ > kAlwaysHeld && count_ > saturating_product(files_.disk_bytes(), kMostPerByte)) {
       fail(fmt::format("it declares {} Gaussians, more than {} bytes can hold", count_,
                        files_.disk_bytes()));
     }
     for (const std::vector<std::byte>* part : {&low, &high, &scales, &rotations, &colors})
       texture_size(*part, texels(), picture_name());
+    std::size_t entries = 0;
     if (harmonics != nullptr) {
       texture_size(labels, texels(), picture_name());
-      texture_size(centroids, palette_texels(*harmonics, palette_width(model.sh_degree)),
-                   palette_name());
+      if (first_) {
+        const Texture size = texture_size(centroids, kAnyPalette, palette_name());
+        model.sh_degree = degree_by_width(size.width);
+        entries = kSogEntriesPerRow * size.height;
+      } else {
+        entries = palette_entries(*harmonics);
+        texture_size(centroids, palette_texels(entries, model.sh_degree), palette_name());
+      }
     }
     model.resize(count_);
     read_means(means, texture(low), texture(high), model);
     read_scales(texture(scales), model);
     read_rotations(texture(rotations), model);
     read_colors(texture(colors), model);
-    if (harmonics != nullptr) read_harmonics(*harmonics, centroids, texture(labels), model);
+    if (harmonics != nullptr)
+      read_harmonics(*harmonics, centroids, entries, texture(labels), model);
     return model;
   }
 
@@ -125,11 +128,36 @@ class Reader {
     throw DataError(fmt::format("{} is no valid SOG: {}", files_.path().string(), what));
   }
 
-  /// It had no number of its version, but the shapes of its textures.
+  /// It had no number of its version, but the shapes of its arrays.
   bool is_first_version() const {
     const auto means = meta_.find("means");
     return !meta_.contains("version") && means != meta_.end() && means->is_object() &&
            means->contains("shape");
+  }
+  std::int64_t count_by_shape() const {
+    const Json& shape = member(member(meta_, "means"), "shape");
+    if (!shape.is_array() || shape.empty()) fail("'shape' is no list of whole numbers");
+    return whole(shape.front(), "shape");
+  }
+  /// The compression of gsplat, from which that version came, has arrays of the same names, but
+  /// three numbers of a rotation and a picture of opacities.
+  void require_packed_rotations() const {
+    const Json& rotations = member(meta_, "quats");
+    const auto encoding = rotations.find("encoding");
+    if (encoding == rotations.end() || *encoding != "quaternion_packed")
+      fail("it has no number of its version, and 'encoding' of 'quats' is not quaternion_packed");
+  }
+  int degree_by_bands(const Json& harmonics) const {
+    const std::int64_t degree = whole(harmonics, "bands");
+    if (degree < 1 || degree > kSogMostDegree) fail(fmt::format("it has {} bands", degree));
+    return static_cast<int>(degree);
+  }
+  /// The first version says nowhere else how many bands there are.
+  int degree_by_width(std::size_t width) const {
+    for (int degree = 1; degree <= kSogMostDegree; ++degree) {
+      if (palette_width(degree) == width) return degree;
+    }
+    fail(fmt::format("its palette is {} wide", width));
   }
   const Json& member(const Json& object, const char* name) const {
     const auto found = object.find(name);
@@ -140,6 +168,9 @@ class Reader {
     const Json& value = object.is_object() ? member(object, name) : object;
     if (!value.is_number_integer()) fail(fmt::format("'{}' is no whole number", name));
     return value.get<std::int64_t>();
+  }
+  double number(const Json& object, const char* name) const {
+    return numbers(Json::array({member(object, name)}), name, 1).front();
   }
   /// A list of exactly `count` finite numbers.
   std::vector<double> numbers(const Json& object, const char* name, std::size_t count) const {
@@ -155,9 +186,40 @@ class Reader {
     }
     return out;
   }
+  /// What the bytes of a texture's channels stand for: a codebook that all of them share, or of the
+  /// first version steps between two numbers of each channel's own.
+  std::vector<std::vector<float>> channel_levels(const Json& object, std::size_t channels) const {
+    std::vector<std::vector<float>> out;
+    if (!first_) {
+      out.assign(channels, codebook(object));
+      return out;
+    }
+    const std::vector<double> least = numbers(object, "mins", channels);
+    const std::vector<double> most = numbers(object, "maxs", channels);
+    for (std::size_t k = 0; k < channels; ++k) out.push_back(steps(least[k], most[k]));
+    return out;
+  }
+  static std::vector<float> steps(double least, double most) {
+    std::vector<float> out(kSogLevels);
+    for (std::size_t i = 0; i < kSogLevels; ++i) {
+      const double share = static_cast<double>(i) / (kSogLevels - 1);
+      out[i] = static_cast<float>(least + (most - least) * share);
+    }
+    return out;
+  }
   std::vector<float> codebook(const Json& object) const {
-    const std::vector<double> levels = numbers(object, "codebook", kSogLevels);
-    return {levels.begin(), levels.end()};
+    Json given = object;
+    // Early writers left out the least level, and PlayCanvas's reader goes one mean step below the
+    // next.
+    const auto list = given.is_object() ? given.find("codebook") : given.end();
+    const bool headless = list != given.end() && list->is_array() && list->size() == kSogLevels &&
+                          list->front().is_null();
+    if (headless) list->front() = list->at(1);
+    const std::vector<double> levels = numbers(given, "codebook", kSogLevels);
+    std::vector<float> out(levels.begin(), levels.end());
+    if (headless)
+      out[0] = static_cast<float>(levels[1] - (levels.back() - levels[1]) / (kSogLevels - 1));
+    return out;
   }
 
   /// Bytes of the picture `index` that an object of meta.json names.
@@ -189,9 +251,9 @@ class Reader {
       fail(fmt::format("it has {} palette entries", entries));
     return static_cast<std::size_t>(entries);
   }
-  TexelRange palette_texels(const Json& harmonics, std::size_t width) const {
-    const std::size_t rows =
-        (palette_entries(harmonics) + kSogEntriesPerRow - 1) / kSogEntriesPerRow;
+  static TexelRange palette_texels(std::size_t entries, int degree) {
+    const std::size_t rows = (entries + kSogEntriesPerRow - 1) / kSogEntriesPerRow;
+    const std::size_t width = palette_width(degree);
     return {width * rows, width * (rows + kSogEntriesPerRow)};
   }
 
@@ -208,10 +270,10 @@ class Reader {
     }
   }
   void read_scales(const Texture& texture, Gaussians& model) {
-    const std::vector<float> levels = codebook(member(meta_, "scales"));
+    const auto levels = channel_levels(member(meta_, "scales"), 3);
     for (std::size_t i = 0; i < count_; ++i) {
       for (std::size_t k = 0; k < 3; ++k)
-        model.log_scales[3 * i + k] = levels[texture.rgba[4 * i + k]];
+        model.log_scales[3 * i + k] = levels[k][texture.rgba[4 * i + k]];
     }
   }
   void read_rotations(const Texture& texture, Gaussians& model) {
@@ -231,25 +293,28 @@ class Reader {
     }
   }
   void read_colors(const Texture& texture, Gaussians& model) {
-    const std::vector<float> levels = codebook(member(meta_, "sh0"));
+    // In the first version alpha is a fourth channel of logits.
+    const auto levels = channel_levels(member(meta_, "sh0"), first_ ? 4 : 3);
     const auto stride = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
     for (std::size_t i = 0; i < count_; ++i) {
       for (std::size_t k = 0; k < 3; ++k)
-        model.sh[stride * i + k] = levels[texture.rgba[4 * i + k]];
-      model.opacities[i] = logit_of(texture.rgba[4 * i + 3] / 255.0, kByteOpacityMargin);
+        model.sh[stride * i + k] = levels[k][texture.rgba[4 * i + k]];
+      const std::uint8_t alpha = texture.rgba[4 * i + 3];
+      model.opacities[i] = first_ ? levels[3][alpha] : logit_of(alpha / 255.0);
     }
   }
   void read_harmonics(const Json& harmonics,
                       const std::vector<std::byte>& picture,
+                      std::size_t entries,
                       const Texture& labels,
                       Gaussians& model) {
-    const std::size_t entries = palette_entries(harmonics);
-    const std::vector<float> levels = codebook(harmonics);
+    const std::vector<float> levels =
+        first_ ? steps(number(harmonics, "mins"), number(harmonics, "maxs")) : codebook(harmonics);
     const auto higher = static_cast<std::size_t>(sh_coefficients(model.sh_degree) - 1);
-    const std::size_t width = palette_width(model.sh_degree);
     const Texture centroids =
-        decode_texture(picture, palette_texels(harmonics, width), palette_name());
-    if (centroids.width != width) fail(fmt::format("its palette is {} wide", centroids.width));
+        decode_texture(picture, palette_texels(entries, model.sh_degree), palette_name());
+    if (centroids.width != palette_width(model.sh_degree))
+      fail(fmt::format("its palette is {} wide", centroids.width));
     for (std::size_t i = 0; i < count_; ++i) {
       const auto label = static_cast<std::size_t>(labels.rgba[4 * i] | labels.rgba[4 * i + 1] << 8);
       if (label >= entries) fail(fmt::format("Gaussian {} has no entry of the palette", i));
@@ -263,6 +328,7 @@ class Reader {
 
   Files files_;
   Json meta_;
+  bool first_ = false;  // of the versions
   std::size_t count_ = 0;
   std::set<std::string> names_;  // of the pictures
 };

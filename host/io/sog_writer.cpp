@@ -168,9 +168,8 @@ Json add_harmonics(const Gaussians& model, NamedFiles& files) {
 }  // namespace
 
 void write_sog(const std::filesystem::path& path, const Gaussians& given) {
-  const Gaussians sorted = in_morton_order(given);
-  const Gaussians model =
-      sorted.sh_degree > kSogMostDegree ? with_sh_degree(sorted, kSogMostDegree) : sorted;
+  Gaussians model = in_morton_order(given);
+  if (model.sh_degree > kSogMostDegree) model = with_sh_degree(model, kSogMostDegree);
   if (blank(model.size()).width > kMostTextureSide) {
     throw DataError(fmt::format("{} cannot be written: SOG has at most {} Gaussians, not {}",
                                 path.string(), kMostTextureSide / 4 * 4 * kMostTextureSide,

@@ -54,8 +54,7 @@ Gaussians read_splat(const std::filesystem::path& path, bool drop_nonfinite) {
       model.sh[3 * i + k] =
           static_cast<float>((reader.read<std::uint8_t>("a colour") / 255.0 - 0.5) / kSh0);
     }
-    model.opacities[i] =
-        logit_of(reader.read<std::uint8_t>("an opacity") / 255.0, kByteOpacityMargin);
+    model.opacities[i] = logit_of(reader.read<std::uint8_t>("an opacity") / 255.0);
     float q[4];
     for (float& part : q) {
       part = static_cast<float>((reader.read<std::uint8_t>("a rotation") - 128.0) / 128.0);

@@ -140,6 +140,24 @@ double median_size(const Gaussians& model) {
   return std::exp(static_cast<double>(*middle));
 }
 
+/// What brings the positions of a model nearer to 0, where all of them or some lie far off.
+const char* nearer(const Gaussians& model) {
+  double spread = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<float> values;
+    for (std::size_t i = axis; i < model.means.size(); i += 3) values.push_back(model.means[i]);
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    const auto center = static_cast<double>(*middle);
+    for (const float x : values)
+      spread = std::max(spread, std::abs(static_cast<double>(x) - center));
+  }
+  // A bit behind the point is worth a move.
+  return 2.0 * spread <= farthest_position(model)
+             ? "all of them lie there, move them to 0 by convert --translate"
+             : "leave out what is far away by convert --crop";
+}
+
 void warn_of_losses(const Gaussians& model, int bits, const std::filesystem::path& path) {
   const double size = median_size(model);
   const std::vector<float> sizes = log_sizes(model);
@@ -156,8 +174,8 @@ void warn_of_losses(const Gaussians& model, int bits, const std::filesystem::pat
   if (std::ldexp(1.0, -bits) > size) {
     spdlog::warn(
         "{}: SPZ keeps positions to {:g}, which is more than half of the Gaussians are large, "
-        "because one is {:.3g} from the origin: leave out what is far away by convert --crop",
-        path.string(), std::ldexp(1.0, -bits), farthest_position(model));
+        "because one is {:.3g} from the origin: {}",
+        path.string(), std::ldexp(1.0, -bits), farthest_position(model), nearer(model));
   }
 }
 
@@ -188,8 +206,8 @@ void check_spz_header(const SpzHeader& header,
     fail(fmt::format("its positions have {} bits behind the point", header.fractional_bits));
   }
   const SpzSizes sizes = spz_sizes(header);
-  if (std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0}) >
-      saturating_product(file_bytes, kSpzMostShrinking)) {
+  if (header.points > kAlwaysHeld && std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0}) >
+                                         saturating_product(file_bytes, kSpzMostShrinking)) {
     fail(fmt::format("it declares {} Gaussians, more than {} bytes can hold", header.points,
                      file_bytes));
   }
@@ -225,7 +243,7 @@ Gaussians unpack_spz(const SpzHeader& header,
                                              static_cast<double>(kSpzLeastLogScale));
   }
   for (std::size_t i = 0; i < model.size(); ++i) {
-    model.opacities[i] = logit_of(byte_at(alphas, i) / 255.0, kByteOpacityMargin);
+    model.opacities[i] = logit_of(byte_at(alphas, i) / 255.0);
     float* q = &model.quaternions[4 * i];
     if (header.version < 3) {
       first_three(rotations, i, q);
@@ -250,9 +268,9 @@ std::array<std::vector<std::byte>, kSpzArrays> pack_spz(const Gaussians& model,
   }
   if (const double largest = farthest_position(model); largest > kPositionLimit) {
     throw DataError(fmt::format(
-        "{} cannot be written: SPZ has no position beyond {:.0f}, but one is {:.6g}: scale the "
-        "model down",
-        path.string(), kPositionLimit, largest));
+        "{} cannot be written: SPZ has no position beyond {:.0f}, but one is {:.6g}: {}, "
+        "or scale the model down",
+        path.string(), kPositionLimit, largest, nearer(model)));
   }
   header.points = static_cast<std::uint32_t>(model.size());
   header.sh_degree = static_cast<std::uint8_t>(model.sh_degree);

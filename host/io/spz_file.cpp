@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/byte_reader.hpp"
 #include "io/compression.hpp"
 #include "io/model_formats.hpp"
+#include "io/spz_axes.hpp"
 #include "io/spz_codes.hpp"
 #include "raysplats/error.hpp"
+#include "scene/gaussian_transform.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats::io {
@@ -17,8 +22,14 @@ namespace {
 
 constexpr std::size_t kShortHeader = 16;  // of versions 1 to 3
 constexpr std::size_t kLongHeader = 32;   // of version 4
-/// Records of extensions that are read over behind the arrays of versions 1 to 3.
+/// Bytes of extensions behind the arrays of versions 1 to 3.
 constexpr std::size_t kMostExtensions = std::size_t{1} << 20;
+
+/// What a file holds, on its own axes.
+struct SpzContent {
+  Gaussians model;
+  std::optional<std::uint32_t> axes;  ///< as it declares them
+};
 
 using Spans = std::array<std::span<const std::byte>, kSpzArrays>;
 
@@ -55,7 +66,9 @@ std::uint64_t total(const SpzSizes& sizes) {
   return sum;
 }
 
-Gaussians read_gzipped(std::span<const std::byte> bytes, const std::filesystem::path& path) {
+bool has_extensions(const SpzHeader& header) { return (header.flags & kSpzExtensions) != 0; }
+
+SpzContent read_gzipped(std::span<const std::byte> bytes, const std::filesystem::path& path) {
   GzipReader gzip(bytes, path);
   std::vector<std::byte> raw(kShortHeader);
   gzip.read(raw);
@@ -67,11 +80,11 @@ Gaussians read_gzipped(std::span<const std::byte> bytes, const std::filesystem::
   const SpzSizes sizes = spz_sizes(header);
   std::vector<std::byte> arrays(total(sizes));
   gzip.read(arrays);
-  gzip.finish((header.flags & kSpzExtensions) != 0 ? kMostExtensions : 0);
-  return unpack_spz(header, split(arrays, sizes), path);
+  const std::vector<std::byte> records = gzip.finish(has_extensions(header) ? kMostExtensions : 0);
+  return {unpack_spz(header, split(arrays, sizes), path), declared_spz_axes(records, path)};
 }
 
-Gaussians read_streams(std::span<const std::byte> bytes, const std::filesystem::path& path) {
+SpzContent read_streams(std::span<const std::byte> bytes, const std::filesystem::path& path) {
   ByteReader reader(bytes, path);
   std::uint8_t streams = 0;
   const SpzHeader header = read_header(reader, streams);
@@ -85,12 +98,13 @@ Gaussians read_streams(std::span<const std::byte> bytes, const std::filesystem::
   const auto table = reader.read<std::uint32_t>("the place of the table");
   const SpzSizes sizes = spz_sizes(header);
   const std::size_t needed = kSpzArrays - (header.sh_degree == 0 ? 1 : 0);
-  if (streams != needed) {
+  // Empty arrays may have none.
+  if (streams != needed && (header.points != 0 || streams != 0)) {
     reader.fail(fmt::format("there are {} streams where {} are needed", streams, needed));
   }
   if (table < kLongHeader) reader.fail(fmt::format("the table lies at byte {}", table));
-  // Records of extensions, all of which can be ignored, lie in between.
   reader.skip(table - reader.offset(), "the table");
+  const std::span<const std::byte> records = bytes.subspan(kLongHeader, table - kLongHeader);
   SpzSizes packed{};
   for (std::size_t i = 0; i < streams; ++i) {
     packed[i] = reader.read<std::uint64_t>("the size of a stream");
@@ -107,7 +121,8 @@ Gaussians read_streams(std::span<const std::byte> bytes, const std::filesystem::
     unzstd(bytes.subspan(begin, packed[i]), out.first(sizes[i]), path);
     out = out.subspan(sizes[i]);
   }
-  return unpack_spz(header, split(arrays, sizes), path);
+  const auto axes = has_extensions(header) ? declared_spz_axes(records, path) : std::nullopt;
+  return {unpack_spz(header, split(arrays, sizes), path), axes};
 }
 
 template <class T>
@@ -129,16 +144,13 @@ std::vector<std::byte> packed_header(const SpzHeader& header, std::uint8_t last)
   return bytes;
 }
 
-}  // namespace
+std::uint32_t code_of(SpzAxes axes) { return axes == SpzAxes::kRub ? kSpzRub : kSpzRdf; }
 
-Gaussians read_spz(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = read_file(path);
-  const bool gzipped =
-      bytes.size() > 1 && bytes[0] == std::byte{0x1f} && bytes[1] == std::byte{0x8b};
-  return gzipped ? read_gzipped(bytes, path) : read_streams(bytes, path);
-}
-
-void write_spz(const std::filesystem::path& path, const Gaussians& model, int version) {
+/// Writes a model that is on these axes.
+void write_as_it_is(const std::filesystem::path& path,
+                    const Gaussians& model,
+                    int version,
+                    SpzAxes axes) {
   SpzHeader header;
   header.version = static_cast<std::uint32_t>(version);
   const auto arrays = pack_spz(model, header, path);
@@ -147,15 +159,20 @@ void write_spz(const std::filesystem::path& path, const Gaussians& model, int ve
     file.write(bytes.data(), bytes.size());
   };
   if (version < 4) {
+    // Without a record of the axes: readers of that time want no byte behind the arrays.
     const std::vector<std::byte> head = packed_header(header, 0);
     std::vector<std::span<const std::byte>> parts{head};
     for (const auto& array : arrays) parts.emplace_back(array);
     write(gzip(parts));
   } else {
-    const std::size_t streams = kSpzArrays - (header.sh_degree == 0 ? 1 : 0);
+    const std::vector<std::byte> record = spz_axes_record(code_of(axes));
+    header.flags = kSpzExtensions;
+    const std::size_t streams =
+        header.points == 0 ? 0 : kSpzArrays - (header.sh_degree == 0 ? 1 : 0);
     std::vector<std::byte> head = packed_header(header, static_cast<std::uint8_t>(streams));
-    put(head, static_cast<std::uint32_t>(kLongHeader));
+    put(head, static_cast<std::uint32_t>(kLongHeader + record.size()));
     head.resize(kLongHeader);
+    head.insert(head.end(), record.begin(), record.end());
     std::vector<std::vector<std::byte>> frames;
     for (std::size_t i = 0; i < streams; ++i) {
       frames.push_back(zstd(arrays[i]));
@@ -166,6 +183,35 @@ void write_spz(const std::filesystem::path& path, const Gaussians& model, int ve
     for (const auto& frame : frames) write(frame);
   }
   file.commit();
+}
+
+}  // namespace
+
+Gaussians read_spz(const std::filesystem::path& path, SpzAxes assumed) {
+  const std::vector<std::byte> bytes = read_file(path);
+  const bool gzipped =
+      bytes.size() > 1 && bytes[0] == std::byte{0x1f} && bytes[1] == std::byte{0x8b};
+  SpzContent content = gzipped ? read_gzipped(bytes, path) : read_streams(bytes, path);
+  const std::uint32_t axes = content.axes.value_or(code_of(assumed));
+  if (content.axes && (axes != kSpzRdf || assumed != SpzAxes::kPly)) {
+    spdlog::info("{}: its axes are {}, as it declares", path.string(), spz_axes_name(axes));
+  } else if (!content.axes && assumed == SpzAxes::kPly) {
+    spdlog::info(
+        "{} does not declare its axes, which are taken as {}: where it is upside down, raysplats "
+        "convert --spz-axes rub writes it as it should be",
+        path.string(), spz_axes_name(axes));
+  }
+  if (axes == kSpzRdf) return std::move(content.model);
+  return transformed(std::move(content.model), spz_axes_turn(axes));
+}
+
+void write_spz(const std::filesystem::path& path,
+               const Gaussians& model,
+               int version,
+               SpzAxes axes) {
+  if (axes == SpzAxes::kPly) return write_as_it_is(path, model, version, axes);
+  // Half a turn, which leads both ways.
+  write_as_it_is(path, transformed(model, spz_axes_turn(code_of(axes))), version, axes);
 }
 
 }  // namespace raysplats::io

@@ -24,11 +24,18 @@ bool parse(std::string_view token, T& value) {
 
 bool parse_number(std::string_view token, double& value) { return parse(token, value); }
 bool parse_number(std::string_view token, std::uint64_t& value) { return parse(token, value); }
+bool parse_number(std::string_view token, std::int32_t& value) { return parse(token, value); }
+
+std::string excerpt(std::string_view text, std::size_t most) {
+  if (text.size() <= most) return std::string(text);
+  std::size_t end = most;
+  // Bytes within a character have the bits 10 first.
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+  return std::string(text.substr(0, end)) + "...";
+}
 
 TextReader::TextReader(std::span<const std::byte> bytes, std::filesystem::path path)
     : text_(reinterpret_cast<const char*>(bytes.data()), bytes.size()), path_(std::move(path)) {
-  // Editors of Windows begin UTF-8 with a mark that nobody sees.
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
 }
 
@@ -61,7 +68,8 @@ double TextReader::number(const char* what) {
   const std::string_view token = word();
   double value = 0;
   if (token.empty()) fail(fmt::format("{} is missing", what));
-  if (!parse_number(token, value)) fail(fmt::format("{} is '{}', not a number", what, token));
+  if (!parse_number(token, value))
+    fail(fmt::format("{} is '{}', not a number", what, excerpt(token)));
   return value;
 }
 
@@ -69,7 +77,9 @@ std::uint64_t TextReader::unsigned_integer(const char* what) {
   const std::string_view token = word();
   std::uint64_t value = 0;
   if (token.empty()) fail(fmt::format("{} is missing", what));
-  if (!parse_number(token, value)) fail(fmt::format("{} is '{}', not a whole number", what, token));
+  if (!parse_number(token, value)) {
+    fail(fmt::format("{} is '{}', not a whole number", what, excerpt(token)));
+  }
   return value;
 }
 

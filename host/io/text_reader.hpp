@@ -10,10 +10,18 @@
 
 namespace raysplats::io {
 
+/// What editors of Windows begin UTF-8 with and nobody sees.
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 /// Parses a number of any locale's program as in C ("1.5", "-2e3"); false when `token` is anything
 /// else.
 bool parse_number(std::string_view token, double& value);
 bool parse_number(std::string_view token, std::uint64_t& value);
+bool parse_number(std::string_view token, std::int32_t& value);
+
+/// The beginning of an untrusted text for a message: whole UTF-8 characters of at most `most`
+/// bytes, and "..." where more follows.
+std::string excerpt(std::string_view text, std::size_t most = 80);
 
 /// Reads untrusted text line by line and word by word; failures throw DataError with the file and
 /// line.

@@ -6,15 +6,15 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 #include <span>
-#include <string_view>
+#include <string>
 
 #include "io/camera_list.hpp"
+#include "io/camera_model_names.hpp"
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
@@ -25,6 +25,7 @@
 #include "scene/camera_model.hpp"
 #include "scene/photo_lens.hpp"
 #include "util/atomic_file.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats {
 namespace io {
@@ -100,54 +101,16 @@ struct Scope {
   }
 };
 
-/// Names of nerfstudio; what a lens distorts decides between kPinhole and kOpenCv.
-struct ModelName {
-  const char* name;
-  CameraModel model;
-};
-constexpr std::array<ModelName, 9> kModelNames{{{"PINHOLE", CameraModel::kPinhole},
-                                                {"SIMPLE_PINHOLE", CameraModel::kPinhole},
-                                                {"SIMPLE_RADIAL", CameraModel::kPinhole},
-                                                {"RADIAL", CameraModel::kPinhole},
-                                                {"OPENCV", CameraModel::kPinhole},
-                                                {"OPENCV_FISHEYE", CameraModel::kFisheye},
-                                                {"FISHEYE624", CameraModel::kPhotoLens},
-                                                {"EQUIRECTANGULAR", CameraModel::kEquirectangular},
-                                                {"ORTHOPHOTO", CameraModel::kOrthographic}}};
-
-const char* model_name(CameraModel model) {
-  if (model == CameraModel::kOpenCv) return "OPENCV";
-  return std::find_if(kModelNames.begin(), kModelNames.end(),
-                      [&](const ModelName& known) { return known.model == model; })
-      ->name;
-}
-
-/// Whether two names differ in nothing but letter case, and in what separates their words.
-bool same_name(std::string_view a, std::string_view b) {
-  const auto plain = [](std::string_view name) {
-    std::string out;
-    for (const char c : name) {
-      if (c != '_' && c != '-' && c != ' ')
-        out += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    }
-    return out;
-  };
-  return plain(a) == plain(b);
-}
-
 void read_model(const Scope& scope, TransformsFrame& frame) {
   const std::string name = scope.text("camera_model");
   if (!name.empty()) {
-    const auto* found =
-        std::find_if(kModelNames.begin(), kModelNames.end(),
-                     [&](const ModelName& known) { return same_name(known.name, name); });
-    if (found == kModelNames.end()) {
+    const std::optional<CameraModel> model = model_of_name(name);
+    if (!model) {
       scope.fail(
-          fmt::format("the camera_model '{}' is not supported (PINHOLE, OPENCV, OPENCV_FISHEYE, "
-                      "FISHEYE624, EQUIRECTANGULAR and ORTHOPHOTO are), undistort the images first",
-                      name));
+          fmt::format("the camera_model '{}' is not supported ({} are), undistort the images first",
+                      name, model_names()));
     }
-    frame.model = found->model;
+    frame.model = *model;
   }
   const auto fisheye = scope.object.find("is_fisheye");
   if (fisheye != scope.object.end() && *fisheye == true) frame.model = CameraModel::kFisheye;

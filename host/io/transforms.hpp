@@ -40,10 +40,9 @@ struct TransformsFile {
 
 /// Numbers may be texts ("500"), matrices of 3 x 4, 4 x 4 or as many numbers in one list. Cameras
 /// of NeuS2 (from_na) and Mitsuba (normal_mts_args) have axes of their own, which an info says.
-/// Throws DataError for malformed JSON, camera models other than pinholes, OPENCV, OPENCV_FISHEYE
-/// (instant-ngp: is_fisheye), FISHEYE624, EQUIRECTANGULAR and ORTHOPHOTO (named), and matrices that
-/// are not finite or, but for the lengths of their axes, no rigid motion to 1e-3; smaller
-/// deviations are orthonormalised.
+/// Throws DataError for malformed JSON, camera models other than those of model_names()
+/// (instant-ngp: is_fisheye), and matrices that are not finite or, but for the lengths of their
+/// axes, no rigid motion to 1e-3; smaller deviations are orthonormalised.
 TransformsFile read_transforms(const std::filesystem::path& path);
 /// The same of what is in memory; `path` names it in errors, and files lie beside it.
 TransformsFile parse_transforms(const nlohmann::json& root, const std::filesystem::path& path);

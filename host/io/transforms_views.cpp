@@ -11,7 +11,6 @@
 
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
-#include "io/photo_mask.hpp"
 #include "io/photo_views.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
@@ -80,7 +79,17 @@ bool has_photos(const TransformsFile& file) {
   });
 }
 
-std::vector<View> transforms_views(TransformsFile& file, const DatasetOptions& options) {
+void add_photos(const TransformsFile& file, MaskFinder& masks) {
+  for (const TransformsFrame& frame : file.frames) {
+    const fs::path name = frame.file_path;
+    // What follows a point is a part of names without an extension.
+    masks.add(has_image_extension(name) ? name : fs::path(name.string() + ".png"));
+  }
+}
+
+std::vector<View> transforms_views(TransformsFile& file,
+                                   const DatasetOptions& options,
+                                   const MaskFinder& masks) {
   const fs::path folder = file.path.parent_path();
   const std::vector<FramePhoto> photos = frame_photos(file);
   std::vector<View> views;
@@ -98,13 +107,8 @@ std::vector<View> transforms_views(TransformsFile& file, const DatasetOptions& o
     }
     if (photos[i].respelt && respelt++ == 0) first_respelt = frame.file_path;
     if (!has_image_extension(name)) name += photo.extension();
-    if (!frame.mask_path.empty()) {
-      view.mask_path = named_by(file, frame, "mask", frame.mask_path);
-    } else {
-      // Names may repeat in several folders (train/r_0, test/r_0).
-      view.mask_path = find_mask(folder, name);
-      if (view.mask_path.empty()) view.mask_path = find_mask(folder, photo.filename());
-    }
+    view.mask_path =
+        frame.mask_path.empty() ? masks.find(name) : named_by(file, frame, "mask", frame.mask_path);
     if (!frame.depth_path.empty())
       view.depth_path = named_by(file, frame, "depth map", frame.depth_path);
     const ImageSize size = image_size(photo);

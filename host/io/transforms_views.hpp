@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "io/photo_mask.hpp"
 #include "io/transforms.hpp"
 #include "raysplats/dataset.hpp"
 
@@ -11,9 +12,15 @@ namespace raysplats::io {
 /// Whether a photo of any frame is there.
 bool has_photos(const TransformsFile& file);
 
-/// The views of a transforms file, in its order. Frames without a photo leave the file, with a
+/// Tells the finder of masks of all photos that a file names.
+void add_photos(const TransformsFile& file, MaskFinder& masks);
+
+/// The views of a transforms file, in its order; masks that it does not name are those of `masks`,
+/// which knows the photos of the whole data set. Frames without a photo leave the file, with a
 /// warning where most have one. Throws DataError for masks and depth maps that are named and not
 /// there, and where most photos are missing.
-std::vector<View> transforms_views(TransformsFile& file, const DatasetOptions& options);
+std::vector<View> transforms_views(TransformsFile& file,
+                                   const DatasetOptions& options,
+                                   const MaskFinder& masks);
 
 }  // namespace raysplats::io

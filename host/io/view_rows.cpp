@@ -28,20 +28,6 @@ RawImage mask_of_photo(const View& view, bool turned) {
   return turned ? upright(mask, view.image_path) : laid(mask, view.image_path);
 }
 
-MaskPlane load_mask(const View& view, bool turned) {
-  MaskPlane mask = mask_plane(mask_of_photo(view, turned));
-  const bool dark =
-      std::none_of(mask.values.begin(), mask.values.end(), [](float value) { return value > 0; });
-  // A photo that shows nothing of a body that was cut out tells where that is not.
-  if (dark && !view.mask_cuts) {
-    throw DataError(fmt::format(
-        "The mask {} is black everywhere and leaves nothing of its photo {}: remove the "
-        "photo from the data set, or the mask",
-        view.mask_path.string(), view.image_path.string()));
-  }
-  return mask;
-}
-
 // What the file says of the colours of a photo. Only floats are light and only alpha multiplies, so
 // that most photos are not opened for it.
 PhotoColors colors_of(const RawImage& raw, const std::filesystem::path& path) {
@@ -69,7 +55,7 @@ ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
   unchanged_ = !colors.light && !colors.associated;
   const bool masked = !view.mask_path.empty();
   if (masked) {
-    mask_ = load_mask(view, turned);
+    mask_ = mask_plane(mask_of_photo(view, turned));
     unchanged_ = false;
   }
   rows_ = fitted(decoded_rows(raw_, masked ? &mask_ : nullptr, colors), view);

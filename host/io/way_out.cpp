@@ -27,15 +27,14 @@ std::string way_out_of_others(const fs::path& root) {
   return "";
 }
 
-/// Whether a folder looks like a data set.
-bool is_data_set(const fs::path& folder) {
+}  // namespace
+
+bool looks_like_dataset(const fs::path& folder) {
   return is_folder(folder / "sparse") || is_file(folder / "transforms.json") ||
          is_file(folder / "transforms_train.json") || is_file(folder / kLlffPoses) ||
          find_polycam(folder) || is_folder(folder / "colmap" / "sparse") ||
-         is_file(folder / "colmap" / "images.txt");
+         is_file(folder / "colmap" / "images.bin") || is_file(folder / "colmap" / "images.txt");
 }
-
-}  // namespace
 
 std::optional<fs::path> enclosing_data_set(const fs::path& root) {
   constexpr int kLevels = 3;  // colmap/sparse/0
@@ -46,7 +45,7 @@ std::optional<fs::path> enclosing_data_set(const fs::path& root) {
     folder = folder.parent_path();
     // What these hold is a part of the data set that they lie in.
     const bool is_part = folder.filename() == "colmap" || folder.filename() == "distorted";
-    if (!is_part && is_data_set(folder)) return folder;
+    if (!is_part && looks_like_dataset(folder)) return folder;
   }
   return std::nullopt;
 }
@@ -56,7 +55,7 @@ std::string way_out(const fs::path& root) {
   std::error_code failure;
   for (fs::directory_iterator entry(root, failure), end; !failure && entry != end;
        entry.increment(failure)) {
-    if (is_data_set(entry->path())) inner.insert(entry->path());
+    if (looks_like_dataset(entry->path())) inner.insert(entry->path());
   }
   if (std::string other = way_out_of_others(root); !other.empty()) return other;
   if (!inner.empty()) return fmt::format("; {} is one", inner.begin()->string());

@@ -7,6 +7,9 @@
 
 namespace raysplats::io {
 
+/// Whether a folder holds what load_dataset() looks for by its name: a data set, whole or not.
+bool looks_like_dataset(const std::filesystem::path& folder);
+
 /// The data set that a folder is a part of, as `images` and `sparse/0` are, by its absolute path;
 /// nothing where there is none.
 std::optional<std::filesystem::path> enclosing_data_set(const std::filesystem::path& root);

@@ -74,6 +74,11 @@ ZipArchive::ZipArchive(std::span<const std::byte> bytes, const std::filesystem::
   end.skip(4, "the end of the archive");
   const auto begin = end.read<std::uint32_t>("the place of the central directory");
   ByteReader reader(bytes, path);
+  // Numbers that do not fit, and that Zip64 says elsewhere, have all bits set.
+  const auto refuse_zip64 = [&] {
+    reader.fail("the archive is a Zip64, as for more than 4 GiB, which is not supported");
+  };
+  if (count == UINT16_MAX || begin == UINT32_MAX) refuse_zip64();
   reader.skip(begin, "the central directory");
   std::uint64_t inflated = 0;
   for (std::uint16_t i = 0; i < count; ++i) {
@@ -96,7 +101,7 @@ ZipArchive::ZipArchive(std::span<const std::byte> bytes, const std::filesystem::
     reader.skip(std::uint64_t{name} + extra + comment, "the name of a file");
     if ((flags & kEncrypted) != 0) reader.fail("a file of the archive is encrypted");
     if (entry.packed == UINT32_MAX || entry.size == UINT32_MAX || entry.header == UINT32_MAX)
-      reader.fail("the archive has more than 4 GiB (Zip64)");
+      refuse_zip64();
     inflated += entry.size;
     entries_.emplace(std::string(reinterpret_cast<const char*>(bytes.data()) + at, name), entry);
   }

@@ -29,8 +29,11 @@ void copy(Context& context, const Buffer<float>& from, Buffer<float>& to, const 
 NormalGaussians::NormalGaussians(Context& context)
     : context_(context), kernel_(context.kernel("light/normal_gaussians.cl", "gaussian_normals")) {}
 
-bool NormalGaussians::follow(const DeviceGaussians& gaussians) {
-  if (revision_ == gaussians.revision) return false;
+void NormalGaussians::follow(const DeviceGaussians& gaussians) {
+  if (revision_ == gaussians.revision) return;
+  // Where this throws, the copy is of nothing.
+  revision_ = 0;
+  eye_.reset();
   copy_.count = gaussians.count;
   copy_.activation = gaussians.activation;
   copy(context_, gaussians.means, copy_.means, "means of normals");
@@ -39,18 +42,18 @@ bool NormalGaussians::follow(const DeviceGaussians& gaussians) {
   copy(context_, gaussians.opacities, copy_.opacities, "opacities of normals");
   copy_.sh.ensure(context_, 3 * gaussians.count, "normals");
   revision_ = gaussians.revision;
-  return true;
 }
 
 const DeviceGaussians& NormalGaussians::of(const DeviceGaussians& gaussians, const Camera& camera) {
   const std::array<float, 4> eye = eye_of(camera);
-  if (!follow(gaussians) && eye == eye_) return copy_;
-  eye_ = eye;
+  follow(gaussians);
+  if (eye_ == eye) return copy_;
   if (copy_.count > 0) {
     kernel_.launch(Range::linear(copy_.count, kGroup), copy_.means, copy_.quaternions, copy_.scales,
                    eye, static_cast<std::uint32_t>(copy_.count), copy_.sh);
   }
   copy_.changed(context_);
+  eye_ = eye;
   return copy_;
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "device/context.hpp"
 #include "device/kernel.hpp"
@@ -22,14 +23,14 @@ class NormalGaussians {
   const DeviceGaussians& of(const DeviceGaussians& gaussians, const Camera& camera);
 
  private:
-  /// False where nothing has changed.
-  bool follow(const DeviceGaussians& gaussians);
+  /// Copies Gaussians that changed.
+  void follow(const DeviceGaussians& gaussians);
 
   Context& context_;
   Kernel kernel_;
   DeviceGaussians copy_;
-  std::uint64_t revision_ = 0;  // of the Gaussians that were copied
-  std::array<float, 4> eye_{};  // that their normals look at
+  std::uint64_t revision_ = 0;               // of the Gaussians that were copied
+  std::optional<std::array<float, 4>> eye_;  // that the normals look at; none are made yet without
 };
 
 }  // namespace raysplats

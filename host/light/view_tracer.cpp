@@ -157,6 +157,7 @@ struct ViewTracer::Impl {
   bool kept = false;
   std::uint64_t revision = 0;  // of its Gaussians
   Camera camera;
+  bool rays_whole = false;  // what `rays` traced last are all pixels of `camera`
   Buffer<float> image;
   Buffer<float> depth;
 };
@@ -203,8 +204,11 @@ void ViewTracer::forward(const DeviceGaussians& gaussians,
     return;
   }
   self.kept = false;
-  if (self.packets_revision != gaussians.revision) self.packets.update(gaussians);
-  self.packets_revision = gaussians.revision;
+  if (self.packets_revision != gaussians.revision) {
+    self.packets_revision = 0;
+    self.packets.update(gaussians);
+    self.packets_revision = gaussians.revision;
+  }
   self.options.background = self.background;
   self.packets.set_background(self.background);
   self.packets.forward(gaussians, camera, keep, sizes);
@@ -247,9 +251,11 @@ void ViewTracer::Impl::trace_batch(const DeviceGaussians& gaussians,
                                    std::size_t first,
                                    std::size_t count,
                                    const Buffer<std::uint32_t>& counter) {
+  rays_whole = false;
   rays->tracer.set_near(RayNear::of(camera, options.near_depth));
   rays->generator.generate(camera, Lens{}, first, count, rays->paths.rays());
   rays->paths.trace(gaussians, count, color_direction(camera), options.background, counter);
+  rays_whole = count == pixels_of(camera);
 }
 
 void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep) {
@@ -355,7 +361,8 @@ void ViewTracer::Impl::backward_rays(const DeviceGaussians& gaussians,
   rays->sums.begin(gaussians, RayScreen::of(camera), pixels * paths.segments());
   for (std::size_t first = 0; first < pixels; first += batch()) {
     const std::size_t count = std::min(batch(), pixels - first);
-    if (batch() < pixels) trace_batch(gaussians, first, count, rays->traced_again);
+    // Whoever watched forward() may have made its batches smaller than those here.
+    if (count < pixels || !rays_whole) trace_batch(gaussians, first, count, rays->traced_again);
     paths.gradients().ensure(context, count, "ray gradients");
     kernel("load_gradients")
         .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), image_gradient,

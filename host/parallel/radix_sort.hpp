@@ -18,11 +18,11 @@ class RadixSort {
   using Pair = std::array<std::uint32_t, 2>;
 
  public:
-  /// Of the scratch memory.
+  /// Bytes of scratch memory.
   static constexpr std::size_t kBytesPerPair = 2 * sizeof(Pair);
 
   explicit RadixSort(Context& context);
-  /// With an explicit division of the work; the result is the same for every shape.
+  /// A sort with an explicit division of the work; the result is the same for every shape.
   RadixSort(Context& context, const ChunkShape& shape);
 
   /// Sorts the first `count` pairs in place by the lowest `bits` bits of the keys (rounded up to a

@@ -14,7 +14,7 @@ namespace raysplats {
 class Scan {
  public:
   explicit Scan(Context& context);
-  /// With an explicit division of the work; the result is the same for every shape.
+  /// A scan with an explicit division of the work; the result is the same for every shape.
   Scan(Context& context, const ChunkShape& shape);
 
   static constexpr std::uint32_t kMost = 0xffffffffu;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <optional>
 
@@ -14,6 +13,7 @@
 #include "scene/sharpness.hpp"
 #include "util/file_kind.hpp"
 #include "util/number_text.hpp"
+#include "util/path_text.hpp"
 #include "util/program.hpp"
 
 namespace raysplats {
@@ -22,13 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kCandidates = 3;  ///< frames of which the sharpest is kept
-
-std::string lower_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 bool is_photo(const fs::path& path) {
   const std::string extension = lower_extension(path);

@@ -310,6 +310,22 @@ std::vector<std::string> chosen_photos(const fs::path& input,
                                   below)));
 }
 
+/// Refuses a folder that belongs to something else: photos that are read, or images, models and
+/// cameras that would be removed or taken for those that are made here.
+void check_output(const fs::path& input, const fs::path& data) {
+  std::error_code error;
+  if (fs::equivalent(input, data / "images", error) || fs::equivalent(input, data, error))
+    throw UsageError(fmt::format("{} is what is read: give another folder with -o", data.string()));
+  if (fs::exists(data / "prepare/own", error)) return;
+  for (const char* name : {"images", "sparse", "database.db", "transforms.json",
+                           "transforms_train.json", "transforms_test.json"}) {
+    if (!fs::exists(data / name, error)) continue;
+    throw DataError(
+        fmt::format("{} holds {} that 'prepare' has not put there: give another folder with -o",
+                    data.string(), name));
+  }
+}
+
 }  // namespace
 
 Prepared prepare_data(const fs::path& input,
@@ -324,14 +340,7 @@ Prepared prepare_data(const fs::path& input,
   if (video) find_program("ffmpeg", "ffmpeg");
   const std::vector<std::string> given =
       video ? std::vector<std::string>{} : chosen_photos(input, data, options);
-  std::error_code error;
-  if (fs::equivalent(input, data / "images", error))
-    throw UsageError(fmt::format("{} is what is read: give another folder with -o", data.string()));
-  if (fs::exists(data / "images", error) && !fs::exists(data / "prepare/own", error)) {
-    throw DataError(
-        fmt::format("{} holds images that 'prepare' has not put there: give another folder with -o",
-                    data.string()));
-  }
+  check_output(input, data);
   Work work(data, watch);
   const std::vector<std::string> photos = gather_images(input, given, options, work);
   const ColmapPlan plan = plan_colmap(work / "images", photos, options, video);

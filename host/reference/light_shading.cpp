@@ -37,6 +37,26 @@ LightAt light_at(const Light& light, const glm::dvec3& point) {
   return out;
 }
 
+/// The mean of the point's projections onto the planes of the corners and their normals, those that
+/// it lies behind, weighted as the corners are (Hanika 2021, Hacking the Shadow Terminator).
+glm::dvec3 shadow_origin(const Triangle& triangle,
+                         const glm::dvec3& weights,
+                         const glm::dvec3& point,
+                         const glm::dvec3& geometric_normal) {
+  glm::dvec3 out(0.0);
+  for (int k = 0; k < 3; ++k) {
+    const auto corner = static_cast<std::size_t>(k);
+    glm::dvec3 projected = point;
+    glm::dvec3 n = triangle.normals[corner];
+    if (glm::length(n) > 0.0) {
+      n = glm::normalize(glm::dot(n, geometric_normal) < 0.0 ? -n : n);
+      projected -= std::min(0.0, glm::dot(point - triangle.corners[corner], n)) * n;
+    }
+    out += weights[k] * projected;
+  }
+  return out;
+}
+
 /// V before strength along one shadow ray.
 double transmittance(const LightScene& scene,
                      const glm::dvec3& point,
@@ -127,6 +147,7 @@ SurfacePoint surface_point(const LightScene& scene,
   out.from_outside = slope < 0.0;
   out.geometric_normal = out.from_outside ? triangle.normal : -triangle.normal;
   out.shading_normal = glm::length(n) > 0.0 ? glm::normalize(n) : out.geometric_normal;
+  out.shadow_origin = shadow_origin(triangle, hit.weights, out.position, out.geometric_normal);
   const double lean = glm::dot(out.shading_normal, out.geometric_normal);
   if (lean < 0.0) out.shading_normal = -out.shading_normal;
   margin = std::min({margin, std::abs(slope), std::abs(lean)});
@@ -155,8 +176,8 @@ glm::dvec3 diffuse_light(const LightScene& scene,
     if (material.specular > 0.0f) margin = std::min(margin, std::abs(cosine));
     if (cosine <= 0.0) continue;
     const double open =
-        visibility(scene, light, point.position, 0.0, point.triangle, render.shadows.mesh_on_mesh,
-                   render.shadows.gaussians_on_mesh, margin);
+        visibility(scene, light, point.shadow_origin, 0.0, point.triangle,
+                   render.shadows.mesh_on_mesh, render.shadows.gaussians_on_mesh, margin);
     const glm::dvec3 arriving = at.color * (1.0 - render.shadows.strength * (1.0 - open));
     const glm::dvec3 half = glm::normalize(at.direction - direction);
     lambert += arriving * cosine;

@@ -9,6 +9,7 @@ namespace raysplats::reference {
 struct SurfacePoint {
   int triangle = -1;
   glm::dvec3 position{0.0};
+  glm::dvec3 shadow_origin{0.0};     ///< where rays to lights start
   glm::dvec3 shading_normal{0.0};    ///< n, turned to the ray's side
   glm::dvec3 geometric_normal{0.0};  ///< N, turned to the ray's side
   bool from_outside = true;          ///< the ray meets the side that N points to unturned

@@ -9,6 +9,7 @@
 
 #include "comm/communicator.hpp"
 #include "render/bands.hpp"
+#include "render/previews.hpp"
 #include "render/shutter.hpp"
 
 namespace raysplats {

@@ -19,7 +19,7 @@ namespace {
 using Bytes = std::vector<unsigned char>;
 
 constexpr int kPanels = 3;
-/// Of all pictures before base64, which adds a third: the page is to stay below 3 MB.
+/// Bytes of all pictures before base64, which adds a third: the page is to stay below 3 MB.
 constexpr std::size_t kMostBytes = 1'600'000;
 
 /// How pictures are made, from the best on.

@@ -27,7 +27,10 @@ constexpr std::uint64_t kMostText = std::uint64_t{64} << 20;
 nlohmann::json metrics_of(const fs::path& run) {
   std::error_code error;
   if (!fs::is_regular_file(run / "metrics.json", error)) {
-    throw DataError(fmt::format("{} is no training run: it holds no metrics.json", run.string()));
+    throw DataError(
+        fs::exists(run, error)
+            ? fmt::format("{} is no training run: it holds no metrics.json", run.string())
+            : fmt::format("{} does not exist: name the folder of a training run", run.string()));
   }
   return io::read_json_object(run / "metrics.json");
 }

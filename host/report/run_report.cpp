@@ -169,7 +169,9 @@ std::string origin(const Json& metrics) {
     const std::string value = text(metrics, key);
     if (!value.empty()) rows += row(name, value);
   }
-  if (metrics.contains("seed")) rows += row("Seed", fmt::format("{:.0f}", number(metrics, "seed")));
+  // Its 64 bits are more than a double has.
+  const auto seed = metrics.find("seed");
+  if (seed != metrics.end() && seed->is_number_integer()) rows += row("Seed", seed->dump());
   return rows;
 }
 

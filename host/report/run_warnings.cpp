@@ -87,6 +87,17 @@ bool is_complete(const Json& metrics) {
   return complete != metrics.end() && complete->is_boolean() && complete->get<bool>();
 }
 
+/// The best of the evaluations of as many views as the last: with --eval-views those before it are
+/// of fewer, which may be easier ones. Null for none.
+Json best_like_last(const std::vector<Json>& evaluations) {
+  Json best;
+  for (const Json& each : evaluations) {
+    if (number(each, "views") != number(evaluations.back(), "views")) continue;
+    if (best.is_null() || number(each, "psnr") > number(best, "psnr")) best = each;
+  }
+  return best;
+}
+
 /// Whether the limit has cut off growth. The other strategies go there by plan.
 bool stopped_growing(const Json& metrics,
                      const std::map<std::string, std::string>& settings,
@@ -180,14 +191,12 @@ std::vector<std::string> warnings_of(const Json& metrics,
   const auto rise = metrics.find("psnr_rise");
   if (rise != metrics.end() && rise->is_number() && rise->get<double>() < kNothingLearned)
     out.emplace_back("No view became better by 0.1 dB: poses or photos may be wrong");
-  if (evaluations.size() > 1) {
-    const auto best = std::max_element(
-        evaluations.begin(), evaluations.end(),
-        [](const Json& a, const Json& b) { return number(a, "psnr") < number(b, "psnr"); });
-    const double below = number(*best, "psnr") - number(evaluations.back(), "psnr");
+  const Json best = best_like_last(evaluations);
+  if (!best.is_null()) {
+    const double below = number(best, "psnr") - number(evaluations.back(), "psnr");
     if (below > kBelowBest) {
       out.push_back(fmt::format("The run ends {:.2f} dB below its best, at iteration {:.0f}", below,
-                                number(*best, "iteration")));
+                                number(best, "iteration")));
     }
   }
   if (stopped_growing(metrics, settings, columns)) {

@@ -15,6 +15,7 @@
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "util/atomic_file.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats {
 namespace {
@@ -30,6 +31,7 @@ constexpr std::uint32_t kOldestVersion = 1;
 constexpr std::uint32_t kMaxSections = 64;
 constexpr std::uint64_t kMaxHeader = 1 << 20;
 constexpr std::size_t kNameBytes = 32;
+constexpr char kFolder[] = "checkpoints";  // of a run
 constexpr int kMaxShDegree = 4;
 // Far above what any device holds, and small enough that sizes made of it cannot overflow.
 constexpr std::uint64_t kMaxGaussians = std::uint64_t{1} << 40;
@@ -97,7 +99,10 @@ nlohmann::json header_of(const Checkpoint& c) {
           {"bad_steps_in_a_row", c.bad_steps_in_a_row},
           {"traced_rays", c.traced_rays},
           {"capped_rays", c.capped_rays},
+          {"skipped_updates", c.skipped_updates},
           {"mean_since", c.mean_since},
+          {"views_joined", c.views_joined},
+          {"pass_due", c.pass_due},
           {"config", c.config}};
 }
 
@@ -133,46 +138,27 @@ Checkpoint parse_header(const std::string& text, std::uint32_t version) {
     get_whole<std::uint64_t>(json, "traced_rays", 0, UINT64_MAX, c.traced_rays);
     get_whole<std::uint64_t>(json, "capped_rays", 0, UINT64_MAX, c.capped_rays);
   }
+  if (json.contains("skipped_updates"))
+    get_whole<std::uint64_t>(json, "skipped_updates", 0, UINT64_MAX, c.skipped_updates);
   if (json.contains("mean_since"))
     get_whole<std::int64_t>(json, "mean_since", 0, kMaxIterations, c.mean_since);
+  if (json.contains("views_joined"))
+    get_whole<std::int64_t>(json, "views_joined", 0, kMaxIterations, c.views_joined);
+  if (json.contains("pass_due")) json.at("pass_due").get_to(c.pass_due);
   json.at("config").get_to(c.config);
   return c;
 }
 
-}  // namespace
-
-void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
-  const std::string header = io::json_text(header_of(checkpoint));
-  Preamble preamble{kMagic, kVersion, static_cast<std::uint32_t>(checkpoint.sections.size()),
-                    header.size(), hash(header.data(), header.size())};
-  std::vector<SectionEntry> table;
-  std::uint64_t offset = sizeof(Preamble) + header.size() +
-                         checkpoint.sections.size() * sizeof(SectionEntry) + sizeof(std::uint64_t);
-  for (const auto& [name, values] : checkpoint.sections) {
-    SectionEntry entry{};
-    name.copy(entry.name.data(), kNameBytes - 1);
-    entry.offset = offset;
-    entry.bytes = values.size() * sizeof(float);
-    entry.hash = hash(values.data(), entry.bytes);
-    offset += entry.bytes;
-    table.push_back(entry);
+// The beginning of a file, and the checkpoint without its sections; the table of them is next.
+Checkpoint read_start(Reader& reader, const std::filesystem::path& path, Preamble& preamble) {
+  constexpr std::size_t kMagicBytes = sizeof(preamble.magic);
+  // First, because of a short file that is something else nothing is missing.
+  reader.read(&preamble, std::min<std::uint64_t>(kMagicBytes, reader.left()));
+  if (preamble.magic != kMagic) {
+    throw DataError(
+        fmt::format("{} is not a raysplats checkpoint: resume from another one", path.string()));
   }
-  const std::uint64_t table_hash = hash(table.data(), table.size() * sizeof(SectionEntry));
-  AtomicFile file(path);
-  file.write(&preamble, sizeof(preamble));
-  file.write(header);
-  file.write(table.data(), table.size() * sizeof(SectionEntry));
-  file.write(&table_hash, sizeof(table_hash));
-  for (const auto& [name, values] : checkpoint.sections)
-    file.write(values.data(), values.size() * sizeof(float));
-  file.commit();
-}
-
-Checkpoint read_checkpoint(const std::filesystem::path& path) {
-  Reader reader(path);
-  Preamble preamble{};
-  reader.read(&preamble, sizeof(preamble));
-  if (preamble.magic != kMagic) reader.fail("is not a raysplats checkpoint");
+  reader.read(reinterpret_cast<char*>(&preamble) + kMagicBytes, sizeof(preamble) - kMagicBytes);
   if (preamble.version < kOldestVersion || preamble.version > kVersion) {
     reader.fail(fmt::format("has version {}, and this program reads {} to {}", preamble.version,
                             kOldestVersion, kVersion));
@@ -184,12 +170,60 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
   reader.read(header.data(), header.size());
   if (hash(header.data(), header.size()) != preamble.header_hash)
     reader.fail("has a damaged header");
-  Checkpoint checkpoint;
   try {
-    checkpoint = parse_header(header, preamble.version);
+    return parse_header(header, preamble.version);
   } catch (const std::exception& error) {
     reader.fail(fmt::format("has a header that cannot be understood ({})", error.what()));
   }
+}
+
+}  // namespace
+
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+  CheckpointSections sections;
+  for (const auto& [name, values] : checkpoint.sections)
+    sections[name] = [&values = values] { return values; };
+  write_checkpoint(path, checkpoint, sections);
+}
+
+// The table stands before the sections and is known behind them.
+void write_checkpoint(const std::filesystem::path& path,
+                      const Checkpoint& checkpoint,
+                      const CheckpointSections& sections) {
+  const std::string header = io::json_text(header_of(checkpoint));
+  const Preamble preamble{kMagic, kVersion, static_cast<std::uint32_t>(sections.size()),
+                          header.size(), hash(header.data(), header.size())};
+  std::vector<SectionEntry> table(sections.size());
+  const std::size_t table_bytes = table.size() * sizeof(SectionEntry);
+  const std::uint64_t table_offset = sizeof(Preamble) + header.size();
+  std::uint64_t table_hash = 0;
+  AtomicFile file(path);
+  file.write(&preamble, sizeof(preamble));
+  file.write(header);
+  file.write(table.data(), table_bytes);
+  file.write(&table_hash, sizeof(table_hash));
+  std::uint64_t offset = table_offset + table_bytes + sizeof(table_hash);
+  auto entry = table.begin();
+  for (const auto& [name, numbers] : sections) {
+    const std::vector<float> values = numbers();
+    name.copy(entry->name.data(), kNameBytes - 1);
+    entry->offset = offset;
+    entry->bytes = values.size() * sizeof(float);
+    entry->hash = hash(values.data(), entry->bytes);
+    file.write(values.data(), entry->bytes);
+    offset += entry->bytes;
+    ++entry;
+  }
+  table_hash = hash(table.data(), table_bytes);
+  file.write_at(table_offset, table.data(), table_bytes);
+  file.write_at(table_offset + table_bytes, &table_hash, sizeof(table_hash));
+  file.commit();
+}
+
+Checkpoint read_checkpoint(const std::filesystem::path& path) {
+  Reader reader(path);
+  Preamble preamble{};
+  Checkpoint checkpoint = read_start(reader, path, preamble);
   std::vector<SectionEntry> table(preamble.sections);
   reader.read(table.data(), table.size() * sizeof(SectionEntry));
   std::uint64_t table_hash = 0;
@@ -214,15 +248,41 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
   return checkpoint;
 }
 
+std::string checkpoint_config(const std::filesystem::path& path) {
+  const auto config_of = [](const std::filesystem::path& file) {
+    Reader reader(file);
+    Preamble preamble{};
+    return read_start(reader, file, preamble).config;
+  };
+  if (is_file(path)) return config_of(path);
+  const std::vector<std::filesystem::path> files = list_checkpoints(path);
+  for (auto file = files.rbegin(); file != files.rend(); ++file) {
+    try {
+      return config_of(*file);
+    } catch (const DataError&) {
+      // load_latest_checkpoint() passes over it too, and says so.
+    }
+  }
+  return "";
+}
+
+std::optional<std::filesystem::path> run_folder_of(const std::filesystem::path& path) {
+  if (!is_file(path)) return path;
+  const std::filesystem::path folder =
+      std::filesystem::absolute(path).lexically_normal().parent_path();
+  if (folder.filename() != kFolder) return std::nullopt;
+  return folder.parent_path();
+}
+
 std::filesystem::path checkpoint_path(const std::filesystem::path& run_folder,
                                       std::int64_t iteration) {
-  return run_folder / "checkpoints" / fmt::format("step_{:09}.rsck", iteration);
+  return run_folder / kFolder / fmt::format("step_{:09}.rsck", iteration);
 }
 
 std::vector<std::filesystem::path> list_checkpoints(const std::filesystem::path& run_folder) {
   std::vector<std::filesystem::path> files;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(run_folder / "checkpoints", error)) {
+  for (const auto& entry : std::filesystem::directory_iterator(run_folder / kFolder, error)) {
     const std::string name = entry.path().filename().string();
     if (entry.path().extension() == ".rsck" && name.rfind("step_", 0) == 0)
       files.push_back(entry.path());
@@ -232,7 +292,7 @@ std::vector<std::filesystem::path> list_checkpoints(const std::filesystem::path&
 }
 
 Checkpoint load_latest_checkpoint(const std::filesystem::path& path) {
-  if (path.extension() == ".rsck" && !std::filesystem::is_directory(path))
+  if (is_file(path) || (path.extension() == ".rsck" && !is_folder(path)))
     return read_checkpoint(path);
   std::vector<std::filesystem::path> files = list_checkpoints(path);
   for (auto file = files.rbegin(); file != files.rend(); ++file) {

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,17 +31,41 @@ struct Checkpoint {
   std::uint32_t bad_steps_in_a_row = 0;
   std::uint64_t traced_rays = 0;  ///< of all training views so far; 0 in older files, as the next
   std::uint64_t capped_rays = 0;  ///< of them, those that stopped because of max_hits
-  std::int64_t mean_since = 0;    ///< iterations before those that the mean of the parameters is of
-  std::string config;             ///< configuration of the run, TOML
+  std::uint64_t skipped_updates = 0;  ///< of Adam so far; 0 in older files
+  std::int64_t mean_since = 0;  ///< iterations before those that the mean of the parameters is of
+  /// Iterations before those that train on the views of validate-views too, as planned or past; 0
+  /// without such views and in older files.
+  std::int64_t views_joined = 0;
+  /// The run failed within the iteration, after its step: what follows a step, density control
+  /// among it, is still to come.
+  bool pass_due = false;
+  std::string config;                                  ///< configuration of the run, TOML
   std::map<std::string, std::vector<float>> sections;  ///< names of at most 31 characters
 };
 
 /// Writes atomically. Throws DataError when the file cannot be written.
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
 
+/// Sections by name, each made when it is its turn to be written.
+using CheckpointSections = std::map<std::string, std::function<std::vector<float>()>>;
+/// The same file with these sections in place of the checkpoint's own, of which memory holds one at
+/// a time: together they are many times the model.
+void write_checkpoint(const std::filesystem::path& path,
+                      const Checkpoint& checkpoint,
+                      const CheckpointSections& sections);
+
 /// Reads and verifies every length and checksum. Throws DataError that names the file and what is
 /// wrong with it.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
+
+/// The configuration that a checkpoint file, or the newest of a run folder whose header is whole,
+/// names; sections are not read. "" without one. Throws DataError like read_checkpoint() for a
+/// file.
+std::string checkpoint_config(const std::filesystem::path& path);
+
+/// The run folder of a path that one resumes from: of a file the one in whose checkpoints/ it is,
+/// nothing for a file elsewhere; else the path itself.
+std::optional<std::filesystem::path> run_folder_of(const std::filesystem::path& path);
 
 /// The file of an iteration in the run folder: checkpoints/step_000007000.rsck.
 std::filesystem::path checkpoint_path(const std::filesystem::path& run_folder,
@@ -49,7 +75,7 @@ std::filesystem::path checkpoint_path(const std::filesystem::path& run_folder,
 std::vector<std::filesystem::path> list_checkpoints(const std::filesystem::path& run_folder);
 
 /// The newest checkpoint of the run folder that is valid; damaged ones are skipped with a warning.
-/// `path` may also be a single .rsck file. Throws DataError when there is none.
+/// `path` may also be a single file. Throws DataError when there is none.
 Checkpoint load_latest_checkpoint(const std::filesystem::path& path);
 
 /// Removes all but the newest `keep` checkpoints of a run folder up to `iteration`; what is beyond

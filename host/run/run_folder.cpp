@@ -7,11 +7,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <memory>
 #include <new>
@@ -32,47 +28,6 @@
 
 namespace raysplats {
 namespace {
-
-constexpr char kCsvHeader[] = "iteration,seconds,loss,psnr,gaussians,it_per_s,candidates,hits\n";
-
-std::ptrdiff_t columns(std::string_view row) { return std::count(row.begin(), row.end(), ','); }
-
-/// A row of metrics.csv below `header` with all the columns of today: those that came later are 0.
-/// Nothing for one that was cut off, as by a power failure.
-std::string with_all_columns(const std::string& row, const std::string& header) {
-  const bool known = std::string_view(kCsvHeader).starts_with(header);
-  if (!known || columns(row) != columns(header) || row.ends_with(',')) return "";
-  std::string out = row;
-  for (std::ptrdiff_t i = columns(header); i < columns(kCsvHeader); ++i) out += ",0";
-  return out + "\n";
-}
-
-nlohmann::json to_json(const EvaluationRow& row) {
-  nlohmann::json json{{"iteration", row.iteration},
-                      {"training_seconds", row.training_seconds},
-                      {"psnr", row.psnr},
-                      {"ssim", row.ssim},
-                      {"views", row.views},
-                      {"gaussians", row.gaussians},
-                      {"psnr_corrected", row.psnr_corrected}};
-  if (row.psnr_all) json["psnr_all"] = *row.psnr_all;
-  if (row.psnr_aligned) json["psnr_aligned"] = *row.psnr_aligned;
-  return json;
-}
-
-EvaluationRow evaluation_from_json(const nlohmann::json& json) {
-  EvaluationRow row;
-  json.at("iteration").get_to(row.iteration);
-  json.at("training_seconds").get_to(row.training_seconds);
-  json.at("psnr").get_to(row.psnr);
-  json.at("ssim").get_to(row.ssim);
-  json.at("views").get_to(row.views);
-  json.at("gaussians").get_to(row.gaussians);
-  row.psnr_corrected = json.value("psnr_corrected", 0.0);  // runs of older versions have none
-  if (json.contains("psnr_all")) row.psnr_all = json.at("psnr_all").get<double>();
-  if (json.contains("psnr_aligned")) row.psnr_aligned = json.at("psnr_aligned").get<double>();
-  return row;
-}
 
 constexpr std::array<const char*, 7> kReports{
     "config.toml",    "cameras.json",         "metrics.csv", "metrics.json",
@@ -133,10 +88,11 @@ void remove_if_empty(const std::filesystem::path& folder) {
 
 RunFolder::RunFolder(std::filesystem::path path, bool writes)
     : path_(std::move(path)), writes_(writes) {
-  if (writes_) make_output_directory(path_);
+  if (writes_) check_output_directory(path_);
 }
 
 FileLock RunFolder::lock() const {
+  make_output_directory(path_);
   FileLock lock(path_ / ".lock");
   const std::size_t stale = remove_stale_temporaries(path_);
   if (stale > 0) spdlog::info("{} temporary files of a run that was killed are removed", stale);
@@ -217,6 +173,14 @@ bool RunFolder::has_model(std::int64_t iteration) const {
   return std::filesystem::exists(model_file(path_, iteration), error);
 }
 
+std::optional<std::int64_t> RunFolder::newest_model() const {
+  std::optional<std::int64_t> newest;
+  for (const auto& [number, folder] : numbered(path_ / "point_cloud", "iteration_", "")) {
+    if (has_model(number)) newest = number;
+  }
+  return newest;
+}
+
 void RunFolder::remove_model(std::int64_t iteration) const {
   if (!writes_) return;
   if (!has_model(iteration)) return;
@@ -262,65 +226,6 @@ void RunFolder::remove_after(std::int64_t iteration) const {
   for (const char* report : kReports) remove_file(path_ / report);
 }
 
-void RunFolder::begin_metrics(std::int64_t iteration) {
-  evaluations_.clear();
-  validations_.clear();
-  std::string csv = kCsvHeader;
-  if (iteration > 0) {
-    std::ifstream rows(path_ / "metrics.csv");
-    std::string header;
-    std::getline(rows, header);
-    std::string line;
-    while (std::getline(rows, line)) {
-      const long long recorded = std::strtoll(line.c_str(), nullptr, 10);
-      if (recorded > 0 && recorded <= iteration) csv += with_all_columns(line, header);
-    }
-    std::ifstream metrics(path_ / "metrics.json");
-    try {
-      const nlohmann::json old = nlohmann::json::parse(metrics);
-      for (const nlohmann::json& entry : old.at("evaluations")) {
-        const EvaluationRow row = evaluation_from_json(entry);
-        if (row.iteration <= iteration) evaluations_.push_back(row);
-      }
-      for (const nlohmann::json& entry : old.value("validations", nlohmann::json::array())) {
-        const EvaluationRow row = evaluation_from_json(entry);
-        if (row.iteration <= iteration) validations_.push_back(row);
-      }
-    } catch (const nlohmann::json::exception&) {
-      // Reports of an earlier run that cannot be read are no reason not to train.
-    }
-  }
-  if (writes_) write_text_file(path_ / "metrics.csv", csv);
-}
-
-void RunFolder::append(const TrainRow& row) {
-  if (!writes_) return;
-  std::ofstream stream(path_ / "metrics.csv", std::ios::app);
-  stream << fmt::format("{},{:.3f},{:.7g},{:.4f},{},{:.3f},{},{}\n", row.iteration, row.seconds,
-                        row.loss, row.psnr, row.gaussians, row.iterations_per_second,
-                        row.candidates, row.hits);
-  stream.flush();
-  if (!stream.good()) {
-    throw DataError(fmt::format("{} cannot be written: {}", (path_ / "metrics.csv").string(),
-                                std::strerror(errno)));
-  }
-}
-
-void RunFolder::record(const EvaluationRow& row) { evaluations_.push_back(row); }
-
-void RunFolder::write_metrics(const nlohmann::json& summary) const {
-  if (!writes_) return;
-  nlohmann::json json = summary;
-  json["evaluations"] = nlohmann::json::array();
-  for (const EvaluationRow& row : evaluations_) json["evaluations"].push_back(to_json(row));
-  if (!validations_.empty()) {
-    json["validations"] = nlohmann::json::array();
-    for (const EvaluationRow& row : validations_) json["validations"].push_back(to_json(row));
-  }
-  json["note"] = "training_seconds exclude evaluation and compiling kernels";
-  write_text_file(path_ / "metrics.json", io::json_text(json, 2) + "\n");
-}
-
 void check_no_run(const std::filesystem::path& folder) {
   std::int64_t newest = -1;
   for (const auto& [number, path] : numbered(folder / "checkpoints", "step_", ".rsck")) {
@@ -338,31 +243,6 @@ void check_no_run(const std::filesystem::path& folder) {
       "The folder {} holds another run ({}): go on with it by --resume latest, choose another "
       "folder, or replace it by --overwrite",
       folder.string(), newest < 0 ? "without a checkpoint" : fmt::format("iteration {}", newest)));
-}
-
-std::optional<EvaluationRow> better_before(std::span<const EvaluationRow> evaluations,
-                                           double margin) {
-  std::optional<EvaluationRow> best;
-  for (const EvaluationRow& row : evaluations) {
-    if (row.views == evaluations.back().views && (!best || row.psnr > best->psnr)) best = row;
-  }
-  if (best && best->psnr <= evaluations.back().psnr + margin) best.reset();
-  return best;
-}
-
-double recorded_seconds(const std::filesystem::path& run_folder, std::int64_t iteration) {
-  std::ifstream rows(run_folder / "metrics.csv");
-  std::string line;
-  std::getline(rows, line);
-  double seconds = 0;
-  while (std::getline(rows, line)) {
-    char* end = nullptr;
-    const long long recorded = std::strtoll(line.c_str(), &end, 10);
-    if (recorded <= 0 || recorded > iteration || *end != ',') continue;
-    const double value = std::strtod(end + 1, nullptr);
-    if (value >= 0 && std::isfinite(value)) seconds = value;
-  }
-  return seconds;
 }
 
 }  // namespace raysplats

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
@@ -36,8 +37,8 @@ struct TrainRow {
 /// file stays, the lock on it does not).
 class RunFolder {
  public:
-  /// Makes the folder. Throws DataError when it cannot be written to. One of several ranks that
-  /// share a run `writes`; the others know the same, and leave the folder alone.
+  /// Throws DataError when the folder cannot be written to; lock() makes it. One of several ranks
+  /// that share a run `writes`; the others know the same, and leave the folder alone.
   explicit RunFolder(std::filesystem::path path, bool writes = true);
 
   const std::filesystem::path& path() const { return path_; }
@@ -60,13 +61,16 @@ class RunFolder {
                    std::int64_t iteration,
                    const std::array<double, 3>& origin = {}) const;
   bool has_model(std::int64_t iteration) const;
+  /// The iteration of the newest model in the folder.
+  std::optional<std::int64_t> newest_model() const;
   void remove_model(std::int64_t iteration) const;
   /// The XXH3 of 128 bits of that model's file, in hexadecimal digits as `xxh128sum` prints it; ""
   /// without the file.
   std::string model_hash(std::int64_t iteration) const;
 
-  /// Keeps other runs out of the folder until the lock goes, and removes temporary files that a
-  /// killed run left. Throws DataError when another run has the folder.
+  /// Makes the folder where there is none, keeps other runs out of it until the lock goes, and
+  /// removes temporary files that a killed run left. Throws DataError when the folder cannot be
+  /// made, and when another run has it.
   [[nodiscard]] FileLock lock() const;
 
   /// Removes what a run has written for iterations after `iteration`, and with 0 its reports and
@@ -76,7 +80,12 @@ class RunFolder {
   /// Starts metrics.csv and the evaluations anew, keeping what was recorded up to `iteration` (0
   /// keeps nothing).
   void begin_metrics(std::int64_t iteration);
+  /// The rows that it kept: iteration, seconds, loss and PSNR alone.
+  const std::vector<TrainRow>& former_rows() const { return rows_; }
+  /// What metrics.json said then, to be read with former_metrics.hpp; null without one.
+  std::shared_ptr<const nlohmann::json> former_metrics() const { return former_; }
   void append(const TrainRow& row);
+  /// Takes the place of an evaluation of the same iteration.
   void record(const EvaluationRow& row);
   const std::vector<EvaluationRow>& evaluations() const { return evaluations_; }
   /// The same of validation views, with the PSNR that decides in `psnr`.
@@ -89,14 +98,21 @@ class RunFolder {
   std::filesystem::path path_;
   bool writes_;
   std::vector<EvaluationRow> evaluations_, validations_;
+  std::vector<TrainRow> rows_;
+  std::shared_ptr<const nlohmann::json> former_;
 };
 
 /// Throws UsageError when a folder holds files of a run, with which another one would mix.
 void check_no_run(const std::filesystem::path& folder);
 
-/// The best of the evaluations before the last one, if that saw as many views and ended more than
-/// `margin` decibels below it.
+/// The PSNR that a run is judged by: with moved cameras where that was measured, or else, with
+/// `exposures` that are trained, with corrected colours.
+double judged_psnr(const EvaluationRow& row, bool exposures);
+
+/// The best of the evaluations before the last one by judged_psnr(), among those that saw as many
+/// views and measured the same, if the last one ended more than `margin` decibels below it.
 std::optional<EvaluationRow> better_before(std::span<const EvaluationRow> evaluations,
+                                           bool exposures = false,
                                            double margin = 0.1);
 
 /// Seconds of training that the metrics.csv of a run folder has recorded up to `iteration`; 0 when

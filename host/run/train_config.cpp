@@ -15,15 +15,19 @@
 
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
+#include "run/checkpoint.hpp"
 #include "run/train_keys.hpp"
 #include "scene/option_flags.hpp"
 #include "scene/trace_rows.hpp"
+#include "util/file_kind.hpp"
 #include "util/nearest_name.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr std::size_t kCommentWidth = 110;
+constexpr char kRunConfig[] = "config.toml";
+constexpr char kCheckpointConfig[] = "the checkpoint's configuration";
 
 // The first line of what to_toml() writes.
 constexpr std::string_view kRunMark = "# ---- Run ----\n";
@@ -176,9 +180,39 @@ void check_fitted_rate(const LearningRate& rate) {
   if (rate.final_value != kFitted) check_rate({initial, rate.final_value});
 }
 
-// Of a rate that begins as it is given.
+// Checks the end of a rate that begins as it is given.
 void check_fitted_end(const LearningRate& rate) {
   check_rate({rate.initial, rate.final_value == kFitted ? rate.initial : rate.final_value});
+}
+
+// Whether the command line has an option of that name.
+std::function<bool(const std::string&)> given_on(const CLI::App& app) {
+  return [&app](const std::string& key) { return app.get_option("--" + key)->count() > 0; };
+}
+
+// Sets the keys of --config that are not on the command line. Returns the names of all.
+std::set<std::string> apply_given_config(CLI::App& app, TrainOptions& options) {
+  const CLI::Option* config = app.get_option("--config");
+  if (config->count() == 0) return {};
+  const std::filesystem::path path = config->as<std::string>();
+  return read_text(file_text(path), path, options, given_on(app));
+}
+
+// What a run wrote of its options; where it could not name them, what they were then.
+void apply_run_text(CLI::App& app,
+                    TrainOptions& options,
+                    const std::string& text,
+                    const std::filesystem::path& path) {
+  const auto given = given_on(app);
+  const std::set<std::string> found = read_text(text, path, options, given);
+  if (found.count("origin") == 0 && !given("origin")) options.data.origin.emplace();
+  if (found.count("raise-clamped") == 0 && !given("raise-clamped")) options.raise_clamped = false;
+  if (found.count("photo-points") == 0 && !given("photo-points")) options.photo_points = false;
+  if (found.count("color-range") == 0 && !given("color-range")) options.color_range = 1;
+  if (found.count("strategy") > 0) return;
+  // The run is older than these keys: it goes on as it began.
+  if (!given("strategy")) options.strategy = DensityStrategy::kAdc;
+  if (!given("footprint")) options.footprint = 0;
 }
 
 }  // namespace
@@ -199,30 +233,28 @@ void add_train_options(CLI::App& app, TrainOptions& options) {
       ->expected(1)
       ->group("Run");
   app.parse_complete_callback([&app, &options] {
-    const CLI::Option* config = app.get_option("--config");
-    if (config->count() > 0) apply_config_file(app, options, config->as<std::string>());
+    // What a resumed run says counts less than the file, and is not known yet.
+    const CLI::Option* resume = app.get_option_no_throw("--resume");
+    if (resume != nullptr && resume->count() > 0) return;
+    apply_given_config(app, options);
     validate(options);
   });
 }
 
-void apply_config_file(CLI::App& app, TrainOptions& options, const std::filesystem::path& path) {
-  read_text(file_text(path), path, options,
-            [&app](const std::string& key) { return app.get_option("--" + key)->count() > 0; });
-}
-
-void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesystem::path& path) {
-  const auto given = [&app](const std::string& key) {
-    return app.get_option("--" + key)->count() > 0;
-  };
-  const std::set<std::string> found = read_text(file_text(path), path, options, given);
-  if (found.count("origin") == 0 && !given("origin")) options.data.origin.emplace();
-  if (found.count("raise-clamped") == 0 && !given("raise-clamped")) options.raise_clamped = false;
-  if (found.count("photo-points") == 0 && !given("photo-points")) options.photo_points = false;
-  if (found.count("color-range") == 0 && !given("color-range")) options.color_range = 1;
-  if (found.count("strategy") > 0) return;
-  // The run is older than these keys: it goes on as it began.
-  if (!given("strategy")) options.strategy = DensityStrategy::kAdc;
-  if (!given("footprint")) options.footprint = 0;
+void apply_resumed_options(CLI::App& app,
+                           TrainOptions& options,
+                           const std::filesystem::path& source) {
+  const std::optional<std::filesystem::path> run = run_folder_of(source);
+  if (run && is_file(*run / kRunConfig)) {
+    apply_run_text(app, options, file_text(*run / kRunConfig), *run / kRunConfig);
+  } else if (const std::string text = checkpoint_config(source); !text.empty()) {
+    apply_run_text(app, options, text, kCheckpointConfig);
+  }
+  const std::set<std::string> named = apply_given_config(app, options);
+  // The end of a run by time is not that of a run which is given another length.
+  const auto given = [&](const char* key) { return named.count(key) > 0 || given_on(app)(key); };
+  if (given("iterations") && !given("end-iteration")) options.end_iteration = 0;
+  validate(options);
 }
 
 void read_train_config(const std::filesystem::path& path, TrainOptions& options) {
@@ -232,8 +264,7 @@ void read_train_config(const std::filesystem::path& path, TrainOptions& options)
 
 TrainOptions parse_train_config(const std::string& text) {
   TrainOptions options;
-  read_text(text, "the checkpoint's configuration", options,
-            [](const std::string&) { return false; });
+  read_text(text, kCheckpointConfig, options, [](const std::string&) { return false; });
   return options;
 }
 

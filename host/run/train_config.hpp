@@ -13,19 +13,21 @@ class App;
 
 namespace raysplats {
 
-/// Registers every key of TrainOptions as an option of `app` (a subcommand), and `--config FILE`.
-/// Values of the file count where the command line says nothing. `options` has to outlive the app's
-/// parse. Parsing throws UsageError for values and files that are wrong.
+/// Registers every key of TrainOptions as an option of `app` (a subcommand), and `--config FILE`, a
+/// TOML file of flat keys (a [train] table is allowed). Values of the file count where the command
+/// line says nothing. `options` has to outlive the app's parse. Parsing throws UsageError for
+/// values and files that are wrong; for an unknown key it names the nearest known one. Where the
+/// app's --resume is given, file and combinations wait for apply_resumed_options().
 void add_train_options(CLI::App& app, TrainOptions& options);
 
-/// Reads a TOML file of flat keys (a [train] table is allowed) into the options of an app parsed
-/// before, leaving those that were given on its command line. Throws UsageError for an unknown key,
-/// naming the nearest known one.
-void apply_config_file(CLI::App& app, TrainOptions& options, const std::filesystem::path& path);
-
-/// The same with the config.toml of a run that is resumed. What a run of an older version could not
-/// name keeps the value that it had then.
-void apply_run_config(CLI::App& app, TrainOptions& options, const std::filesystem::path& path);
+/// Completes the options of such an app, parsed before: those of the run that is resumed, from its
+/// config.toml, or without one from the checkpoint; above them the keys of --config, above these
+/// the command line. `source` is a run folder or a checkpoint file. What a run of an older version
+/// could not name keeps the value that it had then. Throws UsageError as parsing does, DataError
+/// for a damaged checkpoint.
+void apply_resumed_options(CLI::App& app,
+                           TrainOptions& options,
+                           const std::filesystem::path& source);
 
 /// Reads a configuration file into `options`.
 void read_train_config(const std::filesystem::path& path, TrainOptions& options);

@@ -195,7 +195,8 @@ void add_data_keys(TrainTable& t, TrainOptions& o) {
   t.number("sky-degree", o.sky_degree, 0, 4,
            "degree of the spherical harmonics of a sky; 0 = one trained colour");
   t.number("image-budget", o.image_budget, 1, 1e9,
-           "MiB of photos kept on the device; the others are decoded again when their turn comes");
+           "MiB of photos and depth maps kept on the device; the others are read again when their "
+           "turn comes");
   t.resolutions(
       "resolution-schedule", o.resolution_schedule,
       "\"divisor:until\" pairs: photos are reduced by the divisor until that share of the "

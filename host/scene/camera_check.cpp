@@ -47,7 +47,7 @@ void require_believable(const Camera& camera, const std::string& what) {
         "leave it out",
         what, center.x, center.y, center.z, kFarthest));
   }
-  // Of a kPhotoLens measured() has made sure.
+  // measured() has made sure of a kPhotoLens.
   const bool has_lens =
       camera.model == CameraModel::kOpenCv || camera.model == CameraModel::kFisheye;
   if (!has_lens) return;

@@ -7,7 +7,7 @@
 
 namespace raysplats {
 
-/// Of a picture: 24 bits of a float still tell apart the sixteenths of its last pixel.
+/// Largest side of a picture: 24 bits of a float still tell apart the sixteenths of its last pixel.
 constexpr int kMaxSide = 1 << 20;
 
 /// Fields of view that an option or a file may ask for, in degrees: from kLeastFov to most_fov().

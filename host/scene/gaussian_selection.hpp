@@ -17,7 +17,7 @@ Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indice
 /// The indices of Gaussians whose means lie within the box, borders included.
 std::vector<std::uint32_t> within(const Gaussians& model, const CropBox& box);
 
-/// Those of Gaussians of at least this opacity, 0 to 1.
+/// Numbers of the Gaussians of at least this opacity, 0 to 1.
 std::vector<std::uint32_t> with_opacity(const Gaussians& model, double least);
 
 /// What each Gaussian can give to pictures from anywhere: the logarithm of opacity times the area

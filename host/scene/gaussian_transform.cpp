@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/gaussian_transform.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cfloat>
@@ -203,21 +205,26 @@ std::vector<double> sh_band_map(int degree, const glm::dmat3& orthogonal) {
   return map;
 }
 
-Gaussians transformed(const Gaussians& model, const glm::dmat4& map) {
+Gaussians transformed(Gaussians model, const glm::dmat4& map) {
   check(map);
-  Gaussians out = model;
-  if (map == glm::dmat4(1.0)) return out;
+  if (map == glm::dmat4(1.0)) return model;
   const glm::dmat3 linear(map);
   const glm::dvec3 offset(map[3]);
   const glm::dmat3 orthogonal = orthogonal_factor(linear);
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    float* m = &out.means[3 * i];
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    float* m = &model.means[3 * i];
     const glm::dvec3 mean = linear * glm::dvec3(m[0], m[1], m[2]) + offset;
+    if (std::max({std::abs(mean.x), std::abs(mean.y), std::abs(mean.z)}) > FLT_MAX) {
+      throw UsageError(fmt::format(
+          "Gaussian {} would be moved to {:.6g}, {:.6g}, {:.6g}, beyond what 32-bit numbers hold: "
+          "use a smaller scale or translation",
+          i, mean.x, mean.y, mean.z));
+    }
     for (int k = 0; k < 3; ++k) m[k] = static_cast<float>(mean[k]);
   }
-  map_shapes(out, linear, orthogonal);
-  if (orthogonal != glm::dmat3(1.0)) map_colors(out, orthogonal);
-  return out;
+  map_shapes(model, linear, orthogonal);
+  if (orthogonal != glm::dmat3(1.0)) map_colors(model, orthogonal);
+  return model;
 }
 
 SkyLight transformed(const SkyLight& light, const glm::dmat4& map) {

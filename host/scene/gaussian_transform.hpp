@@ -18,7 +18,7 @@ namespace raysplats {
 /// factor of A (polar decomposition), up to degree 4 and for reflections too; clamping and the
 /// order of hits stay as they are. Throws UsageError for a map that is not finite, has another last
 /// row than 0 0 0 1, or flattens space.
-Gaussians transformed(const Gaussians& model, const glm::dmat4& map);
+Gaussians transformed(Gaussians model, const glm::dmat4& map);
 
 /// A light by direction under the same map, of which only Q counts. Throws as the other.
 SkyLight transformed(const SkyLight& light, const glm::dmat4& map);

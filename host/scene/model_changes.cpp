@@ -10,6 +10,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/trigonometric.hpp>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "raysplats/error.hpp"
@@ -20,6 +21,7 @@ namespace raysplats {
 namespace {
 
 constexpr int kMaxShDegree = 4;
+constexpr double kLeastScale = 1e-30, kMostScale = 1e30;  // beyond, 32-bit positions are 0 or none
 
 /// The shortest turn of `up` to -y.
 glm::dmat4 uprighting(const glm::dvec3& up) {
@@ -54,6 +56,10 @@ void check_box(const CropBox& box) {
 glm::dmat4 movement(const ModelChanges& changes) {
   if (!(changes.scale > 0.0))
     throw UsageError(fmt::format("scale is above 0, not {}", changes.scale));
+  if (changes.scale < kLeastScale || changes.scale > kMostScale) {
+    throw UsageError(
+        fmt::format("scale is {} to {}, not {}", kLeastScale, kMostScale, changes.scale));
+  }
   glm::dmat4 map = glm::translate(glm::dmat4(1.0), changes.translate);
   map = glm::rotate(map, glm::radians(changes.rotate_degrees.z), glm::dvec3(0, 0, 1));
   map = glm::rotate(map, glm::radians(changes.rotate_degrees.y), glm::dvec3(0, 1, 0));
@@ -62,7 +68,7 @@ glm::dmat4 movement(const ModelChanges& changes) {
   return changes.up ? map * uprighting(*changes.up) : map;
 }
 
-Gaussians changed(const Gaussians& model, const ModelChanges& changes) {
+Gaussians changed(Gaussians model, const ModelChanges& changes) {
   if (changes.min_opacity && !(*changes.min_opacity >= 0.0 && *changes.min_opacity <= 1.0))
     throw UsageError(fmt::format("min-opacity is 0 to 1, not {}", *changes.min_opacity));
   if (changes.sh_degree && (*changes.sh_degree < 0 || *changes.sh_degree > kMaxShDegree))
@@ -73,22 +79,21 @@ Gaussians changed(const Gaussians& model, const ModelChanges& changes) {
     throw UsageError(fmt::format("There are {} contributions of {} Gaussians: give one of each",
                                  weights.size(), model.size()));
   }
-  Gaussians out = model;
   const auto keep = [&](const std::vector<std::uint32_t>& indices) {
-    if (indices.size() == out.size()) return;
-    out = gathered(out, indices);
+    if (indices.size() == model.size()) return;
+    model = gathered(model, indices);
     if (weights.empty()) return;
     for (std::size_t i = 0; i < indices.size(); ++i) weights[i] = weights[indices[i]];
     weights.resize(indices.size());
   };
-  if (changes.min_opacity) keep(with_opacity(out, *changes.min_opacity));
+  if (changes.min_opacity) keep(with_opacity(model, *changes.min_opacity));
   const glm::dmat4 map = movement(changes);
-  if (map != glm::dmat4(1.0)) out = transformed(out, map);
-  if (changes.crop) keep(within(out, *changes.crop));
+  if (map != glm::dmat4(1.0)) model = transformed(std::move(model), map);
+  if (changes.crop) keep(within(model, *changes.crop));
   if (changes.max_gaussians)
-    keep(largest(weights.empty() ? sections(out) : weights, *changes.max_gaussians));
-  if (changes.sh_degree) out = with_sh_degree(out, *changes.sh_degree);
-  return out;
+    keep(largest(weights.empty() ? sections(model) : weights, *changes.max_gaussians));
+  if (changes.sh_degree) model = with_sh_degree(model, *changes.sh_degree);
+  return model;
 }
 
 }  // namespace raysplats

@@ -32,7 +32,7 @@ const OptionRow* find_row(const std::vector<OptionRow>& rows, const std::string&
 /// Throws UsageError for a present value that its row would refuse, as programs may set it.
 void check_values(const std::vector<OptionRow>& rows);
 
-/// Of options that are 64 bits; rounded, the type ends there.
+/// Upper bound of 64-bit seeds, as a double.
 constexpr double kMaxSeed = 0x1p64;
 
 /// A number in the spellings of number_text.hpp. Throws UsageError that names the key and the
@@ -56,7 +56,7 @@ class OptionTable {
   /// Heading of what follows.
   void section(std::string name) { section_ = std::move(name); }
 
-  /// From `low` to `high`; whole for integer types.
+  /// A number from `low` to `high`; whole for integer types.
   template <class T>
   void number(const std::string& name, T& target, double low, double high, const std::string& help);
   void flag(const std::string& name, bool& target, const std::string& help);
@@ -76,7 +76,7 @@ class OptionTable {
   /// Absolute ones are kept, so that they are found from anywhere. A path may hold what separates
   /// the items of other lists, so that one value is one path.
   void paths(const std::string& name, std::vector<std::string>& target, const std::string& help);
-  /// Of any other kind.
+  /// A row of any other kind.
   void add(const std::string& name,
            const std::string& help,
            std::function<void(const Values&)> set,

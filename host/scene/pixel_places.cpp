@@ -23,7 +23,7 @@ std::uint64_t lattice_step(std::uint64_t samples) {
   }
 }
 
-// Of random numbers that no pixel has.
+// The shift of all pixels' places, from random numbers that no pixel has.
 glm::dvec3 shift_of(std::uint64_t seed) {
   if (seed == 0) return glm::dvec3(0.0);
   const RsRandom4 random = rs_random4(static_cast<rs_uint>(seed), static_cast<rs_uint>(seed >> 32),

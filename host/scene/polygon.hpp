@@ -12,8 +12,7 @@ namespace raysplats {
 /// Splits a polygon of n >= 3 corners into n - 2 triangles of corner numbers with its winding, by
 /// cutting off ears (Meisters 1975) in the plane of its Newell normal (Sutherland et al. 1974). The
 /// last four corners are split along the shorter of the possible diagonals. A polygon that is not
-/// simple, or has no area, is split too, but not in a meaningful way. Typically O(n r) with r the
-/// number of reflex corners, at worst O(n^3).
+/// simple, or has no area, is split too, but not in a meaningful way. O(n^2).
 std::vector<std::array<std::size_t, 3>> triangulate(std::span<const glm::dvec3> corners);
 
 }  // namespace raysplats

@@ -6,6 +6,8 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 #include "util/parallel.hpp"
 #include "util/rng.hpp"
@@ -195,6 +197,38 @@ class Clusters {
   std::vector<float> middles_;  // a row for each number, so that lanes take clusters
 };
 
+/// All vectors that differ, in the order in which they come first; nothing for more than `most`.
+std::optional<VectorPalette> distinct_vectors(std::span<const float> vectors,
+                                              std::size_t width,
+                                              std::size_t most) {
+  const std::size_t count = vectors.size() / width;
+  const auto vector = [&](std::uint32_t i) { return vectors.subspan(i * width, width); };
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const auto [x, y] = std::ranges::mismatch(vector(a), vector(b));
+    return x == vector(a).end() ? a < b : *x < *y;
+  });
+  // Of equal ones the first to come stands for all.
+  std::vector<std::uint32_t> first(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const bool again = k > 0 && std::ranges::equal(vector(order[k]), vector(order[k - 1]));
+    first[order[k]] = again ? first[order[k - 1]] : order[k];
+  }
+  VectorPalette out;
+  out.labels.resize(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (first[i] == i) {
+      if (out.entries.size() == most * width) return std::nullopt;
+      out.labels[i] = static_cast<std::uint32_t>(out.entries.size() / width);
+      out.entries.insert(out.entries.end(), vector(i).begin(), vector(i).end());
+    } else {
+      out.labels[i] = out.labels[first[i]];
+    }
+  }
+  return out;
+}
+
 /// How many of `most` entries each cell gets: in proportion to its spread, at least one, at most as
 /// many as it has vectors.
 std::vector<std::size_t> shares(const std::vector<double>& spreads,
@@ -219,7 +253,8 @@ std::vector<std::size_t> shares(const std::vector<double>& spreads,
     const std::size_t others = order.size() - i - 1;  // each of which needs one
     const double fair =
         spread_left > 0.0 ? static_cast<double>(left) * spreads[c] / spread_left : 1.0;
-    const std::size_t high = std::min(cells[c].size(), left - others);
+    // Equal vectors need no more than one.
+    const std::size_t high = spreads[c] > 0.0 ? std::min(cells[c].size(), left - others) : 1;
     out[c] = std::clamp<std::size_t>(static_cast<std::size_t>(fair), 1, high);
     left -= out[c];
     spread_left -= spreads[c];
@@ -267,13 +302,10 @@ std::size_t nearest_level(std::span<const float> levels, float value) {
 
 VectorPalette vector_palette(std::span<const float> vectors, std::size_t width, std::size_t most) {
   const std::size_t count = vectors.size() / width;
+  if (auto distinct = distinct_vectors(vectors, width, most)) return *std::move(distinct);
   VectorPalette palette;
   palette.labels.resize(count);
   std::iota(palette.labels.begin(), palette.labels.end(), 0u);
-  if (count <= most) {
-    palette.entries.assign(vectors.begin(), vectors.end());
-    return palette;
-  }
   const std::vector<std::uint32_t> all = palette.labels;
   const auto cell_count = static_cast<std::size_t>(std::sqrt(static_cast<double>(most)));
   std::vector<std::uint32_t> sample;

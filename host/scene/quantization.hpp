@@ -25,8 +25,9 @@ struct VectorPalette {
 
 /// At most `most` vectors for all of `vectors` (`width` numbers each, finite) with little squared
 /// error: k-means (Lloyd 1982) in two stages, cells of space first, then entries within each in
-/// proportion to how far its vectors lie from its middle. The vectors themselves where there are no
-/// more. The same for the same vectors, whatever the number of threads. O(n sqrt(most) width).
+/// proportion to how far its vectors lie from its middle. The vectors themselves, equal ones once,
+/// where there are no more. The same for the same vectors, whatever the number of threads.
+/// O(n sqrt(most) width).
 VectorPalette vector_palette(std::span<const float> vectors, std::size_t width, std::size_t most);
 
 }  // namespace raysplats

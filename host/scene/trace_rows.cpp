@@ -105,8 +105,8 @@ void add_trace_rows(OptionTable& t, TraceOptions& o) {
            "rays of a packet: 1, 2, 4, 8 or 16, in a group also 32 or 64; 0 = fit to the device");
   t.add(
       "memory-budget",
-      "MiB for hit lists; above it they are computed again; 0 = 1024 on CPUs, elsewhere a quarter "
-      "of the device's memory, from 1024 to 4096",
+      "MiB for hit lists; above it they are computed again; 0 = a quarter of the device's memory, "
+      "from 1024 to 4096",
       [&o](const OptionTable::Values& values) {
         const std::string& text = option_value("memory-budget", values);
         const auto mib = option_number<std::int64_t>("memory-budget", text, 0, 1e9);

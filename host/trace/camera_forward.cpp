@@ -15,7 +15,7 @@ bool CameraTracer::Impl::can_trace_ahead() const {
   return traced_whole && lists.can_build_ahead(across(camera.width) * across(camera.height));
 }
 
-// With the room that there is, without asking the device whether it is enough.
+// Traces with the room that there is, without asking the device whether it is enough.
 void CameraTracer::Impl::trace_ahead(const DeviceGaussians& gaussians) {
   FaultInjection& faults = context.faults();
   room = faults.strikes(Fault::kHits) ? 0 : static_cast<std::uint32_t>(streams.view_room());
@@ -46,7 +46,7 @@ void CameraTracer::Impl::trace_faces(const DeviceGaussians& gaussians, bool keep
   }
 }
 
-// With the whole pool.
+// Traces rows of tiles with the whole pool of chunks.
 void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
                                     std::uint32_t row,
                                     std::uint32_t rows) {

@@ -16,7 +16,7 @@
 namespace raysplats {
 namespace {
 
-// Of launches whose picture somebody watches.
+// Longest launch while somebody watches the picture.
 constexpr double kWatchedMilliseconds = 300.0;
 
 const std::vector<int> kFront{0};
@@ -61,14 +61,14 @@ CameraTracer::Statistics CameraTracer::Impl::count_statistics() const {
           words[RS_COUNT_CHUNKS] * streams.chunk_bytes()};
 }
 
-// Of the pass just enqueued, whose statistics stay: waits for the device.
+// Chunks that the pass just enqueued wants, whose statistics stay: waits for the device.
 std::size_t CameraTracer::Impl::chunks_wanted() {
   saved = count_statistics();
   statistics_saved = true;
   return saved.stream_bytes / streams.chunk_bytes();
 }
 
-// Those of one face.
+// Begins the programs of one face.
 void CameraTracer::Impl::begin_programs(const DeviceGaussians& gaussians,
                                         int lens,
                                         bool keep,
@@ -108,6 +108,7 @@ void CameraTracer::begin_programs(const DeviceGaussians& gaussians,
 
 void CameraTracer::update(const DeviceGaussians& gaussians) {
   Impl& self = *impl_;
+  self.revision = 0;  // where this throws, the boxes are of no model
   GaussianBounds bounds(self.context, gaussians.activation == ScaleActivation::kSigmoid,
                         self.options.adaptive_radius);
   bounds.compute(gaussians.means, gaussians.quaternions, gaussians.scales, gaussians.opacities,

@@ -60,30 +60,31 @@ class CameraTracer {
                const Camera& camera,
                bool keep_hits = false,
                ViewSizes sizes = ViewSizes::kAwaited);
-  /// From the next forward() without keep_hits on: traces the rows of tiles that are part `part` of
-  /// `parts` equal ones, and leaves the others' pixels as they are. Whoever traces the parts gets
-  /// the pixels of the whole.
+  /// Traces, from the next forward() without keep_hits on, the rows of tiles that are part `part`
+  /// of `parts` equal ones, and leaves the others' pixels as they are. Whoever traces the parts
+  /// gets the pixels of the whole.
   void set_share(std::size_t part, std::size_t parts);
   /// First and last (exclusive) row of pixels that the last forward() has traced.
   std::array<int, 2> rows() const;
-  /// Those of a picture of that height without keep_hits.
+  /// First and last (exclusive) row of this share of a picture of that height, without keep_hits.
   std::array<int, 2> shared_rows(int height) const;
-  /// Not 0 in its word once a view with ViewSizes::kAhead had too little room: that view and those
-  /// after it show the background alone and have no gradients, until clear_overflow().
+  /// A word that is not 0 once a view with ViewSizes::kAhead had too little room: that view and
+  /// those after it show the background alone and have no gradients, until clear_overflow().
   const Buffer<std::uint32_t>& overflow() const;
   void clear_overflow();
 
-  /// Of the views from the next forward() on.
+  /// The background of the views from the next forward() on.
   void set_background(const std::array<float, 3>& background);
 
-  /// From the next forward() on `watch` hears the share of the picture that is done after every
-  /// launch, which then are short ones; what it throws ends forward(). Nothing is heard with {}.
+  /// Lets `watch` hear, from the next forward() on, the share of the picture that is done after
+  /// every launch, which then are short ones; what it throws ends forward(). Nothing is heard with
+  /// {}.
   void set_watch(std::function<void(double share)> watch);
 
   /// Result of the last forward(): planar R, G, B (background blended), A = 1 - T; 4 x height x
   /// width.
   const Buffer<float>& image() const;
-  /// With options.depth: planar expected depth, median depth, hits per ray; 3 x height x width.
+  /// Planar expected depth, median depth and hits per ray, with options.depth; 3 x height x width.
   /// Depth is along z for kPinhole and kOpenCv, along the ray for the others.
   const Buffer<float>& depth() const;
   /// The same as interleaved host images.
@@ -101,9 +102,10 @@ class CameraTracer {
                 PoseGradient* pose = nullptr,
                 const Buffer<float>* depth_gradient = nullptr);
 
-  /// Of the last forward(); waits for the device unless that one kept its hits and waited itself.
+  /// What the last forward() counted; waits for the device unless that one kept its hits and waited
+  /// itself.
   Statistics statistics() const;
-  /// From the next forward() on its kernels count what they really do, RS_TALLIES kinds of work
+  /// Lets kernels count, from the next forward() on, what they really do, RS_TALLIES kinds of work
   /// (cl/trace/view_sizes.h), for the model of speed; they are then slower. Read after forward(),
   /// waits for the device; empty without count_work().
   void count_work();

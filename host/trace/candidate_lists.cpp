@@ -105,7 +105,7 @@ CandidateLists::CandidateLists(Context& context, int tile_size)
   build.define("TILE", tile_size);
   gather_kernel_ = context.kernel("trace/tile_lists.cl", "gather_candidates", build);
   admit_kernel_ = context.kernel("trace/view_sizes.cl", "admit_candidates");
-  live_ = Buffer<std::uint32_t>(context, 1, "listed candidates");
+  live_ = Buffer<std::uint32_t>(context, 2, "listed candidates");
   fitted_ = Buffer<std::uint32_t>(context, 1, "no overflow");
   fitted_.clear();
 }
@@ -193,8 +193,8 @@ void CandidateLists::fill(const Buffer<RsAabb>& boxes,
   const auto tiles = static_cast<std::uint32_t>(window.tiles());
   stride_ = static_cast<std::uint32_t>(room + kBoxPadding);
   admit_kernel_.launch(Range{{1, 1, 1}, {1, 1, 1}, {}}, offsets_,
-                       static_cast<std::uint32_t>(count_), static_cast<std::uint32_t>(capacity),
-                       live_, counters, overflow);
+                       static_cast<std::uint32_t>(count_), boxes, camera,
+                       static_cast<std::uint32_t>(capacity), live_, counters, overflow);
   if (face_.tiles != nullptr) {
     fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, face_.face,
                         face_.tiles->tiles(), face_.tiles->spans(face_.face), live_, keys_,
@@ -218,19 +218,21 @@ bool CandidateLists::build(const Buffer<RsAabb>& boxes,
   const std::size_t found = count_ > 0 ? offsets_.read(count_) : 0;
   const std::size_t most = allowed(budget);
   if (found > most && window.tiles() > 1) return false;
-  if (keys_.size() < found || keys_.size() == 0) {
+  if (capacity_ < found || capacity_ == 0) {
     const std::size_t room = std::min(with_headroom(found), std::max(most, found));
+    capacity_ = 0;
     keys_.ensure(*context_, room, "candidate keys");
     values_.ensure(*context_, room, "candidate references");
     limits_.ensure(*context_, room, "candidate limits");
     boxes_.ensure(*context_, 4 * (room + kBoxPadding), "candidate boxes");
+    capacity_ = room;
   }
   fill(boxes, camera, window, found, found, counters, fitted_);
   return true;
 }
 
 bool CandidateLists::can_build_ahead(std::size_t tiles) const {
-  return keys_.size() > 0 && tiles <= kMaxTiles;
+  return capacity_ > 0 && tiles <= kMaxTiles;
 }
 
 void CandidateLists::build_ahead(const Buffer<RsAabb>& boxes,
@@ -239,7 +241,7 @@ void CandidateLists::build_ahead(const Buffer<RsAabb>& boxes,
                                  std::size_t budget,
                                  Buffer<std::uint32_t>& counters,
                                  Buffer<std::uint32_t>& overflow) {
-  const std::size_t room = std::min(keys_.size(), allowed(budget));
+  const std::size_t room = std::min(capacity_, allowed(budget));
   count(boxes, camera, window);
   fill(boxes, camera, window, room, room, counters, overflow);
 }

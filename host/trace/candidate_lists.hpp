@@ -35,7 +35,8 @@ struct TileWindow {
   std::size_t tiles() const {
     return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   }
-  /// Its rows, or where there is one its columns, in two parts. It must have more than one tile.
+  /// The window in two parts: of its rows, or where it has one of its columns. It must have more
+  /// than one tile.
   std::array<TileWindow, 2> halves() const;
 };
 
@@ -124,9 +125,10 @@ class CandidateLists {
   std::uint32_t tiles_x_ = 1;
   std::uint32_t tile_rows_ = 1;
   std::uint32_t stride_ = 0;
+  std::size_t capacity_ = 0;  // candidates that the lists have room for
   Buffer<RsLine> lines_;
   Buffer<RsViewBounds> bounds_;
-  Buffer<std::uint32_t> live_;     // candidates that are listed
+  Buffer<std::uint32_t> live_;     // candidates that are listed, first step of their depths
   Buffer<std::uint32_t> fitted_;   // an overflow that cannot be
   Buffer<std::uint32_t> offsets_;  // first candidate per Gaussian
   Buffer<std::uint32_t> tile_offsets_;

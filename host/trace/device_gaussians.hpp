@@ -19,8 +19,8 @@ struct DeviceGaussians : Parameters {
   int active_sh_degree =
       0;  ///< bands above this are not evaluated (they are switched on over time)
   ScaleActivation activation = ScaleActivation::kExp;
-  /// Of the parameters as they are, from Context::new_revision(). What is made of them (boxes,
-  /// trees) remembers it, and is stale when it differs.
+  /// The number of this state of the parameters, from Context::new_revision(). What is made of them
+  /// (boxes, trees) remembers it, and is stale when it differs.
   std::uint64_t revision = 0;
 
   /// Copies a host model to the device. For kSigmoid a scale of 1 or more is clamped just below 1.
@@ -34,7 +34,7 @@ struct DeviceGaussians : Parameters {
 
 /// Gradient of the loss for every parameter and what densification needs.
 struct GaussianGradients : Parameters {
-  /// Per Gaussian and view: {norm of the gradient at the projected mean in normalised device
+  /// For each Gaussian of a view {norm of the gradient at the projected mean in normalised device
   /// coordinates (as 3DGS), the same from absolute values per ray (as AbsGS), 1 when any ray met it
   /// else 0}.
   Buffer<float> screen;  ///< 3 N

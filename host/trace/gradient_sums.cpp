@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "trace/gradient_sums.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -34,6 +36,7 @@ GradientSumChoice GradientSumChoice::of(const TraceOptions& options,
                           (std::max<std::size_t>(lines, 1) * sizeof(GradientSums::Line));
   if (fit < units) {
     out.sum = GradientSum::kExact;
+    out.crowded_out = true;
   } else {
     out.copies = std::min(copies_per_unit * units, fit);
   }
@@ -54,6 +57,13 @@ GradientSums::GradientSums(Context& context, std::string label)
 void GradientSums::prepare(const GradientSumChoice& choice, std::size_t count) {
   choice_ = choice;
   count_ = count;
+  if (choice.crowded_out && !std::exchange(told_, true)) {
+    const std::size_t units = std::max<std::size_t>(context_->device().compute_units, 1);
+    spdlog::info(
+        "{}: a private copy for each of {} compute units takes {:.0f} MiB, more than their share "
+        "of memory-budget or than one buffer may have: exact sums are taken, which are slower",
+        label_, units, static_cast<double>(units * count * sizeof(Line)) / (1 << 20));
+  }
   const bool tidy = tidy_copies_ == std::array<std::size_t, 2>{count, choice.copies};
   tidy_copies_ = {};
   lines_.ensure(*context_, count * choice.copies, label_);

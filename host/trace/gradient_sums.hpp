@@ -21,9 +21,11 @@ struct GradientSumChoice {
 
   GradientSum sum = GradientSum::kCopies;  ///< never kAuto
   std::size_t copies = 1;                  ///< more than one with kCopies only
+  bool crowded_out = false;                ///< copies were wanted and kExact took their place
 
-  /// For `lines` lines of 16 floats. Copies may take `room` bytes in all: `copies_per_unit` for
-  /// each compute unit where they fit, at least one; where those do not fit the choice is kExact.
+  /// The choice for `lines` lines of 16 floats. Copies may take `room` bytes in all:
+  /// `copies_per_unit` for each compute unit where they fit, at least one; where those do not fit
+  /// the choice is kExact.
   static GradientSumChoice of(const TraceOptions& options,
                               const DeviceInfo& device,
                               std::size_t lines,
@@ -44,7 +46,7 @@ class GradientSums {
   GradientSums(Context& context, std::string label);
 
   /// Zeros for `count` lines and each of their copies. Throws ResourceError where they do not fit
-  /// the device.
+  /// the device. Tells the log once where exact sums took the place of copies.
   void prepare(const GradientSumChoice& choice, std::size_t count);
   /// GradientSumChoice::define() of the choice.
   BuildOptions& define(BuildOptions& build) const {
@@ -75,6 +77,7 @@ class GradientSums {
   Buffer<Line> exact_;
   std::size_t tidy_exact_ = 0;                // lines whose exact sums are ready
   std::array<std::size_t, 2> tidy_copies_{};  // lines and copies of which all but one hold zeros
+  bool told_ = false;                         // that copies were crowded out
 };
 
 }  // namespace raysplats

@@ -25,8 +25,10 @@ void HitStreams::prepare(std::size_t pixels, std::size_t packets, bool kept) {
 void HitStreams::grow(std::size_t chunks, std::size_t least) {
   const std::size_t room =
       std::max<std::size_t>({std::min(chunks + chunks / 4, limit()), least, std::size_t{1}});
+  capacity_ = 0;
   pool_.ensure(context_, room * kChunkRows, "hit pool");
-  pool_transmittance_.ensure(context_, pool_.size() * lanes_, "hit transmittances");
+  pool_transmittance_.ensure(context_, room * kChunkRows * lanes_, "hit transmittances");
+  capacity_ = room;
 }
 
 std::size_t HitStreams::limit() const { return std::min(share_ / chunk_bytes(), largest()); }
@@ -37,7 +39,7 @@ std::size_t HitStreams::largest() const {
       std::numeric_limits<std::uint32_t>::max() / kChunkRows);
 }
 
-std::size_t HitStreams::view_room() const { return std::min(capacity(), limit()); }
+std::size_t HitStreams::view_room() const { return std::min(capacity_, limit()); }
 
 void HitStreams::check(std::size_t packets,
                        std::uint32_t room,

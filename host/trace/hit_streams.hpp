@@ -25,12 +25,12 @@ class HitStreams {
   /// Room for what pixels and packets have one of each; next to none where no hits are `kept`.
   void prepare(std::size_t pixels, std::size_t packets, bool kept);
   /// Makes room for `chunks` and a quarter more as far as the share allows, and for `least` at any
-  /// rate.
+  /// rate. Where that throws there is room for none.
   void grow(std::size_t chunks, std::size_t least = 1);
 
   std::size_t chunk_bytes() const { return kChunkRows * (sizeof(Row) + row_bytes()); }
   /// Chunks of the pool as it is.
-  std::size_t capacity() const { return pool_.size() / kChunkRows; }
+  std::size_t capacity() const { return capacity_; }
   /// Chunks that fit the share.
   std::size_t limit() const;
   /// Chunks that the device and their 32-bit addresses allow.
@@ -62,6 +62,7 @@ class HitStreams {
   Buffer<Row> ends_;              // of packets
   Buffer<Row> pool_;
   Buffer<float> pool_transmittance_;
+  std::size_t capacity_ = 0;
   Kernel check_;
 };
 

@@ -22,7 +22,7 @@ class LensTiles {
  public:
   LensTiles(Context& context, int tile_size);
 
-  /// Of a central camera that is no pinhole; waits for the device when the lens is a new one.
+  /// Prepares the tiles of a non-pinhole central camera; waits for the device when the lens is new.
   /// Returns false when a tile sees too much for a face (of small pictures all around): its rays
   /// must be traced one by one.
   bool prepare(const Camera& camera);

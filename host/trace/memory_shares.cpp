@@ -8,15 +8,12 @@ namespace raysplats {
 namespace {
 
 // Trained scenes take 0.4 to 0.5 GiB for the hits of 1600x1064 pixels (docs/gpu.md), and buffers
-// keep room for a quarter more: that is above the half of the least, which a CPU's memory bears.
+// keep room for a quarter more: that is above the half of the least.
 constexpr std::uint64_t kLeast = std::uint64_t{1} << 30;
 constexpr std::uint64_t kMost = std::uint64_t{4} << 30;
 
 std::uint64_t own_budget(const DeviceInfo& device) {
-  const std::uint64_t wanted = device.type == DeviceType::kCpu
-                                   ? kLeast
-                                   : std::clamp(device.global_memory / 4, kLeast, kMost);
-  return std::min(wanted, 2 * device.max_allocation);
+  return std::min(std::clamp(device.global_memory / 4, kLeast, kMost), 2 * device.max_allocation);
 }
 
 }  // namespace

@@ -21,9 +21,9 @@ class MemoryShares {
  public:
   MemoryShares(const TraceOptions& options, const DeviceInfo& device);
 
-  /// What is shared out, in bytes. Without a budget in the options 1 GiB on CPUs and a quarter of
-  /// the memory of other devices, from 1 to 4 GiB there; never more than two of its largest
-  /// buffers, because half of it is one.
+  /// What is shared out, in bytes. Without a budget in the options a quarter of the device's
+  /// memory, from 1 to 4 GiB; never more than two of its largest buffers, because half of it is
+  /// one.
   std::size_t all() const { return budget_; }
 
   /// Hits kept for the backward pass.

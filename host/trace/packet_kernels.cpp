@@ -37,8 +37,8 @@ Kernel PacketKernels::backward(const BuildOptions& build) {
   return context_.kernel("trace/camera_backward.cl", "trace_backward", build);
 }
 
-// With subgroups, where the packet has them. Only the compiled kernel tells how large they are; a
-// kernel whose work-groups are several of them is built again without.
+// A kernel of a group's packet, with subgroups where the packet has them. Only the compiled kernel
+// tells how large they are; a kernel whose work-groups are several of them is built again without.
 Kernel PacketKernels::group_kernel(const char* file, const char* name, const BuildOptions& build) {
   if (!shape_.subgroups) return context_.kernel(file, name, build);
   BuildOptions one = build;

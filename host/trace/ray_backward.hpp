@@ -29,10 +29,10 @@ struct RayScreen {
   std::array<double, 3> axis{0, 0, 0};
   std::array<std::array<double, 3>, 3> rows{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 
-  /// Of a camera. Pinhole and kOpenCv: the gradient of the projected mean as CameraTracer yields it
-  /// (for Gaussians that are small against their distance). Others: |dL/dmean| times distance times
-  /// width / (2 fx), where an equirectangular picture has 2 pi radians across and an orthographic
-  /// one knows no distance.
+  /// The screen of a camera. Pinhole and kOpenCv: the gradient of the projected mean as
+  /// CameraTracer yields it (for Gaussians that are small against their distance). Others:
+  /// |dL/dmean| times distance times width / (2 fx), where an equirectangular picture has 2 pi
+  /// radians across and an orthographic one knows no distance.
   static RayScreen of(const Camera& camera);
 };
 
@@ -43,8 +43,8 @@ struct RayScreen {
 class RayBackward {
  public:
   using Gradient = std::array<float, 4>;  ///< of a ray: dL/d(R, G, B) of its colour, dL/dalpha
-  /// Of a ray: dL/dorigin in 0..2, dL/ddirection in 4..6 (of the direction as it is, which need not
-  /// have unit length), zeros. The ends t_min and t_max stay where they are along the ray.
+  /// Gradient of a ray: dL/dorigin in 0..2, dL/ddirection in 4..6 (of the direction as it is, which
+  /// need not have unit length), zeros. The ends t_min and t_max stay where they are along the ray.
   using Slopes = std::array<float, 8>;
 
   /// `tracer` is not owned.

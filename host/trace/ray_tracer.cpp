@@ -59,11 +59,13 @@ RayTracer::RayTracer(Context& context, const TraceOptions& options, int lanes)
 RayTracer::~RayTracer() = default;
 
 void RayTracer::update(const DeviceGaussians& gaussians) {
+  impl_->revision = 0;  // where this throws, the tree is of no model
   impl_->tree.build(gaussians);
   impl_->revision = gaussians.revision;
 }
 
 void RayTracer::refit(const DeviceGaussians& gaussians) {
+  impl_->revision = 0;
   impl_->tree.refit(gaussians);
   impl_->revision = gaussians.revision;
 }
@@ -71,6 +73,7 @@ void RayTracer::refit(const DeviceGaussians& gaussians) {
 bool RayTracer::follow(const DeviceGaussians& gaussians) {
   Impl& self = *impl_;
   if (self.revision > 0 && gaussians.revision == self.revision) return false;
+  self.revision = 0;
   const bool built = self.tree.follow(gaussians);
   self.revision = gaussians.revision;
   return built;

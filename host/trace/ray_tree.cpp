@@ -26,6 +26,7 @@ RayTree::RayTree(Context& context, const TraceOptions& options, int lanes)
     : context_(&context), options_(options), tree_(context, lanes) {}
 
 void RayTree::build(const DeviceGaussians& gaussians) {
+  built_ = false;
   if (gaussians.count > 0) compute_boxes(gaussians);
   tree_.order(boxes_, gaussians.count);
   blocks_.ensure(*context_,
@@ -34,10 +35,11 @@ void RayTree::build(const DeviceGaussians& gaussians) {
                  "ray blocks");
   fill(gaussians);
   built_cost_ = -1;
+  built_ = true;
 }
 
 void RayTree::refit(const DeviceGaussians& gaussians) {
-  if (gaussians.count != tree_.size()) {
+  if (!built_ || gaussians.count != tree_.size()) {
     throw UsageError(fmt::format("A ray tree over {} Gaussians cannot be refitted to {}: build it",
                                  tree_.size(), gaussians.count));
   }
@@ -46,10 +48,12 @@ void RayTree::refit(const DeviceGaussians& gaussians) {
 }
 
 bool RayTree::follow(const DeviceGaussians& gaussians) {
-  if (gaussians.count == tree_.size() && gaussians.count > 0) {
+  if (built_ && gaussians.count == tree_.size() && gaussians.count > 0) {
     if (built_cost_ < 0) built_cost_ = tree_.cost(boxes_);
     refit(gaussians);
-    if (tree_.cost(boxes_) <= kGrowth * built_cost_) return false;
+    const double cost = tree_.cost(boxes_);
+    // The cost is 0 where no Gaussian is left in the window of the last build().
+    if (cost > 0 && cost <= kGrowth * built_cost_) return false;
   }
   build(gaussians);
   return true;

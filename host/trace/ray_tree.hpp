@@ -16,15 +16,17 @@ class RayTree {
  public:
   RayTree(Context& context, const TraceOptions& options, int lanes);
 
-  /// Of a Gaussian in its leaf block.
+  /// Floats that a Gaussian has in its leaf block.
   static std::size_t block_floats(bool adaptive_radius);
 
   void build(const DeviceGaussians& gaussians);
-  /// For Gaussians that changed but kept their number since build(). Throws UsageError otherwise.
+  /// Follows Gaussians that changed but kept their number since build(). Throws UsageError
+  /// otherwise, and where build() did not come to its end.
   void refit(const DeviceGaussians& gaussians);
-  /// For Gaussians that changed in any way: refit(), and build() where their number changed or the
-  /// cost of walking the refitted tree has grown by more than kGrowth since the last build().
-  /// Returns true after a build(). Waits for the device.
+  /// Follows Gaussians that changed in any way: refit(), and build() where their number changed,
+  /// all of them left the place of the last build(), the cost of walking the refitted tree has
+  /// grown by more than kGrowth since, or that build() failed. Returns true after a build(). Waits
+  /// for the device.
   bool follow(const DeviceGaussians& gaussians);
 
   /// Growth of the cost at which a build pays. Rays take longer in proportion.
@@ -33,7 +35,7 @@ class RayTree {
   const Lbvh& tree() const { return tree_; }
   auto arguments() const { return tree_.arguments(blocks_); }
   const Buffer<float>& blocks() const { return blocks_; }
-  /// Of the Gaussians, by their numbers.
+  /// Boxes of the Gaussians, by their numbers.
   const Buffer<RsAabb>& boxes() const { return boxes_; }
   const TraceOptions& options() const { return options_; }
 
@@ -46,6 +48,7 @@ class RayTree {
   Lbvh tree_;
   Buffer<RsAabb> boxes_;
   Buffer<float> blocks_;
+  bool built_ = false;      // the last build() came to its end
   double built_cost_ = -1;  // right after build(), once follow() has asked for it
 };
 

@@ -20,7 +20,7 @@ class Sky {
 
   /// Puts it behind a view over black: planar R, G, B, A; R, G, B are changed.
   void show(const Camera& camera, const Buffer<float>& image);
-  /// For the last show(): from the gradient of its result (planar dL/dR, dL/dG, dL/dB, dL/dA) that
+  /// Turns the gradient of the last show()'s result (planar dL/dR, dL/dG, dL/dB, dL/dA) into that
   /// of the view over black, valid until the next call, and gradient().
   const Buffer<float>& backward(const Camera& camera,
                                 const Buffer<float>& image,
@@ -30,7 +30,7 @@ class Sky {
   const Buffer<float>& coefficients() const { return coefficients_; }
   /// Throws UsageError for another number of them; blocks.
   void set(std::span<const float> coefficients);
-  /// Of the last backward(), in the same order.
+  /// Gradient of the coefficients of the last backward(), in the same order.
   const Buffer<float>& gradient() const { return gradient_; }
   /// The present coefficients and that gradient on the host; both block.
   SkyLight light() const;

@@ -77,7 +77,7 @@ class Adam {
  private:
   Kernel step_kernel(ParameterGroup group, int sh_degree) const;
   std::size_t slice_size() const;
-  // Of the Gaussians [begin, end); begin is a multiple of slice_size().
+  // Makes the step of the Gaussians [begin, end); begin is a multiple of slice_size().
   void step_slice(std::size_t begin,
                   std::size_t end,
                   DeviceGaussians& gaussians,

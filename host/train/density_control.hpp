@@ -50,6 +50,15 @@ class DensityControl {
   /// Whether a pass would be due if passes had not ended: what follows them goes on until the end.
   bool idles_at(std::int64_t iteration) const;
 
+  /// Whether the model is another one after a pass that is due after `iteration`, and whether
+  /// anything is due then.
+  bool changes_at(std::int64_t iteration) const {
+    return refines_at(iteration) || resets_at(iteration);
+  }
+  bool acts_at(std::int64_t iteration) const {
+    return changes_at(iteration) || idles_at(iteration);
+  }
+
   /// Replaces `gaussians` by the new set and starts new statistics. The returned plan says where
   /// each new Gaussian comes from, for whoever keeps state per Gaussian. Throws RuntimeError-coded
   /// Error when no Gaussian is left.

@@ -3,12 +3,11 @@
 
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
-#include "io/depth_map.hpp"
 #include "raysplats/dataset.hpp"
+#include "train/depth_cache.hpp"
 #include "train/device_photo.hpp"
 
 namespace raysplats {
@@ -18,20 +17,27 @@ namespace raysplats {
 /// and m how much they count (masks, alpha). It does not change with the unit of length.
 class DepthSupervision {
  public:
-  /// Reads the depths of some views of a data set. Throws DataError as io::view_depths(), and
-  /// UsageError where nothing is known of any.
+  /// Reads the depths of some views of a data set, of which maps may take `budget` bytes of the
+  /// device (DepthCache). Throws DataError as io::view_depths(), and UsageError where nothing is
+  /// known of any.
   DepthSupervision(Context& context,
                    const Dataset& dataset,
                    std::span<const std::size_t> views,
                    double weight,
-                   double unit);
+                   double unit,
+                   std::size_t budget);
+
+  /// Views that have a depth map.
+  std::size_t maps() const { return cache_.with_maps(); }
+  /// Reads what backward() will need of these views in the background.
+  void prefetch(std::span<const SizedView> wanted) { cache_.prefetch(wanted); }
+  /// Brings what it needs of a view to the device.
+  void prepare(const SizedView& wanted) { cache_.get(wanted); }
 
   /// For the picture and depth of a view (ViewTracer::image(), ViewTracer::depth()) and its photo
   /// of that size: adds the gradient for the coverage to `image_gradient` and writes gradient().
   /// Enqueues without waiting.
-  void backward(std::size_t view,
-                int width,
-                int height,
+  void backward(const SizedView& view,
                 const Buffer<float>& image,
                 const Buffer<float>& depth,
                 const DevicePhoto& photo,
@@ -40,19 +46,10 @@ class DepthSupervision {
   const Buffer<float>& gradient() const { return gradient_; }
 
  private:
-  // At the size that was asked for last.
-  struct Target {
-    int width = 0, height = 0;
-    float known = 0;  // pixels
-    Buffer<float> depths;
-  };
-  const Target& target(std::size_t view, int width, int height);
-
   Context& context_;
   double weight_;
-  Kernel slopes_;
-  std::vector<io::DepthMap> maps_;
-  std::vector<Target> targets_;
+  Kernel slopes_, listed_slopes_;
+  DepthCache cache_;
   Buffer<float> gradient_;
 };
 

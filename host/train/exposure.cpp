@@ -9,8 +9,8 @@ namespace raysplats {
 namespace {
 
 constexpr const char* kProgram = "train/exposure.cl";
-constexpr std::size_t kGroup = 64;
-constexpr std::size_t kBlock = 256;  // as in cl/train/exposure.cl
+constexpr std::size_t kGroup = 64;   // GROUP of cl/train/exposure.cl
+constexpr std::size_t kBlock = 256;  // and its BLOCK
 
 std::size_t pixels_of(int width, int height) {
   return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -62,17 +62,17 @@ void Exposure::observe(const Buffer<float>& image,
                   static_cast<std::int32_t>(pixels), photo.planes,
                   photo.composite(alpha_is_background), background[0], background[1],
                   background[2]);
-  sum_.launch(Range::linear(kSums, kSums), partials_, sums_, static_cast<std::uint32_t>(blocks),
-              static_cast<std::uint32_t>(slot));
+  sum_.launch(Range::linear(kSums * kGroup, kGroup), partials_, sums_,
+              static_cast<std::uint32_t>(blocks), static_cast<std::uint32_t>(slot));
 }
 
 void Exposure::step(std::size_t view,
                     std::size_t slot,
                     double damping,
                     const Buffer<std::uint32_t>& guard) {
-  solve_.launch(Range::linear(1, 1), sums_, guard, deltas_, static_cast<std::uint32_t>(slot),
-                static_cast<std::uint32_t>(views_), static_cast<std::uint32_t>(view),
-                static_cast<float>(damping));
+  solve_.launch(Range::linear(kGroup, kGroup), sums_, guard, deltas_,
+                static_cast<std::uint32_t>(slot), static_cast<std::uint32_t>(views_),
+                static_cast<std::uint32_t>(view), static_cast<float>(damping));
 }
 
 void Exposure::restore(const std::vector<float>& deltas) {

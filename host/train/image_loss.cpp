@@ -18,7 +18,7 @@ namespace {
 constexpr int kPad = 16;
 constexpr int kRadius = 5;
 constexpr std::size_t kFoldItems = 64;
-// Of cl/train/group_loss.cl: work-items along the side of a group, and the local memory it takes.
+// Work-items along the side of a group of cl/train/group_loss.cl, and the local memory it takes.
 constexpr int kSide = 16;
 constexpr std::uint64_t kGroupLocalMemory = 14336;
 
@@ -43,7 +43,7 @@ struct ImageLoss::Impl {
   Buffer<Sums> pixel_partials, sums;
   int width = 0;
   int height = 0;
-  // Of the padded planes of work-items that take tiles.
+  // Row and size of the padded planes of work-items that take tiles.
   int stride = 0;
   int plane = 0;
 

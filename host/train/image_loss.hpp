@@ -68,7 +68,7 @@ class ImageLoss {
   /// Whether it works in groups of kGroups.
   bool grouped() const;
 
-  /// Of the last evaluate().
+  /// Partial sums of the last evaluate().
   Partials partials() const;
 
  private:

@@ -8,8 +8,6 @@
 #include <array>
 #include <cmath>
 #include <glm/vec3.hpp>
-#include <limits>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -17,6 +15,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/gaussian_selection.hpp"
+#include "scene/kd_tree.hpp"
 #include "shared/sh.h"
 #include "train/photo_start.hpp"
 #include "train/plane_sweep.hpp"
@@ -27,119 +26,8 @@
 namespace raysplats {
 namespace {
 
-constexpr double kMinScale = 1e-4;  // of the scene extent
-constexpr double kMaxScale = 0.1;   // of the distance to the nearest camera
-constexpr std::uint32_t kReliableTrack = 3;
-constexpr float kReliableError = 2.0f;
-constexpr std::size_t kEnoughPoints = 2000;
-constexpr std::size_t kFewPoints = 1000;  // fewer leave most of the photos without a start
-constexpr double kStartShare = 0.5;       // of the limit that points, or random places, may take
-constexpr double kPhotoShare = 0.3;       // of the limit that a start from photos takes
-constexpr double kUnsureShare = 0.25;     // of points of photos everywhere: those in no clear depth
-constexpr double kUnsureBeside = 0.1;     // of those in places of sparse ones: more are only slower
-constexpr double kLimitFactor = 4.5;      // Gaussians per root of (pixels of a photo x iterations)
-constexpr std::size_t kLeastLimit = 2000;
-constexpr std::size_t kNeighbours = 3;
-constexpr double kMostlyBare = 0.31;     // of what photos show, in wide cells with no sparse point
-constexpr double kMostlyCovered = 0.72;  // of what agrees in one depth, with sparse points near
-constexpr double kMostlyShown = 0.75;    // of the photos, where masks leave out the rest
-constexpr double kMostlyAgreed = 0.21;   // of what photos show, in one depth
-constexpr std::size_t kMostBeside = 10000;  // points of photos, of which more take seconds to find
-constexpr double kMostlySeen = 0.5;         // of sparse points
-constexpr double kLeastSeen = 0.01;  // of a given model: what photos of its scene see more of
-
-// Balanced k-d tree laid out in place: the median of a range is its node, its halves are the
-// children.
-class KdTree {
- public:
-  explicit KdTree(std::span<const float> positions)
-      : positions_(positions), order_(positions.size() / 3) {
-    std::iota(order_.begin(), order_.end(), 0u);
-    axis_.resize(order_.size());
-    build(0, order_.size());
-  }
-
-  // Mean distance from point `index` to its nearest neighbours.
-  float mean_distance(std::uint32_t index) const {
-    Nearest nearest{};
-    nearest.fill(std::numeric_limits<float>::infinity());
-    search(index, 0, order_.size(), nearest);
-    double sum = 0;
-    std::size_t found = 0;
-    for (float squared : nearest) {
-      if (!std::isfinite(squared)) continue;
-      sum += std::sqrt(static_cast<double>(squared));
-      ++found;
-    }
-    return found > 0 ? static_cast<float>(sum / static_cast<double>(found)) : 0.0f;
-  }
-
- private:
-  using Nearest = std::array<float, kNeighbours>;  // squared distances, ascending
-
-  float coordinate(std::uint32_t point, int axis) const {
-    return positions_[3 * static_cast<std::size_t>(point) + static_cast<std::size_t>(axis)];
-  }
-
-  void build(std::size_t begin, std::size_t end) {
-    if (end - begin < 2) return;
-    std::array<float, 3> low{}, high{};
-    low.fill(std::numeric_limits<float>::infinity());
-    high.fill(-std::numeric_limits<float>::infinity());
-    for (std::size_t i = begin; i < end; ++i) {
-      for (int a = 0; a < 3; ++a) {
-        const auto axis = static_cast<std::size_t>(a);
-        low[axis] = std::min(low[axis], coordinate(order_[i], a));
-        high[axis] = std::max(high[axis], coordinate(order_[i], a));
-      }
-    }
-    int axis = 0;
-    for (int a = 1; a < 3; ++a) {
-      const auto i = static_cast<std::size_t>(a), best = static_cast<std::size_t>(axis);
-      if (high[i] - low[i] > high[best] - low[best]) axis = a;
-    }
-    const std::size_t middle = begin + (end - begin) / 2;
-    const auto at = [this](std::size_t i) {
-      return order_.begin() + static_cast<std::ptrdiff_t>(i);
-    };
-    std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
-      return coordinate(a, axis) < coordinate(b, axis);
-    });
-    axis_[middle] = static_cast<std::uint8_t>(axis);
-    build(begin, middle);
-    build(middle + 1, end);
-  }
-
-  void search(std::uint32_t index, std::size_t begin, std::size_t end, Nearest& nearest) const {
-    if (begin >= end) return;
-    const std::size_t middle = begin + (end - begin) / 2;
-    const std::uint32_t point = order_[middle];
-    if (point != index) {
-      float squared = 0;
-      for (int a = 0; a < 3; ++a) {
-        const float d = coordinate(point, a) - coordinate(index, a);
-        squared += d * d;
-      }
-      for (std::size_t k = 0; k < kNeighbours; ++k) {
-        if (squared < nearest[k]) std::swap(squared, nearest[k]);
-      }
-    }
-    if (end - begin == 1) return;
-    const float offset = coordinate(index, axis_[middle]) - coordinate(point, axis_[middle]);
-    // Points equal to the median may lie on either side, hence "<=" below for the far side.
-    if (offset < 0) {
-      search(index, begin, middle, nearest);
-      if (offset * offset <= nearest.back()) search(index, middle + 1, end, nearest);
-    } else {
-      search(index, middle + 1, end, nearest);
-      if (offset * offset <= nearest.back()) search(index, begin, middle, nearest);
-    }
-  }
-
-  std::span<const float> positions_;
-  std::vector<std::uint32_t> order_;
-  std::vector<std::uint8_t> axis_;
-};
+// Fewer points leave most of the photos without a start.
+constexpr std::size_t kFewPoints = 1000;
 
 // The finite points within the box, each place once: equal neighbours would leave a point no size.
 PointCloud distinct_points(const PointCloud& points, const std::optional<Bounds>& bounds) {
@@ -230,6 +118,10 @@ Beside photos_beside(const PointCloud& points,
                      std::span<const Camera> cameras,
                      const PhotoSource& photos,
                      const TrainOptions& options) {
+  constexpr double kMostlyBare = 0.31;    // of what photos show, in wide cells with no sparse point
+  constexpr double kMostlyShown = 0.75;   // of the photos, where masks leave out the rest
+  constexpr double kMostlyAgreed = 0.21;  // of what photos show, in one depth
+  constexpr double kMostlyCovered = 0.72;  // of what agrees in one depth, with sparse points near
   if (options.init != "auto" || points.size() < kFewPoints) return {};
   const double bare = bare_share(points, photos(PhotoChoice::kSome));
   spdlog::debug("{:.1f} % of what photos show has no sparse points", 100 * bare);
@@ -277,6 +169,7 @@ PointCloud start_points(const Dataset& dataset,
                         const PhotoSource& photos,
                         std::size_t count,
                         const TrainOptions& options) {
+  constexpr double kMostlySeen = 0.5;  // of sparse points
   PointCloud reliable = reliable_points(dataset.points);
   if (options.init == "auto" && dataset.alpha_is_background) {
     // Points were often found before the photos were cut out.
@@ -318,18 +211,12 @@ PointCloud start_points(const Dataset& dataset,
 
 }  // namespace
 
-std::vector<float> neighbour_distances(std::span<const float> positions) {
-  const KdTree tree(positions);
-  std::vector<float> out(positions.size() / 3);
-  for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = tree.mean_distance(static_cast<std::uint32_t>(i));
-  return out;
-}
-
 Gaussians gaussians_from_points(const PointCloud& points,
                                 int sh_degree,
                                 double opacity,
                                 std::span<const Camera> cameras) {
+  constexpr double kMinScale = 1e-4;  // of the scene extent
+  constexpr double kMaxScale = 0.1;   // of the distance to the nearest camera
   PointCloud finite;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float* p = points.positions.data() + 3 * i;
@@ -358,6 +245,9 @@ Gaussians gaussians_from_points(const PointCloud& points,
 }
 
 PointCloud reliable_points(const PointCloud& points) {
+  constexpr std::uint32_t kReliableTrack = 3;
+  constexpr float kReliableError = 2.0f;
+  constexpr std::size_t kEnoughPoints = 2000;
   if (points.track_lengths.size() != points.size() || points.errors.size() != points.size())
     return points;
   PointCloud out;
@@ -369,6 +259,8 @@ PointCloud reliable_points(const PointCloud& points) {
 }
 
 std::size_t fitted_limit(double pixels, std::int64_t iterations) {
+  constexpr double kLimitFactor = 4.5;  // Gaussians per root of (pixels of a photo x iterations)
+  constexpr std::size_t kLeastLimit = 2000;
   const double root = std::sqrt(pixels * static_cast<double>(iterations));
   return std::max(kLeastLimit, static_cast<std::size_t>(std::llround(kLimitFactor * root)));
 }
@@ -397,6 +289,13 @@ Gaussians initial_model(const Dataset& dataset,
                         const PhotoSource& photos,
                         std::size_t limit,
                         const TrainOptions& options) {
+  constexpr double kStartShare = 0.5;    // of the limit that points, or random places, may take
+  constexpr double kPhotoShare = 0.3;    // of the limit that a start from photos takes
+  constexpr double kUnsureShare = 0.25;  // of points of photos everywhere: those in no clear depth
+  constexpr double kUnsureBeside = 0.1;  // of those in places of sparse ones: more are only slower
+  constexpr std::size_t kMostBeside =
+      10000;                           // points of photos, of which more take seconds to find
+  constexpr double kLeastSeen = 0.01;  // of a given model: what photos of its scene see more of
   const bool has_points = dataset.points.size() > 0;
   const std::optional<Bounds> bounds = about_origin(options.bounds, dataset.origin);
   if (options.init == "colmap" && !has_points) {

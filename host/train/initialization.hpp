@@ -17,10 +17,6 @@
 
 namespace raysplats {
 
-/// Mean distance from each of N points (3 N numbers) to its three nearest neighbours (fewer when
-/// there are fewer points; 0 for a single one). k-d tree, O(N log N).
-std::vector<float> neighbour_distances(std::span<const float> positions);
-
 /// Isotropic Gaussians at the points: the scale is the mean distance of the three nearest
 /// neighbours, as in 3DGS, at least 1e-4 of the cameras' extent and at most 0.1 of the distance to
 /// the nearest camera (what stands alone far away may be large, before a camera it may not); band 0
@@ -46,7 +42,7 @@ std::optional<Bounds> about_origin(const std::optional<Bounds>& bounds,
 /// The Gaussians whose mean lies in the box; all of them without one.
 Gaussians inside(const Gaussians& model, const std::optional<Bounds>& bounds);
 
-/// Of the training views: all, or at most a hundred or two dozen that are spread evenly over them.
+/// Which training views: all, or at most a hundred or two dozen that are spread evenly over them.
 enum class PhotoChoice { kAll, kMany, kSome };
 
 /// Photos of the training views, loaded when they are first asked for.

@@ -28,7 +28,7 @@
 namespace raysplats {
 namespace {
 
-// Of a pixel: the nine planes of SSIM's slopes in one buffer (train/image_loss.cpp).
+// Bytes of a pixel in the nine planes of SSIM's slopes in one buffer (train/image_loss.cpp).
 constexpr std::size_t kSlopeBytes = 9 * sizeof(float);
 
 // Whether gradients of packets may be added in long integers. Copies that do not fit their share
@@ -86,7 +86,7 @@ std::size_t packet_bytes(const TrainOptions& options,
   // more for views to come.
   const std::size_t row = sizeof(std::uint32_t) * (2 + static_cast<std::size_t>(packet.lanes));
   const std::size_t hits = demand.pixels * static_cast<std::size_t>(options.trace.max_hits);
-  // Of a square picture.
+  // Tiles along the side of a square picture.
   const auto side = static_cast<std::size_t>(
       std::ceil(std::sqrt(static_cast<double>(demand.pixels)) / packet.tile));
   const std::size_t pairs = demand.gaussians * side * side;
@@ -120,6 +120,8 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   // of the parameters in their place; the least scales.
   const std::size_t footprint = options.footprint > 0 ? 1 : 0;
   out.gaussians = demand.gaussians * (floats * 5 + 5 + 2 + footprint) * sizeof(float);
+  // What of the model lies within the box, while that is measured.
+  if (options.bounds) out.gaussians += demand.gaussians * floats * sizeof(float);
   // Steps of several views: sums of gradients, one for every level of their tree.
   const auto views = static_cast<std::size_t>(options.views_per_step);
   out.gaussians += demand.gaussians * (floats + 3) * std::bit_width(views - 1) * sizeof(float);
@@ -133,13 +135,15 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   // one comes meanwhile) and its floats at half the size.
   const std::size_t photo = demand.photo_words * sizeof(std::uint32_t);
   const std::size_t passing = device.type == DeviceType::kCpu ? 1 : 2;
-  out.images = std::min(static_cast<std::size_t>(options.image_budget) * kMiB,
-                        demand.views * demand.pixels * photo) +
-               demand.pixels * (passing * photo + (25 + (options.exposure ? 4 : 0) +
-                                                   (options.background == "sky" ? 8 : 0)) *
-                                                      sizeof(float));
-  // Depth, its gradient, and what is known of every view.
-  if (options.depth_weight > 0) out.images += demand.pixels * (4 + demand.views) * sizeof(float);
+  out.images =
+      std::min(static_cast<std::size_t>(options.image_budget) * kMiB,
+               demand.pixels * (demand.views * photo + demand.depth_maps * sizeof(float))) +
+      demand.pixels * (passing * photo +
+                       (25 + (options.exposure ? 4 : 0) + (options.background == "sky" ? 8 : 0)) *
+                           sizeof(float));
+  // Depth, its gradient, and a map that found no room. Lists of sparse points are small.
+  if (options.depth_weight > 0)
+    out.images += demand.pixels * (4 + (demand.depth_maps > 0 ? 1 : 0)) * sizeof(float);
   if (packets) out.hits = packet_bytes(options, demand, device);
   std::size_t largest = std::max({sh * sizeof(float), sizeof(RsLine), packets ? exact : 0});
   if (demand.ray_views > 0) {

@@ -18,6 +18,7 @@ struct MemoryDemand {
   std::size_t ray_views = 0;    ///< of these, traced ray by ray (ViewTracer::by_rays())
   std::size_t triangles = 0;    ///< of mirrors
   std::size_t photo_words = 1;  ///< of 32 bits, of a pixel of a photo (io::Photo)
+  std::size_t depth_maps = 0;   ///< of the views, with a map of their depths that is heeded
 };
 
 /// Device memory that a training run will need, in bytes.
@@ -28,7 +29,7 @@ struct MemoryEstimate {
   std::size_t tracing = 0;  ///< records per view, sums of gradients and sort buffers
   std::size_t rays = 0;     ///< views traced ray by ray: tree, sums of gradients, rays (of mirrors:
                             ///< two segments of a path), meshes
-  std::size_t images = 0;   ///< photos within their budget, and the buffers of one view
+  std::size_t images = 0;   ///< photos and depth maps within their budget, the buffers of one view
   std::size_t hits = 0;  ///< hit streams, tile lists and private gradients: memory-budget at most
   std::size_t largest_buffer = 0;
   std::size_t total() const { return gaussians + tracing + rays + images + hits; }

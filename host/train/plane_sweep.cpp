@@ -54,7 +54,7 @@ glm::dvec3 axis_of(const SmallPhoto& photo) {
   return camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height).direction;
 }
 
-// Of photos with their ranks those of the least, at most kMostCompared.
+// The kMostCompared photos with the lowest ranks.
 std::vector<std::size_t> foremost(std::vector<std::pair<double, std::size_t>> ranked) {
   const std::size_t count = std::min(kMostCompared, ranked.size());
   std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count),
@@ -139,7 +139,7 @@ class Sweep {
 
   const std::vector<Sample>& samples() const { return samples_; }
   std::size_t agreed() const { return agreed_; }
-  /// Those that show something, in no clear depth.
+  /// Samples that show something, in no clear depth.
   std::size_t vague() const { return vague_; }
 
  private:
@@ -234,7 +234,7 @@ Probe probe_pixel(std::span<const SmallPhoto> photos,
   return {depths.at(best, kProbeDepths), open};
 }
 
-// Of some pixels those that agree in a depth, and in which.
+// How many of some pixels agree in a depth, and in which.
 struct Agreement {
   std::size_t inside = 0;  // not at an end of the range, where what lies beyond piles up
   double depth = 0;        // the median; 0 of too few
@@ -358,7 +358,7 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
   const std::size_t most_agreed = count - std::min(fog, sweep.vague());
   const std::size_t most_vague = depths.open ? count - std::min(sweep.agreed(), count - fog) : fog;
   std::vector<Sample> taken;
-  // Of those, by photo, the ones as deep as what is around them.
+  // The taken samples that are as deep as what is around them, by photo.
   std::vector<std::vector<std::size_t>> as_deep(photos.size());
   std::size_t agreed = 0, vague = 0;
   for (const Sample& sample : sweep.samples()) {

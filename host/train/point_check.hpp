@@ -48,8 +48,8 @@ PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> phot
 /// nothing is shown.
 double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos);
 
-/// Those of `found` that lie near points: in cells of 10 pixels a side that show some of `points`,
-/// in at least half of the photos that see them. Without their tracks and errors.
+/// The points of `found` that lie near others: in cells of 10 pixels a side that show some of
+/// `points`, in at least half of the photos that see them. Without their tracks and errors.
 PointCloud beside_points(const PointCloud& found,
                          const PointCloud& points,
                          std::span<const SmallPhoto> photos);

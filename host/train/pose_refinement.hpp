@@ -26,7 +26,7 @@ namespace raysplats {
 /// The steps are therefore taken in turns and in motions around what the camera sees.
 class PoseRefinement {
  public:
-  /// Of a camera: the turn in radians (axes of the camera), then the shift in world units.
+  /// Numbers of a camera: the turn in radians (axes of the camera), then the shift in world units.
   static constexpr std::size_t kNumbers = 6;
 
   /// The whole state: kNumbers a photo each, steps one.

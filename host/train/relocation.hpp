@@ -33,7 +33,7 @@ struct RelocationRules {
 /// A plan whose Gaussians, where they are shared, differ from their source.
 struct RelocationPlan {
   DensityPlan density;  ///< roles kKeep and, for all parts of what is shared, kClone
-  /// Of every new Gaussian {opacity parameter, factor of the standard deviations}; a factor of 0
+  /// {opacity parameter, factor of the standard deviations} of every new Gaussian; a factor of 0
   /// where it stays as it is.
   std::vector<std::array<float, 2>> shares;
 };

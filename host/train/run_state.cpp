@@ -31,23 +31,29 @@ std::string mean_section(ParameterGroup group) { return std::string("mean.") + g
 
 }  // namespace
 
-void store_state(const DeviceGaussians& gaussians,
-                 const Adam& adam,
-                 const DensityControl& density,
-                 Checkpoint& checkpoint) {
+CheckpointSections store_state(const DeviceGaussians& gaussians,
+                               const Adam& adam,
+                               const DensityControl& density,
+                               Checkpoint& checkpoint) {
   checkpoint.count = gaussians.count;
   checkpoint.sh_degree = gaussians.sh_degree;
   checkpoint.active_sh_degree = gaussians.active_sh_degree;
   checkpoint.scale_activation = activation_name(gaussians.activation);
   checkpoint.optimiser_steps = adam.steps();
+  CheckpointSections out;
+  const auto add = [&out](const std::string& name, const Buffer<float>& numbers) {
+    out[name] = [&numbers] {
+      return numbers.size() > 0 ? numbers.download() : std::vector<float>();
+    };
+  };
   for (const ParameterGroup group : kParameterGroups) {
     const std::string name = group_name(group);
-    checkpoint.sections[name] = gaussians[group].download();
-    checkpoint.sections[name + ".first"] = adam.first_moment(group).download();
-    checkpoint.sections[name + ".second"] = adam.second_moment(group).download();
+    add(name, gaussians[group]);
+    add(name + ".first", adam.first_moment(group));
+    add(name + ".second", adam.second_moment(group));
   }
-  checkpoint.sections["density"] =
-      density.statistics().size() > 0 ? density.statistics().download() : std::vector<float>();
+  add("density", density.statistics());
+  return out;
 }
 
 void restore_state(Context& context,
@@ -88,11 +94,13 @@ void restore_state(Context& context,
                                          : std::vector<float>());
 }
 
-void store_mean(const ParameterMean& mean, Checkpoint& checkpoint) {
+CheckpointSections store_mean(const ParameterMean& mean, Checkpoint& checkpoint) {
+  CheckpointSections out;
   checkpoint.mean_since = mean.since();
-  if (!mean.known()) return;
+  if (!mean.known()) return out;
   for (const ParameterGroup group : kParameterGroups)
-    checkpoint.sections[mean_section(group)] = mean.model()[group].download();
+    out[mean_section(group)] = [&mean, group] { return mean.model()[group].download(); };
+  return out;
 }
 
 void restore_mean(const Checkpoint& checkpoint,

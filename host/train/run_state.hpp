@@ -11,12 +11,12 @@
 
 namespace raysplats {
 
-/// Copies parameters, Adam's moments and the density statistics into a checkpoint; waits for the
-/// device.
-void store_state(const DeviceGaussians& gaussians,
-                 const Adam& adam,
-                 const DensityControl& density,
-                 Checkpoint& checkpoint);
+/// Puts what is known of them into a checkpoint, and returns parameters, Adam's moments and the
+/// density statistics as its sections, which copy them from the device when they are asked for.
+CheckpointSections store_state(const DeviceGaussians& gaussians,
+                               const Adam& adam,
+                               const DensityControl& density,
+                               Checkpoint& checkpoint);
 
 /// The way back. Throws UsageError when the checkpoint was made with another SH degree or scale
 /// activation than the options say, DataError when its arrays do not fit its counts.
@@ -28,7 +28,7 @@ void restore_state(Context& context,
                    DensityControl& density);
 
 /// The same of the mean of the parameters, if there is one.
-void store_mean(const ParameterMean& mean, Checkpoint& checkpoint);
+CheckpointSections store_mean(const ParameterMean& mean, Checkpoint& checkpoint);
 /// Checkpoints of versions without one leave it unknown. `gaussians` are restored. Throws DataError
 /// when arrays do not fit the counts.
 void restore_mean(const Checkpoint& checkpoint,

@@ -14,7 +14,7 @@
 namespace raysplats {
 namespace {
 
-// Beside that of a Gaussian.
+// Work, where that of a Gaussian is 1.
 constexpr double kBasisWork = 0.037;  // of one of its spherical harmonics
 constexpr double kPixelWork = 0.13;
 constexpr double kHitWork = 0.0244;
@@ -28,7 +28,7 @@ constexpr double kLarge = 0.5;         // of the largest view: steps that tell t
 constexpr std::int64_t kSlices = 400;  // of a run, when its steps are added up
 constexpr std::int64_t kMostIterations = 10'000'000;
 
-// From when on photos have their full size, as a share of the run.
+// When photos begin to have their full size, as a share of the run.
 double full_size_from(const TrainOptions& options) {
   double share = 0.0;
   for (const ResolutionStep& step : options.resolution_schedule) {

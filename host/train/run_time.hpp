@@ -42,7 +42,7 @@ struct LoadRates {
   double hits = 0;        ///< per pixel
   double candidates = 0;  ///< per Gaussian of the model
 
-  /// Of timed steps together.
+  /// The rates of timed steps together.
   static LoadRates of(std::span<const StepSample> samples);
 };
 

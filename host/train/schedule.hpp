@@ -72,8 +72,8 @@ int resolution_divisor(const TrainOptions& options, std::int64_t iteration);
 /// Iteration that the run ends with.
 std::int64_t last_iteration(const TrainOptions& options);
 
-/// From when on steps are alike: photos have their full size, all SH bands are on, and density
-/// control is over.
+/// The iteration from which on steps are alike: photos have their full size, all SH bands are on,
+/// and density control is over.
 std::int64_t steady_from(const TrainOptions& options);
 
 /// Until when a run by time takes the time of such steps, which then tells when it will end.

@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
+#include "io/photo.hpp"
 #include "raysplats/error.hpp"
 #include "run/dataset_fingerprint.hpp"
 #include "run/train_config.hpp"
+#include "train/ignored_photos.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/mirror_meshes.hpp"
 #include "train/step_options.hpp"
@@ -31,6 +34,27 @@ std::vector<View> views_of(const Dataset& dataset, const std::vector<std::size_t
   return views;
 }
 
+// What photos and depth maps may take of the device: all of them if there is room, else parts in
+// the proportion of what they would.
+struct PictureBudget {
+  std::size_t photos, depths;
+
+  static PictureBudget of(const TrainOptions& options,
+                          const Dataset& dataset,
+                          std::span<const std::size_t> views) {
+    const std::size_t budget = static_cast<std::size_t>(options.image_budget) * kMiB;
+    if (options.depth_weight <= 0) return {budget, 0};
+    std::size_t photos = 0;
+    for (const std::size_t view : views) photos += io::photo_bytes(dataset.views[view]);
+    std::size_t maps = depth_map_bytes(dataset, views);
+    if (photos + maps > budget) {
+      maps = static_cast<std::size_t>(static_cast<double>(budget) * static_cast<double>(maps) /
+                                      static_cast<double>(photos + maps));
+    }
+    return {budget - maps, maps};
+  }
+};
+
 TrainOptions with_length(TrainOptions options, const Dataset& dataset) {
   options.iterations = run_length(options, dataset.indices(Split::kTrain).size());
   validate(options);
@@ -51,7 +75,7 @@ Trainer::Impl::Impl(Context& device,
                     Communicator* others)
     : context(device),
       ranks(others != nullptr ? *others : alone),
-      dataset(std::move(data)),
+      dataset(without_ignored_photos(std::move(data))),
       options(with_length(train_options, dataset)),
       run(std::move(run_path), ranks.leads()),
       overwrite(replace),
@@ -79,7 +103,7 @@ Trainer::Impl::Impl(Context& device,
       fit(device, train_views.size()),
       photo_cache(device,
                   views_of(dataset, train_views),
-                  static_cast<std::size_t>(options.image_budget) * kMiB,
+                  PictureBudget::of(options, dataset, train_views).photos,
                   kReadAhead),
       slots(static_cast<std::size_t>(options.views_per_step)),
       share(RankShare::of(slots.size(), ranks.rank(), ranks.size())),
@@ -115,7 +139,8 @@ Trainer::Impl::Impl(Context& device,
   }
   if (options.depth_weight > 0) {
     require_depth_gradients();
-    depths.emplace(device, dataset, train_views, options.depth_weight, options.depth_unit);
+    depths.emplace(device, dataset, train_views, options.depth_weight, options.depth_unit,
+                   PictureBudget::of(options, dataset, train_views).depths);
   }
   if (apart.size() < static_cast<std::size_t>(options.validate_views)) {
     throw UsageError(fmt::format(

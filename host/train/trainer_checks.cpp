@@ -64,9 +64,9 @@ void Trainer::Impl::write_dump() {
       {"height", camera.height},
       {"world_to_camera", rotation},
       {"translation", {camera.translation[0], camera.translation[1], camera.translation[2]}},
-      {"refused_gradients", adam.skipped()}};
+      {"refused_gradients", skipped_before + adam.skipped()}};
   write_text_file(folder / "step.json", io::json_text(json, 2) + "\n");
-  write_checkpoint(folder / "state.rsck", state());
+  write_state(folder / "state.rsck");
 }
 
 }  // namespace raysplats

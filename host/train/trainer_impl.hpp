@@ -9,6 +9,7 @@
 #include <functional>
 #include <initializer_list>
 #include <map>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
@@ -31,6 +32,7 @@
 #include "train/image_loss.hpp"
 #include "train/initialization.hpp"
 #include "train/mcmc.hpp"
+#include "train/memory_estimate.hpp"
 #include "train/model_validator.hpp"
 #include "train/parameter_mean.hpp"
 #include "train/photo_cache.hpp"
@@ -85,15 +87,19 @@ struct Trainer::Impl {
 
   // trainer_start.cpp: from a data set to the first step.
   void start();
+  void take_over_metrics();
+  Gaussians new_model(std::size_t most);
+  void make_first_model();
   void upload_start(std::size_t most);
   std::vector<std::size_t> first_views() const;
   const std::vector<SmallPhoto>& photos(PhotoChoice choice);
   std::vector<SmallPhoto> reduced_photos(std::span<const std::size_t> views) const;
+  MemoryDemand demand(std::size_t count) const;
+  void check_room(std::size_t count, std::size_t most) const;
   void choose_background();
   void choose_color_range();
   void forget_sky();
   void forget_poses();
-  std::size_t loss_views() const { return train_views.size() - apart.size(); }
   std::int64_t turn_of(std::size_t slot) const;
   std::int64_t last_turn() const;
   std::size_t limit() { return most_gaussians(options.iterations); }
@@ -131,6 +137,11 @@ struct Trainer::Impl {
   void keep_time();
 
   // trainer_validation.cpp: training views that judge the run.
+  std::int64_t join_iteration() const;
+  std::size_t loss_views() const;
+  void keep_joined(const Checkpoint& checkpoint);
+  bool judges() const;
+  bool judged() const;
   void judge();
   bool out_of_patience() const;
   void settle_validation();
@@ -151,10 +162,12 @@ struct Trainer::Impl {
   // trainer_report.cpp: what a run says of itself.
   void report(Progress& progress);
   void evaluate_views(bool last);
+  bool evaluated(bool last) const;
   void set_background();
   TraceOptions trace_options();          // that the model looks right with
   const DeviceGaussians& shown() const;  // the mean of the last steps, if they have begun
   Gaussians model_to_save() const;       // of these, without what has left --bounds
+  const DeviceGaussians& measured(DeviceGaussians& room) const;
   void save_model();
   nlohmann::json photo_facts() const;
   void write_metrics(bool complete);
@@ -166,7 +179,8 @@ struct Trainer::Impl {
   void resume(const std::filesystem::path& source);
   void take_up(const std::filesystem::path& source);
   void check_data_options(const Checkpoint& checkpoint) const;
-  Checkpoint state();
+  void check_newer_models(std::int64_t from) const;
+  void write_state(const std::filesystem::path& path);
   void save_checkpoint();
   std::string rescue();
 
@@ -178,11 +192,11 @@ struct Trainer::Impl {
                bool scheduled,
                bool show_progress,
                const std::function<bool()>& interrupted);
-  void run_iterations(std::int64_t until,
-                      bool scheduled,
-                      Progress& progress,
-                      const std::function<bool()>& interrupted);
-  void finish_resumed();
+  struct Loop;
+  void run_iterations(std::int64_t until, const Loop& loop);
+  bool take_step(const Loop& loop);
+  bool complete(const Loop& loop, bool stop, bool anew);
+  void pause(const Loop& loop, const std::function<void()>& work);
   void show(const std::function<bool()>& interrupted);
 
   Context& context;
@@ -205,8 +219,9 @@ struct Trainer::Impl {
   ViewTracer tracer;
   ImageLoss loss;
   Adam adam;
-  // Positions in train_views that stay out of the loss until validation_end().
+  // Positions in train_views that stay out of the loss until join_iteration().
   std::vector<std::size_t> apart;
+  std::optional<std::int64_t> joined;  // when they joined, if the run was to be shorter then
   DensityControl density;
   Footprint footprint;
   ParameterMean mean;
@@ -229,17 +244,21 @@ struct Trainer::Impl {
   Buffer<float> image_gradient;
   std::int64_t iteration = 0;                                   // completed
   std::map<std::size_t, std::vector<SmallPhoto>> small_photos;  // so many, once asked for
-  std::optional<Gaussians> first_model;                         // that estimate() has made
+  std::optional<Gaussians> first_model;                         // made before start()
   bool started = false;
   bool ended = false;  // before its time, by patience
   bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
+  bool pass_due = false;    // of density control, after the newest step
   std::int64_t saved = -1;  // iteration of the newest checkpoint of this run
   std::uint32_t reported_bad_steps = 0;
   std::uint64_t traced_rays = 0;  // of all training views of the run
   std::deque<SentStep> sent;      // the oldest first
   bool await_sizes = false;       // of the next step: its view had too little room
   bool cap_reported = false;
-  std::int64_t timed_steps = 0;  // whose kernels were timed
+  std::int64_t timed_steps = 0;                  // whose kernels were timed
+  std::uint64_t skipped_before = 0;              // updates of Adam, before resume()
+  std::optional<TrainOptions> resumed;           // options of the run that resume() has brought
+  std::shared_ptr<const nlohmann::json> former;  // metrics.json before this object's first start()
   PsnrRise rise;
   Stopwatch training{context};
   Stopwatch evaluating{context};

@@ -8,6 +8,7 @@
 
 #include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/file_kind.hpp"
 #include "util/interrupt.hpp"
 
 namespace raysplats {
@@ -46,67 +47,96 @@ bool every(std::int64_t period, std::int64_t iteration) {
 
 }  // namespace
 
-// Up to `until` completed iterations; with `scheduled` also the evaluations and files of the
-// options.
-void Trainer::Impl::run_iterations(std::int64_t until,
-                                   bool scheduled,
-                                   Progress& progress,
-                                   const std::function<bool()>& interrupted) {
-  const auto pause = [&](const auto& work) {
-    settle();
-    training.stop();
-    progress.suspend();
-    work();
-    progress.resume();
-    training.start();
-  };
+// How run() and step() go about their iterations.
+struct Trainer::Impl::Loop {
+  bool scheduled;  // with the evaluations and files of the options
+  Progress& progress;
+  const std::function<bool()>& interrupted;
+};
+
+// Work that is no training, when all steps are done.
+void Trainer::Impl::pause(const Loop& loop, const std::function<void()>& work) {
+  settle();
+  training.stop();
+  loop.progress.suspend();
+  work();
+  loop.progress.resume();
+  training.start();
+}
+
+// Up to `until` completed iterations. The first thing is what the newest one lacks because an error
+// or a signal came in between, or because it was made into another folder; not what would have
+// been measured of a model that density control has changed since.
+void Trainer::Impl::run_iterations(std::int64_t until, const Loop& loop) {
   bool stop = false;
+  {
+    const auto turn = context.lock();
+    const bool over = iteration == last_iteration(options) || (judged() && out_of_patience());
+    const bool unchanged = iteration > 0 && !density.changes_at(iteration);
+    if (pass_due || (loop.scheduled && (over || unchanged))) stop = complete(loop, false, pass_due);
+  }
   while (iteration < std::min(until, last_iteration(options)) && !stop) {
     const auto turn = context.lock();
-    if (ranks.size() > 1) stop_wished = interrupted() || stop_asked;
-    sampled_step();
-    keep_time();
-    const bool last = iteration == last_iteration(options);
-    if (last || every(options.log_every, iteration)) report(progress);
-    if (every(options.validate_every, iteration)) pause([this] { validate_model(); });
-    if (callback) {
-      const auto hear = callback;  // it may be replaced meanwhile
-      try {
-        pause([&] { hear({iteration, last_iteration(options), gaussians.count}); });
-      } catch (...) {
-        if (!last) control_density();  // what is saved then has this iteration complete
-        throw;
-      }
-    }
-    // Asked once: a signal that comes later is seen after the next step. Ranks end together.
-    stop = ranks.size() > 1 ? stop_agreed : interrupted() || stop_asked;
-    bool ends = false;
-    if (scheduled && validates_at(options, iteration)) {
-      pause([this] { judge(); });
-      ends = out_of_patience();
-    }
-    if (ends) {
-      stop = ended = true;
-      spdlog::info(
-          "iteration {}: the validation views have not gained {} times in a row: the run "
-          "ends here",
-          iteration, options.patience);
-    }
-    const bool evaluates = last || every(options.eval_every, iteration) ||
-                           contains(options.eval_at, options.iterations, iteration);
-    const bool saves = stop || last || contains(options.save_at, options.iterations, iteration);
-    // Before density control, as in 3DGS: fresh clones and children have not settled yet.
-    if (scheduled && saves) pause([this] { save_model(); });
-    if (scheduled && (ends || (evaluates && (last || !stop))))
-      pause([this, last, ends] { evaluate_views(last || ends); });
-    if (!last) control_density();
-    const bool asked = save_asked.exchange(false);
-    if (asked && !(scheduled && saves)) pause([this] { save_model(); });
-    if (asked || (scheduled && (stop || last || every(options.checkpoint_every, iteration))))
-      pause([this] { save_checkpoint(); });
-    if (watcher && !stop && watcher->wants_look()) pause([&] { show(interrupted); });
+    stop = complete(loop, take_step(loop), true);
   }
   settle();
+}
+
+// One step and what is said of it. Returns whether the run is to end with this iteration.
+bool Trainer::Impl::take_step(const Loop& loop) {
+  if (ranks.size() > 1) stop_wished = loop.interrupted() || stop_asked;
+  sampled_step();
+  keep_time();
+  const bool last = iteration == last_iteration(options);
+  if (last || every(options.log_every, iteration)) report(loop.progress);
+  if (every(options.validate_every, iteration)) pause(loop, [this] { validate_model(); });
+  if (callback) {
+    const auto hear = callback;  // it may be replaced meanwhile
+    pause(loop, [&] { hear({iteration, last_iteration(options), gaussians.count}); });
+  }
+  // Asked once: a signal that comes later is seen after the next step. Ranks end together.
+  return ranks.size() > 1 ? stop_agreed : loop.interrupted() || stop_asked;
+}
+
+// What follows a step: evaluations and files, before density control, as in 3DGS, because fresh
+// clones and children have not settled yet; then that, and the checkpoint. Unless the iteration is
+// `anew`, files that are there stay. Returns whether the run ends with it, as it does with `stop`.
+bool Trainer::Impl::complete(const Loop& loop, bool stop, bool anew) {
+  const bool last = iteration == last_iteration(options);
+  bool ends = false;
+  if (loop.scheduled && iteration > 0 && judges()) {
+    if (!judged()) pause(loop, [this] { judge(); });
+    ends = out_of_patience();
+  }
+  if (ends) {
+    stop = ended = true;
+    spdlog::info(
+        "iteration {}: the validation views have not gained {} times in a row: the run ends here, "
+        "and --resume goes on with a larger --patience alone",
+        iteration, options.patience);
+  }
+  const bool evaluates = ends || last ||
+                         (!stop && (every(options.eval_every, iteration) ||
+                                    contains(options.eval_at, options.iterations, iteration)));
+  const bool saves = loop.scheduled &&
+                     (stop || last || contains(options.save_at, options.iterations, iteration)) &&
+                     (anew || !run.has_model(iteration));
+  if (saves) pause(loop, [this] { save_model(); });
+  if (loop.scheduled && evaluates && !evaluated(last || ends))
+    pause(loop, [this, last, ends] { evaluate_views(last || ends); });
+  if (last) {
+    pass_due = false;
+  } else {
+    control_density();
+  }
+  const bool asked = save_asked.exchange(false);
+  if (asked && !saves) pause(loop, [this] { save_model(); });
+  const bool keeps = loop.scheduled &&
+                     (stop || last || every(options.checkpoint_every, iteration)) &&
+                     (anew || !is_file(checkpoint_path(run.path(), iteration)));
+  if (asked || keeps) pause(loop, [this] { save_checkpoint(); });
+  if (watcher && !stop && watcher->wants_look()) pause(loop, [&] { show(loop.interrupted); });
+  return stop;
 }
 
 // Lets the watcher look at the state between two steps, and hold it as long as it wishes.
@@ -122,14 +152,6 @@ void Trainer::Impl::show(const std::function<bool()>& interrupted) {
   } while (wish.wait && !stopping());
 }
 
-// A run that is resumed where it ends: its results may not be in this folder.
-void Trainer::Impl::finish_resumed() {
-  if (ranks.said_by(0, run.has_model(iteration))) return;
-  save_model();
-  evaluate_views(true);
-  save_checkpoint();
-}
-
 // Runs them with the folder locked. What fails is saved as far as it goes.
 void Trainer::Impl::advance(std::int64_t until,
                             bool scheduled,
@@ -141,11 +163,7 @@ void Trainer::Impl::advance(std::int64_t until,
   row_seconds = training.seconds();
   training.start();
   try {
-    if (scheduled && iteration == last_iteration(options)) {
-      const auto turn = context.lock();
-      finish_resumed();
-    }
-    run_iterations(until, scheduled, progress, interrupted);
+    run_iterations(until, {scheduled, progress, interrupted});
   } catch (const Error& error) {
     training.stop();
     if (error.code() == ErrorCode::kRuntime) throw;  // the model itself is at fault
@@ -167,6 +185,10 @@ void Trainer::Impl::advance(std::int64_t until,
 TrainSummary Trainer::Impl::train(bool show_progress) {
   const Busy busy(*this);
   const InterruptGuard interrupt;
+  {
+    const auto turn = context.lock();
+    make_first_model();
+  }
   const FolderUse folder(*this);
   {
     const auto turn = context.lock();
@@ -180,11 +202,12 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   if (const std::uint64_t capped = guard.counts().capped_rays; capped > 0)
     warn_of_capped_rays(capped);
   if (complete) warn_of_no_progress();
-  if (const auto best = better_before(run.evaluations())) {
+  if (const auto best = better_before(run.evaluations(), options.exposure)) {
     spdlog::warn(
         "the last PSNR of the test views, {:.2f} dB, is below that of iteration {}, {:.2f} dB: the "
         "run learns its photos by heart or its rates are too high",
-        run.evaluations().back().psnr, best->iteration, best->psnr);
+        judged_psnr(run.evaluations().back(), options.exposure), best->iteration,
+        judged_psnr(*best, options.exposure));
   }
   if (!complete && !stop_asked && !ended) {
     throw Error(
@@ -219,6 +242,7 @@ bool Trainer::Impl::train_some(std::int64_t count) {
 void Trainer::Impl::prepare() {
   if (prepared) return;
   const auto turn = context.lock();
+  make_first_model();
   if (!folder_lock && ranks.leads()) folder_lock.emplace(run.lock());
   start();
   prepared = true;

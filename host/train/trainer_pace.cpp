@@ -54,6 +54,7 @@ void Trainer::Impl::go_back() {
   iteration = sent.front().iteration;
   adam.set_steps(sent.front().optimiser_steps);
   traced_rays = sent.front().traced_rays;
+  pass_due = false;  // density control waits for all steps before it
   sent.clear();
   tracer.clear_overflow();
   await_sizes = true;

@@ -39,7 +39,7 @@ class Timer {
   Stopwatch watch_;
 };
 
-// Of a run that is given so little time that steps at full size would be few.
+// The sizes of a run that is given so little time that steps at full size would be few.
 const std::vector<ResolutionStep>& coarse_schedule() {
   static const std::vector<ResolutionStep> schedule{{4, 0.2}, {3, 0.5}, {2, 0.9}};
   return schedule;
@@ -77,8 +77,8 @@ void Trainer::Impl::follow_options() {
   TrainOptions centred = options;
   centred.bounds = about_origin(options.bounds, dataset.origin);
   density.follow(centred, loss_views());
-  order = ViewOrder(options.seed, train_views.size(), apart,
-                    validation_end(options) * options.views_per_step);
+  order =
+      ViewOrder(options.seed, train_views.size(), apart, join_iteration() * options.views_per_step);
 }
 
 double Trainer::Impl::seconds_of(const Pilot& pilot,
@@ -113,6 +113,7 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
       camera = divisor > 1 ? downscaled(train_cameras[view], divisor) : train_cameras[view];
       const Timer photo(context);
       photo_cache.get(view, camera.width, camera.height);
+      if (depths) depths->prepare({view, camera.width, camera.height});
       context.finish();
       if (read.insert(view).second) photo_seconds += photo.seconds();
     }
@@ -193,10 +194,10 @@ void Trainer::Impl::forget_pilot() {
   iteration = 0;
   reads_ahead = true;
   traced_rays = 0;
-  whole = stepped = false;
+  whole = stepped = pass_due = false;
 }
 
-// Those of steps that evaluate so many bands.
+// Begins the programs of steps that evaluate so many bands.
 void Trainer::Impl::begin_programs(std::initializer_list<int> degrees) {
   DeviceGaussians form;
   form.activation = options.scale_activation;
@@ -213,13 +214,12 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   const Timer clock(context);
   Pilot pilot;
   const std::size_t most = limit();
+  check_room(0, most);
   // While the start is made: those of the steps that are timed.
   begin_programs({active_sh_degree(options, 0), active_sh_degree(options, options.iterations / 2)});
   choose_background();
   choose_color_range();
-  first_model = initial_model(
-      dataset, train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
-      most, options);
+  first_model = new_model(most);
   std::optional<Gaussians> made = first_model;
   pilot.start_seconds = ranks.said_by(0, clock.seconds());
   upload_start(most);
@@ -284,9 +284,9 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
           pilot.seconds + duration(options.iterations)};
 }
 
-// Of a run by time: its last steps are alike, and once a part of them is timed the time that is
-// left tells how many more there can be. What the steps do depends on the schedules alone, so that
-// a run which is given this end from the beginning has the same bytes.
+// Keeps a run by time to its time: its last steps are alike, and once a part of them is timed the
+// time that is left tells how many more there can be. What the steps do depends on the schedules
+// alone, so that a run which is given this end from the beginning has the same bytes.
 void Trainer::Impl::keep_time() {
   if (!run_seconds) return;
   const std::int64_t from = steady_from(options);

@@ -32,16 +32,27 @@ struct SlotWord {
 
 }  // namespace
 
-// The photos of this rank that come after a view.
+// The photos of this rank that come after a view, and what is known of their depths.
 void Trainer::Impl::read_ahead(std::int64_t turn) {
   if (!reads_ahead) return;
   constexpr std::size_t kOthers = kReadAhead - 1;
+  const std::size_t first = order.at(turn);
   std::vector<std::size_t> own;
   for (const std::size_t view : order.upcoming(kOthers * static_cast<std::size_t>(ranks.size()))) {
     const auto slot = static_cast<std::size_t>(++turn % options.views_per_step);
     if (share.holds(slot) && own.size() < kOthers) own.push_back(view);
   }
   photo_cache.prefetch(own);
+  if (!depths) return;
+  const int divisor = resolution_divisor(options, iteration);
+  own.insert(own.begin(), first);  // not yet asked for: depths come after the photo
+  std::vector<SizedView> sized;
+  for (const std::size_t view : own) {
+    const Camera& full = train_cameras[view];
+    const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
+    sized.push_back({view, camera.width, camera.height});
+  }
+  depths->prefetch(sized);
 }
 
 // Adds what the views of a step say; one view needs no sum, and one rank waits for nothing. With

@@ -9,6 +9,7 @@
 #include "device/profiler.hpp"
 #include "eval/metrics.hpp"
 #include "raysplats/evaluation.hpp"
+#include "run/former_metrics.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
 
@@ -29,18 +30,22 @@ nlohmann::json kernels_of(Context& context) {
 
 }  // namespace
 
-// Of the training photos that the run has read so far: how sharp they are, and how near it came to
-// those that it has seen at full size last.
+// How sharp the training photos are that the run has read so far, and how near it came to those
+// that it has seen at full size last; what this part of it has not seen, as it was before.
 nlohmann::json Trainer::Impl::photo_facts() const {
   nlohmann::json out = nlohmann::json::array();
+  std::map<std::string, nlohmann::json> before = former_photos(*former);
   const std::vector<double> psnr = fit.psnr();
   for (std::size_t i = 0; i < train_cameras.size(); ++i) {
-    const std::optional<double> sharpness = photo_cache.sharpness_of(i);
-    if (!sharpness) continue;
-    const glm::dvec3 center = train_cameras[i].center();
-    nlohmann::json photo{{"name", train_cameras[i].name},
-                         {"sharpness", *sharpness},
-                         {"center", {center.x, center.y, center.z}}};
+    const auto known = before.find(train_cameras[i].name);
+    nlohmann::json photo = known != before.end() ? std::move(known->second) : nullptr;
+    if (const std::optional<double> sharpness = photo_cache.sharpness_of(i)) {
+      const glm::dvec3 center = train_cameras[i].center();
+      photo["name"] = train_cameras[i].name;
+      photo["sharpness"] = *sharpness;
+      photo["center"] = {center.x, center.y, center.z};
+    }
+    if (photo.is_null()) continue;
     if (std::isfinite(psnr[i])) photo["psnr"] = std::min(psnr[i], kMostPsnr);
     out.push_back(std::move(photo));
   }
@@ -90,7 +95,7 @@ void Trainer::Impl::warn_of_capped_rays(std::uint64_t capped) const {
       iteration, capped, traced_rays, options.trace.max_hits);
 }
 
-// Of a run whose pictures never came nearer to the photos.
+// Warns when no picture came nearer to its photo.
 void Trainer::Impl::warn_of_no_progress() const {
   if (!rise.learned_nothing()) return;
   spdlog::warn(
@@ -104,13 +109,10 @@ void Trainer::Impl::evaluate_views(bool last) {
   if (test_views.empty()) return;
   evaluating.start();
   set_background();
-  // What the PLY holds: between passes of density control some may have left the box.
-  std::optional<DeviceGaussians> cropped;
-  if (options.bounds)
-    cropped = DeviceGaussians::upload(context, model_to_save(), ScaleActivation::kExp);
-  const DeviceGaussians& judged = cropped ? *cropped : shown();
+  DeviceGaussians room;
+  const DeviceGaussians& model = measured(room);
   const auto render = [&](const Camera& camera) {
-    tracer.forward(judged, camera);
+    tracer.forward(model, camera);
     return tracer.download_image();
   };
   EvaluationOptions choice;
@@ -121,7 +123,7 @@ void Trainer::Impl::evaluate_views(bool last) {
   const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
                                                       run.evaluation_folder(iteration), choice);
   run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
-              report.images.size(), judged.count, report.mean.psnr_corrected, report.mean.psnr_all,
+              report.images.size(), model.count, report.mean.psnr_corrected, report.mean.psnr_all,
               report.mean.psnr_aligned});
   if (watcher) watcher->evaluated(run.evaluations().back());
   write_metrics(false);
@@ -135,12 +137,34 @@ void Trainer::Impl::evaluate_views(bool last) {
   }
 }
 
+// Whether this iteration has been evaluated; with `last` as the end of a run is, with all views and
+// by all measures.
+bool Trainer::Impl::evaluated(bool last) const {
+  if (test_views.empty()) return true;
+  const std::vector<EvaluationRow>& rows = run.evaluations();
+  if (rows.empty() || rows.back().iteration != iteration) return false;
+  if (!last) return true;
+  const auto some = static_cast<std::size_t>(options.eval_views);
+  const bool partial = some > 0 && some < test_views.size() && rows.back().views <= some;
+  return !partial && (!options.poses || rows.back().psnr_aligned.has_value());
+}
+
 const DeviceGaussians& Trainer::Impl::shown() const {
   return mean.known() ? mean.model() : gaussians;
 }
 
 Gaussians Trainer::Impl::model_to_save() const {
   return inside(shown().download(), about_origin(options.bounds, dataset.origin));
+}
+
+// The model as its PLY holds it: between passes of density control some may have left the box. Then
+// those that stay are in `room`.
+const DeviceGaussians& Trainer::Impl::measured(DeviceGaussians& room) const {
+  if (!options.bounds) return shown();
+  const Gaussians kept = model_to_save();
+  if (kept.size() == shown().count) return shown();
+  room = DeviceGaussians::upload(context, kept, ScaleActivation::kExp);
+  return room;
 }
 
 // Behind views that are judged. A sky is with the tracer already.
@@ -166,7 +190,7 @@ void Trainer::Impl::write_metrics(bool complete) {
   const StepGuard::Counts counts = guard.counts();
   const DeviceInfo& device = context.device();
   const std::string hash = run.model_hash(iteration);
-  run.write_metrics({{"version", RAYSPLATS_VERSION},
+  nlohmann::json now{{"version", RAYSPLATS_VERSION},
                      {"seed", options.seed},
                      {"command", command},
                      {"data", fingerprint},
@@ -183,14 +207,15 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"traced_rays", traced_rays},
                      {"capped_rays", counts.capped_rays},
                      {"psnr_rise", rise.most() ? nlohmann::json(*rise.most()) : nullptr},
-                     {"skipped_updates", adam.skipped()},
+                     {"skipped_updates", skipped_before + adam.skipped()},
                      {"bad_steps", counts.bad_steps},
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", device.name},
                      {"driver", fmt::format("{}, {}", device.platform, device.driver_version)},
                      {"photos", photo_facts()},
                      {"timed_steps", timed_steps},
-                     {"kernels", kernels_of(context)}});
+                     {"kernels", kernels_of(context)}};
+  run.write_metrics(continued_metrics(std::move(now), *former, stepped));
 }
 
 }  // namespace raysplats

@@ -2,16 +2,19 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <optional>
 #include <system_error>
 #include <utility>
 
 #include "run/train_config.hpp"
 #include "train/run_state.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats {
 
-Checkpoint Trainer::Impl::state() {
+// The state between two steps, or with density control still to come.
+void Trainer::Impl::write_state(const std::filesystem::path& path) {
   Checkpoint checkpoint;
   checkpoint.iteration = iteration;
   checkpoint.seed = options.seed;
@@ -23,30 +26,37 @@ Checkpoint Trainer::Impl::state() {
   checkpoint.bad_steps_in_a_row = counts.in_a_row;
   checkpoint.traced_rays = traced_rays;
   checkpoint.capped_rays = counts.capped_rays;
-  store_state(gaussians, adam, density, checkpoint);
-  store_mean(mean, checkpoint);
-  if (footprint.lows().size() > 0) checkpoint.sections["footprint"] = footprint.lows().download();
+  checkpoint.skipped_updates = skipped_before + adam.skipped();
+  if (!apart.empty()) checkpoint.views_joined = join_iteration();
+  checkpoint.pass_due = pass_due && iteration < last_iteration(options);
+  CheckpointSections sections = store_state(gaussians, adam, density, checkpoint);
+  sections.merge(store_mean(mean, checkpoint));
+  if (footprint.lows().size() > 0)
+    sections["footprint"] = [this] { return footprint.lows().download(); };
+  const auto add = [&sections](const char* name, std::vector<float> numbers) {
+    sections[name] = [numbers = std::move(numbers)] { return numbers; };
+  };
   if (poses) {
     const PoseRefinement::State& state = poses->state();
-    checkpoint.sections["poses"] = state.deltas;
-    checkpoint.sections["poses.first"] = state.first;
-    checkpoint.sections["poses.second"] = state.second;
-    checkpoint.sections["poses.steps"] = state.steps;
+    add("poses", state.deltas);
+    add("poses.first", state.first);
+    add("poses.second", state.second);
+    add("poses.steps", state.steps);
   }
   if (sky) {
-    checkpoint.sections["sky"] = tracer.sky()->coefficients().download();
+    add("sky", tracer.sky()->coefficients().download());
     SkyAdam::State moments = sky->state();
-    checkpoint.sections["sky.first"] = std::move(moments.first);
-    checkpoint.sections["sky.second"] = std::move(moments.second);
-    checkpoint.sections["sky.steps"] = std::move(moments.steps);
+    add("sky.first", std::move(moments.first));
+    add("sky.second", std::move(moments.second));
+    add("sky.steps", std::move(moments.steps));
   }
-  if (exposure) checkpoint.sections["exposure"] = exposure->deltas();
-  return checkpoint;
+  if (exposure) add("exposure", exposure->deltas());
+  write_checkpoint(path, checkpoint, sections);
 }
 
 void Trainer::Impl::save_checkpoint() {
   if (!ranks.leads()) return;
-  write_checkpoint(checkpoint_path(run.path(), iteration), state());
+  write_state(checkpoint_path(run.path(), iteration));
   saved = iteration;
   remove_old_checkpoints(run.path(), options.keep_checkpoints, iteration);
 }
@@ -69,7 +79,7 @@ std::string Trainer::Impl::rescue() {
   }
   if (whole && saved != iteration) {
     try {
-      write_checkpoint(checkpoint_path(run.path(), iteration), state());
+      write_state(checkpoint_path(run.path(), iteration));
       saved = iteration;
     } catch (const std::exception& error) {
       spdlog::warn("the state of iteration {} cannot be saved: {}", iteration, error.what());
@@ -110,6 +120,21 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
     differs(name, alpha(before, use), alpha(options, use));
 }
 
+// Models that come after the state to go on from are written again by a run of the length that they
+// are of. Another one would leave them, and the newest model is taken for a run's result.
+void Trainer::Impl::check_newer_models(std::int64_t from) const {
+  const std::optional<std::int64_t> newest = run.newest_model();
+  if (overwrite || !newest || *newest <= from) return;
+  const std::int64_t last = last_iteration(options);
+  const bool same = *newest <= last && (!resumed || resumed->iterations == options.iterations);
+  if (same) return;
+  throw UsageError(fmt::format(
+      "The run in {} has left a model of iteration {}, which one of {} iterations that goes on "
+      "from {} would not make again: give it the length that it had, choose another folder, or "
+      "drop what came after iteration {} by --overwrite",
+      run.path().string(), *newest, last, from, from));
+}
+
 // All ranks read the same state, before one of them writes into the folder again.
 void Trainer::Impl::resume(const std::filesystem::path& source) {
   take_up(source);
@@ -127,11 +152,15 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
   const bool own = source == "latest";
   const std::filesystem::path place = own ? run.path() : source;
   if (own && list_checkpoints(place).empty()) {
+    check_newer_models(0);
     spdlog::info("{} holds no checkpoint yet: the run starts anew", place.string());
     continues = true;
     return;
   }
-  const FolderUse use(*this);
+  // Nobody else has a folder that is not there yet, and it is made when there is a state to go on
+  // from.
+  std::optional<FolderUse> use;
+  if (is_folder(run.path())) use.emplace(*this);
   const Checkpoint checkpoint = load_latest_checkpoint(place);
   if (checkpoint.seed != options.seed) {
     throw UsageError(fmt::format(
@@ -151,10 +180,10 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
         "earlier checkpoint",
         checkpoint.iteration, last_iteration(options)));
   }
-  const bool file = !std::filesystem::is_directory(place);
-  const std::filesystem::path folder = file ? place.parent_path().parent_path() : place;
+  const bool file = is_file(place);
+  const std::optional<std::filesystem::path> folder = run_folder_of(place);
   std::error_code error;
-  continues = std::filesystem::equivalent(folder.empty() ? "." : folder, run.path(), error);
+  continues = folder && std::filesystem::equivalent(*folder, run.path(), error);
   const std::vector<std::filesystem::path> files = list_checkpoints(run.path());
   if (continues && file && !overwrite && !files.empty() &&
       files.back() > checkpoint_path(run.path(), checkpoint.iteration)) {
@@ -163,6 +192,9 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
         "latest, choose another folder, or drop what came after iteration {} by --overwrite",
         run.path().string(), files.back().filename().string(), checkpoint.iteration));
   }
+  if (!checkpoint.config.empty()) resumed = parse_train_config(checkpoint.config);
+  if (continues) check_newer_models(checkpoint.iteration);
+  keep_joined(checkpoint);
   restore_state(context, checkpoint, options, gaussians, adam, density);
   restore_mean(checkpoint, options, gaussians, mean);
   const auto lows = checkpoint.sections.find("footprint");
@@ -186,18 +218,18 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
     tracer.sky()->set(coefficients);
   }
   // What the run began with, black in those of older versions.
-  if (options.background == "auto" && !checkpoint.config.empty())
-    options.background = parse_train_config(checkpoint.config).background;
+  if (options.background == "auto" && resumed) options.background = resumed->background;
   background = background_color(options, cut_out);
-  if (options.color_range == 0 && !checkpoint.config.empty())
-    options.color_range = parse_train_config(checkpoint.config).color_range;
+  if (options.color_range == 0 && resumed) options.color_range = resumed->color_range;
   if (options.color_range == 0) options.color_range = 1;  // of a version that had none
   guard.restore(
       {checkpoint.bad_steps_in_a_row, checkpoint.bad_steps, false, checkpoint.capped_rays});
   reported_bad_steps = checkpoint.bad_steps;
   traced_rays = checkpoint.traced_rays;
+  skipped_before = checkpoint.skipped_updates;
   iteration = checkpoint.iteration;
-  training.set(recorded_seconds(folder, iteration));
+  pass_due = checkpoint.pass_due;
+  if (folder) training.set(recorded_seconds(*folder, iteration));
   started = true;
   whole = true;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "run/former_metrics.hpp"
 #include "run/train_config.hpp"
 #include "scene/gaussian_selection.hpp"
 #include "scene/morton_order.hpp"
@@ -11,6 +12,7 @@
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/file_kind.hpp"
 #include "util/number_text.hpp"
 
 namespace raysplats {
@@ -32,7 +34,7 @@ std::vector<std::size_t> evenly_spread(const std::vector<std::size_t>& all, std:
   return out;
 }
 
-// Of poses that are wrong, as a rule.
+// Warns of cameras far from all others; as a rule their poses are wrong.
 void warn_of_strays(std::span<const Camera> cameras) {
   const std::vector<std::size_t> strays = stray_cameras(cameras);
   if (strays.empty()) return;
@@ -72,7 +74,7 @@ std::vector<SmallPhoto> Trainer::Impl::reduced_photos(std::span<const std::size_
   return out;
 }
 
-// Those that a run may look at from its beginning.
+// Training views that may be looked at from the beginning: all but the validation views.
 std::vector<std::size_t> Trainer::Impl::first_views() const {
   std::vector<std::size_t> out;
   for (std::size_t i = 0; i < train_views.size(); ++i) {
@@ -130,14 +132,27 @@ std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {
   for (const Camera& camera : train_cameras) pixels += static_cast<double>(pixels_of(camera));
   pixels /= static_cast<double>(train_cameras.size());
   if (cut_out) pixels *= opaque_share(photos(PhotoChoice::kAll));
-  const MemoryDemand demand{fitted_limit(pixels, iterations),
-                            largest_photo(),
-                            train_views.size(),
-                            ray_views(),
-                            tracer.triangles(),
-                            photo_words()};
-  return std::max<std::size_t>(1,
-                               ranks.least(gaussians_that_fit(options, demand, context.device())));
+  const std::size_t fitting =
+      gaussians_that_fit(options, demand(fitted_limit(pixels, iterations)), context.device());
+  return std::max<std::size_t>(1, ranks.least(fitting));
+}
+
+// What a run of these photos wants to hold of the device with so many Gaussians.
+MemoryDemand Trainer::Impl::demand(std::size_t count) const {
+  return {count,
+          largest_photo(),
+          train_views.size(),
+          ray_views(),
+          tracer.triangles(),
+          photo_words(),
+          depths ? depths->maps() : 0};
+}
+
+// Refuses a run for which the device has too little memory, that has `count` Gaussians and may grow
+// to `most`.
+void Trainer::Impl::check_room(std::size_t count, std::size_t most) const {
+  const bool grows = density.accumulates_at(iteration);
+  check_memory(options, demand(grows ? std::max(count, most) : count), context.device());
 }
 
 std::size_t Trainer::Impl::largest_photo() const {
@@ -146,7 +161,7 @@ std::size_t Trainer::Impl::largest_photo() const {
   return pixels;
 }
 
-// Of the photos with the most precise numbers.
+// 32-bit words per pixel of the most precise photo.
 std::size_t Trainer::Impl::photo_words() const {
   std::size_t words = 1;
   for (const std::size_t i : train_views) {
@@ -164,7 +179,8 @@ std::size_t Trainer::Impl::ray_views(int divisor) const {
       }));
 }
 
-// Those of depths are known in packets alone. Panoramas have none where they are small.
+// Refuses views without gradients of depths, which are known in packets alone. Panoramas have none
+// where they are small.
 void Trainer::Impl::require_depth_gradients() const {
   if (ray_views() > 0) {
     throw UsageError(
@@ -182,44 +198,65 @@ void Trainer::Impl::require_depth_gradients() const {
   }
 }
 
-// The first model on the device, with at most that many Gaussians.
-void Trainer::Impl::upload_start(std::size_t most) {
-  Gaussians model =
-      first_model
-          ? std::move(*first_model)
-          : initial_model(
-                dataset,
-                train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
-                most, options);
-  first_model.reset();
-  if (options.flat) face_cameras(model, train_cameras);
+// A model to start from, with at most that many Gaussians.
+Gaussians Trainer::Impl::new_model(std::size_t most) {
+  check_room(0, most);
+  Gaussians model = initial_model(
+      dataset, train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
+      most, options);
   if (model.size() == 0) {
     throw UsageError(options.bounds
                          ? "No Gaussian of the start lies within --bounds: give a larger box"
                          : "The first model has no Gaussians: use --init random");
   }
+  return model;
+}
+
+// Before the folder of a new run is made: what keeps the model from being made leaves none behind.
+// A folder that is there may be another run's, which is found out when it is locked.
+void Trainer::Impl::make_first_model() {
+  if (started || first_model || ranks.said_by(0, is_folder(run.path()))) return;
+  first_model = new_model(limit());
+}
+
+// The first model on the device, with at most that many Gaussians.
+void Trainer::Impl::upload_start(std::size_t most) {
+  Gaussians model = first_model ? std::move(*first_model) : new_model(most);
+  first_model.reset();
+  check_room(model.size(), most);
+  if (options.flat) face_cameras(model, train_cameras);
   gaussians = DeviceGaussians::upload(context, gathered(model, morton_order(model.means)),
                                       options.scale_activation);
   adam.initialize(gaussians.count, gaussians.sh_degree);
   footprint.update(gaussians);
 }
 
-// Makes the first model, unless resume() has brought one.
+// What the run has said of itself before resume(), once: what this object says later is in the
+// folder as well.
+void Trainer::Impl::take_over_metrics() {
+  if (former) return;
+  former = run.former_metrics();
+  evaluating.set(former_number(*former, "evaluation_seconds"));
+  const TrainOptions& before = resumed ? *resumed : options;
+  for (const TrainRow& row : run.former_rows()) {
+    last_loss = row.loss;
+    rise.note(order.at(row.iteration * options.views_per_step - 1),
+              resolution_divisor(before, row.iteration - 1), row.psnr);
+  }
+}
+
+// Makes the first model, unless resume() has brought one. What another run left in the folder is
+// removed when nothing refuses this one any more.
 void Trainer::Impl::start() {
   if (!continues && !overwrite && ranks.leads()) check_no_run(run.path());
   const std::size_t most = limit();
   density.set_limit(most);
   if (started) {
-    if (overwrite) run.remove_after(continues ? iteration : 0);
-    run.begin_metrics(iteration);
+    check_room(gaussians.count, most);
   } else {
     upload_start(most);
     choose_background();
     choose_color_range();
-    if (overwrite) run.remove_after(0);
-    run.begin_metrics(0);
-    started = true;
-    whole = true;
   }
   small_photos.clear();
   warn_of_strays(train_cameras);
@@ -237,11 +274,6 @@ void Trainer::Impl::start() {
   }
   if (test_views.empty())
     spdlog::info("no view is held out, so nothing is measured: --test-every 8 does");
-  const bool grows = density.accumulates_at(iteration);
-  check_memory(options,
-               {grows ? std::max(gaussians.count, most) : gaussians.count, largest_photo(),
-                train_views.size(), ray_views(), tracer.triangles(), photo_words()},
-               context.device());
   if (const std::size_t by_rays = ray_views(); by_rays > 0) {
     spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),
                  !options.mirrors.empty() ? "there are mirrors in the scene"
@@ -250,6 +282,13 @@ void Trainer::Impl::start() {
                      : "as tuned for the device, or their cameras have no tiles");
   }
   check_alike();
+  started = whole = true;
+  if (overwrite) {
+    run.remove_after(continues ? iteration : 0);
+    ranks.barrier();  // nobody reads what another run has said
+  }
+  run.begin_metrics(iteration);
+  take_over_metrics();
   run.write_config(options);
   run.write_cameras(train_cameras);
   // From here on what is in the folder is of this run.

@@ -48,7 +48,7 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
     exposure->backward(image_gradient, view, camera.width, camera.height);
   }
   if (depths) {
-    depths->backward(view, camera.width, camera.height, tracer.image(), tracer.depth(), photo,
+    depths->backward({view, camera.width, camera.height}, tracer.image(), tracer.depth(), photo,
                      image_gradient);
   }
   tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr,
@@ -112,34 +112,34 @@ void Trainer::Impl::enqueue_step() {
   ++iteration;
   whole = true;
   stepped = true;
+  pass_due = density.acts_at(iteration);
 }
 
-// What happens between this step and the next one: density control.
+// What happens between this step and the next one: density control. Where it is due all steps up to
+// here are done before it, so that none of them is made again behind it.
 void Trainer::Impl::control_density() {
-  // Means move on after the last pass, and with them the least sizes.
-  if (density.idles_at(iteration)) {
-    settle();
-    footprint.update(gaussians);
-  }
-  const bool refines = density.refines_at(iteration);
-  const bool resets = density.resets_at(iteration);
-  if (!refines && !resets) return;
+  if (!pass_due) return;
   settle();
-  check_guard();
-  whole = false;
-  mean.restart(iteration);
-  if (refines) {
-    check_alike();
-    const DensityPlan plan = density.refine(gaussians, iteration);
-    follow_plan(plan);
-    spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",
-                  iteration, plan.cloned, plan.split, plan.pruned, plan.refused, gaussians.count);
+  // Means move on after the last pass, and with them the least sizes.
+  if (density.idles_at(iteration)) footprint.update(gaussians);
+  if (density.changes_at(iteration)) {
+    check_guard();
+    whole = false;
+    mean.restart(iteration);
+    if (density.refines_at(iteration)) {
+      check_alike();
+      const DensityPlan plan = density.refine(gaussians, iteration);
+      follow_plan(plan);
+      spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",
+                    iteration, plan.cloned, plan.split, plan.pruned, plan.refused, gaussians.count);
+    }
+    if (density.resets_at(iteration)) {
+      density.reset_opacities(gaussians);
+      adam.reset(ParameterGroup::kOpacities);
+    }
+    whole = true;
   }
-  if (resets) {
-    density.reset_opacities(gaussians);
-    adam.reset(ParameterGroup::kOpacities);
-  }
-  whole = true;
+  pass_due = false;
 }
 
 // Optimiser and least sizes follow the new set of Gaussians.

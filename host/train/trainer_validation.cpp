@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "raysplats/evaluation.hpp"
+#include "run/train_config.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {
@@ -27,31 +28,78 @@ bool is_scheduled(const TrainOptions& options, std::int64_t iteration) {
 
 }  // namespace
 
-// Traces the validation views at full size. The model is kept while it is the best so far.
+// The last one before the validation views are trained on too.
+std::int64_t Trainer::Impl::join_iteration() const {
+  return joined.value_or(validation_end(options));
+}
+
+// Those that steps are passes over. The views that join at the end of a run as it was planned come
+// when passes are over.
+std::size_t Trainer::Impl::loss_views() const {
+  return joined ? train_views.size() : train_views.size() - apart.size();
+}
+
+// A model that was trained on the views knows them: in a run that goes on for longer than it was
+// to, they cannot judge again.
+void Trainer::Impl::keep_joined(const Checkpoint& checkpoint) {
+  joined.reset();
+  if (apart.empty()) return;
+  const std::int64_t planned = checkpoint.views_joined > 0 || checkpoint.config.empty()
+                                   ? checkpoint.views_joined
+                                   : validation_end(parse_train_config(checkpoint.config));
+  const bool trained_on = planned > 0 && checkpoint.iteration > planned;
+  if (trained_on && planned < validation_end(options)) {
+    joined = planned;
+    spdlog::warn(
+        "the run was to be shorter, and its {} validation views have been trained on since "
+        "iteration {}: they stay in the loss and judge no more; a new run of this length would be "
+        "judged up to nine tenths of it",
+        apart.size(), planned);
+  }
+  const std::size_t limit = density.limit();
+  follow_options();
+  density.set_limit(limit);
+}
+
+bool Trainer::Impl::judges() const { return !joined && validates_at(options, iteration); }
+
+// Whether this iteration has been.
+bool Trainer::Impl::judged() const {
+  const std::vector<EvaluationRow>& rows = run.validations();
+  return !rows.empty() && rows.back().iteration == iteration;
+}
+
+// Traces the validation views at full size. The model is kept while it is the best so far. Nothing
+// told exposure and pose of photos that were not trained on, so neither counts where it is found
+// for the others: the better a model, the more an error of a pose would cost it.
 void Trainer::Impl::judge() {
   evaluating.start();
-  Dataset judged = dataset;
-  judged.views.clear();
+  Dataset validation = dataset;
+  validation.views.clear();
   for (const std::size_t i : apart) {
-    judged.views.push_back(dataset.views[train_views[i]]);
-    judged.views.back().test = true;
+    validation.views.push_back(dataset.views[train_views[i]]);
+    validation.views.back().test = true;
   }
   set_background();
-  const auto render = [this](const Camera& camera) {
-    tracer.forward(shown(), camera);
+  DeviceGaussians room;
+  const DeviceGaussians& model = measured(room);
+  const auto render = [&](const Camera& camera) {
+    tracer.forward(model, camera);
     return tracer.download_image();
   };
   EvaluationOptions choice;
   choice.ranks = &ranks;
+  choice.align = options.poses;
+  choice.align_colors = exposure.has_value();
   const EvaluationReport report =
-      raysplats::evaluate(render, judged, Split::kTest, background, {}, choice);
-  // Nothing told the exposure of photos that were not trained on.
-  const double psnr = exposure ? report.mean.psnr_corrected : report.mean.psnr;
+      raysplats::evaluate(render, validation, Split::kTest, background, {}, choice);
+  const double psnr =
+      report.mean.psnr_aligned.value_or(exposure ? report.mean.psnr_corrected : report.mean.psnr);
   const std::vector<EvaluationRow>& rows = run.validations();
   std::int64_t former = 0;
   if (!rows.empty()) former = best_of(rows).iteration;
   run.record_validation({iteration, training.seconds(), psnr, report.mean.ssim,
-                         report.images.size(), gaussians.count, report.mean.psnr_corrected,
+                         report.images.size(), model.count, report.mean.psnr_corrected,
                          report.mean.psnr_all, report.mean.psnr_aligned});
   if (best_of(rows).iteration == iteration) {
     save_model();
@@ -59,8 +107,9 @@ void Trainer::Impl::judge() {
   }
   write_metrics(false);
   evaluating.stop();
-  spdlog::info("iteration {}: PSNR {:.2f} dB over {} validation views", iteration, psnr,
-               report.images.size());
+  spdlog::info("iteration {}: PSNR {:.2f} dB over {} validation views{}{}", iteration, psnr,
+               report.images.size(), options.poses ? ", each from where it fits its photo" : "",
+               exposure ? ", in its photo's colours" : "");
 }
 
 bool Trainer::Impl::out_of_patience() const {

@@ -33,7 +33,8 @@ bool is_temporary_name(const std::string& name) {
   return name.find_first_not_of("0123456789", dot + 1) == mark;
 }
 
-// What a link leads to, so that the link stays. A device or pipe would become a plain file.
+// What a link leads to, so that the link stays. A device or pipe would become a plain file, and a
+// folder stays where it is: better said before anything is computed.
 std::filesystem::path real_target(std::filesystem::path target) {
   constexpr int kMostLinks = 16;  // one after the other; a ring of them is no file
   std::error_code error;
@@ -44,6 +45,10 @@ std::filesystem::path real_target(std::filesystem::path target) {
     throw DataError(
         fmt::format("{} is a device or a pipe: give the name of a file", target.string()));
   }
+  if (std::filesystem::is_directory(status))
+    throw DataError(fmt::format("{} is a folder: give the name of a file", target.string()));
+  if (!target.has_filename())
+    throw DataError(fmt::format("'{}' names no file: give the name of one", target.string()));
   return target;
 }
 
@@ -91,6 +96,20 @@ void AtomicFile::write(const void* data, std::size_t bytes) {
   }
 }
 
+void AtomicFile::write_at(std::uint64_t offset, const void* data, std::size_t bytes) {
+  const char* next = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t written = ::pwrite(descriptor_, next, bytes, static_cast<off_t>(offset));
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      fail("be written");
+    }
+    next += written;
+    offset += static_cast<std::uint64_t>(written);
+    bytes -= static_cast<std::size_t>(written);
+  }
+}
+
 void AtomicFile::commit() {
   if (::fsync(descriptor_) != 0) fail("be synced");
   const int descriptor = descriptor_;
@@ -99,6 +118,21 @@ void AtomicFile::commit() {
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("be renamed into place");
   committed_ = true;
   for (const std::filesystem::path& folder : synced_folders_) sync_folder(folder);
+}
+
+void check_output_file(const std::filesystem::path& path,
+                       bool overwrite,
+                       std::initializer_list<std::filesystem::path> inputs) {
+  const std::filesystem::path target = real_target(path);
+  std::error_code error;
+  for (const std::filesystem::path& input : inputs) {
+    if (!std::filesystem::equivalent(target, input, error)) continue;
+    throw UsageError(fmt::format("{} is what is read: give another file to write", path.string()));
+  }
+  if (!overwrite && std::filesystem::exists(target, error)) {
+    throw UsageError(
+        fmt::format("{} is there already: give another name, or --overwrite", path.string()));
+  }
 }
 
 std::size_t remove_stale_temporaries(const std::filesystem::path& folder) {

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <string_view>
 #include <vector>
 
@@ -13,8 +15,8 @@ namespace raysplats {
 /// A file that appears whole or not at all: everything goes to a temporary name in the same folder,
 /// commit() syncs and renames it over the target. Without commit() the temporary file is removed
 /// and the target keeps its old content. Of a link the file that it leads to is written. Failures
-/// throw DataError with the path and the system's reason (disk full, permissions), devices and
-/// pipes too.
+/// throw DataError with the path and the system's reason (disk full, permissions), devices, pipes
+/// and folders too.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path target);
@@ -26,6 +28,8 @@ class AtomicFile {
   const std::filesystem::path& temporary() const { return temporary_; }
   void write(const void* data, std::size_t bytes);
   void write(std::string_view text) { write(text.data(), text.size()); }
+  /// Replaces what was written from byte `offset` on; write() goes on behind the last of its own.
+  void write_at(std::uint64_t offset, const void* data, std::size_t bytes);
   void commit();
 
  private:
@@ -36,6 +40,13 @@ class AtomicFile {
   int descriptor_ = -1;
   bool committed_ = false;
 };
+
+/// Refuses a file to write that somebody has named, before what it is for is computed: UsageError
+/// where it is one of `inputs`, which are read, or is there already without `overwrite`; DataError
+/// where AtomicFile could not take its place.
+void check_output_file(const std::filesystem::path& path,
+                       bool overwrite,
+                       std::initializer_list<std::filesystem::path> inputs = {});
 
 /// Removes the temporary files that processes which were killed left in `folder` and below. Only
 /// for folders that no other process writes to. Returns how many there were.

@@ -6,23 +6,44 @@
 
 #include <cerrno>
 #include <cstring>
+#include <string>
 #include <system_error>
 
 #include "raysplats/error.hpp"
 
 namespace raysplats {
+namespace {
+
+[[noreturn]] void refuse(const std::filesystem::path& path,
+                         const char* what,
+                         const std::string& reason) {
+  throw DataError(fmt::format("The output folder {} cannot be {} ({}): choose another",
+                              path.string(), what, reason));
+}
+
+std::string message_of(std::errc code) { return std::make_error_code(code).message(); }
+
+}  // namespace
 
 void make_output_directory(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (error || !std::filesystem::is_directory(path, error)) {
-    throw DataError(fmt::format("The output folder {} cannot be created ({}): choose another",
-                                path.string(), error ? error.message() : "a file is in the way"));
-  }
-  if (::access(path.c_str(), W_OK | X_OK) != 0) {
-    throw DataError(fmt::format("The output folder {} cannot be written to ({}): choose another",
-                                path.string(), std::strerror(errno)));
-  }
+  if (error || !std::filesystem::is_directory(path, error))
+    refuse(path, "created", error ? error.message() : "a file is in the way");
+  if (::access(path.c_str(), W_OK | X_OK) != 0) refuse(path, "written to", std::strerror(errno));
+}
+
+void check_output_directory(const std::filesystem::path& path) {
+  if (path.empty()) refuse(path, "created", message_of(std::errc::invalid_argument));
+  std::error_code error;
+  std::filesystem::path place = path;  // the part of it that is there
+  while (!place.empty() && !std::filesystem::exists(place, error)) place = place.parent_path();
+  const bool whole = place == path;
+  if (place.empty()) place = ".";
+  if (!std::filesystem::is_directory(place, error))
+    refuse(path, "created", message_of(std::errc::not_a_directory));
+  if (::access(place.c_str(), W_OK | X_OK) != 0)
+    refuse(path, whole ? "written to" : "created", std::strerror(errno));
 }
 
 }  // namespace raysplats

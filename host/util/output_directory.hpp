@@ -9,4 +9,8 @@ namespace raysplats {
 /// when needed. Throws DataError with the system's reason.
 void make_output_directory(const std::filesystem::path& path);
 
+/// Throws what make_output_directory() would for `path`, as far as that is known beforehand; makes
+/// nothing.
+void check_output_directory(const std::filesystem::path& path);
+
 }  // namespace raysplats

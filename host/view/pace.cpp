@@ -13,13 +13,13 @@ constexpr double kLeastHeight = 48.0;
 constexpr double kMostChange = 1.6;
 /// Differences that are left alone: sizes that flicker look worse than ones that are a bit off.
 constexpr double kTolerance = 1.15;
-/// Of the weight of a picture that the one before it has.
+/// Weight of a picture, as a share of that of the next one.
 constexpr double kMemory = 0.85;
-/// Of their mean, by which sizes have to vary to tell what any picture takes.
+/// How much sizes have to vary, as a share of their mean, to tell what any picture takes.
 constexpr double kSpread = 0.1;
-/// Of the time of a picture; more than that is noise.
+/// What any picture takes, at most, as a share of its time; more than that is noise.
 constexpr double kMostFixed = 0.8;
-/// Of the time, what the pixels have at least.
+/// What the pixels have of the time at least, as a share.
 constexpr double kLeastShare = 0.5;
 
 }  // namespace

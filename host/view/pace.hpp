@@ -23,7 +23,8 @@ class Pace {
   double seconds_;
   double pixels_ = 320.0 * 240.0;
   double fixed_ = 0.0;  // seconds that any picture takes
-  // Of the last pictures, older ones counting less: number, pixels, squares, seconds, products.
+  // Sums over the last pictures, older ones counting less: number, pixels, squares, seconds,
+  // products.
   double number_ = 0, sum_pixels_ = 0, sum_squares_ = 0, sum_seconds_ = 0, sum_products_ = 0;
 };
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "render/frame_writer.hpp"
+#include "render/previews.hpp"
 #include "scene/pixel_places.hpp"
 
 namespace raysplats::view {

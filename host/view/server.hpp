@@ -54,8 +54,8 @@ class Server {
 
   /// The addresses to open, with the token: one, or those of all interfaces when it listens on all.
   std::vector<std::string> urls() const;
-  /// From any thread. A picture replaces the one that still waits, one that is to be kept only
-  /// another such one; texts wait in line.
+  /// May be called from any thread, as send_text(). A picture replaces the one that still waits,
+  /// one that is to be kept only another such one; texts wait in line.
   void send_picture(ClientId client, std::vector<std::byte> bytes, bool kept = false);
   void send_text(ClientId client, std::string text);
   /// Waits up to `seconds` until the texts and the pictures to be kept that were sent are on their

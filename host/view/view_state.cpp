@@ -32,7 +32,8 @@ Json pose_json(const Camera& camera) {
   return out;
 }
 
-/// Of the picture's height. Lenses without a focal length that says it get the page's largest.
+/// The angle of view along the picture's height, in degrees. Lenses without a focal length that
+/// says it get the page's largest.
 double vertical_fov(const Camera& camera) {
   const bool angle = camera.model == CameraModel::kPinhole ||
                      camera.model == CameraModel::kOpenCv || camera.model == CameraModel::kFisheye;

@@ -12,14 +12,17 @@ namespace raysplats {
 /// For kFisheye: polynomial k1..k4 of the angle (Kannala and Brandt 2006), p1 and p2 unused.
 struct Distortion {
   double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0, k4 = 0;
+  /// Whether there is any distortion.
   bool any() const { return k1 != 0 || k2 != 0 || k3 != 0 || k4 != 0 || p1 != 0 || p2 != 0; }
 };
 
+/// A lens of kPhotoLens; its type is of the library itself.
 struct PhotoLens;
 
-/// How pixels become rays. The packet tracer (CameraTracer) knows kPinhole alone.
+/// How pixels become rays. Central cameras are traced in packets, through tiles on the faces of a
+/// cube where they are no pinholes; kOrthographic ray by ray.
 enum class CameraModel {
-  kPinhole,
+  kPinhole,          ///< no distortion
   kOpenCv,           ///< pinhole with radial and tangential distortion
   kFisheye,          ///< equidistant with a polynomial of the angle (KB4, OPENCV_FISHEYE)
   kEquirectangular,  ///< 360 degrees across, 180 down; fx, fy, cx, cy unused
@@ -33,15 +36,16 @@ enum class CameraModel {
 struct Camera {
   std::string
       name;  ///< image name the view belongs to, with its folder, without meaning to the tracer
-  int width = 0;
-  int height = 0;
-  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
+  int width = 0;                          ///< pixels
+  int height = 0;                         ///< pixels
+  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< focal lengths and principal point, pixels
   glm::dmat3 rotation{1.0};               ///< world to camera
   glm::dvec3 translation{0.0};            ///< world to camera: x_cam = rotation * x + translation
   CameraModel model = CameraModel::kPinhole;
   Distortion distortion;                  ///< of kOpenCv and kFisheye
   std::shared_ptr<const PhotoLens> lens;  ///< of kPhotoLens, which is not without one
 
+  /// Where the camera stands, world units.
   glm::dvec3 center() const { return -(glm::transpose(rotation) * translation); }
 };
 
@@ -54,7 +58,7 @@ Camera downscaled(const Camera& camera, double factor);
 Camera moved(const Camera& camera, const glm::dvec3& turn, const glm::dvec3& shift);
 
 /// A camera at `eye` that looks at `target`; `up` is the world direction that points up in the
-/// image.
+/// image, `focal` the focal length in pixels. The principal point is the middle of the picture.
 Camera look_at(const glm::dvec3& eye,
                const glm::dvec3& target,
                const glm::dvec3& up,

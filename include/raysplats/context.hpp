@@ -20,6 +20,7 @@ class FaultInjection;
 class Kernel;
 class Profiler;
 
+/// How a context works on its device.
 struct ContextOptions {
   bool profile = false;          ///< time every launch by device events
   bool keep_launches = false;    ///< with profile: also keep each time for take_launches()
@@ -43,8 +44,8 @@ struct ContextOptions {
 /// and "(copy)".
 struct LaunchTime {
   std::string program;  ///< file below cl/
-  std::string kernel;
-  double seconds = 0;
+  std::string kernel;   ///< function in it
+  double seconds = 0;   ///< by the device's own clock
 };
 
 /// One device with an in-order queue and its compiled programs. Models and tracers are made with a
@@ -64,6 +65,7 @@ class Context {
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 
+  /// The device, with the tuning in use.
   const DeviceInfo& device() const;
   /// Replaces the tuning in use; tracers made later follow it.
   void set_tuning(const std::optional<DeviceTuning>& tuning);
@@ -82,13 +84,14 @@ class Context {
   /// Keeps other threads from using the context until the lock goes. A thread may lock it again.
   [[nodiscard]] std::unique_lock<std::recursive_mutex> lock() const;
 
-  /// With profile: calls and device time of every kernel so far, as a table; blocks.
+  /// Calls and device time of every kernel so far, as a table; blocks. With profile alone.
   std::string profile_table();
-  /// With keep_launches: what has run since the last call, in order; blocks. Else nothing.
+  /// What has run since the last call, in order; blocks. Nothing without keep_launches.
   std::vector<LaunchTime> take_launches();
 
-  /// Bytes in live buffers of this context, and the most there have been.
+  /// Bytes in live buffers of this context.
   std::size_t allocated_bytes() const;
+  /// The most there have been at a time.
   std::size_t peak_allocated_bytes() const;
 
   // What follows serves the library itself; its types are not installed.

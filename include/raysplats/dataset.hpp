@@ -14,7 +14,9 @@
 
 namespace raysplats {
 
+/// Whose layout of files a data set has.
 enum class DatasetKind { kColmap, kBlender, kNerfstudio, kLlff, kPolycam };
+/// Which views of a data set: those to train on, those held out, or both.
 enum class Split { kTrain, kTest, kAll };
 
 /// What a photo's mask says about the pixels that are black in it.
@@ -42,7 +44,7 @@ struct View {
   bool mask_cuts = false;   ///< what the mask leaves out is background (MaskUse::kCutout)
   Camera source_camera;     ///< of the photo on disk, with its lens
   int sample_bytes = 1;     ///< of a number in the photo on disk: 1, 2 or 4 (floats)
-  bool test = false;
+  bool test = false;        ///< held out
 };
 
 /// Sparse points of a COLMAP model or a PLY named by the data set.
@@ -51,22 +53,25 @@ struct PointCloud {
   std::vector<float> colors;                 ///< 3 N, in [0, 1]
   std::vector<std::uint32_t> track_lengths;  ///< N photos that show it, or empty
   std::vector<float> errors;                 ///< N reprojection errors in pixels, or empty
+  /// Number of points.
   std::size_t size() const { return positions.size() / 3; }
 };
 
 /// Photos, cameras and points of one scene. Images stay on disk until load_view_image().
 struct Dataset {
-  DatasetKind kind = DatasetKind::kColmap;
-  std::filesystem::path root;
-  std::vector<View> views;  ///< sorted by name within a split
-  PointCloud points;
+  DatasetKind kind = DatasetKind::kColmap;  ///< as found
+  std::filesystem::path root;               ///< the folder
+  std::vector<View> views;                  ///< sorted by name within a split
+  PointCloud points;                        ///< empty where the data set has none
   bool alpha_is_background = false;  ///< RGBA is composited over the background (AlphaUse, or
                                      ///< MaskUse::kCutout), else alpha is a mask
   std::array<double, 3> origin{};    ///< what was taken off all positions of the files
 
+  /// Positions in `views` of those of a split, in their order.
   std::vector<std::size_t> indices(Split split) const;
 };
 
+/// How a data set is read.
 struct DatasetOptions {
   double downscale = 1.0;  ///< COLMAP: images_N is used when it exists, the rest is resampled
   int test_every = 8;      ///< every n-th view of a data set without a split of its own; 0 = none
@@ -74,8 +79,8 @@ struct DatasetOptions {
   /// keep their pixels and their model. Other models cannot become pinholes without loss and keep
   /// theirs either way; lenses that no ray knows (kPhotoLens) are taken out either way.
   bool undistort = true;
-  MaskUse masks = MaskUse::kIgnore;
-  AlphaUse alpha = AlphaUse::kAuto;
+  MaskUse masks = MaskUse::kIgnore;  ///< what black in masks means
+  AlphaUse alpha = AlphaUse::kAuto;  ///< what transparent in photos means
   /// What is taken off all positions; none = 0, but a point near the cameras where the scene lies
   /// so far from the origin of its files (surveyed captures) that single precision would blur it.
   std::optional<std::array<double, 3>> origin;
@@ -94,7 +99,8 @@ Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& op
 /// premultiplied). Numbers of float files count within [0, 1].
 Image load_view_image(const View& view);
 
-/// A photo, and how much each of its pixels counts: a mask that is black everywhere is refused.
+/// A photo, and how much each of its pixels counts. Of one whose mask is black everywhere none
+/// does, unless the mask cuts out.
 struct ViewPicture {
   Image rgba;    ///< as load_view_image()
   Image weight;  ///< one channel in [0, 1], or empty where all count alike (!View::mask_apart)

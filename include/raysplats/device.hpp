@@ -9,6 +9,7 @@
 
 namespace raysplats {
 
+/// What OpenCL calls a device.
 enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
 
 /// How camera rays are traced on a device: the choices that change the speed and nothing else.
@@ -26,28 +27,29 @@ struct DeviceTuning {
 
 /// What one OpenCL device offers, queried once.
 struct DeviceInfo {
-  std::size_t index = 0;  ///< position in list_devices(), the number `--device` takes
-  std::string name;
-  std::string vendor;
-  std::string platform;
-  std::string platform_version;
+  std::size_t index = 0;         ///< position in list_devices(), the number `--device` takes
+  std::string name;              ///< as the driver calls it
+  std::string vendor;            ///< of the device
+  std::string platform;          ///< name of its OpenCL platform
+  std::string platform_version;  ///< OpenCL version string
   std::string version;           ///< OpenCL version string of the device
   std::string language_version;  ///< OpenCL C version string
-  std::string driver_version;
-  DeviceType type = DeviceType::kOther;
-  std::uint32_t compute_units = 0;
-  std::uint64_t global_memory = 0;   ///< bytes
-  std::uint64_t max_allocation = 0;  ///< bytes of the largest single buffer
-  std::uint64_t local_memory = 0;    ///< bytes per work-group
-  std::size_t max_work_group_size = 0;
+  std::string driver_version;    ///< in the driver's own form
+  DeviceType type = DeviceType::kOther;  ///< by OpenCL
+  std::uint32_t compute_units = 0;       ///< processors that run work-groups
+  std::uint64_t global_memory = 0;       ///< bytes
+  std::uint64_t max_allocation = 0;      ///< bytes of the largest single buffer
+  std::uint64_t local_memory = 0;        ///< bytes per work-group
+  std::size_t max_work_group_size = 0;   ///< work-items
   std::uint32_t float_vector_width = 1;  ///< native float lanes
-  bool has_fp64 = false;
-  bool has_int64_atomics = false;
-  bool has_float_atomics = false;  ///< additions in global memory, by cl_ext_float_atomics
-  bool has_subgroups = false;      ///< cl_khr_subgroups, or what became of it in OpenCL 2.1 and 3.0
+  bool has_fp64 = false;                 ///< double precision, which no kernel needs
+  bool has_int64_atomics = false;        ///< additions of 64-bit integers
+  bool has_float_atomics = false;        ///< additions in global memory, by cl_ext_float_atomics
+  bool has_subgroups = false;  ///< cl_khr_subgroups, or what became of it in OpenCL 2.1 and 3.0
   std::optional<DeviceTuning> tuning;  ///< of Context::device(): what `raysplats tune` found
   std::vector<std::string> problems;   ///< why the device cannot be used; empty when it can
 
+  /// Whether a context can be made of it.
   bool usable() const { return problems.empty(); }
 };
 

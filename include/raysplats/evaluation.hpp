@@ -19,27 +19,30 @@ class Communicator;
 
 /// Measures of one view, or their means over views.
 struct EvaluationMetrics {
-  std::string name;
-  double psnr = 0;  ///< decibels, over the pixels that are not masked out; at most 100
-  double ssim = 0;
-  /// The same after the affine colour (3 x 4) that brings the render closest to the photo: what is
+  std::string name;  ///< of the photo; "" of a mean
+  double psnr = 0;   ///< decibels, over the pixels that are not masked out; at most 100
+  double ssim = 0;   ///< at most 1, over the same pixels
+  /// psnr after the affine colour (3 x 4) that brings the render closest to the photo: what is
   /// left when exposure and white balance do not count.
   double psnr_corrected = 0;
   /// With EvaluationOptions::align, as psnr where the camera was turned and shifted to where its
-  /// picture comes closest to the photo: what is left when errors of poses do not count.
+  /// picture comes closest to the photo: what is left when errors of poses do not count. With
+  /// EvaluationOptions::align_colors as psnr_corrected there.
   std::optional<double> psnr_aligned;
   std::optional<double> psnr_all;  ///< over all pixels, when some are masked out
-  std::optional<double> lpips;     ///< when a network was given
+  /// When a network was given: of whole pictures, which are equal where pixels are masked out.
+  std::optional<double> lpips;
   std::string picture;             ///< its file in the output folder; empty when none was written
   std::array<double, 3> center{};  ///< of the camera, from Dataset::origin
-  /// Of the photo, to compare with others of the scene: the mean square of the Laplacian of its
-  /// brightness.
+  /// How sharp the photo is, to compare with others of the scene: the mean square of the Laplacian
+  /// of its brightness.
   double sharpness = 0;
 };
 
+/// The measures of a comparison.
 struct EvaluationReport {
-  EvaluationMetrics mean;
-  std::vector<EvaluationMetrics> images;
+  EvaluationMetrics mean;                 ///< over the views
+  std::vector<EvaluationMetrics> images;  ///< of each view, in the order of the data set
 
   /// One line per image and the mean, aligned.
   std::string table() const;
@@ -49,21 +52,26 @@ struct EvaluationReport {
   std::string json() const;
 };
 
+/// What evaluate() does beside comparing all views.
 struct EvaluationOptions {
   std::size_t max_views = 0;  ///< 0 = all; else so many, spread evenly over the split
   /// Side-by-side pictures at most; all when unset. Fewer than there are views show the worst, the
-  /// median and the best by PSNR, then the first ones, and are traced a second time.
+  /// median and the best by PSNR, then the first ones, and are traced a second time. Where that is
+  /// stopped, EvaluationMetrics::picture names none.
   std::optional<std::size_t> max_pictures;
-  Lpips* lpips = nullptr;  ///< not owned
+  Lpips* lpips = nullptr;  ///< for EvaluationMetrics::lpips; not owned
   /// Measure psnr_aligned too, which takes 10 to 60 pictures of each view. Not with `together`.
   bool align = false;
-  std::function<bool(std::size_t)> done =
-      {};  ///< hears the number of finished views, returns false to stop early
+  /// With `align`: pictures are compared in the colours that come closest to the photo, so that
+  /// psnr_aligned is as psnr_corrected where the camera was turned and shifted.
+  bool align_colors = false;
+  /// Called with the number of finished views; false stops.
+  std::function<bool(std::size_t finished)> done = {};
   /// Of the library itself; its type is not installed. With it every rank calls evaluate() and
   /// compares its share of the views; all get the whole report.
   Communicator* ranks = nullptr;
-  /// With them: every rank renders every view, and what `render` yields is a picture for the rank
-  /// that leads alone, which compares it. It is empty for all or none.
+  /// With `ranks`: every rank renders every view, and what `render` yields is a picture for the
+  /// rank that leads alone, which compares it. It is empty for all or none.
   bool together = false;
 };
 

@@ -18,6 +18,7 @@ struct Gaussians {
   std::vector<float> opacities;    ///< N, logit of the opacity
   std::vector<float> sh;           ///< N x coefficients x 3 (RGB innermost)
 
+  /// Number of Gaussians.
   std::size_t size() const { return opacities.size(); }
   /// Sets the number of Gaussians; new ones are zero apart from unit quaternions.
   void resize(std::size_t count);

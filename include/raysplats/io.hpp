@@ -15,16 +15,16 @@
 namespace raysplats {
 
 /// Axes of SPZ files: most hold those of the PLY that they were made from, the specification wants
-/// x right, y up, z back. Nothing in the file tells.
+/// x right, y up, z back. Files since 2026 may declare theirs, and version 4 as written here does.
 enum class SpzAxes { kPly, kRub };
 
 /// How files of models other than PLY are read and written.
 struct ModelEncoding {
+  /// Of SPZ files that are written, and of those read that declare none.
   SpzAxes spz_axes = SpzAxes::kPly;
   int spz_version = 3;  ///< to write: 3 or 4
-  /// Of a 3DGS PLY, .splat or glTF that is read (other formats hold only finite ones): whether
-  /// Gaussians with numbers that are not finite are left out, with a warning, or the file is
-  /// refused.
+  /// Whether Gaussians with numbers that are not finite are left out of a 3DGS PLY, .splat or glTF,
+  /// with a warning, or the file is refused. Other formats hold only finite ones.
   bool drop_nonfinite = false;
 };
 
@@ -46,9 +46,10 @@ void write_model(const std::filesystem::path& path,
 /// Reads a 3DGS PLY (binary of both byte orders or ASCII; SH degree 0..4; the 3D filter of
 /// Mip-Splatting goes into scales and opacities, infinite opacities and scales of 0 become the
 /// nearest finite ones with a warning, further properties are ignored) or a compressed one of
-/// PlayCanvas. Throws DataError with the byte offset for anything malformed, truncated or
-/// oversized, and for numbers that are not finite unless those Gaussians of a 3DGS PLY are to be
-/// left out.
+/// PlayCanvas. Positions that are doubles which floats would blur, as in the coordinates of a map,
+/// count from read_ply_origin(). Throws DataError with the byte offset for anything malformed,
+/// truncated or oversized, and for numbers that are not finite unless those Gaussians of a 3DGS PLY
+/// are to be left out.
 Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite = false);
 
 /// Writes an Inria-style binary little-endian 3DGS PLY atomically (temporary file, sync, rename).
@@ -65,13 +66,14 @@ void write_ply(const std::filesystem::path& path,
 /// TraceOptions has them; nothing for other files. Throws DataError for a value out of range.
 std::optional<TraceOptions> read_ply_options(const std::filesystem::path& path);
 
-/// The origin in the header of a PLY; 0 where it says none. Throws DataError for one that is no
-/// three numbers.
+/// From where the positions that read_ply() returns count: the origin in the header of a PLY, or of
+/// one without that holds doubles far from 0 the origin that reading takes off; else 0. Throws
+/// DataError for an origin that is no three numbers.
 std::array<double, 3> read_ply_origin(const std::filesystem::path& path);
 
 /// Reads PNG, JPEG, EXR, Radiance HDR, TIFF, WebP, BMP, GIF, TGA, HEIF or AVIF, of several pictures
-/// the first, as float; 1 to 4 channels as in the file
-/// (grey stays 1 channel).
+/// the first, as float; 1 to 4 channels as in the file (grey stays 1 channel). Throws DataError for
+/// a file that is none of these or damaged.
 Image read_image(const std::filesystem::path& path);
 
 /// What the numbers of a picture are: proportional to light, or display values (sRGB).

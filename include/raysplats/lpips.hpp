@@ -16,7 +16,8 @@ class Lpips {
   /// Whether this build can run networks.
   static bool available();
 
-  /// Throws UsageError in a build without OpenCV, DataError for a file that is no such network.
+  /// Throws UsageError in a build without OpenCV, DataError for a file that is no such network or
+  /// one that OpenCV would compute wrongly; scripts/quality/export_lpips.py writes a right one.
   explicit Lpips(const std::filesystem::path& network);
   ~Lpips();
   Lpips(Lpips&&) noexcept;

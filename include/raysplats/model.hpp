@@ -29,10 +29,13 @@ class Model {
   /// The parameters as they are; blocks.
   Gaussians download() const;
 
+  /// Number of Gaussians.
   std::size_t size() const;
+  /// 0 to 4.
   int sh_degree() const;
   /// Another number after every change, never the same twice in a context.
   std::uint64_t revision() const;
+  /// The context that it was made with.
   Context& context() const;
 
   /// Of the library itself; not installed.

@@ -13,20 +13,20 @@ namespace raysplats {
 
 /// An axis-aligned box; by default all space.
 struct CropBox {
-  glm::dvec3 low{-std::numeric_limits<double>::infinity()};
-  glm::dvec3 high{std::numeric_limits<double>::infinity()};
+  glm::dvec3 low{-std::numeric_limits<double>::infinity()};  ///< least x, y, z, world units
+  glm::dvec3 high{std::numeric_limits<double>::infinity()};  ///< greatest x, y, z
 };
 
 /// What `raysplats convert` changes of a model, in this order.
 struct ModelChanges {
   std::optional<double> min_opacity;  ///< 0 to 1: fainter Gaussians are left out
   std::optional<glm::dvec3> up;       ///< this direction becomes up, the -y of model files
-  double scale = 1.0;                 ///< above 0
+  double scale = 1.0;                 ///< factor of all lengths, above 0
   glm::dvec3 rotate_degrees{0.0};     ///< about the axes x, then y, then z
   glm::dvec3 translate{0.0};          ///< world units
   std::optional<CropBox> crop;        ///< in the coordinates of the result, borders included
-  /// Those of the greatest `contributions`; without these, by opacity times the area of the
-  /// ellipsoid's largest section, which is what they can give to pictures from anywhere.
+  /// Keeps the Gaussians of the greatest `contributions`; without these, by opacity times the area
+  /// of the ellipsoid's largest section, which is what they can give to pictures from anywhere.
   std::optional<std::size_t> max_gaussians;
   std::vector<double> contributions;  ///< of each Gaussian, as by raysplats::contributions()
   std::optional<int> sh_degree;       ///< 0 to 4: bands are dropped, or added as zero
@@ -35,6 +35,6 @@ struct ModelChanges {
 /// The model with these changes; what is left keeps its order, and harmonics turn as well. Throws
 /// UsageError for a number out of range, an `up` of length 0 and a box whose least is above its
 /// greatest, and for another number of contributions than of Gaussians.
-Gaussians changed(const Gaussians& model, const ModelChanges& changes);
+Gaussians changed(Gaussians model, const ModelChanges& changes);
 
 }  // namespace raysplats

@@ -26,7 +26,7 @@ class PathTracer {
  public:
   /// Rays of the last render().
   struct Statistics {
-    std::uint64_t camera_rays = 0;
+    std::uint64_t camera_rays = 0;     ///< through the pixels of the picture
     std::uint64_t continued_rays = 0;  ///< behind mirrors, glass, transparent and diffuse surfaces
     std::uint64_t shadow_rays = 0;     ///< from surfaces and Gaussians
     std::uint64_t capped_rays = 0;     ///< stopped because of TraceOptions::max_hits; where packets
@@ -84,7 +84,9 @@ class PathTracer {
   void set_share(std::size_t part, std::size_t parts);
   std::array<int, 2> rows() const;
 
+  /// Rays of the last render().
   Statistics statistics() const;
+  /// The context that it was made with.
   const Context& context() const;
 
  private:

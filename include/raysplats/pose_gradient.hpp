@@ -8,8 +8,8 @@ namespace raysplats {
 /// Gradient of a loss for the pose of a camera.
 struct PoseGradient {
   std::array<double, 3> center{};  ///< for moving the camera's centre along the axes of the world
-  /// For a small turn w about the centre, in camera axes and radians: rotation := exp([w]x) *
-  /// rotation of the world-to-camera matrix, the centre stays.
+  /// The gradient for a small turn w about the centre, in camera axes and radians: rotation :=
+  /// exp([w]x) * rotation of the world-to-camera matrix, the centre stays.
   std::array<double, 3> rotation{};
 };
 

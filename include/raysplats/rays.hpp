@@ -7,10 +7,10 @@ namespace raysplats {
 
 /// One ray o + t d, t in [t_min, t_max]; d need not be normalised, and every t is in units of |d|.
 struct Ray {
-  float origin[3];  ///< world units
-  float t_min;      ///< at least 0
-  float direction[3];
-  float t_max;
+  float origin[3];     ///< world units
+  float t_min;         ///< at least 0
+  float direction[3];  ///< of any length but 0
+  float t_max;         ///< at least t_min; infinity: without end
 };
 
 /// Direction in which a Gaussian's colour is evaluated for a ray.
@@ -37,8 +37,8 @@ struct RayGradient {
 
 /// Gradient of a loss for a ray itself; its ends t_min and t_max are constants.
 struct RaySlope {
-  float origin[3];
-  float direction[3];  ///< for the direction as it was given, of any length
+  float origin[3];     ///< dL/d(origin)
+  float direction[3];  ///< dL/d(direction) as it was given, of any length
 };
 
 }  // namespace raysplats

@@ -15,6 +15,7 @@
 
 namespace raysplats {
 
+/// Red, green and blue.
 using Rgb = std::array<float, 3>;
 
 /// Surface of a mesh. Colours are display values, as the Gaussians' are (docs/light.md).
@@ -26,9 +27,9 @@ struct Material {
     kTransparent,  ///< lit like diffuse with weight `opacity`; the ray goes straight on
     kEmissive,     ///< `emission` alone
   };
-  std::string name;
-  Kind kind = Kind::kDiffuse;
-  Rgb color{0.8f, 0.8f, 0.8f};
+  std::string name;             ///< for messages
+  Kind kind = Kind::kDiffuse;   ///< decides which of the others count
+  Rgb color{0.8f, 0.8f, 0.8f};  ///< of the surface, >= 0
   int texture = -1;             ///< multiplies `color`; index into the textures, -1 = none
   float specular = 0.0f;        ///< strength of the specular lobe of kDiffuse and kTransparent
   float roughness = 0.0f;       ///< in [0, 1]: of the mirror, or width of the specular lobe
@@ -58,59 +59,60 @@ struct Mesh {
 /// colour 1 at distance 1, or a directional light of colour 1, shows c.
 struct Light {
   enum class Kind {
-    kPoint,
-    kDirectional,
-    kSphere,  ///< soft shadows; with radius 0 a point
+    kPoint,        ///< falls with the square of the distance
+    kDirectional,  ///< from far away, the same everywhere
+    kSphere,       ///< soft shadows; with radius 0 a point
   };
-  Kind kind = Kind::kPoint;
-  std::array<float, 3> position{0, 0, 0};
+  Kind kind = Kind::kPoint;                  ///< decides which of the others count
+  std::array<float, 3> position{0, 0, 0};    ///< of kPoint and kSphere, world units
   std::array<float, 3> direction{0, -1, 0};  ///< in which a directional light shines
-  Rgb color{1, 1, 1};
-  float radius = 0.0f;
+  Rgb color{1, 1, 1};                        ///< times intensity, >= 0
+  float radius = 0.0f;                       ///< of kSphere, world units
 };
 
 /// What rays that leave the scene see.
 struct Environment {
-  Rgb color{0, 0, 0};  ///< constant, or factor of the image
-  Image equirect;      ///< 3 channels, any size; empty = `sky`, or constant
-  std::array<float, 3> up{0, 1, 0};
-  float rotation = 0.0f;  ///< degrees about `up`
-  SkyLight sky{};         ///< in world axes, turned by `rotation`; empty = constant
+  Rgb color{0, 0, 0};                ///< constant, or factor of the image
+  Image equirect;                    ///< 3 channels, any size; empty = `sky`, or constant
+  std::array<float, 3> up{0, 1, 0};  ///< where the top of the image is, in the world
+  float rotation = 0.0f;             ///< degrees about `up`, right-handed
+  SkyLight sky{};                    ///< in world axes, turned by `rotation`; empty = constant
 };
 
-/// Which shadows are cast; `strength` 0 switches all off, 1 is full darkness where no light comes.
+/// Which shadows are cast, and how dark.
 struct ShadowSettings {
-  bool mesh_on_mesh = true;
-  bool mesh_on_gaussians = true;
-  bool gaussians_on_mesh = true;
-  bool gaussians_on_gaussians = false;
-  float strength = 0.7f;
+  bool mesh_on_mesh = true;             ///< shadows of meshes on meshes
+  bool mesh_on_gaussians = true;        ///< shadows of meshes on Gaussians
+  bool gaussians_on_mesh = true;        ///< shadows of Gaussians on meshes
+  bool gaussians_on_gaussians = false;  ///< shadows of Gaussians on Gaussians
+  float strength = 0.7f;  ///< 0 switches all off, 1 is full darkness where no light comes
 };
 
+/// How a picture of a scene is made.
 struct RenderSettings {
   int samples = 1;                 ///< rays per pixel; above 1 they are spread over it
   int max_bounces = 8;             ///< surfaces that a path may meet
   float min_throughput = 0.0005f;  ///< a path that carries less ends; no pixel loses more by it
-  std::uint64_t seed = 0;
-  Rgb ambient{0.2f, 0.2f, 0.2f};  ///< light on diffuse surfaces besides lights and environment
-  bool indirect = false;          ///< diffuse surfaces gather light by rays instead of `ambient`
-  int light_samples = 4;          ///< shadow rays per sphere light, surface and sample
-  float aperture = 0.0f;          ///< radius of the lens in world units; 0 = everything is sharp
-  float focus_distance = 1.0f;    ///< depth of what is sharp
-  float bias = 0.0f;              ///< start of shadow rays from Gaussians; 0 = 1/1000 of their size
-  ShadowSettings shadows;
+  std::uint64_t seed = 0;          ///< of everything that is random
+  Rgb ambient{0.2f, 0.2f, 0.2f};   ///< light on diffuse surfaces besides lights and environment
+  bool indirect = false;           ///< diffuse surfaces gather light by rays instead of `ambient`
+  int light_samples = 4;           ///< shadow rays per sphere light, surface and sample
+  float aperture = 0.0f;           ///< radius of the lens in world units; 0 = everything is sharp
+  float focus_distance = 1.0f;     ///< depth of what is sharp, world units
+  float bias = 0.0f;       ///< start of shadow rays from Gaussians; 0 = 1/1000 of their size
+  ShadowSettings shadows;  ///< of meshes and Gaussians
 };
 
 /// Everything that PathTracer draws, in world units.
 struct Scene {
-  Gaussians gaussians;       ///< all models together
-  std::vector<Mesh> meshes;  ///< `materials` index the scene's
-  std::vector<Material> materials;
-  std::vector<Image> textures;  ///< 3 channels
-  std::vector<Light> lights;
-  Environment environment;
-  RenderSettings render;
-  TraceOptions trace;
+  Gaussians gaussians;              ///< all models together
+  std::vector<Mesh> meshes;         ///< `materials` index the scene's
+  std::vector<Material> materials;  ///< `texture` indexes the scene's
+  std::vector<Image> textures;      ///< 3 channels, display values
+  std::vector<Light> lights;        ///< beside `environment` and RenderSettings::ambient
+  Environment environment;          ///< behind everything
+  RenderSettings render;            ///< how the picture is made
+  TraceOptions trace;               ///< how rays meet Gaussians
 };
 
 }  // namespace raysplats

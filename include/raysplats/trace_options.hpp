@@ -32,7 +32,10 @@ enum class PacketForm {
 };
 
 /// Function from the trained scale parameter to the standard deviation.
-enum class ScaleActivation { kExp, kSigmoid };
+enum class ScaleActivation {
+  kExp,      ///< exponential (3DGS)
+  kSigmoid,  ///< 1 / (1 + exp(-x)), below 1 (the paper)
+};
 
 /// How the gradients that rays send to one Gaussian are added.
 enum class GradientSum {
@@ -50,30 +53,31 @@ enum class GradientSum {
 /// direction shows max(0, 0.5 + sum), as colours of Gaussians do.
 using SkyLight = std::vector<std::array<float, 3>>;
 
+/// Which Gaussians a ray meets, how it blends them, and how that is computed.
 struct TraceOptions {
   float quantile =
       11.3449f;  ///< Q: a ray meets a Gaussian when the squared whitened distance is <= Q
-  float min_transmittance = 1e-4f;  ///< a ray stops below this (epsilon_1)
-  int max_hits = 512;               ///< a ray stops after this many hits (K)
-  HitOrder hit_order = HitOrder::kEntry;
+  float min_transmittance = 1e-4f;        ///< a ray stops below this (epsilon_1)
+  int max_hits = 512;                     ///< a ray stops after this many hits (K)
+  HitOrder hit_order = HitOrder::kEntry;  ///< in which hits are blended
   bool adaptive_radius = false;  ///< Q shrinks where opacity * response would be below 1/255
   float near_depth =
       0.0f;  ///< Gaussians whose mean is nearer along the view axis are skipped; 0 = off
-  std::array<float, 3> background{0.0f, 0.0f, 0.0f};
+  std::array<float, 3> background{0.0f, 0.0f, 0.0f};  ///< colour behind everything
   SkyLight sky;  ///< behind everything in views of cameras, in place of `background`; empty: none
   Traversal traversal = Traversal::kAuto;  ///< of camera rays
   bool depth = false;  ///< camera rays also yield expected depth, median depth and hit count
-  PacketForm packet_form = PacketForm::kAuto;
+  PacketForm packet_form = PacketForm::kAuto;  ///< speed alone
   int packet_width = 0;  ///< rays of a packet: 1, 2, 4, 8, 16 in a vector, 8, 16, 32, 64 in a
                          ///< group; 0 = the device's own
-  GradientSum gradient_sum = GradientSum::kAuto;
-  bool deterministic = false;      ///< kAuto gives the same bits every time; on CPUs it always does
+  GradientSum gradient_sum = GradientSum::kAuto;  ///< of the backward pass
+  bool deterministic = false;  ///< kAuto gives the same bits every time; on CPUs it always does
   /// The derivative of a colour that is clamped at 0 is 0. With this, gradients that would raise it
   /// pass all the same: training needs them.
   bool raise_clamped = false;
-  double launch_budget_ms = -1.0;  ///< time of one launch; 0 = unbounded, -1 = the device's default
-  std::size_t memory_budget = 0;   ///< bytes for hit lists and private gradients; 0 = 1 GiB on
-                                   ///< CPUs, elsewhere a quarter of the memory, 1 to 4 GiB
+  double launch_budget_ms = -1.0;  ///< of one launch; 0 = unbounded, -1 = the device's default
+  std::size_t memory_budget = 0;   ///< bytes for hit lists and private gradients; 0 = a quarter
+                                   ///< of the device's memory, from 1 to 4 GiB
 };
 
 /// What models are trained with and shown by unless something else is said: the order of hits in

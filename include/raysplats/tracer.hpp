@@ -31,8 +31,8 @@ struct ViewGradients {
 
 /// Gradients of a loss over rays.
 struct RaysGradients {
-  Gaussians parameters;  ///< as in ViewGradients
-  std::vector<RaySlope> rays;
+  Gaussians parameters;        ///< as in ViewGradients
+  std::vector<RaySlope> rays;  ///< of each ray
 };
 
 /// Traces Gaussians, forward and backward: pictures of cameras of every model, and rays of your
@@ -63,9 +63,9 @@ class Tracer {
                const Camera& camera,
                bool differentiable = false,
                const std::function<bool(double share)>& within = {});
-  /// Of the last picture, with options.depth: expected depth, median depth and number of hits per
-  /// pixel. Depth is along the viewing axis for kPinhole, kOpenCv and kOrthographic, along the ray
-  /// for other models; 0 where nothing is. Throws UsageError without options.depth.
+  /// Expected depth, median depth and number of hits per pixel of the last picture, 3 channels.
+  /// Depth is along the viewing axis for kPinhole, kOpenCv and kOrthographic, along the ray for
+  /// other models; 0 where nothing is. Throws UsageError without options.depth.
   Image depth() const;
   /// Where the surfaces that a camera sees point to: 3 channels, the mean of the hits' normals
   /// weighted by what they show, times alpha, in world axes. The normal of a Gaussian is its
@@ -93,7 +93,9 @@ class Tracer {
 
   /// Rays of the last render() or trace() that stopped because of options.max_hits.
   std::uint64_t capped_rays() const;
+  /// The options that it was made with; background and sky as set since.
   const TraceOptions& options() const;
+  /// The context that it was made with.
   const Context& context() const;
   /// What is behind everything from the next render() or trace() on: a colour, or a sky in its
   /// place. Throws UsageError for a sky with mirrors, and for one whose coefficients are not those

@@ -21,12 +21,13 @@ class Communicator;
 struct DeviceGaussians;
 class RunWatcher;
 
+/// What a run has done.
 struct TrainSummary {
-  std::int64_t iterations = 0;
-  std::size_t gaussians = 0;
-  double loss = 0;              ///< of the last view reported
-  double training_seconds = 0;  ///< evaluation, files and compiling kernels excluded
-  double evaluation_seconds = 0;
+  std::int64_t iterations = 0;      ///< completed, those before resume() included
+  std::size_t gaussians = 0;        ///< of the model
+  double loss = 0;                  ///< of the last view reported
+  double training_seconds = 0;      ///< evaluation, files and compiling kernels excluded
+  double evaluation_seconds = 0;    ///< of the test views
   double kernel_build_seconds = 0;  ///< of the context so far
   std::vector<EvaluationRow>
       evaluations;  ///< the last one is that of the final model, when there are test views
@@ -34,22 +35,22 @@ struct TrainSummary {
 
 /// What a run will take, from steps that were timed.
 struct RunEstimate {
-  std::int64_t iterations = 0;
-  std::size_t gaussians = 0;  ///< at its end, if densification reaches its limit
-  double seconds = 0;         ///< of training, as TrainSummary::training_seconds
+  std::int64_t iterations = 0;  ///< of the whole run
+  std::size_t gaussians = 0;    ///< at its end, if densification reaches its limit
+  double seconds = 0;           ///< of training, as TrainSummary::training_seconds
 };
 
 /// Where a run is after a step.
 struct TrainProgress {
   std::int64_t iteration = 0;   ///< completed
   std::int64_t iterations = 0;  ///< of the whole run
-  std::size_t gaussians = 0;
+  std::size_t gaussians = 0;    ///< of the model now
 };
 
-/// The view that the last step was made with.
+/// Measures of the view that the last step was made with, before that step.
 struct TrainLoss {
-  double total = 0;
-  double psnr = 0;  ///< decibels
+  double total = 0;  ///< the whole loss
+  double psnr = 0;   ///< decibels
 };
 
 /// Trains a model of a data set and writes a run folder (Kerbl et al. 2023 with the gradients of
@@ -64,7 +65,8 @@ class Trainer {
   /// Throws UsageError for options that cannot be trained, ResourceError when the device has too
   /// little memory, DataError when the run folder cannot be written to. With `overwrite` the run
   /// takes the place of one that is in the folder, whose files are removed when training starts;
-  /// without, a folder that holds another run is refused then.
+  /// without, a folder that holds another run is refused then. Views whose masks ignore all of
+  /// their photos are left out with a warning; DataError where none to train on is left.
   ///
   /// `ranks`, which outlives the trainer, is of the library itself; its type is not installed. With
   /// it every rank makes a trainer of its own with the same arguments, and calls what trains,
@@ -81,8 +83,9 @@ class Trainer {
 
   /// Continues from the newest valid checkpoint of a run folder, or from a checkpoint file, instead
   /// of starting anew; "latest" is the run's own folder, and starts anew while that holds none.
-  /// Throws UsageError when it does not fit the options or was made with other data, DataError when
-  /// there is none that is whole or another run has the folder.
+  /// Throws UsageError when it does not fit the options or was made with other data, and without
+  /// `overwrite` when the run's folder holds later models of a run of another length; DataError
+  /// when there is none that is whole or another run has the folder.
   void resume(const std::filesystem::path& source);
 
   /// How long the run will take. Times steps of a small run of the same shape for about `seconds`
@@ -104,8 +107,8 @@ class Trainer {
   /// comes out as it is. Throws DataError when another run has the folder.
   TrainSummary run(bool show_progress = true);
 
-  /// At most `count` iterations more, without the evaluations and files of the schedule; returns
-  /// whether iterations are still to come. Throws UsageError for a count below 1, and what
+  /// Makes at most `count` iterations more, without the evaluations and files of the schedule;
+  /// returns whether iterations are still to come. Throws UsageError for a count below 1, and what
   /// run() throws for a model that is damaged.
   bool step(std::int64_t count = 1);
   /// The command line that started the run, which RUN/metrics.json is to name.
@@ -132,7 +135,7 @@ class Trainer {
   Gaussians model() const;
   /// Completed iterations.
   std::int64_t iteration() const;
-  /// Those of the whole run, as it is planned now.
+  /// Iterations of the whole run, as it is planned now.
   std::int64_t iterations() const;
 
   // What follows serves the library itself; its types are not installed.

@@ -99,6 +99,7 @@ fi
 
 run() { # program, row id, what to call it, bench options
   local result=$work/result.json
+  rm -f -- "$result" # of the row before; programs replace no file unasked
   if ! "${prefix[@]}" "$1" bench --filter "^$2\$" --json "$result" "${@:4}" >"$work/log" 2>&1; then
     printf 'ab.sh: %s fails in %s: %s\n' "$2" "$1" "$(tail -n 1 "$work/log")" >&2
     return 1

@@ -105,6 +105,7 @@ measure() {
 
 # measure_ours ARGUMENTS...: the same for our side alone, through raysplats bench.
 measure_ours() {
+  rm -f -- "$scratch/bench.json"
   "${prefix[@]}" "$build/bin/raysplats" --quiet bench --repeat "$repeat" "${device[@]}" \
     --min-transmittance 0.001 --json "$scratch/bench.json" "$@" >/dev/null
   python3 "$root/scripts/bench/peer_table.py" rows "$scratch/bench.json" | sed "s/^/$round,/" >>"$rows"

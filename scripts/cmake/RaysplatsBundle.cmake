@@ -22,7 +22,7 @@ foreach(target IN LISTS raysplats_bundled)
   target_compile_definitions(raysplats_bundle PUBLIC ${COMPILE_DEFINITIONS})
   target_compile_options(raysplats_bundle PUBLIC ${COMPILE_OPTIONS})
 endforeach()
-# tinygltf is given its files by callbacks and decodes no pictures.
+# tinygltf is given the JSON alone: it opens no files and decodes no pictures.
 target_compile_definitions(raysplats_bundle PUBLIC TINYGLTF_NO_STB_IMAGE TINYGLTF_NO_STB_IMAGE_WRITE)
 find_library(RAYSPLATS_ZSTD_ARCHIVE libzstd.a REQUIRED)
 find_library(RAYSPLATS_WEBP_ARCHIVE libwebp.a REQUIRED)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What else is made of the stored figures: the tables of kernels in docs/gpu.md (what each takes, and how many waves of it are
+"""What else is made of the stored figures: the tables of kernels in docs/gpu_compilers.md (what each takes, and how many waves of it are
 resident), and what the library's model of speed knows of its cards' kernels."""
 import os
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-DOCUMENT = os.path.join(ROOT, "docs", "gpu.md")
+DOCUMENT = os.path.join(ROOT, "docs", "gpu_compilers.md")
 SOURCE = os.path.join(ROOT, "host", "bench", "compiled_kernels.cpp")
 INTEL = ("dg2-g10", "tgllp")
 

@@ -115,6 +115,23 @@ TEST_CASE("a wrong configuration is exit code 2 with the nearest key") {
   check_refused({"train", folder / "data", "--ssim-weight", "2"}, 2, "ssim-weight");
 }
 
+TEST_CASE("a run that cannot begin leaves no folder") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  REQUIRE(raysplats_program(
+              {"generate", data, "--size", "8", "--train-views", "3", "--test-views", "1", "-q"})
+              .code == 0);
+  write_file(folder / "notes.txt", "mine");
+  write_file(folder / "notes.ply", "mine");
+  check_refused({"train", data, "--init", folder / "none.ply"}, 3, "none.ply");
+  check_refused({"train", data, "--init", folder / "notes.ply"}, 3, "notes.ply");
+  check_refused({"train", data, "--resume", folder / "notes.txt"}, 3,
+                "notes.txt is not a raysplats checkpoint");
+  check_refused({"train", data, "--resume", data}, 3, "holds no valid checkpoint");
+  // The sentence depends on whether the build has a viewer.
+  check_refused({"train", data, "--view", "--host", "WRONG"}, 2, "");
+}
+
 TEST_CASE("an output that cannot be written is exit code 3") {
   const TemporaryFolder folder;
   write_file(folder / "model.ply", ply_file(2));

@@ -50,8 +50,10 @@ TEST_CASE("bench lists its rows without running") {
 
 TEST_CASE("bench writes JSON and CSV that compare reads") {
   const TemporaryFolder folder;
-  const Outcome first = raysplats_program(
-      with(kTiny, {"--json", folder / "a.json", "--csv", folder / "a.csv", "--packet-width", "4"}));
+  write_file(folder / "a.json", "of before");
+  const Outcome first =
+      raysplats_program(with(kTiny, {"--json", folder / "a.json", "--csv", folder / "a.csv",
+                                     "--packet-width", "4", "--overwrite"}));
   INFO(first.err);
   REQUIRE(first.code == 0);
   CHECK(contains(first.out, "forward/random/1000"));

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../skip_test.hpp"
 #include "program.hpp"
 
 namespace {
@@ -60,10 +61,7 @@ TEST_CASE("bash completes commands, options, words of options and files") {
 }
 
 TEST_CASE("fish completes the same, where it is installed") {
-  if (!runs("command -v fish")) {
-    MESSAGE("skipped: no fish");
-    return;
-  }
+  SKIP_TEST_UNLESS(runs("command -v fish"), "there is no fish");
   const TemporaryFolder folder;
   write_file(folder / "a.fish", raysplats_program({"completion", "fish"}).out);
   write_file(folder / "garden.ply", "");
@@ -86,10 +84,7 @@ TEST_CASE("fish completes the same, where it is installed") {
 }
 
 TEST_CASE("zsh completes the same, where it is installed") {
-  if (!runs("command -v zsh")) {
-    MESSAGE("skipped: no zsh");
-    return;
-  }
+  SKIP_TEST_UNLESS(runs("command -v zsh"), "there is no zsh");
   const TemporaryFolder folder;
   write_file(folder / "functions/_raysplats", raysplats_program({"completion", "zsh"}).out);
   write_file(folder / "garden.ply", "");

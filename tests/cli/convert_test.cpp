@@ -80,7 +80,7 @@ TEST_CASE("convert writes every format, which every command reads again") {
       INFO(outcome.err);
       CHECK(outcome.code == 0);
     };
-    run("trace", {"--rays", folder / "rays.npy", "-o", folder / "traced.npz"});
+    run("trace", {"--rays", folder / "rays.npy", "-o", folder / "traced.npz", "--overwrite"});
     run("eval", {"--data", folder / "data", "-o", folder / "eval", "--overwrite"});
     run("render", {"--orbit", "1", "--width", "16", "-o", folder / "frames", "--overwrite"});
     const double psnr =
@@ -167,6 +167,16 @@ TEST_CASE("convert says in one sentence what it will not do") {
           "--crop-min");
   refused({"convert", balls, folder / "a.spz", "--crop", "1,1,1,0,0,0"}, 2, "swap them");
   refused({"convert", balls}, 2, "output");
+  refused({"convert", balls, folder / "far.ply", "--translate", "1e300,0,0"}, 2,
+          "Gaussian 0 would be moved to 1e+300, 0, 0");
+  for (const char* scale : {"1e300", "1e-300"})
+    refused({"convert", balls, folder / "far.ply", "--scale", scale}, 2, "scale is 1e-30 to 1e+30");
+  std::string broken = ply_file(1);
+  broken.replace(broken.size() - sizeof(float), sizeof(float), "\xff\xff\xff\x7f");
+  write_file(folder / "broken.ply", broken);
+  refused({"convert", folder / "broken.ply", folder / "far.ply", "--drop-nonfinite"}, 3,
+          "1 of 1 Gaussians have a number that is not finite");
+  CHECK_FALSE(std::filesystem::exists(folder / "far.ply"));
   write_file(folder / "notes.txt", "hello");
   refused({"convert", folder / "notes.txt", "-o", folder / "b.ply"}, 3, "no model that is known");
 }

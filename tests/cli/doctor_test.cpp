@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "../skip_test.hpp"
 #include "program.hpp"
 
 namespace {
@@ -55,7 +56,8 @@ TEST_CASE("doctor names a driver that cannot be loaded") {
 }
 
 TEST_CASE("doctor has no use for a device that is too small") {
-  if (!contains(raysplats_program({"devices"}).out, "Portable Computing Language")) return;
+  SKIP_TEST_UNLESS(contains(raysplats_program({"devices"}).out, "Portable Computing Language"),
+                   "there is no PoCL");
   const Outcome outcome = raysplats_program({"doctor"}, {{{"POCL_MAX_WORK_GROUP_SIZE", "16"}}});
   CHECK(outcome.code == 4);
   CHECK(contains(outcome.out, "not usable: its work-groups hold 16"));

@@ -117,6 +117,7 @@ const std::vector<std::pair<std::string, std::string>> kNotRun{
     {"scripts/figures.sh", "measures for minutes; the test 'figures' compares its parts with docs"},
     {"scripts/ablation.sh", "trains for minutes; its plots: tests/report/pages_test.py"},
     {"scripts/quality/few_photos.py", "needs a capture of COLMAP"},
+    {"scripts/quality/export_lpips.py", "needs PyTorch, and weights that it downloads"},
     {"raysplats train DATA --downscale D --test-every 4", "its numbers stand below it"},
     {"scripts/reliability/fuzz.sh", "needs a build by clang and 20 minutes"},
     {"build/release/bin/fuzz_seeds", "writes into the source tree"},
@@ -280,7 +281,9 @@ void run_command(const Place& place, Words words) {
   // Examples are alternatives: each finds the folders as a reader who tries it alone does.
   for (std::size_t i = 1; i < words.size(); ++i) {
     const bool fresh = words.at(0) != "train" || !has(words, "--resume");
-    if (words[i - 1] == "-o" && fresh) place.remove(words[i]);
+    const bool output =
+        words[i - 1] == "-o" || words[i - 1] == "--video" || words[i - 1] == "--report";
+    if (output && fresh) place.remove(words[i]);
   }
   if (words.at(0) == "generate") place.remove(words.at(1));
   // Its output may be its second word.

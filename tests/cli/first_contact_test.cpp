@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../skip_test.hpp"
 #include "program.hpp"
 
 namespace fs = std::filesystem;
@@ -202,6 +203,26 @@ TEST_CASE("eval leaves the run's own figures alone") {
   succeed({"eval", run, "--data", data(), "-o", run + "/eval", "-q"});
 }
 
+TEST_CASE("eval shows as many views as it is asked for, beside none of before") {
+  const TemporaryFolder folder;
+  write_file(folder / "model.ply", ply_file(2));
+  const std::string out = folder / "eval";
+  const auto eval = [&](const Words& more) {
+    return Words{"eval", folder / "model.ply", "--data", data(), "-o", out, "-q"} + more;
+  };
+  succeed(eval({"--pictures", "0"}));
+  CHECK(entries(out) == 1);  // metrics.json
+  succeed(eval({"--pictures", "1"}));
+  CHECK(entries(out) == 2);
+  const std::string before = content(out);
+  refuse(eval({"--pictures", "1"}), 2, "that would stay beside the new ones");
+  CHECK(content(out) == before);
+  succeed(eval({"--pictures", "9"}));  // of two views
+  CHECK(entries(out) == 3);
+  succeed(eval({}));
+  CHECK(entries(out) == 3);
+}
+
 TEST_CASE("fewer frames do not mix with more of before") {
   const TemporaryFolder folder;
   write_file(folder / "model.ply", ply_file(2));
@@ -299,7 +320,7 @@ TEST_CASE("closed standard streams harm no file") {
 TEST_CASE("results that cannot be written are a failure") {
   Surroundings full;
   full.out_file = "/dev/full";
-  if (!fs::exists(full.out_file)) return;
+  SKIP_TEST_UNLESS(fs::exists(full.out_file), "there is no /dev/full");
   for (const Words& words : {Words{"info", data()}, Words{"--help"}, Words{"--version"},
                              Words{"info", data(), "--json"}, Words{"train", "-h"}}) {
     const Outcome outcome = raysplats_program(words, full);
@@ -359,7 +380,7 @@ TEST_CASE("where no device is found the cause is named") {
                {"none.icd", "libnone_of_that_name.so"});
 
   const bool pocl = contains(raysplats_program(devices).out, "Portable Computing Language");
-  if (!pocl) return;
+  SKIP_TEST_UNLESS(pocl, "there is no PoCL, which the rest is about");
   for (const char* name : {"POCL_CACHE_DIR", "XDG_CACHE_HOME"}) {
     refuse_there({{{name, "/proc/none"}}}, devices, 4,
                  {"the folder /proc/none", name, "cannot be written"});

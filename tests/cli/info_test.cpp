@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 
 #include "program.hpp"
 #include "raysplats/io.hpp"
@@ -210,6 +211,27 @@ TEST_CASE("info says what it reads, and which models a folder without a run hold
   // One thing is no several things.
   write_file(folder / "wall.obj", "v 0 0 0\nv 2 0 0\nv 0 3 0\nf 1 2 3\n");
   CHECK(has(told(folder / "wall.obj"), "1 triangle, 3 vertices"));
+}
+
+TEST_CASE("info takes captures of LLFF and Polycam for data sets, also with a model beside them") {
+  const TemporaryFolder folder;
+  write_file(folder / "llff/fused.ply", ply_file(1));
+  write_npy(folder / "llff/poses_bounds.npy", "False", "(1, 17)",
+            {0, 1, 0, 0, 6, -1, 0, 0, 0, 8, 0, 0, 1, 4, 10, 1, 9});
+  write_file(folder / "polycam/keyframes/cameras/1.json",
+             R"({"t_00":1,"t_01":0,"t_02":0,"t_03":0,"t_10":0,"t_11":1,"t_12":0,"t_13":0,)"
+             R"("t_20":0,"t_21":0,"t_22":1,"t_23":4,"width":8,"height":6,"fx":10,"fy":10,)"
+             R"("cx":4,"cy":3})");
+  write_file(folder / "polycam/raw.glb", "a mesh of the app");
+  for (const char* photo : {"llff/images/1.png", "polycam/keyframes/images/1.png"})
+    raysplats::write_image(folder / photo, raysplats::Image(8, 6, 3, 0.5f));
+  for (const auto& [name, kind] : {std::pair{"llff", "LLFF"}, std::pair{"polycam", "Polycam"}}) {
+    CAPTURE(name);
+    const nlohmann::json json = json_of(folder / name);
+    CHECK(json.at("type") == "dataset");
+    CHECK(json.at("kind") == kind);
+    CHECK(json.at("views") == 1);
+  }
 }
 
 TEST_CASE("info describes the parts of captures, meshes and runs") {

@@ -178,13 +178,26 @@ TEST_CASE("masks that cannot belong to their photo are refused with their name")
   const TemporaryFolder folder;
   const std::string data = folder / "data";
   make_data(data);
-  add_mask(data, kSize, kSize, 0.0f);
-  check_refused(train(data, folder / "black", {"-q"}), 3, "mask.png is black everywhere");
   add_mask(data, kSize, kSize / 2, 1.0f);
   check_refused(train(data, folder / "shape", {"-q"}), 3, "mask.png has 16 x 8 pixels");
   // The same shape in another size is the photo's all the same.
   add_mask(data, 2 * kSize, 2 * kSize, 1.0f);
   check_trains(train(data, folder / "size"), "1 of 5 photos have a mask");
+}
+
+TEST_CASE("photos whose masks are black everywhere are left out, and are not all that there is") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  make_data(data);
+  add_mask(data, kSize, kSize, 0.0f);
+  const Outcome one = train(data, folder / "one");
+  check_trains(one, "warning: 1 of 5 photos are left out");
+  CHECK(contains(one.err, "mask.png"));
+  nlohmann::json json = training_file(data);
+  for (nlohmann::json& frame : json["frames"]) frame["mask_path"] = "mask.png";
+  write_file(data + "/transforms_train.json", json.dump());
+  check_refused(train(data, folder / "all", {"-q"}), 3,
+                "masks of all 4 training photos of " + data);
 }
 
 TEST_CASE("one or two photos are trained on, with a warning of what they leave open") {

@@ -205,8 +205,8 @@ TEST_CASE("masks beside the photos are shown") {
               {"generate", data, "--size", "8", "--train-views", "2", "--test-views", "1", "-q"})
               .code == 0);
   CHECK(raysplats_program({"info", data}).out.find("masks") == std::string::npos);
-  std::filesystem::create_directories(data + "/masks");
-  std::filesystem::copy_file(data + "/train/r_0.png", data + "/masks/r_0.png");
+  std::filesystem::create_directories(data + "/masks/train");
+  std::filesystem::copy_file(data + "/train/r_0.png", data + "/masks/train/r_0.png");
   const Outcome info = raysplats_program({"info", data});
   CHECK(info.out.find("masks            ") != std::string::npos);
   CHECK(info.err.find("have a mask, as ") != std::string::npos);

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "../skip_test.hpp"
 #include "io/colmap_model.hpp"
 #include "program.hpp"
 #include "raysplats/io.hpp"
@@ -406,10 +407,7 @@ TEST_CASE("the real FFmpeg keeps the colours of a video, in folders of any name"
       "format=gbrp,scale=out_color_matrix=bt709:flags=accurate_rnd -pix_fmt yuv420p "
       "-colorspace bt709 -color_primaries bt709 -color_trc bt709 -c:v mpeg4 -q:v 2 '" +
       clip + "'";
-  if (std::system(make.c_str()) != 0) {
-    MESSAGE("skipped: there is no ffmpeg that writes MPEG-4");
-    return;
-  }
+  SKIP_TEST_UNLESS(std::system(make.c_str()) == 0, "there is no ffmpeg that writes MPEG-4");
   const Outcome outcome = stage.run({clip, "-o", folder + "/data", "--frames", "3"});
   INFO(outcome.err);
   REQUIRE(outcome.code == 0);
@@ -483,15 +481,29 @@ TEST_CASE("prepare says in one sentence what is missing") {
   write_file(stage.path("mine/images/x.png"), "mine");
   refused(stage.run({stage.path("photos"), "-o", stage.path("mine")}), 3, "another folder");
   CHECK(read_file(stage.path("mine/images/x.png")) == "mine");
+  // Nor models and data sets of somebody else, runs, and the photos.
+  for (const std::string file : {"sparse/0/cameras.txt", "database.db", "transforms_train.json",
+                                 "point_cloud/iteration_1/point_cloud.ply"}) {
+    CAPTURE(file);
+    const std::string folder = stage.path("of " + file.substr(0, 5));
+    write_file(folder + "/" + file, "mine");
+    const Outcome outcome = stage.run({stage.path("photos"), "-o", folder});
+    INFO(outcome.err);
+    CHECK(outcome.code != 0);
+    CHECK(one_sentence(outcome));
+    CHECK(has(outcome.err, "another"));
+    CHECK(read_file(folder + "/" + file) == "mine");
+    CHECK(!fs::exists(folder + "/prepare"));
+  }
+  refused(stage.run({stage.path("photos"), "-o", stage.path("photos")}), 2, "is what is read");
+  CHECK(entries(stage.path("photos")) == 3);
 }
 
 // RAYSPLATS_TEST_DATA as in tests/unit/io/real_data_test.cpp. COLMAP takes minutes for the photos.
 TEST_CASE("the real COLMAP finds the poses of a capture, where both are there") {
   const char* data = std::getenv("RAYSPLATS_TEST_DATA");
-  if (data == nullptr || std::system("command -v colmap > /dev/null") != 0) {
-    MESSAGE("skipped: RAYSPLATS_TEST_DATA is not set, or there is no colmap");
-    return;
-  }
+  SKIP_TEST_UNLESS(data != nullptr && std::system("command -v colmap > /dev/null") == 0,
+                   "RAYSPLATS_TEST_DATA is not set, or there is no colmap");
   const fs::path capture = fs::path(data) / "colmap/fox_undistorted";
   const TemporaryFolder folder;
   const Outcome outcome =

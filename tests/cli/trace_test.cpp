@@ -46,6 +46,14 @@ TEST_CASE("rays of a file are traced into a file") {
   CHECK(alpha[0] == doctest::Approx(0.5).epsilon(1e-4));
   CHECK(alpha[1] == 0.0f);
 
+  // A camera could be near, a ray is where it says.
+  std::vector<std::string> near = arguments;
+  near.insert(near.end(), {"--near", "1", "--overwrite"});
+  const Outcome of_cameras = raysplats_program(near);
+  CHECK(of_cameras.code == 2);
+  CHECK(one_sentence(of_cameras));
+  CHECK(of_cameras.err.find("give --near 0") != std::string::npos);
+
   const auto refused = [&](const std::string& shape, std::size_t count) {
     write_npy(folder / "rays.npy", "False", shape, std::vector<float>(count));
     std::filesystem::remove(folder / "seen.npz");

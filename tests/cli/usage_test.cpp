@@ -69,6 +69,7 @@ TEST_CASE("a wrong command line is one sentence, exit code 2") {
                 "init-count");
   check_refused({"info", "a", "b"}, 2, "Unexpected argument 'b'");
   check_refused({"info"}, 2, "PATH");
+  check_refused({"devices", "--json", "--clear-cache"}, 2, "leave out --json");
   check_refused({"render", "m.ply", "--orbit", "0", "-o", "x"}, 2, "--orbit");
   check_refused({"render", "m.ply", "--orbit", "3"}, 2, "--video");
   check_refused({"render", "m.ply", "-o", "x", "--path", "p", "--orbit", "3"}, 2, "--path");

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "../skip_test.hpp"
 #include "program.hpp"
 
 namespace fs = std::filesystem;
@@ -94,10 +95,9 @@ TEST_CASE("seconds of a video say how fast its frames go, whatever the cameras a
 }
 
 TEST_CASE("the real ffmpeg writes every frame, where it is installed") {
-  if (std::system("command -v ffmpeg > /dev/null && command -v ffprobe > /dev/null") != 0) {
-    MESSAGE("skipped: no ffmpeg");
-    return;
-  }
+  SKIP_TEST_UNLESS(
+      std::system("command -v ffmpeg > /dev/null && command -v ffprobe > /dev/null") == 0,
+      "there is no ffmpeg");
   const TemporaryFolder folder;
   for (const char* name : {"out.mp4", "out.webm"}) {
     CAPTURE(name);

@@ -324,16 +324,31 @@ void make_models(const fs::path& root) {
   std::ifstream stream(sog, std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
   const io::ZipArchive archive(std::as_bytes(std::span(bytes)), sog);
-  Bytes packed;
-  for (const char* name : {"meta.json", "means_l.webp", "means_u.webp", "scales.webp", "quats.webp",
-                           "sh0.webp", "shN_centroids.webp", "shN_labels.webp"}) {
-    const std::vector<std::byte> file = archive.read(name);
-    packed.add(static_cast<std::uint16_t>(file.size()));
-    packed.add_text({reinterpret_cast<const char*>(file.data()), file.size()});
-  }
+  const auto pack = [&](const std::string& meta) {
+    Bytes packed;
+    packed.add(static_cast<std::uint16_t>(meta.size())).add_text(meta);
+    for (const char* name : {"means_l.webp", "means_u.webp", "scales.webp", "quats.webp",
+                             "sh0.webp", "shN_centroids.webp", "shN_labels.webp"}) {
+      const std::vector<std::byte> file = archive.read(name);
+      packed.add(static_cast<std::uint16_t>(file.size()));
+      packed.add_text({reinterpret_cast<const char*>(file.data()), file.size()});
+    }
+    return packed;
+  };
+  const std::vector<std::byte> text = archive.read("meta.json");
+  const Bytes packed = pack({reinterpret_cast<const char*>(text.data()), text.size()});
   corpus.add("packed_sog", packed.take(5));
   corpus.add("deflated_sog", packed.take(7));
   corpus.add("folder_sog", packed.take(8));
+  // The first version has ranges where the second has codebooks.
+  corpus.add("first_sog",
+             pack(R"({"means":{"shape":[2,3],"mins":[0,0,0],"maxs":[1,1,1],)"
+                  R"("files":["means_l.webp","means_u.webp"]},"scales":{"mins":[-2,-2,-2],)"
+                  R"("maxs":[0,0,0],"files":["scales.webp"]},"quats":{"encoding":)"
+                  R"("quaternion_packed","files":["quats.webp"]},"sh0":{"mins":[0,0,0,-4],)"
+                  R"("maxs":[1,1,1,4],"files":["sh0.webp"]},"shN":{"mins":-1,"maxs":1,)"
+                  R"("files":["shN_centroids.webp","shN_labels.webp"]}})")
+                 .take(5));
   stream.close();
   fs::remove(sog);
   // What is compressed in SPZ of each older version.

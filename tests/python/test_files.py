@@ -47,6 +47,14 @@ def test_errors_say_what_and_where(tmp_path):
     assert issubclass(rs.UsageError, rs.Error) and issubclass(rs.ResourceError, MemoryError)
 
 
+def test_errors_keep_their_text_where_it_is_no_utf8(tmp_path):
+    (tmp_path / "a.ply").write_bytes(
+        b"ply\nformat ascii 1.0\nelement vertex 1\nproperty fl\xffat x\nend_header\n0\n"
+    )
+    with pytest.raises(rs.DataError, match=r"the property type 'fl\\xffat' is unknown"):
+        rs.Gaussians.load(tmp_path / "a.ply")
+
+
 def test_cameras_come_back_as_they_were(tmp_path):
     camera = rs.Camera.look_at((1, 2, 3), (0, 0, 0), (0, 0, 1), 40, 30, 35.0)
     camera.name = "a.png"

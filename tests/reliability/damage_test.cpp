@@ -12,19 +12,6 @@
 
 namespace fs = std::filesystem;
 
-namespace {
-
-// A copy of the undisturbed run without what its last iterations left: its newest checkpoint is
-// that of iteration 25.
-void broken_off(const std::string& run) {
-  fs::copy(undisturbed(), run, fs::copy_options::recursive);
-  fs::remove(checkpoint_of(run, kIterations));
-  fs::remove_all(fs::path(run) / "point_cloud");
-  REQUIRE(fs::exists(checkpoint_of(run, 25)));
-}
-
-}  // namespace
-
 TEST_CASE("a damaged checkpoint is passed over with a warning, and the result is the same") {
   const TemporaryFolder folder;
   const std::string run = folder / "run";

@@ -94,6 +94,15 @@ inline const std::string& undisturbed() {
   return run;
 }
 
+/// A copy of the undisturbed run without what its last iterations left: its newest checkpoint is
+/// that of iteration 25.
+inline void broken_off(const std::string& run) {
+  std::filesystem::copy(undisturbed(), run, std::filesystem::copy_options::recursive);
+  std::filesystem::remove(checkpoint_of(run, kIterations));
+  std::filesystem::remove_all(std::filesystem::path(run) / "point_cloud");
+  REQUIRE(std::filesystem::exists(checkpoint_of(run, 25)));
+}
+
 /// Temporary files anywhere below `folder`.
 inline std::size_t temporaries(const std::filesystem::path& folder) {
   std::size_t count = 0;

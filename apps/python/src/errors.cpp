@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Types of raysplats/error.hpp as Python exceptions with the same sentences.
+#include <cstring>
 #include <new>
 #include <string>
 
@@ -47,11 +48,21 @@ PyObject* type_of(ErrorCode code) {
   return types.error;
 }
 
+/// Raises an exception whose text may hold the bytes of a damaged file or of a name that is no
+/// UTF-8.
+void set_exception(PyObject* type, const char* text) {
+  PyObject* message =
+      PyUnicode_DecodeUTF8(text, static_cast<Py_ssize_t>(std::strlen(text)), "backslashreplace");
+  if (message == nullptr) return;  // that there is no memory is raised already
+  PyErr_SetObject(type, message);
+  Py_DECREF(message);
+}
+
 void translate(const std::exception_ptr& thrown, void*) {
   try {
     std::rethrow_exception(thrown);
   } catch (const Error& error) {
-    PyErr_SetString(type_of(error.code()), error.what());
+    set_exception(type_of(error.code()), error.what());
   } catch (const std::bad_alloc&) {
     PyErr_SetString(types.resource,
                     "The host has no memory left: use fewer Gaussians or smaller pictures");

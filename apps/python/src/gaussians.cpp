@@ -178,7 +178,8 @@ void bind_gaussians(nb::module_& module) {
           "Writes .ply, .compressed.ply, .splat, .spz, .sog or .glb. `options` and the `origin` "
           "from which positions count, as Dataset.origin, go into the header of a PLY.")
       .def_static("load_origin", &read_ply_origin, nb::arg("path"),
-                  "The origin in the header of a PLY; 0 where it says none.")
+                  "From where the positions of a PLY count once it is loaded: the origin in its "
+                  "header, or what was taken off positions in doubles; else 0.")
       .def("changed", &change, nb::kw_only(), nb::arg("min_opacity") = nb::none(),
            nb::arg("up") = nb::none(), nb::arg("scale") = 1.0, nb::arg("rotate") = Triple{},
            nb::arg("translate") = Triple{}, nb::arg("crop_min") = nb::none(),

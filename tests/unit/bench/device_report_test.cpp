@@ -11,6 +11,7 @@
 #include <sstream>
 #include <string>
 
+#include "bench/cards.hpp"
 #include "bench/kernel_folders.hpp"
 #include "raysplats/error.hpp"
 #include "unit/bench/report_fixture.hpp"

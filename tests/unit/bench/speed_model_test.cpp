@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "bench/cards.hpp"
 #include "bench/executed_work.hpp"
 #include "bench/forecast.hpp"
 #include "bench/scene_bench.hpp"

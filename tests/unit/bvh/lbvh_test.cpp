@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "bvh/lbvh_validate.hpp"
+#include "device/fault_injection.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
@@ -433,5 +434,30 @@ TEST_CASE("groups are ordered alike by one work-item and by many [small]") {
       CHECK(results[0] == results[1]);
       if (count > 64) CHECK(results[0] != order);
     }
+  }
+}
+
+TEST_CASE("lbvh: where an allocation fails the tree is empty, and may be made later") {
+  Context context = make_test_context();
+  const Boxes few = random_boxes(20, 0.3, 1), many = random_boxes(500, 0.3, 2);
+  const Buffer<RsAabb> device_boxes = uploaded(context, many);
+  bool failed = true;
+  for (std::size_t n = 1; failed; ++n) {
+    CAPTURE(n);
+    Tree tree(context, 4, ChunkShape::for_device(context.device()));
+    tree.build(few);
+    context.faults().arm(Fault::kAllocation, n);
+    failed = false;
+    try {
+      tree.lbvh().order(device_boxes, many.size());
+    } catch (const ResourceError&) {
+      failed = true;
+    }
+    context.faults().arm(Fault::kAllocation, 0);
+    if (failed) {
+      CHECK(tree.lbvh().size() == 0);
+      CHECK(tree.lbvh().levels() == 0);
+    }
+    check_tree(tree, many);
   }
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "device/context.hpp"
+#include "device/fault_injection.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
 
@@ -43,6 +44,19 @@ TEST_CASE("buffer: empty and growing buffers") {
   buffer.ensure(context, 10, "less");  // keeps its memory
   CHECK(buffer.size() == 10);
   CHECK(buffer.raw().bytes() == bytes);
+}
+
+TEST_CASE("buffer: where it cannot grow it is empty, and may grow later") {
+  Context context(test_device());
+  Buffer<std::uint32_t> buffer(context, 10, "small");
+  context.faults().arm(Fault::kAllocation, 1);
+  CHECK_THROWS_AS(buffer.ensure(context, 100, "more"), ResourceError);
+  CHECK(buffer.size() == 0);
+  CHECK(buffer.raw().empty());
+  CHECK(context.allocated_bytes() == 0);
+  buffer.ensure(context, 5, "again");
+  CHECK(buffer.size() == 5);
+  CHECK(buffer.download().size() == 5);
 }
 
 TEST_CASE("buffer: memory is counted while it lives") {

@@ -16,6 +16,7 @@
 #include "eval/metrics.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/temporary_directory.hpp"
 
 namespace raysplats {
@@ -109,6 +110,22 @@ TEST_CASE("evaluator: a perfect render over the background, written with its pic
 
 TEST_CASE("evaluator: masked pixels neither help nor hurt") {
   Scene scene;
+  // The other half, where both are equal, does not count as perfect.
+  double expected_ssim = 0;
+  {
+    const Image rgba = load_view_image(scene.dataset.views[0]);
+    Image photo(kWidth, kHeight, 3), off(kWidth, kHeight, 3), half(kWidth, kHeight, 1);
+    for (std::size_t p = 0; p < photo.pixels(); ++p) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float value = photo.data[3 * p + c] = rgba.data[4 * p + c];
+        const bool counts = rgba.data[4 * p + 3] > 0;
+        off.data[3 * p + c] = value + (counts ? value < 0.5f ? 0.2f : -0.2f : 0.0f);
+        half.data[p] = counts ? 1.0f : 0.0f;
+      }
+    }
+    expected_ssim = weighted_ssim(off, photo, half);
+    CHECK(expected_ssim < ssim(off, photo) - 0.05);
+  }
   // Off by 0.2 where the photo is valid, by anything elsewhere.
   for (const float elsewhere : {0.0f, 0.9f}) {
     const auto render = [&](const Camera& camera) {
@@ -128,7 +145,7 @@ TEST_CASE("evaluator: masked pixels neither help nor hurt") {
         evaluate(render, scene.dataset, Split::kTest, kBackground, {}, options);
     REQUIRE(report.images.size() == 1);
     CHECK(report.mean.psnr == doctest::Approx(-20 * std::log10(0.2)).epsilon(1e-4));
-    CHECK(report.mean.ssim < 0.999);
+    CHECK(report.mean.ssim == doctest::Approx(expected_ssim).epsilon(1e-6));
     // Beside it what all pixels give, those under the mask included.
     REQUIRE(report.mean.psnr_all.has_value());
     const View& view = scene.dataset.views[0];
@@ -165,6 +182,29 @@ TEST_CASE("evaluator: equal pictures have a PSNR, and views without a pixel are 
   CHECK(heard == 2);
   write_image(scene.dataset.views[1].image_path, Image(kWidth, kHeight, 4, 0.0f));
   CHECK_THROWS_AS(evaluate(photo, scene.dataset, Split::kTest, kBackground), DataError);
+}
+
+TEST_CASE("evaluator: photos whose masks ignore all of them are told once and count nowhere") {
+  Scene scene;
+  const std::filesystem::path mask = scene.path("black.png");
+  write_image(mask, Image(kWidth, kHeight, 1, 0.0f));
+  const auto photo = [&](const Camera& camera) { return load_view_image(scene.view(camera.name)); };
+  for (const bool apart : {false, true}) {
+    CAPTURE(apart);
+    scene.dataset.alpha_is_background = apart;
+    for (const std::size_t i : {std::size_t{0}, std::size_t{2}}) {
+      scene.dataset.views[i].mask_path = mask;
+      scene.dataset.views[i].mask_apart = apart;
+    }
+    const LogCapture log;
+    const EvaluationReport report = evaluate(photo, scene.dataset, Split::kAll, {0, 0, 0});
+    REQUIRE(report.images.size() == 1);
+    CHECK(report.images[0].name == scene.dataset.views[1].camera.name);
+    CHECK(std::isfinite(report.mean.psnr));
+    CHECK(std::isfinite(report.mean.ssim));
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("2 of 3 views cannot be compared"));
+  }
 }
 
 TEST_CASE("evaluator: few pictures show worst, median and best, then the first, by name") {
@@ -214,6 +254,18 @@ TEST_CASE("evaluator: few pictures show worst, median and best, then the first, 
   CHECK(traced == 10);
   CHECK(pictured(6) == "012345");
   CHECK(traced == 16);  // all are written as they are measured
+
+  // A picture that was not written, since tracing it again was stopped, is not named.
+  std::size_t calls = 0;
+  const auto interrupted = [&](const Camera& camera) {
+    return ++calls > errors.size() ? Image() : render(camera);
+  };
+  EvaluationOptions options;
+  options.max_pictures = 2;
+  const EvaluationReport report = evaluate(interrupted, scene.dataset, Split::kTest, kBackground,
+                                           scene.path("stopped"), options);
+  REQUIRE(report.images.size() == errors.size());
+  for (const EvaluationMetrics& image : report.images) CHECK(image.picture.empty());
 }
 
 TEST_CASE("evaluator: ranks that render every view together stop together") {

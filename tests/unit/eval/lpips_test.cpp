@@ -5,8 +5,11 @@
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
+#include <string>
 
 #include "raysplats/error.hpp"
+#include "skip_test.hpp"
 #include "unit/temporary_directory.hpp"
 #include "util/rng.hpp"
 
@@ -32,8 +35,30 @@ namespace {
 //                     numpy_helper.from_array(np.full((1, 3, 1, 1), 1 / 3, np.float32), "l")])
 //   m = h.make_model(g, opset_imports=[h.make_opsetid("", 11)]); m.ir_version = 7
 //   onnx.checker.check_model(m); onnx.save(m, "tiny_lpips.onnx")
-const std::filesystem::path kNetwork =
-    std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "tests/data/tiny_lpips.onnx";
+const std::filesystem::path kData = std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "tests/data";
+const std::filesystem::path kNetwork = kData / "tiny_lpips.onnx";
+
+// Those beside it have what OpenCV gets wrong of LPIPS as its package is: both pictures divided by
+// one constant ("divisor"), means of all pixels ("means"). The third ("root") yields no number.
+// Made with torch 1.13:
+//   import torch
+//   import torch.nn.functional as F
+//   class Tiny(torch.nn.Module):
+//       def __init__(self, kind):
+//           super().__init__()
+//           self.kind = kind
+//           scale = torch.tensor([0.458, 0.448, 0.45])[None, :, None, None]
+//           self.register_buffer("scale", scale)
+//           self.register_buffer("heads", torch.full((1, 3, 1, 1), 1 / 3))
+//       def forward(self, a, b):
+//           if self.kind == "divisor": a, b = a / self.scale, b / self.scale
+//           error = F.conv2d((a - b)**2, self.heads)
+//           if self.kind == "means": return error.mean([2, 3], keepdim=True)
+//           mean = F.adaptive_avg_pool2d(error, 1)
+//           return torch.sqrt(-1 - mean) if self.kind == "root" else mean
+//   for kind in ("divisor", "means", "root"):
+//       torch.onnx.export(Tiny(kind), (torch.rand(1, 3, 8, 8), torch.rand(1, 3, 8, 8)),
+//                         f"tiny_lpips_{kind}.onnx", opset_version=11)
 
 double expected_distance(const Image& a, const Image& b) {
   constexpr double kKernel[3][3] = {{0.25, 0.125, 0}, {0.125, -0.25, 0.125}, {0, 0.125, 0.25}};
@@ -68,10 +93,8 @@ Image random_image(int width, int height, std::uint64_t seed) {
 }  // namespace
 
 TEST_CASE("lpips: runs a network on images of several sizes") {
-  if (!Lpips::available()) {
-    CHECK_THROWS_AS(Lpips{kNetwork}, UsageError);
-    return;
-  }
+  if (!Lpips::available()) CHECK_THROWS_AS(Lpips{kNetwork}, UsageError);
+  SKIP_TEST_UNLESS(Lpips::available(), "LPIPS is not part of this build");
   Lpips lpips(kNetwork);
   for (const int width : {16, 9, 33}) {
     const Image a = random_image(width, 12, 1);
@@ -83,12 +106,39 @@ TEST_CASE("lpips: runs a network on images of several sizes") {
 }
 
 TEST_CASE("lpips: a missing or broken network is refused") {
-  if (!Lpips::available()) return;
+  SKIP_TEST_UNLESS(Lpips::available(), "LPIPS is not part of this build");
   CHECK_THROWS_AS(Lpips{"/nonexistent/network.onnx"}, DataError);
   const TemporaryDirectory folder;
   const std::filesystem::path broken = folder / "broken.onnx";
   std::ofstream(broken) << "this is no network";
   CHECK_THROWS_AS(Lpips{broken}, DataError);
+}
+
+TEST_CASE("lpips: networks that OpenCV computes wrongly are refused with a remedy") {
+  SKIP_TEST_UNLESS(Lpips::available(), "LPIPS is not part of this build");
+  const auto message = [](const auto& act) {
+    try {
+      act();
+    } catch (const DataError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  for (const char* name : {"divisor", "means", "root"}) {
+    CAPTURE(name);
+    const bool is_read = std::string(name) == "root";
+    const std::filesystem::path path = kData / ("tiny_lpips_" + std::string(name) + ".onnx");
+    std::optional<Lpips> lpips;
+    const std::string reading = message([&] { lpips.emplace(path); });
+    REQUIRE(lpips.has_value() == is_read);
+    const std::string said =
+        is_read ? message([&] { lpips->distance(random_image(9, 12, 1), random_image(9, 12, 2)); })
+                : reading;
+    INFO(said);
+    CHECK(said.find(path.string()) != std::string::npos);
+    CHECK(said.find("scripts/quality/export_lpips.py") != std::string::npos);
+    CHECK((said.find("no finite number") != std::string::npos) == is_read);
+  }
 }
 
 }  // namespace raysplats

@@ -45,6 +45,41 @@ Pair make_pair(int height, int width) {
   return out;
 }
 
+// The mean of SSIM by the weights of the pixels that lie `border` from the borders, from windows of
+// 11 x 11 weights whose means are of deviations; edges are repeated.
+double ssim_by_pixel(const Pair& pair, const Image& weight, int border) {
+  const auto mirrored = [](int i, int n) { return i < 0 ? -1 - i : i < n ? i : 2 * n - 1 - i; };
+  double window[11], sum = 0;
+  for (int i = 0; i < 11; ++i) sum += window[i] = std::exp(-0.5 * (i - 5) * (i - 5) / (1.5 * 1.5));
+  double total = 0, weights = 0;
+  for (int y = border; y < weight.height - border; ++y) {
+    for (int x = border; x < weight.width - border; ++x) {
+      const auto w = static_cast<double>(weight.at(x, y, 0));
+      for (int c = 0; c < 3; ++c) {
+        // Calls use(weight, a, b) for all of the window.
+        const auto windowed = [&](const auto& use) {
+          for (int j = -5; j <= 5; ++j) {
+            for (int i = -5; i <= 5; ++i) {
+              const int u = mirrored(x + i, weight.width), v = mirrored(y + j, weight.height);
+              use(window[i + 5] * window[j + 5] / (sum * sum),
+                  static_cast<double>(pair.a.at(u, v, c)), static_cast<double>(pair.b.at(u, v, c)));
+            }
+          }
+        };
+        double a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+        windowed([&](double k, double p, double q) { a += k * p, b += k * q; });
+        windowed([&](double k, double p, double q) {
+          aa += k * (p - a) * (p - a), bb += k * (q - b) * (q - b), ab += k * (p - a) * (q - b);
+        });
+        total +=
+            w * (2 * a * b + 1e-4) * (2 * ab + 9e-4) / ((a * a + b * b + 1e-4) * (aa + bb + 9e-4));
+      }
+      weights += 3 * w;
+    }
+  }
+  return total / weights;
+}
+
 }  // namespace
 
 TEST_CASE("metrics: SSIM and PSNR equal scikit-image's") {
@@ -76,6 +111,32 @@ TEST_CASE("metrics: closed forms") {
   for (const int size : {1, 2, 3, 7}) {
     CHECK(ssim(Image(size, 2 * size, 1, 0.25f), Image(size, 2 * size, 1, 0.75f)) ==
           doctest::Approx(ssim(a, b)).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("metrics: SSIM by weights is the mean of each pixel's own, in one and in many bands") {
+  for (const int height : {17, 150}) {
+    CAPTURE(height);
+    constexpr int kWidth = 24;
+    const Pair pair = make_pair(height, kWidth);
+    Image weight(kWidth, height, 1);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < kWidth; ++x) weight.at(x, y, 0) = static_cast<float>((x * y) % 3) / 2.0f;
+    }
+    const double all = ssim(pair.a, pair.b);
+    const double some = weighted_ssim(pair.a, pair.b, weight);
+    CHECK(all ==
+          doctest::Approx(ssim_by_pixel(pair, Image(kWidth, height, 1, 1.0f), 5)).epsilon(1e-10));
+    CHECK(some == doctest::Approx(ssim_by_pixel(pair, weight, 5)).epsilon(1e-10));
+    CHECK(std::abs(some - all) > 1e-4);
+    CHECK(weighted_ssim(pair.a, pair.b, Image(kWidth, height, 1, 0.25f)) ==
+          doctest::Approx(all).epsilon(1e-12));
+    // All weight along the borders, which are left out of others.
+    Image edge(kWidth, height, 1);
+    edge.at(2, 3, 0) = 1.0f;
+    CHECK(weighted_ssim(pair.a, pair.b, edge) ==
+          doctest::Approx(ssim_by_pixel(pair, edge, 0)).epsilon(1e-10));
+    CHECK_THROWS_AS(weighted_ssim(pair.a, pair.b, Image(kWidth, height, 1)), UsageError);
   }
 }
 

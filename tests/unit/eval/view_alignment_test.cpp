@@ -59,6 +59,30 @@ double angle_between(const Camera& a, const Camera& b) {
   return std::acos(std::clamp(0.5 * (turn[0][0] + turn[1][1] + turn[2][2] - 1.0), -1.0, 1.0));
 }
 
+// Two views whose cameras are not quite where their photos, `gain` times as bright, were taken.
+Dataset misplaced_views(const TemporaryDirectory& folder, float gain) {
+  Dataset dataset;
+  dataset.root = folder.path();
+  for (int i = 0; i < 2; ++i) {
+    const Camera truth = moved(place(), {0, 0.1 * i, 0}, {0.1 * i, 0, 0});
+    View view;
+    view.camera = moved(truth, {0.01, -0.01, 0.005}, {0.02, 0.01, 0.0});
+    view.camera.name = "view_" + std::to_string(i) + ".png";
+    view.source_camera = view.camera;
+    view.image_path = folder / view.camera.name;
+    view.test = true;
+    Image photo(kWidth, kHeight, 4);
+    const Image seen = bowl(truth);
+    for (std::size_t p = 0; p < photo.pixels(); ++p) {
+      for (std::size_t c = 0; c < 3; ++c) photo.data[4 * p + c] = gain * seen.data[3 * p + c];
+      photo.data[4 * p + 3] = 1.0f;
+    }
+    write_image(view.image_path, photo);
+    dataset.views.push_back(view);
+  }
+  return dataset;
+}
+
 }  // namespace
 
 TEST_CASE("a camera finds back to where its photo was taken") {
@@ -123,26 +147,7 @@ TEST_CASE("an alignment that is stopped yields nothing") {
 
 TEST_CASE("evaluator: views with wrong poses are judged where they fit") {
   const TemporaryDirectory folder;
-  Dataset dataset;
-  dataset.root = folder.path();
-  std::vector<Camera> truth;
-  for (int i = 0; i < 2; ++i) {
-    truth.push_back(moved(place(), {0, 0.1 * i, 0}, {0.1 * i, 0, 0}));
-    View view;
-    view.camera = moved(truth.back(), {0.01, -0.01, 0.005}, {0.02, 0.01, 0.0});
-    view.camera.name = "view_" + std::to_string(i) + ".png";
-    view.source_camera = view.camera;
-    view.image_path = folder / view.camera.name;
-    view.test = true;
-    Image photo(kWidth, kHeight, 4);
-    const Image seen = bowl(truth.back());
-    for (std::size_t p = 0; p < photo.pixels(); ++p) {
-      for (std::size_t c = 0; c < 3; ++c) photo.data[4 * p + c] = seen.data[3 * p + c];
-      photo.data[4 * p + 3] = 1.0f;
-    }
-    write_image(view.image_path, photo);
-    dataset.views.push_back(view);
-  }
+  const Dataset dataset = misplaced_views(folder, 1.0f);
   EvaluationOptions options;
   const EvaluationReport plain = evaluate(bowl, dataset, Split::kTest, {}, {}, options);
   CHECK_FALSE(plain.mean.psnr_aligned);
@@ -171,6 +176,21 @@ TEST_CASE("evaluator: views with wrong poses are judged where they fit") {
   CHECK(part.mean.psnr_aligned == report.images[0].psnr_aligned);
   options.together = true;
   CHECK_THROWS_AS(evaluate(bowl, dataset, Split::kTest, {}, {}, options), UsageError);
+}
+
+TEST_CASE("evaluator: views with wrong poses and other exposures are judged without either") {
+  const TemporaryDirectory folder;
+  const Dataset dataset = misplaced_views(folder, 0.7f);
+  EvaluationOptions options;
+  options.align = true;
+  const EvaluationReport plain = evaluate(bowl, dataset, Split::kTest, {}, {}, options);
+  CHECK(*plain.mean.psnr_aligned < 20.0);
+  CHECK(plain.mean.psnr_corrected < 40.0);
+  options.align_colors = true;
+  const EvaluationReport report = evaluate(bowl, dataset, Split::kTest, {}, {}, options);
+  for (const EvaluationMetrics& image : report.images) CHECK(*image.psnr_aligned > 45.0);
+  CHECK(report.mean.psnr == plain.mean.psnr);
+  CHECK(report.mean.psnr_corrected == plain.mean.psnr_corrected);
 }
 
 }  // namespace raysplats

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/convert_model.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
 
+#include "io/gaussian_codes.hpp"
 #include "io/model_file.hpp"
 #include "model_bytes.hpp"
 #include "scene/gaussian_transform.hpp"
+#include "scene/morton_order.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -96,6 +100,8 @@ TEST_CASE("changes out of range are refused, and half a box is half of space") {
   };
   CHECK(contains(refused([](ModelChanges& c) { c.scale = 0.0; }), "scale is above 0"));
   CHECK(contains(refused([](ModelChanges& c) { c.scale = std::nan(""); }), "scale is above 0"));
+  for (const double scale : {1e300, 1e-300})
+    CHECK(contains(refused([&](ModelChanges& c) { c.scale = scale; }), "scale is 1e-30 to 1e+30"));
   CHECK(contains(refused([](ModelChanges& c) { c.min_opacity = 1.5; }), "min-opacity is 0 to 1"));
   CHECK(contains(refused([](ModelChanges& c) { c.sh_degree = 5; }), "sh-degree is 0 to 4"));
   CHECK(!refused([](ModelChanges& c) { c.translate.x = HUGE_VAL; }).empty());
@@ -184,6 +190,18 @@ TEST_CASE("conversion names what only the header of our PLY says") {
   CHECK(!contains(told("b.glb", trace), "--background"));
 }
 
+TEST_CASE("conversion scales the near depth that the header says as the model") {
+  const Scratch scratch;
+  TraceOptions trace;
+  trace.near_depth = 0.25f;
+  write_model(scratch / "a.ply", trained_like(3, 0), {}, trace);
+  ModelChanges changes;
+  changes.scale = 10;
+  convert_model(scratch / "a.ply", scratch / "b.ply", changes, {},
+                read_ply_options(scratch / "a.ply"), false);
+  CHECK(read_ply_options(scratch / "b.ply")->near_depth == 2.5f);
+}
+
 TEST_CASE("the origin of a model scales and turns with it") {
   const Scratch scratch;
   Gaussians model = trained_like(2, 0);
@@ -205,6 +223,72 @@ TEST_CASE("the origin of a model scales and turns with it") {
   CHECK(moved.means[2] == doctest::Approx(20));
 }
 
+TEST_CASE("a translation that leads an origin back to 0 takes it away") {
+  const Scratch scratch;
+  Gaussians model = trained_like(2, 0);
+  model.means = {0, 1, 2, 3, 4, 5};
+  write_model(scratch / "a.ply", model, {}, std::nullopt, {448262, 5411932, 300});
+  const auto moved = [&](const glm::dvec3& by) {
+    ModelChanges changes;
+    changes.translate = by;
+    convert_model(scratch / "a.ply", scratch / "b.ply", changes, {}, std::nullopt, true);
+    return read_model(scratch / "b.ply").means;
+  };
+  CHECK(farthest(moved({-448260, -5411932, -300}), {2, 1, 2, 5, 4, 5}) == 0.0);
+  CHECK(io::model_origin(scratch / "b.ply") == std::array<double, 3>{});
+  // Any other moves what counts from it.
+  CHECK(farthest(moved({10, 0, 0}), {10, 1, 2, 13, 4, 5}) == 0.0);
+  CHECK(io::model_origin(scratch / "b.ply") == std::array<double, 3>{448262, 5411932, 300});
+}
+
+TEST_CASE("opacities at the ends of a byte are whole ones in every format") {
+  const Scratch scratch;
+  Gaussians model = trained_like(300, 0);
+  for (std::size_t i = 0; i < model.size(); ++i) model.opacities[i] = i % 2 == 0 ? 25.0f : -25.0f;
+  for (const char* name : {"a.splat", "a.spz", "a.sog", "a.compressed.ply"}) {
+    CAPTURE(name);
+    write_model(scratch / name, model);
+    std::size_t opaque = 0, empty = 0;
+    for (const float logit : read_model(scratch / name).opacities) {
+      opaque += io::opacity_of(logit) > 1 - 1e-6;
+      empty += io::opacity_of(logit) < 1e-6;
+      CHECK(std::isfinite(logit));
+    }
+    CHECK(opaque == 150);
+    CHECK(empty == 150);
+  }
+}
+
+TEST_CASE("rotations are kept as exactly as is said") {
+  const Scratch scratch;
+  const Gaussians model = in_morton_order(trained_like(2000, 0));
+  const auto median_angle = [&](const char* name) {
+    write_model(scratch / name, model);
+    const std::vector<float> read = read_model(scratch / name).quaternions;
+    REQUIRE(read.size() == model.quaternions.size());
+    std::vector<double> angles;
+    for (std::size_t i = 0; i < read.size(); i += 4) {
+      double plus = 0, minus = 0;
+      for (std::size_t k = 0; k < 4; ++k) {
+        const double a = read[i + k], b = model.quaternions[i + k];
+        plus += (a + b) * (a + b);
+        minus += (a - b) * (a - b);
+      }
+      angles.push_back(2 * std::sqrt(std::min(plus, minus)));
+    }
+    std::nth_element(angles.begin(), angles.begin() + 1000, angles.end());
+    return angles[1000];
+  };
+  for (const auto& [name, format, step] :
+       {std::tuple("a.spz", io::ModelFormat::kSpz, 670),
+        std::tuple("a.compressed.ply", io::ModelFormat::kCompressedPly, 670),
+        std::tuple("a.sog", io::ModelFormat::kSog, 170)}) {
+    CAPTURE(name);
+    CHECK(median_angle(name) == doctest::Approx(1.0 / step).epsilon(0.06));
+    CHECK(contains(io::losses(format, model), "rotations to 1/" + std::to_string(step)));
+  }
+}
+
 TEST_CASE("losses are named for the model at hand") {
   const Gaussians flat = trained_like(2, 0);
   CHECK(contains(io::losses(io::ModelFormat::kSplat, trained_like(2, 2)), "SH"));
@@ -216,7 +300,7 @@ TEST_CASE("losses are named for the model at hand") {
   CHECK(contains(io::losses(io::ModelFormat::kSpz, needles), "clamped"));
   CHECK(!contains(io::losses(io::ModelFormat::kSpz, flat), "clamped"));
   CHECK(contains(io::losses(io::ModelFormat::kSpz, flat), "1/4096"));
-  CHECK(contains(io::losses(io::ModelFormat::kSpz, flat), "rotations to 1/400"));
+  CHECK(contains(io::losses(io::ModelFormat::kSog, flat), "of the range of their logarithm"));
   // 24 bits hold 100000 with 6 of them behind the point.
   Gaussians far = flat;
   far.means[4] = -100000.5f;

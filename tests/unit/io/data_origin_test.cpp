@@ -2,13 +2,20 @@
 #include "io/data_origin.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <vector>
 
 #include "data_sets.hpp"
 #include "raysplats/io.hpp"
+#include "unit/log_capture.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -96,4 +103,63 @@ TEST_CASE("the origin of a PLY is read back to the bit, and 0 is not written") {
   bytes.replace(bytes.find("origin 1"), 8, "origin x");
   write_bytes(scratch / "bad.ply", bytes);
   CHECK(contains(data_error([&] { read_ply_origin(scratch / "bad.ply"); }), "origin x"));
+}
+
+TEST_CASE("positions in doubles that floats would blur count from an origin, which is told") {
+  const Scratch scratch;
+  constexpr std::size_t kCount = 40;
+  const std::array<double, 3> place{448262.125, 5411932.0, 300.0};
+  CounterRng rng(5, 5);
+  std::vector<double> rest;
+  for (std::size_t i = 0; i < 3 * kCount; ++i) rest.push_back(10.0 * rng.normal());
+  // `log_size` of the Gaussians.
+  const auto write = [&](double log_size, const std::string& comment) {
+    std::string bytes =
+        fmt::format("ply\nformat binary_little_endian 1.0\n{}element vertex {}\n", comment, kCount);
+    for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0",
+                             "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
+      bytes += fmt::format("property double {}\n", name);
+    bytes += "end_header\n";
+    for (std::size_t i = 0; i < kCount; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) put(bytes, place[k] + rest[3 * i + k]);
+      for (const double value : {0.0, 0.0, 0.0, 0.0, log_size, log_size, -30.0, 1.0, 0.0, 0.0, 0.0})
+        put(bytes, value);
+    }
+    // Far off and not finite, as they come.
+    const double far = 1e12, nothing = std::nan("");
+    std::memcpy(&bytes[bytes.size() - 28 * sizeof(double)], &far, sizeof(double));
+    std::memcpy(&bytes[bytes.size() - 14 * sizeof(double)], &nothing, sizeof(double));
+    write_bytes(scratch / "a.ply", bytes);
+  };
+  write(-4.0, "");
+  {
+    const LogCapture log;
+    const Gaussians model = read_ply(scratch / "a.ply", true);
+    const std::array<double, 3> origin = read_ply_origin(scratch / "a.ply");
+    for (std::size_t k = 0; k < 3; ++k) {
+      CHECK(std::fmod(origin[k], 10.0) == 0.0);
+      CHECK(std::abs(origin[k] - place[k]) < 20.0);
+    }
+    CHECK(log.contains(fmt::format("count from {}, {}, {}", origin[0], origin[1], origin[2])));
+    REQUIRE(model.size() == kCount - 1);
+    double worst = 0;
+    for (std::size_t i = 0; i < 3 * (kCount - 2); ++i) {
+      const double expected = place[i % 3] + rest[i];
+      worst = std::max(worst, std::abs(origin[i % 3] + model.means[i] - expected));
+    }
+    CHECK(worst < 1e-5);
+    // As rounded numbers it would be a quarter.
+    write_ply(scratch / "b.ply", model, std::nullopt, origin);
+    CHECK(read_ply_origin(scratch / "b.ply") == origin);
+    CHECK(read_ply(scratch / "b.ply").means == model.means);
+  }
+  const LogCapture log;
+  // One that the header says has been taken off, and large Gaussians bear it.
+  write(-4.0, "comment raysplats origin 1,2,3\n");
+  CHECK(read_ply_origin(scratch / "a.ply") == std::array<double, 3>{1, 2, 3});
+  CHECK(read_ply(scratch / "a.ply", true).means[0] == static_cast<float>(place[0] + rest[0]));
+  write(5.0, "");
+  CHECK(read_ply_origin(scratch / "a.ply") == std::array<double, 3>{});
+  CHECK(read_ply(scratch / "a.ply", true).means[0] == static_cast<float>(place[0] + rest[0]));
+  CHECK(!log.contains("count from"));
 }

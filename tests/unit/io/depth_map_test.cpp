@@ -70,6 +70,10 @@ TEST_CASE("depths that are not finite or not above 0 are unknown, and the first 
   const LogCapture log;
   CHECK(io::read_depth_map(scratch / "a.npy", 2).values == std::vector<float>{0, 0, 0, 0, 0, 6});
   CHECK(log.contains("3 of 6 numbers"));
+  CHECK(log.lines() == 1);
+  CHECK(io::read_depth_map(scratch / "a.npy", 2, true).values ==
+        std::vector<float>{0, 0, 0, 0, 0, 6});
+  CHECK(log.lines() == 1);
   write_bytes(scratch / "a.npy", npy("<i2", "(1, 2)", std::vector<std::int16_t>{0, -5}));
   CHECK(contains(data_error([&] { io::read_depth_map(scratch / "a.npy", 1); }), "says nothing"));
 }

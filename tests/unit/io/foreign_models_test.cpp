@@ -69,16 +69,6 @@ TEST_CASE("a PLY of splatfacto may have bytes of colour in place of harmonics, w
                  "no f_dc_0, f_dc_1, f_dc_2"));
 }
 
-TEST_CASE("a SOG of version 1, which has no number of it, is refused with the way out") {
-  const Scratch scratch;
-  write_bytes(scratch / "meta.json",
-              R"({"means": {"shape": [2, 3], "dtype": "float32", "mins": [0, 0, 0],
-                            "maxs": [1, 1, 1], "files": ["means_l.webp", "means_u.webp"]}})");
-  const std::string message = data_error([&] { read_model(scratch / "meta.json"); });
-  CHECK(contains(message, "meta.json is a SOG of version 1, but only 2 is known"));
-  CHECK(contains(message, "SplatTransform"));
-}
-
 TEST_CASE("a .splat may begin with the two bytes of gzip") {
   std::string bytes;
   put<std::uint32_t>(bytes, 0x3f808b1fu);  // 1.0042...

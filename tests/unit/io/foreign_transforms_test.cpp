@@ -74,6 +74,35 @@ TEST_CASE("names of camera models may be spelt in any case and with any separato
   CHECK(contains(cameras_error(file_of("\"camera_model\": \"open_gl\", ", "")), "'open_gl'"));
 }
 
+TEST_CASE("camera models that other programs name otherwise are the lenses that they are") {
+  const auto camera = [](const std::string& name) {
+    return cameras_of(
+               file_of(kKeys + "\"k1\": 0.1, \"k2\": 0.02, \"camera_model\": \"" + name + "\", ",
+                       frame_with(matrix_json(1))))
+        .front();
+  };
+  const auto check_lens = [&](const char* name, CameraModel model) {
+    CAPTURE(name);
+    CHECK(camera(name).model == model);
+    CHECK(camera(name).distortion.k1 == 0.1);
+    CHECK(camera(name).distortion.k2 == 0.02);
+  };
+  for (const char* name : {"BROWN_CONRADY", "brown-conrady", "PERSPECTIVE"})
+    check_lens(name, CameraModel::kOpenCv);
+  for (const char* name :
+       {"RADIAL_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "kannala-brandt4", "KANNALA_BRANDT", "FISHEYE"})
+    check_lens(name, CameraModel::kFisheye);
+  // Lenses of other terms, or that go the other way.
+  for (const char* name : {"INVERSE_BROWN_CONRADY", "MODIFIED_BROWN_CONRADY", "FULL_OPENCV",
+                           "THIN_PRISM_FISHEYE", "FTHETA"}) {
+    const std::string message = cameras_error(
+        file_of(fmt::format("\"camera_model\": \"{}\", ", name), frame_with(matrix_json(1))));
+    CHECK(contains(message, fmt::format("'{}' is not supported", name)));
+    CHECK(contains(message, "OPENCV, BROWN_CONRADY, "));
+    CHECK(contains(message, "FISHEYE624"));
+  }
+}
+
 TEST_CASE("numbers that were written as texts are numbers, other texts are none") {
   const Camera camera =
       cameras_of(file_of("\"w\": \"40\", \"h\": \"30\", \"fl_x\": \"5e1\", \"cx\": \"-1.5\", ",

@@ -153,6 +153,7 @@ TEST_CASE("glTF Gaussians: what is not understood or damaged ends in one sentenc
   file = two();
   extension_of(file)["extensions"]["KHR_gaussian_splatting_compression_spz_2"] = {
       {"bufferView", 0}};
+  file.json["extensionsRequired"].push_back("KHR_gaussian_splatting_compression_spz_2");
   CHECK(contains(error_of(file), "spz_2"));
   file = two();
   file.json["meshes"][0]["primitives"][0]["attributes"].erase(std::string(kExtension) + ":SCALE");
@@ -167,4 +168,26 @@ TEST_CASE("glTF Gaussians: what is not understood or damaged ends in one sentenc
   const float nan = std::nanf("");
   file.buffer.replace(0, 4, reinterpret_cast<const char*>(&nan), 4);
   CHECK(contains(error_of(file), "not finite"));
+}
+
+TEST_CASE("glTF Gaussians: a packed form is passed over where the numbers are there too") {
+  GltfFile file = two();
+  extension_of(file)["extensions"]["KHR_gaussian_splatting_compression_spz_2"] = {
+      {"bufferView", 0}};
+  CHECK(read(file).means == std::vector<float>{-1, -2, 3, 4, -5, -6});
+  json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
+  const json whole = attributes;
+  attributes.erase(std::string(kExtension) + ":ROTATION");
+  CHECK(contains(error_of(file), "packed by KHR_gaussian_splatting_compression_spz_2"));
+  attributes = whole;
+  file.json["accessors"][1].erase("bufferView");
+  CHECK(contains(error_of(file), "packed by KHR_gaussian_splatting_compression_spz_2"));
+}
+
+TEST_CASE("glTF Gaussians: logarithms for scales are taken for what they may be") {
+  GltfFile file = two();
+  const std::string scale = std::string(kExtension) + ":SCALE";
+  file.json["meshes"][0]["primitives"][0]["attributes"][scale] =
+      file.add_vec3({-4, -4, -5, -3, -2, -4});
+  CHECK(contains(error_of(file), "a logarithm perhaps, as splat-transform wrote them"));
 }

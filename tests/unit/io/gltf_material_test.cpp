@@ -185,6 +185,30 @@ TEST_CASE("glTF materials: textures from a buffer, a data URI and a file") {
   CHECK(contains(data_error([&] { io::read_mesh(scratch / "a.glb"); }), "beyond its buffer"));
 }
 
+TEST_CASE("glTF materials: data: URIs of any media type") {
+  const std::string bytes = png();
+  const Scratch scratch;
+  const auto read = [&](const std::string& uri) {
+    GltfFile file = textured(base_texture({{"index", 0}}));
+    file.json["images"].push_back({{"uri", uri}});
+    write_bytes(scratch / "m.glb", file.glb());
+    return io::read_mesh(scratch / "m.glb");
+  };
+  for (const std::string start : {"data:;base64,", "data:image/x-png;base64,",
+                                  "DATA:image/png;Base64,", "data:image/png;name=a.png;base64,"}) {
+    CAPTURE(start);
+    CHECK(read(start + base64(bytes)).textures.at(0).data ==
+          std::vector<float>{1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1});
+  }
+  const std::string other = data_error([&] { read("data:image/webp;base64," + base64("RIFF")); });
+  CHECK(contains(other, "neither a PNG nor"));
+  const std::string broken =
+      data_error([&] { read("data:image/png;base64," + std::string(5000, '?')); });
+  CHECK(contains(broken, "the image 0 has a data: URI that cannot be decoded"));
+  CHECK(broken.size() < 400);
+  CHECK(data_error([&] { read(std::string(5000, 'a')); }).size() < 400);
+}
+
 TEST_CASE("glTF materials: an image that no triangle uses may be missing") {
   const Scratch scratch;
   GltfFile file = GltfFile::triangle_with(json::object());
@@ -235,6 +259,65 @@ TEST_CASE("glTF materials: textures of other properties count with their mean") 
   CHECK(read.textures.empty());
 }
 
+TEST_CASE("glTF materials: specular and glossiness in place of metallic and roughness") {
+  json material = pbr(0.0, 1.0);  // a fallback for others
+  json& given = material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
+  given = {{"diffuseFactor", {1.0, 0.5, 0.0, 0.25}},
+           {"specularFactor", {0.0, 0.04, 0.0}},
+           {"glossinessFactor", 0.5}};
+  const Material plain = mapped(material);
+  CHECK(plain.kind == Kind::kDiffuse);
+  const double half = 1.055 * std::pow(0.5 * 0.96, 1.0 / 2.4) - 0.055;
+  check_color(plain.color, 1.055 * std::pow(0.96, 1.0 / 2.4) - 0.055, half, 0.0);
+  CHECK(plain.roughness == 0.5f);
+  CHECK(plain.specular == doctest::Approx(0.04 * 38.0 / 8.0));
+  material["alphaMode"] = "BLEND";
+  CHECK(mapped(material).opacity == 0.25f);
+  material["alphaMode"] = "OPAQUE";
+  given["specularFactor"] = {1.0, 0.5, 0.0};
+  const Material gold = mapped(material);
+  CHECK(gold.kind == Kind::kMirror);
+  check_color(gold.color, 1.0, kHalf, 0.0);
+  CHECK(gold.roughness == 0.5f);
+  given["glossinessFactor"] = 0.25;
+  CHECK(mapped(material).kind == Kind::kDiffuse);
+  check_color(mapped(material).color, 1.0, kHalf, 0.0);
+  // By default a perfect mirror.
+  given = json::object();
+  const Material silver = mapped(material);
+  CHECK(silver.kind == Kind::kMirror);
+  CHECK(silver.color == Rgb{1, 1, 1});
+  CHECK(silver.roughness == 0.0f);
+}
+
+TEST_CASE("glTF materials: the textures of specular and glossiness") {
+  const Scratch scratch;
+  Image mixed(1, 2, 4);
+  mixed.data = {0.2f, 0, 0, 0.2f, 0.2f, 0, 0, 0.6f};
+  write_image(scratch / "mixed.png", mixed);
+  json material;
+  json& given = material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
+  given = {{"diffuseTexture", {{"index", 0}, {"texCoord", 1}}},
+           {"specularGlossinessTexture", {{"index", 1}}}};
+  GltfFile file = textured(material);
+  file.json["textures"].push_back({{"source", 1}});
+  file.json["images"] = {{{"uri", "data:image/png;base64," + base64(png())}},
+                         {{"uri", "mixed.png"}}};
+  file.json["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"};
+  write_bytes(scratch / "m.glb", file.glb());
+  const io::MeshFile read = io::read_mesh(scratch / "m.glb");
+  REQUIRE(read.textures.size() == 1);
+  CHECK(read.textures[0].width == 2);
+  CHECK(read.materials.at(0).texture == 0);
+  CHECK(read.mesh.uvs == std::vector<float>{1, 1, 1, 1, 1, 1});
+  CHECK(read.materials[0].kind == Kind::kDiffuse);
+  CHECK(read.materials[0].roughness == doctest::Approx(0.6).epsilon(1e-6));
+  // Light of the display value 0.2 is reflected, and the rest of white is left.
+  const double reflected = std::pow((0.2 + 0.055) / 1.055, 2.4);
+  check_color(read.materials[0].color, 1.055 * std::pow(1 - reflected, 1.0 / 2.4) - 0.055,
+              read.materials[0].color[0], read.materials[0].color[0]);
+}
+
 TEST_CASE("glTF materials: hostile numbers stay in range") {
   json material = {{"emissiveFactor", {-1.0, 1e300, 1e300}},
                    {"alphaMode", "BLEND"},
@@ -255,4 +338,10 @@ TEST_CASE("glTF materials: hostile numbers stay in range") {
   const Material glass = mapped(material);
   CHECK(glass.ior == 1.0f);
   for (const float value : glass.absorption) CHECK((value >= 0.0f && std::isfinite(value)));
+  json other;
+  other["extensions"]["KHR_materials_pbrSpecularGlossiness"] = {
+      {"diffuseFactor", {-5.0, 1e300}}, {"specularFactor", "x"}, {"glossinessFactor", -1e300}};
+  const Material rough = mapped(other);
+  for (const float value : rough.color) CHECK((value >= 0.0f && value <= 1.0f));
+  CHECK(rough.roughness == 1.0f);
 }

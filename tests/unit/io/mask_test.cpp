@@ -2,6 +2,8 @@
 #include <doctest/doctest.h>
 
 #include <cstdint>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include "io/photo_rows.hpp"
@@ -37,6 +39,20 @@ TEST_CASE("a mask of 0 and 1 is one of black and white, in 8 bits as in 16") {
   CHECK(mask_of(1, Bytes{0, 128, 255})[1] == 128.0f / 255.0f);
   CHECK(mask_of(1, Floats{0, 0.5f, 7.0f}) == Floats{0, 0.5f, 1});
   CHECK(mask_of(1, Bytes{0, 0}) == Floats{0, 0});
+}
+
+TEST_CASE("a mask is black where no pixel has both colour and alpha") {
+  const auto is_black = [](int channels, auto numbers) {
+    const int width = static_cast<int>(numbers.size()) / channels;
+    return io::is_black({width, 1, channels, std::move(numbers)});
+  };
+  CHECK(is_black(1, Bytes{0, 0, 0}));
+  CHECK_FALSE(is_black(1, Bytes{0, 0, 1}));
+  CHECK_FALSE(is_black(3, Shorts{0, 0, 0, 0, 0, 1}));
+  CHECK(is_black(2, Bytes{255, 0, 0, 255}));
+  CHECK(is_black(4, Bytes{9, 9, 9, 0, 0, 0, 0, 9}));
+  CHECK_FALSE(is_black(4, Bytes{9, 9, 9, 0, 0, 9, 0, 9}));
+  CHECK(is_black(1, Floats{0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN()}));
 }
 
 TEST_CASE("a mask is what is not black: the greatest of its colours, times its alpha") {

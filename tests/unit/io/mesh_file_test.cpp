@@ -12,6 +12,7 @@
 
 #include "scene/mesh.hpp"
 #include "scratch.hpp"
+#include "skip_test.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -43,7 +44,8 @@ TEST_CASE("textures have three channels") {
 
 TEST_CASE("meshes of the real collection have their published sizes") {
   const auto folder = test_data();
-  if (!folder || !fs::exists(*folder / "meshes")) return;
+  SKIP_TEST_UNLESS(folder && fs::exists(*folder / "meshes"),
+                   "RAYSPLATS_TEST_DATA is not set, or has no folder meshes");
   struct Expected {
     std::string name;
     std::size_t vertices;  ///< distinct corners of faces; all of the file in a PLY

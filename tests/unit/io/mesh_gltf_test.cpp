@@ -279,9 +279,6 @@ TEST_CASE("glTF: truncated and foreign files are rejected") {
                           "m.gltf"),
                  "levels deep"));
   CHECK(contains(data_error([] { io::read_mesh("absent.glb"); }), "does not exist"));
-  GltfFile draco = square();
-  draco.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-  CHECK(contains(error_of(draco.glb()), "KHR_draco_mesh_compression"));
 }
 
 TEST_CASE("glTF: primitives without normals among others that have them are flat") {

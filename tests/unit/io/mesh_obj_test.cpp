@@ -106,6 +106,49 @@ TEST_CASE("OBJ: line ends, tabs and continued lines of every kind") {
   }
 }
 
+TEST_CASE("OBJ: a byte order mark hides neither the first vertex nor the first material") {
+  const io::MeshFile file = read(
+      "\xEF\xBB\xBFv 0 0 0\nv 1 0 0\nv 1 1 0\nmtllib m.mtl\n"
+      "usemtl a\nf 1 2 3\n",
+      "\xEF\xBB\xBFnewmtl a\nKd 1 0 0\n");
+  CHECK(file.mesh.positions == std::vector<float>{0, 0, 0, 1, 0, 0, 1, 1, 0});
+  REQUIRE(file.materials.size() == 1);
+  CHECK(file.materials[0].color == Rgb{1, 0, 0});
+}
+
+TEST_CASE("OBJ: corners that end in slashes have no more than what stands before these") {
+  // Other texture coordinates and normals than those of the corners' own numbers.
+  const std::string lines =
+      kSquare + "vt 0.5 1\nvt 0 0\nvt 1 0\nvt 0 0\nvn 0 0 1\nvn 1 0 0\nvn 1 0 0\n";
+  for (const std::string face :
+       {"f 1/ 2/ 3/\n", "f 1// 2// 3//\n", "f 1/ 2// 3/", "f 1//\t2/ 3//\r\n"}) {
+    CAPTURE(face);
+    const Mesh mesh = read(lines + face).mesh;
+    CHECK(mesh.triangles == std::vector<std::uint32_t>{0, 1, 2});
+    CHECK(mesh.positions == std::vector<float>{0, 0, 0, 1, 0, 0, 1, 1, 0});
+    CHECK(mesh.uvs.empty());
+    CHECK(mesh.normals.empty());
+  }
+  const Mesh mesh = read(lines + "f 1/1/ 2/1/ 3/1/\n").mesh;
+  CHECK(mesh.uvs == std::vector<float>{0.5f, 0, 0.5f, 0, 0.5f, 0});
+  CHECK(mesh.normals.empty());
+}
+
+TEST_CASE("OBJ: comments may follow numbers, and are no part of a continued line") {
+  const Mesh expected = read(kSquare + "vt 0.5 1\nf 1/1 2/1 3/1\n").mesh;
+  const Mesh mesh = read(
+                        "# begin \\\nv 0 0 0 # first \\\nv 1 0 0# 2\nv 1 1 0 #\nv 0 1 0\n"
+                        "vt 0.5 1 # 7\nf 1/1 2/1 3/1 # 4 5\n# end")
+                        .mesh;
+  CHECK(mesh.positions == expected.positions);
+  CHECK(mesh.triangles == expected.triangles);
+  CHECK(mesh.uvs == expected.uvs);
+  CHECK(read(kSquare + "vt 0.5 # 7\nf 1/1 2/1 3/1#").mesh.uvs.size() == 6);
+  const io::MeshFile named =
+      read("mtllib m.mtl\n" + kSquare + "usemtl a#1\nf 1 2 3\n", "newmtl a#1\nKd 1 0 0\n");
+  CHECK(named.materials.at(0).name == "a#1");
+}
+
 TEST_CASE("OBJ: what is malformed is named") {
   CHECK(contains(error_of("v 0 0 0\nv 0 nan 0\nv 1 0 0\nf 1 2 3\n"), "not finite in line 2"));
   CHECK(contains(error_of("v 0 0 0\nv 0 1 inf\nv 1 0 0\nf 1 2 3\n"), "line 2"));
@@ -120,7 +163,14 @@ TEST_CASE("OBJ: what is malformed is named") {
   CHECK(contains(error_of(kSquare + "f 1//9 2//9 3//9\n"), "the normal 9"));
   CHECK(contains(error_of(kSquare + "f 1 2 -5\n"), "index -5, but 4 lines precede it"));
   CHECK(contains(error_of(kSquare + "f 0 1 2\n"), "without a vertex"));
-  CHECK(contains(error_of(kSquare + "f a b c\n"), "without a vertex"));
+  CHECK(contains(error_of(kSquare + "f a b c\n"), "'a'"));
+  for (const std::string corner : {"4294967299", "-4294967299", "1/4294967297", "1//x", "1/2/3/4",
+                                   "1.5", "/1", "/", "1///1"}) {
+    CAPTURE(corner);
+    CHECK(contains(error_of(kSquare + "f 1 2 " + corner + "\n"),
+                   "a corner is '" + corner + "', not whole numbers such as 1/2/3 in line 5"));
+  }
+  CHECK(error_of(kSquare + "f 1 2 " + std::string(10000, 'x') + "\n").size() < 400);
   CHECK(contains(error_of(kSquare + "f 1 2\n"), "2 corners"));
   CHECK(contains(error_of(kSquare), "no triangles"));
   CHECK(contains(error_of(""), "no triangles"));

@@ -14,6 +14,7 @@
 #include "raysplats/gaussians.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
+#include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 
 namespace raysplats::test {
@@ -77,6 +78,7 @@ inline double farthest_rotation(const std::vector<float>& a, const std::vector<f
 /// sentence with the file's name. Returns how many were refused.
 inline std::size_t check_damage(const std::string& bytes, const std::string& name) {
   const Scratch scratch;
+  const LogCapture log;
   std::size_t refused = 0;
   const auto attempt = [&](const std::string& damaged) {
     write_bytes(scratch / name, damaged);

@@ -232,6 +232,27 @@ TEST_CASE("a band that is no alpha is left out, where an alpha lies behind it or
             .at(0, 0, 3) == 1.0f);
 }
 
+TEST_CASE("integers of 32 bits are a photo where they fill their range, else of unknown white") {
+  const Scratch scratch;
+  const fs::path path = scratch / "a.tif";
+  const auto most = std::uint32_t{0xffffffff};
+  // A dark photo of the whole range.
+  const Image dark = read_image(write_row<std::uint32_t>(path, {"Y"}, {0, most / 10, most / 5}));
+  CHECK(dark.data[0] == 0.0f);
+  CHECK(dark.data[2] == doctest::Approx(0.2));
+  CHECK(photo_of(write_row<std::int32_t>(path, {"Y"}, {0, 0x7fffffff}))[4] == 1.0f);
+  // Nothing but black is that in any range.
+  CHECK(read_image(write_row<std::uint32_t>(path, {"Y"}, {0, 0})).data == std::vector<float>{0, 0});
+  const auto message = [&] { return data_error([&] { read_image(path); }); };
+  write_row<std::uint32_t>(path, {"R", "G", "B"}, {12, 255, 7, 0, 1, 2});
+  CHECK(contains(message(), "a.tif has integers of 32 bits, of which the greatest is 255"));
+  write_row<std::int32_t>(path, {"Y"}, {-9, 65535, 40});
+  CHECK(contains(message(), "the greatest is 65535"));
+  // Alpha tells nothing of white.
+  write_row<std::uint32_t>(path, {"R", "G", "B", "A"}, {9, 9, 9, most}, true);
+  CHECK(contains(message(), "the greatest is 9:"));
+}
+
 TEST_CASE("colours of another profile than sRGB are told once, of whatever format") {
   const std::string wide = icc_profile("Display P3");
   const auto lines = [](const std::string& extension, const std::string& profile) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the masks of photos are found that nothing names.
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <string>
 #include <vector>
@@ -21,6 +22,18 @@ void write_model(const Scratch& scratch, const Names& names) {
   fixture.images.resize(names.size());
   for (std::size_t i = 0; i < names.size(); ++i) fixture.images[i].name = names[i];
   fixture.write_binary(scratch / "sparse/0");
+}
+
+/// A file of frames with these photos, which are written; those without an extension as PNG.
+void write_frames(const Scratch& scratch, const char* file, const Names& names) {
+  std::string frames;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const bool named = names[i].ends_with(".jpg");
+    write_image(scratch / (named ? names[i] : names[i] + ".png"), Image(40, 30, 3, 0.5f));
+    frames += fmt::format(R"({}{{"file_path": "{}", "transform_matrix": {}}})", i > 0 ? ", " : "",
+                          names[i], matrix_json(static_cast<double>(i)));
+  }
+  write_bytes(scratch / file, fmt::format(R"({{"fl_x": 50, "frames": [{}]}})", frames));
 }
 
 void write_mask(const fs::path& path) { write_image(path, Image(40, 30, 1, 1.0f)); }
@@ -68,4 +81,52 @@ TEST_CASE("a mask without a folder is that of a photo whose file name no other h
   write_mask(scratch / "masks/right/1.png");
   write_mask(scratch / "masks/left/2.png");
   CHECK(masks_of(scratch) == Names{"", "masks/left/2.png", "masks/right/1.png"});
+}
+
+TEST_CASE("masks of photos in folders lie as these do, from whatever folder their names begin") {
+  const Scratch scratch;
+  const Names names{"images/cam1/a.jpg", "images/cam1/b.jpg", "images/cam2/a.jpg"};
+  write_frames(scratch, "transforms.json", names);
+  write_mask(scratch / "masks/cam1/a.png");
+  write_mask(scratch / "masks/cam2/a.png");
+  write_mask(scratch / "masks/b.png");
+  CHECK(masks_of(scratch) == Names{"masks/cam1/a.png", "masks/b.png", "masks/cam2/a.png"});
+  // The longest end of a path goes before shorter ones.
+  write_mask(scratch / "masks/images/cam1/a.png");
+  write_mask(scratch / "masks/cam1/b_mask.png");
+  CHECK(masks_of(scratch) ==
+        Names{"masks/images/cam1/a.png", "masks/cam1/b_mask.png", "masks/cam2/a.png"});
+  // COLMAP's names begin where another machine had the photos.
+  const Scratch moved;
+  write_model(moved, {"/caps/images/cam1/a.jpg", "/caps/images/cam1/b.jpg"});
+  for (const char* name : {"images/a.jpg", "images/b.jpg"})
+    write_image(moved / name, Image(40, 30, 3, 0.5f));
+  write_mask(moved / "masks/cam1/a.png");
+  write_mask(moved / "masks/images/cam1/b.png");
+  CHECK(masks_of(moved) == Names{"masks/cam1/a.png", "masks/images/cam1/b.png"});
+}
+
+TEST_CASE("a mask that may be of several photos is of none, unless it lies as one of them") {
+  const Scratch scratch;
+  write_frames(scratch, "transforms.json", {"images/1.jpg", "images/left/1.jpg"});
+  write_mask(scratch / "masks/1.png");
+  CHECK(masks_of(scratch) == Names{"masks/1.png", ""});
+  write_mask(scratch / "masks/left/1.png");
+  CHECK(masks_of(scratch) == Names{"masks/1.png", "masks/left/1.png"});
+
+  // The photos of a data set count together, whatever file names them.
+  const Scratch blender;
+  write_frames(blender, "transforms_train.json", {"train/r_0", "train/r_1"});
+  write_frames(blender, "transforms_test.json", {"test/r_0"});
+  write_mask(blender / "masks/r_0.png");
+  write_mask(blender / "masks/r_1.png");
+  CHECK(masks_of(blender) == Names{"", "masks/r_1.png", ""});
+  write_mask(blender / "masks/test/r_0.png");
+  CHECK(masks_of(blender) == Names{"", "masks/r_1.png", "masks/test/r_0.png"});
+  // Nor does what follows a point in a name without an extension make two names one.
+  const Scratch pointed;
+  write_frames(pointed, "transforms.json", {"l/f.1", "r/f.1", "r/f.2"});
+  write_mask(pointed / "masks/f.1.png");
+  write_mask(pointed / "masks/f.2.png");
+  CHECK(masks_of(pointed) == Names{"", "", "masks/f.2.png"});
 }

@@ -246,6 +246,10 @@ TEST_CASE(
   REQUIRE(left.size() == 3);
   CHECK(left.means == std::vector<float>{1, 0, 0, 3, 0, 0, 7, 0, 0});
   CHECK(left.sh.size() == 9);
+  CHECK(contains(data_error([&] {
+                   read_model(file("nan 0 0 0 0 0 0 0 0 0 1 0 0 0\n", 1), {SpzAxes::kPly, 3, true});
+                 }),
+                 "no whole one is left"));
   // Opacities of 1 and 0 and an axis of size 0.
   const Gaussians whole =
       read_ply(file("0 0 0 0 0 0 inf 0 0 -inf 1 0 0 0\n0 0 0 0 0 0 -inf 0 0 0 1 0 0 0\n", 2));

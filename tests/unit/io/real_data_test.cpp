@@ -10,6 +10,7 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
 #include "scratch.hpp"
+#include "skip_test.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -79,7 +80,7 @@ void check_dataset(const fs::path& root, const Expected& expected) {
 
 TEST_CASE("real data sets have the views, points and sizes that their descriptions state") {
   const auto data = test_data();
-  if (!data) return;
+  SKIP_TEST_UNLESS(data, "RAYSPLATS_TEST_DATA is not set: real data are not read");
   for (const Expected& expected : {
            Expected{"colmap/fox_undistorted", DatasetKind::kColmap, 1, 43, 7, 14736, 270, 480},
            Expected{"colmap/can_tiles", DatasetKind::kColmap, 2, 62, 9, 4414, 360, 640},
@@ -94,7 +95,7 @@ TEST_CASE("real data sets have the views, points and sizes that their descriptio
 
 TEST_CASE("a real distorted photo keeps its pixels and its lens when it is not undistorted") {
   const auto data = test_data();
-  if (!data) return;
+  SKIP_TEST_UNLESS(data, "RAYSPLATS_TEST_DATA is not set: real data are not read");
   DatasetOptions options;
   options.undistort = false;
   const Dataset dataset = load_dataset(*data / "nerfstudio/fox", options);
@@ -126,7 +127,7 @@ TEST_CASE("a real distorted photo keeps its pixels and its lens when it is not u
 
 TEST_CASE("a real COLMAP model reads the same from text and from binary files") {
   const auto data = test_data();
-  if (!data) return;
+  SKIP_TEST_UNLESS(data, "RAYSPLATS_TEST_DATA is not set: real data are not read");
   const fs::path source = *data / "colmap/can_tiles";
   const Scratch scratch;
   fs::create_directory_symlink(source / "images", scratch / "images");
@@ -157,7 +158,7 @@ TEST_CASE("a real COLMAP model reads the same from text and from binary files") 
 
 TEST_CASE("real trained models load, and survive writing and reading") {
   const auto data = test_data();
-  if (!data) return;
+  SKIP_TEST_UNLESS(data, "RAYSPLATS_TEST_DATA is not set: real data are not read");
   struct Model {
     const char* folder;
     std::size_t count;
@@ -196,7 +197,8 @@ TEST_CASE("real trained models load, and survive writing and reading") {
 
 TEST_CASE("foreign models of every format hold what their programs say") {
   const auto data = test_data();
-  if (!data || !fs::exists(*data / "formats")) return;
+  SKIP_TEST_UNLESS(data && fs::exists(*data / "formats"),
+                   "RAYSPLATS_TEST_DATA is not set, or has no folder formats");
   const fs::path formats = *data / "formats";
   for (const char* name : {"minimal-v3.spz", "minimal-v4.spz"}) {
     const Gaussians model = read_model(formats / name);

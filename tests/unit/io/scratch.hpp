@@ -57,10 +57,7 @@ inline bool contains(const std::string& text, const std::string& part) {
 /// A folder of real data sets, when the environment names one.
 inline std::optional<fs::path> test_data() {
   const char* folder = std::getenv("RAYSPLATS_TEST_DATA");
-  if (folder == nullptr || *folder == '\0') {
-    MESSAGE("RAYSPLATS_TEST_DATA is not set: real data are not read");
-    return std::nullopt;
-  }
+  if (folder == nullptr || *folder == '\0') return std::nullopt;
   return fs::path(folder);
 }
 

@@ -76,6 +76,16 @@ struct Sog {
     files.emplace_back("n", picture(centroids, 192, 2));
     files.emplace_back("i", picture({65, 0, 0, 255, 0, 0, 0, 255}));
   }
+  /// As PlayCanvas's sogs wrote it before versions were counted.
+  void make_first() {
+    meta.erase("version");
+    meta.erase("count");
+    meta["means"]["shape"] = {2, 3};
+    meta["scales"] = {{"mins", {-10, -8, -6}}, {"maxs", {0, 0, 4}}, {"files", {"s"}}};
+    meta["quats"]["encoding"] = "quaternion_packed";
+    meta["sh0"] = {{"mins", {-2, -1, 0, -4}}, {"maxs", {0, 1, 3, 6}}, {"files", {"c"}}};
+    meta["shN"] = {{"mins", -0.5}, {"maxs", 0.5}, {"quantization", 8}, {"files", {"n", "i"}}};
+  }
   std::string archive() const {
     Files all = files;
     all.emplace_back("meta.json", bytes_of_text(meta.dump()));
@@ -161,6 +171,17 @@ TEST_CASE("SOG: what its archive claims to inflate to is compared with the archi
                  "more than its"));
 }
 
+TEST_CASE("SOG: an archive of Zip64 is refused as such") {
+  const std::string archive = Sog().archive();
+  // The number of files, and the place of the directory.
+  for (const auto& [at, bytes] : {std::pair(12, 2), std::pair(6, 4)}) {
+    std::string large = archive;
+    large.replace(large.size() - static_cast<std::size_t>(at), static_cast<std::size_t>(bytes),
+                  std::string(static_cast<std::size_t>(bytes), '\xff'));
+    CHECK(contains(data_error([&] { read(large); }), "is a Zip64"));
+  }
+}
+
 TEST_CASE("SOG: a count has to be borne out by the disk, not by what inflates from it") {
   const Scratch scratch;
   Sog sog;
@@ -186,7 +207,7 @@ TEST_CASE("SOG: a count has to be borne out by the disk, not by what inflates fr
 TEST_CASE("SOG: equal Gaussians, which pack best, are read again") {
   const Scratch scratch;
   Gaussians model;
-  model.resize(20000);
+  model.resize(200000);
   write_model(scratch / "a.sog", model);
   CHECK(read_model(scratch / "a.sog").size() == model.size());
 }
@@ -263,6 +284,78 @@ TEST_CASE("SOG: what does not fit together is refused by name") {
                  }),
                  "no largest part"));
   CHECK(contains(refused([](Sog& s) { s.files[3].second = bytes_of_text("RIFF"); }), "WebP"));
+}
+
+TEST_CASE("SOG: the first version has ranges in place of codebooks, and no number") {
+  Sog sog;
+  const double e = std::exp(1.0), root = std::sqrt(2.0);
+  sog.make_first();
+  const auto check = [&](const Gaussians& model) {
+    REQUIRE(model.size() == 2);
+    REQUIRE(model.sh_degree == 1);
+    CHECK(farthest(model.means,
+                   {static_cast<float>(1 - e), 0.0f, static_cast<float>(std::expm1(0x140 / 4096.0)),
+                    static_cast<float>(e - 1), static_cast<float>(std::expm1(0.5)), 0.0f}) < 1e-5);
+    // From -10 to 0, -8 to 0 and -6 to 4, each axis by itself.
+    CHECK(farthest(model.log_scales, {-10.0f, static_cast<float>(-8 + 8 * 16 / 255.0),
+                                      static_cast<float>(-6 + 10 * 160 / 255.0), 0.0f,
+                                      static_cast<float>(-8 + 8 * 1 / 255.0),
+                                      static_cast<float>(-6 + 10 * 2 / 255.0)}) < 1e-6);
+    CHECK(model.quaternions[1] == doctest::Approx(0.5 * root));
+    CHECK(model.quaternions[7] == doctest::Approx((204 / 255.0 - 0.5) * root));
+    // Logits from -4 to 6.
+    CHECK(model.opacities[0] == doctest::Approx(-4 + 10 * 51 / 255.0));
+    CHECK(model.opacities[1] == doctest::Approx(-4.0));
+    CHECK(model.sh[0] == -2.0f);
+    CHECK(model.sh[1] == doctest::Approx(-1 + 2 * 128 / 255.0));
+    CHECK(model.sh[2] == doctest::Approx(3 * 192 / 255.0));
+    for (int k = 0; k < 9; ++k) {
+      const auto at = static_cast<std::size_t>(3 + k);
+      CHECK(model.sh[at] == doctest::Approx(-0.5 + (136 + 8 * k) / 255.0));
+      CHECK(model.sh[at + 12] == doctest::Approx(-0.5 + 128 / 255.0));
+    }
+  };
+  check(read(sog.archive()));
+  const Scratch scratch;
+  for (const auto& [name, bytes] : sog.files) write_bytes(scratch / name, text_of(bytes));
+  write_bytes(scratch / "meta.json", sog.meta.dump());
+  check(read_model(scratch / "meta.json"));
+  sog.meta.erase("shN");
+  CHECK(read(sog.archive()).sh_degree == 0);
+}
+
+TEST_CASE("SOG: the first version is held to what its pictures bear out") {
+  const auto refused = [](const auto& change) {
+    Sog sog;
+    sog.make_first();
+    change(sog);
+    return error_of(sog);
+  };
+  // As gsplat compresses.
+  CHECK(contains(refused([](Sog& s) { s.meta["quats"].erase("encoding"); }), "quaternion_packed"));
+  CHECK(contains(refused([](Sog& s) { s.meta["sh0"]["mins"].erase(0); }), "no list of 4 numbers"));
+  CHECK(contains(refused([](Sog& s) { s.meta["means"]["shape"] = 2; }), "'shape' is no list"));
+  CHECK(contains(refused([](Sog& s) { s.meta["means"]["shape"][0] = 2.5; }), "no whole number"));
+  CHECK(contains(refused([](Sog& s) { s.meta["means"]["shape"][0] = -2; }), "count is -2"));
+  CHECK(contains(refused([](Sog& s) { s.meta["means"]["shape"][0] = 17; }), "texels"));
+  CHECK(contains(refused([](Sog& s) { s.meta["means"]["shape"][0] = 4000000000; }), "more than"));
+  CHECK(contains(refused([](Sog& s) { s.meta["scales"]["maxs"][1] = nullptr; }), "finite"));
+  CHECK(contains(refused([](Sog& s) { s.meta["shN"]["mins"] = "0"; }), "finite"));
+  CHECK(contains(refused([](Sog& s) { s.meta["shN"].erase("maxs"); }), "'maxs' is missing"));
+  CHECK(contains(refused([](Sog& s) { s.files[5].second = picture({}, 256, 2); }),
+                 "palette is 256 wide"));
+  CHECK(contains(refused([](Sog& s) { s.files[5].second = picture({}, 192, 1); }), "no entry"));
+}
+
+TEST_CASE("SOG: a codebook whose least level is missing goes one mean step below the next") {
+  Sog sog;
+  sog.meta["scales"]["codebook"][0] = nullptr;
+  const Gaussians model = read(sog.archive());
+  // Levels -9.9375 to 5.9375.
+  CHECK(model.log_scales[0] == doctest::Approx(-9.9375 - 15.875 / 255));
+  CHECK(model.log_scales[1] == -9.0f);
+  sog.meta["scales"]["codebook"][1] = nullptr;
+  CHECK(contains(error_of(sog), "finite"));
 }
 
 TEST_CASE("SOG: damage ends in one sentence") {

@@ -7,6 +7,7 @@
 #include "io/compression.hpp"
 #include "io/spz_codes.hpp"
 #include "model_bytes.hpp"
+#include "scene/gaussian_transform.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 
@@ -55,17 +56,29 @@ std::string rotation() {
   return out;
 }
 
-std::string version3() {
-  return head(3, 1, 1, 12) + kPosition + kAlpha + kColor + kScale + rotation() + kHarmonics;
+std::string version3(int flags = 0) {
+  return head(3, 1, 1, 12, flags) + kPosition + kAlpha + kColor + kScale + rotation() + kHarmonics;
 }
 
-std::string version4() {
+/// Niantic's record of an extension.
+std::string record(std::uint32_t type, const std::string& content) {
+  std::string out;
+  put(out, type);
+  put(out, static_cast<std::uint32_t>(content.size()));
+  return out + content;
+}
+
+/// That of the axes, of which PLY's are 6.
+std::string axes_record(int axes) { return record(0xADBE0003u, bytes_of({axes, 0, 0, 0})); }
+
+std::string version4(const std::string& records = axes_record(6), int flags = 2) {
   std::string out = "NGSP";
   put(out, std::uint32_t{4});
   put(out, std::uint32_t{1});
-  out += bytes_of({1, 12, 0, 6});
-  put(out, std::uint32_t{32});
+  out += bytes_of({1, 12, flags, 6});
+  put(out, static_cast<std::uint32_t>(32 + records.size()));
   out.resize(32);
+  out += records;
   std::string frames;
   for (const std::string& array : {kPosition, kAlpha, kColor, kScale, rotation(), kHarmonics}) {
     const std::string frame = text_of(io::zstd(as_span(array)));
@@ -76,10 +89,10 @@ std::string version4() {
   return out + frames;
 }
 
-Gaussians read(const std::string& bytes) {
+Gaussians read(const std::string& bytes, SpzAxes assumed = SpzAxes::kPly) {
   const Scratch scratch;
   write_bytes(scratch / "a.spz", bytes);
-  return read_model(scratch / "a.spz");
+  return read_model(scratch / "a.spz", {assumed});
 }
 
 std::string error_of(const std::string& bytes) {
@@ -109,6 +122,7 @@ void check_known(const Gaussians& model) {
 TEST_CASE("SPZ: known bytes of versions 3 and 4 are read, and written again") {
   check_known(read(gzipped(version3())));
   check_known(read(version4()));
+  check_known(read(version4("", 0)));
   const Scratch scratch;
   const Gaussians model = read(gzipped(version3()));
   write_model(scratch / "three.spz", model, {SpzAxes::kPly, 3});
@@ -140,6 +154,7 @@ TEST_CASE("SPZ: versions 1 and 2 have half floats and three bytes of rotation") 
 
 TEST_CASE("SPZ: round trips stay within the steps of the format at every degree and size") {
   const Scratch scratch;
+  const LogCapture log;
   for (const int version : {3, 4}) {
     for (const std::size_t count : {0u, 1u, 255u, 256u, 257u}) {
       const int degree = static_cast<int>(count % 5);
@@ -207,12 +222,22 @@ TEST_CASE("SPZ: scenes in tiny units get finer steps, and what is too small is t
   CHECK(told == "crop");
 }
 
+TEST_CASE("SPZ: all of a model that lies far away is told to be moved") {
+  const Scratch scratch;
+  Gaussians model = trained_like(50, 0);
+  for (std::size_t i = 0; i < model.means.size(); i += 3) model.means[i] += 5e6f;
+  const LogCapture log;
+  write_model(scratch / "a.spz", model);
+  CHECK(log.contains("convert --translate"));
+  CHECK(!log.contains("--crop"));
+}
+
 TEST_CASE("SPZ: right, up, back axes are half a turn about x, harmonics included") {
   const Scratch scratch;
   const Gaussians model = trained_like(20, 3);
-  write_model(scratch / "rub.spz", model, {SpzAxes::kRub, 4});
+  write_model(scratch / "rub.spz", model, {SpzAxes::kRub, 3});
   const Gaussians raw = read_model(scratch / "rub.spz");
-  const Gaussians back = read_model(scratch / "rub.spz", {SpzAxes::kRub, 4});
+  const Gaussians back = read_model(scratch / "rub.spz", {SpzAxes::kRub});
   CHECK(std::abs(raw.means[1] + model.means[1]) < 1e-3);
   CHECK(farthest(back.means, model.means) <= 0.5 / 4096 + 1e-6);
   CHECK(farthest(back.sh, model.sh) <= 1.0 / 64 + 1e-6);
@@ -221,16 +246,109 @@ TEST_CASE("SPZ: right, up, back axes are half a turn about x, harmonics included
   CHECK(std::abs(raw.sh[9] - model.sh[9]) < 0.05);
 }
 
+TEST_CASE("SPZ: axes that a file declares are obeyed, whatever is assumed") {
+  const Scratch scratch;
+  const Gaussians model = trained_like(20, 4);
+  const auto check_same = [&](const Gaussians& found) {
+    CHECK(farthest(found.means, model.means) <= 0.5 / 4096 + 1e-6);
+    CHECK(farthest(found.sh, model.sh) <= 1.0 / 32);
+    CHECK(farthest(found.log_scales, model.log_scales) <= 1.0 / 32 + 1e-6);
+  };
+  for (const SpzAxes written : {SpzAxes::kPly, SpzAxes::kRub}) {
+    write_model(scratch / "a.spz", model, {written, 4});
+    CHECK(read_bytes(scratch / "a.spz").substr(32, 12) ==
+          axes_record(written == SpzAxes::kRub ? 4 : 6));
+    check_same(read_model(scratch / "a.spz"));
+    check_same(read_model(scratch / "a.spz", {SpzAxes::kRub}));
+  }
+  // x, y and z of every number, in the order of spz's CoordinateSystem.
+  const char* const systems[] = {"LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF",
+                                 "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU", "RBU"};
+  for (int n = 1; n <= 16; ++n) {
+    CAPTURE(n);
+    // What a PLY's right, down and front are on these axes.
+    glm::dmat4 turn(0.0);
+    turn[3][3] = 1.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const char letter = systems[n - 1][axis];
+      if (letter == 'R' || letter == 'L') turn[0][axis] = letter == 'R' ? 1.0 : -1.0;
+      if (letter == 'D' || letter == 'U') turn[1][axis] = letter == 'D' ? 1.0 : -1.0;
+      if (letter == 'F' || letter == 'B') turn[2][axis] = letter == 'F' ? 1.0 : -1.0;
+    }
+    write_model(scratch / "a.spz", transformed(model, turn), {SpzAxes::kPly, 4});
+    std::string bytes = read_bytes(scratch / "a.spz");
+    bytes[40] = static_cast<char>(n);
+    check_same(read(bytes));
+  }
+  // By hand: x right, y front, z up, and a mirrored one.
+  CHECK(read(version4(axes_record(12))).means == std::vector<float>{1, -1.0f / 4096, -1});
+  CHECK(read(version4(axes_record(5))).means == std::vector<float>{-1, -1, 1.0f / 4096});
+}
+
+TEST_CASE("SPZ: axes are declared among other records, and which are taken is told") {
+  const std::vector<float> as_in_file{1, -1, 1.0f / 4096}, turned{1, 1, -1.0f / 4096};
+  const auto told = [](const std::string& bytes, SpzAxes assumed, const std::string& part) {
+    const LogCapture log;
+    const Gaussians model = read(bytes, assumed);
+    CHECK(log.lines() == (part.empty() ? 0u : 1u));
+    CHECK(log.contains(part));
+    return model.means;
+  };
+  const std::string other = record(0xADBE0002u, std::string(12, 'x'));
+  const std::string rub = "x right, y up, z back, as it declares";
+  CHECK(told(version4(other + axes_record(4)), SpzAxes::kPly, rub) == turned);
+  CHECK(told(version4(axes_record(4) + axes_record(6)), SpzAxes::kPly, rub) == turned);
+  const std::string legacy = gzipped(version3(2) + other + axes_record(4));
+  CHECK(told(legacy, SpzAxes::kPly, rub) == turned);
+  CHECK(told(version4(), SpzAxes::kPly, "") == as_in_file);
+  CHECK(told(version4(), SpzAxes::kRub, "x right, y down, z front") == as_in_file);
+  // Nothing is said, or nothing that is meant.
+  const std::string open = "does not declare its axes";
+  CHECK(told(gzipped(version3()), SpzAxes::kPly, open) == as_in_file);
+  CHECK(told(gzipped(version3()), SpzAxes::kRub, "") == turned);
+  CHECK(told(version4(axes_record(0)), SpzAxes::kPly, open) == as_in_file);
+  CHECK(told(version4(axes_record(0)), SpzAxes::kRub, "") == turned);
+  CHECK(told(version4(axes_record(4), 0), SpzAxes::kPly, open) == as_in_file);
+  CHECK(told(version4(axes_record(4).substr(0, 11)), SpzAxes::kPly, open) == as_in_file);
+  CHECK(contains(error_of(version4(axes_record(17))), "declares its axes by 17"));
+  CHECK(contains(error_of(version4(record(0xADBE0003u, "abc"))), "by 3 bytes"));
+}
+
+TEST_CASE("SPZ: equal Gaussians, which pack best, are read again, and none have no streams") {
+  const Scratch scratch;
+  Gaussians model;
+  model.resize(200000);
+  for (const int version : {3, 4}) {
+    write_model(scratch / "a.spz", model, {SpzAxes::kPly, version});
+    CHECK(read_model(scratch / "a.spz").size() == model.size());
+  }
+  std::string none = head(4, 0, 3, 12);
+  put(none, std::uint32_t{32});
+  none.resize(32);
+  CHECK(read(none).size() == 0);
+  // As other programs wrote it, with frames of nothing.
+  std::string frames = none;
+  frames[12] = 0;
+  frames[15] = 5;
+  const std::string frame = text_of(io::zstd({}));
+  for (int i = 0; i < 5; ++i) {
+    put(frames, std::uint64_t{frame.size()});
+    put(frames, std::uint64_t{0});
+  }
+  for (int i = 0; i < 5; ++i) frames += frame;
+  CHECK(read(frames).size() == 0);
+}
+
 TEST_CASE("SPZ: damage ends in one sentence, before memory is asked for") {
   CHECK(check_damage(gzipped(version3()), "a.spz") > 100);
   CHECK(check_damage(version4(), "a.spz") > 100);
   CHECK(contains(error_of(version3()), "gzip"));
   CHECK(contains(error_of(gzipped(head(3, 4000000000u, 4, 12))), "more than"));
-  // Three thousand positions could be in so many bytes, but not their harmonics.
-  CHECK(contains(error_of(gzipped(head(3, 3000, 4, 12))), "more than"));
+  // Nor can as many as any file may hold, and some more.
+  CHECK(contains(error_of(gzipped(head(3, 300000, 4, 12))), "more than"));
+  CHECK(contains(error_of(gzipped(head(3, 3000, 4, 12))), "holds less"));
   std::string four = version4();
-  four[8] = 100;
-  four[9] = 50;
+  four[10] = 50;
   four[12] = 4;
   CHECK(contains(error_of(four), "more than"));
   CHECK(contains(error_of(gzipped(head(5, 0, 0, 12))), "version is 5"));
@@ -241,7 +359,7 @@ TEST_CASE("SPZ: damage ends in one sentence, before memory is asked for") {
   check_known(read(gzipped(with_extension + std::string(24, 'x'))));
   // A stream that claims a gigabyte where the header implies nine bytes.
   std::string lying = version4();
-  lying.replace(40, 8, std::string("\0\0\0\x40\0\0\0\0", 8));
+  lying.replace(52, 8, std::string("\0\0\0\x40\0\0\0\0", 8));
   CHECK(contains(error_of(lying), "where 9 are needed"));
   CHECK(contains(error_of(bytes_of({0x1f, 0x8b})), "truncated"));
 }

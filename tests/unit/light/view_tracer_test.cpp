@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -47,6 +48,50 @@ TEST_CASE("a pinhole's gradients ray by ray are those of packets") {
   ViewTracer exact(context, options), exact_batches(context, tight);
   CHECK(trace_and_differentiate(context, exact, gaussians, large, noise, true).gradients ==
         trace_and_differentiate(context, exact_batches, gaussians, large, noise, true).gradients);
+}
+
+TEST_CASE("the gradients of a picture by rays do not depend on whether somebody watches it") {
+  Context context = make_test_context();
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(context, reference::random_scene(12, 23, 0), ScaleActivation::kExp);
+  // More pixels than a batch has of a picture that is watched.
+  const Camera camera = view_of(CameraModel::kPinhole, 260, 256, 240);
+  Buffer<float> gradient(context, 4 * 260 * 256, "image gradient");
+  gradient.upload(random_image_gradient(260 * 256, 8));
+  TraceOptions bare;
+  bare.traversal = Traversal::kBvh;
+  bare.gradient_sum = GradientSum::kExact;  // the same sum in any batches
+  REQUIRE(ViewTracer::batch(bare, context.device()) > 260 * 256);
+  TraceOptions sky = bare;
+  sky.sky = {{0.1f, 0.2f, 0.3f}};
+  const Mirrors mirror = mirrors_of({{{-3, -3, 1.5}, {6, 0, 0}, {0, 6, 0}, {1, 1, 1}}}, 1);
+  for (const auto& [options, mirrors] :
+       {std::pair{bare, Mirrors{}}, {sky, Mirrors{}}, {bare, mirror}}) {
+    CAPTURE(options.sky.size());
+    CAPTURE(mirrors.meshes.size());
+    ViewTracer tracer(context, options, mirrors);
+    const bool posed = options.sky.empty() && mirrors.meshes.empty();
+    const auto gradients = [&](bool watch_forward, bool watch_backward, PoseGradient& pose) {
+      const auto watch = [&](bool watched) {
+        tracer.set_watch(watched ? [](double) { return true; } : std::function<bool(double)>());
+      };
+      watch(watch_forward);
+      tracer.forward(gaussians, camera, true);
+      watch(watch_backward);
+      GaussianGradients out;
+      tracer.backward(gaussians, gradient, out, posed ? &pose : nullptr);
+      return HostGradients(out);
+    };
+    PoseGradient expected_pose, pose;
+    const HostGradients expected = gradients(false, false, expected_pose);
+    CHECK(gradients(true, false, pose) == expected);
+    if (!posed) continue;
+    CHECK(gradients(false, true, pose) == expected);
+    for (std::size_t k = 0; k < 3; ++k) {
+      CHECK(pose.center[k] == doctest::Approx(expected_pose.center[k]));
+      CHECK(pose.rotation[k] == doctest::Approx(expected_pose.rotation[k]));
+    }
+  }
 }
 
 TEST_CASE("parts of a picture have its pixels, and nobody traces another's") {

@@ -135,6 +135,25 @@ TEST_CASE("a report holds what the run says, escaped, and nothing from elsewhere
   CHECK(fs::file_size(run.path() / "report.html") == page.size());
 }
 
+TEST_CASE("the end of a run is compared with evaluations of as many views") {
+  const Run run;
+  const auto page_of = [&](const std::string& evaluations) {
+    run.write("metrics.json",
+              R"({"complete":true,"psnr_rise":null,"seed":18446744073709551615,"evaluations":[)" +
+                  evaluations + "]}");
+    return run_report(run.path());
+  };
+  // The two views of --eval-views 2 are easier than the nine of the end.
+  const std::string easy = R"({"iteration":100,"psnr":25,"views":2},)";
+  const std::string page = page_of(easy + R"({"iteration":200,"psnr":21,"views":9})");
+  CHECK(!has(page, "below its best"));
+  CHECK(has(page, "Complete: 21.0 dB on 9 held-out views, nothing to warn of."));
+  CHECK(has(page, "<td>18446744073709551615</td>"));
+  CHECK(has(page_of(easy + R"({"iteration":150,"psnr":22,"views":9},
+                              {"iteration":200,"psnr":21.5,"views":9})"),
+            "ends 0.50 dB below its best, at iteration 150"));
+}
+
 TEST_CASE("a report of a run that is under way or damaged says so") {
   const Run run;
   run.write("metrics.json", R"({"iteration":7,"iterations":90})");

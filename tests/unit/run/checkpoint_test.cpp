@@ -8,6 +8,8 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "raysplats/error.hpp"
 #include "unit/temporary_directory.hpp"
@@ -30,6 +32,9 @@ Checkpoint sample(std::int64_t iteration) {
   c.dataset = "0123456789abcdef";
   c.bad_steps = 4;
   c.bad_steps_in_a_row = 2;
+  c.skipped_updates = 11;
+  c.views_joined = 6300;
+  c.pass_due = true;
   c.config = "iterations = 5\n# \"quoted\"\n";
   c.sections["means"] = {1.5f, -0.0f, std::numeric_limits<float>::denorm_min(), std::nanf("7")};
   c.sections["empty"] = {};
@@ -62,6 +67,9 @@ TEST_CASE("a checkpoint comes back bit for bit") {
   CHECK(read.dataset == c.dataset);
   CHECK(read.bad_steps == 4);
   CHECK(read.bad_steps_in_a_row == 2);
+  CHECK(read.skipped_updates == 11);
+  CHECK(read.views_joined == 6300);
+  CHECK(read.pass_due);
   CHECK(read.config == c.config);
   REQUIRE(read.sections.size() == 3);
   for (const auto& [name, values] : c.sections) {
@@ -70,6 +78,52 @@ TEST_CASE("a checkpoint comes back bit for bit") {
     CHECK(std::memcmp(read.sections.at(name).data(), values.data(),
                       values.size() * sizeof(float)) == 0);
   }
+}
+
+TEST_CASE("sections are made one behind the other while the file is written, which is the same") {
+  const TemporaryDirectory folder;
+  const Checkpoint c = sample(7);
+  write_checkpoint(folder / "whole.rsck", c);
+  std::vector<std::string> asked;
+  CheckpointSections sections;
+  for (const auto& each : c.sections) {
+    sections[each.first] = [&asked, &each] {
+      asked.push_back(each.first);
+      return each.second;
+    };
+  }
+  Checkpoint head = c;
+  head.sections.clear();
+  write_checkpoint(folder / "parts.rsck", head, sections);
+  CHECK(read_file(folder / "parts.rsck") == read_file(folder / "whole.rsck"));
+  CHECK(asked == std::vector<std::string>{"empty", "means", "sh"});
+
+  // One that cannot be made leaves no file.
+  sections["sh"] = []() -> std::vector<float> { throw DeviceError("lost"); };
+  CHECK_THROWS_AS(write_checkpoint(folder / "lost.rsck", head, sections), DeviceError);
+  CHECK(!std::filesystem::exists(folder / "lost.rsck"));
+}
+
+TEST_CASE("the configuration of a run is known from its newest checkpoint that has one") {
+  const TemporaryDirectory folder;
+  CHECK(checkpoint_config(folder.path()).empty());
+  CHECK(checkpoint_config(folder / "none").empty());
+  for (const std::int64_t iteration : {1, 2, 3}) {
+    Checkpoint c = sample(iteration);
+    c.config = "iterations = " + std::to_string(iteration) + "\n";
+    write_checkpoint(checkpoint_path(folder.path(), iteration), c);
+  }
+  write_text_file(checkpoint_path(folder.path(), 3), "RSCKPT\r\n");
+  CHECK(checkpoint_config(folder.path()) == "iterations = 2\n");
+  CHECK(checkpoint_config(checkpoint_path(folder.path(), 1)) == "iterations = 1\n");
+  CHECK_THROWS_AS(checkpoint_config(checkpoint_path(folder.path(), 3)), DataError);
+
+  // Where it is of a run at all.
+  CHECK(run_folder_of(folder.path()) == folder.path());
+  CHECK(run_folder_of(checkpoint_path(folder.path(), 1)) == folder.path());
+  std::filesystem::create_directories(folder / "kept");
+  std::filesystem::copy_file(checkpoint_path(folder.path(), 1), folder / "kept/step.rsck");
+  CHECK(!run_folder_of(folder / "kept/step.rsck").has_value());
 }
 
 TEST_CASE("every truncation and every flipped bit is noticed") {
@@ -100,6 +154,23 @@ TEST_CASE("every truncation and every flipped bit is noticed") {
   }
   CHECK(rejected(good + "x"));
   CHECK(!rejected(good));
+}
+
+TEST_CASE("a file that is no checkpoint is said to be none, whatever its name and length") {
+  const TemporaryDirectory folder;
+  for (const char* name : {"notes.txt", "notes.rsck"}) {
+    for (const char* content : {"", "mine", "a file that is longer than a checkpoint's preamble"}) {
+      write_text_file(folder / name, content);
+      std::string told;
+      try {
+        load_latest_checkpoint(folder / name);
+      } catch (const DataError& error) {
+        told = error.what();
+      }
+      INFO(told);
+      CHECK(told.find(std::string(name) + " is not a raysplats checkpoint") != std::string::npos);
+    }
+  }
 }
 
 TEST_CASE("the newest valid checkpoint is found and old ones go") {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,58 @@ TEST_CASE("a run that ends below its best evaluation is told, unless that saw ot
   const auto best = better_before(std::vector{row(5, 21, 3), row(10, 23, 3), row(20, 20, 3)});
   REQUIRE(best.has_value());
   CHECK(best->iteration == 10);
+}
+
+TEST_CASE("a run is told of what it was judged by") {
+  // With exposures by corrected colours: plain ones fall while those rise.
+  EvaluationRow before = row(10, 23, 3), last = row(20, 20, 3);
+  before.psnr_corrected = 24;
+  last.psnr_corrected = 25;
+  CHECK_FALSE(better_before(std::vector{before, last}, true).has_value());
+  CHECK(better_before(std::vector{before, last}, false).has_value());
+  last.psnr_corrected = 23;
+  REQUIRE(better_before(std::vector{before, last}, true).has_value());
+  CHECK(judged_psnr(before, true) == 24);
+  // Where cameras were moved they count, and what was measured without cannot be compared.
+  last.psnr_aligned = 30;
+  CHECK(judged_psnr(last, true) == 30);
+  CHECK_FALSE(better_before(std::vector{before, last}, false).has_value());
+  before.psnr_aligned = 31;
+  CHECK(better_before(std::vector{before, last}, false).has_value());
+}
+
+TEST_CASE("an evaluation takes the place of one of the same iteration") {
+  const TemporaryDirectory folder;
+  RunFolder run(folder.path());
+  run.record(row(10, 20, 1));
+  run.record(row(20, 21, 1));
+  run.record(row(20, 22, 3));
+  REQUIRE(run.evaluations().size() == 2);
+  CHECK(run.evaluations().back().views == 3);
+}
+
+TEST_CASE("a folder knows its newest model, and what a run that goes on has said") {
+  const TemporaryDirectory folder;
+  RunFolder run(folder.path());
+  CHECK_FALSE(run.newest_model().has_value());
+  for (const char* name : {"iteration_9", "iteration_30"})
+    folder.write(std::string("point_cloud/") + name + "/point_cloud.ply", "ply");
+  std::filesystem::create_directories(folder / "point_cloud/iteration_50");  // empty
+  CHECK(run.newest_model() == 30);
+
+  folder.write("metrics.csv",
+               "iteration,seconds,loss,psnr,gaussians,it_per_s,candidates,hits\n"
+               "10,1.5,0.5,12,100,7,1,2\n20,3,0.25,13.5,100,7,1,2\n30,4,0.125,14,100,7,1,2\n");
+  folder.write("metrics.json", R"({"command":"first","evaluations":[]})");
+  run.begin_metrics(20);
+  REQUIRE(run.former_rows().size() == 2);
+  CHECK(run.former_rows().back().iteration == 20);
+  CHECK(run.former_rows().back().loss == 0.25);
+  CHECK(run.former_rows().back().psnr == 13.5);
+  CHECK(run.former_metrics()->at("command") == "first");
+  run.begin_metrics(0);
+  CHECK(run.former_rows().empty());
+  CHECK(run.former_metrics()->is_null());
 }
 
 TEST_CASE("rows of an older metrics.csv stay when its run goes on") {

@@ -7,9 +7,12 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "raysplats/error.hpp"
+#include "run/checkpoint.hpp"
 #include "run/train_keys.hpp"
+#include "unit/temporary_directory.hpp"
 #include "util/atomic_file.hpp"
 
 using namespace raysplats;
@@ -311,16 +314,28 @@ TEST_CASE("the command line beats the file, wherever --config stands") {
   std::filesystem::remove(path);
 }
 
+namespace {
+
+// The options of a run that goes on from `source`, by a command line of these words.
+TrainOptions resumed(const std::filesystem::path& source, std::vector<std::string> words = {}) {
+  TrainOptions options;
+  CLI::App app;
+  std::string from;
+  app.add_option("--resume", from);
+  add_train_options(app, options);
+  words.insert(words.end(), {"--resume", source.string()});
+  app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+  apply_resumed_options(app, options, source);
+  return options;
+}
+
+}  // namespace
+
 TEST_CASE("a resumed run that is older than a key goes on as it began") {
-  const auto path = temporary("old_run.toml");
-  const auto options_of = [&path](const std::string& text, const std::vector<std::string>& words) {
-    write_text_file(path, text);
-    TrainOptions options;
-    CLI::App app;
-    add_train_options(app, options);
-    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
-    apply_run_config(app, options, path);
-    return options;
+  const TemporaryDirectory run;
+  const auto options_of = [&run](const std::string& text, const std::vector<std::string>& words) {
+    run.write("config.toml", text);
+    return resumed(run.path(), words);
   };
   const TrainOptions old = options_of("resolution-schedule = [300, 1000]\nsave-at = [7000]\n", {});
   CHECK(old.strategy == DensityStrategy::kAdc);
@@ -332,5 +347,53 @@ TEST_CASE("a resumed run that is older than a key goes on as it began") {
   const TrainOptions now = options_of("strategy = \"budget\"\nfootprint = 0.5\n", {});
   CHECK(now.strategy == DensityStrategy::kBudget);
   CHECK(now.footprint == 0.5);
-  std::filesystem::remove(path);
+}
+
+TEST_CASE("a resumed run keeps its options below those of a file and of the command line") {
+  const TemporaryDirectory folder;
+  TrainOptions of_run;
+  of_run.iterations = 900;
+  of_run.end_iteration = 850;
+  of_run.validate_views = 2;
+  of_run.seed = 7;
+  of_run.sh_degree = 1;
+  folder.write("run/config.toml", to_toml(of_run));
+  // Patience alone is refused for new runs: it is the run that validates.
+  folder.write("more.toml", "patience = 3\nseed = 8\nsh-degree = 2\n");
+  const TrainOptions options =
+      resumed(folder / "run", {"--config", (folder / "more.toml").string(), "--sh-degree", "0"});
+  CHECK(options.iterations == 900);
+  CHECK(options.end_iteration == 850);
+  CHECK(options.validate_views == 2);
+  CHECK(options.patience == 3);
+  CHECK(options.seed == 8);
+  CHECK(options.sh_degree == 0);
+
+  // Another length has another end, whoever gives it.
+  folder.write("length.toml", "iterations = 1000\n");
+  CHECK(resumed(folder / "run", {"--config", (folder / "length.toml").string()}).end_iteration ==
+        0);
+  CHECK(resumed(folder / "run", {"--iterations", "1000"}).end_iteration == 0);
+  CHECK(resumed(folder / "run", {"--iterations", "1000", "--end-iteration", "950"}).end_iteration ==
+        950);
+
+  // A checkpoint has them too: in a run without the file, and outside of one beside a file that is
+  // not its run's.
+  Checkpoint checkpoint;
+  checkpoint.scale_activation = "exp";
+  checkpoint.config = to_toml(of_run);
+  write_checkpoint(checkpoint_path(folder / "bare", 7), checkpoint);
+  write_checkpoint(folder / "kept/step.rsck", checkpoint);
+  folder.write("config.toml", "iterations = 5\n");
+  for (const std::filesystem::path& source :
+       {folder / "bare", checkpoint_path(folder / "bare", 7), folder / "kept/step.rsck"}) {
+    CAPTURE(source);
+    const TrainOptions kept = resumed(source);
+    CHECK(kept.iterations == 900);
+    CHECK(kept.seed == 7);
+    CHECK(kept.validate_views == 2);
+  }
+  CHECK(resumed(folder / "none").iterations == TrainOptions().iterations);
+  CHECK_THROWS_AS(resumed(folder / "run", {"--validate-views", "0", "--patience", "2"}),
+                  UsageError);
 }

@@ -9,6 +9,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <string>
 
 #include "raysplats/error.hpp"
 #include "reference/gaussian.hpp"
@@ -209,6 +210,24 @@ TEST_CASE("maps that are none are refused") {
   infinite[3][0] = std::numeric_limits<double>::infinity();
   CHECK_THROWS_AS(transformed(model, infinite), UsageError);
   CHECK(transformed(model, glm::dmat4(1.0)).sh == model.sh);
+}
+
+TEST_CASE("Gaussians that would be moved beyond 32-bit numbers are refused") {
+  const Gaussians model = reference::random_scene(3, 1, 1);
+  for (const double far : {1e39, 1e300}) {
+    const glm::dmat4 map = glm::translate(glm::dmat4(1.0), glm::dvec3(0, far, 0));
+    std::string told;
+    try {
+      transformed(model, map);
+    } catch (const UsageError& error) {
+      told = error.what();
+    }
+    INFO(told);
+    CHECK(told.find("Gaussian 0 would be moved to") == 0);
+  }
+  const Gaussians bearable =
+      transformed(model, glm::translate(glm::dmat4(1.0), glm::dvec3(0, 1e38, 0)));
+  CHECK(bearable.means[1] == 1e38f);
 }
 
 TEST_CASE("joined models keep their Gaussians and take the highest degree") {

@@ -85,6 +85,35 @@ TEST_CASE("simple polygons of any shape, place and direction are tiled") {
   }
 }
 
+TEST_CASE("a spiral of many corners, in which ears are rare, is tiled") {
+  // With a search through all corners for every triangle it would take half a minute.
+  Corners spiral;
+  constexpr int kHalf = 2048;
+  const auto add = [&](int i, double from) {
+    const double a = 200.0 * std::numbers::pi * i / kHalf;
+    spiral.emplace_back((from + a) * std::cos(a), (from + a) * std::sin(a), 0.0);
+  };
+  for (int i = 0; i < kHalf; ++i) add(i, 1.0);
+  for (int i = kHalf - 1; i >= 0; --i) add(i, 1.5);
+  check_tiling(spiral);
+}
+
+TEST_CASE("a polygon with holes that bridges join is tiled, from whichever corner it begins") {
+  Corners corners{{0, 0, 0}};
+  for (const double x : {2.0, 5.0, 8.0}) {
+    const Corners hole{{x, 0, 0},     {x, 1, 0},     {x - 1, 1, 0}, {x - 1, 3, 0},
+                       {x + 1, 3, 0}, {x + 1, 1, 0}, {x, 1, 0},     {x, 0, 0}};
+    corners.insert(corners.end(), hole.begin(), hole.end());
+  }
+  for (const glm::dvec3& corner : Corners{{10, 0, 0}, {10, 5, 0}, {0, 5, 0}}) {
+    corners.push_back(corner);
+  }
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    check_tiling(corners);
+    std::rotate(corners.begin(), corners.begin() + 1, corners.end());
+  }
+}
+
 TEST_CASE("a quadrilateral is split along its shorter diagonal") {
   const Corners kite{{0, -2, 0}, {1, 0, 0}, {0, 2, 0}, {-1, 0, 0}};
   for (const auto& t : triangulate(kite)) {

@@ -113,5 +113,22 @@ TEST_CASE("a palette finds clusters, and is better than cells of even size") {
 TEST_CASE("a palette bears equal vectors") {
   const std::vector<float> vectors(3 * 1000, 0.5f);
   const VectorPalette palette = vector_palette(vectors, 3, 64);
-  for (const std::uint32_t label : palette.labels) CHECK(palette.entries[3 * label] == 0.5f);
+  CHECK(palette.entries == std::vector<float>(3, 0.5f));
+  for (const std::uint32_t label : palette.labels) CHECK(label == 0);
+}
+
+TEST_CASE("a palette has equal vectors once, and in no time where few differ") {
+  // Entry by entry against every vector would be 2e10 products, several times.
+  constexpr std::size_t kWidth = 45, kCount = 30000;
+  std::vector<float> vectors(kWidth * kCount, 0.0f);
+  for (std::size_t i = 0; i < kCount; i += 2) vectors[kWidth * i + 44] = 1.0f;
+  vectors[kWidth * 7] = -1.0f;
+  const VectorPalette palette = vector_palette(vectors, kWidth, 16384);
+  REQUIRE(palette.entries.size() == 3 * kWidth);
+  CHECK(palette.labels[0] == 0);
+  CHECK(palette.labels[1] == 1);
+  CHECK(palette.labels[7] == 2);
+  CHECK(palette.labels[29998] == 0);
+  CHECK(palette.entries[44] == 1.0f);
+  CHECK(palette.entries[2 * kWidth] == -1.0f);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include "skip_test.hpp"
 #include "trace/gradient_sums.hpp"
 #include "trace_fixture.hpp"
 
@@ -271,7 +272,7 @@ TEST_CASE("pose gradient equals the double reference") {
 
 TEST_CASE("the backward pass gives the same bits every time on a CPU") {
   Context context = make_test_context();
-  if (context.device().type != DeviceType::kCpu) return;
+  SKIP_TEST_UNLESS(context.device().type == DeviceType::kCpu, "the device is no CPU");
   const Gaussians model = reference::random_scene(1000, 27, 1);
   const Camera camera = reference::cube_camera(100, 90);
   const std::vector<float> image_gradient = random_image_gradient(9000, 7);

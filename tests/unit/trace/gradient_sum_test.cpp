@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -8,6 +10,7 @@
 #include "trace/gradient_sums.hpp"
 #include "trace/launch_budget.hpp"
 #include "trace_fixture.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 
@@ -22,8 +25,12 @@ struct Pass {
 };
 
 // One view forward and backward with its own tracer.
-Pass trace_view(Context& context, const Gaussians& model, const TraceOptions& options) {
-  const Camera camera = reference::cube_camera(kWidth, kHeight);
+Pass trace_view(Context& context,
+                const Gaussians& model,
+                const TraceOptions& options,
+                double unit = 1.0) {
+  Camera camera = reference::cube_camera(kWidth, kHeight);
+  camera.translation *= unit;
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   CameraTracer tracer(context, options);
   tracer.update(gaussians);
@@ -80,17 +87,21 @@ TEST_CASE("exact sums lose nothing between the largest and the smallest") {
   CHECK(exact_sum(context, {0.0f, -0.0f}) == 0.0f);
   CHECK(exact_sum(context, {0x1p28f, 0x1p-100f, -0x1p28f}) == 0x1p-100f);
   CHECK(exact_sum(context, {0x1p28f, -0x1p-100f, -0x1p28f}) == -0x1p-100f);
+  CHECK(exact_sum(context, {0x1p74f, -0x1p-100f, -0x1p74f}, 0x1p75f) == -0x1p-100f);
   CHECK(exact_sum(context, {-0x1p-110f, -0x1p-110f}) == -0x1p-109f);
   CHECK(exact_sum(context, {0x1p-111f, 0x1p-140f}) == 0.0f);  // cut off
   CHECK(exact_sum(context, {1.0f, 0x1.fffffep-30f}) == 1.0f + 0x1.fffffep-30f);
   // Every place of a mantissa, and carries through several words.
-  for (int exponent = -86; exponent < 28; ++exponent) {
+  for (int exponent = -86; exponent < 74; ++exponent) {
     const float value = std::ldexp(0x1.fffffep0f, exponent);
     CAPTURE(exponent);
-    CHECK(exact_sum(context, {value}) == value);
-    CHECK(exact_sum(context, {-value, -value}) == -2.0f * value);
-    CHECK(exact_sum(context, {value, value, -value}) == value);
-    CHECK(exact_sum(context, {-value, 0x1p-86f, value}) == 0x1p-86f);
+    const auto sum = [&](const std::vector<float>& values) {
+      return exact_sum(context, values, 0x1p75f);
+    };
+    CHECK(sum({value}) == value);
+    CHECK(sum({-value, -value}) == -2.0f * value);
+    CHECK(sum({value, value, -value}) == value);
+    CHECK(sum({-value, 0x1p-86f, value}) == 0x1p-86f);
   }
 }
 
@@ -137,6 +148,7 @@ TEST_CASE("the way of adding follows the device, and is never atomic where it mu
   CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kCopies);
   CHECK(choose(cpu, 100, 1 << 20).copies == 8);
   CHECK(choose(cpu, 100, 5 * 6400).copies == 5);
+  CHECK(!choose(cpu, 100, 1 << 20).crowded_out);
   CHECK(choose(gpu, 100, 1 << 20).sum == GradientSum::kAtomic);
   CHECK(choose(gpu, 100, 1 << 20).copies == 1);
   options.deterministic = true;
@@ -148,6 +160,7 @@ TEST_CASE("the way of adding follows the device, and is never atomic where it mu
       options.deterministic = deterministic;
       CHECK(choose(cpu, 100, 3 * 6400).sum == GradientSum::kExact);
       CHECK(choose(cpu, 100, 3 * 6400).copies == 1);
+      CHECK(choose(cpu, 100, 3 * 6400).crowded_out);
       CHECK(choose(cpu, 10000, 1 << 24).sum == GradientSum::kExact);  // the largest allocation
     }
   }
@@ -157,6 +170,20 @@ TEST_CASE("the way of adding follows the device, and is never atomic where it mu
   CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kAtomic);
   options.gradient_sum = GradientSum::kExact;
   CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kExact);
+  CHECK(!choose(cpu, 100, 3 * 6400).crowded_out);
+}
+
+TEST_CASE("the log tells once that copies of gradients give way to exact sums") {
+  Context context = make_test_context();
+  GradientSums sums(context, "line gradients");
+  const LogCapture log;
+  sums.prepare({GradientSum::kExact, 1, false}, 3);
+  CHECK(log.lines() == 0);
+  for (int pass = 0; pass < 2; ++pass) {
+    sums.prepare({GradientSum::kExact, 1, true}, 3);
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("line gradients: a private copy"));
+  }
 }
 
 TEST_CASE("every way of adding gradients gives the same, and all but atomics the same bits") {
@@ -194,6 +221,26 @@ TEST_CASE("every way of adding gradients gives the same, and all but atomics the
     CHECK(trace_view(context, model, tight) == exact);
     tight.launch_budget_ms = 1e-6;
     CHECK(trace_view(context, model, tight) == exact);
+  }
+}
+
+TEST_CASE("exact sums take the gradients of scenes in large and in small units") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(300, 33, 0);
+  for (const int power : {-20, 24}) {
+    CAPTURE(power);
+    Gaussians scaled = model;
+    for (float& mean : scaled.means) mean = std::ldexp(mean, power);
+    for (float& scale : scaled.log_scales) scale += static_cast<float>(power * std::log(2.0));
+    TraceOptions options;
+    options.gradient_sum = GradientSum::kExact;
+    const Pass exact = trace_view(context, scaled, options, std::ldexp(1.0, power));
+    options.gradient_sum = GradientSum::kCopies;
+    const Pass copies = trace_view(context, scaled, options, std::ldexp(1.0, power));
+    for (const auto* values : {&exact.means, &exact.quaternions, &exact.scales, &exact.opacities}) {
+      CHECK(std::all_of(values->begin(), values->end(), [](float v) { return std::isfinite(v); }));
+    }
+    CHECK(error(exact, copies) < 1e-5);
   }
 }
 

@@ -21,10 +21,9 @@ std::size_t own_budget(const DeviceInfo& device) { return MemoryShares({}, devic
 
 }  // namespace
 
-TEST_CASE("memory budget: 1 GiB on CPUs, a quarter of other devices' memory from 1 to 4 GiB") {
-  for (const std::uint64_t memory : {2 * kGiB, 16 * kGiB, 512 * kGiB})
-    CHECK(own_budget(device_with(DeviceType::kCpu, memory, memory / 4)) == kGiB);
-  for (const DeviceType type : {DeviceType::kGpu, DeviceType::kAccelerator, DeviceType::kOther}) {
+TEST_CASE("memory budget: a quarter of the device's memory, from 1 to 4 GiB") {
+  for (const DeviceType type :
+       {DeviceType::kCpu, DeviceType::kGpu, DeviceType::kAccelerator, DeviceType::kOther}) {
     CHECK(own_budget(device_with(type, 2 * kGiB, kGiB)) == kGiB);
     CHECK(own_budget(device_with(type, 4 * kGiB, kGiB)) == kGiB);
     CHECK(own_budget(device_with(type, 10 * kGiB, 4 * kGiB)) == 5 * kGiB / 2);

@@ -6,7 +6,9 @@
 #include <bit>
 #include <string>
 
+#include "device/fault_injection.hpp"
 #include "raysplats/device.hpp"
+#include "raysplats/error.hpp"
 #include "reference/scenes.hpp"
 #include "trace/ray_tree_validate.hpp"
 #include "unit/fixture.hpp"
@@ -79,6 +81,44 @@ TEST_CASE("ray tree: it is built anew when walking it has become dearer, and ref
   f.model.resize(699);
   CHECK(tree.follow(f.uploaded()));
   CHECK(tree.tree().size() == 699);
+}
+
+TEST_CASE("ray tree: it is built anew for Gaussians that left the place where it was built") {
+  Fixture f;
+  RayTree tree(f.context, f.options, 0);
+  tree.build(f.uploaded());
+  f.model = reference::random_scene(700, 5, 1);
+  for (float& mean : f.model.means) mean += 50.0f;
+  CHECK(tree.follow(f.uploaded()));
+  CHECK(validate_ray_tree(RayTreeCopy::of(tree), f.model) == "");
+  CHECK(!tree.follow(f.uploaded()));
+}
+
+TEST_CASE("ray tree: after a build that failed it is not refitted but built") {
+  Fixture f;
+  const DeviceGaussians former = f.uploaded();
+  f.model = reference::random_scene(900, 5, 1);
+  const DeviceGaussians next = f.uploaded();
+  bool failed = true;
+  for (std::size_t n = 1; failed; ++n) {
+    CAPTURE(n);
+    RayTree tree(f.context, f.options, 0);
+    CHECK_THROWS_AS(tree.refit(former), UsageError);
+    tree.build(former);
+    f.context.faults().arm(Fault::kAllocation, n);
+    failed = false;
+    try {
+      tree.build(next);
+    } catch (const ResourceError&) {
+      failed = true;
+    }
+    f.context.faults().arm(Fault::kAllocation, 0);
+    if (failed) {
+      CHECK_THROWS_AS(tree.refit(next), UsageError);
+      CHECK(tree.follow(next));
+    }
+    CHECK(validate_ray_tree(RayTreeCopy::of(tree), f.model) == "");
+  }
 }
 
 TEST_CASE("ray tree validation: a fault of each kind is found") {

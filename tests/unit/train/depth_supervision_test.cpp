@@ -10,6 +10,7 @@
 
 #include "raysplats/device.hpp"
 #include "unit/fixture.hpp"
+#include "unit/train/depth_file.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -50,11 +51,19 @@ std::vector<float> noise(CounterRng& rng, std::size_t count, double low, double 
 TEST_CASE("known depths pull pixels as far as their photo counts there [small] [tiny]") {
   Context context{test_device()};
   CounterRng rng(7, 0);
-  const Dataset data = capture(rng);
-  const io::DepthMap known = io::view_depths(data, data.views[0], 1.0);
+  const TemporaryDirectory folder;
+  Dataset sparse = capture(rng);
+  const io::DepthMap known = io::view_depths(sparse, sparse.views[0], 1.0);
   double count = 0;
   for (const float d : known.values) count += d > 0 ? 1 : 0;
   REQUIRE(count > 6);
+  // Another view of which everything is known.
+  sparse.views.push_back(sparse.views[0]);
+  sparse.views[1].depth_path = folder.path() / "whole.npy";
+  write_depth_file(sparse.views[1].depth_path, kWidth, kHeight, std::vector<float>(kPixels, 2.5f));
+  Dataset dense = sparse;  // the same as a map
+  dense.views[0].depth_path = folder.path() / "depth.npy";
+  write_depth_file(dense.views[0].depth_path, kWidth, kHeight, known.values);
   const std::vector<float> image = noise(rng, 4 * kPixels, 0.0, 1.0);
   const std::vector<float> depth = noise(rng, 3 * kPixels, 2.0, 3.0);
   const std::vector<float> before = noise(rng, 4 * kPixels, -1.0, 1.0);
@@ -70,12 +79,18 @@ TEST_CASE("known depths pull pixels as far as their photo counts there [small] [
   on_image.upload(image);
   on_depth.upload(depth);
   photo.upload(words);
-  const std::vector<std::size_t> views{0};
-  for (const bool weighted : {false, true}) {
+  const std::vector<std::size_t> views{0, 1};
+  for (const int kind : {0, 1, 2, 3}) {
+    const bool weighted = kind % 2 == 1, mapped = kind >= 2;
     CAPTURE(weighted);
-    DepthSupervision supervision(context, data, views, kWeight, 1.0);
+    CAPTURE(mapped);
+    DepthSupervision supervision(context, mapped ? dense : sparse, views, kWeight, 1.0, kPixels);
+    CHECK(supervision.maps() == (mapped ? 2 : 1));
     gradient.upload(before);
-    supervision.backward(0, kWidth, kHeight, on_image, on_depth, {photo, 1, weighted}, gradient);
+    // Its slopes are not to stay.
+    supervision.backward({1, kWidth, kHeight}, on_image, on_depth, {photo, 1, weighted}, gradient);
+    gradient.upload(before);
+    supervision.backward({0, kWidth, kHeight}, on_image, on_depth, {photo, 1, weighted}, gradient);
     const std::vector<float> slopes = supervision.gradient().download();
     const std::vector<float> after = gradient.download();
     std::size_t pulled = 0;

@@ -24,6 +24,8 @@
 #include "raysplats/trainer.hpp"
 #include "scene/camera_model.hpp"
 #include "unit/fixture.hpp"
+#include "unit/log_capture.hpp"
+#include "unit/train/depth_file.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/rng.hpp"
 
@@ -65,18 +67,12 @@ double depth_at(const Camera& camera, int x, int y) {
 }
 
 void write_depths(const fs::path& path, const Camera& camera, float unit) {
-  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" +
-                       std::to_string(camera.height) + ", " + std::to_string(camera.width) + "), }";
-  header.resize(117, ' ');
-  header += '\n';
-  std::ofstream stream(path, std::ios::binary);
-  stream << "\x93NUMPY" << '\x01' << '\0' << static_cast<char>(header.size()) << '\0' << header;
+  std::vector<float> numbers;
   for (int y = 0; y < camera.height; ++y) {
-    for (int x = 0; x < camera.width; ++x) {
-      const float number = static_cast<float>(depth_at(camera, x, y)) / unit;
-      stream.write(reinterpret_cast<const char*>(&number), sizeof(number));
-    }
+    for (int x = 0; x < camera.width; ++x)
+      numbers.push_back(static_cast<float>(depth_at(camera, x, y)) / unit);
   }
+  write_depth_file(path, camera.width, camera.height, numbers);
 }
 
 // Six photos all around the ball and four held-out ones between them.
@@ -191,6 +187,30 @@ TEST_CASE("maps and points halve the error of depth of six photos") {
                                              << " with maps, " << points << " with points");
   CHECK(maps < 0.5 * without);
   CHECK(points < 0.5 * without);
+}
+
+TEST_CASE("depth maps that are read again for every step train as those that stay") {
+  const TemporaryDirectory folder;
+  Context context{test_device()};
+  Dataset data = capture(folder.path() / "data");
+  for (View& view : data.views) {
+    if (view.camera.name == "photo_3") continue;
+    view.depth_path = folder.path() / (view.camera.name + ".npy");
+    write_depths(view.depth_path, view.camera, 1e-3f);
+  }
+  TrainOptions options = short_training(40);
+  options.max_gaussians = 600;
+  options.depth_weight = 0.5;
+  options.trace.deterministic = true;
+  const auto trained = [&](const char* name, bool room) {
+    options.image_budget = room ? 1024 : 0;
+    const LogCapture log;
+    Trainer trainer(context, data, options, folder.path() / name);
+    CHECK(log.contains("read again for every step") == !room);
+    trainer.run(false);
+    return trainer.model();
+  };
+  check_equal(trained("stay", true), trained("come", false));
 }
 
 TEST_CASE(

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -37,7 +38,10 @@ std::vector<float> noise(std::size_t count, std::uint64_t stream, double low, do
 
 // What a photo's numbers become, in double precision.
 struct Reference {
-  std::vector<double> deltas = std::vector<double>(12 * kViews);
+  std::size_t views;
+  std::vector<double> deltas;
+
+  explicit Reference(std::size_t count) : views(count), deltas(12 * count) {}
 
   std::vector<double> apply(const std::vector<float>& image, std::size_t view) const {
     std::vector<double> out(image.begin(), image.end());
@@ -104,8 +108,9 @@ struct Reference {
     }
     for (std::size_t k = 0; k < 12; ++k) {
       double mean = 0;
-      for (std::size_t v = 0; v < kViews; ++v) mean += deltas[12 * v + k] / kViews;
-      for (std::size_t v = 0; v < kViews; ++v) deltas[12 * v + k] -= mean;
+      for (std::size_t v = 0; v < views; ++v)
+        mean += deltas[12 * v + k] / static_cast<double>(views);
+      for (std::size_t v = 0; v < views; ++v) deltas[12 * v + k] -= mean;
     }
   }
 };
@@ -153,7 +158,7 @@ struct Photo {
 
 TEST_CASE("exposure: pictures, gradients and fits agree with double precision [small]") {
   Exposure exposure(context(), kViews, 2);
-  Reference reference;
+  Reference reference(kViews);
   Buffer<float> image(context(), 4 * kPixels, "image");
   Buffer<float> gradient(context(), 4 * kPixels, "gradient");
   Buffer<std::uint32_t> guard(context(), 1, "guard");
@@ -201,6 +206,85 @@ TEST_CASE("exposure: pictures, gradients and fits agree with double precision [s
         CHECK(std::abs(delta - reference.deltas[12 * v + k]) < 1e-4);
       }
       CHECK(std::abs(sum) < 1e-6);
+    }
+  }
+}
+
+TEST_CASE("exposure: the mean of any number of photos is taken off [small]") {
+  Buffer<float> image(context(), 4 * kPixels, "image");
+  Buffer<std::uint32_t> guard(context(), 1, "guard");
+  guard.upload(std::vector<std::uint32_t>{0});
+  const std::vector<float> picture = noise(4 * kPixels, 21, 0.0, 1.0);
+  image.upload(picture);
+  const Photo photo(22, 4, true);
+  Buffer<std::uint32_t> words(context(), photo.words.size(), "photo");
+  words.upload(photo.words);
+  for (const std::size_t views : {1, 2, 63, 64, 65, 1000}) {
+    CAPTURE(views);
+    const std::size_t view = views / 2;
+    std::vector<float> before(12 * views);
+    for (std::size_t i = 0; i < before.size(); ++i)
+      before[i] = static_cast<float>(1.0 + 0.5 * std::sin(12.9898 * static_cast<double>(i)));
+    Exposure exposure(context(), views);
+    exposure.restore(before);
+    Reference reference(views);
+    reference.deltas.assign(before.begin(), before.end());
+    exposure.observe(image, {words, 4, true}, true, {0, 0, 0}, kWidth, kHeight);
+    exposure.step(view, 0, 0.03, guard);
+    reference.step(picture, photo.numbers, {0, 0, 0}, view, 0.03);
+    const std::vector<float> deltas = exposure.deltas();
+    double worst_mean = 0, worst_other = 0, worst_fit = 0;
+    for (std::size_t k = 0; k < 12; ++k) {
+      double mean = 0;
+      for (std::size_t v = 0; v < views; ++v) {
+        const double delta = static_cast<double>(deltas[12 * v + k]);
+        mean += delta / static_cast<double>(views);
+        double& worst = v == view ? worst_fit : worst_other;
+        worst = std::max(worst, std::abs(delta - reference.deltas[12 * v + k]));
+      }
+      worst_mean = std::max(worst_mean, std::abs(mean));
+    }
+    CHECK(worst_fit < 1e-4);
+    // What the fit is off by moves the mean.
+    CHECK(worst_other < 1e-4 / static_cast<double>(views) + 3e-7);
+    // Added one after the other it would be 1e-6 with 1000 photos.
+    CHECK(worst_mean < 2.5e-7);
+  }
+}
+
+TEST_CASE("exposure: sums of pictures of few and many blocks agree with double precision [small]") {
+  Exposure exposure(context(), 1);
+  // 256 pixels make a block, and 64 blocks a row.
+  for (const std::size_t pixels : {100, 16384, 16640, 33000}) {
+    CAPTURE(pixels);
+    const std::vector<float> picture = noise(4 * pixels, 31, 0.0, 1.0);
+    const std::vector<float> photo = noise(4 * pixels, 32, 0.0, 1.0);
+    std::vector<std::uint32_t> bits(4 * pixels);
+    for (std::size_t i = 0; i < bits.size(); ++i) bits[i] = std::bit_cast<std::uint32_t>(photo[i]);
+    Buffer<float> image(context(), picture.size(), "image");
+    Buffer<std::uint32_t> words(context(), bits.size(), "photo");
+    image.upload(picture);
+    words.upload(bits);
+    exposure.observe(image, {words, 4, false}, false, {0, 0, 0}, static_cast<int>(pixels), 1);
+    std::vector<double> expected(Exposure::kSums);
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const auto number = [&](const std::vector<float>& planes, std::size_t c) {
+        return static_cast<double>(planes[c * pixels + i]);
+      };
+      const double weight = number(photo, 3);
+      const double z[4] = {number(picture, 0), number(picture, 1), number(picture, 2), 1};
+      std::size_t j = 0;
+      for (std::size_t a = 0; a < 4; ++a) {
+        for (std::size_t b = a; b < 4; ++b) expected[j++] += weight * z[a] * z[b];
+      }
+      for (std::size_t c = 0; c < 3; ++c) {
+        for (const double factor : z) expected[j++] += weight * factor * (number(photo, c) - z[c]);
+      }
+    }
+    const std::vector<float> sums = exposure.sums().download();
+    for (std::size_t j = 0; j < Exposure::kSums; ++j) {
+      CAPTURE(j);
+      CHECK(std::abs(static_cast<double>(sums[j]) - expected[j]) < 2e-6 * expected[9]);
     }
   }
 }

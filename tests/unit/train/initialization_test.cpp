@@ -10,61 +10,9 @@
 
 #include "raysplats/error.hpp"
 #include "test_photos.hpp"
-#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
-
-namespace {
-
-std::vector<float> random_positions(std::size_t count, bool degenerate) {
-  CounterRng rng(7, 1);
-  std::vector<float> out;
-  for (std::size_t i = 0; i < count; ++i) {
-    // Degenerate: many equal coordinates and coincident points.
-    for (int a = 0; a < 3; ++a) {
-      out.push_back(degenerate ? static_cast<float>(rng.below(4))
-                               : static_cast<float>(rng.normal()));
-    }
-  }
-  return out;
-}
-
-std::vector<float> brute_force_distances(const std::vector<float>& p) {
-  const std::size_t count = p.size() / 3;
-  std::vector<float> out;
-  for (std::size_t i = 0; i < count; ++i) {
-    std::vector<double> distances;
-    for (std::size_t j = 0; j < count; ++j) {
-      if (i == j) continue;
-      double squared = 0;
-      for (std::size_t a = 0; a < 3; ++a)
-        squared += std::pow(static_cast<double>(p[3 * i + a]) - p[3 * j + a], 2);
-      distances.push_back(std::sqrt(squared));
-    }
-    std::sort(distances.begin(), distances.end());
-    const std::size_t k = std::min<std::size_t>(3, distances.size());
-    double sum = 0;
-    for (std::size_t n = 0; n < k; ++n) sum += distances[n];
-    out.push_back(k > 0 ? static_cast<float>(sum / static_cast<double>(k)) : 0.0f);
-  }
-  return out;
-}
-
-}  // namespace
-
-TEST_CASE("neighbour distances equal brute force") {
-  for (const bool degenerate : {false, true}) {
-    for (const std::size_t count : {0u, 1u, 2u, 3u, 4u, 5u, 300u}) {
-      const std::vector<float> positions = random_positions(count, degenerate);
-      const std::vector<float> expected = brute_force_distances(positions);
-      const std::vector<float> found = neighbour_distances(positions);
-      REQUIRE(found.size() == expected.size());
-      for (std::size_t i = 0; i < found.size(); ++i)
-        CHECK(found[i] == doctest::Approx(expected[i]).epsilon(1e-5));
-    }
-  }
-}
 
 TEST_CASE("points become Gaussians with their colour, clamped scales and the opacity asked for") {
   // Extent 20 * 1.1 about the middle of two cameras.

@@ -2,8 +2,11 @@
 // Photos with something in them that the others do not show, and masks that say where.
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
@@ -46,6 +49,11 @@ void add_moving_box(const fs::path& data) {
   }
 }
 
+void add_black_mask(const fs::path& data, const std::string& name) {
+  fs::create_directories((data / "masks" / name).parent_path());
+  write_image(data / "masks" / name, Image(kSize, kSize, 1, 0.0f));
+}
+
 double trained_psnr(Context& context, const fs::path& data, const fs::path& run) {
   Trainer trainer(context, load_dataset(data), short_training(500), run);
   return trainer.run(false).evaluations.back().psnr;
@@ -66,4 +74,32 @@ TEST_CASE("a moving box under masks costs next to nothing, and much without them
   MESSAGE("clean " << clean << " dB, masked " << masked << ", without masks " << bare);
   CHECK(masked > clean - 0.3);
   CHECK(bare < clean - 0.5);
+}
+
+TEST_CASE("a run leaves out photos whose masks ignore all of them, as if they were not there") {
+  const TemporaryDirectory folder;
+  Context context{test_device()};
+  const fs::path data = folder.path() / "data";
+  make_photos(data, kSize, 6, 3);
+  Dataset without = load_dataset(data);
+  std::erase_if(without.views, [](const View& view) {
+    return view.camera.name == "train/r_2.png" || view.camera.name == "test/r_1.png";
+  });
+  REQUIRE(without.views.size() == 7);
+  add_black_mask(data, "train/r_2.png");
+  add_black_mask(data, "test/r_1.png");
+  TrainOptions options = short_training(12);
+  options.eval_every = 6;
+  const auto trained = [&](Dataset dataset, const char* name) {
+    Trainer trainer(context, std::move(dataset), options, folder.path() / name);
+    const EvaluationRow last = trainer.run(false).evaluations.back();
+    return std::pair(last, trainer.model());
+  };
+  const auto [expected, expected_model] = trained(without, "without");
+  const auto [row, model] = trained(load_dataset(data), "masked");
+  CHECK(row.views == 2);
+  CHECK(std::isfinite(row.psnr));
+  CHECK(row.psnr == expected.psnr);
+  CHECK(model.size() > 0);
+  check_equal(model, expected_model);
 }

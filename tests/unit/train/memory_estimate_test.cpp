@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,6 +19,9 @@
 using namespace raysplats;
 
 namespace {
+
+// A line of 16 gradients whose sums have six words of 32 bits each.
+constexpr std::size_t kExactLineBytes = 16 * 6 * 4;
 
 DeviceInfo device_with(std::uint64_t memory, std::uint64_t allocation) {
   DeviceInfo device;
@@ -183,11 +187,30 @@ TEST_CASE("hit lists count up to their budget, exact sums where they may be used
   options.trace.deterministic = true;
   CHECK(estimate_memory(options, demand, gpu).hits == (std::size_t{128} << 20) + 2'500'000 * 40);
   const std::size_t exact = estimate_memory(options, demand, gpu).tracing;
-  CHECK(exact == estimate_memory(options, demand, cpu).tracing + 320 * demand.gaussians);
+  CHECK(exact ==
+        estimate_memory(options, demand, cpu).tracing + kExactLineBytes * demand.gaussians);
   options.trace.deterministic = false;
-  CHECK(exact == estimate_memory(options, demand, gpu).tracing + 320 * demand.gaussians);
+  CHECK(exact ==
+        estimate_memory(options, demand, gpu).tracing + kExactLineBytes * demand.gaussians);
   options.trace.gradient_sum = GradientSum::kExact;
   CHECK(exact == estimate_memory(options, demand, cpu).tracing);
+}
+
+TEST_CASE("depth maps share the budget of photos, and one more may come for its step") {
+  const DeviceInfo gpu = device_with(std::uint64_t{64} << 30, std::uint64_t{16} << 30);
+  const std::size_t pixels = 1'000'000, views = 100, map = sizeof(float) * pixels;
+  TrainOptions options;
+  options.iterations = 10000;
+  options.depth_weight = 0.5;
+  const auto images = [&](std::size_t maps) {
+    return estimate_memory(options, {1000, pixels, views, 0, 0, 1, maps}, gpu).images;
+  };
+  options.image_budget = 4096;  // room for all
+  CHECK(images(60) == images(0) + 60 * map + map);
+  options.image_budget = 450;  // for the photos and some of the maps
+  CHECK(images(60) == images(0) + 450 * kMiB - views * map + map);
+  options.image_budget = 100;
+  CHECK(images(views) == images(0) + map);
 }
 
 TEST_CASE("what packets take is never more than estimated") {
@@ -266,13 +289,23 @@ TEST_CASE("rays one by one count where a view needs them, in batches within thei
   CHECK(some.rays == all.rays);
   CHECK(some.total() == packets.total() + all.rays);
   CHECK(all.total() < some.total());
-  // 64 sums of 20 bytes more for each Gaussian.
+  // 64 sums of 24 bytes more for each Gaussian.
   options.trace.deterministic = true;
   const MemoryEstimate exact = estimate_memory(options, {gaussians, pixels, 10, 10}, gpu);
-  CHECK(exact.rays == all.rays + gaussians * 64 * 20);
+  CHECK(exact.rays == all.rays + gaussians * 64 * 24);
   CHECK(exact.largest_buffer == 36 * pixels);  // of the loss
   CHECK(estimate_memory(options, {gaussians, pixels / 10, 10, 10}, gpu).largest_buffer ==
-        gaussians * 64 * 20);
+        gaussians * 64 * 24);
   options.trace.memory_budget = std::size_t{64} << 20;
   CHECK(estimate_memory(options, {0, pixels, 10, 10}, gpu).rays < std::size_t{64} << 20);
+}
+
+TEST_CASE("with bounds a second model is held while the one within them is measured") {
+  const DeviceInfo gpu = device_with(std::uint64_t{8} << 30, std::uint64_t{2} << 30);
+  TrainOptions options;
+  options.sh_degree = 1;
+  const MemoryEstimate free = estimate_memory(options, {1000, 10'000, 10}, gpu);
+  options.bounds = Bounds{};
+  const MemoryEstimate bounded = estimate_memory(options, {1000, 10'000, 10}, gpu);
+  CHECK(bounded.gaussians == free.gaussians + 1000 * (3 + 4 + 3 + 1 + 12) * sizeof(float));
 }

@@ -2,11 +2,15 @@
 // What runs may learn from: training photos, and validation photos once they have judged.
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "raysplats/context.hpp"
@@ -17,6 +21,7 @@
 #include "raysplats/trainer.hpp"
 #include "train/schedule.hpp"
 #include "unit/fixture.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/rng.hpp"
 
@@ -55,6 +60,31 @@ void check_equal(const Gaussians& a, const Gaussians& b, bool equal) {
 
 nlohmann::json metrics_of(const fs::path& run) {
   return nlohmann::json::parse(std::ifstream(run / "metrics.json"));
+}
+
+// The photos over grey, and of those for validation cameras that are turned too far, by so many
+// radians, and colours times `gain`.
+Dataset with_wrong_validation(const fs::path& data,
+                              const fs::path& photos,
+                              double turn,
+                              float gain) {
+  Dataset out = load_dataset(data);
+  out.alpha_is_background = false;
+  const float grey[3] = {0.4f, 0.45f, 0.5f};
+  const std::vector<std::size_t> train = out.indices(Split::kTrain);
+  std::vector<std::size_t> judges;
+  for (const std::size_t i : validation_views(train.size(), 2)) judges.push_back(train[i]);
+  for (std::size_t i = 0; i < out.views.size(); ++i) {
+    View& view = out.views[i];
+    Image photo = composite(load_view_image(view), grey);
+    if (std::find(judges.begin(), judges.end(), i) != judges.end()) {
+      for (float& value : photo.data) value *= gain;
+      view.camera = moved(view.camera, {0.0, turn, 0.0}, {0.0, 0.0, 0.0});
+    }
+    view.image_path = photos / (std::to_string(i) + ".png");
+    write_image(view.image_path, photo);
+  }
+  return out;
 }
 
 }  // namespace
@@ -139,6 +169,86 @@ TEST_CASE("validation is recorded, resumed runs end with the same bytes, the bes
   CHECK_THROWS_AS(misfit.resume("latest"), UsageError);
 }
 
+TEST_CASE(
+    "neither poses nor exposures of validation photos count where those of others are found") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data";
+  make_photos(data, 24, kTrainViews, 1);
+  struct Kind {
+    bool poses, exposure;
+    const char* name;
+  };
+  for (const Kind& kind : {Kind{true, false, "poses"}, Kind{false, true, "exposure"},
+                           Kind{true, true, "poses and exposure"}}) {
+    CAPTURE(kind.name);
+    const double turn = kind.poses ? 0.05 : 0.0;  // nearly two pixels
+    const float gain = kind.exposure ? 0.6f : 1.0f;
+    std::vector<double> psnr;
+    for (const bool wrong : {false, true}) {
+      const fs::path run = folder.path() / kind.name / (wrong ? "wrong" : "right");
+      const Dataset dataset =
+          with_wrong_validation(data, run / "photos", wrong ? turn : 0.0, wrong ? gain : 1.0f);
+      TrainOptions options = options_of(40, 2);
+      options.poses = kind.poses;
+      options.exposure = kind.exposure;
+      Trainer(context(), dataset, options, run / "run").run(false);
+      psnr.push_back(metrics_of(run / "run").at("validations").back().at("psnr"));
+    }
+    // Darker photos have smaller errors. As they are, they would lose 4 dB by the turn and 9 by
+    // the gain.
+    const double expected = psnr[0] - 20 * std::log10(static_cast<double>(gain));
+    MESSAGE(kind.name << ": " << psnr[0] << " dB, with wrong validation photos " << psnr[1]);
+    CHECK(std::abs(psnr[1] - expected) < 1.5);
+  }
+}
+
+TEST_CASE("validation views that were trained on stay in the loss of a longer run and judge none") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data", run = folder.path() / "run";
+  make_photos(data, kSize, kTrainViews, 1);
+  TrainOptions options = options_of(40, 2);
+  Trainer first(context(), load_dataset(data), options, run);
+  first.run(false);
+  const std::string warning = "stay in the loss and judge no more";
+  const auto resumed = [&](const char* name, const fs::path& source, bool warned) {
+    auto trainer =
+        std::make_unique<Trainer>(context(), load_dataset(data), options, folder.path() / name);
+    const LogCapture log;
+    trainer->resume(source);
+    CHECK(log.contains(warning) == warned);
+    return trainer;
+  };
+
+  // As long as it was to be, a run goes on as if it had not been interrupted.
+  Trainer broken(context(), load_dataset(data), options, folder.path() / "broken");
+  broken.step(38);
+  broken.save();
+  const auto rest = resumed("rest", folder.path() / "broken", false);
+  rest->run(false);
+  check_equal(first.model(), rest->model(), true);
+
+  options.iterations = 80;
+  const auto whole = resumed("whole", run, true);
+  whole->run(false);
+  CHECK_FALSE(metrics_of(folder.path() / "whole").contains("validations"));
+  // Wherever it is interrupted.
+  const auto part = resumed("part", run, true);
+  part->step(15);  // the rest of a pass over all views, and a whole one
+  part->save();
+  CHECK(metrics_of(folder.path() / "part").at("photos").size() == kTrainViews);
+  const auto end = resumed("end", folder.path() / "part", true);
+  end->run(false);
+  check_equal(whole->model(), end->model(), true);
+
+  // In the same folder the judgements of the shorter run remain.
+  const nlohmann::json before = metrics_of(run).at("validations");
+  Trainer longer(context(), load_dataset(data), options, run);
+  longer.resume("latest");
+  longer.run(false);
+  CHECK(metrics_of(run).at("validations") == before);
+  check_equal(whole->model(), longer.model(), true);
+}
+
 TEST_CASE("a run that no longer gains ends when its patience does, with its results in place") {
   const TemporaryDirectory folder;
   const fs::path data = folder.path() / "data", run = folder.path() / "run";
@@ -158,6 +268,16 @@ TEST_CASE("a run that no longer gains ends when its patience does, with its resu
   CHECK(metrics_of(run).at("evaluations").back().at("iteration") == 30);
   CHECK(fs::exists(run / "point_cloud/iteration_30/point_cloud.ply"));
   CHECK(fs::exists(run / "checkpoints/step_000000030.rsck"));
+
+  // It stays over when it is resumed, until it is given more patience.
+  for (const auto& [patience, end] : {std::pair{2, 30}, std::pair{3, 40}}) {
+    options.patience = patience;
+    Trainer resumed(context(), load_dataset(data), options, run);
+    resumed.resume("latest");
+    CHECK(resumed.run(false).iterations == end);
+    CHECK(metrics_of(run).at("complete") == true);
+    CHECK(metrics_of(run).at("evaluations").back().at("iteration") == end);
+  }
 }
 
 TEST_CASE("validation needs views, and patience validation") {

@@ -144,7 +144,7 @@ TEST_CASE("atomic file: a folder that cannot be written names the path and the r
     write_text_file(folder / "sub/inner", "x");
     write_text_file(folder / "sub", "x");
   });
-  CHECK(over_folder.find("directory") != std::string::npos);
+  CHECK(over_folder.find("sub is a folder") != std::string::npos);
   CHECK(read_all(folder / "sub/inner") == "x");
   if (::geteuid() != 0) {  // root may write anywhere
     fs::permissions(folder.path(), fs::perms::owner_read | fs::perms::owner_exec);
@@ -195,4 +195,50 @@ TEST_CASE("atomic file: a link stays one, a pipe stays a pipe") {
   REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
   CHECK_THROWS_AS(AtomicFile{pipe}, DataError);
   CHECK(fs::is_fifo(pipe));
+}
+
+TEST_CASE("atomic file: what is no file's name is refused before a folder is made for it") {
+  const Folder folder;
+  CHECK(data_error([&] { AtomicFile{fs::path()}; }).find("names no file") != std::string::npos);
+  CHECK(data_error([&] { AtomicFile{folder / "new/"}; }).find("names no file") !=
+        std::string::npos);
+  fs::create_directory_symlink(folder.path(), folder / "link");
+  CHECK(data_error([&] { AtomicFile{folder / "link"}; }).find("is a folder") != std::string::npos);
+  CHECK(folder.entries() == 1);
+}
+
+TEST_CASE("atomic file: what stands before is known behind, and writing goes on at the end") {
+  const Folder folder;
+  AtomicFile file(folder / "a");
+  file.write("??? two");
+  file.write_at(0, "one", 3);
+  file.write(" three");
+  file.commit();
+  CHECK(read_all(folder / "a") == "one two three");
+}
+
+TEST_CASE("output files: what is there stays unless it may be replaced, what is read always") {
+  const Folder folder;
+  write_text_file(folder / "a", "read");
+  write_text_file(folder / "b", "old");
+  fs::create_symlink("a", folder / "link");
+  fs::create_symlink("later", folder / "ahead");
+  const auto refusal = [&](const char* name, bool overwrite) -> std::string {
+    try {
+      check_output_file(folder / name, overwrite, {folder / "none", folder / "a"});
+    } catch (const UsageError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  CHECK(refusal("b", false).find("b is there already") != std::string::npos);
+  CHECK(refusal("b", true).empty());
+  for (const char* read : {"a", "link"}) {
+    for (const bool overwrite : {false, true})
+      CHECK(refusal(read, overwrite).find("is what is read") != std::string::npos);
+  }
+  for (const char* name : {"ahead", "new", "new/below"}) CHECK(refusal(name, false).empty());
+  CHECK(data_error([&] { check_output_file(folder.path(), true); }).find("is a folder") !=
+        std::string::npos);
+  CHECK(folder.entries() == 4);
 }

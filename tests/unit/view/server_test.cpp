@@ -15,6 +15,7 @@
 
 #include "page_client.hpp"
 #include "raysplats/error.hpp"
+#include "skip_test.hpp"
 #include "view/viewer.hpp"
 
 using namespace raysplats;
@@ -54,7 +55,7 @@ TEST_CASE("a page whose message ends in an error is let go, and others are serve
   handlers.bytes = [](ClientId, std::span<const std::byte>) { fail(); };
   handlers.closed = [&](ClientId) { ++closed; };
   const auto server = opened<Server>(ServerOptions{}, handlers);
-  if (!server) return;
+  SKIP_TEST_UNLESS(server, "the viewer is not part of this build");
   const std::string url = server->urls().front();
   CHECK(get(url, "/bad").empty());
   CHECK(get(url, "/good").starts_with("HTTP/1.1 200"));
@@ -82,7 +83,7 @@ TEST_CASE("of pictures that a slow page has not taken the newest comes, and the 
   handlers.message = [](ClientId, std::string_view) {};
   handlers.closed = [](ClientId) {};
   const auto server = opened<Server>(ServerOptions{}, handlers);
-  if (!server) return;
+  SKIP_TEST_UNLESS(server, "the viewer is not part of this build");
   Page page(server->urls().front());
   wait_until([&] { return client != 0; });
   // More than sockets take before somebody reads.
@@ -110,7 +111,7 @@ TEST_CASE("photos and figures that cannot be given are one sentence") {
   options.run = []() -> std::string { fail(); };
   options.photo = [](std::size_t) -> std::optional<std::string> { fail(); };
   const auto viewer = opened<Viewer>(options);
-  if (!viewer) return;
+  SKIP_TEST_UNLESS(viewer, "the viewer is not part of this build");
   const std::string url = viewer->urls().front();
   for (const char* path : {"/api/run", "/api/photo/0"}) {
     const std::string answer = get(url, path);
@@ -129,7 +130,8 @@ TEST_CASE("an address that is none of this machine's is told, and no other port 
   } catch (const UsageError& error) {
     told = error.what();
   }
-  if (told.find("RAYSPLATS_VIEWER") != std::string::npos) return;
+  SKIP_TEST_UNLESS(told.find("RAYSPLATS_VIEWER") == std::string::npos,
+                   "the viewer is not part of this build");
   CHECK(told.find("--host 192.0.2.1 is no address of this machine") != std::string::npos);
   CHECK(told.find("--port") == std::string::npos);
 }

@@ -17,6 +17,7 @@
 
 #include "page_client.hpp"
 #include "raysplats/error.hpp"
+#include "skip_test.hpp"
 
 using namespace raysplats;
 using namespace raysplats::view;
@@ -59,7 +60,7 @@ std::unique_ptr<Viewer> opened() {
 
 TEST_CASE("nothing is drawn for a page that goes between its choice and its picture") {
   const std::unique_ptr<Viewer> viewer = opened();
-  if (!viewer) return;
+  SKIP_TEST_UNLESS(viewer, "the viewer is not part of this build");
   for (const bool closes : {true, false}) {
     CAPTURE(closes);
     Page page(viewer->urls().front());
@@ -83,7 +84,7 @@ TEST_CASE("nothing is drawn for a page that goes between its choice and its pict
 
 TEST_CASE("a page that wishes more than a screen can show gets sixty pictures a second") {
   const std::unique_ptr<Viewer> viewer = opened();
-  if (!viewer) return;
+  SKIP_TEST_UNLESS(viewer, "the viewer is not part of this build");
   Page page(viewer->urls().front());
   Pictures pictures;
   std::atomic<bool> over = false;
@@ -108,7 +109,7 @@ TEST_CASE("a page that wishes more than a screen can show gets sixty pictures a 
 
 TEST_CASE("a picture ends when its page has gone") {
   const std::unique_ptr<Viewer> viewer = opened();
-  if (!viewer) return;
+  SKIP_TEST_UNLESS(viewer, "the viewer is not part of this build");
   Page page(viewer->urls().front());
   Pictures pictures;
   page.say(kView);
@@ -128,7 +129,7 @@ TEST_CASE("a picture ends when its page has gone") {
 
 TEST_CASE("a picture that cannot be drawn is told to its page, which may ask again") {
   const std::unique_ptr<Viewer> viewer = opened();
-  if (!viewer) return;
+  SKIP_TEST_UNLESS(viewer, "the viewer is not part of this build");
   Page page(viewer->urls().front());
   Pictures pictures;
   for (const auto& fail : std::vector<std::function<void()>>{
@@ -152,7 +153,7 @@ TEST_CASE("a picture that cannot be drawn is told to its page, which may ask aga
 
 TEST_CASE("a picture that cannot be sent is told to its page, and no trouble of the run's") {
   const std::unique_ptr<Viewer> viewer = opened();
-  if (!viewer) return;
+  SKIP_TEST_UNLESS(viewer, "the viewer is not part of this build");
   Page page(viewer->urls().front());
   Pictures pictures;
   pictures.side = 1 << 30;  // nobody has room for its copy

@@ -42,16 +42,16 @@ TEST_CASE("an estimate leaves no trace in the run, whatever its strategy and opt
     const std::string name = std::to_string(static_cast<int>(strategy));
     Trainer plain(context(), load_dataset(data), options, folder.path() / ("plain" + name));
     plain.run(false);
-    Trainer judged(context(), load_dataset(data), options, folder.path() / ("judged" + name));
-    const RunEstimate estimate = judged.estimate(0.3);
+    Trainer estimated(context(), load_dataset(data), options, folder.path() / ("estimated" + name));
+    const RunEstimate estimate = estimated.estimate(0.3);
     CHECK(estimate.iterations == 60);
     CHECK(estimate.seconds > 0);
-    CHECK(judged.iteration() == 0);
-    const TrainSummary summary = judged.run(false);
+    CHECK(estimated.iteration() == 0);
+    const TrainSummary summary = estimated.run(false);
     CHECK(summary.gaussians <= estimate.gaussians);
-    check_equal(plain.model(), judged.model());
-    CHECK_THROWS_AS(judged.estimate(0.3), UsageError);
-    CHECK_THROWS_AS(judged.fit_time(10), UsageError);
+    check_equal(plain.model(), estimated.model());
+    CHECK_THROWS_AS(estimated.estimate(0.3), UsageError);
+    CHECK_THROWS_AS(estimated.fit_time(10), UsageError);
   }
 }
 
@@ -74,11 +74,12 @@ TEST_CASE("an estimate looks at the photos that the run's background comes from"
     options.exposure = name == "exposure";
     Trainer plain(context(), load_dataset(data), options, folder.path() / ("plain " + name));
     plain.run(false);
-    Trainer judged(context(), load_dataset(data), options, folder.path() / ("judged " + name));
-    judged.estimate(0.1);
-    judged.run(false);
-    CHECK(background("plain " + name) == background("judged " + name));
-    check_equal(plain.model(), judged.model());
+    Trainer estimated(context(), load_dataset(data), options,
+                      folder.path() / ("estimated " + name));
+    estimated.estimate(0.1);
+    estimated.run(false);
+    CHECK(background("plain " + name) == background("estimated " + name));
+    check_equal(plain.model(), estimated.model());
   }
 }
 

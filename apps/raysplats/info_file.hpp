@@ -23,6 +23,9 @@ void print_file(const nlohmann::ordered_json& file);
 /// Number, sizes and lenses of cameras.
 nlohmann::ordered_json describe_cameras(std::span<const Camera> cameras);
 
+/// The least and the greatest x, y and z of positions, which are 3 numbers each.
+nlohmann::ordered_json bounds_of(std::span<const float> positions);
+
 /// As scene files call them.
 const char* model_name(CameraModel model);
 const char* material_kind(Material::Kind kind);

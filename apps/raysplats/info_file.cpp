@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "info_files.hpp"
+#include "info_file.hpp"
 
 #include <fmt/format.h>
 
@@ -24,6 +24,7 @@
 #include "report/run_files.hpp"
 #include "run/checkpoint.hpp"
 #include "run/train_config.hpp"
+#include "util/path_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -169,6 +170,15 @@ Json describe_cameras(std::span<const Camera> cameras) {
   return out;
 }
 
+Json bounds_of(std::span<const float> positions) {
+  std::array<float, 3> low{}, high{};
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    low[i % 3] = i < 3 ? positions[i] : std::min(low[i % 3], positions[i]);
+    high[i % 3] = i < 3 ? positions[i] : std::max(high[i % 3], positions[i]);
+  }
+  return {low, high};
+}
+
 const char* material_kind(Material::Kind kind) {
   switch (kind) {
     case Material::Kind::kMirror:
@@ -186,7 +196,7 @@ const char* material_kind(Material::Kind kind) {
 }
 
 std::optional<Json> describe_file(const std::filesystem::path& path) {
-  const std::string extension = io::lower_extension(path);
+  const std::string extension = lower_extension(path);
   // meta.json is a model of SOG.
   if (extension == ".json" && path.filename() != "meta.json") return describe_json(path);
   if (extension == ".npy") return describe_array(path);

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+namespace raysplats::cli {
+
+/// Views, sizes and lenses of a data set. Throws what load_dataset() throws.
+nlohmann::ordered_json describe_dataset(const std::filesystem::path& path);
+
+/// The same for people.
+void print_dataset(const nlohmann::ordered_json& dataset);
+
+}  // namespace raysplats::cli

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/ply_origin.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "io/data_origin.hpp"
+#include "scene/statistics.hpp"
+
+namespace raysplats::io {
+namespace {
+
+/// The columns of these names; none where one is missing.
+std::vector<std::size_t> columns_of(const PlyFile& file, std::span<const char* const> names) {
+  std::vector<std::size_t> out;
+  for (const char* name : names) {
+    const auto column = file.column(name);
+    if (!column) return {};
+    out.push_back(*column);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::array<double, 3> origin_of_doubles(const PlyFile& file) {
+  constexpr std::array<const char*, 3> kPosition{"x", "y", "z"};
+  constexpr std::array<const char*, 2> kScales{"scale_0", "scale_1"};
+  const std::vector<std::size_t> position = columns_of(file, kPosition);
+  std::vector<std::size_t> scales = columns_of(file, kScales);
+  const bool doubles = std::any_of(position.begin(), position.end(), [&](std::size_t column) {
+    return file.properties()[column].type == PlyType::kDouble;
+  });
+  if (!doubles || scales.empty()) return {};
+  if (const auto third = file.column("scale_2")) scales.push_back(*third);
+  std::vector<double> points, log_sizes;
+  file.for_each_row([&](std::size_t, std::span<const double> values) {
+    double log_size = -HUGE_VAL, sum = 0.0;
+    for (const std::size_t column : scales) log_size = std::max(log_size, values[column]);
+    for (const std::size_t column : position) sum += values[column];
+    // The others are for whoever reads them.
+    if (!std::isfinite(sum) || !std::isfinite(log_size)) return;
+    for (const std::size_t column : position) points.push_back(values[column]);
+    log_sizes.push_back(log_size);
+  });
+  const double half = 0.5;
+  const double detail = std::exp(quantiles(std::move(log_sizes), std::span(&half, 1))[0]);
+  const glm::dvec3 origin = fitting_origin(points, detail);
+  return {origin.x, origin.y, origin.z};
+}
+
+}  // namespace raysplats::io

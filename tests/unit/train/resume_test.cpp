@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs that were broken off, refused or over, and what they are when they go on.
+#include <doctest/doctest.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "raysplats/context.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/trainer.hpp"
+#include "run/checkpoint.hpp"
+#include "trace/device_gaussians.hpp"
+#include "unit/fixture.hpp"
+#include "unit/train/short_training.hpp"
+#include "util/atomic_file.hpp"
+
+using namespace raysplats;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kIterations = 40;
+constexpr std::int64_t kTooMany = 2'000'000'000;  // Gaussians, for any device
+
+Context& context() {
+  static Context instance(test_device());
+  return instance;
+}
+
+// Forty iterations with density control after each tenth up to the thirtieth, and a checkpoint
+// after each twentieth.
+TrainOptions growing() {
+  TrainOptions options = short_training(kIterations);
+  options.init = "random";
+  options.init_count = 200;
+  options.max_gaussians = 400;
+  options.sh_degree = 1;
+  options.densify_from = 10;
+  options.densify_every = 10;
+  options.densify_until = 30;
+  options.resolution_schedule = {};
+  options.checkpoint_every = 20;
+  options.keep_checkpoints = 9;
+  options.log_every = 2;
+  options.trace.deterministic = true;
+  options.trace.memory_budget = std::size_t{64} << 20;
+  return options;
+}
+
+// Photos, and folders of runs on them.
+struct Place {
+  TemporaryDirectory folder;
+
+  Place() { make_photos(folder / "data", 24, 5, 2); }
+  fs::path run(const char* name) const { return folder / name; }
+  std::unique_ptr<Trainer> trainer(const TrainOptions& options,
+                                   const char* name,
+                                   bool overwrite = false) const {
+    return std::make_unique<Trainer>(context(), load_dataset(folder / "data"), options, run(name),
+                                     overwrite);
+  }
+  std::unique_ptr<Trainer> resumed(const TrainOptions& options, const char* name) const {
+    auto out = trainer(options, name);
+    out->resume("latest");
+    return out;
+  }
+  // The message with which a run ends; its evaluation of that iteration cannot be written.
+  std::string broken(const TrainOptions& options, const char* name, int iteration) const {
+    const fs::path way = blocked(name, iteration);
+    write_text_file(way, "in the way");
+    std::string message;
+    try {
+      trainer(options, name)->run(false);
+    } catch (const DataError& error) {
+      message = error.what();
+    }
+    fs::remove(way);
+    return message;
+  }
+  fs::path blocked(const char* name, int iteration) const {
+    return run(name) / "eval" / ("iteration_" + std::to_string(iteration));
+  }
+  fs::path model(const char* name, int iteration) const {
+    return run(name) / "point_cloud" / ("iteration_" + std::to_string(iteration)) /
+           "point_cloud.ply";
+  }
+  nlohmann::json metrics(const char* name) const {
+    return nlohmann::json::parse(std::ifstream(run(name) / "metrics.json"));
+  }
+};
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+template <class Failure, class Work>
+std::string refusal(const Work& work) {
+  try {
+    work();
+  } catch (const Failure& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("a run that broke off in an evaluation goes on as if it had not") {
+  const Place place;
+  TrainOptions options = growing();
+  options.eval_at = {20, 25};
+  const auto straight = place.trainer(options, "straight");
+  const TrainSummary whole = straight->run(false);
+  REQUIRE(whole.evaluations.size() == 3);
+  REQUIRE(whole.gaussians != 200);
+  // Density control is due after the first of them, after the second not.
+  for (const int iteration : {20, 25}) {
+    CAPTURE(iteration);
+    const std::string name = "broken" + std::to_string(iteration);
+    const std::string message = place.broken(options, name.c_str(), iteration);
+    CHECK(has(message, "iteration " + std::to_string(iteration) + " is saved"));
+    CHECK(load_latest_checkpoint(place.run(name.c_str())).pass_due == (iteration == 20));
+    const auto resumed = place.resumed(options, name.c_str());
+    const TrainSummary summary = resumed->run(false);
+    check_equal(straight->gaussians().download(), resumed->gaussians().download());
+    CHECK(load_latest_checkpoint(place.run(name.c_str())).sections ==
+          load_latest_checkpoint(place.run("straight")).sections);
+    // The evaluation is made up for, of the same model.
+    REQUIRE(summary.evaluations.size() == 3);
+    for (std::size_t i = 0; i < 3; ++i) {
+      CHECK(summary.evaluations[i].iteration == whole.evaluations[i].iteration);
+      CHECK(summary.evaluations[i].psnr == whole.evaluations[i].psnr);
+    }
+  }
+}
+
+TEST_CASE("steps of one's own after an error begin with the density control that it kept away") {
+  const Place place;
+  const TrainOptions options = growing();
+  const auto straight = place.trainer(options, "straight");
+  straight->step(kIterations);
+  const auto disturbed = place.trainer(options, "disturbed");
+  disturbed->on_step([](const TrainProgress& progress) {
+    if (progress.iteration == 20) throw DataError("enough");
+  });
+  CHECK_THROWS_AS(disturbed->step(kIterations), DataError);
+  disturbed->on_step(nullptr);
+  disturbed->step(kIterations);
+  check_equal(straight->gaussians().download(), disturbed->gaussians().download());
+}
+
+TEST_CASE("a final evaluation that failed comes when the run is resumed, and once") {
+  const Place place;
+  TrainOptions options = growing();
+  options.eval_at = {20};
+  const std::string message = place.broken(options, "run", kIterations);
+  CHECK(has(message, "iteration 40 is saved"));
+  REQUIRE(fs::exists(place.model("run", kIterations)));
+  const TrainSummary summary = place.resumed(options, "run")->run(false);
+  REQUIRE(summary.evaluations.size() == 2);
+  CHECK(summary.evaluations.back().iteration == kIterations);
+  CHECK(place.metrics("run").at("complete") == true);
+
+  fs::remove_all(place.blocked("run", kIterations));
+  write_text_file(place.blocked("run", kIterations), "in the way");
+  CHECK(place.resumed(options, "run")->run(false).evaluations.size() == 2);
+
+  // One of a part of the views is not that of the end.
+  options.eval_views = 1;
+  place.trainer(options, "part")->run(false);
+  fs::remove(checkpoint_path(place.run("part"), kIterations));
+  fs::remove_all(place.run("part") / "point_cloud");
+  options.iterations = 20;
+  const TrainSummary shorter = place.resumed(options, "part")->run(false);
+  REQUIRE(shorter.evaluations.size() == 1);
+  CHECK(shorter.evaluations.back().views == 2);
+}
+
+TEST_CASE("a run that is refused for its memory removes nothing of the one that it would replace") {
+  const Place place;
+  TrainOptions options = growing();
+  place.trainer(options, "run")->run(false);
+  const std::string metrics = place.metrics("run").dump();
+  options.max_gaussians = kTooMany;
+  const auto refused = [&](Trainer& trainer) {
+    return refusal<ResourceError>([&] { trainer.run(false); });
+  };
+  const auto fresh = place.trainer(options, "run", true);
+  CHECK(has(refusal<ResourceError>([&] { fresh->estimate(0.01); }), "--max-gaussians"));
+  CHECK(has(refused(*fresh), "--max-gaussians"));
+  const auto resumed = place.trainer(options, "run", true);
+  resumed->resume(checkpoint_path(place.run("run"), 20));
+  CHECK(has(refused(*resumed), "--max-gaussians"));
+  CHECK(fs::exists(place.model("run", kIterations)));
+  CHECK(fs::exists(checkpoint_path(place.run("run"), kIterations)));
+  CHECK(place.metrics("run").dump() == metrics);
+
+  // One that has room does replace it.
+  options.max_gaussians = 400;
+  options.iterations = 20;
+  place.trainer(options, "run", true)->run(false);
+  CHECK(!fs::exists(place.model("run", kIterations)));
+}
+
+TEST_CASE("a run of another length leaves no newer model of the one that it goes on from") {
+  const Place place;
+  TrainOptions options = growing();
+  options.save_at = {28};
+  place.trainer(options, "run")->run(false);
+  // As if killed after iteration 28.
+  fs::remove(checkpoint_path(place.run("run"), kIterations));
+  fs::remove_all(place.model("run", kIterations).parent_path());
+  const fs::path newer = place.model("run", 28);
+  for (const int length : {24, 60}) {
+    CAPTURE(length);
+    options.iterations = length;
+    const std::string message = refusal<UsageError>([&] { (void)place.resumed(options, "run"); });
+    CHECK(has(message, "a model of iteration 28"));
+    CHECK(has(message, "--overwrite"));
+    CHECK(fs::exists(newer));
+  }
+  options.iterations = kIterations;
+  CHECK(place.resumed(options, "run")->iteration() == 20);
+  options.iterations = 24;
+  options.save_at = {};
+  const auto dropped = place.trainer(options, "run", true);
+  dropped->resume("latest");
+  dropped->run(false);
+  CHECK(!fs::exists(newer));
+  CHECK(fs::exists(place.model("run", 24)));
+
+  // A folder without a checkpoint is begun anew, but not by a shorter run.
+  fs::remove_all(place.run("run") / "checkpoints");
+  options.iterations = 12;
+  CHECK(has(refusal<UsageError>([&] { (void)place.resumed(options, "run"); }), "iteration 24"));
+}
+
+TEST_CASE("a run says the same of itself when it is resumed halfway and when it is over") {
+  const Place place;
+  const TrainOptions options = growing();
+  place.trainer(options, "straight")->run(false);
+  const nlohmann::json whole = place.metrics("straight");
+  REQUIRE(whole.at("timed_steps") == 1);
+  REQUIRE(whole.at("photos").size() == 5);
+
+  const auto first = place.trainer(options, "run");
+  first->set_command("train first");
+  first->on_step([&](const TrainProgress& progress) {
+    if (progress.iteration == 37) first->stop();
+  });
+  first->run(false);
+  // The rest of three steps sees some of the photos alone.
+  const auto second = place.resumed(options, "run");
+  second->set_command("train second");
+  second->run(false);
+  const nlohmann::json parts = place.metrics("run");
+  CHECK(parts.at("command") == "train first");
+  CHECK(parts.at("loss") == whole.at("loss"));
+  CHECK(parts.at("photos").size() == 5);
+  for (std::size_t i = 0; i < 5; ++i) {
+    CHECK(parts.at("photos")[i].at("name") == whole.at("photos")[i].at("name"));
+    CHECK(parts.at("photos")[i].at("psnr") == whole.at("photos")[i].at("psnr"));
+  }
+  CHECK(parts.at("timed_steps") == 1);
+  CHECK(parts.at("kernels").size() == whole.at("kernels").size());
+  CHECK(parts.at("psnr_rise").get<double>() ==
+        doctest::Approx(whole.at("psnr_rise").get<double>()).epsilon(1e-3));
+  CHECK(parts.at("evaluation_seconds") > 0.0);
+
+  // Nothing is left to do: nothing is said anew.
+  for (int round = 0; round < 2; ++round) {
+    const auto over = place.resumed(options, "run");
+    over->set_command("train third");
+    const TrainSummary summary = over->run(false);
+    CHECK(summary.loss == doctest::Approx(parts.at("loss").get<double>()));
+    CHECK(place.metrics("run") == parts);
+  }
+}
+
+TEST_CASE("updates that were left out are counted over the whole run") {
+  const Place place;
+  const TrainOptions options = growing();
+  place.trainer(options, "run")->run(false);
+  fs::remove(checkpoint_path(place.run("run"), kIterations));
+  Checkpoint half = load_latest_checkpoint(place.run("run"));
+  REQUIRE(half.iteration == 20);
+  CHECK(half.skipped_updates == 0);
+  half.skipped_updates = 5;
+  write_checkpoint(checkpoint_path(place.run("run"), 20), half);
+  place.resumed(options, "run")->run(false);
+  CHECK(place.metrics("run").at("skipped_updates") == 5);
+  CHECK(load_latest_checkpoint(place.run("run")).skipped_updates == 5);
+}
