@@ -88,7 +88,9 @@ class WindowMeans {
 
  private:
   // Where the row y is, which may lie beyond the borders.
-  Row& smoothed(int y) { return along_[static_cast<std::size_t>(y + kRadius) % kTaps]; }
+  Row& smoothed(int y) {
+    return along_[static_cast<std::size_t>(std::ptrdiff_t{y} + kRadius) % kTaps];
+  }
 
   static void add(double weight, const double* from, std::vector<double>& to) {
     for (std::size_t x = 0; x < to.size(); ++x) to[x] += weight * from[x];
@@ -100,7 +102,7 @@ class WindowMeans {
       const int column = reflect(x, image_.width);
       const auto a = static_cast<double>(image_.at(column, from, channel_));
       const auto b = static_cast<double>(photo_.at(column, from, channel_));
-      const auto i = static_cast<std::size_t>(x + kRadius);
+      const auto i = static_cast<std::size_t>(std::ptrdiff_t{x} + kRadius);
       padded_[0][i] = a;
       padded_[1][i] = b;
       padded_[2][i] = a * a + b * b;
