@@ -15,8 +15,8 @@ namespace raysplats::io {
 
 /// A glTF 2.0 file as it is stored.
 // nlohmann::json says that its moves throw nothing, and asserts in them.
-struct GltfDocument {  // NOLINT(bugprone-exception-escape)
-  nlohmann::json json;  ///< an object
+struct GltfDocument {                                // NOLINT(bugprone-exception-escape)
+  nlohmann::json json;                               ///< an object
   std::optional<std::span<const std::byte>> binary;  ///< the binary chunk of a GLB
 };
 
