@@ -21,7 +21,7 @@
 
 // Beyond this slope of the mean's direction the projective form loses digits to cancellation; the
 // general form takes over (docs/model.md).
-#define RS_MAX_SLOPE 16.0f
+#define RS_MAX_SLOPE 8.0f
 // Thinner than this fraction of the distance is treated as this thick: it keeps p, q, r inside
 // float's range.
 #define RS_MIN_RELATIVE_SCALE 1e-7f

@@ -17,33 +17,6 @@ using namespace raysplats::test;
 using nlohmann::json;
 using Indices = std::vector<std::uint32_t>;
 
-namespace {
-
-io::MeshFile read(const std::string& bytes, const std::string& name = "m.glb") {
-  const Scratch scratch;
-  write_bytes(scratch / name, bytes);
-  return io::read_mesh(scratch / name);
-}
-
-std::string error_of(const std::string& bytes, const std::string& name = "m.glb") {
-  const std::string message = data_error([&] { read(bytes, name); });
-  CHECK(contains(message, name));
-  CHECK(!contains(message, "\n"));
-  CHECK(message.size() < 400);
-  return message;
-}
-
-/// Two triangles, whose buffer has 60 bytes.
-GltfFile square() {
-  GltfFile file;
-  const int positions = file.add_vec3({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0});
-  const int indices = file.add_indices({0, 1, 2, 2, 1, 3});
-  file.add_mesh(positions)["indices"] = indices;
-  return file;
-}
-
-}  // namespace
-
 TEST_CASE("data: URIs in base64 and percent-encoded") {
   const auto decoded = [](const std::string& uri) -> std::string {
     const auto bytes = io::decode_data_uri(uri);
@@ -67,31 +40,31 @@ TEST_CASE("glTF: files that need what is not supported are refused by its name")
   const auto refused = [](const GltfFile& file, const std::string& extension) {
     GltfFile needing = file;
     needing.json["extensionsUsed"] = needing.json["extensionsRequired"] = {extension};
-    CHECK(contains(error_of(needing.glb()), "needs the extension " + extension));
-    CHECK(contains(error_of(needing.gltf("absent.bin"), "m.gltf"),
+    CHECK(contains(gltf_mesh_error(needing.glb()), "needs the extension " + extension));
+    CHECK(contains(gltf_mesh_error(needing.gltf("absent.bin"), "m.gltf"),
                    "needs the extension " + extension));
   };
   // Of compressed primitives only the counts and types are stated.
-  GltfFile draco = square();
+  GltfFile draco = GltfFile::square();
   for (json& accessor : draco.json["accessors"]) accessor.erase("bufferView");
   draco.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"] = {
       {"bufferView", 0}, {"attributes", {{"POSITION", 0}}}};
   refused(draco, "KHR_draco_mesh_compression");
   // A second buffer is to be filled when the first one is unpacked.
-  GltfFile meshopt = square();
+  GltfFile meshopt = GltfFile::square();
   meshopt.json["buffers"] = {
       {{"byteLength", 64}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}}};
   refused(meshopt, "EXT_meshopt_compression");
-  refused(square(), "KHR_materials_unheard_of");
-  GltfFile known = square();
+  refused(GltfFile::square(), "KHR_materials_unheard_of");
+  GltfFile known = GltfFile::square();
   known.json["extensionsRequired"] = {"KHR_materials_clearcoat", "KHR_mesh_quantization"};
-  CHECK(read(known.glb()).mesh.triangle_count() == 2);
+  CHECK(read_gltf_mesh(known.glb()).mesh.triangle_count() == 2);
   known.json["extensionsRequired"] = {7};
-  CHECK(contains(error_of(known.glb()), "no text"));
+  CHECK(contains(gltf_mesh_error(known.glb()), "no text"));
 }
 
 TEST_CASE("glTF: what is left out may be in any form") {
-  GltfFile file = square();
+  GltfFile file = GltfFile::square();
   file.json["nodes"] = {{{"mesh", 0}, {"skin", 0}, {"camera", 0}}, {{"name", "bone"}}};
   file.json["scenes"] = {{{"nodes", {0, 1}}}};
   // The inverse bind matrices of a skin are optional.
@@ -100,25 +73,25 @@ TEST_CASE("glTF: what is left out may be in any form") {
   file.json["cameras"] = {{{"type", "fisheye"}}};
   file.json["samplers"] = {{{"wrapS", "clamp"}}};
   file.json["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", 3}}};
-  CHECK(read(file.glb()).mesh.triangle_count() == 2);
+  CHECK(read_gltf_mesh(file.glb()).mesh.triangle_count() == 2);
 }
 
 TEST_CASE("glTF: copies that are left out are told of") {
-  GltfFile file = square();
+  GltfFile file = GltfFile::square();
   file.json["nodes"] = {
       {{"mesh", 0},
        {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", 0}}}}}}}}};
   file.json["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
   const LogCapture log;
-  CHECK(read(file.glb()).mesh.triangle_count() == 2);
+  CHECK(read_gltf_mesh(file.glb()).mesh.triangle_count() == 2);
   CHECK(log.lines() == 1);
   CHECK(log.contains("EXT_mesh_gpu_instancing"));
 }
 
 TEST_CASE("glTF: buffers of data: URIs, longer than needed, absent, and too short") {
-  const GltfFile file = square();
+  const GltfFile file = GltfFile::square();
   const auto triangles = [&](const std::string& uri) {
-    return read(file.gltf(uri), "m.gltf").mesh.triangles;
+    return read_gltf_mesh(file.gltf(uri), "m.gltf").mesh.triangles;
   };
   const Indices expected{0, 1, 2, 2, 1, 3};
   CHECK(triangles("data:application/octet-stream;charset=utf-8;base64," + base64(file.buffer)) ==
@@ -127,14 +100,16 @@ TEST_CASE("glTF: buffers of data: URIs, longer than needed, absent, and too shor
   std::string percent = "data:,";
   for (const char c : file.buffer) percent += fmt::format("%{:02X}", static_cast<unsigned char>(c));
   CHECK(triangles(percent) == expected);
-  const auto error = [&](const std::string& uri) { return error_of(file.gltf(uri), "m.gltf"); };
+  const auto error = [&](const std::string& uri) {
+    return gltf_mesh_error(file.gltf(uri), "m.gltf");
+  };
   const std::string bytes = base64(file.buffer);
   CHECK(contains(error("data:;base64," + bytes.substr(0, 16)), "the buffer 0 has 12 bytes of 60"));
   CHECK(contains(error("data:;base64," + bytes + "!"), "cannot be decoded"));
   CHECK(contains(error("data:;base64," + bytes.substr(0, 17)), "cannot be decoded"));
   CHECK(contains(error("data:" + bytes), "cannot be decoded"));
   CHECK(contains(error(std::string(5000, 'a')), "does not exist"));
-  GltfFile none = square();
+  GltfFile none = GltfFile::square();
   none.json["buffers"] = {{{"byteLength", 60}}};
-  CHECK(contains(error_of(none.json.dump(), "m.gltf"), "the buffer 0 has no bytes"));
+  CHECK(contains(gltf_mesh_error(none.json.dump(), "m.gltf"), "the buffer 0 has no bytes"));
 }

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <doctest/doctest.h>
+
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "io/mesh_file.hpp"
 #include "scratch.hpp"
 
 namespace raysplats::test {
@@ -62,6 +65,15 @@ struct GltfFile {
     return file;
   }
 
+  /// Two triangles over the unit square, whose buffer has 60 bytes.
+  static GltfFile square() {
+    GltfFile file;
+    const int positions = file.add_vec3({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0});
+    const int indices = file.add_indices({0, 1, 2, 2, 1, 3});
+    file.add_mesh(positions)["indices"] = indices;
+    return file;
+  }
+
   /// A GLB: header, JSON chunk, binary chunk.
   std::string glb() const {
     nlohmann::json root = json;
@@ -101,6 +113,22 @@ inline std::string base64(const std::string& bytes) {
     }
   }
   return text;
+}
+
+/// The mesh of a file with these bytes.
+inline io::MeshFile read_gltf_mesh(const std::string& bytes, const std::string& name = "m.glb") {
+  const Scratch scratch;
+  write_bytes(scratch / name, bytes);
+  return io::read_mesh(scratch / name);
+}
+
+/// What reading it says: a short line that names the file.
+inline std::string gltf_mesh_error(const std::string& bytes, const std::string& name = "m.glb") {
+  const std::string message = data_error([&] { read_gltf_mesh(bytes, name); });
+  CHECK(contains(message, name));
+  CHECK(!contains(message, "\n"));
+  CHECK(message.size() < 400);
+  return message;
 }
 
 }  // namespace raysplats::test

@@ -19,28 +19,7 @@ using Floats = std::vector<float>;
 
 namespace {
 
-io::MeshFile read(const std::string& bytes, const std::string& name = "m.glb") {
-  const Scratch scratch;
-  write_bytes(scratch / name, bytes);
-  return io::read_mesh(scratch / name);
-}
-
-std::string error_of(const std::string& bytes, const std::string& name = "m.glb") {
-  const std::string message = data_error([&] { read(bytes, name); });
-  CHECK(contains(message, name));
-  CHECK(!contains(message, "\n"));
-  return message;
-}
-
 const Floats kSquare{0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
-
-GltfFile square() {
-  GltfFile file;
-  const int positions = file.add_vec3(kSquare);
-  const int indices = file.add_indices({0, 1, 2, 2, 1, 3});
-  file.add_mesh(positions)["indices"] = indices;
-  return file;
-}
 
 void check_close(const Floats& values, const Floats& expected) {
   REQUIRE(values.size() == expected.size());
@@ -52,7 +31,7 @@ void check_close(const Floats& values, const Floats& expected) {
 }  // namespace
 
 TEST_CASE("glTF: an indexed mesh from a GLB, embedded, and external buffers") {
-  GltfFile file = square();
+  GltfFile file = GltfFile::square();
   const auto check = [](const io::MeshFile& read) {
     CHECK(read.mesh.positions == kSquare);
     CHECK(read.mesh.triangles == Indices{0, 1, 2, 2, 1, 3});
@@ -61,8 +40,9 @@ TEST_CASE("glTF: an indexed mesh from a GLB, embedded, and external buffers") {
     REQUIRE(read.materials.size() == 1);
     CHECK(read.materials[0].name == "default");
   };
-  check(read(file.glb()));
-  check(read(file.gltf("data:application/octet-stream;base64," + base64(file.buffer)), "m.gltf"));
+  check(read_gltf_mesh(file.glb()));
+  check(read_gltf_mesh(file.gltf("data:application/octet-stream;base64," + base64(file.buffer)),
+                       "m.gltf"));
   const Scratch scratch;
   write_bytes(scratch / "sub/m.gltf", file.gltf("some%20data.bin"));
   write_bytes(scratch / "sub/some data.bin", file.buffer);
@@ -79,7 +59,7 @@ TEST_CASE("glTF: strips, fans and triangles, indexed or not") {
     json& primitive = file.add_mesh(positions);
     primitive["mode"] = mode;
     if (accessor >= 0) primitive["indices"] = accessor;
-    return read(file.glb()).mesh.triangles;
+    return read_gltf_mesh(file.glb()).mesh.triangles;
   };
   CHECK(triangles(4, {}) == Indices{0, 1, 2, 3, 4, 5});
   CHECK(triangles(5, {}) == Indices{0, 1, 2, 1, 3, 2, 2, 3, 4, 3, 5, 4});
@@ -141,24 +121,24 @@ TEST_CASE("glTF: nodes move their meshes, mirrors keep them outward") {
       {{"mesh", 0}}};
   file.json["scenes"] = {{{"nodes", {3}}}, {{"nodes", {0}}}};
   file.json["scene"] = 1;
-  const Mesh mesh = read(file.glb()).mesh;
+  const Mesh mesh = read_gltf_mesh(file.glb()).mesh;
   REQUIRE(mesh.triangle_count() == 2);
   // The last child is walked first.
   check_close(mesh.positions, {10, 0, 7, 9, 0, 7, 10, 1, 7, 10, 0, 5, 10, 2, 5, 7, 0, 5});
   CHECK(mesh.triangles == Indices{0, 2, 1, 3, 4, 5});
   for (std::size_t i = 0; i < 6; ++i) CHECK(mesh.normals[3 * i + 2] == doctest::Approx(1.0));
   file.json.erase("scene");
-  CHECK(read(file.glb()).mesh.positions == Floats{0, 0, 0, 1, 0, 0, 0, 1, 0});
+  CHECK(read_gltf_mesh(file.glb()).mesh.positions == Floats{0, 0, 0, 1, 0, 0, 0, 1, 0});
   file.json.erase("scenes");
-  CHECK(read(file.glb()).mesh.triangle_count() == 3);
+  CHECK(read_gltf_mesh(file.glb()).mesh.triangle_count() == 3);
 }
 
 TEST_CASE("glTF: broken scenes are rejected") {
   const auto with_nodes = [](const json& nodes) {
-    GltfFile file = square();
+    GltfFile file = GltfFile::square();
     file.json["nodes"] = nodes;
     file.json["scenes"] = {{{"nodes", {0}}}};
-    return error_of(file.glb());
+    return gltf_mesh_error(file.glb());
   };
   CHECK(contains(with_nodes({{{"mesh", 1}}}), "no mesh 1"));
   CHECK(contains(with_nodes({{{"children", {1}}}}), "no node 1"));
@@ -175,9 +155,9 @@ TEST_CASE("glTF: broken scenes are rejected") {
 
 TEST_CASE("glTF: malformed primitives are rejected") {
   const auto spoilt = [](const std::function<void(json & primitive, GltfFile & file)>& spoil) {
-    GltfFile file = square();
+    GltfFile file = GltfFile::square();
     spoil(file.json["meshes"][0]["primitives"][0], file);
-    return error_of(file.glb());
+    return gltf_mesh_error(file.glb());
   };
   CHECK(contains(spoilt([](json& p, GltfFile& f) {
                    p["indices"] = f.add_indices({0, 1, 4});
@@ -247,17 +227,17 @@ TEST_CASE("glTF: many instances of a large mesh are refused before memory runs o
     file.json["nodes"].push_back({{"mesh", 0}});
     file.json["scenes"][0]["nodes"].push_back(i);
   }
-  CHECK(contains(error_of(file.glb()), "more than 128 million vertices"));
+  CHECK(contains(gltf_mesh_error(file.glb()), "more than 128 million vertices"));
 }
 
 TEST_CASE("glTF: truncated and foreign files are rejected") {
-  const std::string whole = square().glb();
-  CHECK(contains(error_of(whole.substr(0, whole.size() - 1)), "truncated"));
-  for (std::size_t size = 0; size < whole.size(); size += 7) error_of(whole.substr(0, size));
+  const std::string whole = GltfFile::square().glb();
+  CHECK(contains(gltf_mesh_error(whole.substr(0, whole.size() - 1)), "truncated"));
+  for (std::size_t size = 0; size < whole.size(); size += 7) gltf_mesh_error(whole.substr(0, size));
   const auto changed = [&](std::size_t at, std::uint32_t value) {
     std::string bytes = whole;
     std::memcpy(bytes.data() + at, &value, 4);
-    return error_of(bytes);
+    return gltf_mesh_error(bytes);
   };
   CHECK(contains(changed(4, 1), "version 1"));
   CHECK(contains(changed(8, 0xffffffff), "truncated"));
@@ -269,14 +249,14 @@ TEST_CASE("glTF: truncated and foreign files are rejected") {
   std::memcpy(&bin_size, whole.data() + 20 + json_size, 4);
   // Eight bytes too long: tinygltf 2.7 forgets the chunk's header in its check.
   CHECK(contains(changed(20 + json_size, bin_size + 8), "truncated"));
-  error_of("{}", "m.gltf");
-  error_of("not json", "m.gltf");
-  error_of("", "m.gltf");
-  CHECK(contains(error_of("{\"asset\":{\"version\":\"2.0\"}}", "m.gltf"), "no triangles"));
-  CHECK(contains(error_of(std::string(100000, '['), "m.gltf"), "levels deep"));
-  CHECK(contains(error_of("{\"asset\":{\"version\":\"2.0\"},\"extras\":" + std::string(70, '[') +
-                              std::string(70, ']') + "}",
-                          "m.gltf"),
+  gltf_mesh_error("{}", "m.gltf");
+  gltf_mesh_error("not json", "m.gltf");
+  gltf_mesh_error("", "m.gltf");
+  CHECK(contains(gltf_mesh_error("{\"asset\":{\"version\":\"2.0\"}}", "m.gltf"), "no triangles"));
+  CHECK(contains(gltf_mesh_error(std::string(100000, '['), "m.gltf"), "levels deep"));
+  CHECK(contains(gltf_mesh_error("{\"asset\":{\"version\":\"2.0\"},\"extras\":" +
+                                     std::string(70, '[') + std::string(70, ']') + "}",
+                                 "m.gltf"),
                  "levels deep"));
   CHECK(contains(data_error([] { io::read_mesh("absent.glb"); }), "does not exist"));
 }
@@ -290,7 +270,7 @@ TEST_CASE("glTF: primitives without normals among others that have them are flat
       {{"primitives",
         {{{"attributes", {{"POSITION", positions}, {"NORMAL", normals}}}, {"indices", indices}},
          {{"attributes", {{"POSITION", positions}}}, {"indices", indices}}}}});
-  const Mesh mesh = read(file.glb()).mesh;
+  const Mesh mesh = read_gltf_mesh(file.glb()).mesh;
   CHECK(mesh.vertex_count() == 4 + 6);
   for (std::size_t i = 0; i < 12; ++i) {
     const float* normal = &mesh.normals[3 * std::size_t{mesh.triangles[i]}];
@@ -315,10 +295,10 @@ TEST_CASE("a mesh alone opens no other file, decodes no picture and has a limit 
   write_bytes(scratch / "m.obj", obj);
   CHECK_THROWS_AS(io::read_mesh(scratch / "m.obj"), DataError);
   CHECK(read_alone(io::MeshFormat::kObj, obj).triangle_count() == 1);
-  CHECK(
-      contains(data_error([&] { read_alone(io::MeshFormat::kGltf, square().gltf("beside.bin")); }),
-               "one GLB"));
-  GltfFile picture = square();
+  CHECK(contains(
+      data_error([&] { read_alone(io::MeshFormat::kGltf, GltfFile::square().gltf("beside.bin")); }),
+      "one GLB"));
+  GltfFile picture = GltfFile::square();
   picture.json["images"] = {{{"uri", "absent.png"}}};
   CHECK_THROWS_AS(read_alone(io::MeshFormat::kGltf, picture.glb()), DataError);
   // Small files can place one mesh many times.
@@ -333,7 +313,7 @@ TEST_CASE("a mesh alone opens no other file, decodes no picture and has a limit 
   }
   CHECK(contains(data_error([&] { read_alone(io::MeshFormat::kGltf, many.glb()); }),
                  "more than 2 million"));
-  CHECK(read_alone(io::MeshFormat::kGltf, square().glb()).triangle_count() == 2);
+  CHECK(read_alone(io::MeshFormat::kGltf, GltfFile::square().glb()).triangle_count() == 2);
   CHECK(contains(data_error([&] { read_alone(io::MeshFormat::kObj, "v 0 0 0\nf 1 2 3\n"); }),
                  "alone"));
 }

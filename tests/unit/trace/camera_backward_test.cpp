@@ -24,11 +24,7 @@ HostGradients gradients_on_device(Context& context,
   CameraTracer tracer(context, options);
   tracer.update(gaussians);
   tracer.forward(gaussians, camera, true);
-  Buffer<float> gradient(context, image_gradient.size(), "image gradient");
-  gradient.upload(image_gradient);
-  GaussianGradients out;
-  tracer.backward(gaussians, gradient, out);
-  return HostGradients(out);
+  return backward(context, tracer, gaussians, image_gradient);
 }
 
 // The image gradient with zeros where single precision may order or cut hits otherwise than double.

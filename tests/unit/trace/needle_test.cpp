@@ -37,11 +37,7 @@ Result trace(Context& context,
   CameraTracer tracer(context, options);
   tracer.update(gaussians);
   tracer.forward(gaussians, camera, true);
-  Buffer<float> gradient(context, image_gradient.size(), "image gradient");
-  gradient.upload(image_gradient);
-  GaussianGradients out;
-  tracer.backward(gaussians, gradient, out);
-  return {tracer.image().download(), HostGradients(out)};
+  return {tracer.image().download(), backward(context, tracer, gaussians, image_gradient)};
 }
 
 // Mean difference of alpha over the pixels that see anything.

@@ -117,6 +117,18 @@ struct HostGradients {
   bool operator==(const HostGradients&) const = default;
 };
 
+/// What the last forward pass of a tracer gives for this gradient of its picture (planar).
+inline HostGradients backward(Context& context,
+                              CameraTracer& tracer,
+                              const DeviceGaussians& gaussians,
+                              const std::vector<float>& image_gradient) {
+  Buffer<float> uploaded(context, image_gradient.size(), "image gradient");
+  uploaded.upload(image_gradient);
+  GaussianGradients out;
+  tracer.backward(gaussians, uploaded, out);
+  return HostGradients(out);
+}
+
 inline std::vector<float> random_image_gradient(std::size_t pixels, std::uint64_t seed) {
   CounterRng rng(seed, 77);
   std::vector<float> out(4 * pixels);

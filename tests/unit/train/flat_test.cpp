@@ -105,7 +105,7 @@ TEST_CASE("round Gaussians turn their third axis to the nearest camera") {
   }
 }
 
-TEST_CASE("flat Gaussians end flat, and cost about half a decibel before a wall") {
+TEST_CASE("flat Gaussians end flat, and cost at most half a decibel before a wall") {
   const TemporaryDirectory folder;
   Context context{test_device()};
   const fs::path data = folder.path() / "data";
@@ -116,15 +116,15 @@ TEST_CASE("flat Gaussians end flat, and cost about half a decibel before a wall"
     Trainer trainer(context, load_dataset(data), options, run);
     return trainer.run(false).evaluations.back().psnr;
   };
-  // Single runs differ by as much, and means of five by 0.1.
+  // Single runs differ by as much.
   double round = 0, flat = 0;
-  for (const std::uint64_t seed : {0, 1, 2, 3, 4}) {
+  for (const std::uint64_t seed : {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}) {
     options.seed = seed;
-    round += trained(false, folder.path() / ("round" + std::to_string(seed))) / 5;
-    flat += trained(true, folder.path() / ("flat" + std::to_string(seed))) / 5;
+    round += trained(false, folder.path() / ("round" + std::to_string(seed))) / 10;
+    flat += trained(true, folder.path() / ("flat" + std::to_string(seed))) / 10;
   }
   MESSAGE("PSNR " << round << " dB, flat " << flat);
-  CHECK(flat > round - 0.65);
+  CHECK(flat > round - 0.5);
   const Gaussians model =
       read_model(folder.path() / "flat4/point_cloud/iteration_800/point_cloud.ply");
   for (std::size_t i = 0; i < model.size(); ++i) {
