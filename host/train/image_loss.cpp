@@ -46,6 +46,7 @@ struct ImageLoss::Impl {
   // Row and size of the padded planes of work-items that take tiles.
   int stride = 0;
   int plane = 0;
+  bool laid_out = false;  // whether all buffers are for an image of this size
 
   Impl(Context& owner, PixelLoss pixel_loss, float weight, int vector)
       : context(owner),
@@ -88,7 +89,8 @@ struct ImageLoss::Impl {
   std::size_t pixel_sums() const { return grouped ? ssim_sums() : tiles_x() * tiles_y(); }
 
   void resize(int new_width, int new_height) {
-    if (new_width == width && new_height == height) return;
+    if (laid_out && new_width == width && new_height == height) return;
+    laid_out = false;
     width = new_width;
     height = new_height;
     // An odd number of 64-byte lines per row keeps the 11 rows of a window in different cache sets.
@@ -109,6 +111,7 @@ struct ImageLoss::Impl {
     if (ssim_weight > 0.0f && !grouped) slopes.clear();
     pixel_partials.ensure(context, pixel_sums(), "loss pixel sums");
     ssim_partials.ensure(context, ssim_sums(), "loss SSIM sums");
+    laid_out = true;
   }
 
   void evaluate_tiles(const Buffer<float>& image,
@@ -188,7 +191,7 @@ ImageLoss::Partials ImageLoss::partials() const {
 
 ImageLoss::Value ImageLoss::value() {
   Impl& s = *impl_;
-  if (s.width == 0) throw UsageError("The loss has no value before an image was evaluated");
+  if (!s.laid_out) throw UsageError("The loss has no value before an image was evaluated");
   s.fold.launch(Range{{kFoldItems, 1, 1}, {0, 0, 0}}, s.pixel_partials, s.ssim_partials, s.sums,
                 static_cast<int>(s.pixel_sums()), static_cast<int>(s.ssim_sums()));
   std::array<double, 4> total{};

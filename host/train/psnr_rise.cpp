@@ -17,6 +17,10 @@ void PsnrRise::note(std::size_t view, int divisor, double psnr) {
   ++seen_again_;
 }
 
-bool PsnrRise::learned_nothing() const { return seen_again_ >= kViewsToJudge && *most_ <= kLeast; }
+std::optional<double> PsnrRise::most() const {
+  return seen_again_ >= kViewsToJudge ? most_ : std::nullopt;
+}
+
+bool PsnrRise::learned_nothing() const { return most().has_value() && *most() <= kLeast; }
 
 }  // namespace raysplats

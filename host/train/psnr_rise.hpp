@@ -14,9 +14,10 @@ class PsnrRise {
  public:
   /// A view, at the divisor of its resolution, was reported with this PSNR in decibels.
   void note(std::size_t view, int divisor, double psnr);
-  /// The most that a view has gained over its first report, in decibels; none before one returned.
-  std::optional<double> most() const { return most_; }
-  /// Whether enough views returned to judge, and none of them rose.
+  /// The most that a view has gained over its first report, in decibels; none before enough views
+  /// returned to judge.
+  std::optional<double> most() const;
+  /// Whether enough views returned, and none of them rose.
   bool learned_nothing() const;
 
   static constexpr double kLeast = 0.1;  ///< decibels that a run has to gain

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <iterator>
+#include <set>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -191,10 +192,9 @@ class Place {
     write_npy(folder_ / "rays.npy", "False", "(2, 6)", {0, 0, -6, 0, 0, 1, 1, 0, -6, 0, 0, 1});
     fs::create_directory_symlink(fs::path(RAYSPLATS_SOURCE_DIR) / "configs", folder_ / "configs");
     for (const char* name : {"garden", "lego"}) train(name);
-    for (const char* result : {"a.json", "b.json"}) {
-      run({"bench", "--sizes", "1k", "--resolution", "16x16", "--repeat", "1", "--filter", "^adam",
-           "--json", result});
-    }
+    run({"bench", "--sizes", "1k", "--resolution", "16x16", "--repeat", "1", "--filter", "^adam",
+         "--json", "a.json"});
+    fs::copy(folder_ / "a.json", folder_ / "b.json");
   }
 
   void run(Words words) const {
@@ -276,8 +276,14 @@ class Place {
   TemporaryFolder folder_;
 };
 
-/// Runs what stands in a document after `raysplats`.
-void run_command(const Place& place, Words words) {
+/// Runs what stands in a document after `raysplats`; `measured` are the measurements made so far.
+void run_command(const Place& place, const Words& words, std::set<Words>& measured) {
+  const Words command = place.shortened(words);
+  // What measures the device does not depend on what was run before: documents that name the same
+  // command need it once.
+  const bool measures =
+      command.at(0) == "bench" || command.at(0) == "tune" || command.at(0) == "doctor";
+  if (measures && !measured.insert(command).second) return;
   // Examples are alternatives: each finds the folders as a reader who tries it alone does.
   for (std::size_t i = 1; i < words.size(); ++i) {
     const bool fresh = words.at(0) != "train" || !has(words, "--resume");
@@ -288,7 +294,7 @@ void run_command(const Place& place, Words words) {
   if (words.at(0) == "generate") place.remove(words.at(1));
   // Its output may be its second word.
   if (words.at(0) == "convert" && !words.at(2).starts_with("-")) place.remove(words.at(2));
-  place.run(place.shortened(std::move(words)));
+  place.run(command);
 }
 
 }  // namespace
@@ -300,6 +306,7 @@ TEST_CASE("every command and TOML block of the documents is run") {
     if (entry.path().extension() == ".md") documents.push_back(entry.path());
   }
   std::sort(documents.begin() + 1, documents.end());
+  std::set<Words> measured;
   std::size_t commands = 0;
   std::size_t scenes = 0;
   for (const fs::path& document : documents) {
@@ -329,7 +336,7 @@ TEST_CASE("every command and TOML block of the documents is run") {
           // Where the output goes is the shell's business.
           words.erase(std::find(words.begin(), words.end(), ">"), words.end());
           if (words.front() == "COMMAND") continue;
-          run_command(place, std::move(words));
+          run_command(place, words, measured);
           ++commands;
         } else if (block.document != "architecture.md" && block.language != "text") {
           // The others hold no commands.
@@ -338,7 +345,7 @@ TEST_CASE("every command and TOML block of the documents is run") {
       }
       if (block.language == "toml") {
         place.write("scene.toml", toml);
-        run_command(place, {"render", "scene.toml", "-o", "frames"});
+        run_command(place, {"render", "scene.toml", "-o", "frames"}, measured);
         ++scenes;
       }
     }

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "bvh/lbvh_validate.hpp"
-#include "device/fault_injection.hpp"
 #include "raysplats/error.hpp"
+#include "unit/failed_allocation.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
 
@@ -446,14 +446,7 @@ TEST_CASE("lbvh: where an allocation fails the tree is empty, and may be made la
     CAPTURE(n);
     Tree tree(context, 4, ChunkShape::for_device(context.device()));
     tree.build(few);
-    context.faults().arm(Fault::kAllocation, n);
-    failed = false;
-    try {
-      tree.lbvh().order(device_boxes, many.size());
-    } catch (const ResourceError&) {
-      failed = true;
-    }
-    context.faults().arm(Fault::kAllocation, 0);
+    failed = fails_at(context, n, [&] { tree.lbvh().order(device_boxes, many.size()); });
     if (failed) {
       CHECK(tree.lbvh().size() == 0);
       CHECK(tree.lbvh().levels() == 0);

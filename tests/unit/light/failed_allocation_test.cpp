@@ -2,32 +2,14 @@
 // What is kept from view to view after the device had no memory for one of them.
 #include <doctest/doctest.h>
 
-#include <functional>
+#include <cstddef>
 #include <vector>
 
-#include "device/fault_injection.hpp"
-#include "raysplats/error.hpp"
 #include "raysplats/tracer.hpp"
+#include "unit/failed_allocation.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;
-
-namespace {
-
-// Whether the n-th allocation of `work` failed; false where it has fewer.
-bool fails_at(Context& context, std::size_t n, const std::function<void()>& work) {
-  context.faults().arm(Fault::kAllocation, n);
-  bool failed = false;
-  try {
-    work();
-  } catch (const ResourceError&) {
-    failed = true;
-  }
-  context.faults().arm(Fault::kAllocation, 0);
-  return failed;
-}
-
-}  // namespace
 
 TEST_CASE("views after an allocation that failed are right, of the former model and the new one") {
   Context context = make_test_context();

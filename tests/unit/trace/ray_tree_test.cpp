@@ -6,11 +6,11 @@
 #include <bit>
 #include <string>
 
-#include "device/fault_injection.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "reference/scenes.hpp"
 #include "trace/ray_tree_validate.hpp"
+#include "unit/failed_allocation.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
 
@@ -105,14 +105,7 @@ TEST_CASE("ray tree: after a build that failed it is not refitted but built") {
     RayTree tree(f.context, f.options, 0);
     CHECK_THROWS_AS(tree.refit(former), UsageError);
     tree.build(former);
-    f.context.faults().arm(Fault::kAllocation, n);
-    failed = false;
-    try {
-      tree.build(next);
-    } catch (const ResourceError&) {
-      failed = true;
-    }
-    f.context.faults().arm(Fault::kAllocation, 0);
+    failed = fails_at(f.context, n, [&] { tree.build(next); });
     if (failed) {
       CHECK_THROWS_AS(tree.refit(next), UsageError);
       CHECK(tree.follow(next));

@@ -14,6 +14,7 @@
 
 #include "raysplats/error.hpp"
 #include "reference/ssim.hpp"
+#include "unit/failed_allocation.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
 
@@ -384,6 +385,24 @@ TEST_CASE("image loss: one object serves images of changing size, and repeats to
     check_value(small, PixelLoss::kL1, 0.2f, second.value);
     CHECK(first.value.total == third.value.total);
     CHECK(first.gradient == third.gradient);
+  }
+}
+
+TEST_CASE("image loss: after an allocation that failed the next image of that size is right") {
+  const Scene former = make_scene(9, 7, 3, true), next = make_scene(40, 33, 4, true);
+  for (const int form : kForms) {
+    CAPTURE(form);
+    const Result expected = run(next, PixelLoss::kL1, 0.2f, form);
+    bool failed = true;
+    for (std::size_t n = 1; failed; ++n) {
+      CAPTURE(n);
+      ImageLoss loss(context(), PixelLoss::kL1, 0.2f, form);
+      run(former, loss);
+      failed = fails_at(context(), n, [&] { run(next, loss); });
+      const Result result = run(next, loss);
+      CHECK(result.value.total == expected.value.total);
+      CHECK(result.gradient == expected.gradient);
+    }
   }
 }
 
