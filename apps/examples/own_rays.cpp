@@ -57,18 +57,20 @@ int main() {
 
     // The loss is the alpha of the last ray. Moving its origin outwards by dx loses
     // alpha x / sigma^2 dx, tilting it moves the point nearest to the centre, at t = 2, twice that.
-    std::vector<RayGradient> gradients(rays.size());
+    std::vector<RayResultGradient> gradients(rays.size());
     gradients[3].alpha = 1.0f;
     const RaysGradients back = tracer.backward(model, gradients);
-    const float slope = -seen[3].alpha * 0.15f / 0.09f;
-    good = near("slope of the origin", back.rays[3].origin[0], slope, 1e-3f) && good;
-    good = near("slope of the direction", back.rays[3].direction[0], 2.0f * slope, 1e-3f) && good;
-    good = near("slope of the mean", back.parameters.means[0], -slope, 1e-3f) && good;
-    good = near("slope of the opacity", back.parameters.opacities[0], 0.5f * seen[3].alpha) && good;
+    const float by_origin = -seen[3].alpha * 0.15f / 0.09f;
+    good = near("gradient of the origin", back.rays[3].origin[0], by_origin, 1e-3f) && good;
+    good = near("gradient of the direction", back.rays[3].direction[0], 2.0f * by_origin, 1e-3f) &&
+           good;
+    good = near("gradient of the mean", back.parameters.means[0], -by_origin, 1e-3f) && good;
+    good =
+        near("gradient of the opacity", back.parameters.opacities[0], 0.5f * seen[3].alpha) && good;
 
     // Aim the ray at the centre: gradient ascent on its origin.
     Ray aimed = rays[3];
-    const std::vector<RayGradient> one{{{0, 0, 0}, 1.0f}};
+    const std::vector<RayResultGradient> one{{{0, 0, 0}, 1.0f}};
     for (int step = 0; step < 40; ++step) {
       tracer.trace(model, std::vector<Ray>{aimed}, ColorDirection::kRay, true);
       aimed.origin[0] += 0.05f * tracer.backward(model, one).rays[0].origin[0];

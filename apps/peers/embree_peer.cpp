@@ -109,7 +109,7 @@ void print(const Options& options,
 
 /// Embree's results in the order of `targets` (one entry per ray: a pixel, or npos for none).
 Outcome embree_outcome(const EmbreeTracer& embree,
-                       std::span<const BenchRay> rays,
+                       std::span<const Ray> rays,
                        const std::vector<std::size_t>& targets,
                        std::size_t target_count,
                        const EmbreeTraceOptions& options) {
@@ -186,8 +186,8 @@ void run(const Options& options) {
 
   embree.build(RTC_BUILD_QUALITY_MEDIUM);
   const auto trace_work = [&](const char* work, const Contestant& our_side,
-                              std::span<const BenchRay> rays,
-                              const std::vector<std::size_t>& targets, std::size_t target_count) {
+                              std::span<const Ray> rays, const std::vector<std::size_t>& targets,
+                              std::size_t target_count) {
     std::vector<Contestant> contestants{our_side};
     for (const Variant& variant : kVariants) {
       if (!contains(options.programs, variant.name)) continue;
@@ -207,7 +207,7 @@ void run(const Options& options) {
   }
   if (wants("rays")) {
     const std::size_t side = static_cast<std::size_t>(options.size) / 4 * 4;
-    const std::vector<BenchRay> rays = bench_rays(side * side, options.seed);
+    const std::vector<Ray> rays = bench_rays(side * side, options.seed);
     std::vector<std::size_t> targets(rays.size());
     for (std::size_t i = 0; i < targets.size(); ++i) targets[i] = i;
     trace_work("rays", {"ours", [&] { return ours.rays(rays); }}, rays, targets, rays.size());

@@ -162,13 +162,13 @@ void start(TraversalContext& context, EmbreeRays rays) {
 template <int Capacity>
 void trace_single(RTCScene scene,
                   TraversalContext& context,
-                  std::span<const BenchRay> rays,
+                  std::span<const Ray> rays,
                   EmbreeResult* results) {
   KBuffer<Capacity> buffer;
   context.buffers = &buffer;
   start(context, EmbreeRays::kSingle);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const BenchRay& r = rays[i];
+    const Ray& r = rays[i];
     Blend blend;
     float t_near = r.t_min;
     buffer.start();
@@ -200,7 +200,7 @@ void trace_single(RTCScene scene,
 template <int Capacity>
 void trace_packets(RTCScene scene,
                    TraversalContext& context,
-                   std::span<const BenchRay> rays,
+                   std::span<const Ray> rays,
                    EmbreeResult* results) {
   std::vector<KBuffer<Capacity>> buffers(kLanes);
   context.buffers = buffers.data();
@@ -210,7 +210,7 @@ void trace_packets(RTCScene scene,
     alignas(64) int valid[kLanes];
     Blend blends[kLanes];
     for (int i = 0; i < kLanes; ++i) {
-      const BenchRay& r = rays[first + static_cast<std::size_t>(i)];
+      const Ray& r = rays[first + static_cast<std::size_t>(i)];
       packet.ray.org_x[i] = r.origin[0];
       packet.ray.org_y[i] = r.origin[1];
       packet.ray.org_z[i] = r.origin[2];
@@ -252,7 +252,7 @@ void trace_packets(RTCScene scene,
 
 /// The tracing function and the callback that belong to the options.
 struct Variant {
-  void (*trace)(RTCScene, TraversalContext&, std::span<const BenchRay>, EmbreeResult*);
+  void (*trace)(RTCScene, TraversalContext&, std::span<const Ray>, EmbreeResult*);
   void (*intersect)(const TraversalContext&, const RTCIntersectFunctionNArguments*);
 };
 
@@ -379,7 +379,7 @@ double EmbreeTracer::refit() {
   return seconds;
 }
 
-std::vector<EmbreeResult> EmbreeTracer::trace(std::span<const BenchRay> rays,
+std::vector<EmbreeResult> EmbreeTracer::trace(std::span<const Ray> rays,
                                               const EmbreeTraceOptions& options) const {
   if (rays.size() % kLanes != 0) {
     throw UsageError(fmt::format("The Embree tracer takes whole packets of {} rays, not {} rays.",

@@ -60,7 +60,7 @@ class EmbreeTracer {
   double refit();
 
   /// Traces rays through the tree of the last build(). The number of rays must be a multiple of 16.
-  std::vector<EmbreeResult> trace(std::span<const BenchRay> rays,
+  std::vector<EmbreeResult> trace(std::span<const Ray> rays,
                                   const EmbreeTraceOptions& options) const;
 
  private:

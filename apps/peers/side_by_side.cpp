@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <glm/matrix.hpp>
 
 #include "trace/camera_tracer.hpp"
@@ -69,7 +68,7 @@ CameraRays camera_rays(const Camera& camera) {
     row = std::min(row, camera.height - 1);
     const glm::dvec3 direction = to_world * glm::dvec3((column + 0.5 - camera.cx) / camera.fx,
                                                        (row + 0.5 - camera.cy) / camera.fy, 1.0);
-    BenchRay ray{};
+    Ray ray{};
     for (int k = 0; k < 3; ++k) {
       ray.origin[k] = static_cast<float>(center[k]);
       ray.direction[k] = static_cast<float>(direction[k]);
@@ -137,17 +136,14 @@ Outcome OurTracer::camera(const Camera& camera) {
   return outcome;
 }
 
-Outcome OurTracer::rays(std::span<const BenchRay> rays) {
+Outcome OurTracer::rays(std::span<const Ray> rays) {
   Impl& my = *impl_;
   if (!my.rays_ready) my.ray_tracer.update(my.gaussians);
   my.rays_ready = true;
   my.context.finish();
-  static_assert(sizeof(Ray) == sizeof(BenchRay));
-  std::vector<Ray> copied(rays.size());
-  std::memcpy(copied.data(), rays.data(), rays.size_bytes());
   std::vector<RayResult> results;
   Outcome outcome;
-  outcome.seconds = seconds_of([&] { results = my.ray_tracer.trace(my.gaussians, copied); });
+  outcome.seconds = seconds_of([&] { results = my.ray_tracer.trace(my.gaussians, rays); });
   double hits = 0.0;
   for (const RayResult& result : results) {
     outcome.colors.push_back({result.color[0], result.color[1], result.color[2]});

@@ -46,7 +46,7 @@ std::vector<Result> run_in_turn(const std::vector<Contestant>& contestants, int 
 /// Rays of a pinhole camera as packets of 4x4 pixels within tiles of 16x16, in steps of (X, Y, 1)
 /// in camera axes as CameraTracer's.
 struct CameraRays {
-  std::vector<BenchRay> rays;       ///< a multiple of 16; pixels beyond the image repeat an edge
+  std::vector<Ray> rays;            ///< a multiple of 16; pixels beyond the image repeat an edge
   std::vector<std::size_t> pixels;  ///< row-major pixel of every ray, npos beyond the image
   static constexpr std::size_t npos = ~std::size_t{0};
 };
@@ -61,7 +61,7 @@ class OurTracer {
   /// Candidate lists and tracing of one view; the image stays on the device while time runs.
   Outcome camera(const Camera& camera);
   /// Transfer of the rays, tracing, transfer of the results.
-  Outcome rays(std::span<const BenchRay> rays);
+  Outcome rays(std::span<const Ray> rays);
   /// The tree that rays walk, from the Gaussians on the device: RayTracer::update() and refit().
   Outcome build();
   Outcome refit();

@@ -6,6 +6,8 @@
 
 #include "commands.hpp"
 #include "completion.hpp"
+#include "raysplats/error.hpp"
+#include "render/output_check.hpp"
 #include "util/atomic_file.hpp"
 #include "util/output_directory.hpp"
 #include "validators.hpp"
@@ -27,6 +29,10 @@ void print_completion(const CLI::App& app, const std::string& shell) {
 
 void write_manual(const CLI::App& app, const std::filesystem::path& folder) {
   const CommandEntry program = command_tree(app);
+  if (const auto data = data_set_of(folder)) {
+    throw UsageError(fmt::format("The folder {} belongs to the data set {}: choose another",
+                                 folder.string(), data->string()));
+  }
   make_output_directory(folder);
   write_text_file(folder / "raysplats.1", manual_page(program, RAYSPLATS_VERSION));
   for (const CommandEntry& command : program.commands) {

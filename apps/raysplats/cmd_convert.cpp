@@ -79,12 +79,12 @@ void run(Options& options) {
   if (options.translate) changes.translate = vector_of(*options.translate);
   if (options.crop) {
     const std::array<double, 6> b = parse_box(*options.crop);
-    changes.crop = CropBox{{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
+    changes.crop = Bounds{{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
   }
   if (options.crop_min || options.crop_max) {
     changes.crop.emplace();
-    if (options.crop_min) changes.crop->low = vector_of(*options.crop_min);
-    if (options.crop_max) changes.crop->high = vector_of(*options.crop_max);
+    if (options.crop_min) changes.crop->low = parse_triple(*options.crop_min);
+    if (options.crop_max) changes.crop->high = parse_triple(*options.crop_max);
   }
   const ModelSource source = find_model(options.input);
   // Before the views are traced for what is kept.

@@ -8,10 +8,12 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "commands.hpp"
+#include "eval/former_pictures.hpp"
 #include "frame_progress.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
@@ -59,10 +61,10 @@ void run(const Options& options, const GlobalOptions& global) {
         options.output, (std::filesystem::path(options.output) / "eval").string()));
   }
   check_not_data(options.output, dataset);
-  // Which views are shown is known only at the end where not all are.
-  const bool all_shown = options.pictures.value_or(views) >= views;
+  if (!options.overwrite) check_outside_data(options.output);
+  const std::set<std::string> former = former_pictures(options.output);
   check_leftovers(options.output,
-                  all_shown ? evaluated_names(dataset, split) : std::vector<std::string>{},
+                  replaced_names(former, dataset, split, options.pictures.value_or(views) >= views),
                   FrameFormat::kPng, options.overwrite);
   const TraceOptions trace = options.trace.over(trace_options(source));
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
@@ -87,7 +89,7 @@ void run(const Options& options, const GlobalOptions& global) {
       Image image = tracer.render(on_device, camera, false,
                                   [&](double share) { return progress.within(share); });
       if (together) {
-        if (ranks.any(image.data.empty())) return Image();
+        if (ranks.all_reduce_or(image.data.empty())) return Image();
         collect_rows(ranks, tracer.rows(), image);
       }
       if (!together || ranks.leads()) rays += image.pixels();
@@ -108,6 +110,7 @@ void run(const Options& options, const GlobalOptions& global) {
     progress.finish(report.images.size(),
                     "views: the means in " + options.output + " are of those");
     if (!ranks.leads()) return;
+    remove_former_pictures(options.output, former, report);
     warn_of_capped_rays(capped, rays, trace);
     fmt::print("{}", report.table());
     if (options.device.profile) fmt::print("{}", context.profile_table());

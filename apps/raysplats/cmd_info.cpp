@@ -16,10 +16,10 @@
 #include "info_parts.hpp"
 #include "info_scene.hpp"
 #include "io/colmap_model.hpp"
+#include "io/dataset_advice.hpp"
 #include "io/json_file.hpp"
 #include "io/model_file.hpp"
 #include "io/scene_file.hpp"
-#include "io/way_out.hpp"
 #include "raysplats/error.hpp"
 #include "run/model_source.hpp"
 

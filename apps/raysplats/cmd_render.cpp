@@ -215,6 +215,7 @@ void render_model(const RenderFlags& options, const GlobalOptions& global) {
   TraceOptions trace = options.trace.over(trace_options(source));
   trace.depth = options.depth || options.hits;
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
+    output.check_memory(context.device(), ranks.size());
     const Model on_device(context, model);
     Tracer tracer(context, trace, mirrors_of(source));
     const FrameOptions share = share_of(ranks, output.options(), cameras.size());
@@ -228,7 +229,7 @@ void render_model(const RenderFlags& options, const GlobalOptions& global) {
         [&](std::size_t done) { return progress.done(done); },
         [&](double share) { return progress.within(share); });
     add_up(ranks, report);
-    progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
+    progress.finish(report.frames, output.left());
     if (!ranks.leads()) return;
     output.finish();
     warn_of_capped_rays(report.capped_rays, report.rays, trace);

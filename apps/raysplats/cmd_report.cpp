@@ -23,11 +23,20 @@ struct Options {
   bool overwrite = false;
 };
 
+/// A page takes the place of nothing that it is about.
+void check_page(const Options& options, const std::filesystem::path& file) {
+  for (const std::string& run : options.runs) {
+    for (const std::filesystem::path& input : report_inputs(run))
+      check_output_file(file, true, {input});
+  }
+  check_output_file(file, options.overwrite);
+}
+
 void run(const Options& options) {
   if (options.runs.size() > 1) {
     if (options.output.empty())
       throw UsageError("Several runs have no one folder for their page: say where by -o FILE");
-    check_output_file(options.output, options.overwrite);
+    check_page(options, options.output);
     write_text_file(options.output, runs_report({options.runs.begin(), options.runs.end()}));
     fmt::print("{}\n", options.output);
     return;
@@ -38,8 +47,7 @@ void run(const Options& options) {
   const std::filesystem::path file =
       options.output.empty() ? own : std::filesystem::path(options.output);
   std::error_code error;
-  if (file != own && !std::filesystem::equivalent(file, own, error))
-    check_output_file(file, options.overwrite);
+  if (file != own && !std::filesystem::equivalent(file, own, error)) check_page(options, file);
   write_run_report(run, file);
   fmt::print("{}\n", file.string());
 }

@@ -14,6 +14,7 @@
 #include "raysplats/trainer.hpp"
 #include "render/output_check.hpp"
 #include "report/run_report.hpp"
+#include "run/checkpoint.hpp"
 #include "run/train_config.hpp"
 #include "shared_work.hpp"
 #include "train/mirror_meshes.hpp"
@@ -43,10 +44,17 @@ struct Options {
   DeviceFlags device;
 };
 
-/// --time and --quality choose for a new run what its configuration then names.
-void check_choices(const CLI::App& command, const Options& options) {
+/// --time and --quality choose for a new run what its configuration then names. A command that
+/// begins a run or goes on with it may have them each time.
+void check_choices(const CLI::App& command, Options& options) {
   const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
-  if (!options.resume.empty() && (!options.time.empty() || !options.quality.empty())) {
+  const bool chosen = !options.time.empty() || !options.quality.empty();
+  if (chosen && options.resume == "latest" && !list_checkpoints(options.output).empty()) {
+    spdlog::info("--time and --quality are not asked again: {} names what they chose",
+                 (std::filesystem::path(options.output) / "config.toml").string());
+    options.time.clear();
+    options.quality.clear();
+  } else if (chosen && !options.resume.empty() && options.resume != "latest") {
     throw UsageError(
         "--time and --quality are about new runs: a resumed one has its length, which "
         "--iterations changes");
@@ -182,7 +190,7 @@ void train(const CLI::App& command,
                   &ranks);
   trainer.set_command(global.command);
   if (!options.resume.empty()) trainer.resume(options.resume);
-  options.train.iterations = announce(trainer, options, ranks.said_by(0, quiet));
+  options.train.iterations = announce(trainer, options, ranks.broadcast_value(0, quiet));
   std::unique_ptr<view::RunView> shown;
   if (options.view && ranks.leads()) shown = show(context, trainer, options, views, origin);
   const std::int64_t begun = trainer.iteration();

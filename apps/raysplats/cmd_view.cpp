@@ -22,7 +22,7 @@
 #include "run/run_cameras.hpp"
 #include "scene/morton_order.hpp"
 #include "scene/orbit.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 #include "train/mirror_meshes.hpp"
 #include "util/interrupt.hpp"
 #include "util/number_text.hpp"
@@ -114,8 +114,8 @@ std::string scene_tail(const ModelSource& source, TraceOptions trace, const glm:
       "\n[[light]]\nkind = \"directional\"\ndirection = [{}, {}, {}]\n\n[render]\nsamples = 16\n",
       light.direction[0], light.direction[1], light.direction[2]);
   TraceOptions own = trace_options(source);
-  const std::vector<OptionRow> given = trace_rows(trace);
-  const std::vector<OptionRow> trained = trace_rows(own);
+  const std::vector<OptionRow> given = trace_option_rows(trace);
+  const std::vector<OptionRow> trained = trace_option_rows(own);
   std::string rows;
   for (std::size_t i = 0; i < given.size(); ++i) {
     // Rays that leave a mirror have no camera that could be near.

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "raysplats/train_options.hpp"
-#include "run/train_keys.hpp"
+#include "run/train_option_table.hpp"
 #include "util/nearest_name.hpp"
 #include "util/number_text.hpp"
 
@@ -22,7 +22,7 @@ bool takes_numbers(std::string_view name) {
   if (name == "--background" || name == "--up" || name == "--sizes" || name == "--crop")
     return true;
   TrainOptions options;
-  const std::vector<OptionRow> keys = train_keys(options);
+  const std::vector<OptionRow> keys = train_option_rows(options);
   return name.starts_with("--") && std::any_of(keys.begin(), keys.end(), [&](const OptionRow& key) {
            return key.list == OptionRow::List::kNumbers && key.name == name.substr(2);
          });

@@ -200,6 +200,12 @@ std::optional<Json> describe_file(const std::filesystem::path& path) {
   // meta.json is a model of SOG.
   if (extension == ".json" && path.filename() != "meta.json") return describe_json(path);
   if (extension == ".npy") return describe_array(path);
+  if (extension == ".npz") {
+    throw DataError(
+        fmt::format("{} holds arrays, as trace writes them, which info does not read: open it with "
+                    "numpy.load()",
+                    path.string()));
+  }
   if (extension == ".csv") return describe_curves(path);
   if (extension == ".rsck") return describe_checkpoint(path);
   if (extension == ".toml") return describe_toml(path);

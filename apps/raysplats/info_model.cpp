@@ -12,7 +12,7 @@
 #include "raysplats/io.hpp"
 #include "run/model_source.hpp"
 #include "scene/model_summary.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 
 namespace raysplats::cli {
 namespace {

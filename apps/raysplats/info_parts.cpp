@@ -16,6 +16,7 @@
 #include "io/ply_file.hpp"
 #include "io/ply_points.hpp"
 #include "raysplats/lpips.hpp"
+#include "report/run_files.hpp"
 #include "util/file_kind.hpp"
 
 namespace raysplats::cli {
@@ -131,6 +132,8 @@ std::optional<Json> describe_record(const nlohmann::json& json, const fs::path& 
                {"complete", "iteration", "iterations", "gaussians", "loss", "training_seconds",
                 "device", "driver", "version", "command"},
                out);
+    if (const std::string last = report::last_command(json); !last.empty())
+      out["last_command"] = last;
     return out;
   }
   if (json.contains("images") && json["images"].is_array() && json.contains("psnr")) {

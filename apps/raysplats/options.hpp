@@ -10,12 +10,12 @@
 
 #include "comm/communicator.hpp"
 #include "device/context.hpp"
-#include "io/data_rows.hpp"
+#include "io/data_option_table.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trace_options.hpp"
-#include "scene/render_rows.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/render_option_table.hpp"
+#include "scene/trace_option_table.hpp"
 
 namespace raysplats::cli {
 

@@ -6,7 +6,7 @@
 
 #include "options.hpp"
 #include "render/frame_writer.hpp"
-#include "scene/render_rows.hpp"
+#include "scene/render_option_table.hpp"
 
 namespace raysplats::cli {
 

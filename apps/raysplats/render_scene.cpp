@@ -210,7 +210,7 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
                    [&](std::size_t done) { return progress.done(done); },
                    [&](double share) { return progress.within(share); });
                add_up(ranks, report);
-               progress.finish(report.frames, "frames: what is in " + output.name() + " is whole");
+               progress.finish(report.frames, output.left());
                if (!ranks.leads()) return;
                output.finish();
                const PathTracer::Statistics& rays = report.rays;

@@ -88,11 +88,13 @@ FrameOptions share_of(Communicator& ranks, FrameOptions options, std::size_t fra
 }
 
 std::uint64_t sum_over(Communicator& ranks, std::uint64_t mine) {
-  const std::vector<std::uint64_t> all = ranks.all(mine);
+  const std::vector<std::uint64_t> all = ranks.all_gather(mine);
   return std::accumulate(all.begin(), all.end(), std::uint64_t{0});
 }
 
-double most_of(Communicator& ranks, double mine) { return std::ranges::max(ranks.all(mine)); }
+double most_of(Communicator& ranks, double mine) {
+  return std::ranges::max(ranks.all_gather(mine));
+}
 
 std::string traffic_of(const Communicator& ranks,
                        const Communicator::Traffic& before,

@@ -62,7 +62,7 @@ void time_messages(Communicator& ranks, int repeats) {
       const std::uint64_t begin = ranks.traffic().sent;
       sum.begin(ranks, static_cast<std::size_t>(count), row.size());
       sum.send(row, [] {});
-      sum.settle();
+      sum.wait();
       sum.finish(total);
       sent = ranks.traffic().sent - begin;
     });

@@ -146,11 +146,18 @@ SurfacePoint surface_point(__global const float* vertices,
   return out;
 }
 
+// Least cosine between a triangle's normal and those of its corners that those of something round
+// have: 43 degrees, below the 45 of an edge between two faces of a box, whose corners have 55, and
+// above the 41 of a ball of 6 x 3 facets.
+#define RS_ROUND_COSINE 0.73f
+
 // Where rays from there to lights start. Where normals of corners say that the surface is round,
 // the flat triangle lies behind it, and a ray from the triangle would meet its neighbours although
 // the normal faces the light. So the point is projected onto the plane of each corner and its
 // normal, where it lies behind that plane, and the projections are weighted as the corners are
-// (Hanika 2021, Hacking the Shadow Terminator). The point itself without normals.
+// (Hanika 2021, Hacking the Shadow Terminator). A normal that leans farther than a round surface's
+// is the mean at a sharp edge and says nothing of the kind: its corner stays out of it. The point
+// itself without normals.
 float3 shadow_origin(__global const float* vertices,
                      const RsSurfaceHit* hit,
                      const SurfacePoint* point) {
@@ -161,7 +168,9 @@ float3 shadow_origin(__global const float* vertices,
     const float3 normal = vload3(0, v + 8 * k + 3);
     const float length2 = dot(normal, normal);
     if (length2 <= 1e-12f) continue;
-    const float3 n = normal * copysign(rsqrt(length2), dot(normal, point->normal));
+    const float cosine = dot(normal, point->normal) * rsqrt(length2);
+    if (fabs(cosine) < RS_ROUND_COSINE) continue;
+    const float3 n = normal * copysign(rsqrt(length2), cosine);
     const float behind = dot(vload3(0, v + 8 * k) - point->position, n);
     out += weights[k] * fmax(behind, 0.0f) * n;
   }

@@ -35,7 +35,7 @@ RS_ACTIVATED rs_parameter_of_scale(const RS_ACTIVATED scale) {
 }
 
 // Derivative of a scale by its parameter, divided by the scale.
-RS_ACTIVATED rs_scale_log_slope(const RS_ACTIVATED scale) {
+RS_ACTIVATED rs_scale_log_derivative(const RS_ACTIVATED scale) {
 #if SIGMOID_SCALE
   return 1.0f - scale;
 #else

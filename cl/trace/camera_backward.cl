@@ -71,7 +71,7 @@ typedef struct {
   fv blended[WINDOW];    // T alpha (colour . gradient)
   fv behind[WINDOW];
   uint head, size;
-} OpenRows;
+} StreamWindow;
 
 // Sums one Gaussian's gradient line over the rays of the packet and adds it to memory.
 void add_gradient(const Pixels* p,
@@ -88,7 +88,7 @@ void add_gradient(const Pixels* p,
 
 // The oldest open row has met all rows that it may change places with: its gradient is complete.
 // Returns its T alpha (colour . gradient), which lies behind everything still to come.
-fv close_row(OpenRows* rows,
+fv close_row(StreamWindow* rows,
              const Pixels* p,
              const fv T,
              const fv T_last,
@@ -148,7 +148,7 @@ void packet_backward(const RsCamera* camera,
   load_pixels(&p, camera, tangents, image_gradient, depth_gradient, screen_x, screen_y, px, py);
   const fv T = rs_load_pixels(transmittances, width, height, px, py);
   const fv T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
-  OpenRows rows;
+  StreamWindow rows;
   rows.head = rows.size = 0;
   fv behind = (fv)(0.0f);  // of closed rows: farther than all that are open or still to come
   // Rows are numbered downwards from a number that no window reaches below.

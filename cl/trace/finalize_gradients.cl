@@ -142,14 +142,14 @@ __kernel void finalize_gradients(const uint begin,
   load_columns(sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS, 3 * RS_SH_FUNCTIONS, c);
   fv along[RS_SH_FUNCTIONS];
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
-    along[k] = c[3 * k] * colour.slope[0] + c[3 * k + 1] * colour.slope[1] +
-               c[3 * k + 2] * colour.slope[2];
+    along[k] = c[3 * k] * colour.value[0] + c[3 * k + 1] * colour.value[1] +
+               c[3 * k + 2] * colour.value[2];
   }
   direction_gradient(&colour, along, out.mean);
 #endif
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
     for (int j = 0; j < 3; ++j) {
-      c[3 * k + j] = touched ? colour.basis[k] * colour.slope[j] : (fv)(0.0f);
+      c[3 * k + j] = touched ? colour.basis[k] * colour.value[j] : (fv)(0.0f);
     }
   }
   for (int k = 3 * RS_SH_FUNCTIONS; k < 3 * SH_COEFFICIENTS; ++k) c[k] = (fv)(0.0f);

@@ -44,7 +44,7 @@ typedef struct {
 typedef struct {
   float before[RS_OPEN_OWN];
   float from_here[RS_OPEN_OWN];
-} OwnRows;
+} OwnBackwardRows;
 
 // The nearest hit of a ray among the rows that are closed: farther than all that are still to come.
 typedef struct {
@@ -99,7 +99,7 @@ float group_alpha(__global const float* v, const PacketMeeting* m) {
 
 // The row of the slot has met all rows that it may change places with: its gradient is complete.
 RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
-                               const OwnRows* own,
+                               const OwnBackwardRows* own,
                                const int lane,
                                const uint slot,
                                const Pixels* p,
@@ -160,7 +160,7 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
   const float T = rs_load_pixels(transmittances, width, height, px, py);
   const float T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
   const float sky = background.x * p.gR + background.y * p.gG + background.z * p.gB;
-  OwnRows own;
+  OwnBackwardRows own;
   ClosedHit closed = {0.0f, 0.0f};
   uint open = 0;  // slots that are taken, a bit each
   // Rows are numbered downwards from a number that no window reaches below.

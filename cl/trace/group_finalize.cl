@@ -53,11 +53,11 @@ float staged_size(const __local float* row) {
   return sum;
 }
 
-// Adds the products of the colour's slope with RS_STAGE floats of the SH coefficients from number
-// `column` on, of Gaussians whose rows are present.
+// Adds the products of the colour's gradient with RS_STAGE floats of the SH coefficients from
+// number `column` on, of Gaussians whose rows are present.
 void add_along(const int column,
                __global const float* sh,
-               const float* slope,
+               const float* by_color,
                __local StagedRows* staged,
                float* along) {
   const int count = min(3 * RS_SH_FUNCTIONS - column, RS_STAGE);
@@ -67,14 +67,14 @@ void add_along(const int column,
 #pragma unroll
   for (int t = 0; t < RS_STAGE; ++t) {
     const int k = column + t;
-    if (t < count) along[k / 3] += staged->rows[lane][t] * slope[k % 3];
+    if (t < count) along[k / 3] += staged->rows[lane][t] * by_color[k % 3];
   }
 }
 
 // Stores RS_STAGE floats of the gradient of the SH coefficients from number `column` on.
 void store_sh_gradient(const int column,
                        const float* basis,
-                       const float* slope,
+                       const float* by_color,
                        const int touched,
                        __local StagedRows* staged,
                        __global float* g_sh) {
@@ -85,7 +85,7 @@ void store_sh_gradient(const int column,
   for (int t = 0; t < RS_STAGE; ++t) {
     const int k = column + t;
     const bool moves = touched && k < 3 * RS_SH_FUNCTIONS;
-    if (t < count) staged->rows[lane][t] = moves ? basis[k / 3] * slope[k % 3] : 0.0f;
+    if (t < count) staged->rows[lane][t] = moves ? basis[k / 3] * by_color[k % 3] : 0.0f;
   }
   stage_store(staged, 0, count, g_sh, 3 * SH_COEFFICIENTS, column, ACCUMULATE);
 }
@@ -155,7 +155,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   load_offset(i, means, &camera, colour.n);
   colour_direction(&colour);
   for (int j = 0; j < 3; ++j)
-    colour.slope[j] =
+    colour.value[j] =
         touched && RS_COLOR_PASSES(lines[i].v[13 + j], row[5 + j]) ? row[5 + j] : 0.0f;
   ParameterGradient out;
   for (int j = 0; j < 3; ++j) out.mean[j] = 0.0f;
@@ -165,26 +165,26 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   barrier(CLK_LOCAL_MEM_FENCE);
   staged.present[lane] = touched;
   __global const float* coefficients = sh + first * 3 * SH_COEFFICIENTS;
-  add_along(0, coefficients, colour.slope, &staged, along);
-  add_along(RS_STAGE, coefficients, colour.slope, &staged, along);
-  add_along(2 * RS_STAGE, coefficients, colour.slope, &staged, along);
-  add_along(3 * RS_STAGE, coefficients, colour.slope, &staged, along);
-  add_along(4 * RS_STAGE, coefficients, colour.slope, &staged, along);
-  add_along(5 * RS_STAGE, coefficients, colour.slope, &staged, along);
-  add_along(6 * RS_STAGE, coefficients, colour.slope, &staged, along);
+  add_along(0, coefficients, colour.value, &staged, along);
+  add_along(RS_STAGE, coefficients, colour.value, &staged, along);
+  add_along(2 * RS_STAGE, coefficients, colour.value, &staged, along);
+  add_along(3 * RS_STAGE, coefficients, colour.value, &staged, along);
+  add_along(4 * RS_STAGE, coefficients, colour.value, &staged, along);
+  add_along(5 * RS_STAGE, coefficients, colour.value, &staged, along);
+  add_along(6 * RS_STAGE, coefficients, colour.value, &staged, along);
   direction_gradient(&colour, along, out.mean);
 #endif
   rs_sh_basis(SH_DEGREE, colour.n[0], colour.n[1], colour.n[2], colour.basis);
   barrier(CLK_LOCAL_MEM_FENCE);
   staged.present[lane] = stored;
-  __global float* slopes = g_sh + first * 3 * SH_COEFFICIENTS;
-  store_sh_gradient(0, colour.basis, colour.slope, touched, &staged, slopes);
-  store_sh_gradient(RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
-  store_sh_gradient(2 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
-  store_sh_gradient(3 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
-  store_sh_gradient(4 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
-  store_sh_gradient(5 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
-  store_sh_gradient(6 * RS_STAGE, colour.basis, colour.slope, touched, &staged, slopes);
+  __global float* sh_gradient = g_sh + first * 3 * SH_COEFFICIENTS;
+  store_sh_gradient(0, colour.basis, colour.value, touched, &staged, sh_gradient);
+  store_sh_gradient(RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
+  store_sh_gradient(2 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
+  store_sh_gradient(3 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
+  store_sh_gradient(4 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
+  store_sh_gradient(5 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
+  store_sh_gradient(6 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
 
   stage_fetch(line_gradients + 16 * first, 16, 0, 13, &staged);
   float v[16];

@@ -21,7 +21,7 @@
 
 #if LENS
 // Outermost rays of the packet.
-void outermost_rays(__local GroupMemory* memory,
+void outermost_rays(__local ForwardMemory* memory,
                     const int lane,
                     const PacketRays* rays,
                     GroupCandidates* c) {
@@ -60,7 +60,7 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
                                                   __global float* restrict image,
                                                   __global float* restrict depth_image,
                                                   volatile __global uint* restrict counters) {
-  __local GroupMemory memory;
+  __local ForwardMemory memory;
   const RsCamera camera = camera_argument;
   const RsForward forward = forward_argument;
   const float min_transmittance = forward.min_transmittance;

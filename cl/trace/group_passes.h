@@ -66,7 +66,7 @@ RS_GROUP_INLINE void find_behind(const GroupCandidates* c,
 }
 
 // Traces the rays that are `alive`. Returns whether the ray lost a hit to max_hits.
-RS_GROUP_INLINE bool group_in_passes(__local GroupMemory* memory,
+RS_GROUP_INLINE bool group_in_passes(__local ForwardMemory* memory,
                                      const GroupCandidates* candidates,
                                      const int lane,
                                      bool alive,

@@ -69,7 +69,7 @@ typedef struct {
   // Chunk of the stream and what is used of it, for work-item 0: now, and where a part began.
   uint2 stream_end, stream_begin;
 #endif
-} GroupMemory;
+} ForwardMemory;
 
 // The way through the candidate list of the tile; the same in every work-item.
 typedef struct {
@@ -82,7 +82,9 @@ typedef struct {
 } GroupCandidates;
 
 // Reads on until there is a batch, or the list ends. A box per work-item.
-RS_GROUP_INLINE void group_fetch(__local GroupMemory* memory, GroupCandidates* c, const int lane) {
+RS_GROUP_INLINE void group_fetch(__local ForwardMemory* memory,
+                                 GroupCandidates* c,
+                                 const int lane) {
   while (c->queued - c->taken < RS_GROUP_BATCH && c->read < c->end) {
     const uint k = c->read + lane;
     bool meets = false;
@@ -99,7 +101,7 @@ RS_GROUP_INLINE void group_fetch(__local GroupMemory* memory, GroupCandidates* c
   }
 }
 
-float group_waiting_key(const __local GroupMemory* memory,
+float group_waiting_key(const __local ForwardMemory* memory,
                         const int begin,
                         const int waiting,
                         const int i) {
@@ -145,7 +147,7 @@ void group_settle(__local OpenRows* rows,
 
 #if KEEP_HITS
 // Reserves a place in the stream; for work-item 0, which alone knows where it ends.
-uint group_push(__local GroupMemory* memory,
+uint group_push(__local ForwardMemory* memory,
                 const uint reference,
                 const uint window,
                 HitStream* stream) {
@@ -158,7 +160,7 @@ uint group_push(__local GroupMemory* memory,
 
 // Reserves places in the stream, for work-item 0: for the rows of the slots `closing`, which settle
 // now.
-void group_push_rows(__local GroupMemory* memory, uint closing, uint settled, HitStream* stream) {
+void group_push_rows(__local ForwardMemory* memory, uint closing, uint settled, HitStream* stream) {
   __local OpenRows* rows = &memory->open;
   for (; closing != 0; closing &= closing - 1, ++settled) {
     const uint slot = rs_lowest_bit(closing);
@@ -171,7 +173,7 @@ void group_push_rows(__local GroupMemory* memory, uint closing, uint settled, Hi
 // Traces the rays that are `traced`. False when they need more rows at once than there is room for,
 // or a ray has more than max_hits hits: fewer rays need less room, and group_passes.h has no such
 // limits. Work-item 0 alone pushes rows into its stream; all set them.
-RS_GROUP_INLINE bool group_in_rows(__local GroupMemory* memory,
+RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
                                    GroupCandidates* candidates,
                                    const int lane,
                                    const bool traced,

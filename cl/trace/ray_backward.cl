@@ -11,9 +11,9 @@
 // min_transmittance): that difference costs up to eps / T of relative accuracy. Cost: that of
 // trace_rays plus O(1) per hit.
 //
-// RAY_SLOPES 1 also yields the gradients of the rays themselves. Moving the origin moves every
-// residual as moving the mean back does; with t_p, the parameter of the point nearest to the mean,
-// a change of the direction moves that point by t_p times as much.
+// WITH_RAY_GRADIENT 1 also yields the gradients of the rays themselves. Moving the origin moves
+// every residual as moving the mean back does; with t_p, the parameter of the point nearest to the
+// mean, a change of the direction moves that point by t_p times as much.
 //
 // Launch: `items` work-items; each takes every items-th chunk of `chunk` rays in the order given,
 // or with RS_ONE_RAY one ray.
@@ -25,8 +25,8 @@
 #include "trace/ray_color.h"
 #include "trace/ray_sums.h"
 
-#ifndef RAY_SLOPES
-#define RAY_SLOPES 0
+#ifndef WITH_RAY_GRADIENT
+#define WITH_RAY_GRADIENT 0
 #endif
 
 // Whether a work-item has one ray, as on GPUs: no loop, whose counters would lie in registers
@@ -37,7 +37,7 @@
 #define RS_SHARE __attribute__((always_inline)) static
 
 // Waves of 16 where their registers are enough.
-#if EXACT_SUMS || RAY_SLOPES
+#if EXACT_SUMS || WITH_RAY_GRADIENT
 #define RS_RAY_WAVE
 #else
 #define RS_RAY_WAVE RS_WAVE_OF_16
@@ -66,7 +66,7 @@ typedef struct {
   bool stopped;
   float last_key;
   uint next_index;  // one more than its own
-#if RAY_SLOPES
+#if WITH_RAY_GRADIENT
   float3 by_origin, by_direction;
 #endif
 } RayState;
@@ -88,7 +88,7 @@ RS_SHARE float16 line_sums(const RayData* ray,
   const float g = -0.5f * alpha * by_alpha;
   const float3 by_v = 2.0f * g * v;
   const float3 by_mean = -(by_v.x * x + by_v.y * y + by_v.z * z);
-#if RAY_SLOPES
+#if WITH_RAY_GRADIENT
   state->by_origin -= by_mean;
   state->by_direction += dot(o, d) / dot(d, d) * by_mean;
 #endif
@@ -107,20 +107,20 @@ RS_SHARE float16 line_sums(const RayData* ray,
 #if SH_DEGREE > 0
 // Gradient of what a colour's direction goes to, from that of the colour: n is the unit direction,
 // `inverse` one over the length it had.
-RS_SHARE float3 direction_slope(const RayScene* scene,
-                                const uint index,
-                                const float3 n,
-                                const float inverse,
-                                const float3 by_color) {
+RS_SHARE float3 direction_gradient_of(const RayScene* scene,
+                                      const uint index,
+                                      const float3 n,
+                                      const float inverse,
+                                      const float3 by_color) {
   float along[RS_RAY_FUNCTIONS];
   __global const float* c = scene->sh + (size_t)index * 3 * scene->sh_coefficients;
 #if KEPT
 #pragma unroll 1
 #endif
   for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) along[k] = dot(vload3(k, c), by_color);
-  float slope[3];
-  rs_sh_gradient(SH_DEGREE, n.x, n.y, n.z, along, slope);
-  const float3 by_n = (float3)(slope[0], slope[1], slope[2]);
+  float gradient[3];
+  rs_sh_gradient(SH_DEGREE, n.x, n.y, n.z, along, gradient);
+  const float3 by_n = (float3)(gradient[0], gradient[1], gradient[2]);
   return (by_n - n * dot(by_n, n)) * inverse;
 }
 
@@ -161,16 +161,16 @@ RS_INLINE void add_hit(const RayScene* scene,
   rs_add_numbers(&state->sums, line, sum, 11, 14);
 #else
   add_coefficients(&state->sums, index, basis, by_color);
-  if (RAY_SLOPES || scene->color_from_origin) {
+  if (WITH_RAY_GRADIENT || scene->color_from_origin) {
     const float4 n = color_direction(scene, ray, pending, k);
-    const float3 slope = direction_slope(scene, index, n.xyz, n.w, by_color);
+    const float3 by_way = direction_gradient_of(scene, index, n.xyz, n.w, by_color);
     if (scene->color_from_origin) {
-      sum.sbcd = slope;
+      sum.sbcd = by_way;
       rs_add_numbers(&state->sums, line, sum, 11, 14);
-#if RAY_SLOPES
-      state->by_origin -= slope;
+#if WITH_RAY_GRADIENT
+      state->by_origin -= by_way;
     } else {
-      state->by_direction += slope;
+      state->by_direction += by_way;
 #endif
     }
   }
@@ -233,15 +233,15 @@ RS_INLINE void add_hit(const RayScene* scene,
     const float3 n = -inverse * offset;
     rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, own_basis);
     basis = own_basis;
-    sum.sbcd = direction_slope(scene, index, n, inverse, by_color);
-#if RAY_SLOPES
+    sum.sbcd = direction_gradient_of(scene, index, n, inverse, by_color);
+#if WITH_RAY_GRADIENT
     state->by_origin -= sum.sbcd;
 #endif
   }
-#if RAY_SLOPES
+#if WITH_RAY_GRADIENT
   if (!scene->color_from_origin) {
     const float inverse = rsqrt(fmax(dot(ray->d, ray->d), 1e-38f));
-    state->by_direction += direction_slope(scene, index, inverse * ray->d, inverse, by_color);
+    state->by_direction += direction_gradient_of(scene, index, inverse * ray->d, inverse, by_color);
   }
 #endif
   add_coefficients(&state->sums, index, basis, by_color);
@@ -304,7 +304,7 @@ RS_INLINE void add_ray(const RayScene* scene,
                        __global const float4* gradients,
                        const size_t id,
                        RayState* state,
-                       __global float8* slopes) {
+                       __global float8* ray_gradients) {
   const float4 gradient = gradients[id];
   const RayResult result = load_result(results, id);
   const int hits = (int)result.hits;
@@ -320,21 +320,21 @@ RS_INLINE void add_ray(const RayScene* scene,
   state->stopped = false;
   state->last_key = -1.0f;
   state->next_index = 0;
-#if RAY_SLOPES
+#if WITH_RAY_GRADIENT
   state->by_origin = state->by_direction = (float3)(0.0f);
 #endif
   walk_ray(scene, raw.t_max, basis, &ray, state);
-#if RAY_SLOPES
-  slopes[id] = (float8)(state->by_origin, 0.0f, state->by_direction, 0.0f);
+#if WITH_RAY_GRADIENT
+  ray_gradients[id] = (float8)(state->by_origin, 0.0f, state->by_direction, 0.0f);
 #else
-  (void)slopes;
+  (void)ray_gradients;
 #endif
 }
 
 // Gradients of the rays [first, last) in their order. results: what trace_rays gave them;
 // gradients: dL/d(R, G, B, alpha) per ray; records: whitening matrix and mean of every Gaussian
-// (ray_gradients.cl); sums: as for LineSums; slopes: with RAY_SLOPES of every ray the gradients of
-// its origin and direction, four floats each, zeros at first.
+// (ray_gradients.cl); sums: as for LineSums; ray_gradients: with WITH_RAY_GRADIENT of every ray the
+// gradients of its origin and direction, four floats each, zeros at first.
 RS_RAY_WAVE RS_RAY_KERNEL __kernel void ray_backward(const uint first,
                                                      const uint last,
                                                      const uint chunk,
@@ -348,7 +348,7 @@ RS_RAY_WAVE RS_RAY_KERNEL __kernel void ray_backward(const uint first,
                                                      __global const float* restrict records,
                                                      const RsRaySums ray_sums,
                                                      __global float* restrict sums,
-                                                     __global float8* restrict slopes) {
+                                                     __global float8* restrict ray_gradients) {
   const uint item = get_global_id(0);
   if (item >= items) return;
   const RsRayWalk walk = walk_argument;
@@ -374,14 +374,14 @@ RS_RAY_WAVE RS_RAY_KERNEL __kernel void ray_backward(const uint first,
   const uint position = first + item;
   if (position < last) {
     add_ray(&scene, rays, results, gradients, ordered ? ray_order[position] : position, &state,
-            slopes);
+            ray_gradients);
   }
 #else
   for (size_t begin = first + (size_t)item * chunk; begin < last; begin += (size_t)items * chunk) {
     const size_t end = min(begin + chunk, (size_t)last);
     for (size_t position = begin; position < end; ++position) {
       add_ray(&scene, rays, results, gradients, ordered ? ray_order[position] : position, &state,
-              slopes);
+              ray_gradients);
     }
   }
 #endif

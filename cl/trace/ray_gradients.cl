@@ -154,7 +154,7 @@ __kernel void finish_ray_gradients(const uint begin,
   for (int k = 0; k < 3; ++k) {
     const fv diagonal = k == 0 ? v[3] : k == 1 ? v[6] : v[8];
     const iv moves = touched & (g.raw_scale[k] >= g.scale[k]);
-    const fv value = -2.0f * diagonal * rs_scale_log_slope(g.scale[k]);
+    const fv value = -2.0f * diagonal * rs_scale_log_derivative(g.scale[k]);
     gs[k] = moves ? value : zero;
     const fv mixed = k == 0 ? v[7] : k == 1 ? v[5] : v[4];
     const fv a = g.scale[(k + 1) % 3], b = g.scale[(k + 2) % 3];

@@ -156,13 +156,13 @@ void screen_statistics(const ViewGaussian* g,
   (void)screen_y;
   const fv x0 = g->m[0] / g->m[2], y0 = g->m[1] / g->m[2];
   const fv across = x0 * v[0] + y0 * v[1];
-  const fv slope =
+  const fv on_screen =
       screen_x * sqrt((1.0f + x0 * x0 + y0 * y0) * (v[0] * v[0] + v[1] * v[1] + across * across));
 #else
   (void)g;
-  const fv slope = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
+  const fv on_screen = sqrt(v[0] * v[0] * screen_x * screen_x + v[1] * v[1] * screen_y * screen_y);
 #endif
-  out[0] = counts ? slope : zero;
+  out[0] = counts ? on_screen : zero;
   out[1] = counts ? v[2] : zero;
   out[2] = touched ? (fv)(1.0f) : zero;
 }
@@ -173,7 +173,7 @@ typedef struct {
   fv n[3];
   fv inverse;  // 1 / |m - c|
   fv basis[RS_SH_FUNCTIONS];
-  fv slope[3];  // of R, G, B before they are clamped
+  fv value[3];  // of R, G, B before they are clamped
 } ColourGradient;
 
 // Finds the direction of the colour from out->n = m - c.
@@ -192,13 +192,13 @@ void colour_gradient(
   colour_direction(out);
 #pragma unroll
   for (int j = 0; j < 3; ++j) {
-    out->slope[j] = (touched & RS_COLOR_PASSES(line[13 + j], v[13 + j])) ? v[13 + j] : zero;
+    out->value[j] = (touched & RS_COLOR_PASSES(line[13 + j], v[13 + j])) ? v[13 + j] : zero;
   }
   rs_sh_basis(SH_DEGREE, out->n[0], out->n[1], out->n[2], out->basis);
 }
 
 // The share of the mean's gradient that comes from the colour; `along` holds per function the
-// product of its coefficients with the slope.
+// product of its coefficients with that gradient.
 void direction_gradient(const ColourGradient* colour, const fv* along, fv* mean) {
   const fv* n = colour->n;
   fv gn[3];
@@ -245,7 +245,7 @@ void parameter_gradient(const ViewGaussian* g,
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
     const iv moves = touched & (g->raw_scale[k] >= g->scale[k]);
-    const fv value = -view->w[k] * g->w[k] * rs_scale_log_slope(g->scale[k]);
+    const fv value = -view->w[k] * g->w[k] * rs_scale_log_derivative(g->scale[k]);
     out->scale[k] = moves ? value : zero;
   }
   out->opacity = touched ? opacity * g->opacity * (1.0f - g->opacity) : zero;

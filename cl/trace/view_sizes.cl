@@ -13,17 +13,33 @@
 // Gaussians that are asked how far away things are.
 #define RS_ASKED 8
 
-// The distance of the farthest of a few Gaussians, along the axis of the world where it is
-// greatest; 1 where none of them shows anything.
-float farthest_of_few(__global const RsAabb* boxes, const uint count, const float4 center) {
-  float most = -1.0f;
+// The median distance of a few Gaussians, each along the axis of the world where it is greatest;
+// the lower of two, and 1 where none of them is anywhere. One that is far from all others, as
+// training and file formats leave behind, would take an end of their distances with it.
+float median_of_few(__global const RsAabb* boxes, const uint count, const float4 center) {
+  float away[RS_ASKED];
+  uint found = 0;
 #pragma unroll
-  for (uint k = 0; k < RS_ASKED && count > 0; ++k) {
-    const RsBox box = box_load(boxes, (size_t)(count / RS_ASKED) * k);
+  for (uint k = 0; k < RS_ASKED; ++k) {
+    away[k] = INFINITY;
+    if (count == 0) continue;
+    const RsBox box = box_load(boxes, (size_t)count * k / RS_ASKED);
     const float4 way = fabs(box_center(box) - center);
-    if (box_valid(box)) most = fmax(most, fmax(fmax(way.x, way.y), way.z));
+    const float most = fmax(fmax(way.x, way.y), way.z);
+    if (!box_valid(box) || !(most > 0.0f && most <= FLT_MAX)) continue;
+    away[k] = most;
+    ++found;
   }
-  return most < 0.0f ? 1.0f : most;
+  float median = 1.0f;
+#pragma unroll
+  for (uint k = 0; k < RS_ASKED; ++k) {
+    uint nearer = 0;
+#pragma unroll
+    for (uint j = 0; j < RS_ASKED; ++j)
+      nearer += away[j] < away[k] || (away[j] == away[k] && j < k) ? 1 : 0;
+    if (found > 0 && nearer == (found - 1) / 2) median = away[k];
+  }
+  return median;
 }
 
 // offsets[count] is the number of candidates, `boxes` are those of the Gaussians.
@@ -39,7 +55,7 @@ __kernel void admit_candidates(__global const uint* offsets,
   if (wanted > capacity) overflow[0] = 1;
   live[0] = overflow[0] == 0 ? wanted : 0;
   const float4 center = (float4)(camera.center[0], camera.center[1], camera.center[2], 0.0f);
-  live[1] = first_depth_step(farthest_of_few(boxes, count, center));
+  live[1] = first_depth_step(median_of_few(boxes, count, center));
   rs_count(counters + RS_COUNT_CANDIDATES, wanted);
 }
 

@@ -8,9 +8,9 @@
 //   image     planes R, G, B       photo    as train/photo.h says
 //   composite 0: m is the photo's alpha; 1: the photo is blended over the background and m is 1; 2:
 //             the same, and m is the photo's plane of weights
-//   slopes    per channel planes E, F, G as large as the image
+//   derivatives  per channel planes E, F, G as large as the image
 // Per pixel and channel 2.6 pixels of image and photo are fetched, and as many of each plane of
-// slopes: 26^2 for 16^2.
+// derivatives: 26^2 for 16^2.
 #define LANES 1
 #include "train/loss_pixel.h"
 #include "train/photo.h"
@@ -95,10 +95,10 @@ float4 group_sum(float4 value, int lane, __local float4* scratch) {
 
 // Per tile and channel, tiles of a channel one after the other: pixel_partials {sum m rho(x - y),
 // sum m (clamp(x) - y)^2, sum m, 0}, ssim_partials the sum of SSIM.
-__kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_slopes(
+__kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_ssim_derivatives(
     const __global float* image,
     const __global uint* photo,
-    __global float* slopes,
+    __global float* derivatives,
     __global float4* pixel_partials,
     __global float* ssim_partials,
     int width,
@@ -158,7 +158,7 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_slopes(
     const int pixel = row * width + column;
     const Ssim ssim = rs_ssim(moments.x, moments.y, moments.z, moments.w);
 #if SSIM_GRADIENT
-    __global float* out = slopes + 3 * channel * pixels + pixel;
+    __global float* out = derivatives + 3 * channel * pixels + pixel;
     out[0] = ssim.e;
     out[pixels] = ssim.f;
     out[2 * pixels] = ssim.g;
@@ -183,7 +183,7 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_slopes(
 __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradient(
     const __global float* image,
     const __global uint* photo,
-    const __global float* slopes,
+    const __global float* derivatives,
     __global float* gradient,
     int width,
     int height,
@@ -204,7 +204,7 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradien
   const int lane = get_local_id(1) * SIDE + get_local_id(0);
   const int left = (int)get_group_id(0) * SIDE - RADIUS;
   const int top = (int)get_group_id(1) * SIDE - RADIUS;
-  const __global float* in = slopes + 3 * channel * pixels;
+  const __global float* in = derivatives + 3 * channel * pixels;
   for (int i = lane; i < SPAN * SPAN; i += ITEMS) {
     const int x = left + i % SPAN;
     const int y = top + i / SPAN;
@@ -224,7 +224,7 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradien
   const int pixel = row * width + column;
   const Sample s = sample_at(&of, pixel);
   const float v = s.mask * (s.x - s.y);
-  float result = rs_pixel_slope(v, s.mask, pixel_scale);
+  float result = rs_pixel_gradient(v, s.mask, pixel_scale);
 #if SSIM_GRADIENT
   const int center = lane + RADIUS * SIDE;
   const float u = v + 2.0f * s.y;

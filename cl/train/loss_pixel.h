@@ -31,7 +31,7 @@ fv rs_add_pixel(fv x, fv y, fv mask, LossSums* sums) {
 }
 
 // scale m rho'(x - y), from v = m (x - y).
-fv rs_pixel_slope(fv v, fv mask, float scale) {
+fv rs_pixel_gradient(fv v, fv mask, float scale) {
 #if PIXEL_L2
   return 2.0f * scale * v;
 #else

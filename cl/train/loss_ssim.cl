@@ -3,8 +3,9 @@
 //
 // Launch of both kernels: one work-item per tile of TILE x ROWS pixels and channel, grid tiles_x x
 // tiles_y x 3.
-//   pair    3 planes u, 3 planes v     slopes  per channel planes E, F, G     (padded, borders
-//   zero)
+//   pair         3 planes u, 3 planes v
+//   derivatives  per channel planes E, F, G
+// Both are padded, with borders of zeros.
 // Complexity: 2 x 11 multiply-adds per moment and pixel: a column pass into private memory, then a
 // row pass.
 #include "train/loss_pixel.h"
@@ -18,13 +19,13 @@
 #endif
 
 // partials[channel * tiles + tile] = sum of SSIM over the tile.
-__kernel void ssim_slopes(const __global float* pair,
-                          __global float* slopes,
-                          __global float* partials,
-                          int width,
-                          int height,
-                          int stride,
-                          int plane) {
+__kernel void ssim_derivatives(const __global float* pair,
+                               __global float* derivatives,
+                               __global float* partials,
+                               int width,
+                               int height,
+                               int stride,
+                               int plane) {
   const int tile_x = get_global_id(0);
   const int tile_y = get_global_id(1);
   const int channel = get_global_id(2);
@@ -71,7 +72,7 @@ __kernel void ssim_slopes(const __global float* pair,
       rs_store_private(qu, square_u + i);
       rs_store_private(qv, square_v + i);
     }
-    __global float* out = slopes + 3 * channel * plane + RS_PADDED(row, stride) + first;
+    __global float* out = derivatives + 3 * channel * plane + RS_PADDED(row, stride) + first;
     for (int i = 0; first + i < last; i += LANES) {
       const Ssim ssim =
           rs_ssim(rs_window_row(mean_u + HALO + i), rs_window_row(mean_v + HALO + i),
@@ -91,7 +92,7 @@ __kernel void ssim_slopes(const __global float* pair,
 // gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B; the A plane is
 // zeroed. `masked`: 0, m = 1; 1, the photo's alpha; 2, its plane of weights.
 __kernel void loss_gradient(const __global float* pair,
-                            const __global float* slopes,
+                            const __global float* derivatives,
                             const __global uint* photo,
                             __global float* gradient,
                             int width,
@@ -116,7 +117,8 @@ __kernel void loss_gradient(const __global float* pair,
   float e[TILE_SPAN], f[TILE_SPAN], g[TILE_SPAN];
   for (int row = top; row < bottom; ++row) {
 #if SSIM_GRADIENT
-    const __global float* in = slopes + 3 * channel * plane + RS_PADDED(row, stride) + first - HALO;
+    const __global float* in =
+        derivatives + 3 * channel * plane + RS_PADDED(row, stride) + first - HALO;
     for (int i = 0; i < span; i += LANES) {
       rs_store_private(rs_window_column(in + i, stride), e + i);
       rs_store_private(rs_window_column(in + plane + i, stride), f + i);
@@ -132,7 +134,7 @@ __kernel void loss_gradient(const __global float* pair,
       fv mask = (fv)(1.0f);
       if (masked == 1) mask = rs_photo_channel(photo, planes, pixels, pixel, last - column, 3);
       if (masked == 2) mask = rs_photo_weight(photo, planes, pixels, pixel, last - column);
-      fv result = rs_pixel_slope(v, mask, pixel_scale);
+      fv result = rs_pixel_gradient(v, mask, pixel_scale);
 #if SSIM_GRADIENT
       const fv u = rs_load(center);
       result += ssim_scale * mask *

@@ -12,9 +12,9 @@
 #define LEAST_GATE 1e-3f
 
 // d scale / d parameter.
-float mcmc_scale_slope(float parameter) {
+float mcmc_scale_derivative(float parameter) {
   const float scale = rs_scale_of(parameter);
-  return scale * rs_scale_log_slope(scale);
+  return scale * rs_scale_log_derivative(scale);
 }
 
 // Adds the gradients of opacity_weight * (sum of opacities) + scale_weight * (sum of standard
@@ -32,9 +32,9 @@ __kernel void mcmc_press(uint count,
   const float opacity = rs_sigmoid(opacities[i]);
   opacity_gradient[i] += opacity_weight * opacity * (1.0f - opacity);
   const float3 scale = vload3(i, scales);
-  const float3 slope =
-      (float3)(mcmc_scale_slope(scale.x), mcmc_scale_slope(scale.y), mcmc_scale_slope(scale.z));
-  vstore3(vload3(i, scale_gradient) + scale_weight * slope, i, scale_gradient);
+  const float3 derivative = (float3)(mcmc_scale_derivative(scale.x), mcmc_scale_derivative(scale.y),
+                                     mcmc_scale_derivative(scale.z));
+  vstore3(vload3(i, scale_gradient) + scale_weight * derivative, i, scale_gradient);
 }
 
 // mean += strength * gate(opacity) * covariance * (three standard normal numbers); gate falls from

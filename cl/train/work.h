@@ -6,19 +6,20 @@
 #define RS_TRAIN_WORK_H
 
 // Value of the loss, per pixel: R, G, B 12 and photo 4 read, u and v of three channels written and
-// read (48), slopes of three channels written (36).
+// read (48), derivatives of three channels written (36).
 #define RS_WORK_LOSS_VALUE_BYTES 100
 // Per channel: pair and pixel term 14, moments along the column 84 and the row 64, SSIM and its
-// slopes 45.
+// derivatives 45.
 #define RS_WORK_LOSS_VALUE_FLOPS 621
 
-// Gradient of the loss, per pixel: slopes 36, u and v 24, photo 4 read; gradient 16 written.
+// Gradient of the loss, per pixel: derivatives 36, u and v 24, photo 4 read; gradient 16 written.
 #define RS_WORK_LOSS_GRADIENT_BYTES 80
 // Per channel: three windows along the column 48 and the row 48, sum 10.
 #define RS_WORK_LOSS_GRADIENT_FLOPS 318
 
 // The same in groups, which make the pair anew from image and photo instead of storing it: image
-// 12, photo 4, slopes 36; then gradient 16. Windows along the rows are taken of 26 rows for 16.
+// 12, photo 4, derivatives 36; then gradient 16. Windows along the rows are taken of 26 rows for
+// 16.
 #define RS_WORK_GROUP_LOSS_VALUE_BYTES 52
 #define RS_WORK_GROUP_LOSS_VALUE_FLOPS 848
 #define RS_WORK_GROUP_LOSS_GRADIENT_BYTES 68

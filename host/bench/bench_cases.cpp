@@ -10,7 +10,7 @@
 
 #include "device/tuning.hpp"
 #include "raysplats/error.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 #include "synth/bench_scenes.hpp"
 #include "trace/memory_shares.hpp"
 
@@ -45,7 +45,7 @@ std::map<std::string, std::string> option_texts(const Context& context,
           {"repeat", std::to_string(options.repeat)},
           {"rays", std::to_string(options.rays)},
           {"triangles", std::to_string(options.triangles)},
-          {"packet-shape", packet_shape_name(options.trace.packet_form)},
+          {"packet-shape", packet_shape_name(options.trace.packet_shape)},
           {"packet-width", std::to_string(options.trace.packet_width)},
           {"hit-order", hit_order_name(options.trace.hit_order)},
           {"quantile", fmt::format("{:g}", options.trace.quantile)},

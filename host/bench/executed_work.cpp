@@ -193,7 +193,7 @@ KernelWork loss_work(const ExecutedCounts& c, bool value) {
       value ? (c.grouped ? RS_WORK_GROUP_LOSS_VALUE_BYTES : RS_WORK_LOSS_VALUE_BYTES)
             : (c.grouped ? RS_WORK_GROUP_LOSS_GRADIENT_BYTES : RS_WORK_LOSS_GRADIENT_BYTES);
   KernelWork out = times(c.pixels, pixel) + moved(bytes * c.pixels, bytes * c.pixels);
-  // Of planes that tiles read in rows: u and v, for the gradient slopes as well.
+  // Of planes that tiles read in rows: u and v, for the derivatives of SSIM as well.
   if (!c.grouped) out.tiled = (value ? 24 : 60) * c.pixels / kLine;
   out.launches = out.shared = value ? 2 : 1;
   return out;

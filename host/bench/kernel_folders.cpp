@@ -54,11 +54,11 @@ void add_step(Context& context,
   Buffer<std::uint32_t> target(context, photo.size(), "photo");
   target.upload(photo);
   ImageLoss loss(context, PixelLoss::kL1, 0.2f);
-  Buffer<float> slopes;
-  loss.evaluate(tracer.image(), {target}, false, {0, 0, 0}, width, height, slopes);
-  out.push_back({way + "gradient of the image", slopes.download()});
+  Buffer<float> image_gradient;
+  loss.evaluate(tracer.image(), {target}, false, {0, 0, 0}, width, height, image_gradient);
+  out.push_back({way + "gradient of the image", image_gradient.download()});
   GaussianGradients gradients;
-  tracer.backward(gaussians, slopes, gradients);
+  tracer.backward(gaussians, image_gradient, gradients);
   add(out, way + "gradients of ", gradients);
   Adam adam(context, {});
   adam.step(gaussians, gradients, {kRate, kRate, kRate, kRate, kRate, kRate});

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "bench/scene_state.hpp"
-#include "trace/packet_shape.hpp"
+#include "trace/packet_layout.hpp"
 #include "trace/view_sizes.h"
 
 namespace raysplats {
@@ -81,7 +81,7 @@ void count_rays(const std::vector<RayResult>& results, ExecutedCounts& out) {
 ExecutedCounts SceneBench::counts(bool grouped) {
   Impl& self = *impl_;
   TraceOptions trace = self.options.trace;
-  trace.packet_form = grouped ? PacketForm::kGroup : PacketForm::kVector;
+  trace.packet_shape = grouped ? PacketShape::kGroup : PacketShape::kVector;
   trace.packet_width = grouped ? static_cast<int>(kWave) : kVectorLanes;
   const Tuned tuned(self.context, grouped);
   ExecutedCounts out;
@@ -90,13 +90,13 @@ ExecutedCounts SceneBench::counts(bool grouped) {
   out.sh = self.sh_count();
   out.pixels = self.pixels();
   out.peak_order = trace.hit_order == HitOrder::kPeak;
-  const PacketShape shape = packet_shape(self.context.device(), trace);
+  const PacketLayout layout = packet_layout(self.context.device(), trace);
   const auto across = [&](int size, int part) { return (size + part - 1) / part; };
   const Camera& camera = self.model.camera;
-  out.packets =
-      static_cast<double>(across(camera.width, shape.width)) * across(camera.height, shape.height);
+  out.packets = static_cast<double>(across(camera.width, layout.width)) *
+                across(camera.height, layout.height);
   const auto tiles =
-      static_cast<unsigned>(across(camera.width, shape.tile) * across(camera.height, shape.tile));
+      static_cast<unsigned>(across(camera.width, layout.tile) * across(camera.height, layout.tile));
   out.sort_passes = (16 + static_cast<int>(std::bit_width(tiles - 1)) + 7) / 8;
   CameraTracer tracer(self.context, trace);
   count_view(tracer, self.gaussians(), camera, out);

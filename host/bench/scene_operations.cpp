@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/scene_state.hpp"
 #include "parallel/work.h"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 #include "trace/work.h"
 #include "util/rng.hpp"
 
@@ -53,7 +53,7 @@ BenchOperation SceneBench::Impl::build() {
           {},
           [this] { ray_tracer->update(gaussians()); },
           {{"order",
-            {"bvh/curve.cl", "bvh/order_groups.cl", "bvh/group_order.cl", "parallel/"},
+            {"bvh/curve.cl", "bvh/leaf_order.cl", "bvh/leaf_order_group.cl", "parallel/"},
             false,
             [this] { return order_work(); }},
            {"nodes", {"trace/ray_tree.cl", "bvh/lbvh.cl"}, false, [this] { return nodes_work(); }},
@@ -122,13 +122,13 @@ BenchOperation SceneBench::Impl::backward() {
             }}}};
 }
 
-BenchOperation SceneBench::Impl::packets(PacketForm form) {
-  const std::string shape = packet_shape_name(form);
-  return {[this, form] {
+BenchOperation SceneBench::Impl::packets(PacketShape shape) {
+  const std::string name = packet_shape_name(shape);
+  return {[this, shape] {
             make_loss();
             TraceOptions trace = options.trace;
-            trace.packet_form = form;
-            if (options.trace.packet_form != form) trace.packet_width = 0;
+            trace.packet_shape = shape;
+            if (options.trace.packet_shape != shape) trace.packet_width = 0;
             shaped_tracer.reset();
             shaped_tracer = std::make_unique<CameraTracer>(context, trace);
             shaped_tracer->update(gaussians());
@@ -143,11 +143,11 @@ BenchOperation SceneBench::Impl::packets(PacketForm form) {
             shaped_tracer->forward(gaussians(), model.camera, true);
             shaped_tracer->backward(gaussians(), image_gradient, gradients);
           },
-          {{"forward-" + shape,
+          {{"forward-" + name,
             {"trace/camera_forward.cl", "trace/group_forward.cl"},
             false,
             [this] { return forward_work(shaped_statistics); }},
-           {"backward-" + shape,
+           {"backward-" + name,
             {"trace/camera_backward.cl", "trace/group_backward.cl", ":(fill)"},
             false,
             [this] { return backward_work(shaped_statistics); }}},
@@ -174,8 +174,8 @@ BenchOperation SceneBench::Impl::loss() {
             image_loss->value();
           },
           {{"loss-value",
-            {"train/loss_prepare.cl", "train/loss_ssim.cl:ssim_slopes",
-             "train/group_loss.cl:group_slopes", "train/loss_reduce.cl"},
+            {"train/loss_prepare.cl", "train/loss_ssim.cl:ssim_derivatives",
+             "train/group_loss.cl:group_ssim_derivatives", "train/loss_reduce.cl"},
             false,
             [this] { return loss_value_work(); }},
            {"loss-gradient",
@@ -300,9 +300,9 @@ std::vector<BenchOperation> SceneBench::operations() {
           self.light("light-mirror", small, Kind::kMirror, false),
           self.light("light-glass", small, Kind::kGlass, false),
           self.light("light-shadows", small, Kind::kDiffuse, true),
-          self.packets(PacketForm::kVector),
-          self.packets(PacketForm::kGroup),
-          self.packets(PacketForm::kSubgroup)};
+          self.packets(PacketShape::kVector),
+          self.packets(PacketShape::kGroup),
+          self.packets(PacketShape::kSubgroup)};
 }
 
 }  // namespace raysplats

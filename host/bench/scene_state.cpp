@@ -154,7 +154,7 @@ void SceneBench::Impl::make_rays() {
   if (!ray_list.empty()) return;
   const auto [center, half] = middle();
   const std::size_t rays = std::min(options.rays, static_cast<std::size_t>(pixels()));
-  for (const BenchRay& unit : bench_rays(rays, options.seed)) {
+  for (const Ray& unit : bench_rays(rays, options.seed)) {
     Ray ray{};
     ray.t_min = unit.t_min;
     double length2 = 0;

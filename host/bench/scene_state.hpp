@@ -61,7 +61,7 @@ struct SceneBench::Impl {
   BenchOperation view_by_bvh();
   BenchOperation backward();
   /// Both passes in one shape of packets, which need not be the device's own.
-  BenchOperation packets(PacketForm form);
+  BenchOperation packets(PacketShape shape);
   BenchOperation iteration_by_bvh();
   BenchOperation rays();
   BenchOperation loss();

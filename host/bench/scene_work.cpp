@@ -4,7 +4,7 @@
 #include "bench/scene_state.hpp"
 #include "bvh/work.h"
 #include "parallel/work.h"
-#include "trace/packet_shape.hpp"
+#include "trace/packet_layout.hpp"
 #include "trace/work.h"
 #include "train/work.h"
 
@@ -45,7 +45,7 @@ BenchWork SceneBench::Impl::prepare_work() const {
 
 BenchWork SceneBench::Impl::lists_work() const {
   const auto candidates = static_cast<double>(view_statistics.candidates);
-  const int tile = packet_shape(context.device(), options.trace).tile;
+  const int tile = packet_layout(context.device(), options.trace).tile;
   const auto across = [tile](int size) { return static_cast<unsigned>((size + tile - 1) / tile); };
   const unsigned tiles = across(model.camera.width) * across(model.camera.height);
   // Keys are a tile and 16 bits of depth.

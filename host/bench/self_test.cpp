@@ -27,7 +27,7 @@ constexpr double kGradientLimit = 2e-3;
 
 struct Expected {
   reference::Render render;
-  std::vector<float> slopes;  // of the picture
+  std::vector<float> image_gradient;
   reference::Gradient gradient;
 };
 
@@ -37,12 +37,12 @@ Expected expected_of(const Gaussians& model, const TraceOptions& options, const 
   out.render = reference::render(parameters, options, camera);
   const std::size_t pixels = out.render.pixels();
   CounterRng random(kSeed, 1);
-  out.slopes.resize(4 * pixels);
-  for (std::size_t i = 0; i < out.slopes.size(); ++i) {
-    const auto slope = static_cast<float>(random.normal());
-    out.slopes[i] = out.render.margin[i % pixels] < kTie ? 0.0f : slope;
+  out.image_gradient.resize(4 * pixels);
+  for (std::size_t i = 0; i < out.image_gradient.size(); ++i) {
+    const auto value = static_cast<float>(random.normal());
+    out.image_gradient[i] = out.render.margin[i % pixels] < kTie ? 0.0f : value;
   }
-  const std::vector<double> wide(out.slopes.begin(), out.slopes.end());
+  const std::vector<double> wide(out.image_gradient.begin(), out.image_gradient.end());
   out.gradient = reference::render_gradient(parameters, options, camera, wide);
   return out;
 }
@@ -81,10 +81,10 @@ void check_way(Context& context,
   }
   out.push_back({way + ": image, mean difference", mean, kMeanLimit});
   out.push_back({way + ": image, largest difference", most, kMostLimit});
-  Buffer<float> slopes(context, expected.slopes.size(), "image gradient");
-  slopes.upload(expected.slopes);
+  Buffer<float> image_gradient(context, expected.image_gradient.size(), "image gradient");
+  image_gradient.upload(expected.image_gradient);
   GaussianGradients gradients;
-  tracer.backward(gaussians, slopes, gradients);
+  tracer.backward(gaussians, image_gradient, gradients);
   const reference::Parameters& right = expected.gradient.parameters;
   const auto check = [&](const char* group, const Buffer<float>& got,
                          const std::vector<double>& wanted) {

@@ -72,7 +72,7 @@ constexpr Row kRows[] = {{"sort", "sort pairs: scatter"},
                          {"forward-train", "group forward train: trace_forward_group"},
                          {"backward", "group backward atomic: trace_backward_group"},
                          {"finalize", "finalize group sh3: finalize_group"},
-                         {"loss-value", "loss group: group_slopes"},
+                         {"loss-value", "loss group: group_ssim_derivatives"},
                          {"loss-gradient", "loss group: group_gradient"},
                          {"adam", "adam sh3: adam_step"},
                          {"rays", "rays: trace_rays"}};

@@ -9,7 +9,7 @@
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
-#include "trace/packet_shape.hpp"
+#include "trace/packet_layout.hpp"
 
 namespace raysplats {
 namespace {
@@ -47,8 +47,8 @@ class Course {
 
   std::unique_ptr<ViewTracer> tracer(const DeviceTuning& tuning) {
     context_.set_tuning(tuning);
-    // Named, so that a form that does not run is not another one in silence.
-    options_.packet_form = tuned_form(tuning);
+    // Named, so that a shape that does not run is not another one in silence.
+    options_.packet_shape = tuned_shape(tuning);
     auto out = std::make_unique<ViewTracer>(context_, options_);
     run(*out);  // compiles and allocates
     context_.finish_builds();
@@ -131,9 +131,9 @@ namespace {
 DeviceTuning tuning_of(const DeviceInfo& device, const TraceOptions& options) {
   DeviceInfo plain = device;
   plain.tuning.reset();
-  const PacketShape shape = packet_shape(plain, options);
-  return {shape.grouped, shape.lanes, shape.tile,     shape.pending,
-          shape.group,   false,       shape.subgroups};
+  const PacketLayout layout = packet_layout(plain, options);
+  return {layout.grouped, layout.lanes, layout.tile,     layout.pending,
+          layout.group,   false,        layout.subgroups};
 }
 
 }  // namespace
@@ -162,11 +162,12 @@ std::vector<DeviceTuning> tune_candidates(const std::string& axis,
   } else if (axis == "packet-shape") {
     // A CPU runs the work-items of a group one after the other, and compiles them long.
     if (device.type == DeviceType::kCpu) return out;
-    for (const PacketForm form : {PacketForm::kVector, PacketForm::kGroup, PacketForm::kSubgroup}) {
-      if (form == PacketForm::kSubgroup && !device.has_subgroups) continue;
+    for (const PacketShape shape :
+         {PacketShape::kVector, PacketShape::kGroup, PacketShape::kSubgroup}) {
+      if (shape == PacketShape::kSubgroup && !device.has_subgroups) continue;
       TraceOptions other;
-      other.packet_form = form;
-      if (form != tuned_form(current)) out.push_back(tuning_of(device, other));
+      other.packet_shape = shape;
+      if (shape != tuned_shape(current)) out.push_back(tuning_of(device, other));
     }
   } else if (axis == "packet-width" && current.grouped) {
     for (const int width : kGroupWidths) {

@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::string_view kCurve = "bvh/curve.cl";
 constexpr std::string_view kTree = "bvh/lbvh.cl";
-constexpr std::string_view kOrder = "bvh/order_groups.cl";
-constexpr std::string_view kGroupOrder = "bvh/group_order.cl";
+constexpr std::string_view kLeafOrder = "bvh/leaf_order.cl";
+constexpr std::string_view kLeafOrderGroup = "bvh/leaf_order_group.cl";
 constexpr std::string_view kCost = "bvh/tree_cost.cl";
 constexpr std::size_t kGroup = 64;
 // Boxes ordered together by the surface area heuristic. Larger groups make a better tree but need
@@ -79,7 +79,7 @@ Kernel Lbvh::kernel(std::string_view program, const char* name) const {
   // Only what a program reads: every other set of definitions is compiled again.
   BuildOptions build;
   build.define("LANES", lanes_);
-  if (program == kOrder || program == kGroupOrder) {
+  if (program == kLeafOrder || program == kLeafOrderGroup) {
     build.define("GROUP", order_group());
   } else if (program != kTree) {
     build.define("GROUP", shape_.group_size);
@@ -150,10 +150,10 @@ void Lbvh::sort_along_curve(const Buffer<RsAabb>& boxes, std::size_t count) {
     sort_.sort(high_, order_, count);
   }
   if (cpu) {
-    kernel(kOrder, "order_groups")
+    kernel(kLeafOrder, "order_leaves")
         .launch(Range::linear(ceil_div(count, order_group()), 1), boxes, order_, u32(count));
   } else {
-    kernel(kGroupOrder, "order_group")
+    kernel(kLeafOrderGroup, "order_leaves_group")
         .launch(Range::linear(count, order_group()), boxes, order_, u32(count));
   }
 }

@@ -32,11 +32,11 @@ void Communicator::exchange(std::span<const Outgoing> out,
   for (const Incoming& message : in) traffic_.received += message.bytes.size();
 }
 
-void Communicator::give_up() {
-  if (transport_) transport_->give_up();
+void Communicator::cancel() {
+  if (transport_) transport_->cancel();
 }
 
-void Communicator::hide(double seconds) {
+void Communicator::count_as_hidden(double seconds) {
   traffic_.seconds -= seconds;
   traffic_.hidden += seconds;
 }
@@ -62,7 +62,7 @@ void Communicator::broadcast(std::span<std::byte> bytes, int root) {
   }
 }
 
-std::vector<std::string> Communicator::gather(const std::string& mine) {
+std::vector<std::string> Communicator::all_gather_texts(const std::string& mine) {
   const int ranks = size(), self = rank();
   std::vector<std::uint64_t> sizes(static_cast<std::size_t>(ranks), mine.size());
   std::vector<std::string> all(static_cast<std::size_t>(ranks));
@@ -92,7 +92,7 @@ std::vector<std::string> Communicator::gather(const std::string& mine) {
 
 // By dissemination (Hensgen, Finkel and Manber 1988): after round k every rank knows of the 2^k
 // ranks before it.
-bool Communicator::any(bool mine) {
+bool Communicator::all_reduce_or(bool mine) {
   const int ranks = size(), self = rank();
   std::byte known{static_cast<unsigned char>(mine ? 1 : 0)};
   for (int step = 1; step < ranks; step *= 2) {
@@ -106,9 +106,11 @@ bool Communicator::any(bool mine) {
   return known != std::byte{0};
 }
 
-std::uint64_t Communicator::least(std::uint64_t mine) { return std::ranges::min(all(mine)); }
+std::uint64_t Communicator::all_reduce_min(std::uint64_t mine) {
+  return std::ranges::min(all_gather(mine));
+}
 
-void Communicator::share(std::span<std::byte> row) {
+void Communicator::all_gather_in_place(std::span<std::byte> row) {
   const int self = rank();
   const std::size_t size_of_piece = row.size() / static_cast<std::size_t>(size());
   const auto piece = [&](int r) {

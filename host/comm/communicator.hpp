@@ -37,47 +37,50 @@ class Communicator {
   /// Whether this rank writes files and speaks for all.
   bool leads() const { return rank() == 0; }
 
-  /// As Transport, and counted.
+  /// As Transport, and counted: MPI_Irecv and MPI_Isend of all messages, then MPI_Waitall.
   void exchange(std::span<const Outgoing> out,
                 std::span<const Incoming> in,
                 Wait wait = Wait::kSpinning);
-  void give_up();
+  /// As Transport: tells that this rank has failed. MPI has no operation for it.
+  void cancel();
   /// So many of the seconds within exchange() passed beside other work of this rank.
-  void hide(double seconds);
+  void count_as_hidden(double seconds);
+  /// MPI_Abort.
   [[noreturn]] void abort(ErrorCode code);
 
-  /// All ranks: the bytes of `root` become those of all.
+  /// All ranks, MPI_Bcast: the bytes of `root` become those of all.
   void broadcast(std::span<std::byte> bytes, int root = 0);
-  /// All ranks: what each has, in the order of the ranks. Sizes may differ.
-  std::vector<std::string> gather(const std::string& mine);
-  /// All ranks: the values of all, in the order of the ranks.
+  /// All ranks, MPI_Allgatherv: what each has, in the order of the ranks. Sizes may differ.
+  std::vector<std::string> all_gather_texts(const std::string& mine);
+  /// All ranks, MPI_Allgather: the values of all, in the order of the ranks.
   template <class T>
-  std::vector<T> all(const T& mine) {
+  std::vector<T> all_gather(const T& mine) {
     static_assert(std::is_trivially_copyable_v<T>);
     std::vector<T> values(static_cast<std::size_t>(size()));
     values[static_cast<std::size_t>(rank())] = mine;
-    share(std::as_writable_bytes(std::span(values)));
+    all_gather_in_place(std::as_writable_bytes(std::span(values)));
     return values;
   }
-  /// All ranks: the value of `root`.
+  /// All ranks, MPI_Bcast: the value of `root`.
   template <class T>
-  T said_by(int root, T mine) {
+  T broadcast_value(int root, T mine) {
     static_assert(std::is_trivially_copyable_v<T>);
     broadcast(std::as_writable_bytes(std::span(&mine, 1)), root);
     return mine;
   }
-  /// All ranks: whether any of them says so.
-  bool any(bool mine);
-  /// All ranks: the least of their numbers.
-  std::uint64_t least(std::uint64_t mine);
-  /// All ranks: waits until all are here.
-  void barrier() { any(false); }
+  /// All ranks, MPI_Allreduce with MPI_LOR: whether any of them says so.
+  bool all_reduce_or(bool mine);
+  /// All ranks, MPI_Allreduce with MPI_MIN: the least of their numbers.
+  std::uint64_t all_reduce_min(std::uint64_t mine);
+  /// All ranks, MPI_Barrier: waits until all are here.
+  void barrier() { all_reduce_or(false); }
 
   const Traffic& traffic() const { return traffic_; }
 
  private:
-  // A row of equal pieces, one a rank: each gives its own to all others.
-  void share(std::span<std::byte> row);
+  // MPI_Allgather with MPI_IN_PLACE: a row of equal pieces, one a rank, each of which gives its own
+  // to all others.
+  void all_gather_in_place(std::span<std::byte> row);
 
   std::shared_ptr<Transport> transport_;  // none = alone
   Traffic traffic_;

@@ -37,7 +37,7 @@ std::vector<PairwiseNode> SlotSum::nodes(std::size_t slots, int rank, int ranks)
 // Where the rank fails while rows are on their way, the others may never send theirs.
 SlotSum::~SlotSum() {
   if (!under_way_.valid()) return;
-  ranks_->give_up();
+  ranks_->cancel();
   under_way_.wait();
 }
 
@@ -79,7 +79,7 @@ void SlotSum::send(std::span<const float> row, std::function<void()> arrive) {
       });
 }
 
-void SlotSum::settle() {
+void SlotSum::wait() {
   // While it is made, the others are on their way.
   if (last_.second) last_.second();
   if (under_way_.valid()) {
@@ -87,7 +87,7 @@ void SlotSum::settle() {
     under_way_.get();
     const double waited =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    ranks_->hide(std::max(0.0, beside_ - waited));
+    ranks_->count_as_hidden(std::max(0.0, beside_ - waited));
   }
   const std::size_t own = rounds_of(ranks_->rank());
   std::size_t most = 0;

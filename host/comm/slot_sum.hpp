@@ -35,13 +35,13 @@ class SlotSum {
   SlotSum& operator=(const SlotSum&) = delete;
 
   /// All ranks: a sum of rows of `numbers` numbers. `ranks` has to outlive this, and nothing else
-  /// may be exchanged until settle().
+  /// may be exchanged until wait().
   void begin(Communicator& ranks, std::size_t slots, std::size_t numbers);
   /// The row of the next node, which is whole once `arrive` has returned, in whatever thread. Both
-  /// have to last until settle().
+  /// have to last until wait().
   void send(std::span<const float> row, std::function<void()> arrive);
-  /// All ranks: waits until all rows have come. Throws RankLost, and what `arrive` throws.
-  void settle();
+  /// All ranks, MPI_Waitall: until all rows have come. Throws RankLost, and what `arrive` throws.
+  void wait();
   /// All ranks: the sum of all slots.
   void finish(std::span<float> total);
 

@@ -87,7 +87,7 @@ class ThreadTransport : public Transport {
     wait(lock, [&] { return open == 0; });
   }
 
-  void give_up() override { group_.fail(rank_); }
+  void cancel() override { group_.fail(rank_); }
 
   [[noreturn]] void abort(int /*code*/) override {
     group_.fail(rank_);

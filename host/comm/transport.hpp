@@ -42,7 +42,7 @@ class Transport {
   /// order; the sizes have to agree. Throws RankLost.
   virtual void exchange(std::span<const Outgoing> out, std::span<const Incoming> in, Wait wait) = 0;
   /// Tells, from any thread, that this rank has failed: an exchange() of it throws an Error soon.
-  virtual void give_up() = 0;
+  virtual void cancel() = 0;
   /// Ends all ranks; `code` is the exit status of a process.
   [[noreturn]] virtual void abort(int code) = 0;
 };

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "device/cl.hpp"
+#include "device/container_memory.hpp"
 #include "device/driver_trouble.hpp"
 #include "device/platform.hpp"
 #include "raysplats/error.hpp"
@@ -98,7 +99,8 @@ DeviceInfo query(const cl::Platform& platform, const cl::Device& device) {
   info.driver_version = trimmed(device.getInfo<CL_DRIVER_VERSION>());
   info.type = type_of(device.getInfo<CL_DEVICE_TYPE>());
   info.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
-  info.global_memory = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>();
+  info.global_memory =
+      memory_within_container(info.type, device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>());
   info.max_allocation = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
   info.local_memory = device.getInfo<CL_DEVICE_LOCAL_MEM_SIZE>();
   info.max_work_group_size = device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>();

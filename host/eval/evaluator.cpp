@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <utility>
@@ -15,11 +14,11 @@
 #include "eval/error_map.hpp"
 #include "eval/metrics.hpp"
 #include "eval/view_alignment.hpp"
-#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render/frame_writer.hpp"
 #include "scene/sharpness.hpp"
+#include "trace/sky.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats {
@@ -70,12 +69,12 @@ Comparison compare(Image traced,
   return out;
 }
 
-// Makes the render equal to the photo where that is masked out.
+// Makes the render equal to the photo where that does not count at all. How much the other pixels
+// count is for the means over them to say.
 void hide_masked_out(Comparison& pair) {
   if (pair.valid == 1.0) return;
   for (std::size_t i = 0; i < pair.render.data.size(); ++i) {
-    const float photo = pair.photo.data[i];
-    pair.render.data[i] = photo + pair.mask.data[i / 3] * (pair.render.data[i] - photo);
+    if (pair.mask.data[i / 3] == 0) pair.render.data[i] = pair.photo.data[i];
   }
 }
 
@@ -125,7 +124,7 @@ std::vector<MeasuredView> of_all_ranks(Communicator& ranks, const std::vector<Me
   const std::string mine(reinterpret_cast<const char*>(own.data()),
                          own.size() * sizeof(MeasuredView));
   std::vector<MeasuredView> all;
-  for (const std::string& theirs : ranks.gather(mine)) {
+  for (const std::string& theirs : ranks.all_gather_texts(mine)) {
     const std::size_t before = all.size();
     all.resize(before + theirs.size() / sizeof(MeasuredView));
     std::copy(theirs.begin(), theirs.end(), reinterpret_cast<char*>(all.data() + before));
@@ -151,23 +150,6 @@ std::set<std::size_t> telling(const std::vector<MeasuredView>& all, std::size_t 
     if (out.size() < most) out.insert(index);
   }
   return out;
-}
-
-nlohmann::json to_json(const EvaluationMetrics& metrics) {
-  nlohmann::json json;
-  if (!metrics.name.empty()) {
-    json["name"] = metrics.name;
-    json["center"] = metrics.center;
-    json["sharpness"] = metrics.sharpness;
-  }
-  json["psnr"] = metrics.psnr;
-  json["ssim"] = metrics.ssim;
-  json["psnr_corrected"] = metrics.psnr_corrected;
-  if (metrics.psnr_aligned) json["psnr_aligned"] = *metrics.psnr_aligned;
-  if (metrics.psnr_all) json["psnr_all"] = *metrics.psnr_all;
-  if (metrics.lpips) json["lpips"] = *metrics.lpips;
-  if (!metrics.picture.empty()) json["picture"] = metrics.picture;
-  return json;
 }
 
 EvaluationMetrics mean_of(const std::vector<EvaluationMetrics>& images) {
@@ -205,34 +187,170 @@ std::vector<std::string> names_of(const Dataset& dataset, const std::vector<std:
   return frame_names(cameras);
 }
 
+// One call of evaluate(): some views of a data set, by their numbers among those.
+class Evaluation {
+ public:
+  Evaluation(const std::function<Image(const Camera&)>& render,
+             const Dataset& dataset,
+             const std::vector<std::size_t>& views,
+             const std::array<float, 3>& background,
+             const std::filesystem::path& output,
+             const EvaluationOptions& options)
+      : render_(render),
+        dataset_(dataset),
+        views_(views),
+        names_(names_of(dataset, views)),
+        background_(background),
+        output_(output),
+        options_(options),
+        ranks_(options.ranks != nullptr ? *options.ranks : alone_),
+        compares_(!options.together || ranks_.leads()),
+        first_(options.together ? 0 : static_cast<std::size_t>(ranks_.rank())),
+        step_(options.together ? 1 : static_cast<std::size_t>(ranks_.size())),
+        pictures_(output.empty() ? 0 : options.max_pictures.value_or(views.size())),
+        all_shown_(pictures_ >= views.size()) {}
+
+  // This rank's share, and then what the others say of theirs.
+  void measure_views() {
+    std::vector<MeasuredView> own;
+    for (std::size_t i = first_; i < views_.size() && !stopped_; i += step_)
+      stopped_ = for_all(!measure_view(i, own));
+    stopped_ = ranks_.all_reduce_or(stopped_);
+    all_ = of_all_ranks(ranks_, own);
+  }
+
+  // Which views tell most is known only now; tracing them again takes less than keeping all.
+  void write_telling_pictures() {
+    shown_ = telling(all_, pictures_);
+    bool cut_off = false;
+    for (const std::size_t i : shown_) {
+      if (all_shown_ || i % step_ != first_) continue;
+      std::optional<Comparison> pair = compare_view(i);
+      cut_off = for_all(compares_ && !pair);
+      if (cut_off) break;
+      if (!pair) continue;
+      hide_masked_out(*pair);
+      write_picture(i, *pair);
+    }
+    // Those of other ranks are not known to be there.
+    if (ranks_.all_reduce_or(cut_off)) shown_.clear();
+  }
+
+  EvaluationReport report() const {
+    EvaluationReport out;
+    std::size_t empty = 0;
+    std::string first_empty;
+    for (const MeasuredView& measured : all_) {
+      const Camera& camera = view(measured.index).camera;
+      const glm::dvec3 center = camera.center();
+      EvaluationMetrics metrics = metrics_of(measured);
+      metrics.name = camera.name.empty() ? names_[measured.index] : camera.name;
+      metrics.center = {center.x, center.y, center.z};
+      if (shown_.contains(measured.index)) metrics.picture = picture_of(measured.index);
+      if (measured.compared) {
+        out.images.push_back(metrics);
+      } else if (empty++ == 0) {
+        first_empty = metrics.name;
+      }
+    }
+    if (out.images.empty() && stopped_) return out;
+    if (out.images.empty()) {
+      throw DataError(
+          fmt::format("No view of {} has a pixel to compare: their masks or lenses leave none",
+                      dataset_.root.string()));
+    }
+    if (empty > 0 && ranks_.leads()) {
+      spdlog::warn(
+          "{} of {} views cannot be compared, {} among them: their masks or lenses leave no pixel",
+          empty, all_.size(), first_empty);
+    }
+    out.mean = mean_of(out.images);
+    return out;
+  }
+
+  void write_report(const EvaluationReport& report) const {
+    if (output_.empty() || !ranks_.leads() || report.images.empty()) return;
+    write_text_file(output_ / "metrics.json", report.json());
+  }
+
+ private:
+  const View& view(std::size_t i) const { return dataset_.views[views_[i]]; }
+  std::string picture_of(std::size_t i) const { return names_[i] + ".png"; }
+  void write_picture(std::size_t i, const Comparison& pair) const {
+    write_image(output_ / picture_of(i), side_by_side(pair.photo, pair.render));
+  }
+  // Ranks that render together stop together.
+  bool for_all(bool stop) const { return options_.together ? ranks_.all_reduce_or(stop) : stop; }
+
+  Comparison compared(Image traced, const ViewPicture& picture) const {
+    return compare(std::move(traced), picture, dataset_.alpha_is_background, background_);
+  }
+
+  // None where it was stopped, and of pictures that another rank compares.
+  std::optional<Comparison> compare_view(std::size_t i) const {
+    Image traced = render_(view(i).camera);
+    if (!compares_ || traced.data.empty()) return std::nullopt;
+    const ViewPicture picture = load_view_picture(view(i));
+    const Image& rgba = picture.rgba;
+    if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
+      throw UsageError(fmt::format(
+          "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names_[i],
+          traced.width, traced.height, traced.channels, rgba.width, rgba.height));
+    }
+    return compared(std::move(traced), picture);
+  }
+
+  // After compare_view(), whose pair that is; none where it was stopped.
+  std::optional<double> aligned_psnr(std::size_t i, const Comparison& pair) const {
+    const ViewPicture picture = load_view_picture(view(i));
+    const auto shown = [&](const Camera& camera) {
+      Image traced = render_(camera);
+      if (!options_.align_colors || traced.data.empty()) return traced;
+      return color_corrected(compared(std::move(traced), picture).render, pair.photo, pair.mask);
+    };
+    std::optional<AlignedView> aligned = align_view(shown, view(i).camera, pair.photo, pair.mask);
+    if (!aligned) return std::nullopt;
+    return psnr_of(compared(std::move(aligned->render), picture));
+  }
+
+  // Adds a view to those of this rank. Returns whether to go on.
+  bool measure_view(std::size_t i, std::vector<MeasuredView>& own) const {
+    std::optional<Comparison> pair = compare_view(i);
+    if (!pair) return !compares_;
+    MeasuredView measured = measure(i, *pair, options_.lpips);
+    if (all_shown_ && measured.compared) write_picture(i, *pair);
+    if (options_.align && measured.compared) {
+      const std::optional<double> aligned = aligned_psnr(i, *pair);
+      if (!aligned) return false;
+      measured.has_aligned = true;
+      measured.psnr_aligned = *aligned;
+    }
+    own.push_back(measured);
+    return !options_.done || options_.done(own.size());
+  }
+
+  const std::function<Image(const Camera&)>& render_;
+  const Dataset& dataset_;
+  const std::vector<std::size_t>& views_;
+  std::vector<std::string> names_;
+  std::array<float, 3> background_;
+  const std::filesystem::path& output_;
+  const EvaluationOptions& options_;
+  Communicator alone_;
+  Communicator& ranks_;
+  bool compares_;             // what is rendered, with its photos
+  std::size_t first_, step_;  // of the views that are this rank's
+  std::size_t pictures_;      // at most
+  bool all_shown_;            // as they are measured
+  bool stopped_ = false;
+  std::vector<MeasuredView> all_;
+  std::set<std::size_t> shown_;  // whose pictures are written
+};
+
 }  // namespace
 
 std::vector<std::string> evaluated_names(const Dataset& dataset, Split split) {
   return names_of(dataset, dataset.indices(split));
-}
-
-std::string EvaluationReport::table() const {
-  std::size_t width = 5;
-  for (const EvaluationMetrics& image : images) width = std::max(width, image.name.size());
-  std::string out =
-      fmt::format("{:<{}} {:>8} {:>8} {:>9}{}{}\n", "image", width, "PSNR", "SSIM", "corrected",
-                  mean.psnr_aligned ? "  aligned" : "", mean.lpips ? "    LPIPS" : "");
-  const auto line = [&](const std::string& name, const EvaluationMetrics& m) {
-    out += fmt::format("{:<{}} {:>8.3f} {:>8.4f} {:>9.3f}{}{}\n", name, width, m.psnr, m.ssim,
-                       m.psnr_corrected,
-                       m.psnr_aligned ? fmt::format(" {:>8.3f}", *m.psnr_aligned) : "",
-                       m.lpips ? fmt::format(" {:>8.4f}", *m.lpips) : "");
-  };
-  for (const EvaluationMetrics& image : images) line(image.name, image);
-  line("mean", mean);
-  return out;
-}
-
-std::string EvaluationReport::json() const {
-  nlohmann::json json = to_json(mean);
-  json["images"] = nlohmann::json::array();
-  for (const EvaluationMetrics& image : images) json["images"].push_back(to_json(image));
-  return io::json_text(json, 2) + "\n";
 }
 
 EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
@@ -241,13 +359,15 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
                           const std::array<float, 3>& background,
                           const std::filesystem::path& output,
                           const EvaluationOptions& options) {
+  check_background(background);
   const std::vector<std::size_t> views = spread(dataset.indices(split), options.max_views);
   if (views.empty()) {
     throw UsageError(fmt::format(
         "The data set {} has no views to evaluate; choose another split or --test-every",
         dataset.root.string()));
   }
-  const std::vector<std::string> names = names_of(dataset, views);
+  if (options.align && options.together)
+    throw UsageError("Views that ranks render together cannot be aligned with their photos");
   if (!output.empty()) {
     std::error_code error;
     std::filesystem::create_directories(output, error);
@@ -255,122 +375,11 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
       throw DataError(
           fmt::format("The folder {} cannot be created: {}", output.string(), error.message()));
   }
-
-  Communicator alone;
-  Communicator& ranks = options.ranks != nullptr ? *options.ranks : alone;
-  if (options.align && options.together)
-    throw UsageError("Views that ranks render together cannot be aligned with their photos");
-  const bool compares = !options.together || ranks.leads();
-  // None where it was stopped, and of pictures that another rank compares.
-  const auto compare_view = [&](std::size_t i) -> std::optional<Comparison> {
-    if (!compares) {
-      render(dataset.views[views[i]].camera);
-      return std::nullopt;
-    }
-    Image traced = render(dataset.views[views[i]].camera);
-    if (traced.data.empty()) return std::nullopt;
-    const ViewPicture picture = load_view_picture(dataset.views[views[i]]);
-    const Image& rgba = picture.rgba;
-    if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
-      throw UsageError(fmt::format(
-          "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names[i],
-          traced.width, traced.height, traced.channels, rgba.width, rgba.height));
-    }
-    return compare(std::move(traced), picture, dataset.alpha_is_background, background);
-  };
-  // After compare_view(), whose pair that is; none where it was stopped.
-  const auto aligned_psnr = [&](std::size_t i, const Comparison& pair) -> std::optional<double> {
-    const View& view = dataset.views[views[i]];
-    const ViewPicture picture = load_view_picture(view);
-    const auto compared = [&](Image traced) {
-      return compare(std::move(traced), picture, dataset.alpha_is_background, background);
-    };
-    const auto shown = [&](const Camera& camera) {
-      Image traced = render(camera);
-      if (!options.align_colors || traced.data.empty()) return traced;
-      return color_corrected(compared(std::move(traced)).render, pair.photo, pair.mask);
-    };
-    std::optional<AlignedView> aligned = align_view(shown, view.camera, pair.photo, pair.mask);
-    if (!aligned) return std::nullopt;
-    return psnr_of(compared(std::move(aligned->render)));
-  };
-  // Ranks that render together stop together.
-  const auto for_all = [&](bool stop) { return options.together ? ranks.any(stop) : stop; };
-  const auto picture_of = [&](std::size_t i) { return names[i] + ".png"; };
-  const auto write_picture = [&](std::size_t i, const Comparison& pair) {
-    write_image(output / picture_of(i), side_by_side(pair.photo, pair.render));
-  };
-
-  const std::size_t pictures = output.empty() ? 0 : options.max_pictures.value_or(views.size());
-  const bool all_shown = pictures >= views.size();
-  std::vector<MeasuredView> measured;
-  bool stopped = false;
-  const std::size_t rank = options.together ? 0 : static_cast<std::size_t>(ranks.rank());
-  const std::size_t step = options.together ? 1 : static_cast<std::size_t>(ranks.size());
-  for (std::size_t i = rank; i < views.size() && !stopped; i += step) {
-    std::optional<Comparison> pair = compare_view(i);
-    stopped = compares && !pair;
-    if (pair) {
-      measured.push_back(measure(i, *pair, options.lpips));
-      if (all_shown && pair->valid > 0) write_picture(i, *pair);
-      if (options.align && pair->valid > 0) {
-        const std::optional<double> aligned = aligned_psnr(i, *pair);
-        measured.back().has_aligned = true;
-        measured.back().psnr_aligned = aligned.value_or(0.0);
-        stopped = !aligned;
-        if (stopped) measured.pop_back();
-      }
-      stopped = stopped || (options.done && !options.done(measured.size()));
-    }
-    stopped = for_all(stopped);
-  }
-  stopped = ranks.any(stopped);
-
-  const std::vector<MeasuredView> all = of_all_ranks(ranks, measured);
-  const std::set<std::size_t> shown = telling(all, pictures);
-  // Which views tell most is known only now; tracing them again takes less than keeping all.
-  bool cut_off = false;
-  for (const std::size_t i : shown) {
-    if (all_shown || i % step != rank) continue;
-    std::optional<Comparison> pair = compare_view(i);
-    cut_off = for_all(compares && !pair);
-    if (cut_off) break;
-    if (!pair) continue;
-    hide_masked_out(*pair);
-    write_picture(i, *pair);
-  }
-  // Those of other ranks are not known to be there.
-  const bool named = !ranks.any(cut_off);
-
-  EvaluationReport report;
-  std::size_t empty = 0;
-  std::string first_empty;
-  for (const MeasuredView& view : all) {
-    EvaluationMetrics metrics = metrics_of(view);
-    const Camera& camera = dataset.views[views[view.index]].camera;
-    metrics.name = camera.name.empty() ? names[view.index] : camera.name;
-    const glm::dvec3 center = camera.center();
-    metrics.center = {center.x, center.y, center.z};
-    if (named && shown.contains(view.index)) metrics.picture = picture_of(view.index);
-    if (view.compared) {
-      report.images.push_back(metrics);
-    } else if (empty++ == 0) {
-      first_empty = metrics.name;
-    }
-  }
-  if (report.images.empty() && stopped) return report;
-  if (report.images.empty()) {
-    throw DataError(
-        fmt::format("No view of {} has a pixel to compare: their masks or lenses leave none",
-                    dataset.root.string()));
-  }
-  if (empty > 0 && ranks.leads()) {
-    spdlog::warn(
-        "{} of {} views cannot be compared, {} among them: their masks or lenses leave no pixel",
-        empty, all.size(), first_empty);
-  }
-  report.mean = mean_of(report.images);
-  if (!output.empty() && ranks.leads()) write_text_file(output / "metrics.json", report.json());
+  Evaluation evaluation(render, dataset, views, background, output, options);
+  evaluation.measure_views();
+  evaluation.write_telling_pictures();
+  const EvaluationReport report = evaluation.report();
+  evaluation.write_report(report);
   return report;
 }
 

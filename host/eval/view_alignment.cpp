@@ -89,18 +89,19 @@ Numbers solve(Matrix matrix, Numbers right, double damping) {
   return right;
 }
 
-struct Slopes {
-  Matrix matrix{};  // of the normal equations
-  Numbers right{};
+struct NormalEquations {
+  Matrix matrix{};  // J^T W J, with the slopes of the picture as J
+  Numbers right{};  // J^T W times what the picture lacks
 };
 
-// Slopes of the picture at `view` by every number; `lengths` are the steps to find them by, those
-// of shifts a guess that is made right here.
-std::optional<Slopes> slopes_at(const std::function<Image(const Camera&)>& render,
-                                const AlignedView& view,
-                                const Image& photo,
-                                const Image& weight,
-                                Numbers& lengths) {
+// Of the slopes of the picture at `view` by every number; `lengths` are the steps to find them by,
+// those of shifts a guess that is made right here.
+std::optional<NormalEquations> normal_equations_at(
+    const std::function<Image(const Camera&)>& render,
+    const AlignedView& view,
+    const Image& photo,
+    const Image& weight,
+    Numbers& lengths) {
   std::array<Image, kNumbers> pictures;
   double by_turns = 0.0;  // how much a turn of as many pixels changes
   for (std::size_t k = 0; k < kNumbers; ++k) {
@@ -118,7 +119,7 @@ std::optional<Slopes> slopes_at(const std::function<Image(const Camera&)>& rende
       for (std::size_t s = 3; s < kNumbers; ++s) lengths[s] *= std::clamp(factor, 1e-3, 1e3);
     }
   }
-  Slopes out;
+  NormalEquations out;
   for_all_numbers(photo, weight, view.render.channels, [&](std::size_t i, double w, std::size_t k) {
     const auto now = static_cast<double>(view.render.data[k]);
     const double missing = static_cast<double>(photo.data[i]) - now;
@@ -146,11 +147,11 @@ std::optional<AlignedView> align_view(const std::function<Image(const Camera&)>&
   const double shift = turn * std::max(glm::length(start.center()), 1e-3);
   Numbers lengths{turn, turn, turn, shift, shift, shift};
   double damping = kFirstDamping;
-  std::optional<Slopes> slopes;  // at the best camera
+  std::optional<NormalEquations> equations;  // at the best camera
   for (int tries = 0; tries < kMostSteps; ++tries) {
-    if (!slopes) slopes = slopes_at(render, best, photo, weight, lengths);
-    if (!slopes) return std::nullopt;
-    Camera camera = moved_by(best.camera, solve(slopes->matrix, slopes->right, damping));
+    if (!equations) equations = normal_equations_at(render, best, photo, weight, lengths);
+    if (!equations) return std::nullopt;
+    Camera camera = moved_by(best.camera, solve(equations->matrix, equations->right, damping));
     Image picture = render(camera);
     if (picture.data.empty()) return std::nullopt;
     const double now = squared_error(picture, photo, weight);
@@ -162,7 +163,7 @@ std::optional<AlignedView> align_view(const std::function<Image(const Camera&)>&
     const bool last = error - now < kLeastGain * error;
     best = {std::move(camera), std::move(picture)};
     error = now;
-    slopes.reset();
+    equations.reset();
     if (last) break;
   }
   return best;

@@ -27,8 +27,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kRotation = 1e-3;  // that its columns may be off an orthonormal system
-
 std::optional<glm::dvec3> triple(const Json& json) {
   if (!json.is_array() || json.size() != 3) return std::nullopt;
   glm::dvec3 out;
@@ -62,13 +60,7 @@ std::optional<glm::dmat3> rotation_of(const Json& rows) {
     if (!row) return std::nullopt;
     out[static_cast<int>(r)] = *row;
   }
-  for (int a = 0; a < 3; ++a) {
-    for (int b = 0; b < 3; ++b) {
-      if (std::abs(glm::dot(out[a], out[b]) - (a == b ? 1.0 : 0.0)) > kRotation)
-        return std::nullopt;
-    }
-  }
-  if (glm::determinant(out) < 0.0) return std::nullopt;
+  if (!is_rotation(out)) return std::nullopt;
   return out;
 }
 

@@ -19,10 +19,12 @@
 #include <utility>
 
 #include "io/byte_reader.hpp"
+#include "io/ply_points.hpp"
 #include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/photo_lens.hpp"
+#include "util/file_kind.hpp"
 #include "util/path_text.hpp"
 
 namespace raysplats::io {
@@ -271,6 +273,18 @@ void read_images_binary(const fs::path& path, ColmapModel& model) {
   }
 }
 
+/// Whether what is left of the line are points of an image, of which there may be none: x, y and a
+/// whole number each. A line of an image has numbers in these places too, but ends with its name.
+bool are_image_points(TextReader& reader) {
+  std::size_t words = 0;
+  for (std::string_view word = reader.word(); !word.empty(); word = reader.word()) {
+    double number = 0;
+    if (++words % 3 == 0 && !(parse_number(word, number) && number == std::floor(number)))
+      return false;
+  }
+  return words % 3 == 0;
+}
+
 void read_images_text(const fs::path& path, ColmapModel& model) {
   const auto bytes = read_file(path);
   TextReader reader(bytes, path);
@@ -282,11 +296,8 @@ void read_images_text(const fs::path& path, ColmapModel& model) {
     const std::uint64_t camera = reader.unsigned_integer("the camera of an image");
     model.images.push_back(make_image(std::string(reader.rest()), camera, pose, fail));
     model.images.back().id = static_cast<std::uint32_t>(id);
-    // The image's points, three numbers each, an empty line when there are none.
     if (!reader.next_line()) return;
-    std::size_t words = 0;
-    while (!reader.word().empty()) ++words;
-    if (words % 3 != 0) {
+    if (!are_image_points(reader)) {
       reader.fail(
           fmt::format("the points of image '{}' (x, y, number), or an empty line, are missing: "
                       "found other text",
@@ -470,8 +481,13 @@ ColmapModel read_colmap_model(const fs::path& folder) {
   ColmapModel model = read_poses(folder);
   if (const std::optional<fs::path> points = model_file(folder, "points3D")) {
     is_binary(*points) ? read_points_binary(*points, model) : read_points_text(*points, model);
+  } else if (const fs::path ply = folder / "points3D.ply"; is_file(ply)) {
+    PlyPoints read = read_ply_points(ply);
+    model.points = std::move(read.cloud);
+    model.positions = std::move(read.positions);
+    spdlog::info("{} points are those of {}", model.points.size(), ply.string());
   } else {
-    spdlog::warn("{} has no points3D.bin or points3D.txt: the data set has no points to start from",
+    spdlog::warn("{} has no points3D.bin, .txt or .ply: the data set has no points to start from",
                  folder.string());
   }
   return model;

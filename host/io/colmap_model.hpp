@@ -39,7 +39,8 @@ struct ColmapModel {
 /// out with a warning; throws DataError when none can.
 std::optional<std::filesystem::path> find_colmap_model(const std::filesystem::path& root);
 
-/// Reads cameras, images and points3D (.bin, else .txt) of a folder. Points are optional, and
+/// Reads cameras, images and points3D (.bin, else .txt; points also .ply, as 3DGS leaves them) of a
+/// folder. Points are optional, and
 /// cameras that no image names are left out, whatever their lens. Throws DataError with byte offset
 /// or line for malformed files, and for camera models that are none of COLMAP 4's: SIMPLE_PINHOLE,
 /// PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV without its rational terms (these become

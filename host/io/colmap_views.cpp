@@ -11,13 +11,13 @@
 #include <string>
 #include <utility>
 
+#include "io/dataset_advice.hpp"
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
 #include "io/photo_folder.hpp"
 #include "io/photo_mask.hpp"
 #include "io/photo_views.hpp"
 #include "io/transforms.hpp"
-#include "io/way_out.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
@@ -40,10 +40,8 @@ void require_photos_of_their_own(const std::vector<View>& views) {
   for (const View& view : views) {
     const auto [owner, is_new] = owners.emplace(view.image_path, &view);
     if (is_new) continue;
-    throw DataError(fmt::format(
-        "The images '{}' and '{}' of the COLMAP model are both the file {}: keep the photos in "
-        "the folders that the model names",
-        owner->second->camera.name, view.camera.name, view.image_path.string()));
+    refuse_shared_photo(owner->second->camera.name, view.camera.name, "the COLMAP model",
+                        view.image_path);
   }
 }
 
@@ -87,7 +85,7 @@ std::vector<View> colmap_views(const ColmapModel& model,
       continue;
     }
     view.image_path = *photo;
-    view.mask_path = masks.find(image.name);
+    view.mask_path = masks.find(image.name, *photo);
     view.points = image.points;
     Camera nominal = model.cameras.at(image.camera_id);
     nominal.name = inner_name(image.name);

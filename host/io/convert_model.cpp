@@ -67,7 +67,8 @@ Conversion convert_model(const std::filesystem::path& input,
     moved_origin = glm::dvec3(0.0);
   }
   const std::array<double, 3> origin{moved_origin.x, moved_origin.y, moved_origin.z};
-  if (of_numbers.crop) of_numbers.crop->low -= moved_origin, of_numbers.crop->high -= moved_origin;
+  for (std::size_t k = 0; of_numbers.crop && k < 3; ++k)
+    of_numbers.crop->low[k] -= origin[k], of_numbers.crop->high[k] -= origin[k];
   const Gaussians result = changed(std::move(model), of_numbers);
   if (read > 0 && result.size() == 0) {
     throw UsageError(fmt::format(

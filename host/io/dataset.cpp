@@ -16,17 +16,18 @@
 #include "io/colmap_model.hpp"
 #include "io/colmap_views.hpp"
 #include "io/color_profiles.hpp"
-#include "io/cut_out.hpp"
 #include "io/data_origin.hpp"
+#include "io/dataset_advice.hpp"
 #include "io/find_image.hpp"
+#include "io/frame_lists.hpp"
 #include "io/llff.hpp"
 #include "io/photo_folder.hpp"
 #include "io/photo_mask.hpp"
+#include "io/photo_transparency.hpp"
 #include "io/ply_points.hpp"
 #include "io/polycam.hpp"
 #include "io/transforms.hpp"
 #include "io/transforms_views.hpp"
-#include "io/way_out.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
 
@@ -137,49 +138,33 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
   sort_by_name(dataset.views);
   if (held_out) {
     std::vector<View> test = io::transforms_views(*held_out, options, masks);
+    io::require_photos_of_their_own({&train, &*held_out});
     sort_by_name(test);
     for (View& view : test) {
       view.test = true;
       dataset.views.push_back(std::move(view));
     }
   } else {
+    io::require_photos_of_their_own({&train});
     mark_every(dataset.views, options.test_every);
   }
   set_origin(dataset, points, options);
   return dataset;
 }
 
-/// Says which frames of a nerfstudio file its lists leave out, and which names are of none of its
-/// `frames`, with or without a photo.
-void tell_of_lists(const io::TransformsFile& file,
-                   const std::set<std::string>& frames,
-                   const std::set<std::string>& train,
-                   const std::set<std::string>& test,
-                   std::size_t used) {
-  std::size_t unknown = 0;
-  std::string first;
-  for (const std::set<std::string>* list : {&train, &test}) {
-    for (const std::string& name : *list) {
-      if (frames.contains(name)) continue;
-      if (unknown++ == 0) first = name;
-    }
-  }
-  if (unknown > 0) {
-    spdlog::warn(
-        "{}: {} of {} names in train_filenames, val_filenames and test_filenames are of no frame, "
-        "'{}' among them: write them as the frames' file_path",
-        file.path.string(), unknown, train.size() + test.size(), first);
-  }
-  if (used < file.frames.size()) {
-    spdlog::info("{} of {} frames of {} are in none of its lists and left out",
-                 file.frames.size() - used, file.frames.size(), file.path.string());
-  }
-}
-
-/// The points that a file of cameras names, also where another machine has them elsewhere.
-fs::path points_of(const io::TransformsFile& file) {
+/// The points that a file of cameras names, also where another machine has them elsewhere; nothing,
+/// with a warning, where they are not there.
+std::optional<fs::path> points_of(const io::TransformsFile& file) {
+  if (file.ply_file_path.empty()) return std::nullopt;
   const fs::path folder = file.path.parent_path();
   fs::path path = io::find_beside(folder, file.ply_file_path, 1);
+  if (!is_file(path)) {
+    spdlog::warn(
+        "{} names the points {}, which are not there: the data set has no points to start "
+        "from",
+        file.path.string(), file.ply_file_path);
+    return std::nullopt;
+  }
   if (path != folder / file.ply_file_path) {
     spdlog::info("{} is not where {} says: the points are those of {}", file.ply_file_path,
                  file.path.string(), path.string());
@@ -191,43 +176,22 @@ fs::path points_of(const io::TransformsFile& file) {
 std::vector<View> views_of(io::TransformsFile& file, const DatasetOptions& options) {
   io::MaskFinder masks(file.path.parent_path());
   io::add_photos(file, masks);
-  return io::transforms_views(file, options, masks);
+  std::vector<View> views = io::transforms_views(file, options, masks);
+  io::require_photos_of_their_own({&file});
+  return views;
 }
 
 Dataset load_nerfstudio(const fs::path& path, const DatasetOptions& options) {
   io::TransformsFile file = io::read_transforms(path);
   Dataset dataset;
   dataset.kind = DatasetKind::kNerfstudio;
-  std::set<std::string> frames;
-  for (const io::TransformsFrame& frame : file.frames)
-    frames.insert(io::inner_name(frame.file_path));
-  std::vector<View> views = views_of(file, options);
-  const auto names = [&](const std::optional<std::vector<std::string>>& list) {
-    std::set<std::string> set;
-    for (const std::string& name : list.value_or(std::vector<std::string>{}))
-      set.insert(io::inner_name(name));
-    return set;
-  };
-  const std::set<std::string> train = names(file.train_filenames);
-  const std::set<std::string> test =
-      names(file.test_filenames ? file.test_filenames : file.val_filenames);
-  if (train.empty() && test.empty()) {
-    sort_by_name(views);
-    mark_every(views, options.test_every);
-    dataset.views = std::move(views);
-  } else {
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const std::string name = io::inner_name(file.frames[i].file_path);
-      views[i].test = test.contains(name) || (test.empty() && !train.contains(name));
-      // Frames that the file assigns to neither side are left out.
-      if (views[i].test || train.empty() || train.contains(name))
-        dataset.views.push_back(std::move(views[i]));
-    }
-    tell_of_lists(file, frames, train, test, dataset.views.size());
-    sort_by_name(dataset.views);
-  }
+  const std::set<std::string> names = io::frame_names(file);
+  dataset.views = views_of(file, options);
+  const bool divided = io::divide_by_lists(file, names, dataset.views);
+  sort_by_name(dataset.views);
+  if (!divided) mark_every(dataset.views, options.test_every);
   std::vector<double> points;
-  if (!file.ply_file_path.empty()) points = take_points(dataset, points_of(file));
+  if (const auto path = points_of(file)) points = take_points(dataset, *path);
   set_origin(dataset, points, options);
   return dataset;
 }
@@ -270,10 +234,11 @@ bool shows_cut_outs(const Dataset& dataset, AlphaUse use) {
 }
 
 /// What nerfstudio makes of a capture has COLMAP's model in a folder of its own. Its file says more
-/// (masks, depth maps, lists), and where it names points there is nothing that the model has more.
+/// (masks, depth maps, lists), and where it has points there is nothing that the model has more.
 bool goes_before(const fs::path& transforms, const fs::path& root, const fs::path& model) {
-  return model.lexically_relative(root / "colmap").begin()->string() != ".." &&
-         !io::read_transforms(transforms).ply_file_path.empty();
+  if (model.lexically_relative(root / "colmap").begin()->string() == "..") return false;
+  const std::string points = io::read_transforms(transforms).ply_file_path;
+  return !points.empty() && is_file(io::find_beside(root, points, 1));
 }
 
 Dataset load_any(const fs::path& root, const DatasetOptions& options) {
@@ -298,7 +263,7 @@ Dataset load_any(const fs::path& root, const DatasetOptions& options) {
       fmt::format("{} is no data set: it has neither a COLMAP model (sparse/0) nor transforms.json "
                   "nor transforms_train.json nor poses_bounds.npy (LLFF) nor keyframes/cameras "
                   "(Polycam){}",
-                  root.string(), io::way_out(root)));
+                  root.string(), io::advice_for(root)));
 }
 
 bool is_transforms(const fs::path& path) {
@@ -353,13 +318,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
   dataset.alpha_is_background = shows_cut_outs(dataset, options.alpha);
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
-  if (const fs::path masks = io::mask_folder(root); masked == 0 && is_folder(masks)) {
-    spdlog::warn(
-        "No mask in {} has the name of a photo: {} would have {}.png, {}.png or {}_mask.png",
-        masks.string(), dataset.views.front().camera.name, dataset.views.front().camera.name,
-        fs::path(dataset.views.front().camera.name).replace_extension().string(),
-        fs::path(dataset.views.front().camera.name).replace_extension().string());
-  }
+  io::warn_of_masks(dataset.views, root);
   if (masked > 0) {
     for (const View& view : dataset.views) {
       if (has_mask(view)) io::check_mask(view);

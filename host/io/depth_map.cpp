@@ -80,10 +80,9 @@ double depth_of(const Camera& camera, const glm::dvec3& world) {
   return counts_along_ray(camera) ? glm::length(local) : local.z;
 }
 
-DepthMap from_map(const DepthMap& map, const View& view) {
-  Camera photo = view.source_camera;  // in the place of the view, whatever its own
-  photo.rotation = view.camera.rotation;
-  photo.translation = view.camera.translation;
+// Refuses a map of another shape than its photo.
+void check_shape(const DepthMap& map, const View& view) {
+  const Camera& photo = view.source_camera;
   const double expected_height = static_cast<double>(map.width) * photo.height / photo.width;
   if (std::abs(expected_height - map.height) > std::max(2.0, 0.02 * map.height)) {
     throw DataError(fmt::format(
@@ -91,6 +90,13 @@ DepthMap from_map(const DepthMap& map, const View& view) {
         "it of the photo that it belongs to",
         view.depth_path.string(), map.width, map.height, photo.width, photo.height));
   }
+}
+
+DepthMap from_map(const DepthMap& map, const View& view) {
+  check_shape(map, view);
+  Camera photo = view.source_camera;  // in the place of the view, whatever its own
+  photo.rotation = view.camera.rotation;
+  photo.translation = view.camera.translation;
   const Camera& camera = view.camera;
   const bool same_rays = camera.model == photo.model;
   const bool other_depths = counts_along_ray(camera) && !counts_along_ray(photo);
@@ -144,16 +150,10 @@ DepthMap from_points(const PointCloud& points, const View& view) {
 
 DepthMap read_depth_map(const std::filesystem::path& path, double unit, bool again) {
   DepthMap out = lower_extension(path) == ".npy" ? read_array(path) : read_picture(path);
-  std::size_t odd = 0, known = 0;
+  std::size_t odd = 0;
   for (float& value : out.values) {
     odd += std::isfinite(value) ? 0 : 1;
     value = std::isfinite(value) && value > 0 ? static_cast<float>(unit * value) : 0.0f;
-    known += value > 0 ? 1 : 0;
-  }
-  if (known == 0) {
-    throw DataError(fmt::format(
-        "The depth map {} has no number above 0 and says nothing: remove it from the data set",
-        path.string()));
   }
   if (odd > 0 && !again) {
     spdlog::warn("{} of {} numbers of the depth map {} are not finite: they count as unknown", odd,
@@ -166,6 +166,17 @@ DepthMap view_depths(const Dataset& dataset, const View& view, double unit, bool
   if (!view.depth_path.empty()) return from_map(read_depth_map(view.depth_path, unit, again), view);
   if (!view.points.empty()) return from_points(dataset.points, view);
   return {};
+}
+
+std::size_t count_known(const DepthMap& depths) {
+  return static_cast<std::size_t>(
+      std::count_if(depths.values.begin(), depths.values.end(), [](float d) { return d > 0; }));
+}
+
+bool check_depth_map(const View& view, double unit) {
+  const DepthMap map = read_depth_map(view.depth_path, unit);
+  check_shape(map, view);
+  return count_known(map) > 0;
 }
 
 DepthMap reduced(const DepthMap& depths, int width, int height) {

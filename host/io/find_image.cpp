@@ -5,6 +5,7 @@
 #include <cctype>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/image_file.hpp"
@@ -30,11 +31,64 @@ std::optional<fs::path> only_entry(const fs::path& folder,
   return found;
 }
 
+/// The letters that those of U+00C0 to U+017F are with a mark on them; a point for the others.
+constexpr std::string_view kBaseLetters =
+    "AAAAAA.CEEEEIIII.NOOOOO..UUUUY..aaaaaa.ceeeeiiii.nooooo..uuuuy.y"
+    "AaAaAaCcCcCcCcDd..EeEeEeEeEeGgGgGgGgHh..IiIiIiIiI...JjKk.LlLlLl."
+    "...NnNnNn...OoOoOo..RrRrRrSsSsSsSsTtTt..UuUuUuUuUuUuWwYyYZzZzZz.";
+static_assert(kBaseLetters.size() == 0x180 - 0xC0);
+constexpr unsigned kFirstLetter = 0xC0, kFirstMark = 0x300, kLastMark = 0x36F;
+
+/// The character of U+0080 to U+07FF whose two bytes of UTF-8 begin at `at`; 0 for others.
+unsigned two_byte_character(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+  };
+  const bool is_one = (byte(at) & 0xE0u) == 0xC0u && (byte(at + 1) & 0xC0u) == 0x80u;
+  return is_one ? (byte(at) & 0x1Fu) << 6 | (byte(at + 1) & 0x3Fu) : 0u;
+}
+
+struct BareName {
+  std::string text;       ///< without the marks on its letters
+  bool has_mark = false;  ///< whether one was a character of its own, as macOS writes them
+};
+
+BareName without_marks(std::string_view name) {
+  BareName out;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const unsigned character = two_byte_character(name, i);
+    const bool is_mark = character >= kFirstMark && character <= kLastMark;
+    const char base = character >= kFirstLetter && character < kFirstLetter + kBaseLetters.size()
+                          ? kBaseLetters[character - kFirstLetter]
+                          : '.';
+    if (is_mark) {
+      out.has_mark = true;
+      ++i;
+    } else if (base != '.') {
+      out.text += base;
+      ++i;
+    } else {
+      out.text += name[i];
+    }
+  }
+  return out;
+}
+
 /// Whether two names differ in nothing but the case of A to Z.
 bool same_but_case(std::string_view a, std::string_view b) {
   const auto small = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [&](char x, char y) { return small(x) == small(y); });
+}
+
+/// Likewise, also where one has letters with marks and the other has these as two characters.
+bool same_but_spelling(std::string_view a, std::string_view b) {
+  if (same_but_case(a, b)) return true;
+  // The first bytes of all marks, looked for first as folders have many names.
+  constexpr std::string_view kMarkBytes = "\xCC\xCD";
+  if (a.find_first_of(kMarkBytes) == a.npos && b.find_first_of(kMarkBytes) == b.npos) return false;
+  const BareName bare_a = without_marks(a), bare_b = without_marks(b);
+  return bare_a.has_mark != bare_b.has_mark && same_but_case(bare_a.text, bare_b.text);
 }
 
 }  // namespace
@@ -66,7 +120,7 @@ std::optional<fs::path> find_respelt(const fs::path& folder, const fs::path& fil
   const std::string name = path.filename().string();
   const bool named = has_image_extension(path);
   return only_entry(place, [&](const fs::path& entry) {
-    return same_but_case((named ? entry.filename() : entry.stem()).string(), name) &&
+    return same_but_spelling((named ? entry.filename() : entry.stem()).string(), name) &&
            has_image_extension(entry) && is_file(entry);
   });
 }
@@ -93,7 +147,7 @@ fs::path find_beside(const fs::path& folder, const fs::path& file_path, std::siz
 std::optional<fs::path> find_folder(const fs::path& folder, std::string_view name) {
   if (is_folder(folder / name)) return folder / name;
   return only_entry(folder, [&](const fs::path& entry) {
-    return same_but_case(entry.filename().string(), name) && is_folder(entry);
+    return same_but_spelling(entry.filename().string(), name) && is_folder(entry);
   });
 }
 

@@ -13,8 +13,9 @@ namespace raysplats::io {
 std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
                                                 const std::filesystem::path& file_path);
 
-/// The single image that differs from that path in letter case alone, in folders or name: systems
-/// that do not tell them apart have written the path. Reads the folder from end to end.
+/// The single image that differs from that path in letter case alone, in folders or name, or in
+/// that the marks of its letters are characters of their own: systems that do not tell them apart
+/// have written the path. Reads the folder from end to end.
 std::optional<std::filesystem::path> find_respelt(const std::filesystem::path& folder,
                                                   const std::filesystem::path& file_path);
 
@@ -30,7 +31,7 @@ std::filesystem::path find_beside(const std::filesystem::path& folder,
                                   const std::filesystem::path& file_path,
                                   std::size_t least_parts);
 
-/// The folder of that name in another, in any letter case, the exact one first.
+/// The folder of that name in another, spelt as find_respelt() says, the exact one first.
 std::optional<std::filesystem::path> find_folder(const std::filesystem::path& folder,
                                                  std::string_view name);
 

@@ -213,7 +213,8 @@ class Record {
 
 std::size_t checksum(const std::string& header, std::span<const std::byte> data) {
   uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(header.data()), header.size());
-  crc = crc32_z(crc, reinterpret_cast<const Bytef*>(data.data()), data.size());
+  // Of no data at no address the sum would begin anew.
+  if (!data.empty()) crc = crc32_z(crc, reinterpret_cast<const Bytef*>(data.data()), data.size());
   return crc;
 }
 

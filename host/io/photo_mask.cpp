@@ -2,13 +2,15 @@
 #include "io/photo_mask.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <optional>
 #include <string>
 
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
-#include "io/photo_turn.hpp"
+#include "io/photo_orientation.hpp"
 #include "io/transforms.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
@@ -47,38 +49,104 @@ std::optional<fs::path> mask_named(const fs::path& folder, const std::string& na
   return std::nullopt;
 }
 
+/// Where masks lie that nothing names; empty where there is no such folder.
+fs::path mask_folder(const fs::path& root) {
+  for (const char* name : {"masks", "mask", "resized_anon_masks"}) {
+    if (const auto folder = find_folder(root, name)) return *folder;
+  }
+  return {};
+}
+
+/// A to Z in small letters.
+std::string in_small_letters(std::string text) {
+  for (char& c : text) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return text;
+}
+
+void warn_of_dynamic_masks(const std::vector<View>& views, const fs::path& root) {
+  std::size_t count = 0;
+  fs::path first;
+  for (const View& view : views) {
+    const fs::path mask = view.image_path.parent_path() /
+                          ("dynamic_mask_" + view.image_path.stem().string() + ".png");
+    if (is_file(mask) && count++ == 0) first = mask;
+  }
+  if (count == 0) return;
+  spdlog::warn(
+      "{} of {} photos have a mask of instant-ngp beside them ({}), where white does not count: "
+      "these are not read, so put them inverted, and under the names of their photos, into {}",
+      count, views.size(), first.string(), (root / "masks").string());
+}
+
 }  // namespace
 
-fs::path mask_folder(const fs::path& root) {
-  return is_folder(root / "masks") ? root / "masks" : root / "resized_anon_masks";
-}
-
-MaskFinder::MaskFinder(const fs::path& root) {
-  if (const fs::path folder = mask_folder(root); is_folder(folder)) folder_ = folder;
-}
+MaskFinder::MaskFinder(const fs::path& root) : root_(root), folder_(mask_folder(root)) {}
 
 void MaskFinder::add(const fs::path& name) {
   const std::string path = inner_name(name);
+  const bool is_first = photos_.empty();
   if (!photos_.insert(path).second) return;
-  if (photos_.size() == 1) shared_ = fs::path(path).parent_path().generic_string();
-  while (!lies_in(path, shared_)) shared_ = fs::path(shared_).parent_path().generic_string();
-  const std::string stem = stem_of(path);
-  for (std::size_t at = 0; at != std::string::npos; at = next_part(stem, at))
-    ++ends_[stem.substr(at)];
+  const auto learn = [&](Known& known, const std::string& spelling) {
+    if (is_first) known.shared = fs::path(spelling).parent_path().generic_string();
+    while (!lies_in(spelling, known.shared))
+      known.shared = fs::path(known.shared).parent_path().generic_string();
+    const std::string stem = stem_of(spelling);
+    for (std::size_t at = 0; at != std::string::npos; at = next_part(stem, at))
+      ++known.ends[stem.substr(at)];
+  };
+  learn(exact_, path);
+  learn(small_, in_small_letters(path));
 }
 
-fs::path MaskFinder::find(const fs::path& name) const {
-  if (folder_.empty()) return {};
+fs::path MaskFinder::find(const fs::path& name, const fs::path& photo) const {
   // Absolute names and those with ".." would lead to the photo itself.
   const std::string path = inner_name(name);
-  for (std::size_t at = 0; at != std::string::npos; at = next_part(path, at)) {
-    const std::string end = path.substr(at);
-    const bool counts = at == 0 || (lies_in(path, shared_) && at == shared_.size() + 1) ||
-                        !is_shared(ends_, stem_of(end));
+  const std::string stored = inner_name(photo.lexically_normal().lexically_relative(
+      root_.empty() ? fs::path(".") : root_.lexically_normal()));
+  if (!folder_.empty()) {
+    if (fs::path mask = find_in_folder(path, path, exact_); !mask.empty()) return mask;
+    if (fs::path mask = find_in_folder(stored, in_small_letters(stored), small_); !mask.empty())
+      return mask;
+  }
+  fs::path beside = photo;
+  beside.replace_filename(photo.stem().string() + "_mask.png");
+  // Another photo may be called so.
+  const bool is_photo = photos_.contains(stem_of(path) + "_mask.png");
+  return !is_photo && is_file(beside) ? beside : fs::path();
+}
+
+/// `spelling`: the path as `known` spells paths, of the same length.
+fs::path MaskFinder::find_in_folder(const std::string& path,
+                                    const std::string& spelling,
+                                    const Known& known) const {
+  for (std::size_t at = 0; at != std::string::npos && at < path.size(); at = next_part(path, at)) {
+    const bool counts = at == 0 ||
+                        (lies_in(spelling, known.shared) && at == known.shared.size() + 1) ||
+                        !is_shared(known.ends, stem_of(spelling.substr(at)));
     if (!counts) continue;
-    if (const auto mask = mask_named(folder_, end)) return *mask;
+    if (const auto mask = mask_named(folder_, path.substr(at))) return *mask;
   }
   return {};
+}
+
+void warn_of_masks(const std::vector<View>& views, const fs::path& root) {
+  const auto has_no_mask = [](const View& view) { return view.mask_path.empty(); };
+  const auto without =
+      static_cast<std::size_t>(std::count_if(views.begin(), views.end(), has_no_mask));
+  if (const fs::path folder = mask_folder(root); without == views.size() && !folder.empty()) {
+    const std::string& name = views.front().camera.name;
+    const std::string stem = stem_of(name);
+    spdlog::warn(
+        "No mask in {} has the name of a photo: {} would have {}.png, {}.png or {}_mask.png",
+        folder.string(), name, name, stem, stem);
+  } else if (without > 0 && without < views.size()) {
+    spdlog::warn("{} of {} photos have no mask, {} among them: all of their pixels count", without,
+                 views.size(),
+                 std::find_if(views.begin(), views.end(), has_no_mask)->image_path.string());
+  }
+  warn_of_dynamic_masks(views, root);
 }
 
 void check_mask(const View& view) {

@@ -21,9 +21,8 @@ namespace {
 
 constexpr std::size_t kChannels = 4;
 
-// A step of integers, as their numbers in [0, 1] have it.
-constexpr float kByteStep = 1.0f / 255.0f;
-constexpr float kShortStep = 1.0f / 65535.0f;
+// Labels count the objects of a picture from 0: whole numbers far below the white of their type.
+constexpr float kMostLabel = 31.0f;
 
 // A number of a file, of which 1 is white.
 float to_float(std::uint8_t value) { return static_cast<float>(value) / 255.0f; }
@@ -258,6 +257,30 @@ class ReducedRows : public PhotoRows {
   std::vector<std::array<float, kChannels>> sums_;
 };
 
+// Whether the numbers, of which 1 is white, are labels in integers up to `white`.
+bool are_labels(const std::vector<float>& values, float most, float white) {
+  if (most * white < 0.5f || most * white > kMostLabel + 0.5f) return false;
+  return std::all_of(values.begin(), values.end(), [&](float value) {
+    const float label = value * white;
+    return std::abs(label - std::round(label)) < 1e-3f;
+  });
+}
+
+// Makes every label above 0 white.
+void make_labels_whole(std::vector<float>& values) {
+  const float most = values.empty() ? 0.0f : *std::max_element(values.begin(), values.end());
+  if (!are_labels(values, most, 255.0f) && !are_labels(values, most, 65535.0f)) return;
+  for (float& value : values) value = value > 0.0f ? 1.0f : 0.0f;
+}
+
+// Programs that cut out a shape leave black beneath it.
+bool shape_is_in_alpha(const std::vector<float>& values, const std::vector<float>& alphas) {
+  const auto is_black = [](float value) { return value == 0.0f; };
+  return !alphas.empty() && std::all_of(values.begin(), values.end(), is_black) &&
+         std::any_of(alphas.begin(), alphas.end(),
+                     [&](float alpha) { return alpha != alphas.front(); });
+}
+
 }  // namespace
 
 float MaskPlane::at(int x, int y, int photo_width, int photo_height) const {
@@ -271,11 +294,6 @@ MaskPlane mask_plane(const RawImage& mask) {
   const auto channels = static_cast<std::size_t>(mask.channels);
   const bool covered = has_alpha(channels);
   const std::size_t colors = covered ? channels - 1 : channels;
-  // Labels are 0 and 1, of 255 or 65535: what their greatest number is to be divided by.
-  const auto whole = [](const std::vector<float>& values) {
-    const float most = values.empty() ? 0.0f : *std::max_element(values.begin(), values.end());
-    return most == kByteStep || most == kShortStep ? most : 1.0f;
-  };
   std::vector<float> alphas;
   std::visit(
       [&](const auto& numbers) {
@@ -289,27 +307,16 @@ MaskPlane mask_plane(const RawImage& mask) {
         }
       },
       mask.numbers);
-  const float white = whole(out.values), opaque = whole(alphas);
-  for (float& value : out.values) value /= white;
-  for (std::size_t i = 0; i < alphas.size(); ++i) out.values[i] *= alphas[i] / opaque;
+  if (shape_is_in_alpha(out.values, alphas)) std::fill(out.values.begin(), out.values.end(), 1.0f);
+  make_labels_whole(out.values);
+  make_labels_whole(alphas);
+  for (std::size_t i = 0; i < alphas.size(); ++i) out.values[i] *= alphas[i];
   return out;
 }
 
 bool is_black(const RawImage& mask) {
-  const auto channels = static_cast<std::size_t>(mask.channels);
-  const bool covered = has_alpha(channels);
-  const std::size_t colors = covered ? channels - 1 : channels;
-  return std::visit(
-      [&](const auto& numbers) {
-        for (std::size_t i = 0; i < numbers.size(); i += channels) {
-          if (covered && !(numbers[i + colors] > 0)) continue;
-          for (std::size_t c = 0; c < colors; ++c) {
-            if (numbers[i + c] > 0) return false;
-          }
-        }
-        return true;
-      },
-      mask.numbers);
+  const std::vector<float> values = mask_plane(mask).values;
+  return std::all_of(values.begin(), values.end(), [](float value) { return value == 0.0f; });
 }
 
 std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,

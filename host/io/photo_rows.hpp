@@ -44,8 +44,9 @@ struct MaskPlane {
   float at(int x, int y, int photo_width, int photo_height) const;
 };
 
-/// What is not black in a mask, in [0, 1]: the greatest of its colours, times its alpha. A mask of
-/// 0 and 1 of 8 or 16 bits is one of black and white.
+/// What is not black in a mask, in [0, 1]: the greatest of its colours, times its alpha; alpha
+/// alone where all colours are black and alpha is not the same everywhere. Numbers that are whole
+/// and at most 31 of 255 or of 65535 are labels of objects, each of which above 0 is white.
 MaskPlane mask_plane(const RawImage& mask);
 
 /// Whether mask_plane() is 0 everywhere.

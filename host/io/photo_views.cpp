@@ -6,7 +6,7 @@
 
 #include <utility>
 
-#include "io/photo_turn.hpp"
+#include "io/photo_orientation.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_check.hpp"
 #include "scene/photo_lens.hpp"
@@ -53,13 +53,25 @@ void leave_out_missing(std::size_t missing,
   spdlog::warn("{}: they are left out", what);
 }
 
+void refuse_shared_photo(const std::string& first,
+                         const std::string& second,
+                         const std::string& cameras,
+                         const fs::path& photo) {
+  throw DataError(fmt::format(
+      "The images '{}' and '{}' of {} are both the file {}: keep the photos in the folders that it "
+      "names",
+      first, second, cameras, photo.string()));
+}
+
 void tell_of_case(std::size_t respelt,
                   std::size_t all,
                   const fs::path& cameras,
                   const std::string& first) {
   if (respelt == 0) return;
-  spdlog::info("{} of {} photos are spelt otherwise than in {} ('{}') and differ in letter case",
-               respelt, all, cameras.string(), first);
+  spdlog::info(
+      "{} of {} photos are spelt otherwise than in {} ('{}') and differ in letter case or in "
+      "how accents are written",
+      respelt, all, cameras.string(), first);
 }
 
 }  // namespace raysplats::io

@@ -12,8 +12,9 @@
 namespace raysplats::io {
 
 /// Sets the cameras of a view: `nominal` is the camera at the size that its model states, the photo
-/// may have another (reduced copies, rounding by a pixel) or lie on its side (photo_turn.hpp), and
-/// is used reduced by `factor`. Throws DataError for a photo of another shape.
+/// may have another (reduced copies, rounding by a pixel) or lie on its side
+/// (photo_orientation.hpp), and is used reduced by `factor`. Throws DataError for a photo of
+/// another shape.
 void set_cameras(View& view, const Camera& nominal, ImageSize photo, double factor, bool undistort);
 
 /// Poses without a photo, as those of blurred photos that were deleted, are left out with a
@@ -23,8 +24,15 @@ void leave_out_missing(std::size_t missing,
                        const std::string& what,
                        const std::string& advice);
 
-/// Tells of photos whose names another system wrote, to which letter case is all the same: so many
-/// of `all`, `first` as the file of cameras has it.
+/// Throws DataError: two images of `cameras`, a file or model by its name, have one photo.
+[[noreturn]] void refuse_shared_photo(const std::string& first,
+                                      const std::string& second,
+                                      const std::string& cameras,
+                                      const std::filesystem::path& photo);
+
+/// Tells of photos whose names another system wrote, to which letter case is all the same, or
+/// whether an accent is a character of its own: so many of `all`, `first` as the file of cameras
+/// has it.
 void tell_of_case(std::size_t respelt,
                   std::size_t all,
                   const std::filesystem::path& cameras,

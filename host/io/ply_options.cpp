@@ -15,7 +15,7 @@
 #include "io/ply_origin.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 
 namespace raysplats {
 namespace {
@@ -85,7 +85,7 @@ bool set_option(std::string_view key, std::string_view value, TraceOptions& out)
   // Of any size here: the light of a scene may be brighter than what a picture shows.
   if (key == "background") return parse_triple(value, out.background);
   if (key == "sky") return parse_sky(value, out.sky);
-  const std::vector<OptionRow> rows = trace_rows(out);
+  const std::vector<OptionRow> rows = trace_option_rows(out);
   for (const char* name : kOptions) {
     if (key != header_key(name)) continue;
     try {
@@ -153,7 +153,7 @@ std::string io::ply_option_comments(const TraceOptions& options) {
     out += fmt::format("{}{} {}\n", kPrefix, key, value);
   };
   TraceOptions written = options;
-  const std::vector<OptionRow> rows = trace_rows(written);
+  const std::vector<OptionRow> rows = trace_option_rows(written);
   for (const char* name : kOptions) {
     std::string text = find_row(rows, name)->text();
     std::erase(text, '"');
@@ -176,7 +176,7 @@ std::string io::ply_origin_comment(const std::array<double, 3>& origin) {
 std::string io::flags_to_show(const TraceOptions& shown) {
   TraceOptions told = shown;
   TraceOptions taken = peak_order();
-  const std::vector<OptionRow> rows = trace_rows(told), defaults = trace_rows(taken);
+  const std::vector<OptionRow> rows = trace_option_rows(told), defaults = trace_option_rows(taken);
   std::string out;
   const auto add = [&](const std::string& flag) { out += (out.empty() ? "" : " ") + flag; };
   for (const char* name : kOptions) {

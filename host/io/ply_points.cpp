@@ -2,6 +2,7 @@
 #include "io/ply_points.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -65,14 +66,17 @@ PlyPoints read_ply_points(const std::filesystem::path& path) {
   points.colors.reserve(3 * file.rows());
   out.positions.reserve(3 * file.rows());
   double brightest = 0.0;
-  file.for_each_row([&](std::size_t row, std::span<const double> values) {
+  std::size_t left_out = 0;
+  file.for_each_row([&](std::size_t, std::span<const double> values) {
+    const bool finite = std::all_of(position.begin(), position.end(), [&](std::size_t column) {
+      return std::isfinite(static_cast<float>(values[column]));
+    });
+    if (!finite) {
+      ++left_out;
+      return;
+    }
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto coordinate = static_cast<float>(values[position[i]]);
-      if (!std::isfinite(coordinate)) {
-        throw DataError(fmt::format("{}: '{}' of point {} is not finite", path.string(),
-                                    position_names[i], row));
-      }
-      points.positions.push_back(coordinate);
+      points.positions.push_back(static_cast<float>(values[position[i]]));
       out.positions.push_back(values[position[i]]);
       double value = color ? values[(*color)[i]] * scale[i] : 0.5;
       if (!std::isfinite(value)) value = 0.5;
@@ -80,6 +84,10 @@ PlyPoints read_ply_points(const std::filesystem::path& path) {
       points.colors.push_back(static_cast<float>(value));
     }
   });
+  if (left_out > 0) {
+    spdlog::warn("{}: {} of {} points have a coordinate that is not finite and are left out",
+                 path.string(), left_out, file.rows());
+  }
   // Floating-point and int colours state no range: more than 1 means 0 to 255.
   const float divisor = brightest > 1.0 ? 255.0f : 1.0f;
   for (float& value : points.colors) value = std::clamp(value / divisor, 0.0f, 1.0f);

@@ -16,7 +16,8 @@ struct PlyPoints {
 
 /// Points of a PLY with x, y, z and, when present, their colours: red, green, blue, the same behind
 /// diffuse_, or r, g, b (integers of their type's range, or floating point in [0, 1] or [0, 255]);
-/// mid-grey without. Throws DataError as read_ply() does.
+/// mid-grey without. Points whose place is not finite are left out with a warning. Throws DataError
+/// as read_ply() does.
 PlyPoints read_ply_points(const std::filesystem::path& path);
 
 }  // namespace raysplats::io

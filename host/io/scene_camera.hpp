@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/data_rows.hpp"
+#include "io/data_option_table.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/dataset.hpp"
 #include "scene/orbit.hpp"

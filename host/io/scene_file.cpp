@@ -12,7 +12,7 @@
 
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
-#include "scene/render_rows.hpp"
+#include "scene/render_option_table.hpp"
 #include "util/nearest_name.hpp"
 
 namespace raysplats {
@@ -225,9 +225,9 @@ void read_rows(TomlTable& table, const std::vector<OptionRow>& rows) {
 
 RenderSettings read_render(TomlTable& table) {
   RenderSettings r;
-  read_rows(table, render_rows(r));
+  read_rows(table, render_option_rows(r));
   if (auto shadows = table.table("shadows")) {
-    read_rows(*shadows, shadow_rows(r.shadows));
+    read_rows(*shadows, shadow_option_rows(r.shadows));
     shadows->finish();
   }
   table.finish();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -34,6 +35,32 @@ constexpr std::size_t kSlack = 4096;
 /// all entries of degree 3.
 constexpr TexelRange kAnyPalette{3 * kSogEntriesPerRow, 15 * kSogMostEntries};
 
+/// torch.save() writes zip archives too.
+void refuse_checkpoint(const std::vector<std::string>& names, const std::filesystem::path& path) {
+  const bool is_checkpoint = std::any_of(names.begin(), names.end(), [](const std::string& name) {
+    return std::filesystem::path(name).filename() == "data.pkl";
+  });
+  if (!is_checkpoint) return;
+  throw DataError(
+      fmt::format("{} is a checkpoint of PyTorch: export the model in it as a PLY with the program "
+                  "that wrote it, and give that",
+                  path.string()));
+}
+
+/// The one folder of an archive that has a meta.json, where none lies outside of folders: systems
+/// that pack a folder put its name in front. "" where there is no such or several; macOS's own
+/// folder does not count.
+std::string folder_of_meta(const std::vector<std::string>& names) {
+  std::vector<std::string> folders;
+  for (const std::string& name : names) {
+    if (name == kMeta) return "";
+    const std::size_t slash = name.find('/');
+    if (slash == std::string::npos || name.substr(slash + 1) != kMeta) continue;
+    if (!name.starts_with("__MACOSX/")) folders.push_back(name.substr(0, slash + 1));
+  }
+  return folders.size() == 1 ? folders.front() : "";
+}
+
 /// The files of a SOG: of a zip archive, or beside a meta.json.
 class Files {
  public:
@@ -42,9 +69,12 @@ class Files {
     bytes_ = read_file(path);
     disk_bytes_ = bytes_.size();
     archive_.emplace(bytes_, path);
+    const std::vector<std::string> names = archive_->names();
+    refuse_checkpoint(names, path);
+    folder_ = folder_of_meta(names);
   }
   std::vector<std::byte> read(const std::string& name) {
-    if (archive_) return archive_->read(name);
+    if (archive_) return archive_->read(folder_ + name);
     std::vector<std::byte> bytes = read_file(path_.parent_path() / name);
     disk_bytes_ += bytes.size();
     return bytes;
@@ -58,6 +88,7 @@ class Files {
   std::vector<std::byte> bytes_;
   std::uint64_t disk_bytes_ = 0;
   std::optional<ZipArchive> archive_;
+  std::string folder_;  // in the archive, with its slash
 };
 
 class Reader {

@@ -34,7 +34,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr double kRigidTolerance = 1e-3;
 constexpr double kLeastAxis = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180.0;
 
@@ -162,6 +161,11 @@ void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
   d.k4 = scope.number("k4").value_or(d.k4);
   d.p1 = scope.number("p1").value_or(d.p1);
   d.p2 = scope.number("p2").value_or(d.p2);
+  for (const char* term : {"k5", "k6"}) {
+    if (scope.number(term).value_or(0.0) == 0.0) continue;
+    scope.fail(fmt::format(
+        "'{}' is a term of a lens that is not supported, undistort the images first", term));
+  }
   read_parameters(scope, frame);
   if (const auto radius = scope.positive("fisheye_crop_radius")) frame.crop_radius = radius;
 }
@@ -239,17 +243,11 @@ bool read_pose(const Scope& scope, const glm::dvec3& signs, TransformsFrame& fra
   for (int i = 0; i < 3; ++i) {
     const double length = glm::length(rotation[i]);
     if (!(length > kLeastAxis && length < 1.0 / kLeastAxis)) continue;
-    if (std::abs(length - 1.0) <= kRigidTolerance) continue;
+    if (std::abs(length - 1.0) <= kRotationTolerance) continue;
     rotation[i] /= length;
     scaled = true;
   }
-  const glm::dmat3 gram = glm::transpose(rotation) * rotation;
-  double deviation = 0;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j)
-      deviation = std::max(deviation, std::abs(gram[i][j] - (i == j ? 1.0 : 0.0)));
-  }
-  if (deviation > kRigidTolerance || glm::determinant(rotation) < 0) {
+  if (!is_rotation(rotation)) {
     scope.fail(
         "the transform_matrix is no rotation with a translation (it shears, mirrors or is "
         "singular)");

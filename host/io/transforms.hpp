@@ -15,10 +15,12 @@ namespace raysplats::io {
 
 /// Intrinsics of one frame, as far as the file states them.
 struct TransformsFrame {
-  std::size_t number = 0;  ///< in the file
-  std::string file_path;   ///< as in the file; may be empty
-  std::string mask_path;   ///< as in the file; usually empty
-  std::string depth_path;  ///< likewise
+  std::size_t number = 0;       ///< in the file
+  std::string file_path;        ///< as in the file; may be empty
+  std::string mask_path;        ///< as in the file; usually empty
+  std::string depth_path;       ///< likewise
+  std::filesystem::path photo;  ///< the file that transforms_views() found
+  bool moved = false;           ///< by the end of file_path, which was written elsewhere
   std::optional<int> width, height;
   std::optional<double> fx, fy, cx, cy;       ///< pixels
   std::optional<double> angle_x, angle_y;     ///< field of view, radians
@@ -41,8 +43,8 @@ struct TransformsFile {
 /// Numbers may be texts ("500"), matrices of 3 x 4, 4 x 4 or as many numbers in one list. Cameras
 /// of NeuS2 (from_na) and Mitsuba (normal_mts_args) have axes of their own, which an info says.
 /// Throws DataError for malformed JSON, camera models other than those of model_names()
-/// (instant-ngp: is_fisheye), and matrices that are not finite or, but for the lengths of their
-/// axes, no rigid motion to 1e-3; smaller deviations are orthonormalised.
+/// (instant-ngp: is_fisheye), k5 and k6 that are not 0, and matrices that are not finite or, but
+/// for the lengths of their axes, no rigid motion to 1e-3; smaller deviations are orthonormalised.
 TransformsFile read_transforms(const std::filesystem::path& path);
 /// The same of what is in memory; `path` names it in errors, and files lie beside it.
 TransformsFile parse_transforms(const nlohmann::json& root, const std::filesystem::path& path);

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -44,8 +45,12 @@ std::vector<FramePhoto> frame_photos(TransformsFile& file) {
   std::vector<TransformsFrame> found, missing;
   for (TransformsFrame& frame : file.frames) {
     const auto photo = frame_photo(file, frame);
+    if (photo) {
+      frame.photo = photo->path;
+      frame.moved = photo->moved;
+      photos.push_back(*photo);
+    }
     (photo ? found : missing).push_back(std::move(frame));
-    if (photo) photos.push_back(*photo);
   }
   file.frames = std::move(found);
   if (missing.empty()) return photos;
@@ -107,8 +112,8 @@ std::vector<View> transforms_views(TransformsFile& file,
     }
     if (photos[i].respelt && respelt++ == 0) first_respelt = frame.file_path;
     if (!has_image_extension(name)) name += photo.extension();
-    view.mask_path =
-        frame.mask_path.empty() ? masks.find(name) : named_by(file, frame, "mask", frame.mask_path);
+    view.mask_path = frame.mask_path.empty() ? masks.find(name, photo)
+                                             : named_by(file, frame, "mask", frame.mask_path);
     if (!frame.depth_path.empty())
       view.depth_path = named_by(file, frame, "depth map", frame.depth_path);
     const ImageSize size = image_size(photo);
@@ -124,6 +129,18 @@ std::vector<View> transforms_views(TransformsFile& file,
   }
   tell_of_case(respelt, views.size(), file.path, first_respelt);
   return views;
+}
+
+void require_photos_of_their_own(const std::vector<const TransformsFile*>& files) {
+  std::map<fs::path, const TransformsFrame*> owners;
+  for (const TransformsFile* file : files) {
+    for (const TransformsFrame& frame : file->frames) {
+      const auto [owner, is_new] = owners.emplace(frame.photo, &frame);
+      const TransformsFrame& first = *owner->second;
+      if (is_new || first.file_path == frame.file_path || !(first.moved || frame.moved)) continue;
+      refuse_shared_photo(first.file_path, frame.file_path, file->path.string(), frame.photo);
+    }
+  }
 }
 
 }  // namespace raysplats::io

@@ -23,4 +23,8 @@ std::vector<View> transforms_views(TransformsFile& file,
                                    const DatasetOptions& options,
                                    const MaskFinder& masks);
 
+/// Throws DataError where two frames of the data set, whose views have been made, name different
+/// paths but have one photo, found by the end of a path: one of them is another camera's.
+void require_photos_of_their_own(const std::vector<const TransformsFile*>& files);
+
 }  // namespace raysplats::io

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "io/gif_moments.hpp"
+#include "io/gif_delays.hpp"
 #include "io/image_codec.hpp"
 #include "io/video_frame.hpp"
 #include "raysplats/error.hpp"
@@ -93,7 +93,7 @@ class Gif : public VideoFile {
   void finish() override {
     if (!encoder_) throw UsageError(fmt::format("The video {} has no frames", path_.string()));
     encoder_->finish();
-    io::set_gif_moments(file_.temporary(), path_, frames_, fps_);
+    io::set_gif_delays(file_.temporary(), path_, frames_, fps_);
     file_.commit();
   }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "io/image_file.hpp"
-#include "io/photo_turn.hpp"
+#include "io/photo_orientation.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
@@ -25,7 +25,7 @@ RawImage mask_of_photo(const View& view, bool turned) {
   const bool other =
       !has_shape(mask.width, mask.height, photo) && has_shape(mask.height, mask.width, photo);
   if (!other || !lies_on_its_side(view.image_path)) return mask;
-  return turned ? upright(mask, view.image_path) : laid(mask, view.image_path);
+  return turned ? turned_upright(mask, view.image_path) : as_stored(mask, view.image_path);
 }
 
 // What the file says of the colours of a photo. Only floats are light and only alpha multiplies, so
@@ -44,7 +44,7 @@ ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
   const bool across = raw_.width != raw_.height && raw_.width == view.source_camera.height &&
                       raw_.height == view.source_camera.width;
   const bool turned = across && lies_on_its_side(view.image_path);
-  if (turned) raw_ = upright(raw_, view.image_path);
+  if (turned) raw_ = turned_upright(raw_, view.image_path);
   if (raw_.width != view.source_camera.width || raw_.height != view.source_camera.height) {
     throw DataError(
         fmt::format("The image {} has {} x {} pixels now, but {} x {} when the data set was opened",

@@ -153,6 +153,12 @@ std::vector<std::byte> ZipArchive::read(const std::string& name) const {
   return out;
 }
 
+std::vector<std::string> ZipArchive::names() const {
+  std::vector<std::string> names;
+  for (const auto& [name, entry] : entries_) names.push_back(name);
+  return names;
+}
+
 std::vector<std::byte> zip_of(
     const std::vector<std::pair<std::string, std::vector<std::byte>>>& files,
     const std::filesystem::path& path) {

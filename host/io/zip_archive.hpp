@@ -23,6 +23,8 @@ class ZipArchive {
 
   /// Whole content of a file, checked against its checksum.
   std::vector<std::byte> read(const std::string& name) const;
+  /// The names of all files, sorted, with their folders.
+  std::vector<std::string> names() const;
 
  private:
   struct Entry {

@@ -45,11 +45,11 @@ std::vector<double> contributions(Context& context,
     const double pixels = static_cast<double>(view.width) * view.height;
     const Camera camera = downscaled(view, std::max(1.0, std::sqrt(pixels / kMostPixels)));
     tracer.render(on_device, camera, true);
-    // The slope of the picture's red by a Gaussian's is the sum of its shares.
-    Image slope(camera.width, camera.height, 4);
-    for (std::size_t i = 0; i < slope.pixels(); ++i) slope.data[4 * i] = 1.0f;
-    const Gaussians gradient = tracer.backward(on_device, slope).parameters;
-    const double share = 1.0 / (RS_SH0 * static_cast<double>(slope.pixels() * views));
+    // The derivative of the picture's red by a Gaussian's is the sum of its shares.
+    Image of_red(camera.width, camera.height, 4);
+    for (std::size_t i = 0; i < of_red.pixels(); ++i) of_red.data[4 * i] = 1.0f;
+    const Gaussians gradient = tracer.backward(on_device, of_red).parameters;
+    const double share = 1.0 / (RS_SH0 * static_cast<double>(of_red.pixels() * views));
     for (std::size_t i = 0; i < out.size(); ++i)
       out[i] += share * static_cast<double>(gradient.sh[3 * i]);
   }

@@ -29,6 +29,10 @@ Frame frame_of(const Environment& environment) {
   if (!(glm::length(frame.up) > 0)) {
     throw UsageError("The environment's up direction is zero: give another");
   }
+  if (!std::isfinite(glm::length(frame.up)) || !std::isfinite(environment.rotation)) {
+    throw UsageError(
+        "The environment has an up direction or a rotation that is not finite: correct it");
+  }
   frame.up = glm::normalize(frame.up);
   glm::dvec3 forward{0, 0, 1};
   if (std::abs(frame.up.z) > 1 - 1e-6) forward = {1, 0, 0};

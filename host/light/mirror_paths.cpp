@@ -105,8 +105,8 @@ void MirrorPaths::trace(const DeviceGaussians& gaussians,
 
 void MirrorPaths::backward(const DeviceGaussians& gaussians,
                            RayBackward& sums,
-                           Buffer<RayBackward::Slopes>* slopes) {
-  if (slopes != nullptr && has_mirrors()) {
+                           Buffer<RayBackward::PaddedRayGradient>* ray_gradients) {
+  if (ray_gradients != nullptr && has_mirrors()) {
     throw UsageError(
         "Gradients of rays and poses do not go through mirrors: leave the mirrors out, or the "
         "gradient of the pose");
@@ -127,7 +127,7 @@ void MirrorPaths::backward(const DeviceGaussians& gaussians,
                 goes_on ? levels_[number + 1].seen : no_colors_, level.results, level.gradients,
                 goes_on ? levels_[number + 1].gradients : no_colors_);
     sums.add(gaussians, level.rays, level.count, level.results, level.gradients,
-             number == 0 ? direction_ : ColorDirection::kRay, slopes);
+             number == 0 ? direction_ : ColorDirection::kRay, ray_gradients);
   }
 }
 

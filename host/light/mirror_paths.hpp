@@ -41,12 +41,12 @@ class MirrorPaths {
   const Buffer<RayResult>& results() const { return levels_[0].results; }
 
   /// Gradients of seen(), `count` of them, to be filled by the caller before backward().
-  Buffer<RayBackward::Gradient>& gradients() { return levels_[0].gradients; }
-  /// Adds the gradients of the last trace() to `sums`. `slopes`: as RayBackward::add(), for rays()
-  /// as they are made; UsageError with mirrors.
+  Buffer<RayBackward::ResultGradient>& gradients() { return levels_[0].gradients; }
+  /// Adds the gradients of the last trace() to `sums`. `ray_gradients`: as RayBackward::add(), for
+  /// rays() as they are made; UsageError with mirrors.
   void backward(const DeviceGaussians& gaussians,
                 RayBackward& sums,
-                Buffer<RayBackward::Slopes>* slopes = nullptr);
+                Buffer<RayBackward::PaddedRayGradient>* ray_gradients = nullptr);
 
   bool has_mirrors() const { return surfaces_ != nullptr; }
   /// Most rays that come of one: itself and its reflections.
@@ -61,7 +61,7 @@ class MirrorPaths {
     Buffer<std::uint32_t> starts;
     Buffer<RayResult> results;
     Buffer<std::array<float, 4>> seen;
-    Buffer<RayBackward::Gradient> gradients;
+    Buffer<RayBackward::ResultGradient> gradients;
   };
 
   std::size_t find_mirrors(std::size_t level);

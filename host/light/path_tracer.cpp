@@ -18,7 +18,7 @@
 #include "raysplats/error.hpp"
 #include "scene/gaussian_check.hpp"
 #include "scene/pixel_places.hpp"
-#include "scene/render_rows.hpp"
+#include "scene/render_option_table.hpp"
 #include "scene/row_share.hpp"
 #include "scene/shadow_bias.hpp"
 #include "trace/camera_rays.hpp"

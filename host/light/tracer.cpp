@@ -24,10 +24,11 @@ namespace raysplats {
 namespace {
 
 // Of a ray on the device, with its result and gradients.
-constexpr std::size_t kRayBytes =
-    sizeof(Ray) + sizeof(RayResult) + sizeof(RayBackward::Gradient) + sizeof(RayBackward::Slopes);
+constexpr std::size_t kRayBytes = sizeof(Ray) + sizeof(RayResult) +
+                                  sizeof(RayBackward::ResultGradient) +
+                                  sizeof(RayBackward::PaddedRayGradient);
 constexpr std::size_t kLeastBatch = 4096;
-static_assert(sizeof(RayGradient) == sizeof(RayBackward::Gradient));
+static_assert(sizeof(RayResultGradient) == sizeof(RayBackward::ResultGradient));
 
 bool finite(const float (&v)[3]) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
@@ -102,10 +103,10 @@ struct Tracer::Impl {
         sums(context_in, tracer) {}
 
   std::size_t batch() const {
-    return std::max(
-        kLeastBatch,
-        std::min<std::size_t>(MemoryShares(options, context.device()).ray_batch() / kRayBytes,
-                              context.device().max_allocation / sizeof(RayBackward::Slopes)));
+    return std::max(kLeastBatch,
+                    std::min<std::size_t>(
+                        MemoryShares(options, context.device()).ray_batch() / kRayBytes,
+                        context.device().max_allocation / sizeof(RayBackward::PaddedRayGradient)));
   }
   void require_bare_rays() const {
     if (!options.sky.empty()) {
@@ -124,7 +125,7 @@ struct Tracer::Impl {
   }
   void trace_batch(const DeviceGaussians& gaussians, std::size_t first, std::size_t count);
   RaysGradients backward(const DeviceGaussians& gaussians,
-                         std::span<const RayBackward::Gradient> gradients);
+                         std::span<const RayBackward::ResultGradient> gradients);
 
   Context& context;
   TraceOptions options;
@@ -147,8 +148,8 @@ struct Tracer::Impl {
   // Of backward().
   GaussianGradients gradients;
   Buffer<float> image_gradient;
-  Buffer<RayBackward::Gradient> ray_gradients;
-  Buffer<RayBackward::Slopes> slopes;
+  Buffer<RayBackward::ResultGradient> result_gradients;
+  Buffer<RayBackward::PaddedRayGradient> ray_gradients;
 };
 
 Tracer::Tracer(Context& context, const TraceOptions& options, Mirrors mirrors) {
@@ -244,7 +245,7 @@ ViewGradients Tracer::backward(const Model& model, const Image& gradient) {
   self.views.backward(gaussians, self.image_gradient, self.gradients,
                       known_pose ? &out.pose : nullptr);
   out.parameters = downloaded(self.gradients, gaussians.sh_degree);
-  if (const Sky* sky = self.views.sky()) out.sky = sky->slopes();
+  if (const Sky* sky = self.views.sky()) out.sky = sky->download_gradient();
   return out;
 }
 
@@ -313,7 +314,7 @@ void trace(Tracer& tracer,
   copy_out(self.context, self.results.raw(), results, count * sizeof(RayResult), "the results");
 }
 
-RaysGradients Tracer::backward(const Model& model, std::span<const RayGradient> gradients) {
+RaysGradients Tracer::backward(const Model& model, std::span<const RayResultGradient> gradients) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
@@ -326,9 +327,9 @@ RaysGradients Tracer::backward(const Model& model, std::span<const RayGradient> 
         fmt::format("There are {} gradients for the {} rays that were traced: give one for each",
                     gradients.size(), self.rays.size()));
   }
-  std::vector<RayBackward::Gradient> numbers(gradients.size());
+  std::vector<RayBackward::ResultGradient> numbers(gradients.size());
   for (std::size_t i = 0; i < gradients.size(); ++i) {
-    const RayGradient& g = gradients[i];
+    const RayResultGradient& g = gradients[i];
     if (!finite(g.color) || !std::isfinite(g.alpha)) {
       throw UsageError(
           fmt::format("The gradient of ray {} has a number that is not finite: check the loss", i));
@@ -339,21 +340,21 @@ RaysGradients Tracer::backward(const Model& model, std::span<const RayGradient> 
 }
 
 RaysGradients Tracer::Impl::backward(const DeviceGaussians& gaussians,
-                                     std::span<const RayBackward::Gradient> of_rays) {
+                                     std::span<const RayBackward::ResultGradient> of_rays) {
   RaysGradients out;
   out.rays.resize(rays.size());
   sums.begin(gaussians, {}, rays.size());
-  std::vector<RayBackward::Slopes> host_slopes;
+  std::vector<RayBackward::PaddedRayGradient> host_gradients;
   for (std::size_t first = 0; first < rays.size(); first += batch()) {
     const std::size_t count = std::min(batch(), rays.size() - first);
     if (count < rays.size()) trace_batch(gaussians, first, count);
-    ray_gradients.ensure(context, count, "ray gradients");
-    ray_gradients.upload(of_rays.subspan(first, count));
-    sums.add(gaussians, device_rays, count, results, ray_gradients, direction, &slopes);
-    host_slopes.resize(count);
-    slopes.download(std::span<RayBackward::Slopes>(host_slopes));
+    result_gradients.ensure(context, count, "ray gradients");
+    result_gradients.upload(of_rays.subspan(first, count));
+    sums.add(gaussians, device_rays, count, results, result_gradients, direction, &ray_gradients);
+    host_gradients.resize(count);
+    ray_gradients.download(std::span<RayBackward::PaddedRayGradient>(host_gradients));
     for (std::size_t i = 0; i < count; ++i) {
-      const RayBackward::Slopes& s = host_slopes[i];
+      const RayBackward::PaddedRayGradient& s = host_gradients[i];
       out.rays[first + i] = {{s[0], s[1], s[2]}, {s[4], s[5], s[6]}};
     }
   }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <optional>
@@ -25,8 +26,9 @@ namespace {
 
 constexpr std::size_t kGroup = 64;
 // A ray with its result, surface hit and gradients, and once more for a reflected one.
-constexpr std::size_t kPathBytes = 2 * (sizeof(Ray) + sizeof(RayResult) + sizeof(RsSurfaceHit) +
-                                        sizeof(RsPath) + 2 * sizeof(RayBackward::Gradient) + 4);
+constexpr std::size_t kPathBytes =
+    2 * (sizeof(Ray) + sizeof(RayResult) + sizeof(RsSurfaceHit) + sizeof(RsPath) +
+         2 * sizeof(RayBackward::ResultGradient) + 4);
 constexpr std::size_t kLeastBatch = 4096;
 constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;
 
@@ -95,7 +97,7 @@ struct ViewTracer::Rays {
   // Rays that stopped because of max_hits, as counters of 64 bits in two words.
   Buffer<std::uint32_t> capped;  // of the last view
   Buffer<std::uint32_t> traced_again;
-  Buffer<RayBackward::Slopes> slopes;
+  Buffer<RayBackward::PaddedRayGradient> ray_gradients;
 };
 
 struct ViewTracer::Impl {
@@ -112,6 +114,7 @@ struct ViewTracer::Impl {
   }
 
   void set_background(const std::array<float, 3>& color, const SkyLight& light) {
+    check_background(color);
     if (!light.empty() && !mirrors.meshes.empty()) require_no_sky();
     if (sky || !light.empty()) kept = false;
     background = light.empty() ? color : std::array<float, 3>{};
@@ -367,7 +370,7 @@ void ViewTracer::Impl::backward_rays(const DeviceGaussians& gaussians,
     kernel("load_gradients")
         .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), image_gradient,
                 paths.gradients());
-    paths.backward(gaussians, rays->sums, pose != nullptr ? &rays->slopes : nullptr);
+    paths.backward(gaussians, rays->sums, pose != nullptr ? &rays->ray_gradients : nullptr);
     if (pose != nullptr) rays->add_pose(camera, count, *pose);
   }
   rays->sums.finish(gaussians, gradients);
@@ -379,9 +382,9 @@ void ViewTracer::Rays::add_pose(const Camera& camera,
                                 std::size_t count_of_rays,
                                 PoseGradient& pose) {
   std::vector<Ray> traced(count_of_rays);
-  std::vector<RayBackward::Slopes> by_ray(count_of_rays);
+  std::vector<RayBackward::PaddedRayGradient> by_ray(count_of_rays);
   paths.rays().download(std::span<Ray>(traced));
-  slopes.download(std::span<RayBackward::Slopes>(by_ray));
+  ray_gradients.download(std::span<RayBackward::PaddedRayGradient>(by_ray));
   const glm::dvec3 center = camera.center();
   glm::dvec3 by_center(0.0), turn(0.0);
   for (std::size_t i = 0; i < count_of_rays; ++i) {

@@ -107,7 +107,7 @@ class MpiTransport : public Transport {
     }
     wait(requests, how);
   }
-  void give_up() override { given_up_ = true; }
+  void cancel() override { cancelled_ = true; }
 
   // A launcher that is ending the ranks already may leave MPI_Abort waiting.
   [[noreturn]] void abort(int code) override {
@@ -153,7 +153,7 @@ class MpiTransport : public Transport {
       if (done == MPI_UNDEFINED) return;  // nothing is open
       const Clock::time_point now = Clock::now();
       if (done > 0) news = now;
-      if (given_up_) throw Error(ErrorCode::kRuntime, "This rank has failed: see what it says");
+      if (cancelled_) throw Error(ErrorCode::kRuntime, "This rank has failed: see what it says");
       const bool rests = how == Wait::kResting;
       if (!rests && now - news < kBusy) {
         ::sched_yield();
@@ -177,7 +177,7 @@ class MpiTransport : public Transport {
   }
 
   int rank_ = 0, size_ = 1, local_rank_ = 0;
-  std::atomic<bool> given_up_ = false;
+  std::atomic<bool> cancelled_ = false;
   std::vector<pollfd> processes_;  // of ranks_
   std::vector<int> ranks_;
 };

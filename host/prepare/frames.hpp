@@ -13,7 +13,8 @@ namespace raysplats {
 
 /// Names of the files in a folder that are photos by their extension, sorted.
 std::vector<std::string> photos_in(const std::filesystem::path& folder);
-/// With those of all folders below it, as "folder/photo", but for hidden folders and `without`.
+/// Names of the photos in a folder and, as "folder/photo", in all folders below it but for hidden
+/// ones and `without`, sorted.
 std::vector<std::string> photos_below(const std::filesystem::path& folder,
                                       const std::filesystem::path& without = {});
 /// Number of files by extension that are pictures of cameras and phones in formats that are not

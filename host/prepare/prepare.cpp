@@ -272,7 +272,7 @@ void place(const ColmapPlan& plan, Work& work) {
   });
 }
 
-/// The photos to take. Those in folders below may be the same at other sizes, or masks: they are
+/// The photos to take. Folders below may hold the same photos at other sizes, or masks: theirs are
 /// taken where that is wished, and else it is said that they are there.
 std::vector<std::string> chosen_photos(const fs::path& input,
                                        const fs::path& data,

@@ -48,8 +48,8 @@ using PrepareWatch =
     std::function<bool(const std::string& step, std::size_t done, std::size_t total)>;
 
 /// Makes a data set of photos (a folder) or a video: `data`/images and `data`/sparse, by the
-/// programs colmap and ffmpeg in PATH, whose words are in `data`/prepare.log. Of a video three
-/// times as many frames as wanted are taken, and of each three the sharpest is kept. A line of the
+/// programs colmap and ffmpeg in PATH, whose words are in `data`/prepare.log. A video gives
+/// three times as many frames as wanted, and the sharpest of each three is kept. A line of the
 /// log says beforehand how long COLMAP will take, roughly, and others what was left out or chosen
 /// by the number of photos. Steps that `data` has already from the same input, by its sizes and
 /// times of writing, with the same options are not done again. Throws UsageError for a missing

@@ -72,7 +72,7 @@ glm::dvec3 color_backward(const Parameters& p,
   const auto stride = static_cast<std::size_t>(sh_coefficients(p.sh_degree));
   const int degree = std::min(p.sh_degree, p.active_sh_degree);
   const auto basis = sh_basis(degree, direction);
-  const auto slopes = sh_basis_gradient(degree, direction);
+  const auto basis_gradient = sh_basis_gradient(degree, direction);
   const glm::dvec3 clamped = color(p, i, direction);
   for (int k = 0; k < 3; ++k) {
     if (clamped[k] <= 0.0 && !(raises && color_gradient[k] < 0.0)) color_gradient[k] = 0.0;
@@ -82,7 +82,7 @@ glm::dvec3 color_backward(const Parameters& p,
     for (std::size_t k = 0; k < 3; ++k) {
       const double g = color_gradient[static_cast<int>(k)];
       out.sh[3 * (i * stride + b) + k] += g * basis[b];
-      by_direction += g * p.sh[3 * (i * stride + b) + k] * slopes[b];
+      by_direction += g * p.sh[3 * (i * stride + b) + k] * basis_gradient[b];
     }
   }
   return (by_direction - direction * glm::dot(direction, by_direction)) / distance;
@@ -100,8 +100,8 @@ void whitening_backward(const Parameters& p,
   for (int k = 0; k < 3; ++k) {
     const std::size_t at = 3 * i + static_cast<std::size_t>(k);
     const double scale = activated_scale(p.scales[at], p.activation);
-    const double log_slope = p.activation == ScaleActivation::kSigmoid ? 1.0 - scale : 1.0;
-    out.scales[at] = -log_slope * glm::dot(by_rows[k], rows[k]);
+    const double log_derivative = p.activation == ScaleActivation::kSigmoid ? 1.0 - scale : 1.0;
+    out.scales[at] = -log_derivative * glm::dot(by_rows[k], rows[k]);
     by_rotation[k] = by_rows[k] / scale;
   }
   const auto q = quaternion_gradient({p.quaternions[4 * i], p.quaternions[4 * i + 1],

@@ -14,6 +14,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kRings = 8;
 constexpr int kSpokes = 32;
+constexpr double kRoundCosine = 0.73;  ///< of corner normals with the triangle's: 43 degrees
 
 glm::dvec3 vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
 
@@ -38,7 +39,8 @@ LightAt light_at(const Light& light, const glm::dvec3& point) {
 }
 
 /// The mean of the point's projections onto the planes of the corners and their normals, those that
-/// it lies behind, weighted as the corners are (Hanika 2021, Hacking the Shadow Terminator).
+/// it lies behind, weighted as the corners are (Hanika 2021, Hacking the Shadow Terminator). Of
+/// corners whose normals lean farther than those of something round: the point itself.
 glm::dvec3 shadow_origin(const Triangle& triangle,
                          const glm::dvec3& weights,
                          const glm::dvec3& point,
@@ -50,7 +52,8 @@ glm::dvec3 shadow_origin(const Triangle& triangle,
     glm::dvec3 n = triangle.normals[corner];
     if (glm::length(n) > 0.0) {
       n = glm::normalize(glm::dot(n, geometric_normal) < 0.0 ? -n : n);
-      projected -= std::min(0.0, glm::dot(point - triangle.corners[corner], n)) * n;
+      if (glm::dot(n, geometric_normal) >= kRoundCosine)
+        projected -= std::min(0.0, glm::dot(point - triangle.corners[corner], n)) * n;
     }
     out += weights[k] * projected;
   }

@@ -36,13 +36,14 @@ glm::dvec3 light_behind_gradient(const TraceOptions& options,
   const double length = glm::length(direction);
   const glm::dvec3 unit = direction / length;
   const glm::dvec3 color = sky_sum(options.sky, unit);
-  const auto slopes = sh_basis_gradient(degree_of(options.sky), unit);
+  const auto basis_gradient = sh_basis_gradient(degree_of(options.sky), unit);
   glm::dvec3 by_unit(0.0);
   for (std::size_t k = 0; k < options.sky.size(); ++k) {
     for (std::size_t c = 0; c < 3; ++c) {
       const int channel = static_cast<int>(c);
       if (color[channel] <= 0.0) continue;
-      by_unit += color_gradient[channel] * static_cast<double>(options.sky[k][c]) * slopes[k];
+      by_unit +=
+          color_gradient[channel] * static_cast<double>(options.sky[k][c]) * basis_gradient[k];
     }
   }
   return (by_unit - unit * glm::dot(unit, by_unit)) / length;

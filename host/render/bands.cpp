@@ -16,7 +16,7 @@ void collect_rows(Communicator& ranks, const std::array<int, 2>& rows, Image& im
                                       .subspan(row * static_cast<std::size_t>(r[0]),
                                                row * static_cast<std::size_t>(r[1] - r[0])));
   };
-  const std::vector<std::array<int, 2>> all = ranks.all(rows);
+  const std::vector<std::array<int, 2>> all = ranks.all_gather(rows);
   std::vector<Outgoing> out;
   std::vector<Incoming> in;
   if (!ranks.leads()) out.push_back({0, of_rows(rows)});

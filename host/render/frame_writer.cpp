@@ -88,7 +88,7 @@ Exposed exposed(Tracer& tracer,
     Image picture =
         tracer.render(model, downscaled(camera, 1.0 / options.supersample), false,
                       [&](double share) { return !within || within((k + share) / moments); });
-    if (ranks.any(picture.data.empty())) return {};
+    if (ranks.all_reduce_or(picture.data.empty())) return {};
     collect_rows(ranks, tracer.rows(), picture);
     if (options.depth || options.hits) {
       Image depth = tracer.depth();
@@ -218,7 +218,7 @@ FrameReport write_frames(Tracer& tracer,
     report.capped_rays += samples.capped_rays;
     // What follows is left to the one that leads.
     if (!ranks.leads()) {
-      if (ranks.any(done && !done(report.frames))) break;
+      if (ranks.all_reduce_or(done && !done(report.frames))) break;
       continue;
     }
     report.rays += samples.rgba.pixels() * static_cast<std::uint64_t>(options.shutter_samples);
@@ -229,7 +229,7 @@ FrameReport write_frames(Tracer& tracer,
           downscaled(camera_between(cameras, i, last, options.closed), 1.0 / options.supersample),
           within);
       if (sums.data.empty()) {
-        ranks.any(true);
+        ranks.all_reduce_or(true);
         break;
       }
       layers.normals = unit_normals(box_average(sums, options.supersample));
@@ -237,7 +237,7 @@ FrameReport write_frames(Tracer& tracer,
     write_frame(folder / names[i], box_average(samples.rgba, options.supersample), cameras[i],
                 layers, options);
     ++report.frames;
-    if (ranks.any(done && !done(report.frames))) break;
+    if (ranks.all_reduce_or(done && !done(report.frames))) break;
   }
   tracer.set_share(0, 1);
   return report;

@@ -5,10 +5,14 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <system_error>
 
+#include "io/dataset_advice.hpp"
 #include "raysplats/error.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats {
 namespace {
@@ -16,6 +20,49 @@ namespace {
 bool same(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code error;
   return std::filesystem::equivalent(a, b, error) && !error;
+}
+
+// Where the formats that are read have their pictures.
+constexpr const char* kPictureFolders[] = {"images",
+                                           "images_2",
+                                           "images_4",
+                                           "images_8",
+                                           "train",
+                                           "test",
+                                           "val",
+                                           "input",
+                                           "masks",
+                                           "mask",
+                                           "depths",
+                                           "keyframes/images",
+                                           "keyframes/corrected_images",
+                                           "keyframes/depth"};
+
+// The folders of the files that transforms*.json in `root` name. What cannot be read names none.
+std::set<std::filesystem::path> named_folders(const std::filesystem::path& root) {
+  std::set<std::filesystem::path> out;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(root, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::filesystem::path& path = entry->path();
+    if (path.extension() != ".json" || !path.filename().string().starts_with("transforms"))
+      continue;
+    std::ifstream stream(path, std::ios::binary);
+    const nlohmann::json json = nlohmann::json::parse(stream, nullptr, false);
+    if (!json.is_object() || !json.contains("frames")) continue;
+    for (const nlohmann::json& frame : json["frames"]) {
+      if (!frame.is_object()) continue;
+      for (const auto& [key, value] : frame.items()) {
+        if (key.ends_with("path") && value.is_string())
+          out.insert((root / value.get<std::string>()).parent_path());
+      }
+    }
+  }
+  return out;
+}
+
+bool is_run(const std::filesystem::path& folder) {
+  return is_file(folder / "config.toml") && is_file(folder / "cameras.json");
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& output, const std::filesystem::path& data) {
@@ -41,11 +88,38 @@ void check_not_data(const std::filesystem::path& output, const std::filesystem::
   if (!std::filesystem::is_directory(data, error)) {
     root = data.has_parent_path() ? data.parent_path() : ".";
   }
-  // Where the formats that are read have their photos.
-  for (const char* folder :
-       {".", "images", "images_2", "images_4", "images_8", "train", "test", "val"}) {
+  if (same(output, root)) refuse(output, data);
+  for (const char* folder : kPictureFolders) {
     if (same(output, root / folder)) refuse(output, data);
   }
+}
+
+std::optional<std::filesystem::path> data_set_of(const std::filesystem::path& folder) {
+  if (is_run(folder)) return std::nullopt;
+  if (io::looks_like_dataset(folder)) return folder;
+  std::error_code error;
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(folder, error);
+  const std::optional<std::filesystem::path> root = io::enclosing_data_set(whole);
+  if (error || !root) return std::nullopt;
+  std::set<std::filesystem::path> pictures = named_folders(*root);
+  for (const char* name : kPictureFolders) pictures.insert(*root / name);
+  for (std::filesystem::path part = whole; !same(part, *root) && part.has_relative_path();
+       part = part.parent_path()) {
+    if (is_run(part)) return std::nullopt;
+    for (const std::filesystem::path& each : pictures) {
+      if (same(part, each)) return root;
+    }
+  }
+  return std::nullopt;
+}
+
+void check_outside_data(const std::filesystem::path& output) {
+  const std::optional<std::filesystem::path> data = data_set_of(output);
+  if (!data) return;
+  throw UsageError(fmt::format(
+      "The output folder {} belongs to the data set {}, whose photos could be lost: choose another "
+      "with -o, or write there all the same with --overwrite",
+      output.string(), data->string()));
 }
 
 void check_leftovers(const std::filesystem::path& output,

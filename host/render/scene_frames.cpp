@@ -83,7 +83,7 @@ SceneReport write_scene_frames(PathTracer& tracer,
     report.trace_seconds +=
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
         (tracer.context().build_seconds() - built);
-    if (ranks.any(rgba.pixels() == 0)) break;
+    if (ranks.all_reduce_or(rgba.pixels() == 0)) break;
     collect_rows(ranks, tracer.rows(), rgba);
     // What follows is left to the one that leads.
     if (ranks.leads()) {
@@ -92,14 +92,14 @@ SceneReport write_scene_frames(PathTracer& tracer,
         if (scene.moves()) tracer.set_meshes(scene.meshes(static_cast<double>(i)));
         layers = layers_of(tracer, scene.cameras[i], within);
         if (layers.alpha.data.empty()) {
-          ranks.any(true);
+          ranks.all_reduce_or(true);
           break;
         }
       }
       write_frame(folder / names[i], rgba, scene.cameras[i], layers, options);
       ++report.frames;
     }
-    if (ranks.any(done && !done(report.frames))) break;
+    if (ranks.all_reduce_or(done && !done(report.frames))) break;
   }
   tracer.set_share(0, 1);
   tracer.set_sampling(scene.scene.render.samples, scene.scene.render.seed);

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "util/utf8.hpp"
+
 namespace raysplats::report {
 namespace {
 
@@ -26,34 +28,12 @@ figure{margin:14px 0}img{max-width:100%;min-width:min(100%,640px);height:auto}pr
 h2{break-after:avoid}figure,svg,tr{break-inside:avoid}img{min-width:0;max-height:9cm}details{display:none}table{display:table}td,th{overflow-wrap:anywhere}svg,.warn{print-color-adjust:exact}}
 )";
 
-/// Bytes of the character that starts here, 0 when it is no UTF-8.
-std::size_t character(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const std::size_t size = byte(0) < 0x80   ? 1
-                           : byte(0) < 0xc2 ? 0
-                           : byte(0) < 0xe0 ? 2
-                           : byte(0) < 0xf0 ? 3
-                           : byte(0) < 0xf5 ? 4
-                                            : 0;
-  if (size > text.size()) return 0;
-  for (std::size_t i = 1; i < size; ++i) {
-    if ((byte(i) & 0xc0) != 0x80) return 0;
-  }
-  // Too long a form, and what UTF-8 has no characters for.
-  if (size == 3 && ((byte(0) == 0xe0 && byte(1) < 0xa0) || (byte(0) == 0xed && byte(1) > 0x9f) ||
-                    (byte(0) == 0xef && byte(1) == 0xbf && byte(2) > 0xbd)))
-    return 0;
-  if (size == 4 && ((byte(0) == 0xf0 && byte(1) < 0x90) || (byte(0) == 0xf4 && byte(1) > 0x8f)))
-    return 0;
-  return size;
-}
-
 }  // namespace
 
 std::string escaped(std::string_view text) {
   std::string out;
   while (!text.empty()) {
-    const std::size_t size = character(text);
+    const std::size_t size = utf8_character(text);
     const char c = text.front();
     const bool control = static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t';
     if (size == 0 || control) {

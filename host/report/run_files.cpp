@@ -80,6 +80,12 @@ std::string text(const Json& json, const char* key) {
   return found != json.end() && found->is_string() ? found->get<std::string>() : "";
 }
 
+std::string last_command(const Json& metrics) {
+  const auto list = metrics.find("commands");
+  const bool some = list != metrics.end() && list->is_array() && !list->empty();
+  return some && list->back().is_string() ? list->back().get<std::string>() : "";
+}
+
 std::vector<Json> objects(const Json& json, const char* key) {
   std::vector<Json> out;
   const auto found = json.find(key);

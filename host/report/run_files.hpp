@@ -28,6 +28,8 @@ std::string text_of(const std::filesystem::path& path);
 double number(const nlohmann::json& json, const char* key);
 /// A text of a JSON object; "" when it has none.
 std::string text(const nlohmann::json& json, const char* key);
+/// The command that the run was last resumed by, of its metrics.json; "" for one that never was.
+std::string last_command(const nlohmann::json& metrics);
 /// The objects of a list.
 std::vector<nlohmann::json> objects(const nlohmann::json& json, const char* key);
 

@@ -169,6 +169,8 @@ std::string origin(const Json& metrics) {
     const std::string value = text(metrics, key);
     if (!value.empty()) rows += row(name, value);
   }
+  if (const std::string last = last_command(metrics); !last.empty())
+    rows += row("Resumed, last by", last);
   // Its 64 bits are more than a double has.
   const auto seed = metrics.find("seed");
   if (seed != metrics.end() && seed->is_number_integer()) rows += row("Seed", seed->dump());
@@ -190,6 +192,13 @@ std::string configuration(const fs::path& run) {
 }
 
 }  // namespace
+
+std::vector<fs::path> report_inputs(const fs::path& run) {
+  std::vector<fs::path> files{run / "metrics.json", run / "metrics.csv", run / "config.toml",
+                              run / "cameras.json", run / "exposures.json"};
+  if (const fs::path model = newest_model(run); !model.empty()) files.push_back(model);
+  return files;
+}
 
 std::string run_report(const fs::path& run) {
   const Json metrics = metrics_of(run);

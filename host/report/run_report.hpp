@@ -13,6 +13,9 @@ namespace raysplats {
 /// for a folder that is no run or whose files are damaged.
 std::string run_report(const std::filesystem::path& run);
 
+/// The files of a run that its page is made from, those that are not there among them; no pictures.
+std::vector<std::filesystem::path> report_inputs(const std::filesystem::path& run);
+
 /// Writes run_report() atomically.
 void write_run_report(const std::filesystem::path& run, const std::filesystem::path& file);
 

@@ -35,7 +35,8 @@ double itself(double value) { return value; }
 double octaves(double sharpness) { return std::log2(std::max(sharpness, 1e-12)); }
 
 /// The views whose number `key`, on its `scale`, lies far below the median: by 3.5 robust standard
-/// deviations (Iglewicz and Hoaglin 1993) and by `least`. Those without that number are left out.
+/// deviations (Iglewicz and Hoaglin 1993) and by `least`. Views without that number are left
+/// out.
 std::vector<Json> far_below(std::vector<Json> views,
                             const char* key,
                             double (*scale)(double),

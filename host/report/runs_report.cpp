@@ -131,14 +131,17 @@ std::string facts(const std::vector<Run>& runs) {
   out += numbers_row("Training, s", runs, "{:.0f}", metric("training_seconds"));
   out += numbers_row("Device memory at most, MiB", runs, "{:.0f}",
                      metric("peak_device_bytes", 1.0 / 1048576.0));
-  for (const Origin& origin : kOrigins) {
-    const auto value = [&](const Run& run) { return text(run.metrics, origin.key); };
+  const auto texts = [&](const char* name, const auto& value) {
     if (std::all_of(runs.begin(), runs.end(), [&](const Run& run) { return value(run).empty(); }))
-      continue;
-    out += fmt::format("<tr><th>{}</th>", escaped(origin.name));
+      return;
+    out += fmt::format("<tr><th>{}</th>", escaped(name));
     for (const Run& run : runs) out += fmt::format("<td>{}</td>", escaped(value(run)));
     out += "</tr>\n";
+  };
+  for (const Origin& origin : kOrigins) {
+    texts(origin.name, [&](const Run& run) { return text(run.metrics, origin.key); });
   }
+  texts("Resumed, last by", [](const Run& run) { return last_command(run.metrics); });
   return out + "</table>\n";
 }
 

@@ -40,6 +40,19 @@ std::vector<Json> named(const Json& of, const char* key) {
   return out;
 }
 
+// The commands that the run had, the one that started it first.
+Json commands_of(const Json& of) {
+  Json out = Json::array();
+  const auto list = of.find("commands");
+  if (list != of.end() && list->is_array()) {
+    for (const Json& each : *list) {
+      if (each.is_string()) out.push_back(each);
+    }
+  }
+  if (out.empty()) out.push_back(of.at("command"));
+  return out;
+}
+
 struct Kernel {
   std::uint64_t calls = 0;
   double ms = 0;
@@ -95,8 +108,12 @@ Json continued_metrics(Json now, const Json& former, bool stepped) {
     for (const char* key : kOfNow) out[key] = now.at(key);
     return out;
   }
-  if (const std::string command = text(former, "command"); !command.empty())
+  if (const std::string command = text(former, "command"); !command.empty()) {
+    now["commands"] = commands_of(former);
+    if (const std::string last = text(now, "command"); !last.empty())
+      now["commands"].push_back(last);
     now["command"] = command;
+  }
   now["kernel_build_seconds"] =
       former_number(now, "kernel_build_seconds") + former_number(former, "kernel_build_seconds");
   now["peak_device_bytes"] =

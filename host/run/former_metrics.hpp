@@ -12,9 +12,9 @@ namespace raysplats {
 /// unknown.
 
 /// `now` is of the part since then, and of all of the run where checkpoints know it. Returns what
-/// is true of all of it: the command that started it, the kernels of all timed steps on this
-/// device, the most memory, the time for building kernels. Without a step since then what steps
-/// said stays as it was.
+/// is true of all of it: the command that started it, all "commands" in their order, the kernels of
+/// all timed steps on this device, the most memory, the time for building kernels. Without a step
+/// since then what steps said stays as it was.
 nlohmann::json continued_metrics(nlohmann::json now, const nlohmann::json& former, bool stepped);
 
 /// The facts about each training photo, by its name.

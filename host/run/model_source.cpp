@@ -45,7 +45,8 @@ void read_options(ModelSource& source, const std::filesystem::path& run) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(config_of(run), error)) return;
   source.trained.emplace();
-  read_train_config(config_of(run), *source.trained);
+  source.config = config_of(run);
+  read_train_config(source.config, *source.trained);
 }
 
 void read_header(ModelSource& source) {

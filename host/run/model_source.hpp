@@ -18,7 +18,8 @@ namespace raysplats {
 struct ModelSource {
   std::filesystem::path file;
   std::optional<TrainOptions>
-      trained;  ///< of the run folder it is in; none for a PLY from elsewhere
+      trained;                   ///< of the run folder it is in; none for a PLY from elsewhere
+  std::filesystem::path config;  ///< that says so, where one does
   std::optional<TraceOptions> header;     ///< what the header of a PLY says
   SkyLight sky;                           ///< that the header of a PLY names
   std::optional<std::int64_t> iteration;  ///< of RUN/point_cloud/iteration_N

@@ -2,6 +2,7 @@
 #include "run/train_config.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -16,9 +17,9 @@
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "run/checkpoint.hpp"
-#include "run/train_keys.hpp"
+#include "run/train_option_table.hpp"
 #include "scene/option_flags.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 #include "util/file_kind.hpp"
 #include "util/nearest_name.hpp"
 
@@ -135,7 +136,7 @@ std::set<std::string> read_text(const std::string& text,
                                 const std::function<bool(const std::string&)>& skip) {
   const toml::table root = io::parse_toml(text.starts_with(kRunMark) ? modern(text) : text, path);
   std::set<std::string> seen;
-  read_keys(root, "", path, train_keys(options), seen, skip);
+  read_keys(root, "", path, train_option_rows(options), seen, skip);
   return seen;
 }
 
@@ -215,10 +216,24 @@ void apply_run_text(CLI::App& app,
   if (!given("footprint")) options.footprint = 0;
 }
 
+// What the run goes on with besides what it had: "iterations 48000 (1500), seed 8 (7)". What the
+// photos choose, of which its configuration names the choice, stays as it was chosen.
+std::string changes(TrainOptions before, TrainOptions after) {
+  const std::vector<OptionRow> were = train_option_rows(before), are = train_option_rows(after);
+  std::string out;
+  for (std::size_t i = 0; i < are.size(); ++i) {
+    const std::string was = were[i].text(), is = are[i].text();
+    const bool chosen = is == toml_text("auto") || (are[i].name == "color-range" && is == "0");
+    if (was != is && !chosen)
+      out += fmt::format("{}{} {} ({})", out.empty() ? "" : ", ", are[i].name, is, was);
+  }
+  return out;
+}
+
 }  // namespace
 
 void add_train_options(CLI::App& app, TrainOptions& options) {
-  for (const OptionRow& key : train_keys(options)) {
+  for (const OptionRow& key : train_option_rows(options)) {
     const char* names = key.name == "iterations" ? "-n" : key.name == "mirrors" ? "--mirror" : "";
     CLI::Option* option = add_row(app, key, key.set, names);
     option->default_str(shell_text(key.text()))->group(key.section);
@@ -245,12 +260,19 @@ void apply_resumed_options(CLI::App& app,
                            TrainOptions& options,
                            const std::filesystem::path& source) {
   const std::optional<std::filesystem::path> run = run_folder_of(source);
+  bool known = true;
   if (run && is_file(*run / kRunConfig)) {
     apply_run_text(app, options, file_text(*run / kRunConfig), *run / kRunConfig);
   } else if (const std::string text = checkpoint_config(source); !text.empty()) {
     apply_run_text(app, options, text, kCheckpointConfig);
+  } else {
+    known = false;
   }
+  const TrainOptions before = options;
   const std::set<std::string> named = apply_given_config(app, options);
+  // What the command line itself says is no surprise.
+  if (const std::string other = changes(before, options); known && !other.empty())
+    spdlog::warn("the run goes on with other options than it had, by --config: {}", other);
   // The end of a run by time is not that of a run which is given another length.
   const auto given = [&](const char* key) { return named.count(key) > 0 || given_on(app)(key); };
   if (given("iterations") && !given("end-iteration")) options.end_iteration = 0;
@@ -272,7 +294,7 @@ std::string to_toml(const TrainOptions& options) {
   TrainOptions copy = options;
   std::string out;
   std::string section;
-  for (const OptionRow& key : train_keys(copy)) {
+  for (const OptionRow& key : train_option_rows(copy)) {
     if (key.section != section) {
       section = key.section;
       out += fmt::format("{}# ---- {} ----\n", out.empty() ? "" : "\n", section);

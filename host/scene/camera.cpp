@@ -1,15 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raysplats/camera.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
+
+#include "raysplats/error.hpp"
 
 namespace raysplats {
 
 Camera downscaled(const Camera& camera, double factor) {
+  const double side = std::max(camera.width, camera.height) / factor;
+  // Written so that NaN is refused.
+  if (!(factor > 0.0) || !(side <= std::numeric_limits<int>::max())) {
+    throw UsageError(
+        fmt::format("Camera '{}' of {} x {} pixels cannot be downscaled by {}: give a positive "
+                    "factor that leaves a size",
+                    camera.name, camera.width, camera.height, factor));
+  }
   Camera out = camera;
   out.width = std::max(1, static_cast<int>(std::lround(camera.width / factor)));
   out.height = std::max(1, static_cast<int>(std::lround(camera.height / factor)));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <initializer_list>
 
 #include "raysplats/error.hpp"
@@ -37,6 +38,17 @@ double strongest_term(const Camera& camera) {
 }
 
 }  // namespace
+
+bool is_rotation(const glm::dmat3& matrix) {
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      const double off = glm::dot(matrix[a], matrix[b]) - (a == b ? 1.0 : 0.0);
+      // Written so that NaN is off.
+      if (!(std::abs(off) <= kRotationTolerance)) return false;
+    }
+  }
+  return glm::determinant(matrix) > 0.0;
+}
 
 void require_believable(const Camera& camera, const std::string& what) {
   const glm::dvec3 center = camera.center();

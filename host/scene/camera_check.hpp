@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <glm/mat3x3.hpp>
 #include <string>
 
 #include "raysplats/camera.hpp"
@@ -16,6 +17,13 @@ constexpr double kLeastFov = 0.001;
 constexpr double most_fov(CameraModel model) {
   return model == CameraModel::kFisheye ? 360.0 : 179.9;
 }
+
+/// Deviation from a rotation that rounding may cause: of files, and of single precision.
+constexpr double kRotationTolerance = 1e-3;
+
+/// Whether the columns have length 1 and right angles, up to kRotationTolerance in any of their
+/// products, and do not mirror.
+bool is_rotation(const glm::dmat3& matrix);
 
 /// Throws DataError, which names `what` ("the camera of a.png"), for a camera that no photo can
 /// have been taken with: one that is more than 1e9 from the origin or whose lens moves the corner

@@ -37,15 +37,10 @@ Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indice
   return out;
 }
 
-std::vector<std::uint32_t> within(const Gaussians& model, const CropBox& box) {
+std::vector<std::uint32_t> within(const Gaussians& model, const Bounds& box) {
   return kept(model, [&](std::uint32_t i) {
-    bool inside = true;
-    for (int k = 0; k < 3; ++k) {
-      const auto x =
-          static_cast<double>(model.means[3 * std::size_t{i} + static_cast<std::size_t>(k)]);
-      inside = inside && x >= box.low[k] && x <= box.high[k];
-    }
-    return inside;
+    const float* mean = &model.means[3 * std::size_t{i}];
+    return box.contains(mean[0], mean[1], mean[2]);
   });
 }
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "raysplats/bounds.hpp"
 #include "raysplats/gaussians.hpp"
-#include "raysplats/model_changes.hpp"
 
 namespace raysplats {
 
@@ -15,7 +15,7 @@ namespace raysplats {
 Gaussians gathered(const Gaussians& model, std::span<const std::uint32_t> indices);
 
 /// The indices of Gaussians whose means lie within the box, borders included.
-std::vector<std::uint32_t> within(const Gaussians& model, const CropBox& box);
+std::vector<std::uint32_t> within(const Gaussians& model, const Bounds& box);
 
 /// Numbers of the Gaussians of at least this opacity, 0 to 1.
 std::vector<std::uint32_t> with_opacity(const Gaussians& model, double least);

@@ -41,8 +41,8 @@ glm::dmat4 uprighting(const glm::dvec3& up) {
   return glm::rotate(glm::dmat4(1.0), std::atan2(sine, cosine), axis / sine);
 }
 
-void check_box(const CropBox& box) {
-  for (int i = 0; i < 3; ++i) {
+void check_box(const Bounds& box) {
+  for (std::size_t i = 0; i < 3; ++i) {
     if (box.low[i] <= box.high[i]) continue;
     throw UsageError(fmt::format(
         "The box to crop to has no inside: its least {} is {} and its greatest {}: swap "

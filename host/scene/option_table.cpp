@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "raysplats/error.hpp"
+#include "util/utf8.hpp"
 
 namespace raysplats {
 namespace {
@@ -25,6 +26,13 @@ const std::string& quotable(const std::string& key, const std::string& value) {
         "The option '{}' takes no double quotes, no control characters and no single quotes "
         "beside backslashes",
         key));
+  }
+  // As TOML is; a configuration with anything else could not be read again.
+  if (!is_utf8(value)) {
+    throw UsageError(
+        fmt::format("The option '{}' takes UTF-8 alone, as configurations are written in: give the "
+                    "file or folder another name",
+                    key));
   }
   return value;
 }
@@ -219,7 +227,7 @@ void OptionTable::paths(const std::string& name,
         target.clear();
         for (const std::string& value : values) {
           if (value.empty() || value == "[]") continue;
-          target.push_back(std::filesystem::absolute(quotable(name, value)).string());
+          target.push_back(quotable(name, std::filesystem::absolute(value).string()));
         }
       },
       [&target] {

@@ -246,10 +246,10 @@ Camera bench_camera(int width, int height) {
   return camera;
 }
 
-std::vector<BenchRay> bench_rays(std::size_t count, std::uint64_t seed) {
-  std::vector<BenchRay> rays(count);
+std::vector<Ray> bench_rays(std::size_t count, std::uint64_t seed) {
+  std::vector<Ray> rays(count);
   CounterRng rng(seed, kRayStream);
-  for (BenchRay& ray : rays) {
+  for (Ray& ray : rays) {
     const glm::dvec3 through = uniform_in_cube(rng, 1.0);
     const glm::dvec3 direction = uniform_direction(rng);
     const glm::dvec3 origin = through - kCameraDistance * direction;

@@ -9,6 +9,7 @@
 
 #include "raysplats/camera.hpp"
 #include "raysplats/gaussians.hpp"
+#include "raysplats/rays.hpp"
 #include "raysplats/scene.hpp"
 
 namespace raysplats {
@@ -31,17 +32,9 @@ Gaussians bench_scene(const std::string& name,
 /// Camera at (0, 0, -4) that looks along +z; the front face of [-1, 1]^3 fills the image.
 Camera bench_camera(int width, int height);
 
-/// A ray origin + t direction, t in [t_min, t_max]: the eight floats that ray tracers take.
-struct BenchRay {
-  float origin[3];
-  float t_min;
-  float direction[3];
-  float t_max;
-};
-
 /// Rays without coherence that all cross [-1, 1]^3: each passes through a uniform point of the cube
 /// in a uniform direction of length 1, and starts 4 units before that point, outside the cube.
-std::vector<BenchRay> bench_rays(std::size_t count, std::uint64_t seed);
+std::vector<Ray> bench_rays(std::size_t count, std::uint64_t seed);
 
 /// A closed body with bumps: a grid of n x 2 n cells on a sphere, two triangles each, as many as
 /// come nearest to `triangles` (at least 8), with smooth normals and material 0.

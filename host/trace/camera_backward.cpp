@@ -51,23 +51,23 @@ void CameraTracer::Impl::backward_face(const DeviceGaussians& gaussians,
   const auto band = static_cast<std::uint32_t>(
       std::max<std::size_t>(1, all * streams.capacity() * 3 / 4 / wanted));
   for (std::uint32_t row = 0; row < all; row += band) {
-    backward_rows(gaussians, image_gradient, row,
-                  std::min(band, static_cast<std::uint32_t>(all) - row));
+    backward_tile_rows(gaussians, image_gradient, row,
+                       std::min(band, static_cast<std::uint32_t>(all) - row));
   }
 }
 
 // Traces rows again with the pool to themselves, then runs them backwards; halves them until their
 // hits fit.
-void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
-                                       const Buffer<float>& image_gradient,
-                                       std::uint32_t row,
-                                       std::uint32_t rows) {
+void CameraTracer::Impl::backward_tile_rows(const DeviceGaussians& gaussians,
+                                            const Buffer<float>& image_gradient,
+                                            std::uint32_t row,
+                                            std::uint32_t rows) {
   counters.clear();
-  trace_rows(gaussians, row, rows);
+  trace_tile_rows(gaussians, row, rows);
   const std::size_t wanted = counters.read(RS_COUNT_CHUNKS);
   if (wanted > streams.capacity() && rows > 1) {
-    backward_rows(gaussians, image_gradient, row, rows / 2);
-    backward_rows(gaussians, image_gradient, row + rows / 2, rows - rows / 2);
+    backward_tile_rows(gaussians, image_gradient, row, rows / 2);
+    backward_tile_rows(gaussians, image_gradient, row + rows / 2, rows - rows / 2);
     return;
   }
   // A row of tiles is the least, whatever its share of the budget.
@@ -81,7 +81,7 @@ void CameraTracer::Impl::backward_rows(const DeviceGaussians& gaussians,
     }
     streams.grow(wanted, wanted);
     counters.clear();
-    trace_rows(gaussians, row, rows);
+    trace_tile_rows(gaussians, row, rows);
   }
   launch_backward(image_gradient, row, rows);
 }

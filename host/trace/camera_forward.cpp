@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "device/fault_injection.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer_impl.hpp"
 
@@ -47,9 +47,9 @@ void CameraTracer::Impl::trace_faces(const DeviceGaussians& gaussians, bool keep
 }
 
 // Traces rows of tiles with the whole pool of chunks.
-void CameraTracer::Impl::trace_rows(const DeviceGaussians& gaussians,
-                                    std::uint32_t row,
-                                    std::uint32_t rows) {
+void CameraTracer::Impl::trace_tile_rows(const DeviceGaussians& gaussians,
+                                         std::uint32_t row,
+                                         std::uint32_t rows) {
   room = static_cast<std::uint32_t>(streams.capacity());
   trace_window(gaussians, tile_window(row, rows), true);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "raysplats/error.hpp"
+#include "scene/camera_check.hpp"
 #include "scene/camera_model.hpp"
 #include "shared/layout.h"
 
@@ -89,6 +90,12 @@ void require_pixels(const Camera& camera) {
   if (!std::isfinite(sum)) {
     throw UsageError(fmt::format(
         "Camera '{}' has a pose or a lens that is not finite: correct its numbers", camera.name));
+  }
+  if (!is_rotation(camera.rotation)) {
+    throw UsageError(fmt::format(
+        "Camera '{}' has a rotation that scales, shears or mirrors: give rows of length 1 at right "
+        "angles, with a determinant of 1",
+        camera.name));
   }
 }
 

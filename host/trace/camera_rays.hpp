@@ -27,8 +27,8 @@ struct Lens {
 int camera_model_number(CameraModel model);
 RsLensCamera lens_camera(const Camera& camera, const Lens& lens);
 
-/// Throws UsageError for a camera without pixels or focal length, or with a number that is not
-/// finite.
+/// Throws UsageError for a camera without pixels or focal length, with a number that is not finite,
+/// or with a rotation that is none.
 void require_pixels(const Camera& camera);
 
 /// Where rays of the camera take the colour of Gaussians from: seen from its centre, or along each

@@ -9,7 +9,7 @@
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
 #include "scene/planes.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer_impl.hpp"
 

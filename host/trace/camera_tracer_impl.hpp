@@ -34,17 +34,17 @@ struct CameraTracer::Impl {
   void trace_faces(const DeviceGaussians& gaussians, bool keep);
   bool can_trace_ahead() const;
   void trace_ahead(const DeviceGaussians& gaussians);
-  void trace_rows(const DeviceGaussians& gaussians, std::uint32_t row, std::uint32_t rows);
+  void trace_tile_rows(const DeviceGaussians& gaussians, std::uint32_t row, std::uint32_t rows);
   void trace_window(const DeviceGaussians& gaussians, const TileWindow& window, bool keep);
   void launch_forward(const TileWindow& window, bool keep);
   Kernel& forward_kernel(int lens, bool keep);
 
   // camera_backward.cpp: from hits to gradients of lines, and from those to parameters.
   void backward_face(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient);
-  void backward_rows(const DeviceGaussians& gaussians,
-                     const Buffer<float>& image_gradient,
-                     std::uint32_t row,
-                     std::uint32_t rows);
+  void backward_tile_rows(const DeviceGaussians& gaussians,
+                          const Buffer<float>& image_gradient,
+                          std::uint32_t row,
+                          std::uint32_t rows);
   Kernel backward_kernel(int lens, const GradientSumChoice& choice, bool with_depth);
   GaussianKernel finalize_kernel(
       const DeviceGaussians& gaussians, int lens, bool with_depth, bool accumulate, bool pose);
@@ -76,7 +76,7 @@ struct CameraTracer::Impl {
             static_cast<std::int32_t>(rows)};
   }
   const std::vector<int>& faces() const;
-  const PacketShape& packet() const { return kernels.shape(); }
+  const PacketLayout& packet() const { return kernels.layout(); }
   // RS_VIEW_ARGUMENTS of cl/trace/arguments.h.
   auto view_arguments() const {
     const bool bent = lens_kind != RS_LENS_PINHOLE;

@@ -8,7 +8,7 @@
 #include "device/context.hpp"
 #include "device/kernel.hpp"
 #include "raysplats/trace_options.hpp"
-#include "trace/packet_shape.hpp"
+#include "trace/packet_layout.hpp"
 
 namespace raysplats {
 
@@ -24,9 +24,11 @@ class PacketKernels {
  public:
   PacketKernels(Context& context, const TraceOptions& options);
 
-  const PacketShape& shape() const { return shape_; }
+  const PacketLayout& layout() const { return layout_; }
   /// Work-items of a packet.
-  std::size_t items() const { return shape_.grouped ? static_cast<std::size_t>(shape_.lanes) : 1; }
+  std::size_t items() const {
+    return layout_.grouped ? static_cast<std::size_t>(layout_.lanes) : 1;
+  }
 
   /// What the kernels of both passes are built with, besides their own.
   BuildOptions build(int lens_kind) const;
@@ -43,8 +45,8 @@ class PacketKernels {
   Kernel group_kernel(const char* file, const char* name, const BuildOptions& build);
 
   Context& context_;
-  PacketForm form_;
   PacketShape shape_;
+  PacketLayout layout_;
 };
 
 }  // namespace raysplats

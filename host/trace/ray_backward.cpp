@@ -52,7 +52,7 @@ RayBackward::RayBackward(Context& context, const RayTracer& tracer)
     : context_(&context),
       tracer_(&tracer),
       order_(context),
-      no_slopes_(context, 1, "no gradients of rays"),
+      no_ray_gradients_(context, 1, "no gradients of rays"),
       sums_(context, "ray gradient sums"),
       budget_(tracer.options().launch_budget_ms, context.device().type) {}
 
@@ -104,9 +104,9 @@ void RayBackward::add(const DeviceGaussians& gaussians,
                       const Buffer<Ray>& rays,
                       std::size_t count,
                       const Buffer<RayResult>& results,
-                      const Buffer<Gradient>& gradients,
+                      const Buffer<ResultGradient>& gradients,
                       ColorDirection color_direction,
-                      Buffer<Slopes>* slopes) {
+                      Buffer<PaddedRayGradient>* ray_gradients) {
   if (!begun_ || count_ != gaussians.count || revision_ != gaussians.revision ||
       degree_ != gaussians.active_sh_degree) {
     throw UsageError("RayBackward::begin() must come before add(), for the same Gaussians");
@@ -124,9 +124,9 @@ void RayBackward::add(const DeviceGaussians& gaussians,
                     rays_, taken_, count));
   }
   taken_ += count;
-  if (slopes != nullptr) {
-    slopes->ensure(*context_, count, "gradients of rays");
-    slopes->clear();
+  if (ray_gradients != nullptr) {
+    ray_gradients->ensure(*context_, count, "gradients of rays");
+    ray_gradients->clear();
   }
   if (count == 0 || gaussians.count == 0) return;
   const DeviceInfo& device = context_->device();
@@ -135,7 +135,8 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   const bool cpu = device.type == DeviceType::kCpu;
   const bool ordered = order_.compute(tree, rays, count);
   BuildOptions build = ray_walk_build(device, options, tracer_->near(), tree.lanes(), degree_);
-  sums_.define(build.define("SH_DEGREE", degree_).define("RAY_SLOPES", slopes != nullptr ? 1 : 0)
+  sums_.define(build.define("SH_DEGREE", degree_)
+                   .define("WITH_RAY_GRADIENT", ray_gradients != nullptr ? 1 : 0)
                    .define("RAISE_CLAMPED", options.raise_clamped ? 1 : 0));
   const std::size_t chunk = cpu ? kCpuChunk : 1;
   // Rays that all work-items, or a group of them, take in one turn: bands of whole rows leave every
@@ -153,7 +154,7 @@ void RayBackward::add(const DeviceGaussians& gaussians,
     kernel.launch(Range::linear(items, group), u32(first), u32(last), u32(chunk), u32(items),
                   tracer_->tree().arguments(), gaussians.sh, walk, order_.arguments(rays, ordered),
                   results, gradients, records_, shares_, sums_.target(),
-                  slopes != nullptr ? *slopes : no_slopes_);
+                  ray_gradients != nullptr ? *ray_gradients : no_ray_gradients_);
   });
 }
 

@@ -42,10 +42,11 @@ struct RayScreen {
 /// tracer's.
 class RayBackward {
  public:
-  using Gradient = std::array<float, 4>;  ///< of a ray: dL/d(R, G, B) of its colour, dL/dalpha
+  /// Of what a ray met: dL/d(R, G, B) of its colour, dL/dalpha.
+  using ResultGradient = std::array<float, 4>;
   /// Gradient of a ray: dL/dorigin in 0..2, dL/ddirection in 4..6 (of the direction as it is, which
   /// need not have unit length), zeros. The ends t_min and t_max stay where they are along the ray.
-  using Slopes = std::array<float, 8>;
+  using PaddedRayGradient = std::array<float, 8>;
 
   /// `tracer` is not owned.
   RayBackward(Context& context, const RayTracer& tracer);
@@ -59,16 +60,16 @@ class RayBackward {
              const RayScreen& screen = {},
              std::size_t rays = kMostRays);
   /// The first `count` of `rays` again, with the `results` that the tracer gave them (background
-  /// included) and the gradients of those. With `slopes`, which grows as needed, the first `count`
-  /// of these become the gradients of the rays. Enqueues and returns. Throws UsageError without
-  /// begin(), for more rays than it was told, and for buffers that are too small.
+  /// included) and the gradients of those. With `ray_gradients`, which grows as needed, the first
+  /// `count` of these become the gradients of the rays. Enqueues and returns. Throws UsageError
+  /// without begin(), for more rays than it was told, and for buffers that are too small.
   void add(const DeviceGaussians& gaussians,
            const Buffer<Ray>& rays,
            std::size_t count,
            const Buffer<RayResult>& results,
-           const Buffer<Gradient>& gradients,
+           const Buffer<ResultGradient>& gradients,
            ColorDirection color_direction,
-           Buffer<Slopes>* slopes = nullptr);
+           Buffer<PaddedRayGradient>* ray_gradients = nullptr);
   /// Overwrites `gradients`, growing its buffers as needed.
   void finish(const DeviceGaussians& gaussians, GaussianGradients& gradients);
 
@@ -91,7 +92,7 @@ class RayBackward {
   std::size_t rays_ = 0;   // that begin() was told
   std::size_t taken_ = 0;  // of these
   Buffer<float> records_;
-  Buffer<Slopes> no_slopes_;
+  Buffer<PaddedRayGradient> no_ray_gradients_;
   GradientSums sums_;
   LaunchBudget budget_;
 };

@@ -50,6 +50,15 @@ void check_sky(const SkyLight& light) {
   }
 }
 
+void check_background(const std::array<float, 3>& background) {
+  for (const float value : background) {
+    if (std::isfinite(value)) continue;
+    throw UsageError(
+        fmt::format("The background {}, {}, {} has a number that is not finite: give a colour",
+                    background[0], background[1], background[2]));
+  }
+}
+
 Sky::Sky(Context& context, const SkyLight& light)
     : context_(context), degree_((check_sky(light), degree_of(light.size()))) {
   std::vector<float> numbers;
@@ -101,6 +110,6 @@ void Sky::set(std::span<const float> coefficients) {
 }
 
 SkyLight Sky::light() const { return by_coefficient(coefficients_.download()); }
-SkyLight Sky::slopes() const { return by_coefficient(gradient_.download()); }
+SkyLight Sky::download_gradient() const { return by_coefficient(gradient_.download()); }
 
 }  // namespace raysplats

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 
@@ -34,7 +35,7 @@ class Sky {
   const Buffer<float>& gradient() const { return gradient_; }
   /// The present coefficients and that gradient on the host; both block.
   SkyLight light() const;
-  SkyLight slopes() const;
+  SkyLight download_gradient() const;
 
  private:
   Kernel kernel(const char* name, const Camera& camera) const;
@@ -46,5 +47,7 @@ class Sky {
 
 /// Throws UsageError as Sky does.
 void check_sky(const SkyLight& light);
+/// Throws UsageError for a colour behind everything that is not finite.
+void check_background(const std::array<float, 3>& background);
 
 }  // namespace raysplats

@@ -69,7 +69,7 @@ std::vector<std::size_t> usual_cameras(std::span<const Camera> cameras) {
   return out;
 }
 
-double scene_extent(std::span<const Camera> all) {
+double camera_extent(std::span<const Camera> all) {
   const std::vector<Camera> cameras = usual(all);
   const glm::dvec3 center = mean_center(cameras);
   double radius = 0;
@@ -80,7 +80,7 @@ double scene_extent(std::span<const Camera> all) {
 
 Region visible_region(std::span<const Camera> all) {
   const std::vector<Camera> cameras = usual(all);
-  const Region around{mean_center(cameras), 3.0 * scene_extent(cameras)};
+  const Region around{mean_center(cameras), 3.0 * camera_extent(cameras)};
   // Least squares over the distances to the view axes: sum (I - d d^T) p = sum (I - d d^T) c.
   glm::dmat3 normal(0.0);
   glm::dvec3 right(0.0);
@@ -113,7 +113,7 @@ Region visible_region(std::span<const Camera> all) {
 
 double motion_extent(std::span<const Camera> cameras) {
   constexpr double kMostHalves = 5.0;  // usual lenses have 0.5 to 4.7
-  return std::min(scene_extent(cameras), kMostHalves * visible_region(cameras).half_side);
+  return std::min(camera_extent(cameras), kMostHalves * visible_region(cameras).half_side);
 }
 
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {

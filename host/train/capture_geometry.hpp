@@ -19,7 +19,7 @@ std::vector<std::size_t> usual_cameras(std::span<const Camera> cameras);
 /// Radius of the camera centres about their mean, times 1.1, as in 3DGS, without the stray ones:
 /// the length that learning rates and size thresholds are relative to. Never below a small positive
 /// number.
-double scene_extent(std::span<const Camera> cameras);
+double camera_extent(std::span<const Camera> cameras);
 
 /// An axis-aligned cube, world units.
 struct Region {

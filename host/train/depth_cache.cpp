@@ -1,8 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/depth_cache.hpp"
 
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
+#include <exception>
+#include <filesystem>
+#include <string>
 #include <utility>
+
+#include "raysplats/error.hpp"
+#include "util/parallel.hpp"
 
 namespace raysplats {
 namespace {
@@ -70,19 +79,48 @@ DepthCache::DepthCache(Context& context,
                        double unit,
                        std::size_t budget)
     : context_(context), unit_(unit), budget_(budget), entries_(views.size()) {
-  for (std::size_t i = 0; i < views.size(); ++i) {
+  std::vector<std::exception_ptr> errors(views.size());
+  std::vector<std::uint8_t> empty(views.size());  // maps that know nothing
+  in_parallel(views.size(), [&](std::size_t i) {
     const View& view = dataset.views[views[i]];
-    const io::DepthMap map = io::view_depths(dataset, view, unit);
     Entry& entry = entries_[i];
-    entry.source = view;
-    entry.source.points.clear();
-    if (!view.depth_path.empty()) {
-      ++with_maps_;
-      continue;
+    try {
+      entry.source = view;
+      entry.source.points.clear();
+      if (view.depth_path.empty()) {
+        entry.points = listed(io::view_depths(dataset, view, unit));
+      } else {
+        empty[i] = io::check_depth_map(view, unit) ? 0 : 1;
+      }
+    } catch (...) {
+      errors[i] = std::current_exception();
     }
-    entry.points = listed(map);
-    with_points_ += map.values.empty() ? 0 : 1;
+  });
+  std::size_t empty_maps = 0;
+  std::string first_empty;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (errors[i]) std::rethrow_exception(errors[i]);
+    std::filesystem::path& map = entries_[i].source.depth_path;
+    if (empty[i] != 0) {
+      if (empty_maps++ == 0) first_empty = map.string();
+      map.clear();
+    } else if (!map.empty()) {
+      ++with_maps_;
+    } else if (!dataset.views[views[i]].points.empty()) {
+      ++with_points_;
+    }
   }
+  if (empty_maps == 0) return;
+  if (with_maps_ + with_points_ == 0) {
+    throw DataError(fmt::format(
+        "No depth map has a number above 0, {} as little as the others: give maps that know "
+        "depths, or leave out 'depth-weight'",
+        first_empty));
+  }
+  spdlog::warn(
+      "{} of {} depth maps have no number above 0, {} among them: nothing is known of the depths "
+      "of their photos",
+      empty_maps, empty_maps + with_maps_, first_empty);
 }
 
 // What is on the device of a view at that size; null if nothing is.
@@ -92,15 +130,20 @@ const DeviceDepths* DepthCache::held(const SizedView& wanted) const {
   return passing_view_ == wanted.view && has_size(passing_, wanted) ? &passing_ : nullptr;
 }
 
-DepthCache::Map DepthCache::load(std::size_t view) const {
-  return std::make_shared<const io::DepthMap>(
-      io::view_depths({}, entries_[view].source, unit_, true));
+// On a thread of its own where it was foreseen: a lens is taken out, and a large map reduced, in
+// tenths of a second.
+DepthCache::SizedMap DepthCache::load(const SizedView& wanted) const {
+  io::DepthMap map = io::view_depths({}, entries_[wanted.view].source, unit_, true);
+  if (map.width != wanted.width || map.height != wanted.height)
+    map = io::reduced(map, wanted.width, wanted.height);
+  const std::size_t known = io::count_known(map);
+  return {std::make_shared<const std::vector<float>>(std::move(map.values)), known};
 }
 
-DepthCache::Map DepthCache::take(std::size_t view) {
-  const auto found = coming_.find(view);
-  if (found == coming_.end()) return load(view);
-  std::future<Map> map = std::move(found->second);
+DepthCache::SizedMap DepthCache::take(const SizedView& wanted) {
+  const auto found = coming_.find(wanted.view);
+  if (found == coming_.end() || found->second.wanted != wanted) return load(wanted);
+  std::future<SizedMap> map = std::move(found->second.map);
   coming_.erase(found);
   return map.get();
 }
@@ -131,24 +174,18 @@ const DeviceDepths& DepthCache::get(const SizedView& wanted) {
     upload_points(entry, wanted.width, wanted.height);
     return entry.resident;
   }
-  const Map map = take(wanted.view);
-  std::shared_ptr<const std::vector<float>> values(map, &map->values);
-  if (map->width != wanted.width || map->height != wanted.height) {
-    values = std::make_shared<const std::vector<float>>(
-        io::reduced(*map, wanted.width, wanted.height).values);
-  }
+  const SizedMap map = take(wanted);
   cached_ -= map_bytes(entry.resident.width, entry.resident.height);
   entry.resident = {};
   const std::size_t bytes = map_bytes(wanted.width, wanted.height);
   const bool stays = cached_ + bytes <= budget_;
   DeviceDepths& target = stays ? entry.resident : passing_;
   target.width = target.height = 0;  // holds nothing until it is there
-  target.depths.ensure(context_, values->size(), "known depths");
-  target.depths.upload_later(values);
+  target.depths.ensure(context_, map.values->size(), "known depths");
+  target.depths.upload_later(map.values);
   target.width = wanted.width;
   target.height = wanted.height;
-  target.known = static_cast<std::size_t>(
-      std::count_if(values->begin(), values->end(), [](float d) { return d > 0; }));
+  target.known = map.known;
   if (stays) {
     cached_ += bytes;
   } else {
@@ -158,16 +195,16 @@ const DeviceDepths& DepthCache::get(const SizedView& wanted) {
 }
 
 void DepthCache::prefetch(std::span<const SizedView> wanted) {
-  std::map<std::size_t, std::future<Map>> coming;
+  std::map<std::size_t, Coming> coming;
   for (const SizedView& one : wanted) {
     if (entries_[one.view].source.depth_path.empty() || held(one) != nullptr) continue;
+    if (coming.contains(one.view)) continue;
     const auto found = coming_.find(one.view);
-    const bool known = found != coming_.end();
-    if (!known && coming.contains(one.view)) continue;
-    coming.emplace(one.view, known ? std::move(found->second)
-                                   : std::async(std::launch::async,
-                                                [this, view = one.view] { return load(view); }));
-    if (known) coming_.erase(found);
+    if (found != coming_.end() && found->second.wanted == one) {
+      coming.insert(coming_.extract(found));
+    } else {
+      coming[one.view] = {one, std::async(std::launch::async, [this, one] { return load(one); })};
+    }
   }
   coming_ = std::move(coming);
 }

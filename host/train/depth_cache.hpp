@@ -40,6 +40,8 @@ struct DeviceDepths {
 struct SizedView {
   std::size_t view = 0;
   int width = 0, height = 0;
+
+  friend bool operator==(const SizedView&, const SizedView&) = default;
 };
 
 /// Bytes on the device of the depth maps that some views have, at full size.
@@ -50,20 +52,22 @@ std::size_t depth_map_bytes(const Dataset& dataset, std::span<const std::size_t>
 /// was asked for last, and nowhere else; the others are read again whenever they are asked for.
 class DepthCache {
  public:
-  /// Reads the depths of some views of a data set, to know that they can be; `unit` as in
-  /// io::view_depths(), whose DataErrors it throws. `budget` in bytes of the device, of maps.
+  /// Makes sure that the depths of some views of a data set can be read; `unit` as in
+  /// io::view_depths(), whose DataErrors it throws. A view whose map knows nothing has no depths,
+  /// and a warning counts them; where all maps are so and no view has points, that is a DataError.
+  /// `budget` in bytes of the device, of maps.
   DepthCache(Context& context,
              const Dataset& dataset,
              std::span<const std::size_t> views,
              double unit,
              std::size_t budget);
 
-  /// The depths of a view (an index into `views`) reduced to width x height, until the next call.
-  /// Waits for the file, not for the device.
+  /// The depths of a view (an index into `views`) reduced to width x height, until the next call:
+  /// io::reduced() of those at full size. Waits for the file, not for the device.
   const DeviceDepths& get(const SizedView& wanted);
 
-  /// Reads what get() will need of these in the background. What an earlier call asked for, this
-  /// one does not and nobody got is dropped.
+  /// Reads and reduces what get() will need of these in the background. What an earlier call asked
+  /// for, this one does not and nobody got is dropped.
   void prefetch(std::span<const SizedView> wanted);
 
   std::size_t with_maps() const { return with_maps_; }      ///< views
@@ -72,17 +76,25 @@ class DepthCache {
   std::size_t cached_bytes() const { return cached_; }
 
  private:
-  using Map = std::shared_ptr<const io::DepthMap>;
+  // A map at the size that is asked for.
+  struct SizedMap {
+    std::shared_ptr<const std::vector<float>> values;
+    std::size_t known = 0;  // pixels
+  };
+  struct Coming {
+    SizedView wanted;
+    std::future<SizedMap> map;
+  };
 
   struct Entry {
-    View source;                     // with its map, if it has one
+    View source;                     // with its map, if it has one that knows something
     std::vector<DepthPoint> points;  // else what is known, at full size
     DeviceDepths resident;
   };
 
   const DeviceDepths* held(const SizedView& wanted) const;
-  Map load(std::size_t view) const;
-  Map take(std::size_t view);
+  SizedMap load(const SizedView& wanted) const;
+  SizedMap take(const SizedView& wanted);
   void upload_points(Entry& entry, int width, int height);
 
   Context& context_;
@@ -93,7 +105,7 @@ class DepthCache {
   std::vector<Entry> entries_;
   DeviceDepths passing_;  // of a map that found no room
   std::size_t passing_view_ = 0;
-  std::map<std::size_t, std::future<Map>> coming_;  // last: threads read the entries
+  std::map<std::size_t, Coming> coming_;  // by view; last: threads read the entries
 };
 
 }  // namespace raysplats

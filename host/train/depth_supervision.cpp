@@ -27,8 +27,8 @@ DepthSupervision::DepthSupervision(Context& context,
                                    std::size_t budget)
     : context_(context),
       weight_(weight),
-      slopes_(context.kernel(kProgram, "depth_slopes")),
-      listed_slopes_(context.kernel(kProgram, "listed_depth_slopes")),
+      add_gradient_(context.kernel(kProgram, "add_depth_gradient")),
+      add_listed_gradient_(context.kernel(kProgram, "add_listed_depth_gradient")),
       cache_(context, dataset, views, unit, budget) {
   if (cache_.with_maps() + cache_.with_points() == 0) {
     throw UsageError(
@@ -61,15 +61,15 @@ void DepthSupervision::backward(const SizedView& view,
   const std::int32_t weighted = photo.weighted ? 1 : 0;
   const float scale = static_cast<float>(weight_) / static_cast<float>(target.known);
   if (target.listed) {
-    listed_slopes_.launch(Range::linear(target.known, kGroup), image, depth, target.pixels,
-                          target.depths, photo.words, image_gradient, gradient_,
-                          static_cast<std::uint32_t>(target.known),
-                          static_cast<std::uint32_t>(pixels), photo.planes, weighted, scale);
+    add_listed_gradient_.launch(Range::linear(target.known, kGroup), image, depth, target.pixels,
+                                target.depths, photo.words, image_gradient, gradient_,
+                                static_cast<std::uint32_t>(target.known),
+                                static_cast<std::uint32_t>(pixels), photo.planes, weighted, scale);
     return;
   }
-  slopes_.launch(Range::linear(pixels, kGroup), image, depth, target.depths, photo.words,
-                 image_gradient, gradient_, static_cast<std::uint32_t>(pixels), photo.planes,
-                 weighted, scale);
+  add_gradient_.launch(Range::linear(pixels, kGroup), image, depth, target.depths, photo.words,
+                       image_gradient, gradient_, static_cast<std::uint32_t>(pixels), photo.planes,
+                       weighted, scale);
 }
 
 }  // namespace raysplats

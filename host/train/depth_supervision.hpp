@@ -48,7 +48,7 @@ class DepthSupervision {
  private:
   Context& context_;
   double weight_;
-  Kernel slopes_, listed_slopes_;
+  Kernel add_gradient_, add_listed_gradient_;
   DepthCache cache_;
   Buffer<float> gradient_;
 };

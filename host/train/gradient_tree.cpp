@@ -67,8 +67,8 @@ void GradientTree::send() {
   spare_.push_back(std::move(sum));
 }
 
-void GradientTree::settle() {
-  if (sent_ > 0) among_.settle();
+void GradientTree::wait() {
+  if (sent_ > 0) among_.wait();
 }
 
 void GradientTree::finish(StepGradients& sum) {

@@ -30,15 +30,15 @@ class GradientTree {
   explicit GradientTree(Context& context) : context_(context) {}
 
   /// All ranks: a sum of `slots` slots, of which each rank adds those of its RankShare. Forgets
-  /// what was added: a step that broke off, after settle().
+  /// what was added: a step that broke off, after wait().
   void begin(Communicator& ranks, std::size_t slots);
   /// Takes the gradients of a slot, which follows the last one since begin(), and leaves buffers of
   /// an earlier one in their place. Enqueues without waiting; what is whole for other ranks goes to
   /// them while the device goes on (SlotSum).
   void add(std::size_t slot, StepGradients& gradients);
   /// All ranks: waits until all slots have been added and told.
-  void settle();
-  /// All ranks, after settle(): moves the sum of all slots to `sum`, which add() has left. With
+  void wait();
+  /// All ranks, after wait(): moves the sum of all slots to `sum`, which add() has left. With
   /// several ranks it comes from the host. Throws UsageError without any slot.
   void finish(StepGradients& sum);
 

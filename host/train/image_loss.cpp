@@ -38,8 +38,8 @@ struct ImageLoss::Impl {
                  // them
   int tile;
   int rows;
-  Kernel prepare, slopes_kernel, gradient_kernel, fold;
-  Buffer<float> pair, slopes, ssim_partials;
+  Kernel prepare, derivatives_kernel, gradient_kernel, fold;
+  Buffer<float> pair, derivatives, ssim_partials;
   Buffer<Sums> pixel_partials, sums;
   int width = 0;
   int height = 0;
@@ -77,7 +77,8 @@ struct ImageLoss::Impl {
     }
     build.define("SSIM_GRADIENT", weight > 0.0f ? 1 : 0);
     const char* program = grouped ? "train/group_loss.cl" : "train/loss_ssim.cl";
-    slopes_kernel = owner.kernel(program, grouped ? "group_slopes" : "ssim_slopes", build);
+    derivatives_kernel =
+        owner.kernel(program, grouped ? "group_ssim_derivatives" : "ssim_derivatives", build);
     gradient_kernel = owner.kernel(program, grouped ? "group_gradient" : "loss_gradient", build);
     fold = owner.kernel("train/loss_reduce.cl", "fold_loss");
     sums = Buffer<Sums>(owner, kFoldItems, "loss sums");
@@ -107,8 +108,8 @@ struct ImageLoss::Impl {
       pair.ensure(context, 6 * size, "loss image pair");
       pair.clear();
     }
-    slopes.ensure(context, ssim_weight > 0.0f ? 9 * size : 1, "loss SSIM slopes");
-    if (ssim_weight > 0.0f && !grouped) slopes.clear();
+    derivatives.ensure(context, ssim_weight > 0.0f ? 9 * size : 1, "loss SSIM derivatives");
+    if (ssim_weight > 0.0f && !grouped) derivatives.clear();
     pixel_partials.ensure(context, pixel_sums(), "loss pixel sums");
     ssim_partials.ensure(context, ssim_sums(), "loss SSIM sums");
     laid_out = true;
@@ -125,10 +126,11 @@ struct ImageLoss::Impl {
     prepare.launch(range, image, photo.words, pair, pixel_partials, width, height, stride, plane,
                    photo.planes, composite, background[0], background[1], background[2]);
     range.global[2] = 3;
-    slopes_kernel.launch(range, pair, slopes, ssim_partials, width, height, stride, plane);
+    derivatives_kernel.launch(range, pair, derivatives, ssim_partials, width, height, stride,
+                              plane);
     const int masked = composite == 0 ? 1 : (composite == 1 ? 0 : 2);
-    gradient_kernel.launch(range, pair, slopes, photo.words, gradient, width, height, stride, plane,
-                           photo.planes, masked, scales[0], scales[1]);
+    gradient_kernel.launch(range, pair, derivatives, photo.words, gradient, width, height, stride,
+                           plane, photo.planes, masked, scales[0], scales[1]);
   }
 
   void evaluate_groups(const Buffer<float>& image,
@@ -140,12 +142,12 @@ struct ImageLoss::Impl {
     Range range = Range::plane(static_cast<std::size_t>(width), static_cast<std::size_t>(height),
                                kSide, kSide);
     range.global[2] = 3;
-    slopes_kernel.launch(range, image, photo.words, slopes, pixel_partials, ssim_partials, width,
-                         height, photo.planes, composite, background[0], background[1],
-                         background[2]);
-    gradient_kernel.launch(range, image, photo.words, slopes, gradient, width, height, photo.planes,
-                           composite, background[0], background[1], background[2], scales[0],
-                           scales[1]);
+    derivatives_kernel.launch(range, image, photo.words, derivatives, pixel_partials, ssim_partials,
+                              width, height, photo.planes, composite, background[0], background[1],
+                              background[2]);
+    gradient_kernel.launch(range, image, photo.words, derivatives, gradient, width, height,
+                           photo.planes, composite, background[0], background[1], background[2],
+                           scales[0], scales[1]);
   }
 };
 

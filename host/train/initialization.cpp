@@ -74,7 +74,7 @@ Gaussians subset(const Gaussians& model, std::size_t limit) {
 double guessed_depth(std::span<const Camera> cameras, const Region& region) {
   // Cameras in one place have no middle to be distant from.
   const double middle = median_distance(cameras, region.center);
-  const double extent = scene_extent(cameras);
+  const double extent = camera_extent(cameras);
   return middle > 1e-3 * extent ? middle : extent;
 }
 
@@ -229,7 +229,7 @@ Gaussians gaussians_from_points(const PointCloud& points,
   const std::vector<float> distances = neighbour_distances(finite.positions);
   const auto stride = 3 * static_cast<std::size_t>(sh_coefficients(sh_degree));
   const auto logit = static_cast<float>(std::log(opacity / (1.0 - opacity)));
-  const double least = kMinScale * scene_extent(cameras);
+  const double least = kMinScale * camera_extent(cameras);
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* p = finite.positions.data() + 3 * i;
     const double most = kMaxScale * nearest_distance(cameras, {p[0], p[1], p[2]});
@@ -274,14 +274,7 @@ std::optional<Bounds> about_origin(const std::optional<Bounds>& bounds,
 }
 
 Gaussians inside(const Gaussians& model, const std::optional<Bounds>& bounds) {
-  if (!bounds) return model;
-  std::vector<std::uint32_t> indices;
-  for (std::size_t i = 0; i < model.size(); ++i) {
-    const float* mean = model.means.data() + 3 * i;
-    if (bounds->contains(mean[0], mean[1], mean[2]))
-      indices.push_back(static_cast<std::uint32_t>(i));
-  }
-  return gathered(model, indices);
+  return bounds ? gathered(model, within(model, *bounds)) : model;
 }
 
 Gaussians initial_model(const Dataset& dataset,

@@ -22,9 +22,9 @@ Kernel kernel(Context& context, const char* name, const DeviceGaussians& gaussia
 Mcmc::Mcmc(Context& context, const TrainOptions& options, double extent)
     : context_(context), options_(options), extent_(extent) {}
 
-void Mcmc::press(const DeviceGaussians& gaussians,
-                 GaussianGradients& gradients,
-                 const Buffer<std::uint32_t>& guard) {
+void Mcmc::add_regularisation(const DeviceGaussians& gaussians,
+                              GaussianGradients& gradients,
+                              const Buffer<std::uint32_t>& guard) {
   // The gradients are sums over views, each of which has the regularisers in its loss.
   const double count = static_cast<double>(gaussians.count) / options_.views_per_step;
   kernel(context_, "mcmc_press", gaussians)
@@ -34,9 +34,9 @@ void Mcmc::press(const DeviceGaussians& gaussians,
               gaussians.opacities, gaussians.scales, gradients.opacities, gradients.scales);
 }
 
-void Mcmc::disturb(DeviceGaussians& gaussians,
-                   std::int64_t iteration,
-                   const Buffer<std::uint32_t>& guard) {
+void Mcmc::add_noise(DeviceGaussians& gaussians,
+                     std::int64_t iteration,
+                     const Buffer<std::uint32_t>& guard) {
   const LearningRate rate = position_rate(options_);
   if (options_.mcmc_noise <= 0 || rate.initial <= 0) return;
   const double decay = learning_rate(rate, options_, iteration) / rate.initial;

@@ -12,7 +12,7 @@
 namespace raysplats {
 
 /// What 3DGS-MCMC (Kheradmand et al. 2024) does in every step beside the gradient's: see
-/// cl/train/mcmc.cl. Both are free of scale: sizes count in units of `extent` (scene_extent()).
+/// cl/train/mcmc.cl. Both are free of scale: sizes count in units of `extent` (camera_extent()).
 /// Everything random is a function of seed, iteration and Gaussian.
 class Mcmc {
  public:
@@ -20,15 +20,15 @@ class Mcmc {
 
   /// Adds the gradients of opacity-reg times the mean opacity and of scale-reg times the mean
   /// standard deviation over the extent.
-  void press(const DeviceGaussians& gaussians,
-             GaussianGradients& gradients,
-             const Buffer<std::uint32_t>& guard);
+  void add_regularisation(const DeviceGaussians& gaussians,
+                          GaussianGradients& gradients,
+                          const Buffer<std::uint32_t>& guard);
 
   /// After the step of `iteration`: moves the means of faint Gaussians by mcmc-noise times their
   /// covariance over the extent times normal numbers; as position-lr falls, so does this.
-  void disturb(DeviceGaussians& gaussians,
-               std::int64_t iteration,
-               const Buffer<std::uint32_t>& guard);
+  void add_noise(DeviceGaussians& gaussians,
+                 std::int64_t iteration,
+                 const Buffer<std::uint32_t>& guard);
 
  private:
   Context& context_;

@@ -20,7 +20,7 @@
 #include "trace/exact_sum.h"
 #include "trace/gradient_sums.hpp"
 #include "trace/memory_shares.hpp"
-#include "trace/packet_shape.hpp"
+#include "trace/packet_layout.hpp"
 #include "trace/ray_backward.hpp"
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
@@ -28,8 +28,8 @@
 namespace raysplats {
 namespace {
 
-// Bytes of a pixel in the nine planes of SSIM's slopes in one buffer (train/image_loss.cpp).
-constexpr std::size_t kSlopeBytes = 9 * sizeof(float);
+// Bytes of a pixel in the nine planes of SSIM's derivatives in one buffer (train/image_loss.cpp).
+constexpr std::size_t kSsimPlaneBytes = 9 * sizeof(float);
 
 // Whether gradients of packets may be added in long integers. Copies that do not fit their share
 // of memory-budget become that, too.
@@ -65,7 +65,7 @@ RayShare rays_per_gaussian(const TrainOptions& options,
 // backward; with mirrors those that are reflected as well. Few meet more than one.
 std::size_t ray_bytes(const TrainOptions& options, std::size_t pixels, const DeviceInfo& device) {
   constexpr std::size_t segment =
-      sizeof(Ray) + sizeof(RayResult) + 2 * sizeof(RayBackward::Gradient);
+      sizeof(Ray) + sizeof(RayResult) + 2 * sizeof(RayBackward::ResultGradient);
   constexpr std::size_t order = 2 * RayOrder::kBytesPerRay;
   const std::size_t mirrors =
       options.mirrors.empty() ? 0 : sizeof(RsSurfaceHit) + sizeof(std::uint32_t);
@@ -81,7 +81,7 @@ std::size_t packet_bytes(const TrainOptions& options,
                          const MemoryDemand& demand,
                          const DeviceInfo& device) {
   const MemoryShares shares(options.trace, device);
-  const PacketShape packet = packet_shape(device, options.trace);
+  const PacketLayout packet = packet_layout(device, options.trace);
   // Each hit in a row of its own (and those of packets that start again are few), and a quarter
   // more for views to come.
   const std::size_t row = sizeof(std::uint32_t) * (2 + static_cast<std::size_t>(packet.lanes));
@@ -153,7 +153,7 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
     largest = std::max(largest, share.largest);
   }
   out.largest_buffer =
-      std::max(demand.gaussians * largest, demand.pixels * std::max(kSlopeBytes, photo));
+      std::max(demand.gaussians * largest, demand.pixels * std::max(kSsimPlaneBytes, photo));
   return out;
 }
 

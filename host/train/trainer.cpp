@@ -82,7 +82,7 @@ Trainer::Impl::Impl(Context& device,
       train_views(dataset.indices(Split::kTrain)),
       test_views(dataset.indices(Split::kTest)),
       train_cameras(cameras_of(dataset, train_views)),
-      extent(scene_extent(train_cameras)),
+      extent(camera_extent(train_cameras)),
       motion(motion_extent(train_cameras)),
       cut_out(dataset.alpha_is_background),
       fingerprint(dataset_fingerprint(dataset, options.depth_weight > 0)),
@@ -115,11 +115,11 @@ Trainer::Impl::Impl(Context& device,
         ranks.size(), slots.size()));
   }
   options.data.origin = dataset.origin;
-  follow_options();
+  apply_options();
   if (options.strategy == DensityStrategy::kMcmc) mcmc.emplace(device, options, extent);
   if (options.exposure) exposure.emplace(device, train_views.size(), slots.size());
-  forget_sky();
-  forget_poses();
+  reset_sky();
+  reset_poses();
   if (options.scale_activation == ScaleActivation::kSigmoid && options.scale_min * extent >= 1) {
     throw UsageError(
         fmt::format("The option 'scale-min' = {} is {:.3g} units of this data set, and with "
@@ -132,10 +132,12 @@ Trainer::Impl::Impl(Context& device,
         "it at auto, or choose 'masks' = ignore and 'alpha' = ignore");
   }
   if (train_views.empty()) {
-    const bool held_out = options.data.test_every == 1 && !test_views.empty();
+    const bool by_option = options.data.test_every == 1 && !test_views.empty();
     throw UsageError(fmt::format(
         "The data set {} has no training views: {}", dataset.root.string(),
-        held_out ? "--test-every 1 holds all of them out" : "its files name none to train on"));
+        by_option             ? "--test-every 1 holds all of them out"
+        : !test_views.empty() ? "its files hold all of them out; let them name some for training"
+                              : "its files name none to train on"));
   }
   if (options.depth_weight > 0) {
     require_depth_gradients();
@@ -177,9 +179,10 @@ RunEstimate Trainer::fit_time(double seconds) {
   return impl_->fit_time(seconds);
 }
 
-bool Trainer::step(std::int64_t count) { return impl_->train_some(count); }
+bool Trainer::step(std::int64_t count) { return impl_->run_steps(count); }
 
 void Trainer::on_step(std::function<void(const TrainProgress&)> callback) {
+  if (callback && impl_->busy) Impl::refuse_while_busy();
   const auto turn = impl_->context.lock();
   impl_->callback = std::move(callback);
 }
@@ -193,7 +196,7 @@ EvaluationRow Trainer::evaluate() {
     throw UsageError(fmt::format("The data set {} has no test views: set TrainOptions::test_every",
                                  self.dataset.root.string()));
   }
-  if (!self.busy) self.prepare();
+  if (!self.busy) self.begin_stepping();
   self.evaluate_views(true);
   return self.run.evaluations().back();
 }
@@ -205,7 +208,7 @@ void Trainer::save() {
     return;
   }
   const auto turn = self.context.lock();
-  self.prepare();
+  self.begin_stepping();
   self.context.finish();
   self.save_model();
   self.save_checkpoint();
@@ -222,7 +225,7 @@ TrainLoss Trainer::loss() {
 
 Gaussians Trainer::model() const {
   const auto turn = impl_->context.lock();
-  return impl_->started ? impl_->shown().download() : Gaussians();
+  return impl_->started ? impl_->model_to_show().download() : Gaussians();
 }
 
 const DeviceGaussians& Trainer::gaussians() const { return impl_->gaussians; }

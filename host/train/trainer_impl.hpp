@@ -58,8 +58,8 @@ constexpr std::size_t kReadAhead = 8;
 
 /// One of the views of a step, and what its gradient leaves besides.
 struct ViewSlot {
-  std::size_t view = 0;  ///< position among the training views
-  PoseGradient slope;    ///< where poses are trained
+  std::size_t view = 0;        ///< position among the training views
+  PoseGradient pose_gradient;  ///< where poses are trained
 };
 
 /// What the last view of a step says of itself.
@@ -87,10 +87,10 @@ struct Trainer::Impl {
 
   // trainer_start.cpp: from a data set to the first step.
   void start();
-  void take_over_metrics();
+  void load_former_metrics();
   Gaussians new_model(std::size_t most);
   void make_first_model();
-  void upload_start(std::size_t most);
+  void upload_first_model(std::size_t most);
   std::vector<std::size_t> first_views() const;
   const std::vector<SmallPhoto>& photos(PhotoChoice choice);
   std::vector<SmallPhoto> reduced_photos(std::span<const std::size_t> views) const;
@@ -98,8 +98,8 @@ struct Trainer::Impl {
   void check_room(std::size_t count, std::size_t most) const;
   void choose_background();
   void choose_color_range();
-  void forget_sky();
-  void forget_poses();
+  void reset_sky();
+  void reset_poses();
   std::int64_t turn_of(std::size_t slot) const;
   std::int64_t last_turn() const;
   std::size_t limit() { return most_gaussians(options.iterations); }
@@ -114,45 +114,45 @@ struct Trainer::Impl {
   void enqueue_views();
   void enqueue_step();
   void control_density();
-  void follow_plan(const DensityPlan& plan);
+  void apply_plan(const DensityPlan& plan);
 
   // trainer_ranks.cpp: what ranks that share the run tell each other.
   void read_ahead(std::int64_t turn);
-  bool join_views();
-  void share_slots();
-  void check_alike();
+  bool sum_views();
+  void exchange_slots();
+  void check_ranks_agree();
   LastView last_view();
 
   // trainer_pilot.cpp: how long a run will take.
   struct Pilot;
   void check_not_begun(const char* function) const;
-  void follow_options();
-  double seconds_of(const Pilot& pilot, std::int64_t iterations, std::size_t most) const;
+  void apply_options();
+  double predicted_seconds(const Pilot& pilot, std::int64_t iterations, std::size_t most) const;
   void begin_programs(std::initializer_list<int> degrees);
   Pilot run_pilot(double seconds, std::optional<double> run_time);
   void time_steps(double seconds, std::optional<double> run, Pilot& pilot);
-  void forget_pilot();
+  void undo_pilot();
   RunEstimate estimate(double seconds);
   RunEstimate fit_time(double seconds);
-  void keep_time();
+  void fit_end_to_time();
 
   // trainer_validation.cpp: training views that judge the run.
   std::int64_t join_iteration() const;
   std::size_t loss_views() const;
-  void keep_joined(const Checkpoint& checkpoint);
-  bool judges() const;
-  bool judged() const;
-  void judge();
+  void restore_joined_views(const Checkpoint& checkpoint);
+  bool validation_due() const;
+  bool is_validated() const;
+  void validate_views();
   bool out_of_patience() const;
-  void settle_validation();
+  void keep_best_model();
 
   // trainer_pace.cpp: steps on their way.
-  void step();
-  void sampled_step();
-  void follow(bool all);
-  void settle();
-  void abandon();
-  void go_back();
+  void send_step();
+  void send_sampled_step();
+  void collect_done(bool all);
+  void finish_steps();
+  void drop_unfinished();
+  void rewind();
 
   // trainer_checks.cpp: what stops a run.
   StepGuard::Counts check_guard();
@@ -162,14 +162,14 @@ struct Trainer::Impl {
   // trainer_report.cpp: what a run says of itself.
   void report(Progress& progress);
   void evaluate_views(bool last);
-  bool evaluated(bool last) const;
+  bool is_evaluated(bool last) const;
   void set_background();
-  TraceOptions trace_options();          // that the model looks right with
-  const DeviceGaussians& shown() const;  // the mean of the last steps, if they have begun
-  Gaussians model_to_save() const;       // of these, without what has left --bounds
-  const DeviceGaussians& measured(DeviceGaussians& room) const;
+  TraceOptions trace_options();                  // that the model looks right with
+  const DeviceGaussians& model_to_show() const;  // the mean of the last steps, if they have begun
+  Gaussians model_to_save() const;               // of these, without what has left --bounds
+  const DeviceGaussians& model_to_measure(DeviceGaussians& room) const;
   void save_model();
-  nlohmann::json photo_facts() const;
+  nlohmann::json photo_report() const;
   void write_metrics(bool complete);
   std::string capped_share(std::uint64_t capped);
   void warn_of_capped_rays(std::uint64_t capped) const;
@@ -177,7 +177,7 @@ struct Trainer::Impl {
 
   // trainer_resume.cpp: checkpoints.
   void resume(const std::filesystem::path& source);
-  void take_up(const std::filesystem::path& source);
+  void restore_from(const std::filesystem::path& source);
   void check_data_options(const Checkpoint& checkpoint) const;
   void check_newer_models(std::int64_t from) const;
   void write_state(const std::filesystem::path& path);
@@ -186,18 +186,19 @@ struct Trainer::Impl {
 
   // trainer_loop.cpp: iterations by the schedule.
   TrainSummary train(bool show_progress);
-  bool train_some(std::int64_t count);
-  void prepare();
-  void advance(std::int64_t until,
-               bool scheduled,
-               bool show_progress,
-               const std::function<bool()>& interrupted);
+  bool run_steps(std::int64_t count);
+  void begin_stepping();
+  bool saves_model(std::int64_t at) const;
+  void run_and_rescue(std::int64_t until,
+                      bool scheduled,
+                      bool show_progress,
+                      const std::function<bool()>& interrupted);
   struct Loop;
   void run_iterations(std::int64_t until, const Loop& loop);
-  bool take_step(const Loop& loop);
-  bool complete(const Loop& loop, bool stop, bool anew);
-  void pause(const Loop& loop, const std::function<void()>& work);
-  void show(const std::function<bool()>& interrupted);
+  bool run_iteration(const Loop& loop);
+  bool finish_iteration(const Loop& loop, bool stop, bool anew);
+  void untimed(const Loop& loop, const std::function<void()>& work);
+  void let_watcher_look(const std::function<bool()>& interrupted);
 
   Context& context;
   Communicator alone;
@@ -234,7 +235,7 @@ struct Trainer::Impl {
   PhotoFit fit;
   std::optional<ModelValidator> validator;  // once it is asked for
   PhotoCache photo_cache;
-  ViewOrder order{0, 0};  // of views, of which a step takes several (follow_options())
+  ViewOrder order{0, 0};  // of views, of which a step takes several (apply_options())
 
   DeviceGaussians gaussians;
   std::vector<ViewSlot> slots;  // views-per-step
@@ -280,14 +281,15 @@ struct Trainer::Impl {
   bool prepared = false;           // for steps of the caller's own
   std::optional<FileLock> folder_lock;
 
+  [[noreturn]] static void refuse_while_busy() {
+    throw UsageError(
+        "The trainer is training already: wait for its run() or step(), and call neither from its "
+        "callback");
+  }
   // Marks the trainer as busy while it lives.
   struct Busy {
     explicit Busy(Impl& impl) : busy(impl.busy) {
-      if (busy.exchange(true)) {
-        throw UsageError(
-            "The trainer is training already: wait for its run() or step(), and call neither from "
-            "its callback");
-      }
+      if (busy.exchange(true)) refuse_while_busy();
       impl.stop_asked = false;
     }
     ~Busy() { busy = false; }

@@ -55,8 +55,8 @@ struct Trainer::Impl::Loop {
 };
 
 // Work that is no training, when all steps are done.
-void Trainer::Impl::pause(const Loop& loop, const std::function<void()>& work) {
-  settle();
+void Trainer::Impl::untimed(const Loop& loop, const std::function<void()>& work) {
+  finish_steps();
   training.stop();
   loop.progress.suspend();
   work();
@@ -71,42 +71,51 @@ void Trainer::Impl::run_iterations(std::int64_t until, const Loop& loop) {
   bool stop = false;
   {
     const auto turn = context.lock();
-    const bool over = iteration == last_iteration(options) || (judged() && out_of_patience());
+    const bool over = iteration == last_iteration(options) ||
+                      ranks.broadcast_value(0, is_validated() && out_of_patience());
     const bool unchanged = iteration > 0 && !density.changes_at(iteration);
-    if (pass_due || (loop.scheduled && (over || unchanged))) stop = complete(loop, false, pass_due);
+    if (pass_due || (loop.scheduled && (over || unchanged)))
+      stop = finish_iteration(loop, false, pass_due);
   }
   while (iteration < std::min(until, last_iteration(options)) && !stop) {
     const auto turn = context.lock();
-    stop = complete(loop, take_step(loop), true);
+    stop = finish_iteration(loop, run_iteration(loop), true);
   }
-  settle();
+  finish_steps();
 }
 
 // One step and what is said of it. Returns whether the run is to end with this iteration.
-bool Trainer::Impl::take_step(const Loop& loop) {
+bool Trainer::Impl::run_iteration(const Loop& loop) {
   if (ranks.size() > 1) stop_wished = loop.interrupted() || stop_asked;
-  sampled_step();
-  keep_time();
+  send_sampled_step();
+  fit_end_to_time();
   const bool last = iteration == last_iteration(options);
   if (last || every(options.log_every, iteration)) report(loop.progress);
-  if (every(options.validate_every, iteration)) pause(loop, [this] { validate_model(); });
+  if (every(options.validate_every, iteration)) untimed(loop, [this] { validate_model(); });
   if (callback) {
     const auto hear = callback;  // it may be replaced meanwhile
-    pause(loop, [&] { hear({iteration, last_iteration(options), gaussians.count}); });
+    untimed(loop, [&] { hear({iteration, last_iteration(options), gaussians.count}); });
   }
   // Asked once: a signal that comes later is seen after the next step. Ranks end together.
   return ranks.size() > 1 ? stop_agreed : loop.interrupted() || stop_asked;
 }
 
+// Whether a run of these options writes a model there, whatever happens to it.
+bool Trainer::Impl::saves_model(std::int64_t at) const {
+  const std::int64_t last = last_iteration(options);
+  return at == last || (at < last && contains(options.save_at, options.iterations, at));
+}
+
 // What follows a step: evaluations and files, before density control, as in 3DGS, because fresh
 // clones and children have not settled yet; then that, and the checkpoint. Unless the iteration is
 // `anew`, files that are there stay. Returns whether the run ends with it, as it does with `stop`.
-bool Trainer::Impl::complete(const Loop& loop, bool stop, bool anew) {
+// What is done together rank 0 decides: others may have a folder of their own, which says less.
+bool Trainer::Impl::finish_iteration(const Loop& loop, bool stop, bool anew) {
   const bool last = iteration == last_iteration(options);
   bool ends = false;
-  if (loop.scheduled && iteration > 0 && judges()) {
-    if (!judged()) pause(loop, [this] { judge(); });
-    ends = out_of_patience();
+  if (loop.scheduled && iteration > 0 && validation_due()) {
+    if (!ranks.broadcast_value(0, is_validated())) untimed(loop, [this] { validate_views(); });
+    ends = ranks.broadcast_value(0, out_of_patience());
   }
   if (ends) {
     stop = ended = true;
@@ -118,34 +127,35 @@ bool Trainer::Impl::complete(const Loop& loop, bool stop, bool anew) {
   const bool evaluates = ends || last ||
                          (!stop && (every(options.eval_every, iteration) ||
                                     contains(options.eval_at, options.iterations, iteration)));
-  const bool saves = loop.scheduled &&
-                     (stop || last || contains(options.save_at, options.iterations, iteration)) &&
-                     (anew || !run.has_model(iteration));
-  if (saves) pause(loop, [this] { save_model(); });
-  if (loop.scheduled && evaluates && !evaluated(last || ends))
-    pause(loop, [this, last, ends] { evaluate_views(last || ends); });
+  const bool saves =
+      loop.scheduled && (stop || saves_model(iteration)) && (anew || !run.has_model(iteration));
+  if (saves) untimed(loop, [this] { save_model(); });
+  if (loop.scheduled && evaluates && !ranks.broadcast_value(0, is_evaluated(last || ends)))
+    untimed(loop, [this, last, ends] { evaluate_views(last || ends); });
   if (last) {
     pass_due = false;
   } else {
     control_density();
   }
   const bool asked = save_asked.exchange(false);
-  if (asked && !saves) pause(loop, [this] { save_model(); });
+  if (asked && !saves) untimed(loop, [this] { save_model(); });
   const bool keeps = loop.scheduled &&
                      (stop || last || every(options.checkpoint_every, iteration)) &&
                      (anew || !is_file(checkpoint_path(run.path(), iteration)));
-  if (asked || keeps) pause(loop, [this] { save_checkpoint(); });
-  if (watcher && !stop && watcher->wants_look()) pause(loop, [&] { show(loop.interrupted); });
+  if (asked || keeps) untimed(loop, [this] { save_checkpoint(); });
+  if (watcher && !stop && watcher->wants_look())
+    untimed(loop, [&] { let_watcher_look(loop.interrupted); });
   return stop;
 }
 
 // Lets the watcher look at the state between two steps, and hold it as long as it wishes.
-void Trainer::Impl::show(const std::function<bool()>& interrupted) {
+void Trainer::Impl::let_watcher_look(const std::function<bool()>& interrupted) {
   const auto stopping = [&] { return stop_asked || interrupted(); };
   RunWish wish;
   do {
     wish = watcher->look(
-        {iteration, background, sky ? tracer.sky()->light() : SkyLight(), &shown()}, stopping);
+        {iteration, background, sky ? tracer.sky()->light() : SkyLight(), &model_to_show()},
+        stopping);
     if (!wish.save) continue;
     save_model();
     if (saved != iteration) save_checkpoint();
@@ -153,10 +163,10 @@ void Trainer::Impl::show(const std::function<bool()>& interrupted) {
 }
 
 // Runs them with the folder locked. What fails is saved as far as it goes.
-void Trainer::Impl::advance(std::int64_t until,
-                            bool scheduled,
-                            bool show_progress,
-                            const std::function<bool()>& interrupted) {
+void Trainer::Impl::run_and_rescue(std::int64_t until,
+                                   bool scheduled,
+                                   bool show_progress,
+                                   const std::function<bool()>& interrupted) {
   Progress progress("Training", last_iteration(options), iteration,
                     show_progress ? stderr : nullptr);
   row_iteration = iteration;
@@ -194,9 +204,9 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     const auto turn = context.lock();
     start();
   }
-  advance(kWholeRun, true, show_progress, [&] { return interrupt.requested(); });
+  run_and_rescue(kWholeRun, true, show_progress, [&] { return interrupt.requested(); });
   ranks.barrier();  // what rank 0 writes is written
-  settle_validation();
+  keep_best_model();
   const bool complete = iteration == last_iteration(options);
   write_metrics(ended || complete);
   if (const std::uint64_t capped = guard.counts().capped_rays; capped > 0)
@@ -226,20 +236,20 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   return summary;
 }
 
-bool Trainer::Impl::train_some(std::int64_t count) {
+bool Trainer::Impl::run_steps(std::int64_t count) {
   if (count < 1) {
     throw UsageError(
         fmt::format("Trainer::step() cannot make {} iterations: ask for 1 or more", count));
   }
   const Busy busy(*this);
-  prepare();
-  advance(count < kWholeRun - iteration ? iteration + count : kWholeRun, false, false,
-          [] { return false; });
+  begin_stepping();
+  run_and_rescue(count < kWholeRun - iteration ? iteration + count : kWholeRun, false, false,
+                 [] { return false; });
   return iteration < last_iteration(options);
 }
 
 // For steps of the caller's own: the folder stays locked until the trainer goes.
-void Trainer::Impl::prepare() {
+void Trainer::Impl::begin_stepping() {
   if (prepared) return;
   const auto turn = context.lock();
   make_first_model();

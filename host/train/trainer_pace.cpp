@@ -16,8 +16,8 @@ constexpr std::int64_t kTimedEvery = 32;
 
 }  // namespace
 
-void Trainer::Impl::step() {
-  follow(false);
+void Trainer::Impl::send_step() {
+  collect_done(false);
   const std::int64_t begun = iteration;
   const std::int64_t optimiser_steps = adam.steps();
   const std::uint64_t rays = traced_rays;
@@ -28,21 +28,21 @@ void Trainer::Impl::step() {
 
 // A step now and then has its kernels timed, which tells of all of them and costs nothing that
 // could be measured. Not the first: it finds out what the later ones know.
-void Trainer::Impl::sampled_step() {
-  if (iteration % kTimedEvery != kTimedEvery / 2) return step();
+void Trainer::Impl::send_sampled_step() {
+  if (iteration % kTimedEvery != kTimedEvery / 2) return send_step();
   const KernelSample sample(context);
-  step();
+  send_step();
   if (sample.alone()) ++timed_steps;
 }
 
 // Takes note of the steps that are done, of all of them with `all`. Goes back to the first one
 // that had too little room.
-void Trainer::Impl::follow(bool all) {
+void Trainer::Impl::collect_done(bool all) {
   while (!sent.empty()) {
     const SentStep& oldest = sent.front();
     if (!all && sent.size() <= kMostAhead && !oldest.overflow.ready()) return;
     if (oldest.overflow.words()[0] != 0) {
-      go_back();
+      rewind();
     } else {
       sent.pop_front();
     }
@@ -50,7 +50,7 @@ void Trainer::Impl::follow(bool all) {
 }
 
 // To the state that the device is in since the oldest step of `sent` found too little room.
-void Trainer::Impl::go_back() {
+void Trainer::Impl::rewind() {
   iteration = sent.front().iteration;
   adam.set_steps(sent.front().optimiser_steps);
   traced_rays = sent.front().traced_rays;
@@ -61,17 +61,17 @@ void Trainer::Impl::go_back() {
 }
 
 // Waits until all steps up to this iteration are done and count.
-void Trainer::Impl::settle() {
+void Trainer::Impl::finish_steps() {
   const std::int64_t wanted = iteration;
   do {
-    while (iteration < wanted) step();
-    follow(true);
+    while (iteration < wanted) send_step();
+    collect_done(true);
   } while (iteration < wanted);
 }
 
 // Waits for what is on its way and leaves out what would have to be made again.
-void Trainer::Impl::abandon() {
-  follow(true);
+void Trainer::Impl::drop_unfinished() {
+  collect_done(true);
   context.finish();
 }
 

@@ -73,7 +73,7 @@ void Trainer::Impl::check_not_begun(const char* function) const {
 }
 
 // What was derived from the options when this was made, from options that have changed.
-void Trainer::Impl::follow_options() {
+void Trainer::Impl::apply_options() {
   TrainOptions centred = options;
   centred.bounds = about_origin(options.bounds, dataset.origin);
   density.follow(centred, loss_views());
@@ -81,9 +81,9 @@ void Trainer::Impl::follow_options() {
       ViewOrder(options.seed, train_views.size(), apart, join_iteration() * options.views_per_step);
 }
 
-double Trainer::Impl::seconds_of(const Pilot& pilot,
-                                 std::int64_t iterations,
-                                 std::size_t most) const {
+double Trainer::Impl::predicted_seconds(const Pilot& pilot,
+                                        std::int64_t iterations,
+                                        std::size_t most) const {
   TrainOptions shaped = options;
   shaped.iterations = iterations;
   const auto limit = static_cast<double>(most);
@@ -118,8 +118,8 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
       if (read.insert(view).second) photo_seconds += photo.seconds();
     }
     const Timer timer(context);
-    step();
-    settle();
+    send_step();
+    finish_steps();
     const double seconds_of_step = timer.seconds();
     spent += seconds_of_step;
     // Its views are taken to be like the last one.
@@ -138,21 +138,21 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
     timed_step();
     const std::size_t begin = samples.size();
     // The first rank's clock counts for all.
-    for (int i = 0; i < kLeastSteps || ranks.said_by(0, spent < until * seconds); ++i) {
+    for (int i = 0; i < kLeastSteps || ranks.broadcast_value(0, spent < until * seconds); ++i) {
       iteration = first_step + i % kViews;
       samples.push_back(timed_step());
     }
     const std::span<const StepSample> own = std::span(samples).subspan(begin);
     const LoadRates met = LoadRates::of(own);
-    pilot.per_work = ranks.said_by(0, seconds_per_work(own));
+    pilot.per_work = ranks.broadcast_value(0, seconds_per_work(own));
     timed = own.size();
-    return LoadRates{ranks.said_by(0, met.hits), ranks.said_by(0, met.candidates)};
+    return LoadRates{ranks.broadcast_value(0, met.hits), ranks.broadcast_value(0, met.candidates)};
   };
   iteration = 0;
   reads_ahead = false;
   pilot.at_start = pilot.at_full_size = stage(kCoarseShare);
   const auto rough = [&](std::int64_t iterations) {
-    return seconds_of(pilot, iterations, gaussians.count);
+    return predicted_seconds(pilot, iterations, gaussians.count);
   };
   if (run || rough(options.iterations) > kShortRun) {
     const std::int64_t middle = options.iterations / 2;
@@ -162,7 +162,7 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
         most_gaussians(run ? iterations_within(*run, kLeastIterations, rough) : options.iterations);
     for (int pass = 0; pass < kMostPasses && density.accumulates_at(0) && gaussians.count < most;
          ++pass)
-      follow_plan(density.split_evenly(gaussians, most));
+      apply_plan(density.split_evenly(gaussians, most));
     pilot.at_full_size = stage(1);
   }
   spdlog::debug(
@@ -175,22 +175,22 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
   // The run reads several at a time, each rank its own.
   const std::size_t readers =
       std::min<std::size_t>(kReadAhead, std::max(1u, std::thread::hardware_concurrency()));
-  pilot.photo_seconds = ranks.said_by(
+  pilot.photo_seconds = ranks.broadcast_value(
       0, photo_seconds /
              static_cast<double>(read.size() * readers * static_cast<std::size_t>(ranks.size())));
 }
 
 // Everything as it was before the first step.
-void Trainer::Impl::forget_pilot() {
-  follow_options();
+void Trainer::Impl::undo_pilot() {
+  apply_options();
   density.restore_statistics({});
   gaussians = DeviceGaussians();
   guard.restore({});
   mean.restart(0);
   fit.forget();
   if (exposure) exposure.emplace(context, train_views.size(), slots.size());
-  forget_sky();
-  forget_poses();
+  reset_sky();
+  reset_poses();
   iteration = 0;
   reads_ahead = true;
   traced_rays = 0;
@@ -221,20 +221,20 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   choose_color_range();
   first_model = new_model(most);
   std::optional<Gaussians> made = first_model;
-  pilot.start_seconds = ranks.said_by(0, clock.seconds());
-  upload_start(most);
+  pilot.start_seconds = ranks.broadcast_value(0, clock.seconds());
+  upload_first_model(most);
   pilot.first = gaussians.count;
   if (cut_out) pilot.opaque_share = opaque_share(photos(PhotoChoice::kAll));
   context.finish_builds();  // compilers would slow down the steps of a CPU
   try {
     time_steps(seconds, run_time, pilot);
   } catch (...) {
-    forget_pilot();
+    undo_pilot();
     throw;
   }
-  forget_pilot();
+  undo_pilot();
   first_model = std::move(made);
-  pilot.seconds = ranks.said_by(0, clock.seconds());
+  pilot.seconds = ranks.broadcast_value(0, clock.seconds());
   return pilot;
 }
 
@@ -243,7 +243,7 @@ RunEstimate Trainer::Impl::estimate(double seconds) {
   const Pilot pilot = run_pilot(seconds, std::nullopt);
   const std::size_t most = most_gaussians(options.iterations);
   const bool grows = density.accumulates_at(0);
-  const double planned = seconds_of(pilot, options.iterations, grows ? most : pilot.first);
+  const double planned = predicted_seconds(pilot, options.iterations, grows ? most : pilot.first);
   const std::int64_t end = last_iteration(options);
   return {end, grows ? most : pilot.first,
           planned * static_cast<double>(end) /
@@ -260,7 +260,7 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
   const Pilot pilot = run_pilot(kMeasuredShare * seconds, seconds);
   const double left = seconds - pilot.seconds;
   const auto duration = [&](std::int64_t iterations) {
-    return seconds_of(pilot, iterations, most_gaussians(iterations));
+    return predicted_seconds(pilot, iterations, most_gaussians(iterations));
   };
   const double least = duration(kLeastIterations);
   if (least > left) {
@@ -276,7 +276,7 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
   }
   options.max_gaussians = static_cast<std::int64_t>(most_gaussians(options.iterations));
   first_model.reset();  // it was made for another limit
-  follow_options();
+  apply_options();
   options.end_iteration = 0;
   training.set(pilot.seconds);
   run_seconds = seconds;
@@ -287,24 +287,24 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
 // Keeps a run by time to its time: its last steps are alike, and once a part of them is timed the
 // time that is left tells how many more there can be. What the steps do depends on the schedules
 // alone, so that a run which is given this end from the beginning has the same bytes.
-void Trainer::Impl::keep_time() {
+void Trainer::Impl::fit_end_to_time() {
   if (!run_seconds) return;
   const std::int64_t from = steady_from(options);
   const std::int64_t until = timed_until(options);
   if (iteration == from) {
-    settle();
+    finish_steps();
     steady_seconds = training.seconds();
     return;
   }
   if (!steady_seconds || iteration != until || iteration >= options.iterations) return;
-  settle();
+  finish_steps();
   const double now = training.seconds();
   const double more =
       (*run_seconds - now) / (now - *steady_seconds) * static_cast<double>(until - from);
   const auto latest = kLatestEnd * static_cast<double>(options.iterations);
   const double end =
       std::clamp(static_cast<double>(iteration) + more, static_cast<double>(iteration) + 1, latest);
-  options.end_iteration = static_cast<std::int64_t>(ranks.said_by(0, end));
+  options.end_iteration = static_cast<std::int64_t>(ranks.broadcast_value(0, end));
   run.write_config(options);
   spdlog::debug("{} iterations after all, not {}", options.end_iteration, options.iterations);
 }

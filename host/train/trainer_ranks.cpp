@@ -26,7 +26,7 @@ struct StepWord {
 
 // And of one of them, where photos have exposures or poses.
 struct SlotWord {
-  PoseGradient slope;
+  PoseGradient pose_gradient;
   std::array<float, Exposure::kSums> exposure{};
 };
 
@@ -36,35 +36,36 @@ struct SlotWord {
 void Trainer::Impl::read_ahead(std::int64_t turn) {
   if (!reads_ahead) return;
   constexpr std::size_t kOthers = kReadAhead - 1;
-  const std::size_t first = order.at(turn);
   std::vector<std::size_t> own;
-  for (const std::size_t view : order.upcoming(kOthers * static_cast<std::size_t>(ranks.size()))) {
-    const auto slot = static_cast<std::size_t>(++turn % options.views_per_step);
-    if (share.holds(slot) && own.size() < kOthers) own.push_back(view);
-  }
-  photo_cache.prefetch(own);
-  if (!depths) return;
-  const int divisor = resolution_divisor(options, iteration);
-  own.insert(own.begin(), first);  // not yet asked for: depths come after the photo
-  std::vector<SizedView> sized;
-  for (const std::size_t view : own) {
+  std::vector<SizedView> sized;  // as they will be, also where the sizes change meanwhile
+  const auto foresee = [&](std::size_t view, std::int64_t its_turn) {
+    const int divisor = resolution_divisor(options, its_turn / options.views_per_step);
     const Camera& full = train_cameras[view];
     const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
     sized.push_back({view, camera.width, camera.height});
+  };
+  foresee(order.at(turn), turn);  // not yet asked for: depths come after the photo
+  for (const std::size_t view : order.upcoming(kOthers * static_cast<std::size_t>(ranks.size()))) {
+    const auto slot = static_cast<std::size_t>(++turn % options.views_per_step);
+    if (!share.holds(slot) || own.size() == kOthers) continue;
+    own.push_back(view);
+    foresee(view, turn);
   }
+  photo_cache.prefetch(own);
+  if (!depths) return;
   depths->prefetch(sized);
 }
 
 // Adds what the views of a step say; one view needs no sum, and one rank waits for nothing. With
 // several ranks false when a view of any had too little room: then all make their views again, and
 // wait for the sizes.
-bool Trainer::Impl::join_views() {
+bool Trainer::Impl::sum_views() {
   if (ranks.size() > 1) {
-    sum.settle();
+    sum.wait();
     const std::vector<std::uint32_t> capped = guard.step_capped().download();
     StepWord sum_of_all{0, 0, 0};
-    for (const StepWord& word : ranks.all(StepWord{std::uint64_t{capped[1]} << 32 | capped[0],
-                                                   guard.marked(), stop_wished ? 1u : 0u})) {
+    for (const StepWord& word : ranks.all_gather(StepWord{
+             std::uint64_t{capped[1]} << 32 | capped[0], guard.marked(), stop_wished ? 1u : 0u})) {
       sum_of_all.capped_rays += word.capped_rays;
       sum_of_all.mark |= word.mark;
       sum_of_all.stop |= word.stop;
@@ -78,36 +79,36 @@ bool Trainer::Impl::join_views() {
     }
     guard.set_step_capped(sum_of_all.capped_rays);
     stop_agreed = sum_of_all.stop != 0;
-    share_slots();
+    exchange_slots();
   }
   if (slots.size() > 1) sum.finish(gradients);
   return true;
 }
 
 // What a photo alone says of its exposure and its pose.
-void Trainer::Impl::share_slots() {
+void Trainer::Impl::exchange_slots() {
   if (!exposure && !poses) return;
   std::vector<float> colors(Exposure::kSums * slots.size());
   if (exposure) exposure->sums().download(colors);
   std::string mine;
   for (std::size_t slot = share.first; slot < share.last; ++slot) {
-    SlotWord word{slots[slot].slope, {}};
+    SlotWord word{slots[slot].pose_gradient, {}};
     std::copy_n(&colors[Exposure::kSums * slot], Exposure::kSums, word.exposure.begin());
     mine.append(reinterpret_cast<const char*>(&word), sizeof(word));
   }
   std::string all;
-  for (const std::string& theirs : ranks.gather(mine)) all += theirs;
+  for (const std::string& theirs : ranks.all_gather_texts(mine)) all += theirs;
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     SlotWord word;
     std::memcpy(&word, &all.at(slot * sizeof(word)), sizeof(word));
-    slots[slot].slope = word.slope;
+    slots[slot].pose_gradient = word.pose_gradient;
     std::copy(word.exposure.begin(), word.exposure.end(), &colors[Exposure::kSums * slot]);
   }
   if (exposure) exposure->sums().upload(colors);
 }
 
 // Ranks whose data, options or models are not the same would drift apart without a word.
-void Trainer::Impl::check_alike() {
+void Trainer::Impl::check_ranks_agree() {
   if (ranks.size() == 1) return;
   const std::string about = fingerprint + to_toml(options);
   XXH64_hash_t hash = XXH64(about.data(), about.size(), 0);
@@ -117,7 +118,7 @@ void Trainer::Impl::check_alike() {
         hash = XXH64(values.data(), values.size() * sizeof(float), hash);
       },
       gaussians);
-  const std::vector<std::uint64_t> all = ranks.all(std::uint64_t{hash});
+  const std::vector<std::uint64_t> all = ranks.all_gather(std::uint64_t{hash});
   for (std::size_t rank = 1; rank < all.size(); ++rank) {
     if (all[rank] == all[0]) continue;
     throw Error(ErrorCode::kRuntime,
@@ -132,7 +133,7 @@ LastView Trainer::Impl::last_view() {
   const int last = ranks.size() - 1;
   LastView out;
   if (ranks.rank() == last) out = {loss.value(), tracer.statistics()};
-  return ranks.said_by(last, out);
+  return ranks.broadcast_value(last, out);
 }
 
 }  // namespace raysplats

@@ -32,7 +32,7 @@ nlohmann::json kernels_of(Context& context) {
 
 // How sharp the training photos are that the run has read so far, and how near it came to those
 // that it has seen at full size last; what this part of it has not seen, as it was before.
-nlohmann::json Trainer::Impl::photo_facts() const {
+nlohmann::json Trainer::Impl::photo_report() const {
   nlohmann::json out = nlohmann::json::array();
   std::map<std::string, nlohmann::json> before = former_photos(*former);
   const std::vector<double> psnr = fit.psnr();
@@ -54,7 +54,7 @@ nlohmann::json Trainer::Impl::photo_facts() const {
 
 // Waits for the device and reports the step just done.
 void Trainer::Impl::report(Progress& progress) {
-  settle();
+  finish_steps();
   const auto [value, work] = last_view();
   const StepGuard::Counts counts = check_guard();
   last_loss = value.total;
@@ -110,7 +110,7 @@ void Trainer::Impl::evaluate_views(bool last) {
   evaluating.start();
   set_background();
   DeviceGaussians room;
-  const DeviceGaussians& model = measured(room);
+  const DeviceGaussians& model = model_to_measure(room);
   const auto render = [&](const Camera& camera) {
     tracer.forward(model, camera);
     return tracer.download_image();
@@ -139,7 +139,7 @@ void Trainer::Impl::evaluate_views(bool last) {
 
 // Whether this iteration has been evaluated; with `last` as the end of a run is, with all views and
 // by all measures.
-bool Trainer::Impl::evaluated(bool last) const {
+bool Trainer::Impl::is_evaluated(bool last) const {
   if (test_views.empty()) return true;
   const std::vector<EvaluationRow>& rows = run.evaluations();
   if (rows.empty() || rows.back().iteration != iteration) return false;
@@ -149,20 +149,20 @@ bool Trainer::Impl::evaluated(bool last) const {
   return !partial && (!options.poses || rows.back().psnr_aligned.has_value());
 }
 
-const DeviceGaussians& Trainer::Impl::shown() const {
+const DeviceGaussians& Trainer::Impl::model_to_show() const {
   return mean.known() ? mean.model() : gaussians;
 }
 
 Gaussians Trainer::Impl::model_to_save() const {
-  return inside(shown().download(), about_origin(options.bounds, dataset.origin));
+  return inside(model_to_show().download(), about_origin(options.bounds, dataset.origin));
 }
 
 // The model as its PLY holds it: between passes of density control some may have left the box. Then
 // those that stay are in `room`.
-const DeviceGaussians& Trainer::Impl::measured(DeviceGaussians& room) const {
-  if (!options.bounds) return shown();
+const DeviceGaussians& Trainer::Impl::model_to_measure(DeviceGaussians& room) const {
+  if (!options.bounds) return model_to_show();
   const Gaussians kept = model_to_save();
-  if (kept.size() == shown().count) return shown();
+  if (kept.size() == model_to_show().count) return model_to_show();
   room = DeviceGaussians::upload(context, kept, ScaleActivation::kExp);
   return room;
 }
@@ -212,7 +212,7 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", device.name},
                      {"driver", fmt::format("{}, {}", device.platform, device.driver_version)},
-                     {"photos", photo_facts()},
+                     {"photos", photo_report()},
                      {"timed_steps", timed_steps},
                      {"kernels", kernels_of(context)}};
   run.write_metrics(continued_metrics(std::move(now), *former, stepped));

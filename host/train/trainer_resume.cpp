@@ -71,7 +71,7 @@ std::string Trainer::Impl::rescue() {
   }
   if (whole) {
     try {
-      abandon();
+      drop_unfinished();
     } catch (const std::exception& error) {
       spdlog::warn("the steps on their way to iteration {} are lost: {}", iteration, error.what());
       whole = false;
@@ -121,13 +121,14 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
 }
 
 // Models that come after the state to go on from are written again by a run of the length that they
-// are of. Another one would leave them, and the newest model is taken for a run's result.
+// are of, and by one that saves at the newest. Another one would leave them, and the newest model
+// is taken for a run's result.
 void Trainer::Impl::check_newer_models(std::int64_t from) const {
   const std::optional<std::int64_t> newest = run.newest_model();
   if (overwrite || !newest || *newest <= from) return;
   const std::int64_t last = last_iteration(options);
   const bool same = *newest <= last && (!resumed || resumed->iterations == options.iterations);
-  if (same) return;
+  if (same || saves_model(*newest)) return;
   throw UsageError(fmt::format(
       "The run in {} has left a model of iteration {}, which one of {} iterations that goes on "
       "from {} would not make again: give it the length that it had, choose another folder, or "
@@ -137,8 +138,8 @@ void Trainer::Impl::check_newer_models(std::int64_t from) const {
 
 // All ranks read the same state, before one of them writes into the folder again.
 void Trainer::Impl::resume(const std::filesystem::path& source) {
-  take_up(source);
-  const std::vector<std::int64_t> all = ranks.all(started ? iteration : -1);
+  restore_from(source);
+  const std::vector<std::int64_t> all = ranks.all_gather(started ? iteration : -1);
   for (std::size_t rank = 1; rank < all.size(); ++rank) {
     if (all[rank] == all[0]) continue;
     throw DataError(fmt::format(
@@ -148,7 +149,7 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   }
 }
 
-void Trainer::Impl::take_up(const std::filesystem::path& source) {
+void Trainer::Impl::restore_from(const std::filesystem::path& source) {
   const bool own = source == "latest";
   const std::filesystem::path place = own ? run.path() : source;
   if (own && list_checkpoints(place).empty()) {
@@ -194,7 +195,7 @@ void Trainer::Impl::take_up(const std::filesystem::path& source) {
   }
   if (!checkpoint.config.empty()) resumed = parse_train_config(checkpoint.config);
   if (continues) check_newer_models(checkpoint.iteration);
-  keep_joined(checkpoint);
+  restore_joined_views(checkpoint);
   restore_state(context, checkpoint, options, gaussians, adam, density);
   restore_mean(checkpoint, options, gaussians, mean);
   const auto lows = checkpoint.sections.find("footprint");

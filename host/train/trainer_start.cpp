@@ -26,6 +26,7 @@ constexpr double kSigmoidExtent = 20;    // then one unit is less than 0.05 exte
 constexpr double kPosePrior = 1;         // PoseRefinement: what errors of half a degree can bear
 constexpr std::size_t kSomePhotos = 24;  // that tell what is typical of all
 constexpr std::size_t kManyPhotos = 100;  // that tell of depth
+constexpr double kLeastShown = 0.01;      // of the photos, for a start to be without a reason
 
 std::vector<std::size_t> evenly_spread(const std::vector<std::size_t>& all, std::size_t most) {
   std::vector<std::size_t> out;
@@ -56,6 +57,17 @@ void note_many_passes(const TrainOptions& options, std::size_t photos) {
       views / static_cast<std::int64_t>(photos), asked);
 }
 
+// Iterations that were asked for by their number and that the run does not reach.
+void warn_of_late(const char* option,
+                  const std::vector<RunShare>& moments,
+                  const TrainOptions& options) {
+  for (const RunShare& moment : moments) {
+    if (moment.value < 1 || moment.of(options.iterations) <= last_iteration(options)) continue;
+    spdlog::warn("{} = {} is beyond the {} of the run: nothing happens then", option, moment.value,
+                 counted(last_iteration(options), "iteration"));
+  }
+}
+
 }  // namespace
 
 const std::vector<SmallPhoto>& Trainer::Impl::photos(PhotoChoice choice) {
@@ -84,7 +96,7 @@ std::vector<std::size_t> Trainer::Impl::first_views() const {
 }
 
 // A sky that nothing has been learned of.
-void Trainer::Impl::forget_sky() {
+void Trainer::Impl::reset_sky() {
   const SkyLight light = trace_options_of(options, background).sky;
   if (light.empty()) return;
   tracer.set_background({}, light);
@@ -92,7 +104,7 @@ void Trainer::Impl::forget_sky() {
 }
 
 // Poses as the data set has them, where they are trained.
-void Trainer::Impl::forget_poses() {
+void Trainer::Impl::reset_poses() {
   if (!options.poses) return;
   poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent),
                 kPosePrior);
@@ -134,7 +146,7 @@ std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {
   if (cut_out) pixels *= opaque_share(photos(PhotoChoice::kAll));
   const std::size_t fitting =
       gaussians_that_fit(options, demand(fitted_limit(pixels, iterations)), context.device());
-  return std::max<std::size_t>(1, ranks.least(fitting));
+  return std::max<std::size_t>(1, ranks.all_reduce_min(fitting));
 }
 
 // What a run of these photos wants to hold of the device with so many Gaussians.
@@ -204,23 +216,28 @@ Gaussians Trainer::Impl::new_model(std::size_t most) {
   Gaussians model = initial_model(
       dataset, train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
       most, options);
-  if (model.size() == 0) {
-    throw UsageError(options.bounds
-                         ? "No Gaussian of the start lies within --bounds: give a larger box"
-                         : "The first model has no Gaussians: use --init random");
+  if (model.size() > 0) return model;
+  if (options.bounds)
+    throw UsageError("No Gaussian of the start lies within --bounds: give a larger box");
+  const double shown = opaque_share(photos(PhotoChoice::kAll));
+  if (shown < kLeastShown) {
+    throw UsageError(fmt::format(
+        "The first model has no Gaussians, because masks or transparent pixels leave {:.2g} % of "
+        "the photos: give masks that are white where photos count",
+        100 * shown));
   }
-  return model;
+  throw UsageError("The first model has no Gaussians: use --init random");
 }
 
 // Before the folder of a new run is made: what keeps the model from being made leaves none behind.
 // A folder that is there may be another run's, which is found out when it is locked.
 void Trainer::Impl::make_first_model() {
-  if (started || first_model || ranks.said_by(0, is_folder(run.path()))) return;
+  if (started || first_model || ranks.broadcast_value(0, is_folder(run.path()))) return;
   first_model = new_model(limit());
 }
 
 // The first model on the device, with at most that many Gaussians.
-void Trainer::Impl::upload_start(std::size_t most) {
+void Trainer::Impl::upload_first_model(std::size_t most) {
   Gaussians model = first_model ? std::move(*first_model) : new_model(most);
   first_model.reset();
   check_room(model.size(), most);
@@ -233,7 +250,7 @@ void Trainer::Impl::upload_start(std::size_t most) {
 
 // What the run has said of itself before resume(), once: what this object says later is in the
 // folder as well.
-void Trainer::Impl::take_over_metrics() {
+void Trainer::Impl::load_former_metrics() {
   if (former) return;
   former = run.former_metrics();
   evaluating.set(former_number(*former, "evaluation_seconds"));
@@ -254,7 +271,7 @@ void Trainer::Impl::start() {
   if (started) {
     check_room(gaussians.count, most);
   } else {
-    upload_start(most);
+    upload_first_model(most);
     choose_background();
     choose_color_range();
   }
@@ -265,6 +282,8 @@ void Trainer::Impl::start() {
                  counted(train_views.size(), "training view"), dataset.root.string());
   }
   note_many_passes(options, train_views.size());
+  warn_of_late("eval-at", options.eval_at, options);
+  warn_of_late("save-at", options.save_at, options);
   if (options.scale_activation == ScaleActivation::kSigmoid && extent > kSigmoidExtent) {
     spdlog::warn(
         "scale-activation = sigmoid keeps every axis below one unit of the data set, {:.2g} of the "
@@ -281,14 +300,14 @@ void Trainer::Impl::start() {
                      ? "traversal is bvh"
                      : "as tuned for the device, or their cameras have no tiles");
   }
-  check_alike();
+  check_ranks_agree();
   started = whole = true;
   if (overwrite) {
     run.remove_after(continues ? iteration : 0);
     ranks.barrier();  // nobody reads what another run has said
   }
   run.begin_metrics(iteration);
-  take_over_metrics();
+  load_former_metrics();
   run.write_config(options);
   run.write_cameras(train_cameras);
   // From here on what is in the folder is of this run.

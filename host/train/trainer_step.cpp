@@ -29,13 +29,13 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
   const std::size_t view = out.view;
   read_ahead(turn);
   const int divisor = resolution_divisor(options, iteration);
-  const bool slopes = poses && iteration < pose_end(options);
+  const bool trains_poses = poses && iteration < pose_end(options);
   const Camera full = poses ? poses->camera(view) : train_cameras[view];
   const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
   const std::array<float, 3> behind = step_background(options, cut_out, background, turn);
   if (!sky) tracer.set_background(behind);
   tracer.forward(gaussians, camera, true,
-                 await_sizes || slopes ? ViewSizes::kAwaited : ViewSizes::kAhead);
+                 await_sizes || trains_poses ? ViewSizes::kAwaited : ViewSizes::kAhead);
   const Buffer<float>& shown =
       exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
                : tracer.image();
@@ -51,13 +51,14 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
     depths->backward({view, camera.width, camera.height}, tracer.image(), tracer.depth(), photo,
                      image_gradient);
   }
-  tracer.backward(gaussians, image_gradient, gradients.gaussians, slopes ? &out.slope : nullptr,
+  tracer.backward(gaussians, image_gradient, gradients.gaussians,
+                  trains_poses ? &out.pose_gradient : nullptr,
                   depths ? &depths->gradient() : nullptr);
   if (slots.size() == 1) return;
   if (sky) {
-    const Buffer<float>& slope = tracer.sky()->gradient();
-    gradients.sky.ensure(context, slope.size(), "sky gradient of a view");
-    gradients.sky.copy_from(slope, slope.size());
+    const Buffer<float>& sky_gradient = tracer.sky()->gradient();
+    gradients.sky.ensure(context, sky_gradient.size(), "sky gradient of a view");
+    gradients.sky.copy_from(sky_gradient, sky_gradient.size());
   }
   guard.count_capped(tracer.kept_capped_rays(), slot == share.first);
   sum.add(slot, gradients);
@@ -77,7 +78,7 @@ void Trainer::Impl::enqueue_step() {
   gaussians.active_sh_degree = active_sh_degree(options, iteration);
   do {
     enqueue_views();
-  } while (!join_views());
+  } while (!sum_views());
   const int divisor = resolution_divisor(options, iteration);
   const bool several = slots.size() > 1;
   whole = false;
@@ -87,7 +88,7 @@ void Trainer::Impl::enqueue_step() {
     traced_rays += pixels_of(divisor > 1 ? downscaled(full, divisor) : full);
     if (exposure) exposure->step(one.view, slot, options.exposure_damping, guard.mark());
     if (poses && iteration < pose_end(options))
-      poses->step(one.view, one.slope, learning_rate(options.pose_lr, options, iteration));
+      poses->step(one.view, one.pose_gradient, learning_rate(options.pose_lr, options, iteration));
   }
   if (density.accumulates_at(iteration))
     density.accumulate(gaussians, gradients.gaussians, &guard.mark());
@@ -96,13 +97,13 @@ void Trainer::Impl::enqueue_step() {
               color_share(options) * learning_rate(options.sky_lr, options, iteration),
               guard.mark());
   }
-  GaussianGradients& slopes = gradients.gaussians;
-  if (mcmc) mcmc->press(gaussians, slopes, guard.mark());
+  GaussianGradients& summed = gradients.gaussians;
+  if (mcmc) mcmc->add_regularisation(gaussians, summed, guard.mark());
   const bool measured = density.measures_step(iteration);
   if (measured) density.begin_step(gaussians);
-  adam.step(gaussians, slopes, adam_rates_of(options, extent, motion, iteration), &guard.mark());
+  adam.step(gaussians, summed, adam_rates_of(options, extent, motion, iteration), &guard.mark());
   if (measured) density.end_step(gaussians, guard.mark());
-  if (mcmc) mcmc->disturb(gaussians, iteration, guard.mark());
+  if (mcmc) mcmc->add_noise(gaussians, iteration, guard.mark());
   const double thickness = flat_thickness(options, iteration);
   footprint.apply(gaussians, guard.mark(), thickness);
   if (mean.add(options, gaussians, iteration + 1, guard.mark()))
@@ -119,7 +120,7 @@ void Trainer::Impl::enqueue_step() {
 // here are done before it, so that none of them is made again behind it.
 void Trainer::Impl::control_density() {
   if (!pass_due) return;
-  settle();
+  finish_steps();
   // Means move on after the last pass, and with them the least sizes.
   if (density.idles_at(iteration)) footprint.update(gaussians);
   if (density.changes_at(iteration)) {
@@ -127,9 +128,9 @@ void Trainer::Impl::control_density() {
     whole = false;
     mean.restart(iteration);
     if (density.refines_at(iteration)) {
-      check_alike();
+      check_ranks_agree();
       const DensityPlan plan = density.refine(gaussians, iteration);
-      follow_plan(plan);
+      apply_plan(plan);
       spdlog::debug("iteration {}: {} cloned, {} split, {} pruned, {} refused, {} Gaussians",
                     iteration, plan.cloned, plan.split, plan.pruned, plan.refused, gaussians.count);
     }
@@ -143,7 +144,7 @@ void Trainer::Impl::control_density() {
 }
 
 // Optimiser and least sizes follow the new set of Gaussians.
-void Trainer::Impl::follow_plan(const DensityPlan& plan) {
+void Trainer::Impl::apply_plan(const DensityPlan& plan) {
   if (plan.changes()) {
     const std::vector<std::uint32_t> source =
         options.densify_inherit ? plan.source : plan.state_source();

@@ -41,7 +41,7 @@ std::size_t Trainer::Impl::loss_views() const {
 
 // A model that was trained on the views knows them: in a run that goes on for longer than it was
 // to, they cannot judge again.
-void Trainer::Impl::keep_joined(const Checkpoint& checkpoint) {
+void Trainer::Impl::restore_joined_views(const Checkpoint& checkpoint) {
   joined.reset();
   if (apart.empty()) return;
   const std::int64_t planned = checkpoint.views_joined > 0 || checkpoint.config.empty()
@@ -57,14 +57,14 @@ void Trainer::Impl::keep_joined(const Checkpoint& checkpoint) {
         apart.size(), planned);
   }
   const std::size_t limit = density.limit();
-  follow_options();
+  apply_options();
   density.set_limit(limit);
 }
 
-bool Trainer::Impl::judges() const { return !joined && validates_at(options, iteration); }
+bool Trainer::Impl::validation_due() const { return !joined && validates_at(options, iteration); }
 
 // Whether this iteration has been.
-bool Trainer::Impl::judged() const {
+bool Trainer::Impl::is_validated() const {
   const std::vector<EvaluationRow>& rows = run.validations();
   return !rows.empty() && rows.back().iteration == iteration;
 }
@@ -72,7 +72,7 @@ bool Trainer::Impl::judged() const {
 // Traces the validation views at full size. The model is kept while it is the best so far. Nothing
 // told exposure and pose of photos that were not trained on, so neither counts where it is found
 // for the others: the better a model, the more an error of a pose would cost it.
-void Trainer::Impl::judge() {
+void Trainer::Impl::validate_views() {
   evaluating.start();
   Dataset validation = dataset;
   validation.views.clear();
@@ -82,7 +82,7 @@ void Trainer::Impl::judge() {
   }
   set_background();
   DeviceGaussians room;
-  const DeviceGaussians& model = measured(room);
+  const DeviceGaussians& model = model_to_measure(room);
   const auto render = [&](const Camera& camera) {
     tracer.forward(model, camera);
     return tracer.download_image();
@@ -120,7 +120,7 @@ bool Trainer::Impl::out_of_patience() const {
 }
 
 // At the end of a run: its best model stays, and is named, if the last validation was worse.
-void Trainer::Impl::settle_validation() {
+void Trainer::Impl::keep_best_model() {
   const std::vector<EvaluationRow>& rows = run.validations();
   if (rows.empty() || (iteration < last_iteration(options) && !ended)) return;
   const EvaluationRow& best = best_of(rows);

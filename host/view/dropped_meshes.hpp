@@ -35,9 +35,10 @@ class DroppedMeshes {
   /// Parses and places a mesh. Throws DataError for one that is damaged, UsageError for one too
   /// many, and what `show` throws; nothing has changed then.
   void add(SentMesh sent);
-  /// The same for one that is there; UsageError where it is not. Nothing has changed when they
-  /// throw.
+  /// Moves mesh number `mesh`. Throws UsageError where there is none of that number, and what
+  /// `show` throws; nothing has changed then.
   void place(std::uint32_t mesh, const Placement& placement);
+  /// Takes mesh number `mesh` away; throws as place().
   void remove(std::uint32_t mesh);
 
   /// The message {"type": "meshes"} for pages: number, name, triangles and placement of each.

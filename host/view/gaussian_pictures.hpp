@@ -30,9 +30,9 @@ class GaussianPictures : public PictureSource {
   std::uint64_t samples() const override;
   bool has_depth() const override { return mirrors_.meshes.empty(); }
 
-  /// In place of those so far; they outlive it too.
+  /// Shows these Gaussians from the next picture on; they outlive it too.
   void set_gaussians(const DeviceGaussians& gaussians) { gaussians_ = &gaussians; }
-  /// Behind everything where a page wishes nothing else.
+  /// What is behind everything where a page wishes nothing else: a colour in [0, 1], or a sky.
   void set_background(const std::array<float, 3>& background, const SkyLight& sky) {
     options_.background = background;
     options_.sky = sky;

@@ -22,7 +22,7 @@ std::string text_of(const sockaddr& address, bool ipv6) {
     bytes = &reinterpret_cast<const sockaddr_in&>(address).sin_addr;
   } else if (address.sa_family == AF_INET6 && ipv6) {
     const in6_addr& own = reinterpret_cast<const sockaddr_in6&>(address).sin6_addr;
-    // Those of a link need its name, for which URLs have no place.
+    // Addresses of one link alone need its name, for which URLs have no place.
     if (!IN6_IS_ADDR_LINKLOCAL(&own)) bytes = &own;
   }
   if (bytes == nullptr) return {};

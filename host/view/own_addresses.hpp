@@ -6,8 +6,8 @@
 
 namespace raysplats::view {
 
-/// The addresses of this machine's interfaces that are up, those of the loopback first: what
-/// reaches a server that listens on all of them. Of IPv4, and of IPv6 too where `ipv6` says so.
+/// The IPv4 addresses of this machine's interfaces that are up, with `ipv6` their IPv6 addresses
+/// too, those of the loopback first: what reaches a server that listens on all interfaces.
 /// Throws Error when the system does not tell them.
 std::vector<std::string> own_addresses(bool ipv6);
 

@@ -12,8 +12,8 @@ struct PageFile {
   std::string content;
 };
 
-/// The files of host/view/page, which the library holds: "/" is index.html, others go by name.
-/// Nothing for any other path.
+/// A file of host/view/page, which the library holds: "/" is index.html, others go by name; nothing
+/// for any other path.
 std::optional<PageFile> page_file(std::string_view path);
 
 }  // namespace raysplats::view

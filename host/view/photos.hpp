@@ -20,8 +20,8 @@ class Photos {
  public:
   Photos(std::vector<View> views, const std::array<float, 3>& background);
 
-  /// The file of a photo, of the views' number; nothing beyond. Those asked for last are kept.
-  /// Throws DataError where the photo cannot be read.
+  /// The file of a photo, of the views' number; nothing beyond. The files that were asked for last
+  /// stay in memory. Throws DataError where the photo cannot be read.
   std::optional<std::string> jpeg(std::size_t index);
 
  private:

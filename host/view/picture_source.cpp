@@ -28,7 +28,7 @@ class ScenePictures : public MeshPictures {
   Image draw(const ViewRequest& request, std::uint64_t sample, const Watch& watch) override {
     const Camera camera = jittered(request.camera, sample);
     if (request.output == Output::kColor || request.output == Output::kAlpha) {
-      // Of a picture that moves there is one sample, which is sharp; a still one's are averaged.
+      // A picture that moves has one sample, which is sharp; those of a still one are averaged.
       tracer_.set_sampling(1, seed_ + sample, !request.moving);
       const Image rgba = tracer_.render(camera, watch);
       if (rgba.pixels() == 0) return {};

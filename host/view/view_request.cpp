@@ -13,7 +13,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/gaussian_transform.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 
 namespace raysplats::view {
 namespace {

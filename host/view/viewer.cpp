@@ -1,42 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view/viewer.hpp"
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
-#include <deque>
-#include <exception>
 #include <limits>
-#include <map>
-#include <mutex>
-#include <new>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <span>
 #include <utility>
 #include <variant>
 
-#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
-#include "view/mesh_line.hpp"
-#include "view/mesh_uploads.hpp"
-#include "view/pace.hpp"
-#include "view/page.hpp"
 #include "view/picture_file.hpp"
-#include "view/view_request.hpp"
+#include "view/viewer_impl.hpp"
 
 namespace raysplats::view {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-constexpr std::string_view kPhotoPath = "/api/photo/";
 constexpr int kMovingQuality = 60;
 constexpr int kStillQuality = 85;
 constexpr int kLastQuality = 94;
@@ -51,17 +33,6 @@ double seconds_since(Clock::time_point start) {
 /// Pictures are sent at 1, 2, 4, 8, ... samples, and at the last one.
 bool worth_sending(std::uint64_t samples, std::uint64_t most) {
   return samples == most || (samples & (samples - 1)) == 0;
-}
-
-constexpr const char* kNoRoomForPicture =
-    "There is not enough memory for the picture: make the window smaller";
-constexpr const char* kNoRoomForMesh =
-    "There is not enough memory for that mesh: simplify it first";
-constexpr const char* kNoRoom = "There is not enough memory: close other programs and try again";
-
-/// What went wrong, for people; `no_room` where it was memory.
-std::string sentence(const std::exception& error, const char* no_room) {
-  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ? no_room : error.what();
 }
 
 /// Sees one pixel, at a place that is given in shares of the picture.
@@ -80,29 +51,6 @@ Camera pixel_of(Camera camera, double x, double y) {
   return look_at(ray.origin, ray.origin + ray.direction, up, 1, 1, camera.fy);
 }
 
-/// A sample that is to be drawn.
-struct Order {
-  ViewRequest request;
-  std::optional<Pace> pace;  ///< where its size is chosen by time
-  std::uint64_t wish = 0;
-  std::uint64_t sample = 0;
-};
-
-/// One page.
-struct Client {
-  std::optional<ViewRequest> wanted;  ///< its newest wish
-  std::uint64_t wish = 0;             ///< counts the wishes
-  std::uint64_t drawn = 0;            ///< samples of `sum`, of the wish in work
-  Image sum;
-  Pace pace{0.0};          ///< of movements
-  Pace rest{0.0};          ///< of pictures in a hurry
-  std::uint64_t turn = 0;  ///< when it was served last
-  bool fresh = false;      ///< nothing has been tried of `wanted`
-  Clock::time_point due;   ///< of its next wish
-
-  bool ready(Clock::time_point now) const { return !fresh || now >= due; }
-};
-
 void add(Image& sum, const Image& image) {
   if (sum.pixels() == 0) {
     sum = image;
@@ -119,205 +67,6 @@ Image divided(const Image& sum, std::uint64_t samples) {
 }
 
 }  // namespace
-
-struct Viewer::Impl {
-  explicit Impl(const ViewerOptions& options_in)
-      : options(options_in),
-        server(options.server,
-               {[this](std::string_view path) { return get(path); },
-                [this](ClientId id) { opened(id); },
-                [this](ClientId id, std::string_view text) { heard(id, text); },
-                [this](ClientId id, std::span<const std::byte> bytes) { received(id, bytes); },
-                [this](ClientId id) { closed(id); }}) {}
-
-  HttpReply get(std::string_view path) const {
-    try {
-      return found(path);
-    } catch (const std::exception& error) {
-      const std::string what = sentence(error, kNoRoom);
-      spdlog::warn("no {} for the page: {}", path, what);
-      return {500, "text/plain; charset=utf-8", what + "\n"};
-    }
-  }
-
-  HttpReply found(std::string_view path) const {
-    if (path == "/api/state") return {200, "application/json", options.state};
-    if (path == "/api/run" && options.run) return {200, "application/json", options.run()};
-    if (path.starts_with(kPhotoPath) && options.photo) return photo(path.substr(kPhotoPath.size()));
-    if (const std::optional<PageFile> file = page_file(path))
-      return {200, file->type, file->content};
-    return {404, "text/plain", "Not found\n"};
-  }
-
-  HttpReply photo(std::string_view number) const {
-    std::size_t index = 0;
-    const char* end = number.data() + number.size();
-    const auto [read, error] = std::from_chars(number.data(), end, index);
-    if (error != std::errc() || read != end) return {404, "text/plain", "Not found\n"};
-    if (const std::optional<std::string> jpeg = options.photo(index))
-      return {200, "image/jpeg", *jpeg};
-    return {404, "text/plain", "Not found\n"};
-  }
-
-  void opened(ClientId id) {
-    const std::lock_guard<std::mutex> guard(mutex);
-    clients[id].pace = Pace(options.moving_seconds);
-    clients[id].rest = Pace(hurry);
-  }
-  void closed(ClientId id) {
-    const std::lock_guard<std::mutex> guard(mutex);
-    clients.erase(id);
-    picks.erase(id);
-    uploads.forget(id);
-  }
-  void heard(ClientId id, std::string_view text) {
-    try {
-      Message message = parse_message(text, options.max_side);
-      {
-        const std::lock_guard<std::mutex> guard(mutex);
-        Client& client = clients[id];
-        if (auto* view = std::get_if<ViewRequest>(&message)) {
-          client.wanted = std::move(*view);
-          client.wish = ++wishes;
-          client.fresh = true;
-          client.drawn = 0;
-          client.sum = {};
-          if (client.wanted->moving) last_motion = Clock::now();
-        } else if (std::holds_alternative<Leave>(message)) {
-          client.wanted.reset();
-          client.wish = ++wishes;  // what is drawn of the last one comes too late
-        } else if (auto* pick = std::get_if<PickRequest>(&message)) {
-          picks[id] = std::move(*pick);
-        } else if (auto* command = std::get_if<RunCommand>(&message)) {
-          if (commands.size() < kMostWaiting) commands.push_back(*command);
-        } else if (options.meshes == nullptr) {
-          throw UsageError("Meshes can be dropped into `raysplats view` alone");
-        } else if (auto* offer = std::get_if<MeshOffer>(&message)) {
-          uploads.begin(id, *offer, Clock::now());
-        } else {
-          about_meshes.put(id, about_mesh(message));
-        }
-      }
-      news.notify_one();
-    } catch (const std::exception& error) {
-      excuse(id, error, kNoRoom);
-    }
-  }
-
-  void received(ClientId id, std::span<const std::byte> bytes) {
-    try {
-      {
-        const std::lock_guard<std::mutex> guard(mutex);
-        std::optional<SentMesh> sent = uploads.take(id, bytes, Clock::now());
-        if (!sent) return;
-        about_meshes.put(id, std::move(*sent));
-      }
-      news.notify_one();
-    } catch (const std::exception& error) {
-      excuse(id, error, kNoRoomForMesh);
-    }
-  }
-
-  static MeshMessage about_mesh(const Message& message) {
-    if (const auto* place = std::get_if<PlaceMesh>(&message)) return *place;
-    if (const auto* remove = std::get_if<RemoveMesh>(&message)) return *remove;
-    if (std::holds_alternative<MeshQuestion>(message)) return MeshQuestion{};
-    return std::get<SceneQuestion>(message);
-  }
-
-  /// A page's message has failed. What is not its own fault is said here as well.
-  void excuse(ClientId id, const std::exception& error, const char* no_room) {
-    const std::string what = sentence(error, no_room);
-    if (dynamic_cast<const Error*>(&error) == nullptr)
-      spdlog::warn("a message of the page has failed: {}", what);
-    complain(id, what);
-  }
-  void complain(ClientId id, const std::string& what) { say(id, "error", what); }
-  void note(ClientId id, const std::string& what) { say(id, "note", what); }
-  void say(ClientId id, const char* type, const std::string& what) {
-    server.send_text(id, io::json_text({{"type", type}, {"text", what}}));
-  }
-
-  /// The page that has waited longest, those that move first; nothing when all have what they want.
-  std::optional<ClientId> next(std::uint64_t most, Clock::time_point now) const {
-    std::optional<ClientId> best;
-    bool best_moves = false;
-    std::uint64_t best_turn = 0;
-    for (const auto& [id, client] : clients) {
-      if (!client.wanted || !client.ready(now)) continue;
-      if (client.drawn >= samples_of(*client.wanted, most)) continue;
-      const bool moves = client.wanted->moving;
-      if (!best || (moves && !best_moves) || (moves == best_moves && client.turn < best_turn)) {
-        best = id;
-        best_moves = moves;
-        best_turn = client.turn;
-      }
-    }
-    return best;
-  }
-
-  /// A page whose question may be answered.
-  std::optional<ClientId> next_pick(Clock::time_point now) const {
-    for (const auto& each : picks) {
-      if (now >= clients.at(each.first).due) return each.first;
-    }
-    return std::nullopt;
-  }
-
-  bool has_work(std::uint64_t most, Clock::time_point now) const {
-    return !commands.empty() || !about_meshes.empty() || next_pick(now) || next(most, now);
-  }
-
-  /// When the next wish that has to wait may be seen to.
-  Clock::time_point next_due(Clock::time_point now) const {
-    auto soonest = Clock::time_point::max();
-    for (const auto& [id, client] : clients) {
-      const bool waits = (client.wanted && client.fresh) || picks.contains(id);
-      if (waits && client.due > now) soonest = std::min(soonest, client.due);
-    }
-    return soonest;
-  }
-
-  std::uint64_t samples_of(const ViewRequest& request, std::uint64_t most) const {
-    // Depths of several samples have no common scale, and what moves has no time.
-    return request.moving || hurry > 0.0 || request.output == Output::kDepth ? 1 : most;
-  }
-
-  void answer(PictureSource& source, ClientId id, const PickRequest& pick);
-  void obey(ClientId id, MeshMessage message);
-  /// The page's wish cannot be drawn: it is told why, and nothing is tried until it wishes again.
-  void give_up(ClientId id, std::uint64_t wish, const std::exception& error);
-  void tell(const std::string& json);
-  void refresh();
-  void draw(PictureSource& source,
-            std::int64_t iteration,
-            ClientId id,
-            const std::function<bool()>& stop);
-  /// Draws the next sample of what was ordered and sends what there is of it.
-  void deliver(PictureSource& source,
-               std::int64_t iteration,
-               ClientId id,
-               Order& order,
-               const std::function<bool()>& stop);
-
-  static constexpr std::size_t kMostWaiting = 16;
-
-  ViewerOptions options;
-  mutable std::mutex mutex;
-  std::condition_variable news;
-  std::map<ClientId, Client> clients;
-  std::map<ClientId, PickRequest> picks;  ///< the newest of each page
-  std::deque<RunCommand> commands;
-  MeshUploads uploads;
-  MeshLine about_meshes;
-  std::uint64_t wishes = 0;
-  std::uint64_t turns = 0;
-  double hurry = 0.0;  ///< seconds for a picture of a page that rests; 0 = as long as it takes
-  std::optional<Clock::time_point> last_motion;
-  std::string last_trouble;  ///< of give_up()
-  std::function<void(RunCommand)> on_command;
-  Server server;  // last: its thread uses all of the above
-};
 
 void Viewer::Impl::answer(PictureSource& source, ClientId id, const PickRequest& pick) {
   ViewRequest request = pick.view;

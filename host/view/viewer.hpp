@@ -19,13 +19,14 @@ struct ViewerOptions {
   int max_side = 1920;                 ///< pixels of pictures
   double moving_seconds = 1.0 / 15.0;  ///< for a picture while the camera moves
   std::string state;                   ///< JSON of /api/state, for the page to start with
-  /// JSON of /api/run, asked for from another thread than that of work(); none: there is no run.
+  /// JSON of /api/run, asked for from another thread than that of work(). Without it there is no
+  /// run.
   std::function<std::string()> run;
   /// The JPEG of /api/photo/N, asked for from that thread too; nothing for a number that there is
-  /// not. None: there are no photos.
+  /// not. Without it there are no photos.
   std::function<std::optional<std::string>(std::size_t number)> photo;
-  /// Meshes that pages drop, used in the thread of work(), and outliving the viewer. None: pages
-  /// cannot drop any.
+  /// Meshes that pages drop, used in the thread of work(), and outliving the viewer. Without
+  /// it pages cannot drop any.
   DroppedMeshes* meshes = nullptr;
 };
 
@@ -47,13 +48,14 @@ class Viewer {
   bool awaited() const;
   /// Whether commands or questions wait for work().
   bool asked() const;
-  /// Since the last time that a page moved; infinite before.
+  /// Seconds since the last time that a page moved; infinite before.
   double seconds_since_motion() const;
   /// Hears of commands for a run, in the thread of work().
   void on_command(std::function<void(RunCommand)> handler);
   /// Text for every open page.
   void tell(const std::string& json);
-  /// The same as the last word: waits up to a second until it is on its way.
+  /// Tells every open page its last word, as tell() does, and waits up to a second until that is on
+  /// its way.
   void tell_last(const std::string& json);
 
   /// Draws the next picture that a page waits for, or tells it why it cannot be drawn; `iteration`

@@ -50,7 +50,8 @@ struct Camera {
 };
 
 /// The camera of the same view for an image reduced by `factor` (a positive number; sizes round to
-/// nearest). For every model: the field of view stays.
+/// nearest). For every model: the field of view stays. Throws UsageError for other numbers, and for
+/// sizes that an int does not hold.
 Camera downscaled(const Camera& camera, double factor);
 
 /// The camera turned about its own axes by the rotation vector `turn` (radians) and with its centre

@@ -24,7 +24,7 @@ class Profiler;
 struct ContextOptions {
   bool profile = false;          ///< time every launch by device events
   bool keep_launches = false;    ///< with profile: also keep each time for take_launches()
-  bool kernel_cache = true;      ///< keep compiled programs in the user's cache directory
+  bool kernel_cache = true;      ///< keep compiled programs in `cache_directory`
   bool tuning = true;            ///< use what `raysplats tune` stored for the device
   std::string kernel_directory;  ///< kernels are read from here; "" = those that are built in, or
                                  ///< of the folder that RAYSPLATS_KERNEL_DIR names
@@ -77,21 +77,23 @@ class Context {
   /// writes of buffers that block.
   std::uint64_t host_waits() const;
 
-  /// How long programs have been waited for so far, from the cache or the compiler: it is no part
-  /// of any work, and happens once.
+  /// Seconds that programs have been waited for so far, from the cache or the compiler: they are no
+  /// part of any work, and are waited for once.
   double build_seconds() const;
 
   /// Keeps other threads from using the context until the lock goes. A thread may lock it again.
   [[nodiscard]] std::unique_lock<std::recursive_mutex> lock() const;
 
-  /// Calls and device time of every kernel so far, as a table; blocks. With profile alone.
+  /// Calls and device time in milliseconds of every kernel so far, as a table; blocks. Without
+  /// ContextOptions::profile it has no rows.
   std::string profile_table();
-  /// What has run since the last call, in order; blocks. Nothing without keep_launches.
+  /// The launches since the last call, in the order in which they ran; blocks. None without
+  /// ContextOptions::keep_launches.
   std::vector<LaunchTime> take_launches();
 
   /// Bytes in live buffers of this context.
   std::size_t allocated_bytes() const;
-  /// The most there have been at a time.
+  /// The most bytes that there have been in live buffers at a time.
   std::size_t peak_allocated_bytes() const;
 
   // What follows serves the library itself; its types are not installed.

@@ -37,7 +37,7 @@ struct DeviceInfo {
   std::string driver_version;    ///< in the driver's own form
   DeviceType type = DeviceType::kOther;  ///< by OpenCL
   std::uint32_t compute_units = 0;       ///< processors that run work-groups
-  std::uint64_t global_memory = 0;       ///< bytes
+  std::uint64_t global_memory = 0;       ///< bytes; of a CPU no more than its container may take
   std::uint64_t max_allocation = 0;      ///< bytes of the largest single buffer
   std::uint64_t local_memory = 0;        ///< bytes per work-group
   std::size_t max_work_group_size = 0;   ///< work-items

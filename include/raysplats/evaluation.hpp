@@ -81,8 +81,8 @@ std::vector<std::string> evaluated_names(const Dataset& dataset, Split split);
 /// Compares renders with the photos of a split. `render` yields RGB (further channels are ignored)
 /// of the camera's size, `background` blended in, or an empty image to stop early; it is clamped to
 /// [0, 1] and compared in floating point. The photo is composited over `background` when the data
-/// set's alpha is background; else alpha is a mask, and render and photo are blended to be equal
-/// where it is 0. With an output folder the photo | render | error of views goes to NAME.png there,
+/// set's alpha is background; else alpha is a mask, and where it is 0 the photo takes the place of
+/// the render. With an output folder the photo | render | error of views goes to NAME.png there,
 /// and the report to metrics.json, unless it was stopped before the first comparison. Throws
 /// UsageError when the split has no views or a render has another size than its photo, DataError
 /// when masks leave no pixel of any view; single views without one are left out with a warning.

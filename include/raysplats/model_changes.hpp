@@ -3,19 +3,13 @@
 
 #include <cstddef>
 #include <glm/vec3.hpp>
-#include <limits>
 #include <optional>
 #include <vector>
 
+#include "raysplats/bounds.hpp"
 #include "raysplats/gaussians.hpp"
 
 namespace raysplats {
-
-/// An axis-aligned box; by default all space.
-struct CropBox {
-  glm::dvec3 low{-std::numeric_limits<double>::infinity()};  ///< least x, y, z, world units
-  glm::dvec3 high{std::numeric_limits<double>::infinity()};  ///< greatest x, y, z
-};
 
 /// What `raysplats convert` changes of a model, in this order.
 struct ModelChanges {
@@ -24,7 +18,7 @@ struct ModelChanges {
   double scale = 1.0;                 ///< factor of all lengths, above 0
   glm::dvec3 rotate_degrees{0.0};     ///< about the axes x, then y, then z
   glm::dvec3 translate{0.0};          ///< world units
-  std::optional<CropBox> crop;        ///< in the coordinates of the result, borders included
+  std::optional<Bounds> crop;         ///< in the coordinates of the result, borders included
   /// Keeps the Gaussians of the greatest `contributions`; without these, by opacity times the area
   /// of the ellipsoid's largest section, which is what they can give to pictures from anywhere.
   std::optional<std::size_t> max_gaussians;

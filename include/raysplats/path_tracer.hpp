@@ -19,12 +19,12 @@ namespace raysplats {
 
 /// Draws a scene of Gaussians, meshes, materials, lights and an environment by path tracing
 /// (docs/light.md): paths advance one surface at a time, all of a picture's together, as waves of
-/// rays without the ones that have ended (Laine, Karras and Aila 2013). Of one sample per pixel the
-/// rays of a camera with a centre are traced in packets as Tracer does, until lights on Gaussians
-/// ask for more; those that end on a surface once more. Threads: as Context.
+/// rays without the ones that have ended (Laine, Karras and Aila 2013). With one sample per pixel
+/// the rays of a camera with a centre are traced in packets as Tracer does, unless lights on
+/// Gaussians ask for more; rays that end on a surface are traced once more. Threads: as Context.
 class PathTracer {
  public:
-  /// Rays of the last render().
+  /// Numbers of rays of the last render().
   struct Statistics {
     std::uint64_t camera_rays = 0;     ///< through the pixels of the picture
     std::uint64_t continued_rays = 0;  ///< behind mirrors, glass, transparent and diffuse surfaces
@@ -34,11 +34,17 @@ class PathTracer {
     std::uint64_t ended_by_bounces = 0;  ///< paths that max_bounces ended
   };
 
-  /// Pictures of what rays meet first.
+  /// What the rays of a camera meet first: pictures of camera.height x camera.width pixels, in rows
+  /// from the top left. All are empty when first_hits() was stopped.
   struct FirstHits {
-    Image depth;    ///< 3 channels as of Tracer::depth(): expected, median, number of Gaussians
-    Image normals;  ///< 3 channels as of Tracer::normals(): sums, in world axes
-    Image alpha;    ///< 1 channel: share of the ray that ends there
+    /// 3 channels, as Tracer::depth(): expected depth and median depth in world units, and the
+    /// number of Gaussians before the surface; 0 where nothing is.
+    Image depth;
+    /// 3 channels, as Tracer::normals(): x, y and z in world axes of the mean normal times alpha.
+    Image normals;
+    /// 1 channel in [0, 1]: share of the light that does not come from behind everything; 1 where a
+    /// surface is.
+    Image alpha;
   };
 
   /// Uploads the scene and builds both trees. Throws UsageError for settings out of range and
@@ -51,18 +57,20 @@ class PathTracer {
   PathTracer& operator=(PathTracer&&) noexcept;
 
   /// Rays per pixel and the seed of everything random from the next render() on. Pictures of one
-  /// sample are sharp, unless they are `of_many` that are to be averaged: then their rays too pass
+  /// sample are sharp, unless they are `of_many` that the caller averages: then their rays too pass
   /// anywhere through the lens and scatter at rough mirrors. Throws UsageError for less than one
   /// sample.
   void set_sampling(int samples, std::uint64_t seed, bool of_many = false);
 
-  /// The same materials and Gaussians with other meshes (an animation's next frame).
+  /// Replaces the meshes (an animation's next frame); materials and Gaussians stay. Throws
+  /// DataError and ResourceError as the constructor.
   void set_meshes(const std::vector<Mesh>& meshes);
 
-  /// RGBA: the background or environment is blended, alpha is the share of light that did not come
-  /// from there. Any camera model. `within` hears the share of the picture that is done, after
-  /// every sample of a batch of pixels, and returns false to stop; then the picture is empty.
-  /// Throws UsageError for a camera without pixels or with a number that is not finite,
+  /// The picture of a camera of any model, 4 channels: R, G and B in display values with the
+  /// background or environment blended, and as alpha the share of light that did not come from
+  /// there. `within` hears the share of the picture that is done, after every sample of a batch of
+  /// pixels, and returns false to stop; then the picture is empty. Throws UsageError for a camera
+  /// without pixels, with a number that is not finite or with a rotation that is none (Tracer),
   /// ResourceError when its paths would not fit the device beside the scene.
   Image render(const Camera& camera, const std::function<bool(double share)>& within = {});
 
@@ -78,13 +86,15 @@ class PathTracer {
   /// neither. Throws UsageError as render().
   std::optional<glm::dvec3> first_point(const Camera& camera);
 
-  /// Of the library itself: from the next render() on, draw part `part` of `parts` equal ones of
-  /// the picture's rows, and leave the others' pixels 0; the rows, first and last (exclusive), of
-  /// the last picture.
+  // What follows serves the library itself.
+
+  /// From the next render() on draws part `part`, counted from 0, of `parts` equal ones of the
+  /// picture's rows; the pixels of other rows are 0.
   void set_share(std::size_t part, std::size_t parts);
+  /// The rows that the last render() drew, from the top: the first, and the one behind the last.
   std::array<int, 2> rows() const;
 
-  /// Rays of the last render().
+  /// Numbers of rays of the last render().
   Statistics statistics() const;
   /// The context that it was made with.
   const Context& context() const;

@@ -30,13 +30,13 @@ struct RayResult {
 };
 
 /// Gradient of a loss for what a ray met.
-struct RayGradient {
+struct RayResultGradient {
   float color[3];  ///< dL/dR, dL/dG, dL/dB
   float alpha;     ///< dL/dalpha
 };
 
 /// Gradient of a loss for a ray itself; its ends t_min and t_max are constants.
-struct RaySlope {
+struct RayGradient {
   float origin[3];     ///< dL/d(origin)
   float direction[3];  ///< dL/d(direction) as it was given, of any length
 };

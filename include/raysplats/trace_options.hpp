@@ -23,7 +23,7 @@ enum class Traversal {
 };
 
 /// What a packet of camera rays is made of.
-enum class PacketForm {
+enum class PacketShape {
   kAuto,      ///< the device's own: vectors on CPUs, elsewhere subgroups where its compiler makes
               ///< one of a packet, or groups; widths 32 and 64 are never vectors
   kVector,    ///< the lanes of a vector in one work-item
@@ -67,7 +67,7 @@ struct TraceOptions {
   SkyLight sky;  ///< behind everything in views of cameras, in place of `background`; empty: none
   Traversal traversal = Traversal::kAuto;  ///< of camera rays
   bool depth = false;  ///< camera rays also yield expected depth, median depth and hit count
-  PacketForm packet_form = PacketForm::kAuto;  ///< speed alone
+  PacketShape packet_shape = PacketShape::kAuto;  ///< speed alone
   int packet_width = 0;  ///< rays of a packet: 1, 2, 4, 8, 16 in a vector, 8, 16, 32, 64 in a
                          ///< group; 0 = the device's own
   GradientSum gradient_sum = GradientSum::kAuto;  ///< of the backward pass
@@ -77,7 +77,8 @@ struct TraceOptions {
   bool raise_clamped = false;
   double launch_budget_ms = -1.0;  ///< of one launch; 0 = unbounded, -1 = the device's default
   std::size_t memory_budget = 0;   ///< bytes for hit lists and private gradients; 0 = a quarter
-                                   ///< of the device's memory, from 1 to 4 GiB
+                                   ///< of the device's memory, from 1 to 4 GiB and no more than
+                                   ///< two of its largest buffers
 };
 
 /// What models are trained with and shown by unless something else is said: the order of hits in

@@ -31,8 +31,8 @@ struct ViewGradients {
 
 /// Gradients of a loss over rays.
 struct RaysGradients {
-  Gaussians parameters;        ///< as in ViewGradients
-  std::vector<RaySlope> rays;  ///< of each ray
+  Gaussians parameters;           ///< as in ViewGradients
+  std::vector<RayGradient> rays;  ///< of each ray
 };
 
 /// Traces Gaussians, forward and backward: pictures of cameras of every model, and rays of your
@@ -57,8 +57,9 @@ class Tracer {
   /// RGBA at the camera's size: background blended in, A = 1 - transmittance. `differentiable`
   /// keeps what backward() needs, within options.memory_budget. `within` hears the share of the
   /// picture that is done, several times a second, and returns false to stop; then the picture is
-  /// empty. Throws UsageError for a camera without pixels or with a number that is not finite, for
-  /// a model of another context, and for a camera that Traversal::kTiles cannot trace.
+  /// empty. Throws UsageError for a camera without pixels, with a number that is not finite or with
+  /// a rotation that scales, shears or mirrors by more than 1e-3, for a model of another context,
+  /// and for a camera that Traversal::kTiles cannot trace.
   Image render(const Model& model,
                const Camera& camera,
                bool differentiable = false,
@@ -89,7 +90,7 @@ class Tracer {
                                ColorDirection direction = ColorDirection::kRay,
                                bool differentiable = false);
   /// Gradients of the last rays, one gradient for each of them. Throws as the other backward().
-  RaysGradients backward(const Model& model, std::span<const RayGradient> gradients);
+  RaysGradients backward(const Model& model, std::span<const RayResultGradient> gradients);
 
   /// Rays of the last render() or trace() that stopped because of options.max_hits.
   std::uint64_t capped_rays() const;
@@ -98,8 +99,8 @@ class Tracer {
   /// The context that it was made with.
   const Context& context() const;
   /// What is behind everything from the next render() or trace() on: a colour, or a sky in its
-  /// place. Throws UsageError for a sky with mirrors, and for one whose coefficients are not those
-  /// of a degree or not finite.
+  /// place. Throws UsageError for a colour that is not finite, for a sky with mirrors, and for one
+  /// whose coefficients are not those of a degree or not finite.
   void set_background(const std::array<float, 3>& background, const SkyLight& sky = {});
 
   /// Of the library itself: from the next render() that is not differentiable on, trace part `part`

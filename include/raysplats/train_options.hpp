@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "raysplats/bounds.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/trace_options.hpp"
 
@@ -57,18 +58,6 @@ struct ResolutionStep {
   int divisor = 1;  ///< width and height of the photos are divided by it, at least 1
   RunShare until;   ///< moment at which the next step begins
   bool operator==(const ResolutionStep&) const = default;
-};
-
-/// An axis-aligned box, world units; every `high` lies above its `low`.
-struct Bounds {
-  std::array<double, 3> low{};   ///< least x, y, z
-  std::array<double, 3> high{};  ///< greatest x, y, z
-  /// Whether the point lies inside or on the border.
-  bool contains(float x, float y, float z) const {
-    return x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1] && z >= low[2] &&
-           z <= high[2];
-  }
-  bool operator==(const Bounds&) const = default;
 };
 
 /// Stands for a number that follows from the length of the run, as in short runs every step has to

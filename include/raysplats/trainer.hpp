@@ -115,7 +115,8 @@ class Trainer {
   void set_command(std::string command);
   /// `callback` hears of every iteration of run() and step(), in their thread, before density
   /// control; nullptr ends that. It may use this trainer's loss(), model(), evaluate(), save() and
-  /// stop().
+  /// stop(). Throws UsageError for a callback while run() or step() is under way, which keeps its
+  /// own.
   void on_step(std::function<void(const TrainProgress&)> callback);
   /// Ends run() or step() after the iteration that is under way. run() then saves as it does for a
   /// signal, and returns: its summary has fewer iterations than the options.

@@ -7,7 +7,7 @@ KERNELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "
 # Context::Impl::program (host/device/context.cpp).
 COMPILER = ["-cl-mad-enable"]
 
-# packet_shape.cpp and camera_tracer.cpp: a packet per work-group, or one ray per work-item, in tiles of 16. SUBGROUP 1 is what
+# packet_layout.cpp and camera_tracer.cpp: a packet per work-group, or one ray per work-item, in tiles of 16. SUBGROUP 1 is what
 # a device with subgroups is tried with, 2 what it is asked for by name.
 CAMERA = dict(LANES=1, TILE=16, CHUNK=16, LENS=0)
 GROUP_CAMERA = dict(CAMERA, GROUP=32)
@@ -23,7 +23,7 @@ SWAP = dict(ATOMIC, FLOAT_ATOMICS=0)
 EXACT = dict(SWAP, EXACT_SUMS=1)
 # ray_launch.cpp, ray_backward.cpp.
 WALK = dict(LANES=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_LIMIT=0, LENS=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
-RAY_BACKWARD = dict(WALK, RAY_SLOPES=0, RAISE_CLAMPED=1)
+RAY_BACKWARD = dict(WALK, WITH_RAY_GRADIENT=0, RAISE_CLAMPED=1)
 RAY_GRADIENTS = dict(SIGMOID_SCALE=0, LANES=1, GROUP=64)
 # image_loss.cpp: groups, or what devices get whose groups are smaller.
 LOSS = dict(LANES=1, TILE=16, ROWS=1, PIXEL_L2=0)
@@ -79,14 +79,14 @@ PROGRAMS = [
     ("ray backward atomic", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC)),
     ("ray backward swap", "trace/ray_backward.cl", dict(RAY_BACKWARD, **SWAP)),
     ("ray backward exact", "trace/ray_backward.cl", dict(RAY_BACKWARD, **EXACT)),
-    ("ray slopes", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC, RAY_SLOPES=1)),
+    ("ray backward of rays", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC, WITH_RAY_GRADIENT=1)),
     ("ray records", "trace/ray_gradients.cl", RAY_GRADIENTS),
     ("ray gradients", "trace/ray_gradients.cl", dict(RAY_GRADIENTS, SH_DEGREE=3, SH_COEFFICIENTS=16)),
     ("gaussian blocks", "trace/ray_tree.cl", dict(LANES=4, SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
     ("bounds", "bvh/gaussian_bounds.cl", dict(SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
     ("curve", "bvh/curve.cl", dict(CHUNKS, LANES=4)),
     ("tree", "bvh/lbvh.cl", dict(LANES=4)),
-    ("tree order", "bvh/group_order.cl", dict(LANES=4, GROUP=64)),
+    ("tree order", "bvh/leaf_order_group.cl", dict(LANES=4, GROUP=64)),
     ("tree cost", "bvh/tree_cost.cl", dict(CHUNKS, LANES=4)),
     ("sort arrays", "parallel/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=0)),
     ("sort to pairs", "parallel/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=1)),
@@ -121,7 +121,7 @@ PROGRAMS = [
 ]
 
 # What GPUs never get.
-CPU_ONLY = {"bvh/order_groups.cl", "trace/finalize_gradients.cl"}
+CPU_ONLY = {"bvh/leaf_order.cl", "trace/finalize_gradients.cl"}
 
 
 def unlisted():

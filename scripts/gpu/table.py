@@ -31,12 +31,12 @@ ROWS = [
     ("`ray_backward` (SH 3, exact)", 64, True, "ray backward exact: ray_backward"),
     ("`nearest_surface`", 64, False, "surface rays: nearest_surface"),
     ("`light_through`", 64, False, "surface rays: light_through"),
-    ("`group_slopes` (loss)", 256, False, "loss group: group_slopes"),
+    ("`group_ssim_derivatives` (loss)", 256, False, "loss group: group_ssim_derivatives"),
     ("`group_gradient` (loss)", 256, False, "loss group: group_gradient"),
     ("`choose_steps` (Adam)", 64, False, "adam sh3: choose_steps"),
     ("`adam_step` (SH 3)", 64, False, "adam sh3: adam_step"),
     ("`advance` (light)", 64, False, "waves: advance"),
-    ("`order_group` (tree)", 64, False, "tree order: order_group"),
+    ("`order_leaves_group` (tree)", 64, False, "tree order: order_leaves_group"),
 ]
 
 # Of a SIMD of AMD's: registers of a work-item and how many are given out together, most waves, local bytes.
@@ -55,7 +55,7 @@ MODEL_KERNELS = [
     ("group forward train: trace_forward_group", 32),
     ("group backward atomic: trace_backward_group", 32),
     ("finalize group sh3: finalize_group", 64),
-    ("loss group: group_slopes", 256),
+    ("loss group: group_ssim_derivatives", 256),
     ("loss group: group_gradient", 256),
     ("adam sh3: adam_step", 64),
     ("rays: trace_rays", 64),

@@ -10,21 +10,6 @@
 
 namespace {
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
-void check_refused(const std::vector<std::string>& arguments,
-                   int code,
-                   const std::string& message) {
-  const Outcome outcome = raysplats_program(arguments);
-  INFO(outcome.err);
-  CHECK(outcome.code == code);
-  CHECK(one_sentence(outcome));
-  CHECK(contains(outcome.err, message));
-  CHECK(outcome.out.empty());
-}
-
 const std::vector<std::string> kTiny{"bench",          "--sizes",     "1k",   "--resolution",
                                      "32x32",          "--repeat",    "2",    "--filter",
                                      "adam/|forward/", "--log-level", "error"};

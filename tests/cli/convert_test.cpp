@@ -14,10 +14,6 @@
 
 namespace {
 
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 /// The files of a SOG beside each other, as other programs unpack them.
 void unpack_sog(const std::string& archive, const std::filesystem::path& folder) {
   const std::string bytes = read_file(archive);
@@ -55,10 +51,10 @@ TEST_CASE("convert writes every format, which every command reads again") {
     const Outcome outcome = convert({folder / "balls.ply", "-o", folder / name});
     INFO(outcome.err);
     REQUIRE(outcome.code == 0);
-    CHECK(has(outcome.out, "5 Gaussians, SH degree 0"));
-    CHECK(has(outcome.out, name == std::string("a.ply") || name == std::string("a.glb")
-                               ? "nothing is lost"
-                               : "8 bits"));
+    CHECK(contains(outcome.out, "5 Gaussians, SH degree 0"));
+    CHECK(contains(outcome.out, name == std::string("a.ply") || name == std::string("a.glb")
+                                    ? "nothing is lost"
+                                    : "8 bits"));
     const nlohmann::json json = told(folder / name);
     CHECK(json.at("type") == "model");
     CHECK(json.at("gaussians") == 5);
@@ -129,7 +125,8 @@ TEST_CASE("convert keeps what the views of a run see") {
         raysplats_program({"convert", input, folder / name, "--max-gaussians", "2"});
     INFO(outcome.err);
     REQUIRE(outcome.code == 0);
-    CHECK(has(outcome.err, name == "seen.ply" ? "what is seen in 1 view is kept" : "no views"));
+    CHECK(
+        contains(outcome.err, name == "seen.ply" ? "what is seen in 1 view is kept" : "no views"));
     return raysplats::read_ply(folder / name).means;
   };
   CHECK(kept(run.string(), "seen.ply") == std::vector<float>{1.5f, 0, 0, 2, 0, 0});
@@ -139,44 +136,40 @@ TEST_CASE("convert keeps what the views of a run see") {
       raysplats_program({"convert", folder / "alone.ply", folder / "x.ply", "--data", "data"});
   CHECK(idle.code == 2);
   CHECK(one_sentence(idle));
-  CHECK(has(idle.err, "--max-gaussians"));
+  CHECK(contains(idle.err, "--max-gaussians"));
 }
 
 TEST_CASE("convert says in one sentence what it will not do") {
   const TemporaryFolder folder;
   write_file(folder / "balls.ply", ply_file(5));
-  const auto refused = [&](const std::vector<std::string>& words, int code,
-                           const std::string& part) {
-    const Outcome outcome = raysplats_program(words);
-    INFO(outcome.err);
-    CHECK(outcome.code == code);
-    CHECK(one_sentence(outcome));
-    CHECK(has(outcome.err, part));
-  };
   const std::string balls = folder / "balls.ply";
-  refused({"convert", balls, "-o", folder / "a.obj"}, 2, ".splat");
-  refused({"convert", balls, "-o", balls, "--overwrite"}, 2, "what is read");
+  check_refused({"convert", balls, "-o", folder / "a.obj"}, 2, ".splat");
+  check_refused({"convert", balls, "-o", balls, "--overwrite"}, 2, "what is read");
   write_file(folder / "there.spz", "mine");
-  refused({"convert", balls, "-o", folder / "there.spz"}, 2, "--overwrite");
+  check_refused({"convert", balls, "-o", folder / "there.spz"}, 2, "--overwrite");
   CHECK(read_file(folder / "there.spz") == "mine");
-  refused({"convert", folder / "there.spz", "-o", folder / "b.ply"}, 3, "there.spz");
-  refused({"convert", balls, "-o", folder / "a.spz", "--crop-min", "90,90,90"}, 2, "None of the 5");
-  refused({"info", folder / "there.spz"}, 3, "there.spz");
-  refused({"convert", balls, folder / "a.spz", "--crop", "0,0,0,1,1"}, 2, "-1,-1,0,1,1,2");
-  refused({"convert", balls, folder / "a.spz", "--crop", "0,0,0,1,1,1", "--crop-min", "0,0,0"}, 2,
-          "--crop-min");
-  refused({"convert", balls, folder / "a.spz", "--crop", "1,1,1,0,0,0"}, 2, "swap them");
-  refused({"convert", balls}, 2, "output");
-  refused({"convert", balls, folder / "far.ply", "--translate", "1e300,0,0"}, 2,
-          "Gaussian 0 would be moved to 1e+300, 0, 0");
+  check_refused({"convert", folder / "there.spz", "-o", folder / "b.ply"}, 3, "there.spz");
+  check_refused({"convert", balls, "-o", folder / "a.spz", "--crop-min", "90,90,90"}, 2,
+                "None of the 5");
+  check_refused({"info", folder / "there.spz"}, 3, "there.spz");
+  check_refused({"convert", balls, folder / "a.spz", "--crop", "0,0,0,1,1"}, 2, "-1,-1,0,1,1,2");
+  check_refused(
+      {"convert", balls, folder / "a.spz", "--crop", "0,0,0,1,1,1", "--crop-min", "0,0,0"}, 2,
+      "--crop-min");
+  check_refused({"convert", balls, folder / "a.spz", "--crop", "1,1,1,0,0,0"}, 2, "swap them");
+  check_refused({"convert", balls}, 2, "output");
+  check_refused({"convert", balls, folder / "far.ply", "--translate", "1e300,0,0"}, 2,
+                "Gaussian 0 would be moved to 1e+300, 0, 0");
   for (const char* scale : {"1e300", "1e-300"})
-    refused({"convert", balls, folder / "far.ply", "--scale", scale}, 2, "scale is 1e-30 to 1e+30");
+    check_refused({"convert", balls, folder / "far.ply", "--scale", scale}, 2,
+                  "scale is 1e-30 to 1e+30");
   std::string broken = ply_file(1);
   broken.replace(broken.size() - sizeof(float), sizeof(float), "\xff\xff\xff\x7f");
   write_file(folder / "broken.ply", broken);
-  refused({"convert", folder / "broken.ply", folder / "far.ply", "--drop-nonfinite"}, 3,
-          "1 of 1 Gaussians have a number that is not finite");
+  check_refused({"convert", folder / "broken.ply", folder / "far.ply", "--drop-nonfinite"}, 3,
+                "1 of 1 Gaussians have a number that is not finite");
   CHECK_FALSE(std::filesystem::exists(folder / "far.ply"));
   write_file(folder / "notes.txt", "hello");
-  refused({"convert", folder / "notes.txt", "-o", folder / "b.ply"}, 3, "no model that is known");
+  check_refused({"convert", folder / "notes.txt", "-o", folder / "b.ply"}, 3,
+                "no model that is known");
 }

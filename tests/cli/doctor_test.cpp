@@ -7,14 +7,6 @@
 #include "../skip_test.hpp"
 #include "program.hpp"
 
-namespace {
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
-}  // namespace
-
 TEST_CASE("doctor tests every device and says that it works") {
   const Outcome text = raysplats_program({"doctor", "-q"});
   INFO(text.err);

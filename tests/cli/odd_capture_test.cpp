@@ -23,10 +23,6 @@ using Words = std::vector<std::string>;
 
 constexpr int kSize = 16;
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 /// Four photos for training and one that is held out.
 void make_data(const std::string& path) {
   const Outcome outcome = raysplats_program({"generate", path, "--size", std::to_string(kSize),
@@ -97,14 +93,6 @@ void check_trains(const Outcome& outcome, const std::string& remark) {
   const std::size_t at = outcome.err.find(remark);
   REQUIRE(at != std::string::npos);
   CHECK(outcome.err.find(remark, at + 1) == std::string::npos);
-}
-
-/// The run ends with one sentence that has `part`.
-void check_refused(const Outcome& outcome, int code, const std::string& part) {
-  INFO(outcome.err);
-  CHECK(outcome.code == code);
-  CHECK(one_sentence(outcome));
-  CHECK(contains(outcome.err, part));
 }
 
 }  // namespace
@@ -179,7 +167,7 @@ TEST_CASE("masks that cannot belong to their photo are refused with their name")
   const std::string data = folder / "data";
   make_data(data);
   add_mask(data, kSize, kSize / 2, 1.0f);
-  check_refused(train(data, folder / "shape", {"-q"}), 3, "mask.png has 16 x 8 pixels");
+  check_refusal(train(data, folder / "shape", {"-q"}), 3, "mask.png has 16 x 8 pixels");
   // The same shape in another size is the photo's all the same.
   add_mask(data, 2 * kSize, 2 * kSize, 1.0f);
   check_trains(train(data, folder / "size"), "1 of 5 photos have a mask");
@@ -196,7 +184,7 @@ TEST_CASE("photos whose masks are black everywhere are left out, and are not all
   nlohmann::json json = training_file(data);
   for (nlohmann::json& frame : json["frames"]) frame["mask_path"] = "mask.png";
   write_file(data + "/transforms_train.json", json.dump());
-  check_refused(train(data, folder / "all", {"-q"}), 3,
+  check_refusal(train(data, folder / "all", {"-q"}), 3,
                 "masks of all 4 training photos of " + data);
 }
 
@@ -211,7 +199,7 @@ TEST_CASE("one or two photos are trained on, with a warning of what they leave o
   check_trains(one, "warning: 1 training view of " + data);
   check_trains(one, "no view is held out, so nothing is measured");
   keep_photos(data, 0, false);
-  check_refused(train(data, folder / "none", {"-q"}), 3, "has no views");
+  check_refusal(train(data, folder / "none", {"-q"}), 3, "has no views");
 }
 
 TEST_CASE("a run without test views says that nothing is measured") {
@@ -222,7 +210,7 @@ TEST_CASE("a run without test views says that nothing is measured") {
   const Outcome outcome = train(data, folder / "run", {"--test-every", "0"});
   check_trains(outcome, "no view is held out, so nothing is measured");
   CHECK_FALSE(contains(outcome.out, "PSNR"));
-  check_refused(train(data, folder / "all", {"-q", "--test-every", "1"}), 2,
+  check_refusal(train(data, folder / "all", {"-q", "--test-every", "1"}), 2,
                 "--test-every 1 holds all of them out");
 }
 
@@ -233,12 +221,12 @@ TEST_CASE("depth maps are taken as far as they know something, and refused with 
   const Words weight{"--depth-weight", "0.5", "--depth-unit", "1"};
   Words quiet = weight;
   quiet.push_back("-q");
-  check_refused(train(data, folder / "without", quiet), 2, "neither depth maps nor sparse points");
+  check_refusal(train(data, folder / "without", quiet), 2, "neither depth maps nor sparse points");
 
   nlohmann::json json = training_file(data);
   json["frames"][1]["depth_file_path"] = "depth.npy";
   write_file(data + "/transforms_train.json", json.dump());
-  check_refused(train(data, folder / "missing", quiet), 3, "the depth map 'depth.npy' of frame 1");
+  check_refusal(train(data, folder / "missing", quiet), 3, "the depth map 'depth.npy' of frame 1");
   const auto write_map = [&](int width, int height, float value, float first) {
     std::vector<float> numbers(static_cast<std::size_t>(width * height), value);
     numbers[0] = first;
@@ -248,9 +236,10 @@ TEST_CASE("depth maps are taken as far as they know something, and refused with 
   write_map(kSize, kSize, 4.0f, nan);
   check_trains(train(data, folder / "nan", weight), "1 of 256 numbers of the depth map");
   write_map(kSize, kSize, nan, nan);
-  check_refused(train(data, folder / "nothing", quiet), 3, "depth.npy has no number above 0");
+  check_refusal(train(data, folder / "nothing", quiet), 3,
+                "No depth map has a number above 0, " + data + "/depth.npy");
   write_map(kSize, kSize / 2, 4.0f, 4.0f);
-  check_refused(train(data, folder / "shape", quiet), 3, "depth.npy has 16 x 8 pixels");
+  check_refusal(train(data, folder / "shape", quiet), 3, "depth.npy has 16 x 8 pixels");
   // Maps are not read by runs that do not ask for them.
   check_trains(train(data, folder / "off"), "iterations, up to");
 }
@@ -259,7 +248,7 @@ TEST_CASE("a cap below the start takes a part of it, and never what was asked fo
   const TemporaryFolder folder;
   const std::string data = folder / "data";
   make_data(data);
-  check_refused(train(data, folder / "count", {"-q", "--init-count", "50", "--max-gaussians", "8"}),
+  check_refusal(train(data, folder / "count", {"-q", "--init-count", "50", "--max-gaussians", "8"}),
                 2, "'init-count' = 50 Gaussians is above 'max-gaussians' = 8");
   write_file(folder / "model.ply", ply_file(20));
   const Words from_model{"--init", folder / "model.ply", "--max-gaussians", "8"};

@@ -20,11 +20,7 @@ Words operator+(Words first, const Words& second) {
 }
 
 void refuse(const Words& arguments, const std::string& message) {
-  const Outcome outcome = raysplats_program(arguments);
-  INFO(outcome.err);
-  CHECK(outcome.code == 2);
-  CHECK(one_sentence(outcome));
-  CHECK(outcome.err.find(message) != std::string::npos);
+  check_refused(arguments, 2, message);
 }
 
 const Words kRender{"render", "m.ply", "-o", "x", "--orbit", "2"};

@@ -45,12 +45,10 @@ class Place {
     words.insert(words.end(), more.begin(), more.end());
     return raysplats_program(words);
   }
+  /// Before anything is computed.
   static void check_refused(const Outcome& outcome, int code, const std::string& part) {
-    INFO(outcome.err);
-    CHECK(outcome.code == code);
-    CHECK(one_sentence(outcome));
-    CHECK(outcome.err.find(part) != std::string::npos);
-    CHECK(outcome.out.empty());  // before anything is computed
+    check_refusal(outcome, code, part);
+    CHECK(outcome.out.empty());
   }
 
   std::vector<Writer> writers;
@@ -108,6 +106,15 @@ TEST_CASE("what is read is not written to") {
                        "is what is read");
   CHECK(read_file(place.path("m.ply")) == model);
   CHECK(read_file(place.path("rays.npy")) == rays);
+
+  // Of a run its options are read too.
+  write_file(place.path("run/point_cloud/iteration_5/point_cloud.ply"), model);
+  write_file(place.path("run/config.toml"), "seed = 7\n");
+  const Place::Writer of_run{
+      {"trace", place.path("run"), "--rays", place.path("rays.npy")}, "-o", ""};
+  Place::check_refused(Place::run(of_run, place.path("run/config.toml"), {"--overwrite"}), 2,
+                       "is what is read");
+  CHECK(read_file(place.path("run/config.toml")) == "seed = 7\n");
 }
 
 TEST_CASE("convert refuses before it looks for what to keep") {
@@ -127,10 +134,16 @@ TEST_CASE("a run's own page is made anew, and its other files stay") {
     CHECK(raysplats_program(words).code == 0);
     CHECK(read_file(page).starts_with("<!DOCTYPE html>"));
   }
-  Place::check_refused(
-      raysplats_program({"report", place.path("a"), "-o", place.path("a/metrics.json")}), 2,
-      "is there already");
+  write_file(place.path("a/config.toml"), "seed = 7\n");
+  for (const char* read : {"a/metrics.json", "a/config.toml"}) {
+    for (const Words& runs : {Words{place.path("a")}, Words{place.path("b"), place.path("a")}}) {
+      Words words{"report", "-o", place.path(read), "--overwrite"};
+      words.insert(words.end(), runs.begin(), runs.end());
+      Place::check_refused(raysplats_program(words), 2, "is what is read");
+    }
+  }
   CHECK(read_file(place.path("a/metrics.json")) == "{}");
+  CHECK(read_file(place.path("a/config.toml")) == "seed = 7\n");
   Place::check_refused(raysplats_program({"report", place.path("none")}), 3, "does not exist");
 }
 

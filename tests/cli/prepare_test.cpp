@@ -26,10 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 /// How far the poses of one model are from another's of the same photos.
 struct Apart {
   std::size_t photos = 0;
@@ -178,49 +174,49 @@ TEST_CASE("prepare makes a data set of photos and names those without a pose") {
   const Outcome outcome = stage.run({stage.path("photos"), "-o", stage.path("data")});
   INFO(outcome.err);
   REQUIRE(outcome.code == 0);
-  CHECK(has(outcome.out, "2 of 3 photos with poses and 1 point in"));
-  CHECK(has(outcome.err, "1 photo without a pose"));
-  CHECK(has(outcome.err, "c.png"));
+  CHECK(contains(outcome.out, "2 of 3 photos with poses and 1 point in"));
+  CHECK(contains(outcome.err, "1 photo without a pose"));
+  CHECK(contains(outcome.err, "c.png"));
   const std::string calls = stage.calls();
-  CHECK(has(calls, "feature_extractor"));
-  CHECK(has(calls, "--ImageReader.single_camera 1"));
-  CHECK(has(calls, "--SiftExtraction.max_num_features 8192"));
-  CHECK(has(outcome.err, "COLMAP will take about 0:0"));
-  CHECK(has(outcome.err, "for 3 photos"));
-  CHECK(has(calls, "exhaustive_matcher"));
-  CHECK(has(read_file(stage.path("data/prepare.log")), "Processed file [3/3]"));
+  CHECK(contains(calls, "feature_extractor"));
+  CHECK(contains(calls, "--ImageReader.single_camera 1"));
+  CHECK(contains(calls, "--SiftExtraction.max_num_features 8192"));
+  CHECK(contains(outcome.err, "COLMAP will take about 0:0"));
+  CHECK(contains(outcome.err, "for 3 photos"));
+  CHECK(contains(calls, "exhaustive_matcher"));
+  CHECK(contains(read_file(stage.path("data/prepare.log")), "Processed file [3/3]"));
   const Outcome info = raysplats_program({"info", stage.path("data")});
   INFO(info.err);
   CHECK(info.code == 0);
-  CHECK(has(info.out, "views            2"));
+  CHECK(contains(info.out, "views            2"));
 
   // All is done: COLMAP is not called again, unless something has changed.
   const Outcome idle = stage.run({stage.path("photos"), "-o", stage.path("data")});
   CHECK(idle.code == 0);
   CHECK(stage.calls().empty());
-  CHECK(!has(idle.err, "COLMAP will take"));
+  CHECK(!contains(idle.err, "COLMAP will take"));
   CHECK(stage.run({stage.path("photos"), "-o", stage.path("data"), "--matching", "sequential"})
             .code == 0);
   const std::string again = stage.calls();
-  CHECK(!has(again, "feature_extractor"));
-  CHECK(has(again, "sequential_matcher"));
-  CHECK(has(again, "mapper"));
+  CHECK(!contains(again, "feature_extractor"));
+  CHECK(contains(again, "sequential_matcher"));
+  CHECK(contains(again, "mapper"));
 }
 
 TEST_CASE("prepare goes on after the last finished step") {
   const Stage stage;
   const Outcome failed = stage.run({stage.path("photos"), "-o", stage.path("data")}, "mapper");
   CHECK(failed.code == 1);
-  CHECK(has(failed.err, "colmap ended with exit code 7: "));
-  CHECK(has(failed.err, "the disk is on fire"));
-  CHECK(has(failed.err, "prepare.log"));
+  CHECK(contains(failed.err, "colmap ended with exit code 7: "));
+  CHECK(contains(failed.err, "the disk is on fire"));
+  CHECK(contains(failed.err, "prepare.log"));
   CHECK(!fs::exists(stage.path("data/sparse")));
   stage.calls();
   CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
   const std::string calls = stage.calls();
-  CHECK(!has(calls, "feature_extractor"));
-  CHECK(!has(calls, "matcher"));
-  CHECK(has(calls, "mapper"));
+  CHECK(!contains(calls, "feature_extractor"));
+  CHECK(!contains(calls, "matcher"));
+  CHECK(contains(calls, "mapper"));
 }
 
 TEST_CASE("prepare shares a camera among photos of one size") {
@@ -241,8 +237,8 @@ TEST_CASE("prepare shares a camera among photos of one size") {
             .code == 0);
   const std::string own = stage.calls();
   CHECK(own.find("feature_extractor") == own.rfind("feature_extractor"));
-  CHECK(has(own, "--ImageReader.single_camera 0"));
-  CHECK(has(own, "--SiftExtraction.max_num_features 1000"));
+  CHECK(contains(own, "--ImageReader.single_camera 0"));
+  CHECK(contains(own, "--SiftExtraction.max_num_features 1000"));
 }
 
 TEST_CASE("prepare takes photos of folders below where that is wished") {
@@ -251,8 +247,9 @@ TEST_CASE("prepare takes photos of folders below where that is wished") {
     raysplats::write_image(stage.path("photos/" + std::string(name)), raysplats::Image(8, 6, 3));
   const Outcome without = stage.run({stage.path("photos"), "-o", stage.path("data")});
   CHECK(without.code == 0);
-  CHECK(has(without.err, "left out: left (1), left/deep (1), right cam (1); --subfolders takes"));
-  CHECK(has(without.out, "2 of 3 photos"));
+  CHECK(contains(without.err,
+                 "left out: left (1), left/deep (1), right cam (1); --subfolders takes"));
+  CHECK(contains(without.out, "2 of 3 photos"));
   // What it has made lies below the photos, and is none of them.
   const std::string data = stage.path("photos/data");
   const auto with = [&](const std::vector<std::string>& more) {
@@ -264,7 +261,7 @@ TEST_CASE("prepare takes photos of folders below where that is wished") {
   const Outcome outcome = with({});
   INFO(outcome.err);
   REQUIRE(outcome.code == 0);
-  CHECK(has(outcome.out, "2 of 6 photos"));
+  CHECK(contains(outcome.out, "2 of 6 photos"));
   CHECK(read_file(data + "/prepare/photos.txt") ==
         "a.png\nb.png\nc.png\nleft/a.png\nleft/deep/d.png\nright cam/b.png\n");
   CHECK(fs::exists(data + "/images/right cam/b.png"));
@@ -278,7 +275,7 @@ TEST_CASE("prepare takes photos of folders below where that is wished") {
   for (std::size_t at = 0; (at = calls.find("feature_extractor", at)) != std::string::npos; ++at)
     ++extractors;
   CHECK(extractors == 4);
-  CHECK(has(calls, "--ImageReader.single_camera 1"));
+  CHECK(contains(calls, "--ImageReader.single_camera 1"));
 }
 
 TEST_CASE("prepare finds the axis of a lens that has photos enough") {
@@ -288,12 +285,12 @@ TEST_CASE("prepare finds the axis of a lens that has photos enough") {
                            raysplats::Image(8, 6, 3, 0.5f));
   }
   CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
-  CHECK(has(stage.calls(), "--BundleAdjustment.refine_principal_point 1"));
+  CHECK(contains(stage.calls(), "--BundleAdjustment.refine_principal_point 1"));
   // A tenth photo of another camera does not do.
   fs::remove(stage.path("photos/more_6.png"));
   raysplats::write_image(stage.path("photos/tall.png"), raysplats::Image(6, 8, 3, 0.5f));
   CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
-  CHECK(!has(stage.calls(), "bundle_adjuster"));
+  CHECK(!contains(stage.calls(), "bundle_adjuster"));
 }
 
 TEST_CASE("prepare takes the sharpest of every three frames of a video") {
@@ -320,9 +317,9 @@ TEST_CASE("prepare takes the sharpest of every three frames of a video") {
   INFO(outcome.err);
   CHECK(outcome.code == 0);
   const std::string calls = stage.calls();
-  CHECK(has(calls, "fps=0.720000"));  // 9 frames of 12.5 s
-  CHECK(has(calls, "--ImageReader.single_camera 1"));
-  CHECK(has(calls, "sequential_matcher"));
+  CHECK(contains(calls, "fps=0.720000"));  // 9 frames of 12.5 s
+  CHECK(contains(calls, "--ImageReader.single_camera 1"));
+  CHECK(contains(calls, "sequential_matcher"));
   CHECK(entries(stage.path("data/images")) == 3);
   for (const char* name : {"frame_000002.jpg", "frame_000004.jpg", "frame_000009.jpg"})
     CHECK(fs::exists(stage.path("data/images/" + std::string(name))));
@@ -338,18 +335,18 @@ TEST_CASE("prepare calls the options of COLMAP by the names that its version has
     INFO(outcome.err);
     CHECK(outcome.code == 0);
     const std::string calls = stage.calls();
-    CHECK(has(calls, "--FeatureExtraction.use_gpu 0"));
-    CHECK(has(calls, max_size + " 1600"));
-    CHECK(has(calls, "--FeatureMatching.use_gpu 0"));
-    CHECK(has(outcome.err, "] 1/1"));  // pairs
-    CHECK(has(outcome.err, "] 2/3"));  // poses
+    CHECK(contains(calls, "--FeatureExtraction.use_gpu 0"));
+    CHECK(contains(calls, max_size + " 1600"));
+    CHECK(contains(calls, "--FeatureMatching.use_gpu 0"));
+    CHECK(contains(outcome.err, "] 1/1"));  // pairs
+    CHECK(contains(outcome.err, "] 2/3"));  // poses
   }
   // Where its help says nothing of them, the names are the old ones.
   const Stage stage;
   CHECK(stage.run({stage.path("photos"), "-o", stage.path("data")}).code == 0);
   const std::string calls = stage.calls();
-  CHECK(has(calls, "--SiftExtraction.use_gpu 0 --SiftExtraction.max_image_size 1600"));
-  CHECK(has(calls, "--SiftMatching.use_gpu 0"));
+  CHECK(contains(calls, "--SiftExtraction.use_gpu 0 --SiftExtraction.max_image_size 1600"));
+  CHECK(contains(calls, "--SiftMatching.use_gpu 0"));
 }
 
 TEST_CASE("prepare sees that a photo or a video has become another") {
@@ -369,11 +366,11 @@ TEST_CASE("prepare sees that a photo or a video has become another") {
     CHECK(stage.calls().empty());
     later(changed);
     CHECK(stage.run(words).code == 0);
-    CHECK(has(stage.calls(), "feature_extractor"));
+    CHECK(contains(stage.calls(), "feature_extractor"));
   }
   write_file(stage.path("walk.mp4"), "a longer video");
   CHECK(stage.run({stage.path("walk.mp4"), "-o", stage.path("walk"), "--frames", "3"}).code == 0);
-  CHECK(has(stage.calls(), "fps="));
+  CHECK(contains(stage.calls(), "fps="));
 }
 
 TEST_CASE("prepare takes the length of a video that states none from its packets") {
@@ -385,16 +382,16 @@ TEST_CASE("prepare takes the length of a video that states none from its packets
   const Outcome outcome = prepared();
   INFO(outcome.err);
   CHECK(outcome.code == 0);
-  CHECK(has(stage.calls(), "fps=9.000000"));  // 9 frames of five times 0.2 s
+  CHECK(contains(stage.calls(), "fps=9.000000"));  // 9 frames of five times 0.2 s
   stage.write_video("N/A", "N/A\\nN/A\\n");
   const Outcome without = prepared();
   CHECK(without.code == 3);
-  CHECK(has(without.err, "walk.mp4 states no length"));
-  CHECK(has(without.err, "'ffmpeg -i walk.mp4 -c copy walk_anew.mp4'"));
+  CHECK(contains(without.err, "walk.mp4 states no length"));
+  CHECK(contains(without.err, "'ffmpeg -i walk.mp4 -c copy walk_anew.mp4'"));
   stage.write_video("N/A", "");
   const Outcome none = prepared();
   CHECK(none.code == 3);
-  CHECK(has(none.err, "walk.mp4 is no video that ffmpeg can read"));
+  CHECK(contains(none.err, "walk.mp4 is no video that ffmpeg can read"));
 }
 
 TEST_CASE("the real FFmpeg keeps the colours of a video, in folders of any name") {
@@ -437,49 +434,45 @@ TEST_CASE("prepare says which of many photos it compares, and which pictures it 
     return outcome.err;
   };
   const std::string told = prepared({});
-  CHECK(has(told, "more than 400 photos: each is compared with the 12 that follow it by name"));
-  CHECK(has(told, "--matching exhaustive"));
-  CHECK(has(told, "left out: 1 .heic; convert"));
-  CHECK(has(stage.calls(), "sequential_matcher"));
+  CHECK(
+      contains(told, "more than 400 photos: each is compared with the 12 that follow it by name"));
+  CHECK(contains(told, "--matching exhaustive"));
+  CHECK(contains(told, "left out: 1 .heic; convert"));
+  CHECK(contains(stage.calls(), "sequential_matcher"));
   // Where nothing is compared, and where somebody has chosen, nothing is said.
-  CHECK(!has(prepared({}), "more than 400"));
-  CHECK(!has(prepared({"--matching", "exhaustive"}), "more than 400"));
-  CHECK(has(stage.calls(), "exhaustive_matcher"));
+  CHECK(!contains(prepared({}), "more than 400"));
+  CHECK(!contains(prepared({"--matching", "exhaustive"}), "more than 400"));
+  CHECK(contains(stage.calls(), "exhaustive_matcher"));
 }
 
 TEST_CASE("prepare says in one sentence what is missing") {
   const Stage stage;
-  const auto refused = [](const Outcome& outcome, int code, const std::string& part) {
-    INFO(outcome.err);
-    CHECK(outcome.code == code);
-    CHECK(one_sentence(outcome));
-    CHECK(has(outcome.err, part));
-  };
   Surroundings without;
   without.environment = {{"PATH", stage.path("empty")}};
-  refused(raysplats_program({"prepare", stage.path("photos"), "-o", stage.path("data")}, without),
-          2, "apt-get install colmap");
+  check_refusal(
+      raysplats_program({"prepare", stage.path("photos"), "-o", stage.path("data")}, without), 2,
+      "apt-get install colmap");
   CHECK(!fs::exists(stage.path("data")));
-  refused(stage.run({stage.path("nothing"), "-o", stage.path("data")}), 3, "does not exist");
+  check_refusal(stage.run({stage.path("nothing"), "-o", stage.path("data")}), 3, "does not exist");
   fs::create_directories(stage.path("few"));
-  refused(stage.run({stage.path("few"), "-o", stage.path("data")}), 3, "0 photos");
+  check_refusal(stage.run({stage.path("few"), "-o", stage.path("data")}), 3, "0 photos");
   // Photos in folders below may be the same at other sizes: none is taken unasked.
   fs::copy(stage.path("photos"), stage.path("few/camera 1"));
   const Outcome below = stage.run({stage.path("few"), "-o", stage.path("data")});
-  refused(below, 3, "camera 1 (3): name one of them, or take all with --subfolders");
+  check_refusal(below, 3, "camera 1 (3): name one of them, or take all with --subfolders");
   CHECK(!fs::exists(stage.path("data")));
   // What phones and cameras write, and nothing here reads.
   for (const char* name : {"IMG_1.HEIC", "IMG_2.heic", "IMG_3.dng", "a.txt"})
     write_file(stage.path("phone/" + std::string(name)), "?");
-  refused(stage.run({stage.path("phone"), "-o", stage.path("data")}), 3,
-          "(1 .dng, 2 .heic): convert them to JPEG");
+  check_refusal(stage.run({stage.path("phone"), "-o", stage.path("data")}), 3,
+                "(1 .dng, 2 .heic): convert them to JPEG");
   CHECK(!fs::exists(stage.path("data")));
   const Outcome nowhere = stage.run({stage.path("photos"), "-o", "/proc/raysplats"});
-  refused(nowhere, 3, "The output folder /proc/raysplats cannot be created");
-  CHECK(!has(nowhere.err, "filesystem error"));
+  check_refusal(nowhere, 3, "The output folder /proc/raysplats cannot be created");
+  CHECK(!contains(nowhere.err, "filesystem error"));
   // Images of somebody else are not touched.
   write_file(stage.path("mine/images/x.png"), "mine");
-  refused(stage.run({stage.path("photos"), "-o", stage.path("mine")}), 3, "another folder");
+  check_refusal(stage.run({stage.path("photos"), "-o", stage.path("mine")}), 3, "another folder");
   CHECK(read_file(stage.path("mine/images/x.png")) == "mine");
   // Nor models and data sets of somebody else, runs, and the photos.
   for (const std::string file : {"sparse/0/cameras.txt", "database.db", "transforms_train.json",
@@ -491,11 +484,12 @@ TEST_CASE("prepare says in one sentence what is missing") {
     INFO(outcome.err);
     CHECK(outcome.code != 0);
     CHECK(one_sentence(outcome));
-    CHECK(has(outcome.err, "another"));
+    CHECK(contains(outcome.err, "another"));
     CHECK(read_file(folder + "/" + file) == "mine");
     CHECK(!fs::exists(folder + "/prepare"));
   }
-  refused(stage.run({stage.path("photos"), "-o", stage.path("photos")}), 2, "is what is read");
+  check_refusal(stage.run({stage.path("photos"), "-o", stage.path("photos")}), 2,
+                "is what is read");
   CHECK(entries(stage.path("photos")) == 3);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "program.hpp"
 
+#include <doctest/doctest.h>
 #include <fcntl.h>
 #include <linux/capability.h>
 #include <sys/ioctl.h>
@@ -190,4 +191,21 @@ bool one_sentence(const Outcome& outcome) {
   return outcome.err.starts_with("raysplats: ") && outcome.err.size() > 12 &&
          outcome.err.back() == '\n' &&
          std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1;
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+void check_refusal(const Outcome& outcome, int code, const std::string& part) {
+  INFO(outcome.err);
+  CHECK(outcome.code == code);
+  CHECK(one_sentence(outcome));
+  CHECK(contains(outcome.err, part));
+}
+
+void check_refused(const std::vector<std::string>& arguments, int code, const std::string& part) {
+  const Outcome outcome = raysplats_program(arguments);
+  check_refusal(outcome, code, part);
+  CHECK(outcome.out.empty());
 }

@@ -28,7 +28,7 @@ struct Surroundings {
   rlim_t memory_limit = RLIM_INFINITY;  ///< bytes of address space, as by ulimit -v
   bool permissions_count = false;       ///< even for root: what may not be written cannot be
   std::string out_file = {};            ///< where standard output goes, such as /dev/full
-  std::string err_file = {};            ///< the same of standard error
+  std::string err_file = {};            ///< where standard error goes
   bool terminal = false;                ///< standard error is one, 80 columns wide
   bool closed_out = false;              ///< as by >&-
   bool closed_err = false;
@@ -99,3 +99,10 @@ std::string ply_file(std::size_t count, std::int64_t declared = -1);
 
 /// True when the outcome is one sentence on standard error, prefixed by the program's name.
 bool one_sentence(const Outcome& outcome);
+
+bool contains(const std::string& text, const std::string& part);
+
+/// Checks that the program ended with `code` and one sentence that has `part`.
+void check_refusal(const Outcome& outcome, int code, const std::string& part);
+/// Runs it with `arguments` and checks that, and that it printed no results.
+void check_refused(const std::vector<std::string>& arguments, int code, const std::string& part);

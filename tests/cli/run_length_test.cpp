@@ -12,10 +12,6 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 Outcome succeed(const Words& arguments) {
   Outcome outcome = raysplats_program(arguments);
   INFO(outcome.err);
@@ -66,4 +62,32 @@ TEST_CASE("a quality leaves what a configuration says of length and size") {
       {"train", data, "-o", look, "--quality", "preview", "--config", folder / "my.toml", "-q"});
   CHECK(value_of(look, "iterations") == "12");
   CHECK(value_of(look, "downscale") == "3");
+}
+
+TEST_CASE("a command with a quality or a time begins a run, and goes on with it") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", run = folder / "run";
+  succeed({"generate", data, "--size", "16", "--train-views", "3", "--test-views", "1", "-q"});
+  std::ofstream(folder / "my.toml") << "iterations = 6\n";
+  Words words{"train",     data,     "-o",       run,
+              "--resume",  "latest", "--config", folder / "my.toml",
+              "--quality", "preview"};
+  succeed(words);
+  CHECK(value_of(run, "iterations") == "6");
+  const Outcome again = succeed(words);
+  CHECK(contains(again.err, "config.toml names what they chose"));
+  CHECK(value_of(run, "iterations") == "6");
+  // A run that is named is there already.
+  words[5] = run;
+  CHECK(raysplats_program(words).code == 2);
+}
+
+TEST_CASE("evaluations beyond the end of a run are not left out in silence") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  succeed({"generate", data, "--size", "16", "--train-views", "3", "--test-views", "1", "-q"});
+  const Outcome outcome =
+      succeed({"train", data, "-o", folder / "run", "-n", "3", "--eval-at", "2,5000"});
+  CHECK(contains(outcome.err, "eval-at = 5000 is beyond the 3 iterations"));
+  CHECK(!contains(outcome.err, "eval-at = 2 "));
 }

@@ -113,7 +113,7 @@ TEST_CASE("a scene file is seen by the cameras of a data set as its model is") {
   survey.scene("", "large", {"--data", data, "--downscale", "1", "--frames", ":1"});
   survey.check_same("large", "full", {"r_0.png"}, 32);
 
-  // Those of the file, which the command line's replace.
+  // Frames that the scene file names, in whose place the command line's are drawn.
   const std::string camera = "[camera]\ndata = \"data\"\nsplit = \"train\"\nviews = [2, 0]\n";
   survey.scene(camera, "own");
   survey.check_same("own", "train", {"r_0.png", "r_2.png"}, 16);

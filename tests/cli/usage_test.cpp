@@ -7,24 +7,7 @@
 
 #include "program.hpp"
 
-namespace {
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
-void check_refused(const std::vector<std::string>& arguments,
-                   int code,
-                   const std::string& message) {
-  const Outcome outcome = raysplats_program(arguments);
-  INFO(outcome.err);
-  CHECK(outcome.code == code);
-  CHECK(one_sentence(outcome));
-  CHECK(contains(outcome.err, message));
-  CHECK(outcome.out.empty());
-}
-
-}  // namespace
+namespace {}  // namespace
 
 TEST_CASE("help and version") {
   const Outcome help = raysplats_program({"--help"});
@@ -126,11 +109,7 @@ TEST_CASE("no OpenCL platform is exit code 4 with the remedy") {
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"devices"},
         {"-q", "render", folder / "model.ply", "--orbit", "1", "-o", folder / "frames"}}) {
-    const Outcome outcome = raysplats_program(arguments, bare);
-    INFO(outcome.err);
-    CHECK(outcome.code == 4);
-    CHECK(one_sentence(outcome));
-    CHECK(contains(outcome.err, "pocl-opencl-icd"));
+    check_refusal(raysplats_program(arguments, bare), 4, "pocl-opencl-icd");
   }
   CHECK(entries(folder / "frames") == 0);
 }
@@ -162,10 +141,8 @@ TEST_CASE("an unknown device is exit code 2") {
   const TemporaryFolder folder;
   write_file(folder / "model.ply", ply_file(2));
   for (const char* device : {"99", "no such device"}) {
-    const Outcome outcome = raysplats_program({"render", folder / "model.ply", "--orbit", "1", "-o",
-                                               folder / "frames", "--device", device, "-q"});
-    CHECK(outcome.code == 2);
-    CHECK(one_sentence(outcome));
-    CHECK(contains(outcome.err, "raysplats devices"));
+    check_refused({"render", folder / "model.ply", "--orbit", "1", "-o", folder / "frames",
+                   "--device", device, "-q"},
+                  2, "raysplats devices");
   }
 }

@@ -45,18 +45,15 @@ const std::map<std::string, Names> kBelow{{"util", {}},
 
 /// The module that a public header is the face of.
 const std::map<std::string, std::string> kFaces{
-    {"error", "util"},          {"device", "device"},
-    {"context", "device"},      {"camera", "scene"},
-    {"gaussians", "scene"},     {"model_changes", "scene"},
-    {"image", "scene"},         {"rays", "scene"},
-    {"trace_options", "scene"}, {"scene", "scene"},
-    {"pose_gradient", "scene"}, {"mirrors", "scene"},
-    {"dataset", "io"},          {"io", "io"},
-    {"model", "trace"},         {"tracer", "light"},
-    {"path_tracer", "light"},   {"lpips", "eval"},
-    {"evaluation", "eval"},     {"evaluation_row", "run"},
-    {"train_options", "run"},   {"trainer", "train"},
-    {"opencl", "light"},        {"contributions", "light"}};
+    {"error", "util"},          {"bounds", "scene"},    {"device", "device"},
+    {"context", "device"},      {"camera", "scene"},    {"gaussians", "scene"},
+    {"model_changes", "scene"}, {"image", "scene"},     {"rays", "scene"},
+    {"trace_options", "scene"}, {"scene", "scene"},     {"pose_gradient", "scene"},
+    {"mirrors", "scene"},       {"dataset", "io"},      {"io", "io"},
+    {"model", "trace"},         {"tracer", "light"},    {"path_tracer", "light"},
+    {"lpips", "eval"},          {"evaluation", "eval"}, {"evaluation_row", "run"},
+    {"train_options", "run"},   {"trainer", "train"},   {"opencl", "light"},
+    {"contributions", "light"}};
 
 Names reach_of(const std::string& module) {
   Names reach{module};

@@ -122,6 +122,22 @@ def test_contributions_make_up_alpha(context, arrays):
     assert found.sum() == pytest.approx(alpha.mean(), rel=1e-4)
 
 
+def test_poses_and_backgrounds_that_mean_nothing_are_refused(context, arrays):
+    model = rs.Model(context, as_gaussians(arrays))
+    tracer = rs.Tracer(context)
+    scaled = rs.Camera(4, 3, 4.0, rotation=[[2, 0, 0], [0, 1, 0], [0, 0, 1]], translation=(0, 0, 3), name="a")
+    with pytest.raises(rs.UsageError, match="'a' has a rotation that scales, shears or mirrors"):
+        tracer.render(model, scaled)
+    for background in ((np.nan, 0, 0), (0, 0, np.inf)):
+        with pytest.raises(rs.UsageError, match="background .* is not finite"):
+            tracer.set_background(background)
+        with pytest.raises(rs.UsageError, match="background .* is not finite"):
+            rs.Tracer(context, rs.TraceOptions(background=background))
+    for factor in (0, -1, np.nan):
+        with pytest.raises(rs.UsageError, match="cannot be downscaled"):
+            scaled.downscaled(factor)
+
+
 def test_backward_is_refused_where_it_means_nothing(context, arrays):
     model = rs.Model(context, as_gaussians(arrays))
     tracer = rs.Tracer(context)

@@ -54,6 +54,43 @@ def test_threads_share_a_context(context):
     assert len(found) == 15 and all(np.array_equal(each, expected) for each in found)
 
 
+def test_a_thread_keeps_a_context_for_several_calls(context):
+    model = rs.Model(context, as_gaussians(random_arrays()))
+    tracer = rs.Tracer(context)
+    camera = rs.Camera(32, 24, 30.0, translation=(0, 0, 3))
+    drawn = threading.Event()
+
+    def draw():
+        tracer.render(model, camera)
+        drawn.set()
+
+    thread = threading.Thread(target=draw)
+    with context.lock(), context.lock() as nothing:
+        assert nothing is None
+        tracer.render(model, camera, differentiable=True)
+        thread.start()
+        assert not drawn.wait(0.2)
+        # What is kept is still that of this thread.
+        assert tracer.backward(model, np.ones((24, 32, 4), np.float32)).parameters.means.any()
+    thread.join()
+    assert drawn.is_set()
+
+    held = context.lock()
+    with held:
+        said = []
+
+        def leave():
+            try:
+                held.__exit__(None, None, None)
+            except rs.UsageError as error:
+                said.append(str(error))
+
+        thread = threading.Thread(target=leave)
+        thread.start()
+        thread.join()
+    assert "does not have the lock" in said[0]
+
+
 def test_counts_of_rays_wait_for_a_picture_of_another_thread():
     # In a process of its own, which ends: the two would wait for each other.
     code = """

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """raysplats.torch against autograd through the reference in double precision."""
 
+import concurrent.futures
 import gc
 import inspect
+import sys
 import weakref
 
 import numpy as np
@@ -152,6 +154,56 @@ def test_a_camera_may_be_moved_on_before_the_backward_pass(renderer):
     assert torch.allclose(found, expected, rtol=1e-5, atol=1e-4 * expected.abs().max())
 
 
+def test_a_pass_that_failed_meanwhile_does_not_matter(renderer):
+    single, _ = leaves(random_arrays())
+    camera = rs.Camera.look_at((3, 0, 1), (0, 0, 0), (0, 0, 1), 12, 10, 14)
+    (expected,) = torch.autograd.grad(renderer.render(camera, **single).rgba.sum(), [single["means"]])
+    seen = renderer.render(camera, **single).rgba.sum()
+    with pytest.raises(rs.UsageError):
+        renderer.render(rs.Camera(0, 10, 14.0), **single)
+    (found,) = torch.autograd.grad(seen, [single["means"]])
+    assert torch.allclose(found, expected, rtol=1e-5, atol=1e-4 * expected.abs().max())
+
+
+@pytest.fixture
+def hasty_threads():
+    """The interpreter changes threads as often as it can."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(usual)
+
+
+def assert_threads_find(calls, expected, rounds=25):
+    """Functions that are called again and again, each in a thread of its own, find what they find alone."""
+
+    def again(call):
+        return [call() for _ in range(rounds)]
+
+    with concurrent.futures.ThreadPoolExecutor(len(calls)) as threads:
+        found = [each.result() for each in [threads.submit(again, call) for call in calls]]
+    for several, one in zip(found, expected):
+        for each in several:
+            assert torch.allclose(each, one, rtol=1e-4, atol=1e-4 * one.abs().max())
+
+
+def test_threads_share_a_renderer(renderer, hasty_threads):
+    def view(angle, seed):
+        camera = rs.Camera.look_at((3 * np.cos(angle), 3 * np.sin(angle), 1), (0, 0, 0), (0, 0, 1), 12, 10, 14)
+        single, _ = leaves(random_arrays(seed=seed))
+        return lambda: torch.autograd.grad(renderer.render(camera, **single).rgba.sum(), [single["means"]])[0]
+
+    def rays(seed):
+        single, _ = leaves(random_arrays(seed=seed))
+        origins = torch.tensor([[0.0, 0.0, -3.0], [0.1, 0.1, -3.0]])
+        directions = torch.tensor([[0.0, 0.0, 1.0]]).repeat(2, 1)
+        return lambda: torch.autograd.grad(
+            renderer.trace(origins, directions, **single).color.sum(), [single["means"]])[0]
+
+    calls = [view(0, 3), view(2, 4), view(4, 5), rays(3)]
+    assert_threads_find(calls, [call() for call in calls])
+
+
 def test_pictures_without_gradients_are_the_same(renderer):
     single, _ = leaves(random_arrays())
     camera = rs.Camera.look_at((3, 0, 1), (0, 0, 0), (0, 0, 1), 12, 10, 14)
@@ -170,6 +222,16 @@ def test_gradients_of_gradients_are_refused(renderer):
         (slope,) = torch.autograd.grad(seen.square().sum(), [single["means"]], create_graph=True)
         with pytest.raises(RuntimeError, match="once_differentiable"):
             slope.square().sum().backward()
+
+
+def test_a_viewmat_that_is_no_rigid_motion_is_refused(renderer):
+    single, _ = leaves(random_arrays())
+    camera = rs.Camera(4, 4, 4.0)
+    rigid = pose(torch.tensor([0.2, -0.3, 0.1, 0.05, 2.4]))
+    renderer.render(camera, **single, viewmat=rigid)
+    for wrong in (2 * rigid, rigid * torch.tensor([[-1.0], [1], [1], [1]])):
+        with pytest.raises(rs.UsageError, match="a rotation that scales, shears or mirrors"):
+            renderer.render(camera, **single, viewmat=wrong)
 
 
 def test_wrong_tensors_are_refused_in_one_sentence(renderer):
@@ -223,6 +285,22 @@ def test_rasterization_gives_what_the_tracer_gives(context):
         assert scene[name].grad.abs().max() > 0, name
     with pytest.raises(KeyError, match="means2d"):
         meta["means2d"]
+
+
+def test_rasterization_draws_for_a_viewer_while_a_thread_trains(hasty_threads):
+    scene, other = gsplat_scene(views=1), gsplat_scene(views=1)
+    scene["means"].requires_grad_()
+    other["viewmats"][0, 2, 3] = 4
+
+    def trained():
+        return torch.autograd.grad(rt.rasterization(**scene)[0].sum(), [scene["means"]])[0]
+
+    def viewed():
+        with torch.no_grad():
+            return rt.rasterization(**other)[0]
+
+    calls = [trained, viewed]
+    assert_threads_find(calls, [call() for call in calls])
 
 
 def test_rasterization_keeps_few_renderers():

@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 
 import numpy as np
 import pytest
@@ -80,6 +81,32 @@ def test_what_a_callback_raises_comes_out(context, folder, tmp_path):
 
     with pytest.raises(rs.UsageError):
         trainer.step(0)
+
+
+def test_a_refused_call_leaves_the_one_under_way_its_callback(context, folder, tmp_path):
+    trainer = rs.Trainer(context, rs.Dataset.load(folder), tmp_path / "run", options(30))
+    heard = []
+
+    def refused():
+        for call in (trainer.step, trainer.run):
+            with pytest.raises(rs.UsageError, match="is training already"):
+                call(on_step=lambda progress: heard.append(None))
+
+    def on_step(progress):
+        heard.append(progress.iteration)
+        if progress.iteration == 2:
+            refused()
+        if progress.iteration == 4:
+            # From another thread, which an iteration does not wait for but this callback does.
+            other = threading.Thread(target=refused)
+            other.start()
+            other.join()
+        if progress.iteration == 6:
+            trainer.stop()
+
+    assert trainer.step(20, on_step=on_step)
+    assert heard == [1, 2, 3, 4, 5, 6] and trainer.iteration == 6
+    assert trainer.step(1)
 
 
 def test_what_a_render_raises_comes_out(folder):

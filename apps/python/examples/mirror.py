@@ -34,10 +34,10 @@ def main():
     second = np.zeros(3)
     for step in range(1, 251):
         off = tracer.render(model, camera, differentiable=True).rgba - photo
-        slope = tracer.backward(model, (2 * off / off.size).astype(np.float32)).parameters.means[0]
+        gradient = tracer.backward(model, (2 * off / off.size).astype(np.float32)).parameters.means[0]
         # Adam.
-        first = 0.9 * first + 0.1 * slope
-        second = 0.99 * second + 0.01 * slope**2
+        first = 0.9 * first + 0.1 * gradient
+        second = 0.99 * second + 0.01 * gradient**2
         move = first / (1 - 0.9**step) / (np.sqrt(second / (1 - 0.99**step)) + 1e-12)
         g.means[0] -= 0.03 * 0.98**step * move
         model.assign(g)

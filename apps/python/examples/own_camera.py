@@ -42,8 +42,8 @@ def main():
     along = np.linspace(-0.5, 0.5, ROWS, dtype=np.float32).repeat(COLUMNS)
     for step in range(60):
         seen = tracer.trace(model, *scan_rays(speed), differentiable=True)
-        slopes = tracer.backward_rays(model, seen.color - scanned)
-        speed -= 0.02 * 0.94**step * np.sign((slopes.origins[:, 1] * along).sum())
+        gradients = tracer.backward_rays(model, seen.color - scanned)
+        speed -= 0.02 * 0.94**step * np.sign((gradients.origins[:, 1] * along).sum())
     print(f"speed {speed:.4f} (2)")
     assert abs(speed - 2.0) < 0.005
 
@@ -58,9 +58,9 @@ def main():
         seen = tracer.trace(model, *rays, differentiable=True)
         off = seen.color - scanned
         errors.append(float((off**2).mean()))
-        slope = tracer.backward_rays(model, off).parameters.sh
-        first = 0.9 * first + 0.1 * slope
-        second = 0.99 * second + 0.01 * slope**2
+        gradient = tracer.backward_rays(model, off).parameters.sh
+        first = 0.9 * first + 0.1 * gradient
+        second = 0.99 * second + 0.01 * gradient**2
         g.sh[:] -= 0.1 * first / (1 - 0.9**step) / (np.sqrt(second / (1 - 0.99**step)) + 1e-12)
         model.assign(g)
     print(f"squared error {errors[0]:.5f} -> {errors[-1]:.7f}")

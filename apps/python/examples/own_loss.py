@@ -30,7 +30,7 @@ def main():
     losses = []
     for step in range(STEPS):
         loss = 0.0
-        slopes = {"means": 0.0, "log_scales": 0.0}
+        sums = {"means": 0.0, "log_scales": 0.0}
         for camera, silhouette in zip(cameras(), silhouettes):
             off = tracer.render(model, camera, differentiable=True).alpha - silhouette
             # Charbonnier's: quadratic for small errors, linear for large ones.
@@ -39,11 +39,11 @@ def main():
             gradient = np.zeros((*off.shape, 4), np.float32)
             gradient[..., 3] = off / length / off.size
             found = tracer.backward(model, gradient).parameters
-            for name in slopes:
-                slopes[name] = slopes[name] + getattr(found, name)
-        for name, slope in slopes.items():
+            for name in sums:
+                sums[name] = sums[name] + getattr(found, name)
+        for name, total in sums.items():
             view = getattr(g, name)
-            view -= RATE * (1 - step / STEPS) * slope / (np.linalg.norm(slope) + 1e-12)
+            view -= RATE * (1 - step / STEPS) * total / (np.linalg.norm(total) + 1e-12)
         model.assign(g)
         losses.append(loss)
     print(f"loss {losses[0]:.4f} -> {losses[-1]:.4f}, mean {g.means[0].round(3)}, "

@@ -45,11 +45,11 @@ def main():
     for step in range(1, 401):
         moved(camera, center, rotation)
         off = tracer.render(model, camera, differentiable=True).rgba - photo
-        slopes = tracer.backward(model, (2 * off / off.size).astype(np.float32))
-        slope = np.concatenate([slopes.camera_center, slopes.camera_rotation])
+        gradients = tracer.backward(model, (2 * off / off.size).astype(np.float32))
+        gradient = np.concatenate([gradients.camera_center, gradients.camera_rotation])
         # Adam on the centre and on a small turn about it, in the camera's axes.
-        first = 0.9 * first + 0.1 * slope
-        second = 0.99 * second + 0.01 * slope**2
+        first = 0.9 * first + 0.1 * gradient
+        second = 0.99 * second + 0.01 * gradient**2
         move = first / (1 - 0.9**step) / (np.sqrt(second / (1 - 0.99**step)) + 1e-12)
         move *= 0.01 * 0.985**step
         center = center - move[:3]

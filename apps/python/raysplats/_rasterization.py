@@ -2,6 +2,7 @@
 """raysplats.torch.rasterization: gsplat's call, answered by ray tracing."""
 
 import collections
+import threading
 
 import torch
 
@@ -16,6 +17,7 @@ _CAMERA_MODELS = {"pinhole": "pinhole", "ortho": "orthographic", "fisheye": "fis
 # Each holds a model and its pictures on the device: scripts have few sets of options at a time.
 _MOST_RENDERERS = 4
 _renderers = collections.OrderedDict()  # the one used last at the end
+_renderers_lock = threading.RLock()
 
 
 class _Meta(dict):
@@ -49,13 +51,14 @@ def _renderer(options, near_plane, depth):
             setattr(chosen, name, getattr(options, name))
     chosen.near_depth, chosen.depth, chosen.background = near_plane, depth, (0, 0, 0)
     key = str([(name, getattr(chosen, name)) for name in _option_names()])
-    if key not in _renderers:
-        context = next((each.context for each in _renderers.values()), None)
-        _renderers[key] = Renderer(context, chosen)
-    _renderers.move_to_end(key)
-    if len(_renderers) > _MOST_RENDERERS:
-        _renderers.popitem(last=False)
-    return _renderers[key]
+    with _renderers_lock:
+        if key not in _renderers:
+            context = next((each.context for each in _renderers.values()), None)
+            _renderers[key] = Renderer(context, chosen)
+        _renderers.move_to_end(key)
+        if len(_renderers) > _MOST_RENDERERS:
+            _renderers.popitem(last=False)
+        return _renderers[key]
 
 
 def _camera(k, width, height, camera_model, radial):

@@ -102,7 +102,7 @@ class _View(torch.autograd.Function):
     @once_differentiable
     def backward(ctx, gradient, *_):
         viewmat, *parameters = ctx.saved_tensors
-        found = ctx.renderer._view_slopes(ctx.camera, viewmat, parameters, ctx.ticket, gradient)
+        found = ctx.renderer._view_gradients(ctx.camera, viewmat, parameters, ctx.ticket, gradient)
         pose = None
         if viewmat is not None and ctx.needs_input_grad[3]:
             matrix = viewmat.detach().cpu().double().numpy()
@@ -126,7 +126,7 @@ class _Rays(torch.autograd.Function):
     @once_differentiable
     def backward(ctx, d_color, d_alpha, *_):
         origins, directions, *parameters = ctx.saved_tensors
-        found = ctx.renderer._ray_slopes(
+        found = ctx.renderer._ray_gradients(
             ctx.color_direction, origins, directions, parameters, ctx.ticket, d_color, d_alpha
         )
         return (
@@ -144,13 +144,16 @@ class Renderer:
 
     Parameters are those of raysplats.Gaussians, before activation: means (N, 3), quaternions (N, 4), log_scales
     (N, 3), opacities (N,) as logits, sh (N, K, 3). The device keeps the last forward pass alone: the backward pass of
-    an earlier one runs its forward pass again.
+    an earlier one runs its forward pass again. Threads may share a renderer, and take turns.
     """
 
     def __init__(self, context=None, options=None, *, mirrors=None):
         """context: a raysplats.Context, or what it takes for a device; options: raysplats.TraceOptions."""
         self.context = context if isinstance(context, rs.Context) else rs.Context(context or "")
         self.tracer = rs.Tracer(self.context, options, mirrors=mirrors)
+        # What the device keeps, and the number of the pass that it is of, are used together by the thread that has
+        # the lock of the context, as every call of the tracer does: a lock of our own beside it could be waited for
+        # by a thread that has that one, such as a callback of a Trainer.
         self._model = None
         self._ticket = 0
 
@@ -170,6 +173,7 @@ class Renderer:
         return TracedRays(*_Rays.apply(self, color_direction, graded, origins, directions, *parameters))
 
     def _upload(self, parameters):
+        self._ticket += 1  # at once: what the device had is gone, whether or not this pass succeeds
         arrays = {name: _array(each, name) for name, each in zip(_NAMES, parameters)}
         if self._model is None:
             self._model = rs.Model(self.context, rs.Gaussians(**arrays))
@@ -187,34 +191,35 @@ class Renderer:
         return posed
 
     def _see(self, camera, viewmat, parameters, differentiable):
-        self._upload(parameters)
-        posed = self._posed(camera, viewmat)
-        picture = self.tracer.render(self._model, posed, differentiable)
-        self._ticket += 1
-        return picture, self._ticket
+        with self.context.lock():
+            self._upload(parameters)
+            posed = self._posed(camera, viewmat)
+            return self.tracer.render(self._model, posed, differentiable), self._ticket
 
-    def _view_slopes(self, camera, viewmat, parameters, ticket, gradient):
-        if ticket != self._ticket:
-            self._see(camera, viewmat, parameters, True)
-        return self.tracer.backward(self._model, _array(gradient.contiguous(), "the gradient"))
+    def _view_gradients(self, camera, viewmat, parameters, ticket, gradient):
+        with self.context.lock():
+            if ticket != self._ticket:
+                self._see(camera, viewmat, parameters, True)
+            return self.tracer.backward(self._model, _array(gradient.contiguous(), "the gradient"))
 
     def _meet(self, color_direction, origins, directions, parameters, differentiable):
-        self._upload(parameters)
-        traced = self.tracer.trace(
-            self._model,
-            _array(origins, "origins"),
-            _array(directions, "directions"),
-            color_direction=color_direction,
-            differentiable=differentiable,
-        )
-        self._ticket += 1
-        return traced, self._ticket
+        with self.context.lock():
+            self._upload(parameters)
+            traced = self.tracer.trace(
+                self._model,
+                _array(origins, "origins"),
+                _array(directions, "directions"),
+                color_direction=color_direction,
+                differentiable=differentiable,
+            )
+            return traced, self._ticket
 
-    def _ray_slopes(self, color_direction, origins, directions, parameters, ticket, d_color, d_alpha):
-        if ticket != self._ticket:
-            self._meet(color_direction, origins, directions, parameters, True)
-        return self.tracer.backward_rays(
-            self._model,
-            _array(d_color.contiguous(), "the gradient"),
-            _array(d_alpha.contiguous(), "the gradient"),
-        )
+    def _ray_gradients(self, color_direction, origins, directions, parameters, ticket, d_color, d_alpha):
+        with self.context.lock():
+            if ticket != self._ticket:
+                self._meet(color_direction, origins, directions, parameters, True)
+            return self.tracer.backward_rays(
+                self._model,
+                _array(d_color.contiguous(), "the gradient"),
+                _array(d_alpha.contiguous(), "the gradient"),
+            )

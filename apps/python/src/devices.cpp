@@ -5,14 +5,20 @@
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
+#include <atomic>
 #include <cstdint>
+#include <mutex>
 #include <string>
+#include <thread>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "bindings.hpp"
 #include "context.hpp"
 #include "names.hpp"
 #include "raysplats/device.hpp"
+#include "raysplats/error.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -45,6 +51,33 @@ void make_context(
   new (self) HeldContext(chosen(device), options);
 }
 
+/// What `with context.lock()` holds. Used without the interpreter's lock: who has the context may
+/// wait for that.
+class Turn {
+ public:
+  explicit Turn(const Context& context) : context_(context) {}
+  void begin() {
+    auto lock = context_.lock();
+    locks_.push_back(std::move(lock));
+    holder_ = std::this_thread::get_id();
+  }
+  void end() {
+    if (holder_ != std::this_thread::get_id()) {
+      throw UsageError(
+          "This thread does not have the lock of the Context: leave its with block in the thread "
+          "that entered it");
+    }
+    const auto lock = std::move(locks_.back());
+    locks_.pop_back();
+    if (locks_.empty()) holder_ = std::thread::id();
+  }
+
+ private:
+  const Context& context_;
+  std::vector<std::unique_lock<std::recursive_mutex>> locks_;  // of the holder, who alone looks
+  std::atomic<std::thread::id> holder_{};
+};
+
 std::string describe(const DeviceInfo& info) {
   return fmt::format("<raysplats.DeviceInfo {}: {} ({}), {}>", info.index, info.name,
                      name_of(kDeviceTypes, info.type), info.platform);
@@ -76,6 +109,11 @@ void bind_devices(nb::module_& module) {
   bind_info(module);
   module.def("devices", &devices, "Every OpenCL device of every platform, in the loader's order.");
   using Guard = nb::call_guard<nb::gil_scoped_release>;
+  nb::class_<Turn>(module, "_Turn", "What Context.lock() gives.")
+      .def("__enter__", &Turn::begin, Guard())
+      .def(
+          "__exit__", [](Turn& self, const nb::args& /*error*/) { self.end(); },
+          nb::sig("def __exit__(self, *error: object) -> None"));
   nb::class_<HeldContext>(
       module, "Context",
       "A device with its queue and compiled kernels. Models and tracers are made with a context "
@@ -87,6 +125,10 @@ void bind_devices(nb::module_& module) {
            "device: an index, a part of a name, a DeviceInfo, or '' for the first GPU, else the "
            "first CPU.")
       .def_prop_ro("device", [](HeldContext& self) { return self->device(); })
+      .def(
+          "lock", [](HeldContext& self) { return new Turn(*self); }, nb::keep_alive<0, 1>(),
+          "For `with context.lock():`, within which other threads do not use the context: what "
+          "several calls do together, as a picture and its gradients. It may be nested.")
       .def(
           "finish", [](HeldContext& self) { self->finish(); }, Guard(),
           "Blocks until everything enqueued has finished.")

@@ -112,8 +112,8 @@ Gaussians change(const Gaussians& self,
   changes.rotate_degrees = vector_of(rotate);
   changes.translate = vector_of(translate);
   if (crop_min || crop_max) changes.crop.emplace();
-  if (crop_min) changes.crop->low = vector_of(*crop_min);
-  if (crop_max) changes.crop->high = vector_of(*crop_max);
+  if (crop_min) changes.crop->low = *crop_min;
+  if (crop_max) changes.crop->high = *crop_max;
   changes.max_gaussians = max_gaussians;
   changes.sh_degree = sh_degree;
   changes.contributions = contributions;

@@ -30,11 +30,11 @@ inline constexpr std::array<Name<HitOrder>, 2> kHitOrders{
     {{"entry", HitOrder::kEntry}, {"peak", HitOrder::kPeak}}};
 inline constexpr std::array<Name<Traversal>, 3> kTraversals{
     {{"auto", Traversal::kAuto}, {"tiles", Traversal::kTiles}, {"bvh", Traversal::kBvh}}};
-inline constexpr std::array<Name<PacketForm>, 4> kPacketForms{
-    {{"auto", PacketForm::kAuto},
-     {"vector", PacketForm::kVector},
-     {"group", PacketForm::kGroup},
-     {"subgroup", PacketForm::kSubgroup}}};
+inline constexpr std::array<Name<PacketShape>, 4> kPacketShapes{
+    {{"auto", PacketShape::kAuto},
+     {"vector", PacketShape::kVector},
+     {"group", PacketShape::kGroup},
+     {"subgroup", PacketShape::kSubgroup}}};
 inline constexpr std::array<Name<GradientSum>, 5> kGradientSums{{{"auto", GradientSum::kAuto},
                                                                  {"copies", GradientSum::kCopies},
                                                                  {"exact", GradientSum::kExact},

@@ -30,9 +30,10 @@ void bind_choices(nb::class_<TraceOptions>& type) {
           },
           "'auto', 'tiles' or 'bvh'.")
       .def_prop_rw(
-          "packet_form", [](const TraceOptions& o) { return name_of(kPacketForms, o.packet_form); },
+          "packet_shape",
+          [](const TraceOptions& o) { return name_of(kPacketShapes, o.packet_shape); },
           [](TraceOptions& o, const std::string& name) {
-            o.packet_form = value_of(kPacketForms, "packet_form", name);
+            o.packet_shape = value_of(kPacketShapes, "packet_shape", name);
           },
           "'auto', 'vector', 'group' or 'subgroup'.")
       .def_prop_rw(

@@ -149,7 +149,7 @@ RaysGradients backward_rays(HeldTracer& self,
                             const FloatArray& color,
                             const std::optional<FloatArray>& alpha) {
   const Numbers<float> c = numbers(color, "color", {kAny, 3});
-  std::vector<RayGradient> gradients(c.shape[0]);
+  std::vector<RayResultGradient> gradients(c.shape[0]);
   for (std::size_t i = 0; i < gradients.size(); ++i) {
     for (std::size_t k = 0; k < 3; ++k) gradients[i].color[k] = c.values[3 * i + k];
     gradients[i].alpha = 0.0f;
@@ -263,21 +263,21 @@ void bind_gradients(nb::module_& module) {
           "exp([w]x) rotation, the centre stays; NaN with mirrors and with a sky.")
       .def_ro("sky", &ViewGradients::sky, "Of TraceOptions.sky; [] without one.");
   using Rays = nb::handle_t<RaysGradients>;
-  const auto slopes = [](nb::handle self) -> std::vector<RaySlope>& {
+  const auto by_ray = [](nb::handle self) -> std::vector<RayGradient>& {
     return nb::cast<RaysGradients&>(self).rays;
   };
   nb::class_<RaysGradients>(module, "RaysGradients", "Gradients of a loss over rays.")
       .def_ro("parameters", &RaysGradients::parameters, "As in ViewGradients.")
       .def_prop_ro(
           "origins",
-          [slopes](Rays self) {
-            return column<float>(self, slopes(self), slopes(self).data()->origin, 3);
+          [by_ray](Rays self) {
+            return column<float>(self, by_ray(self), by_ray(self).data()->origin, 3);
           },
           "(N, 3).")
       .def_prop_ro(
           "directions",
-          [slopes](Rays self) {
-            return column<float>(self, slopes(self), slopes(self).data()->direction, 3);
+          [by_ray](Rays self) {
+            return column<float>(self, by_ray(self), by_ray(self).data()->direction, 3);
           },
           "(N, 3), for directions as they were given, of any length.");
 }

@@ -8,6 +8,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -18,7 +19,7 @@
 #include "context.hpp"
 #include "raysplats/error.hpp"
 #include "run/train_config.hpp"
-#include "run/train_keys.hpp"
+#include "run/train_option_table.hpp"
 #include "signals.hpp"
 #include "util/nearest_name.hpp"
 
@@ -27,7 +28,12 @@ namespace {
 
 namespace nb = nanobind;
 
-using HeldTrainer = Held<Trainer>;
+/// A trainer, which one call of run() or step() has at a time.
+class HeldTrainer : public Held<Trainer> {
+ public:
+  using Held::Held;
+  std::atomic<bool> taken = false;
+};
 
 /// A value of Python as the words that configuration files have.
 std::string word(nb::handle value) {
@@ -46,7 +52,7 @@ std::vector<std::string> words(nb::handle value) {
 void set_option(TrainOptions& options, std::string key, nb::handle value) {
   std::replace(key.begin(), key.end(), '_', '-');
   std::vector<std::string> names;
-  for (const OptionRow& known : train_keys(options)) {
+  for (const OptionRow& known : train_option_rows(options)) {
     if (known.name == key) return known.set(words(value));
     names.push_back(known.name);
   }
@@ -58,7 +64,7 @@ void set_option(TrainOptions& options, std::string key, nb::handle value) {
 std::string option_text(TrainOptions& options, std::string key) {
   std::replace(key.begin(), key.end(), '_', '-');
   std::vector<std::string> names;
-  for (const OptionRow& known : train_keys(options)) {
+  for (const OptionRow& known : train_option_rows(options)) {
     if (known.name == key) return known.text();
     names.push_back(known.name);
   }
@@ -80,37 +86,45 @@ void make_options(TrainOptions* self,
 
 using Callback = std::optional<nb::callable>;
 
-/// Sets what an iteration calls, and takes it back at the end: a trainer that kept its callback
-/// could keep itself alive by it. Made and gone with the interpreter's lock.
-class StepCallback {
+/// Takes the trainer and sets what an iteration calls; gives both back at the end: a trainer that
+/// kept its callback could keep itself alive by it. A trainer that is taken is refused before its
+/// callback is touched, which the call that has it needs until it is over. Made and gone without
+/// the interpreter's lock.
+class Steps {
  public:
-  StepCallback(Trainer& trainer, const Callback& callback) : trainer_(trainer) {
+  Steps(HeldTrainer& held, const Callback& callback) : trainer_(*held), taken_(held.taken) {
+    if (taken_.exchange(true)) {
+      throw UsageError(
+          "The trainer is training already: wait for its run() or step(), and call neither from "
+          "its callback");
+    }
     trainer_.on_step([&callback](const TrainProgress& progress) {
       heed_signals(0);
       const nb::gil_scoped_acquire acquire;
       if (callback) (*callback)(progress);
     });
   }
-  ~StepCallback() { trainer_.on_step(nullptr); }
-  StepCallback(const StepCallback&) = delete;
-  StepCallback& operator=(const StepCallback&) = delete;
+  ~Steps() {
+    trainer_.on_step(nullptr);
+    taken_ = false;
+  }
+  Steps(const Steps&) = delete;
+  Steps& operator=(const Steps&) = delete;
+  Trainer* operator->() { return &trainer_; }
 
  private:
   Trainer& trainer_;
+  std::atomic<bool>& taken_;
 };
 
 TrainSummary run(HeldTrainer& self, bool show_progress, const Callback& on_step) {
-  Trainer& trainer = *self;
   const nb::gil_scoped_release release;
-  const StepCallback callback(trainer, on_step);
-  return trainer.run(show_progress);
+  return Steps(self, on_step)->run(show_progress);
 }
 
 bool step(HeldTrainer& self, std::int64_t count, const Callback& on_step) {
-  Trainer& trainer = *self;
   const nb::gil_scoped_release release;
-  const StepCallback callback(trainer, on_step);
-  return trainer.step(count);
+  return Steps(self, on_step)->step(count);
 }
 
 void bind_records(nb::module_& module) {
@@ -155,7 +169,7 @@ void bind_options(nb::module_& module) {
           [] {
             TrainOptions options;
             std::vector<std::string> names;
-            for (const OptionRow& key : train_keys(options)) names.push_back(key.name);
+            for (const OptionRow& key : train_option_rows(options)) names.push_back(key.name);
             return names;
           },
           "The name of every key.")
@@ -211,8 +225,7 @@ void bind_trainer(nb::module_& module) {
           "gaussians", [](HeldTrainer& self) { return self->model(); }, Guard(),
           "The model as it is now.")
       .def_prop_ro(
-          "iteration", [](HeldTrainer& self) { return self->iteration(); },
-          "Completed iterations.")
+          "iteration", [](HeldTrainer& self) { return self->iteration(); }, "Completed iterations.")
       .def_prop_ro(
           "iterations", [](HeldTrainer& self) { return self->iterations(); },
           "Those of the whole run, as it is planned now.");

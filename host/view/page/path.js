@@ -3,7 +3,7 @@
 
 import * as v from './vectors.js';
 
-// Of the frames of files that do not say it.
+// Pixels of the frames of files that do not say them.
 export const WIDTH = 1920;
 export const HEIGHT = 1080;
 const ZERO = [0, 0, 0];

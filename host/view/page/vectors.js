@@ -50,7 +50,7 @@ export function axesOf([w, x, y, z]) {
 
 export function slerp(a, b, t) {
   let cosine = a.reduce((sum, x, i) => sum + x * b[i], 0);
-  // Of the two ways around, the short one.
+  // The short one of the two ways around.
   const other = cosine < 0 ? b.map((x) => -x) : b;
   cosine = Math.min(Math.abs(cosine), 1);
   const angle = Math.acos(cosine);

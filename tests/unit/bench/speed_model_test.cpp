@@ -122,7 +122,7 @@ TEST_CASE("kernels that count their work find the same hits and change no pixel"
   SceneBench bench(context, model, options);
   const ExecutedCounts vectors = bench.counts(false), groups = bench.counts(true);
   TraceOptions trace = options.trace;
-  trace.packet_form = PacketForm::kVector;
+  trace.packet_shape = PacketShape::kVector;
   CameraTracer plain(context, trace), counting(context, trace);
   counting.count_work();
   const DeviceGaussians gaussians =

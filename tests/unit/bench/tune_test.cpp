@@ -48,14 +48,14 @@ TEST_CASE("tune: GPUs try groups and vectors, each in its own widths") {
   const DeviceTuning start = default_tuning(device);
   CHECK(start.grouped);
   CHECK(start.packet_width == 32);
-  const std::vector<DeviceTuning> forms = tune_candidates("packet-shape", start, device);
-  REQUIRE(forms.size() == 2);
-  CHECK_FALSE(forms[1].grouped);
-  CHECK(tune_candidates("packet-shape", forms[1], device)[1] == start);
-  for (const DeviceTuning& form : forms) {
-    for (const DeviceTuning& c : tune_candidates("packet-width", form, device)) {
+  const std::vector<DeviceTuning> shapes = tune_candidates("packet-shape", start, device);
+  REQUIRE(shapes.size() == 2);
+  CHECK_FALSE(shapes[1].grouped);
+  CHECK(tune_candidates("packet-shape", shapes[1], device)[1] == start);
+  for (const DeviceTuning& shape : shapes) {
+    for (const DeviceTuning& c : tune_candidates("packet-width", shape, device)) {
       CHECK(is_valid(c));
-      CHECK(c.grouped == form.grouped);
+      CHECK(c.grouped == shape.grouped);
     }
   }
   device.has_subgroups = true;
@@ -64,13 +64,13 @@ TEST_CASE("tune: GPUs try groups and vectors, each in its own widths") {
   const std::vector<DeviceTuning> three = tune_candidates("packet-shape", subgroup, device);
   REQUIRE(three.size() == 3);
   CHECK(std::count(three.begin(), three.end(), start) == 1);
-  CHECK(std::count(three.begin(), three.end(), forms[1]) == 1);
+  CHECK(std::count(three.begin(), three.end(), shapes[1]) == 1);
   for (const DeviceTuning& c : tune_candidates("packet-width", subgroup, device)) {
     CHECK(is_valid(c));
     CHECK(c.subgroups);
   }
   CHECK(tune_candidates("pending", start, device).size() == 1);
-  CHECK(tune_candidates("pending", forms[1], device).size() > 1);
+  CHECK(tune_candidates("pending", shapes[1], device).size() > 1);
 }
 
 TEST_CASE("tune: measures the axes and leaves the winner in the context") {

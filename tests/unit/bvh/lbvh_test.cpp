@@ -425,8 +425,8 @@ TEST_CASE("groups are ordered alike by one work-item and by many [small]") {
       for (const bool many : {false, true}) {
         Buffer<std::uint32_t> device_order(context, count, "order");
         device_order.upload(order);
-        Kernel kernel = context.kernel(many ? "bvh/group_order.cl" : "bvh/order_groups.cl",
-                                       many ? "order_group" : "order_groups", build);
+        Kernel kernel = context.kernel(many ? "bvh/leaf_order_group.cl" : "bvh/leaf_order.cl",
+                                       many ? "order_leaves_group" : "order_leaves", build);
         kernel.launch(many ? Range::linear(count, 64) : Range::linear((count + 63) / 64, 1),
                       device_boxes, device_order, static_cast<std::uint32_t>(count));
         results.push_back(device_order.download());

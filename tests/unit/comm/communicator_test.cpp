@@ -52,7 +52,7 @@ std::vector<float> sum_among(int ranks, std::size_t slots, std::size_t n) {
       for (const PairwiseNode& node : SlotSum::nodes(slots, self.rank(), self.size()))
         rows.push_back(row_of(node, n));
       for (const auto& row : rows) sum.send(row, [] {});
-      sum.settle();
+      sum.wait();
       sum.finish(total);
     }
     totals[static_cast<std::size_t>(self.rank())] = total;
@@ -99,15 +99,15 @@ TEST_CASE("what ranks say reaches all, whoever says it") {
         std::vector<int> values(100, self.rank() == root ? 7 + root : -1);
         self.broadcast(std::as_writable_bytes(std::span(values)), root);
         CHECK(values == std::vector<int>(100, 7 + root));
-        CHECK(self.any(self.rank() == root));
-        CHECK_FALSE(self.any(false));
+        CHECK(self.all_reduce_or(self.rank() == root));
+        CHECK_FALSE(self.all_reduce_or(false));
       }
-      CHECK(self.least(static_cast<std::uint64_t>(10 + (self.rank() + 1) % ranks)) == 10);
-      const std::vector<double> halves = self.all(0.5 * self.rank());
+      CHECK(self.all_reduce_min(static_cast<std::uint64_t>(10 + (self.rank() + 1) % ranks)) == 10);
+      const std::vector<double> halves = self.all_gather(0.5 * self.rank());
       REQUIRE(halves.size() == static_cast<std::size_t>(ranks));
       for (int r = 0; r < ranks; ++r) CHECK(halves[static_cast<std::size_t>(r)] == 0.5 * r);
-      CHECK(self.said_by(ranks - 1, self.rank()) == ranks - 1);
-      const std::vector<std::string> all = self.gather(std::string(self.rank() * 3, 'a'));
+      CHECK(self.broadcast_value(ranks - 1, self.rank()) == ranks - 1);
+      const std::vector<std::string> all = self.all_gather_texts(std::string(self.rank() * 3, 'a'));
       REQUIRE(all.size() == static_cast<std::size_t>(ranks));
       for (std::size_t i = 0; i < all.size(); ++i) CHECK(all[i] == std::string(i * 3, 'a'));
     });
@@ -134,7 +134,7 @@ TEST_CASE("traffic counts what goes out and comes in") {
     SlotSum sum;
     sum.begin(self, 2, kNumbers);
     sum.send(row, [] {});
-    sum.settle();
+    sum.wait();
     sum.finish(total);
     CHECK(total.front() == 2.0f);
     CHECK(total.back() == 1.0f);
@@ -187,7 +187,7 @@ TEST_CASE("what is whole goes while the rest is made") {
     sum.send(row, [] {});
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     sum.send(row, [] {});
-    sum.settle();
+    sum.wait();
     sum.finish(total);
     CHECK(total.back() == 4.0f);
     CHECK(self.traffic().hidden > 0);
@@ -207,7 +207,7 @@ TEST_CASE("a rank that fails with rows on their way does not wait for the others
       // Rank 0 sends what rank 1 will not answer.
       sum.send(row, [] {});
       sum.send(row, [] {});
-      sum.settle();
+      sum.wait();
     });
   };
   CHECK_THROWS_WITH_AS(run(), "The second photo of rank 1 is gone", DataError);

@@ -163,6 +163,35 @@ TEST_CASE("evaluator: masked pixels neither help nor hurt") {
   }
 }
 
+TEST_CASE("evaluator: how bright a mask is where it counts does not matter") {
+  Scene scene;
+  View& view = scene.dataset.views[0];
+  const Image photo = load_view_image(view);
+  view.mask_path = scene.path("mask.png");
+  const auto render = [&](const Camera& camera) {
+    Image image(camera.width, camera.height, 3);
+    for (std::size_t p = 0; p < image.pixels(); ++p) {
+      for (std::size_t c = 0; c < 3; ++c)
+        image.data[3 * p + c] = 0.8f * photo.data[4 * p + c] + 0.02f * static_cast<float>(p % 5);
+    }
+    return image;
+  };
+  EvaluationOptions options;
+  options.max_views = 1;
+  std::vector<EvaluationMetrics> means;
+  for (const int level : {255, 128, 2}) {
+    Image mask(kWidth, kHeight, 1, 0.0f);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 3; x < 10; ++x) mask.at(x, y, 0) = static_cast<float>(level) / 255.0f;
+    }
+    write_image(view.mask_path, mask);
+    means.push_back(evaluate(render, scene.dataset, Split::kTest, kBackground, {}, options).mean);
+    CHECK(means.back().psnr == doctest::Approx(means[0].psnr).epsilon(1e-5));
+    CHECK(means.back().ssim == doctest::Approx(means[0].ssim).epsilon(1e-5));
+  }
+  CHECK(means[0].ssim < 0.995);
+}
+
 TEST_CASE("evaluator: equal pictures have a PSNR, and views without a pixel are left out") {
   Scene scene;
   const auto photo = [&](const Camera& camera) { return load_view_image(scene.view(camera.name)); };
@@ -298,6 +327,7 @@ TEST_CASE("evaluator: limits, early stop, LPIPS and refusals") {
   const auto render = [](const Camera& camera) {
     return Image(camera.width, camera.height, 3, 0.5f);
   };
+  CHECK_THROWS_AS(evaluate(render, scene.dataset, Split::kAll, {0, NAN, 0}, {}), UsageError);
   EvaluationOptions options;
   options.max_pictures = 1;
   std::size_t heard = 0;

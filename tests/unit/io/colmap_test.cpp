@@ -416,6 +416,33 @@ TEST_CASE("text with a byte order mark is read, and images without their points 
   CHECK(
       contains(text_error_with("images.txt", "1 1 0 0 0 0 0 0 1 a.png\n2 1 0 0 0 0 0 0 1 b.png\n"),
                "the points of image 'a.png'"));
+  // A name of three words makes the number of words one of whole points.
+  CHECK(contains(text_error_with("images.txt",
+                                 "1 1 0 0 0 0 0 0 1 My photo a.png\n"
+                                 "2 1 0 0 0 0 0 0 1 My photo b.png\n"),
+                 "the points of image 'My photo a.png'"));
+}
+
+TEST_CASE("points of a COLMAP model may be a PLY where the model has no others") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch.path());
+  write_bytes(scratch / "points3D.ply",
+              "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+              "y\nproperty float z\nend_header\n1 2 3\n");
+  CHECK(io::read_colmap_model(scratch.path()).points.size() == fixture.points.size());
+  fs::remove(scratch / "points3D.bin");
+  {
+    const LogCapture log;
+    const io::ColmapModel model = io::read_colmap_model(scratch.path());
+    CHECK(model.points.positions == std::vector<float>{1, 2, 3});
+    CHECK(model.positions == std::vector<double>{1, 2, 3});
+    CHECK(log.contains("points3D.ply"));
+  }
+  fs::remove(scratch / "points3D.ply");
+  const LogCapture log;
+  CHECK(io::read_colmap_model(scratch.path()).points.size() == 0);
+  CHECK(log.contains("no points to start from"));
 }
 
 TEST_CASE("a data set without its photos, with foreign photos or without anything is refused") {

@@ -55,7 +55,7 @@ TEST_CASE("conversion moves, crops and thins in the stated order") {
   changes.scale = 2.0;
   changes.rotate_degrees = {0, 0, 90};
   changes.translate = {0, 0, 1};
-  changes.crop = CropBox{{-4, -4, -4}, {4, 4, 4}};
+  changes.crop = Bounds{{-4, -4, -4}, {4, 4, 4}};
   changes.sh_degree = 1;
   const Gaussians out = changed(model, changes);
   REQUIRE(out.size() == 2);
@@ -106,11 +106,11 @@ TEST_CASE("changes out of range are refused, and half a box is half of space") {
   CHECK(contains(refused([](ModelChanges& c) { c.sh_degree = 5; }), "sh-degree is 0 to 4"));
   CHECK(!refused([](ModelChanges& c) { c.translate.x = HUGE_VAL; }).empty());
   CHECK(contains(refused([](ModelChanges& c) {
-                   c.crop = CropBox{{0, 2, 0}, {1, 1, 1}};
+                   c.crop = Bounds{{0, 2, 0}, {1, 1, 1}};
                  }),
                  "its least y is 2 and its greatest 1: swap them"));
   ModelChanges half;
-  half.crop.emplace().low.x = 0.0;
+  half.crop.emplace().low[0] = 0.0;
   REQUIRE(changed(model, half).size() == 1);
   CHECK(changed(model, half).means[0] == 1.0f);
 }
@@ -151,7 +151,7 @@ TEST_CASE("conversion refuses what would be lost") {
   CHECK(contains(convert("c.ply", fewer, true).losses, "nothing but what was asked for"));
   fs::remove(scratch / "c.ply");
   ModelChanges nothing;
-  nothing.crop = CropBox{{100, 100, 100}, {101, 101, 101}};
+  nothing.crop = Bounds{{100, 100, 100}, {101, 101, 101}};
   CHECK(contains(usage_error([&] { convert("c.ply", nothing, false); }), "None of the 3"));
   CHECK(!fs::exists(scratch / "c.ply"));
 }
@@ -211,7 +211,7 @@ TEST_CASE("the origin of a model scales and turns with it") {
   changes.scale = 10;
   changes.rotate_degrees = {0, 0, 90};
   // Around the first one, in the coordinates of the data.
-  changes.crop = CropBox{{-2015, 9995, -5}, {-2005, 10005, 25}};
+  changes.crop = Bounds{{-2015, 9995, -5}, {-2005, 10005, 25}};
   const Conversion done =
       convert_model(scratch / "a.ply", scratch / "b.ply", changes, {}, std::nullopt, false);
   CHECK(done.written == 1);

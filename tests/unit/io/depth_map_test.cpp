@@ -74,6 +74,27 @@ TEST_CASE("depths that are not finite or not above 0 are unknown, and the first 
   CHECK(io::read_depth_map(scratch / "a.npy", 2, true).values ==
         std::vector<float>{0, 0, 0, 0, 0, 6});
   CHECK(log.lines() == 1);
+  // A sensor may have measured nothing.
   write_bytes(scratch / "a.npy", npy("<i2", "(1, 2)", std::vector<std::int16_t>{0, -5}));
-  CHECK(contains(data_error([&] { io::read_depth_map(scratch / "a.npy", 1); }), "says nothing"));
+  CHECK(io::read_depth_map(scratch / "a.npy", 1).values == std::vector<float>{0, 0});
+}
+
+TEST_CASE("a map is checked for what its view would find wrong, and for whether it knows any") {
+  const Scratch scratch;
+  View view;
+  view.camera.width = view.source_camera.width = 400;
+  view.camera.height = view.source_camera.height = 200;
+  view.depth_path = scratch / "a.npy";
+  const auto has_depths = [&](const char* shape, const std::vector<float>& numbers) {
+    write_bytes(view.depth_path, npy("<f4", shape, numbers));
+    return io::check_depth_map(view, 1);
+  };
+  CHECK(has_depths("(2, 4)", {0, 0, 0, 0, 0, 0, 0, 3}));
+  CHECK_FALSE(has_depths("(2, 4)", {0, 0, 0, 0, 0, -1, 0, 0}));
+  const std::vector<float> tall(32, 1.0f);
+  CHECK(contains(data_error([&] { has_depths("(8, 4)", tall); }), "which is another shape"));
+  CHECK(contains(data_error([&] {
+                   has_depths("(8,)", {1, 1, 1, 1, 1, 1, 1, 1});
+                 }),
+                 "height x width"));
 }

@@ -239,7 +239,54 @@ TEST_CASE("points that another machine has elsewhere are found beside the file, 
     CHECK(points(path) == 1);
     CHECK(log.contains("the points are those of"));
   }
-  CHECK(contains(data_error([&] { points("/home/u/fox/other.ply"); }), "other.ply"));
+  const LogCapture log;
+  CHECK(points("/home/u/fox/other.ply") == 0);
+  CHECK(log.contains("names the points /home/u/fox/other.ply, which are not there"));
+}
+
+TEST_CASE("photos are found where marks are characters of their own in one of the names") {
+  // U+00E4 against an a with U+0308 behind it, and likewise U+0161; the folder as well.
+  const std::string composed = "f\xC3\xB6to/B\xC3\xA4r \xC5\xA1 0.png";
+  const std::string decomposed = "fo\xCC\x88to/Ba\xCC\x88r s\xCC\x8C 0.png";
+  for (const bool is_composed : {true, false}) {
+    CAPTURE(is_composed);
+    const Scratch scratch;
+    write_scene(scratch, {is_composed ? composed : decomposed},
+                {is_composed ? decomposed : composed});
+    const LogCapture log;
+    CHECK(load_dataset(scratch.path()).views.size() == 1);
+    CHECK(log.contains("how accents are written"));
+  }
+  // Without any mark it is another name.
+  const Scratch scratch;
+  write_scene(scratch, {"Bar.png"}, {"B\xC3\xA4r.png"});
+  CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "do not exist"));
+}
+
+TEST_CASE("two frames whose paths end alike are refused where one photo stands for both") {
+  const Scratch scratch;
+  write_scene(scratch, {"cam0/a.png", "cam1/a.png", "cam0/b.png"},
+              {"images/a.png", "images/b.png"});
+  const std::string message = data_error([&] { load_dataset(scratch.path()); });
+  CHECK(contains(message, "'cam0/a.png' and 'cam1/a.png'"));
+  CHECK(contains(message, "are both the file"));
+  // Those of the two files of a Blender data set as well.
+  const Scratch blender;
+  write_scene(blender, {"train/a.png"}, {"a.png"});
+  fs::rename(blender / "transforms.json", blender / "transforms_train.json");
+  write_scene(blender, {"test/a.png"}, {});
+  fs::rename(blender / "transforms.json", blender / "transforms_test.json");
+  CHECK(contains(data_error([&] { load_dataset(blender.path()); }),
+                 "'train/a.png' and 'test/a.png'"));
+}
+
+TEST_CASE("terms of a lens that no camera here has are refused by name") {
+  const auto with = [](const std::string& keys) {
+    return cameras_error(file_of(kKeys + keys, frame_with(matrix_json(1))));
+  };
+  CHECK(contains(with("\"k1\": 0.1, \"k5\": 0.01, "), "'k5' is a term of a lens"));
+  CHECK(contains(with("\"k6\": \"-1e-3\", "), "'k6' is a term of a lens"));
+  CHECK(with("\"k5\": 0, \"k6\": 0.0, ").empty());
 }
 
 TEST_CASE("cameras.json of trainers of 3DGS is read as cameras without lenses") {

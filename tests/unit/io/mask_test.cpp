@@ -34,11 +34,37 @@ TEST_CASE("a mask of 0 and 1 is one of black and white, in 8 bits as in 16") {
   CHECK(mask_of(2, Bytes{1, 255, 1, 0}) == Floats{1, 0});
   // Floats of a codec that has no others (Python's).
   CHECK(mask_of(1, Floats{0, 1.0f / 255.0f}) == Floats{0, 1});
-  // Greys are shares, however dark.
-  CHECK(mask_of(1, Bytes{0, 1, 2}) == Floats{0, 1.0f / 255.0f, 2.0f / 255.0f});
   CHECK(mask_of(1, Bytes{0, 128, 255})[1] == 128.0f / 255.0f);
   CHECK(mask_of(1, Floats{0, 0.5f, 7.0f}) == Floats{0, 0.5f, 1});
   CHECK(mask_of(1, Bytes{0, 0}) == Floats{0, 0});
+}
+
+TEST_CASE("labels of several objects, whole numbers far below white, count whole") {
+  CHECK(mask_of(1, Bytes{0, 1, 2}) == Floats{0, 1, 1});
+  CHECK(mask_of(1, Bytes{0, 2, 0}) == Floats{0, 1, 0});
+  CHECK(mask_of(1, Bytes{31, 0, 7}) == Floats{1, 0, 1});
+  CHECK(mask_of(1, Shorts{0, 3, 31}) == Floats{0, 1, 1});
+  CHECK(mask_of(1, Shorts{0, 2 * 257, 31 * 257}) == Floats{0, 1, 1});
+  CHECK(mask_of(1, Floats{0, 2.0f / 255.0f, 3.0f / 255.0f}) == Floats{0, 1, 1});
+  // Lighter numbers, and those between whole ones, are greys, which are shares.
+  CHECK(mask_of(1, Bytes{0, 1, 32}) == Floats{0, 1.0f / 255.0f, 32.0f / 255.0f});
+  CHECK(mask_of(1, Shorts{0, 32, 300}) == Floats{0, 32.0f / 65535.0f, 300.0f / 65535.0f});
+  CHECK(mask_of(1, Floats{0, 0.05f}) == Floats{0, 0.05f});
+}
+
+TEST_CASE("a black mask with a shape in its alpha is that shape") {
+  const auto is_black = [](int channels, Bytes numbers) {
+    const int width = static_cast<int>(numbers.size()) / channels;
+    return io::is_black({width, 1, channels, std::move(numbers)});
+  };
+  const Bytes shape{0, 0, 0, 255, 0, 0, 0, 0, 0, 0, 0, 51};
+  CHECK(mask_of(4, shape) == Floats{1, 0, 51.0f / 255.0f});
+  CHECK_FALSE(is_black(4, shape));
+  CHECK(mask_of(2, Bytes{0, 1, 0, 0}) == Floats{1, 0});
+  // Alpha that is the same everywhere has no shape.
+  CHECK(mask_of(4, Bytes{0, 0, 0, 255, 0, 0, 0, 255}) == Floats{0, 0});
+  CHECK(is_black(4, Bytes{0, 0, 0, 255, 0, 0, 0, 255}));
+  CHECK(is_black(2, Bytes{0, 0, 0, 0}));
 }
 
 TEST_CASE("a mask is black where no pixel has both colour and alpha") {

@@ -261,3 +261,13 @@ TEST_CASE("rays are read with and without ends, and results keep their shape") {
   CHECK(number(hits, hits.size() - 8, 4) == 7);
   CHECK(number(hits, hits.size() - 4, 4) == 17);
 }
+
+TEST_CASE("the results of no rays are a whole archive") {
+  const TemporaryDirectory scratch;
+  const fs::path written = scratch.path() / "none.npz";
+  io::write_ray_results(written, {0}, {});
+  const std::vector<std::byte> bytes = io::read_file(written);
+  const auto files = unzip({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  CHECK(files.size() == 5);
+  CHECK(files.at("color.npy").find("(0, 3)") != std::string::npos);
+}

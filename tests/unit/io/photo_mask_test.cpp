@@ -130,3 +130,61 @@ TEST_CASE("a mask that may be of several photos is of none, unless it lies as on
   write_mask(pointed / "masks/f.2.png");
   CHECK(masks_of(pointed) == Names{"", "", "masks/f.2.png"});
 }
+
+TEST_CASE("masks lie in a folder mask too, in any letter case") {
+  for (const char* folder : {"masks", "mask", "Masks", "MASK"}) {
+    CAPTURE(folder);
+    const Scratch scratch;
+    write_frames(scratch, "transforms.json", {"image/000.jpg", "image/001.jpg"});
+    write_mask(scratch / folder / "001.png");
+    const LogCapture log;
+    CHECK(masks_of(scratch) == Names{"", std::string(folder) + "/001.png"});
+    CHECK(log.contains("1 of 2 photos have no mask"));
+    CHECK(log.contains("000.jpg among them"));
+  }
+}
+
+TEST_CASE("a photo that is spelt otherwise than in its file has the mask of its own spelling") {
+  const Scratch scratch;
+  write_frames(scratch, "transforms.json", {"images/a.jpg", "images/l/b.jpg", "images/r/b.jpg"});
+  fs::rename(scratch / "images", scratch / "Images");
+  fs::rename(scratch / "Images/a.jpg", scratch / "Images/A.JPG");
+  for (const char* folder : {"l", "r"})
+    fs::rename(scratch / "Images" / folder / "b.jpg", scratch / "Images" / folder / "B.jpg");
+  write_mask(scratch / "masks/A.png");
+  write_mask(scratch / "masks/B.png");
+  // As ever the mask of two photos is that of none.
+  CHECK(masks_of(scratch) == Names{"masks/A.png", "", ""});
+  write_mask(scratch / "masks/l/B.png");
+  write_mask(scratch / "masks/Images/r/B.jpg.png");
+  CHECK(masks_of(scratch) == Names{"masks/A.png", "masks/l/B.png", "masks/Images/r/B.jpg.png"});
+
+  const Scratch colmap;
+  write_model(colmap, {"a.JPG", "b.JPG"});
+  for (const char* name : {"a.jpg", "b.jpg"})
+    write_image(colmap / "images" / name, Image(40, 30, 3, 0.5f));
+  write_mask(colmap / "masks/b.jpg.png");
+  CHECK(masks_of(colmap) == Names{"", "masks/b.jpg.png"});
+}
+
+TEST_CASE("masks beside photos: those of 3dgrut are read, those of instant-ngp told") {
+  const Scratch scratch;
+  write_frames(scratch, "transforms.json", {"images/a.jpg", "images/b"});
+  write_mask(scratch / "images/a_mask.png");
+  write_mask(scratch / "images/b_mask.png");
+  CHECK(masks_of(scratch) == Names{"images/a_mask.png", "images/b_mask.png"});
+  write_mask(scratch / "masks/b.png");
+  CHECK(masks_of(scratch) == Names{"images/a_mask.png", "masks/b.png"});
+  // A photo is no mask.
+  const Scratch photos;
+  write_frames(photos, "transforms.json", {"images/a", "images/a_mask"});
+  CHECK(masks_of(photos) == Names{"", ""});
+
+  const Scratch dynamic;
+  write_frames(dynamic, "transforms.json", {"images/a", "images/b"});
+  write_mask(dynamic / "images/dynamic_mask_b.png");
+  const LogCapture log;
+  CHECK(masks_of(dynamic) == Names{"", ""});
+  CHECK(log.contains("1 of 2 photos have a mask of instant-ngp"));
+  CHECK(log.contains("dynamic_mask_b.png"));
+}

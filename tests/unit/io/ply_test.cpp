@@ -418,3 +418,17 @@ TEST_CASE("point clouds have colours of their type's range") {
               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n");
   CHECK(contains(data_error([&] { io::read_ply_points(scratch / "b.ply"); }), "'y'"));
 }
+
+TEST_CASE("points that are not finite are left out, which is told") {
+  const Scratch scratch;
+  write_bytes(scratch / "a.ply",
+              "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float "
+              "y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+              "end_header\n1 2 3 255 0 0\n4 nan 6 0 255 0\n7 8 inf 0 255 0\n9 10 11 0 0 255\n");
+  const LogCapture log;
+  const io::PlyPoints read = io::read_ply_points(scratch / "a.ply");
+  CHECK(read.cloud.positions == std::vector<float>{1, 2, 3, 9, 10, 11});
+  CHECK(read.positions == std::vector<double>{1, 2, 3, 9, 10, 11});
+  CHECK(read.cloud.colors == std::vector<float>{1, 0, 0, 0, 0, 1});
+  CHECK(log.contains("2 of 4 points"));
+}

@@ -7,12 +7,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <optional>
 #include <string>
 
-#include "raysplats/error.hpp"
 #include "unit/temporary_directory.hpp"
+#include "unit/text.hpp"
 
 namespace raysplats::test {
 
@@ -38,20 +37,6 @@ void put(std::string& bytes, T value) {
   char raw[sizeof(T)];
   std::memcpy(raw, &value, sizeof(T));
   bytes.append(raw, sizeof(T));
-}
-
-/// The message of the DataError that `action` throws; "" when it throws none.
-inline std::string data_error(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const DataError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-inline bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 /// A folder of real data sets, when the environment names one.

@@ -152,6 +152,25 @@ TEST_CASE("SOG: archives of other writers leave sizes out of local headers, or d
   check_known(read(text_of(deflated_zip(all))));
 }
 
+TEST_CASE("SOG: an archive may hold its folder, and one of PyTorch's is named as such") {
+  const Sog sog;
+  const auto packed = [&](const std::string& folder, Files all) {
+    for (const auto& [name, bytes] : sog.files) all.emplace_back(folder + name, bytes);
+    all.emplace_back(folder + "meta.json", bytes_of_text(sog.meta.dump()));
+    return text_of(io::zip_of(all, "test"));
+  };
+  check_known(read(packed("scan/", {})));
+  check_known(read(packed("./", {})));
+  check_known(read(packed("scan/", {{"__MACOSX/meta.json", {}}, {"notes.txt", {}}})));
+  CHECK(contains(data_error([&] {
+                   read(packed("scan/", {{"other/meta.json", {}}}));
+                 }),
+                 "'meta.json' in it is missing"));
+  const std::string checkpoint = text_of(
+      io::zip_of({{"archive/data.pkl", bytes_of_text("x")}, {"archive/data/0", {}}}, "test"));
+  CHECK(contains(data_error([&] { read(checkpoint); }), "is a checkpoint of PyTorch"));
+}
+
 TEST_CASE("SOG: what its archive claims to inflate to is compared with the archive") {
   const std::string text(5000, 'x');
   std::vector<std::byte> zip = deflated_zip({{"a", bytes_of_text(text)}});

@@ -63,7 +63,7 @@ TEST_CASE("contributions are the shares of light that make up a picture's alpha"
   changes.contributions = found;
   CHECK(changed(model, changes).opacities == std::vector<float>{9, 0});
   // They are those of the model that comes in, not of what is left.
-  changes.crop = CropBox{{-10, -10, -10}, {10, 10, 1}};
+  changes.crop = Bounds{{-10, -10, -10}, {10, 10, 1}};
   changes.max_gaussians = 1;
   CHECK(changed(model, changes).opacities == std::vector<float>{9});
   changes.contributions.pop_back();

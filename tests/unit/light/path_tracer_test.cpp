@@ -8,12 +8,14 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 #include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include "light/view_tracer.hpp"
 #include "light_fixture.hpp"
+#include "raysplats/error.hpp"
 #include "trace/camera_tracer.hpp"
 #include "util/rng.hpp"
 
@@ -372,6 +374,24 @@ TEST_CASE("environment pictures and textures") {
   for (float& x : wall.uvs) x = 2.5f * x - 0.7f;  // repeats
   add_mesh(scene, wall, painted);
   check_picture(context, scene, kCamera, "a texture", kLitByPicture);
+}
+
+TEST_CASE("an environment that is not finite is refused, and so is a camera that scales") {
+  Context context = make_test_context();
+  const Scene sound = cloud_scene(2);
+  for (const float value :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    Scene scene = sound;
+    scene.environment.rotation = value;
+    CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
+    scene = sound;
+    scene.environment.up[1] = value;
+    CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
+  }
+  PathTracer tracer(context, sound);
+  Camera camera = kCamera;
+  camera.rotation *= 2.0;
+  CHECK_THROWS_AS(tracer.render(camera), UsageError);
 }
 
 TEST_CASE("other cameras and sizes of picture") {

@@ -33,6 +33,17 @@ Scene coarse_ball(bool smooth) {
   return scene;
 }
 
+/// The box with the normals that averaging over its faces gives.
+Mesh smooth_box(const glm::dvec3& low, const glm::dvec3& high) {
+  Mesh mesh = reference::box(low, high, 0);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const auto axis = static_cast<int>(i % 3);
+    const double middle = (low[axis] + high[axis]) / 2;
+    mesh.normals.push_back(mesh.positions[i] < middle ? -0.57735027f : 0.57735027f);
+  }
+  return mesh;
+}
+
 /// From ten or so away, so that a white ball shows about the cosine of its normals with the light.
 Light distant_light(const std::array<float, 3>& position) {
   Light light;
@@ -120,6 +131,25 @@ TEST_CASE("a smooth column of few sides is lit at its very edges [small]") {
   const Shaded pixels = shaded(context, scene, cube_camera(41, 41));
   CHECK(pixels.lit > 400);
   CHECK(pixels.dark == 0);
+}
+
+TEST_CASE("a box whose normals are averaged has the shadows of what stands on it") {
+  // Seen from above, so that its upper face fills the picture.
+  Context context = make_test_context();
+  const Camera camera = look_at({0.03, -4, 0.02}, {0, 0, 0}, {0, 0, 1}, 40, 40, 80.0);
+  Scene scene = coarse_ball(true);
+  const glm::dvec3 low(-1.5, 0.4, -1.5), high(1.5, 0.6, 1.5);
+  scene.meshes = {reference::box(low, high, 0),
+                  reference::box({-0.3, -0.2, -0.3}, {0.3, 0.4, 0.3}, 0)};
+  Light sun;
+  sun.kind = Light::Kind::kDirectional;
+  sun.direction = {0.5f, 1.0f, 0.3f};
+  scene.lights = {sun};
+  const Shaded flat = shaded(context, scene, camera);
+  CHECK(flat.dark > 40);
+  scene.meshes[0] = smooth_box(low, high);
+  CHECK(shaded(context, scene, camera).dark == flat.dark);
+  check_picture(context, scene, camera, "a cube on a smooth box");
 }
 
 TEST_CASE("rays to lights leave flat triangles where they did, to the bit [small]") {

@@ -148,14 +148,14 @@ TEST_CASE(
     "packets of every shape see the same sky, whether hits are kept or traced again [small]") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(300, 93, 1);
-  for (const auto& [form, width] :
-       {std::pair{PacketForm::kVector, 1}, std::pair{PacketForm::kVector, 8},
-        std::pair{PacketForm::kVector, 16}, std::pair{PacketForm::kGroup, 8},
-        std::pair{PacketForm::kGroup, 32}}) {
-    CAPTURE(static_cast<int>(form));
+  for (const auto& [shape, width] :
+       {std::pair{PacketShape::kVector, 1}, std::pair{PacketShape::kVector, 8},
+        std::pair{PacketShape::kVector, 16}, std::pair{PacketShape::kGroup, 8},
+        std::pair{PacketShape::kGroup, 32}}) {
+    CAPTURE(static_cast<int>(shape));
     CAPTURE(width);
     TraceOptions options = under_sky(2, 5);
-    options.packet_form = form;
+    options.packet_shape = shape;
     options.packet_width = width;
     check_view(context, model, options, lens_of(CameraModel::kPinhole, 34, 27), false);
     options.memory_budget = 1000;

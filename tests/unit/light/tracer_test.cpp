@@ -51,7 +51,7 @@ std::string message_of(const auto& call) {
   return "";
 }
 
-double loss_of(const reference::RayTrace& trace, const RayGradient& g) {
+double loss_of(const reference::RayTrace& trace, const RayResultGradient& g) {
   double loss = static_cast<double>(g.alpha) * trace.alpha;
   for (int c = 0; c < 3; ++c) loss += static_cast<double>(g.color[c]) * trace.color[c];
   return loss;
@@ -65,8 +65,8 @@ bool same_hits(const reference::RayTrace& a, const reference::RayTrace& b) {
   return true;
 }
 
-RayGradient random_gradient(CounterRng& rng) {
-  RayGradient g{};
+RayResultGradient random_gradient(CounterRng& rng) {
+  RayResultGradient g{};
   for (float& value : g.color) value = static_cast<float>(rng.normal());
   g.alpha = static_cast<float>(rng.normal());
   return g;
@@ -96,8 +96,8 @@ TEST_CASE("gradients of rays equal central differences of a double reference [sm
       };
       const std::vector<Ray> rays = random_rays(150, 32);
       CounterRng rng(33, 1);
-      std::vector<RayGradient> gradients(rays.size());
-      for (RayGradient& g : gradients) g = random_gradient(rng);
+      std::vector<RayResultGradient> gradients(rays.size());
+      for (RayResultGradient& g : gradients) g = random_gradient(rng);
       Tracer tracer(context, options);
       const std::vector<RayResult> results = tracer.trace(model, rays, direction, true);
       const RaysGradients got = tracer.backward(model, gradients);
@@ -123,8 +123,8 @@ TEST_CASE("gradients of rays equal central differences of a double reference [sm
           REQUIRE(same_hits(below, at));
           expected.push_back((loss_of(above, gradients[i]) - loss_of(below, gradients[i])) /
                              (2.0 * step));
-          const RaySlope& slope = got.rays[i];
-          device.push_back(origin ? slope.origin[k] : slope.direction[k - 3]);
+          const RayGradient& by_ray = got.rays[i];
+          device.push_back(origin ? by_ray.origin[k] : by_ray.direction[k - 3]);
         }
       }
       CHECK(expected.size() > 300);
@@ -135,7 +135,7 @@ TEST_CASE("gradients of rays equal central differences of a double reference [sm
       tight.memory_budget = 1000;
       Tracer batches(context, tight);
       std::vector<Ray> many;
-      std::vector<RayGradient> of_many;
+      std::vector<RayResultGradient> of_many;
       while (many.size() < 5000) {
         many.insert(many.end(), rays.begin(), rays.end());
         of_many.insert(of_many.end(), gradients.begin(), gradients.end());
@@ -182,7 +182,7 @@ TEST_CASE("gradients of poses equal central differences for cameras of every mod
     };
     CounterRng rng(36, 1);
     Image gradient(camera.width, camera.height, 4);
-    std::vector<RayGradient> of_pixels(gradient.pixels());
+    std::vector<RayResultGradient> of_pixels(gradient.pixels());
     std::vector<reference::RayTrace> at;
     for (std::size_t i = 0; i < gradient.pixels(); ++i) {
       at.push_back(trace(camera, i));
@@ -249,7 +249,7 @@ TEST_CASE("a tracer follows its model, and refuses gradients of a state that is 
   model.assign(gaussians);
   CHECK(model.revision() != revision);
   CHECK(model.download().means == gaussians.means);
-  const std::vector<RayGradient> gradients(rays.size());
+  const std::vector<RayResultGradient> gradients(rays.size());
   CHECK_THROWS_AS(tracer.backward(model, Image(24, 20, 4)), UsageError);
   CHECK_THROWS_AS(tracer.backward(model, gradients), UsageError);
   // The trees are those of the new parameters.
@@ -426,7 +426,7 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
   CHECK(tracer.trace(model, {}).empty());
 
   const std::vector<Ray> rays{good, good};
-  std::vector<RayGradient> gradients(2);
+  std::vector<RayResultGradient> gradients(2);
   CHECK_THROWS_AS(tracer.backward(model, gradients), UsageError);
   tracer.trace(model, rays);
   CHECK_THROWS_AS(tracer.backward(model, gradients), UsageError);
@@ -460,7 +460,30 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
     broken.model = lens;
     broken.width = 0;
     CHECK_THROWS_AS(tracer.render(model, broken), UsageError);
+    for (const glm::dvec3& factors : {glm::dvec3(2, 1, 1), glm::dvec3(1.002), glm::dvec3(-1)}) {
+      broken = camera;
+      broken.model = lens;
+      for (int k = 0; k < 3; ++k) broken.rotation[k] *= factors[k];
+      CHECK(message_of([&] { tracer.render(model, broken); }).find("scales, shears or mirrors") !=
+            std::string::npos);
+      CHECK_THROWS_AS(tracer.normals(model, broken), UsageError);
+    }
+    // What single precision and a step along a tangent leave of a rotation.
+    broken = camera;
+    broken.model = lens;
+    broken.rotation[0] *= 1.0004;
+    CHECK_NOTHROW(tracer.render(model, broken));
   }
+
+  for (const float value : {kNan, kInfinity}) {
+    CHECK(message_of([&] {
+            tracer.set_background({0, value, 0});
+          }).find("not finite") != std::string::npos);
+    TraceOptions behind;
+    behind.background[2] = value;
+    CHECK_THROWS_AS(Tracer(context, behind), UsageError);
+  }
+  CHECK(tracer.options().background == std::array<float, 3>{});
 
   Context second = make_test_context();
   const Model elsewhere(second, gaussians);

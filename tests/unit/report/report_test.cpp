@@ -387,6 +387,16 @@ TEST_CASE("reports say what views measure where they fit") {
   CHECK(!has(runs_report({plain.path(), plain.path()}), "where the views fit"));
 }
 
+TEST_CASE("reports say by which command a run was last resumed") {
+  const Run resumed("_resumed"), plain("_plain");
+  resumed.write("metrics.json",
+                R"({"complete":true,"command":"one","commands":["one","two","<three>"]})");
+  CHECK(has(run_report(resumed.path()), "&lt;three&gt;"));
+  CHECK(!has(run_report(plain.path()), "last by"));
+  CHECK(has(runs_report({plain.path(), resumed.path()}),
+            "<tr><th>Resumed, last by</th><td></td><td>&lt;three&gt;</td></tr>"));
+}
+
 TEST_CASE("several runs stand side by side, with what differs between them") {
   const Run first("_<one>"), second("_two"), third("_three");
   second.write("metrics.json",

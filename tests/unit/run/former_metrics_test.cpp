@@ -85,3 +85,20 @@ TEST_CASE("what cannot be read of a run before counts as unknown") {
   CHECK(former_photos(Json()).empty());
   CHECK(former_number(Json(), "loss") == 0.0);
 }
+
+TEST_CASE("a run keeps all the commands that it went on by") {
+  const Json first = metrics(10);
+  CHECK_FALSE(first.contains("commands"));
+  Json second = continued_metrics(metrics(20), first, true);
+  CHECK(second.at("command") == "first");
+  CHECK(second.at("commands") == Json::array({"first", "second"}));
+  Json now = metrics(20);
+  now["command"] = "third";
+  now["iteration"] = 30;
+  CHECK(continued_metrics(now, second, true).at("commands") ==
+        Json::array({"first", "second", "third"}));
+  // Without a step nothing is said anew, and what is no list of texts is none.
+  CHECK(continued_metrics(second, second, false).at("commands").size() == 2);
+  second["commands"] = 7;
+  CHECK(continued_metrics(now, second, true).at("commands") == Json::array({"first", "third"}));
+}

@@ -11,7 +11,8 @@
 
 #include "raysplats/error.hpp"
 #include "run/checkpoint.hpp"
-#include "run/train_keys.hpp"
+#include "run/train_option_table.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/temporary_directory.hpp"
 #include "util/atomic_file.hpp"
 
@@ -81,7 +82,7 @@ TEST_CASE("the configurations of the project are valid and the default one docum
   std::ifstream stream(folder / "default.toml");
   const std::string text((std::istreambuf_iterator<char>(stream)),
                          std::istreambuf_iterator<char>());
-  for (const OptionRow& key : train_keys(defaults)) {
+  for (const OptionRow& key : train_option_rows(defaults)) {
     INFO(key.name);
     CHECK(text.find("\n" + key.name + " = ") != std::string::npos);
     CHECK(!key.help.empty());
@@ -396,4 +397,47 @@ TEST_CASE("a resumed run keeps its options below those of a file and of the comm
   CHECK(resumed(folder / "none").iterations == TrainOptions().iterations);
   CHECK_THROWS_AS(resumed(folder / "run", {"--validate-views", "0", "--patience", "2"}),
                   UsageError);
+}
+
+TEST_CASE("a file that makes another run of the one that is resumed is said to, once") {
+  const TemporaryDirectory folder;
+  TrainOptions of_run;
+  of_run.iterations = 1500;
+  of_run.seed = 7;
+  of_run.background = "0,0,0";
+  folder.write("run/config.toml", to_toml(of_run));
+  // A background that the photos choose stays what they have chosen.
+  folder.write("other.toml",
+               "iterations = 48000\nseed = 7\nsh-degree = 1\nbackground = \"auto\"\n");
+  const std::string file = (folder / "other.toml").string();
+  {
+    const LogCapture log;
+    CHECK(resumed(folder / "run", {"--config", file}).iterations == 48000);
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("iterations 48000 (1500)"));
+    CHECK(log.contains("sh-degree 1 (3)"));
+    CHECK_FALSE(log.contains("seed"));
+    CHECK_FALSE(log.contains("background"));
+  }
+  const LogCapture log;
+  // What the command line says is meant, and without a run there is nothing to change.
+  resumed(folder / "run", {"--config", file, "-n", "2000", "--sh-degree", "2"});
+  resumed(folder / "run", {"--seed", "7", "-n", "3000"});
+  resumed(folder / "none", {"--config", file});
+  CHECK(log.lines() == 0);
+}
+
+TEST_CASE("texts and paths that no configuration can hold are refused") {
+  const std::string bad = "/photos/b\xE4ll.obj";
+  for (const std::string option : {"--mirror", "--init"}) {
+    CAPTURE(option);
+    std::string message;
+    try {
+      parse({option, bad});
+    } catch (const UsageError& error) {
+      message = error.what();
+    }
+    CHECK(message.find("UTF-8") != std::string::npos);
+  }
+  CHECK(parse({"--mirror", "/photos/b\xC3\xA4ll.obj"}).mirrors.size() == 1);
 }

@@ -6,6 +6,11 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
+#include <utility>
+
+#include "raysplats/error.hpp"
+#include "scene/camera_check.hpp"
 
 using namespace raysplats;
 
@@ -44,9 +49,33 @@ TEST_CASE("camera: downscaled keeps the field of view on both axes") {
     CHECK(small.translation == camera.translation);
     CHECK(small.name == camera.name);
   }
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const double factor : {0.0, -1.0, -infinity, infinity - infinity, 1e-9}) {
+    CAPTURE(factor);
+    CHECK_THROWS_AS(downscaled(camera, factor), UsageError);
+  }
   const Camera least = downscaled(camera, 1000);
   CHECK(least.width == 1);
   CHECK(least.height == 1);
+}
+
+TEST_CASE("camera: a rotation is one up to rounding, whatever is multiplied to it or mirrored") {
+  const glm::dmat3 turn = look_at({1, 2, 3}, {-4, 0, 5}, {0, 0, 1}, 4, 3, 5).rotation;
+  CHECK(is_rotation(turn));
+  CHECK(is_rotation(glm::dmat3(glm::mat3(turn))));
+  CHECK(is_rotation(1.0004 * turn));
+  CHECK(!is_rotation(1.0006 * turn));
+  CHECK(!is_rotation(-1.0 * turn));
+  CHECK(!is_rotation(glm::dmat3(0.0)));
+  glm::dmat3 other = turn;
+  other[1] += 0.002 * turn[0];  // a shear
+  CHECK(!is_rotation(other));
+  other = turn;
+  std::swap(other[0], other[1]);
+  CHECK(!is_rotation(other));
+  other = turn;
+  other[2][1] = std::numeric_limits<double>::quiet_NaN();
+  CHECK(!is_rotation(other));
 }
 
 TEST_CASE("camera: look_at puts the target on the axis, up above and right to the right") {

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cmath>
-#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
@@ -13,25 +12,14 @@
 #include <numbers>
 #include <string>
 
-#include "raysplats/error.hpp"
+#include "unit/text.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
+using test::contains;
+using test::data_error;
 
 namespace {
-
-std::string data_error(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const DataError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 Mesh triangle() {
   Mesh mesh;

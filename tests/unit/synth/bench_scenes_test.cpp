@@ -127,7 +127,7 @@ TEST_CASE("incoherent benchmark rays start outside the cube, cross it and are re
   REQUIRE(rays.size() == 2000);
   glm::dvec3 sum(0.0);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const BenchRay& ray = rays[i];
+    const Ray& ray = rays[i];
     double length = 0.0, farthest = 0.0, middle = 0.0;
     for (int k = 0; k < 3; ++k) {
       length += double(ray.direction[k]) * ray.direction[k];

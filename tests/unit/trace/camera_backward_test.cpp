@@ -80,7 +80,7 @@ void check_every_variant(Gaussians model, const Camera& camera) {
         options.adaptive_radius = adaptive;
         options.background = {0.25f, 0.5f, 1.0f};
         CHECK_ERRORS(compare_gradients(context, model, options, camera, activation), 1e-3);
-        options.packet_form = PacketForm::kGroup;
+        options.packet_shape = PacketShape::kGroup;
         CHECK_ERRORS(compare_gradients(context, model, options, camera, activation), 1e-3);
       }
     }

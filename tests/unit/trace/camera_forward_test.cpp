@@ -90,7 +90,7 @@ TEST_CASE("every SH degree is evaluated as the reference does") {
   }
 }
 
-TEST_CASE("every form of packet gives the same image") {
+TEST_CASE("every shape of packet gives the same image") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(400, 4, 1);
   const Camera camera = reference::cube_camera(37, 29);
@@ -269,8 +269,8 @@ TEST_CASE("empty scenes, single pixels and odd sizes [small]") {
   for (const auto& size : std::vector<std::pair<int, int>>{{1, 1}, {1, 70}, {70, 1}, {33, 2}}) {
     CAPTURE(size.first);
     CAPTURE(size.second);
-    for (const PacketForm form : {PacketForm::kAuto, PacketForm::kGroup}) {
-      options.packet_form = form;
+    for (const PacketShape shape : {PacketShape::kAuto, PacketShape::kGroup}) {
+      options.packet_shape = shape;
       check_against_reference(context, model, options,
                               reference::cube_camera(size.first, size.second));
     }
@@ -292,7 +292,7 @@ TEST_CASE("a camera inside the scene: means beside and behind it, ellipsoids aro
       TraceOptions options;
       options.hit_order = order;
       check_against_reference(context, model, options, camera);
-      options.packet_form = PacketForm::kGroup;
+      options.packet_shape = PacketShape::kGroup;
       check_against_reference(context, model, options, camera);
     }
   }
@@ -397,7 +397,7 @@ TEST_CASE("packets that are no subgroup are refused where subgroups are asked fo
   const Gaussians model = reference::random_scene(20, 18, 0);
   const Camera camera = reference::cube_camera(9, 7);
   TraceOptions options;
-  options.packet_form = PacketForm::kSubgroup;
+  options.packet_shape = PacketShape::kSubgroup;
   // 64 work-items are one subgroup on few devices.
   for (const int width : {8, 64}) {
     CAPTURE(width);
@@ -416,7 +416,7 @@ TEST_CASE("packets that are no subgroup are refused where subgroups are asked fo
     }
   }
   // Without being asked for they are groups there.
-  options.packet_form = PacketForm::kAuto;
+  options.packet_shape = PacketShape::kAuto;
   options.packet_width = 64;
   check_against_reference(context, model, options, camera);
 }

@@ -105,14 +105,14 @@ HostGradients on_device(Context& context,
   const std::size_t pixels = loss.depth.size();
   const std::vector<float> image = tracer.image().download(), depth = tracer.depth().download();
   // Expected depth is S / A.
-  std::vector<float> slope = loss.image, of_sum(pixels);
+  std::vector<float> of_image = loss.image, of_sum(pixels);
   for (std::size_t i = 0; i < pixels; ++i) {
     if (loss.depth[i] == 0.0f) continue;
     of_sum[i] = loss.depth[i] / image[3 * pixels + i];
-    slope[3 * pixels + i] -= of_sum[i] * depth[i];
+    of_image[3 * pixels + i] -= of_sum[i] * depth[i];
   }
-  Buffer<float> image_gradient(context, slope.size(), "image gradient");
-  image_gradient.upload(slope);
+  Buffer<float> image_gradient(context, of_image.size(), "image gradient");
+  image_gradient.upload(of_image);
   Buffer<float> depth_gradient(context, pixels, "depth gradient");
   depth_gradient.upload(of_sum);
   GaussianGradients out;
@@ -143,12 +143,12 @@ void check_against_differences(const Gaussians& model, TraceOptions options, con
 
 TEST_CASE("the gradient of depth equals finite differences for packets and groups [small]") {
   for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
-    for (const PacketForm form : {PacketForm::kVector, PacketForm::kGroup}) {
+    for (const PacketShape shape : {PacketShape::kVector, PacketShape::kGroup}) {
       CAPTURE(static_cast<int>(order));
-      CAPTURE(static_cast<int>(form));
+      CAPTURE(static_cast<int>(shape));
       TraceOptions options;
       options.hit_order = order;
-      options.packet_form = form;
+      options.packet_shape = shape;
       options.background = {0.25f, 0.5f, 1.0f};
       check_against_differences(reference::random_scene(20, 21, 1), options,
                                 reference::cube_camera(7, 6));

@@ -291,11 +291,11 @@ TEST_CASE("the screen gradients of a lens are those of its rays one by one") {
     generator.generate(view.camera, Lens{}, 0, pixels, rays);
     Buffer<RayResult> results;
     ray_tracer.trace(gaussians, rays, pixels, results, ColorDirection::kFromOrigin);
-    std::vector<RayBackward::Gradient> by_ray(pixels);
+    std::vector<RayBackward::ResultGradient> by_ray(pixels);
     for (std::size_t i = 0; i < pixels; ++i) {
       for (std::size_t c = 0; c < 4; ++c) by_ray[i][c] = gradient[c * pixels + i];
     }
-    Buffer<RayBackward::Gradient> uploaded(context, pixels, "ray gradients");
+    Buffer<RayBackward::ResultGradient> uploaded(context, pixels, "ray gradients");
     uploaded.upload(by_ray);
     RayBackward ray_backward(context, ray_tracer);
     ray_backward.begin(gaussians, RayScreen::of(view.camera));

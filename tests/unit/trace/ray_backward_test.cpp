@@ -40,12 +40,12 @@ Errors errors_of(const HostGradients& got, const Expected& expected) {
           error(got.sh, expected.sh)};
 }
 
-using Gradients = std::vector<RayBackward::Gradient>;
+using Gradients = std::vector<RayBackward::ResultGradient>;
 
 Gradients random_gradients(std::size_t count, std::uint64_t seed) {
   CounterRng rng(seed, 78);
   Gradients out(count);
-  for (RayBackward::Gradient& g : out) {
+  for (RayBackward::ResultGradient& g : out) {
     for (float& value : g) value = static_cast<float>(rng.normal());
   }
   return out;
@@ -90,7 +90,7 @@ struct Batch {
     gradients.upload(host_gradients);
   }
   Buffer<Ray> rays;
-  Buffer<RayBackward::Gradient> gradients;
+  Buffer<RayBackward::ResultGradient> gradients;
   Buffer<RayResult> results;
 };
 

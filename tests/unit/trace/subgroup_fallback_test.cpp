@@ -66,14 +66,14 @@ class SeveralSubgroups {
   }
 
   // Picture, gradients of the means in exact sums, and the programs that were compiled.
-  std::tuple<std::vector<float>, std::vector<float>, std::size_t> trace(PacketForm form) {
+  std::tuple<std::vector<float>, std::vector<float>, std::size_t> trace(PacketShape shape) {
     ContextOptions options = options_;
     options.kernel_cache = false;
     std::size_t compiled = 0;
     options.compiling = [&](std::size_t number, const std::string&) { compiled = number; };
     Context context(device_, options);
     TraceOptions trace;
-    trace.packet_form = form;
+    trace.packet_shape = shape;
     trace.packet_width = kRays;
     trace.gradient_sum = GradientSum::kExact;
     const Camera camera = reference::cube_camera(9, 7);
@@ -82,9 +82,9 @@ class SeveralSubgroups {
     CameraTracer tracer(context, trace);
     tracer.update(gaussians);
     tracer.forward(gaussians, camera, true);
-    const std::vector<float> slopes = random_image_gradient(9 * 7, 3);
-    Buffer<float> gradient(context, slopes.size(), "image gradient");
-    gradient.upload(slopes);
+    const std::vector<float> numbers = random_image_gradient(9 * 7, 3);
+    Buffer<float> gradient(context, numbers.size(), "image gradient");
+    gradient.upload(numbers);
     GaussianGradients out;
     tracer.backward(gaussians, gradient, out);
     return {tracer.download_image().data, HostGradients(out).means, compiled};
@@ -112,15 +112,15 @@ TEST_CASE("packets that become several subgroups are traced as groups unless dem
   SeveralSubgroups device;
   std::string refusal;
   try {
-    device.trace(PacketForm::kSubgroup);
+    device.trace(PacketShape::kSubgroup);
   } catch (const DeviceError& error) {
     refusal = error.what();
   }
   SKIP_TEST_UNLESS(!refusal.empty(), "64 work-items are one subgroup here: nothing falls back");
   CHECK(refusal.find("subgroups of a packet of 64 rays in kernel trace_forward_group") !=
         std::string::npos);
-  const auto [image, means, compiled] = device.trace(PacketForm::kAuto);
-  const auto [group_image, group_means, group_compiled] = device.trace(PacketForm::kGroup);
+  const auto [image, means, compiled] = device.trace(PacketShape::kAuto);
+  const auto [group_image, group_means, group_compiled] = device.trace(PacketShape::kGroup);
   CHECK(image == group_image);
   CHECK(means == group_means);
   // The forward kernel with subgroups was tried, in vain, and the backward one not even that.

@@ -14,7 +14,7 @@
 #include "reference/gradients.hpp"
 #include "reference/scenes.hpp"
 #include "reference/tracer.hpp"
-#include "scene/trace_rows.hpp"
+#include "scene/trace_option_table.hpp"
 #include "trace/camera_tracer.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
@@ -23,29 +23,29 @@ namespace raysplats {
 
 /// What a packet of rays may be.
 struct Packet {
-  PacketForm form;
+  PacketShape shape;
   int lanes;
 
   TraceOptions over(TraceOptions options) const {
-    options.packet_form = form;
+    options.packet_shape = shape;
     options.packet_width = lanes;
     return options;
   }
 };
 
 inline std::ostream& operator<<(std::ostream& out, const Packet& packet) {
-  return out << packet_shape_name(packet.form) << " of " << packet.lanes;
+  return out << packet_shape_name(packet.shape) << " of " << packet.lanes;
 }
 
-/// Every form of packet in the widths named; subgroups where the device has any, up to 32 wide.
+/// Every shape of packet in the widths named; subgroups where the device has any, up to 32 wide.
 inline std::vector<Packet> packets(const std::vector<int>& vectors = {1, 2, 4, 8, 16},
                                    const std::vector<int>& groups = {8, 16, 32, 64}) {
   std::vector<Packet> out;
-  for (const int lanes : vectors) out.push_back({PacketForm::kVector, lanes});
-  for (const int lanes : groups) out.push_back({PacketForm::kGroup, lanes});
+  for (const int lanes : vectors) out.push_back({PacketShape::kVector, lanes});
+  for (const int lanes : groups) out.push_back({PacketShape::kGroup, lanes});
   static const bool has_subgroups = test_device().has_subgroups;
   for (const int lanes : groups) {
-    if (has_subgroups && lanes <= 32) out.push_back({PacketForm::kSubgroup, lanes});
+    if (has_subgroups && lanes <= 32) out.push_back({PacketShape::kSubgroup, lanes});
   }
   return out;
 }

@@ -30,14 +30,14 @@ struct Scene {
         gaussians(DeviceGaussians::upload(
             context_in, reference::random_scene(3000, 71, 1), ScaleActivation::kExp)),
         tracer(context_in, options),
-        slopes(context_in, 4 * 256 * 256, "image gradient") {
+        image_gradient(context_in, 4 * 256 * 256, "image gradient") {
     tracer.update(gaussians);
-    slopes.upload(random_image_gradient(256 * 256, 5));
+    image_gradient.upload(random_image_gradient(256 * 256, 5));
   }
 
   void trace(const Camera& camera, ViewSizes sizes) {
     tracer.forward(gaussians, camera, true, sizes);
-    tracer.backward(gaussians, slopes, gradients);
+    tracer.backward(gaussians, image_gradient, gradients);
   }
   Traced result() {
     const CameraTracer::Statistics statistics = tracer.statistics();
@@ -48,7 +48,7 @@ struct Scene {
   Context& context;
   DeviceGaussians gaussians;
   CameraTracer tracer;
-  Buffer<float> slopes;
+  Buffer<float> image_gradient;
   GaussianGradients gradients;
 };
 
@@ -67,7 +67,7 @@ void check_nothing_seen(Scene& scene) {
     REQUIRE(nothing.image.data[4 * i] == 0.25f);
     REQUIRE(nothing.image.data[4 * i + 3] == 0.0f);
   }
-  for (const float slope : nothing.means) REQUIRE(slope == 0.0f);
+  for (const float number : nothing.means) REQUIRE(number == 0.0f);
 }
 
 }  // namespace
@@ -125,12 +125,12 @@ TEST_CASE("lists and hits without room are noticed each by itself") {
     ::setenv(fault, "1", 1);
     Context context = make_test_context();
     ::unsetenv(fault);
-    Scene scene(context, options_of({PacketForm::kVector, 8}));
+    Scene scene(context, options_of({PacketShape::kVector, 8}));
     scene.trace(camera, ViewSizes::kAwaited);
     const Traced expected = scene.result();
     scene.trace(camera, ViewSizes::kAhead);
     CHECK(scene.tracer.overflow().read(0) == 1);
-    for (const float slope : scene.gradients.means.download()) REQUIRE(slope == 0.0f);
+    for (const float number : scene.gradients.means.download()) REQUIRE(number == 0.0f);
     scene.tracer.clear_overflow();
     scene.trace(camera, ViewSizes::kAhead);
     CHECK(scene.result() == expected);
@@ -140,7 +140,7 @@ TEST_CASE("lists and hits without room are noticed each by itself") {
 TEST_CASE("where the memory budget has no room for a view, its sizes are waited for") {
   Context context = make_test_context();
   const Camera camera = reference::cube_camera(97, 61);
-  TraceOptions options = options_of({PacketForm::kVector, 8});
+  TraceOptions options = options_of({PacketShape::kVector, 8});
   options.memory_budget = 1 << 19;
   Scene scene(context, options);
   for (int i = 0; i < 2; ++i) {

@@ -32,23 +32,23 @@ TEST_CASE(
     outward.push_back(
         look_at(camera.center(), 2.0 * camera.center() - target, {0, 0, 1}, 80, 80, 80));
   }
-  CHECK(visible_region(outward).half_side == doctest::Approx(3.0 * scene_extent(outward)));
-  CHECK(scene_extent(ring(12, 4.0, target)) == doctest::Approx(4.4));
-  CHECK(scene_extent(std::vector<Camera>(1)) > 0);
+  CHECK(visible_region(outward).half_side == doctest::Approx(3.0 * camera_extent(outward)));
+  CHECK(camera_extent(ring(12, 4.0, target)) == doctest::Approx(4.4));
+  CHECK(camera_extent(std::vector<Camera>(1)) > 0);
 }
 
 TEST_CASE("means move by what cameras see where these stand far away, else by their spread") {
   const glm::dvec3 target(3, -2, 1);
   const std::vector<Camera> usual = ring(12, 4.0, target);
-  CHECK(motion_extent(usual) == scene_extent(usual));
+  CHECK(motion_extent(usual) == camera_extent(usual));
   std::vector<Camera> telephoto = ring(12, 40.0, target);
   for (Camera& camera : telephoto) camera.fx = camera.fy = 10 * camera.fx;
   CHECK(motion_extent(telephoto) == doctest::Approx(5 * visible_region(usual).half_side));
-  CHECK(scene_extent(telephoto) == doctest::Approx(44.0));
+  CHECK(camera_extent(telephoto) == doctest::Approx(44.0));
   // Without a common target nothing says what they look at.
   for (Camera& camera : telephoto)
     camera.translation = -(camera.rotation * (2.0 * target - camera.center()));
-  CHECK(motion_extent(telephoto) == scene_extent(telephoto));
+  CHECK(motion_extent(telephoto) == camera_extent(telephoto));
 }
 
 TEST_CASE("cameras far from all others have no say in lengths, as long as they are exceptions") {
@@ -58,12 +58,12 @@ TEST_CASE("cameras far from all others have no say in lengths, as long as they a
   std::vector<Camera> cameras = sound;
   cameras[7] = look_at({500, 80, 3}, target, {0, 0, 1}, 80, 100, 160);
   CHECK(stray_cameras(cameras) == std::vector<std::size_t>{7});
-  CHECK(scene_extent(cameras) == doctest::Approx(scene_extent(sound)).epsilon(0.1));
+  CHECK(camera_extent(cameras) == doctest::Approx(camera_extent(sound)).epsilon(0.1));
   CHECK(glm::distance(visible_region(cameras).center, target) < 1e-6);
   // A second one of twenty is a part of the capture, and so is one within the reach of others.
   cameras[8] = cameras[7];
   CHECK(stray_cameras(cameras).empty());
-  CHECK(scene_extent(cameras) > 100);
+  CHECK(camera_extent(cameras) > 100);
   cameras = sound;
   cameras[7] = look_at(target + glm::dvec3(20, 0, 0), target, {0, 0, 1}, 80, 100, 160);
   CHECK(stray_cameras(cameras).empty());

@@ -199,6 +199,55 @@ TEST_CASE("depth maps stay on the device within the budget, and the rest are rea
   CHECK(missing.size() <= 2);  // the last one may still be there
 }
 
+TEST_CASE("a depth map that is prefetched for one size is right at another") {
+  const Scratch scratch;
+  const Dataset data = with_maps(scratch, 2);
+  Context context(test_device());
+  DepthCache cache(context, data, all_of(data), 1.0, 0);
+  for (const Size& foreseen : kSizes) {
+    for (const Size& size : kSizes) {
+      CAPTURE(foreseen.width);
+      CAPTURE(size.width);
+      const std::vector<SizedView> next{{1, foreseen.width, foreseen.height}};
+      cache.prefetch(next);
+      const io::DepthMap expected =
+          io::reduced(io::view_depths({}, data.views[1], 1.0), size.width, size.height);
+      const DeviceDepths& got = cache.get({1, size.width, size.height});
+      CHECK(got.known == known_in(expected));
+      CHECK(got.depths.download() == expected.values);
+      cache.get({0, size.width, size.height});  // in its place
+    }
+  }
+}
+
+TEST_CASE("views whose depth maps know nothing have no depths, and one warning counts them") {
+  const Scratch scratch;
+  const Dataset data = with_maps(scratch, 4);
+  const std::vector<float> nothing(kPixels, 0.0f);
+  for (const std::size_t i : {1u, 2u})
+    write_depth_file(data.views[i].depth_path, kWidth, kHeight, nothing);
+  Context context(test_device());
+  {
+    const LogCapture log;
+    DepthCache cache(context, data, all_of(data), 1.0, 4 * kBytes);
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("2 of 4 depth maps"));
+    CHECK(log.contains("1.npy among them"));
+    CHECK(cache.with_maps() == 2);
+    CHECK(cache.with_points() == 0);
+    const std::vector<SizedView> next{{1, 18, 11}, {3, 18, 11}};
+    cache.prefetch(next);
+    CHECK(cache.get(next[0]).known == 0);
+    CHECK(cache.get(next[1]).known > 0);
+    CHECK(log.lines() == 1);
+  }
+  for (const std::size_t i : {0u, 3u})
+    write_depth_file(data.views[i].depth_path, kWidth, kHeight, nothing);
+  const std::string error =
+      data_error([&] { DepthCache(context, data, all_of(data), 1.0, 4 * kBytes); });
+  CHECK(contains(error, "No depth map has a number above 0"));
+}
+
 TEST_CASE("what is wrong with depth maps is told when they are first read, and once") {
   const Scratch scratch;
   const Dataset data = with_maps(scratch, 2);

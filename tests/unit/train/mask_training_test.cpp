@@ -11,6 +11,7 @@
 #include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
+#include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
 #include "unit/fixture.hpp"
@@ -102,4 +103,24 @@ TEST_CASE("a run leaves out photos whose masks ignore all of them, as if they we
   CHECK(row.psnr == expected.psnr);
   CHECK(model.size() > 0);
   check_equal(model, expected_model);
+}
+
+TEST_CASE("a start without a Gaussian because masks leave nothing of the photos names the masks") {
+  const TemporaryDirectory folder;
+  Context context{test_device()};
+  const fs::path data = folder.path() / "data", mask = folder.path() / "dark.png";
+  make_photos(data, kSize, 6, 1);
+  write_image(mask, Image(kSize, kSize, 1, 0.3f));  // less than half of every pixel
+  Dataset dataset = load_dataset(data);
+  dataset.alpha_is_background = false;
+  dataset.points = {};
+  for (View& view : dataset.views) view.mask_path = mask;
+  Trainer trainer(context, dataset, short_training(10), folder.path() / "run");
+  std::string message;
+  try {
+    trainer.run(false);
+  } catch (const UsageError& error) {
+    message = error.what();
+  }
+  CHECK(message.find("masks or transparent pixels leave 0 % of the photos") != std::string::npos);
 }

@@ -68,9 +68,9 @@ TEST_CASE("pressure adds the gradients of mean opacity and mean size [small]") {
     gradients.opacities.upload(std::span(before).first(kCount));
     gradients.scales.upload(before);
     Mcmc mcmc(context(), options, kExtent);
-    mcmc.press(gaussians, gradients, guard_of(1));
+    mcmc.add_regularisation(gaussians, gradients, guard_of(1));
     CHECK(gradients.scales.download() == before);
-    mcmc.press(gaussians, gradients, guard_of(0));
+    mcmc.add_regularisation(gaussians, gradients, guard_of(0));
     const std::vector<float> opacity = gradients.opacities.download();
     const std::vector<float> scale = gradients.scales.download();
     for (std::size_t i = 0; i < kCount; ++i) {
@@ -110,7 +110,7 @@ TEST_CASE("noise is normal, shaped by the covariance, for faint Gaussians, and f
     Gaussians scaled = many;
     for (float& v : scaled.log_scales) v += static_cast<float>(std::log(unit));
     DeviceGaussians gaussians = DeviceGaussians::upload(context(), scaled, ScaleActivation::kExp);
-    Mcmc(context(), options, kExtent * unit).disturb(gaussians, iteration, guard_of(word));
+    Mcmc(context(), options, kExtent * unit).add_noise(gaussians, iteration, guard_of(word));
     return gaussians.means.download();
   };
   CHECK(moved(1, 50, 1) == many.means);

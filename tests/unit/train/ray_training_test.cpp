@@ -5,15 +5,14 @@
 #include <filesystem>
 #include <string>
 
-#include "light/view_tracer.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/mirror_meshes.hpp"
 #include "unit/fixture.hpp"
+#include "unit/train/photographed.hpp"
 #include "util/atomic_file.hpp"
-#include "util/rng.hpp"
 
 using namespace raysplats;
 
@@ -22,61 +21,12 @@ namespace {
 constexpr int kWidth = 44;
 constexpr int kHeight = 36;
 
-Gaussians coloured_cloud(std::size_t count, double reach, std::uint64_t seed) {
-  CounterRng rng(seed, 3);
-  Gaussians out;
-  out.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      out.means[3 * i + a] = static_cast<float>(reach * (2.0 * rng.uniform() - 1.0));
-      out.log_scales[3 * i + a] = static_cast<float>(std::log(0.05 + 0.15 * rng.uniform()));
-      out.sh[3 * i + a] = static_cast<float>(3.0 * rng.uniform() - 1.5);
-    }
-    out.opacities[i] = 2.0f;
-  }
-  return out;
+double trained_psnr(Photographed& photos, const TrainOptions& options, const std::string& run) {
+  Trainer trainer(photos.context, photos.dataset, options, photos.folder / run);
+  const TrainSummary summary = trainer.run(false);
+  REQUIRE(summary.evaluations.size() == 1);
+  return summary.evaluations[0].psnr;
 }
-
-// Photos of a few coloured Gaussians, in a folder that goes with the object.
-struct Photos {
-  TemporaryDirectory folder;
-  Context context{test_device()};
-  Dataset dataset;
-
-  Photos() {
-    std::filesystem::create_directories(folder / "images");
-    dataset.root = folder.path();
-  }
-
-  void take(const Gaussians& truth, const std::vector<Camera>& cameras, const Mirrors& mirrors) {
-    const DeviceGaussians gaussians =
-        DeviceGaussians::upload(context, truth, ScaleActivation::kExp);
-    ViewTracer tracer(context, TraceOptions{}, mirrors);
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-      View view;
-      view.camera = cameras[i];
-      view.camera.name = "view_" + std::to_string(i) + ".png";
-      view.source_camera = view.camera;
-      view.image_path = folder / "images" / view.camera.name;
-      view.test = i % 5 == 0;
-      tracer.forward(gaussians, view.camera);
-      const Image traced = tracer.download_image();
-      Image rgb(traced.width, traced.height, 3);
-      for (std::size_t p = 0; p < rgb.pixels(); ++p) {
-        for (std::size_t c = 0; c < 3; ++c) rgb.data[3 * p + c] = traced.data[4 * p + c];
-      }
-      write_image(view.image_path, rgb);
-      dataset.views.push_back(view);
-    }
-  }
-
-  double train(const TrainOptions& options, const std::string& run) {
-    Trainer trainer(context, dataset, options, folder / run);
-    const TrainSummary summary = trainer.run(false);
-    REQUIRE(summary.evaluations.size() == 1);
-    return summary.evaluations[0].psnr;
-  }
-};
 
 TrainOptions small_options(std::int64_t iterations) {
   TrainOptions options;
@@ -115,11 +65,10 @@ TEST_CASE("training through a distorted camera reaches nearly what a pinhole rea
   for (const CameraModel model :
        {CameraModel::kPinhole, CameraModel::kFisheye, CameraModel::kOpenCv}) {
     CAPTURE(static_cast<int>(model));
-    Photos photos;
-    photos.take(truth, ring(model), {});
+    Photographed photos(truth, ring(model));
     const TrainOptions options = small_options(150);
-    const double before = photos.train(small_options(1), "start");
-    const double psnr = photos.train(options, "run");
+    const double before = trained_psnr(photos, small_options(1), "start");
+    const double psnr = trained_psnr(photos, options, "run");
     MESSAGE("camera model " << static_cast<int>(model) << ": " << before << " dB, after training "
                             << psnr << " dB");
     if (model == CameraModel::kPinhole) pinhole = psnr;
@@ -129,9 +78,9 @@ TEST_CASE("training through a distorted camera reaches nearly what a pinhole rea
 }
 
 TEST_CASE("what photos show in a known mirror alone is learnt through it") {
-  Photos photos;
+  const TemporaryDirectory folder;
   // The cameras look at the mirror, the wall x = 2; the Gaussians are behind them.
-  const std::filesystem::path mesh = photos.folder / "mirror.obj";
+  const std::filesystem::path mesh = folder / "mirror.obj";
   write_text_file(mesh,
                   "v 2 -4 -4\nv 2 4 -4\nv 2 4 4\nv 2 -4 4\n"
                   "f 1 2 3\nf 1 3 4\n");
@@ -143,18 +92,18 @@ TEST_CASE("what photos show in a known mirror alone is learnt through it") {
     cameras.push_back(look_at({1.2, 1.1 * std::cos(angle), 1.1 * std::sin(angle)}, {4.0, 0.0, 0.0},
                               {0, 0, 1}, kWidth, kHeight, 70));
   }
-  photos.take(coloured_cloud(60, 0.6, 12), cameras, mirrors);
+  Photographed photos(coloured_cloud(60, 0.6, 12), cameras, mirrors);
   const Gaussians start = coloured_cloud(400, 0.7, 13);
   write_ply(photos.folder / "start.ply", start);
 
   TrainOptions options = small_options(1);
   options.init = (photos.folder / "start.ply").string();
   options.mirrors = {mesh.string()};
-  const double before = photos.train(options, "before");
+  const double before = trained_psnr(photos, options, "before");
   options.iterations = 120;
-  const double with = photos.train(options, "with");
+  const double with = trained_psnr(photos, options, "with");
   options.mirrors = {};
-  const double without = photos.train(options, "without");
+  const double without = trained_psnr(photos, options, "without");
   MESSAGE("seen in a mirror alone: " << before << " dB, trained " << with
                                      << " dB, trained without the mirror " << without << " dB");
   CHECK(with > before + 5.0);
@@ -162,8 +111,7 @@ TEST_CASE("what photos show in a known mirror alone is learnt through it") {
 }
 
 TEST_CASE("mirrors that cannot be read are refused") {
-  Photos photos;
-  photos.take(coloured_cloud(5, 0.5, 14), ring(CameraModel::kPinhole), {});
+  Photographed photos(coloured_cloud(5, 0.5, 14), ring(CameraModel::kPinhole));
   TrainOptions options = small_options(1);
   options.mirrors = {(photos.folder / "none.obj").string()};
   CHECK_THROWS_AS(Trainer(photos.context, photos.dataset, options, photos.folder / "run"),

@@ -219,12 +219,19 @@ TEST_CASE("a run of another length leaves no newer model of the one that it goes
   for (const int length : {24, 60}) {
     CAPTURE(length);
     options.iterations = length;
+    options.save_at = {};
     const std::string message = refusal<UsageError>([&] { (void)place.resumed(options, "run"); });
     CHECK(has(message, "a model of iteration 28"));
     CHECK(has(message, "--overwrite"));
     CHECK(fs::exists(newer));
   }
   options.iterations = kIterations;
+  CHECK(place.resumed(options, "run")->iteration() == 20);
+  // Others that make that model again: by their length, or by when they save.
+  options.iterations = 28;
+  CHECK(place.resumed(options, "run")->iteration() == 20);
+  options.iterations = 60;
+  options.save_at = {28};
   CHECK(place.resumed(options, "run")->iteration() == 20);
   options.iterations = 24;
   options.save_at = {};

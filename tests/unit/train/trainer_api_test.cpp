@@ -11,53 +11,27 @@
 #include "device/context.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "raysplats/tracer.hpp"
 #include "raysplats/trainer.hpp"
 #include "run/checkpoint.hpp"
 #include "unit/fixture.hpp"
-#include "util/rng.hpp"
+#include "unit/train/photographed.hpp"
 
 using namespace raysplats;
 
 namespace {
 
-// A few coloured balls photographed from ten places, in a folder that goes with the object.
-struct Photos {
-  TemporaryDirectory folder;
-  Context context{test_device()};
-  Dataset dataset;
-
-  Photos() {
-    std::filesystem::create_directories(folder / "images");
-    dataset.root = folder.path();
-    CounterRng rng(21, 3);
-    Gaussians truth;
-    truth.resize(40);
-    for (std::size_t i = 0; i < 3 * truth.size(); ++i) {
-      truth.means[i] = static_cast<float>(1.2 * rng.uniform() - 0.6);
-      truth.log_scales[i] = static_cast<float>(std::log(0.05 + 0.15 * rng.uniform()));
-      truth.sh[i] = static_cast<float>(3.0 * rng.uniform() - 1.5);
-    }
-    const Model model(context, truth);
-    Tracer tracer(context);
-    for (int i = 0; i < 10; ++i) {
-      const double angle = 0.628 * i;
-      View view;
-      view.camera = look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0}, {0, 0, 0}, {0, 0, 1},
-                            32, 28, 36);
-      view.camera.name = "view_" + std::to_string(i) + ".png";
-      view.source_camera = view.camera;
-      view.image_path = folder / "images" / view.camera.name;
-      view.test = i % 5 == 0;
-      const Image traced = tracer.render(model, view.camera);
-      Image rgb(traced.width, traced.height, 3);
-      for (std::size_t p = 0; p < rgb.pixels(); ++p) {
-        for (std::size_t c = 0; c < 3; ++c) rgb.data[3 * p + c] = traced.data[4 * p + c];
-      }
-      write_image(view.image_path, rgb);
-      dataset.views.push_back(view);
-    }
+std::vector<Camera> cameras_around() {
+  std::vector<Camera> out;
+  for (int i = 0; i < 10; ++i) {
+    const double angle = 0.628 * i;
+    out.push_back(
+        look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0}, {0, 0, 0}, {0, 0, 1}, 32, 28, 36));
   }
+  return out;
+}
+
+struct Photos : Photographed {
+  Photos() : Photographed(coloured_cloud(40, 0.6, 21, 0.0f), cameras_around()) {}
 };
 
 TrainOptions small_options() {
@@ -144,6 +118,28 @@ TEST_CASE("what is saved in a callback is what a run goes on from") {
   if (photos.context.device().type == DeviceType::kCpu) {
     CHECK(second.model().means == whole.model().means);
   }
+}
+
+TEST_CASE("a callback that is refused while the trainer trains leaves the one that is heard") {
+  Photos photos;
+  Trainer trainer(photos.context, photos.dataset, small_options(), photos.folder / "run");
+  std::vector<std::int64_t> heard;
+  bool other = false;
+  trainer.on_step([&](const TrainProgress& progress) {
+    heard.push_back(progress.iteration);
+    const auto replace = [&] { trainer.on_step([&](const TrainProgress&) { other = true; }); };
+    CHECK_THROWS_AS(replace(), UsageError);
+    if (progress.iteration == 3) trainer.stop();
+  });
+  trainer.step(10);
+  CHECK(heard == std::vector<std::int64_t>{1, 2, 3});
+  CHECK(!other);
+  // It may end itself, and be replaced once it is over.
+  trainer.on_step([&](const TrainProgress&) { trainer.on_step(nullptr); });
+  CHECK(trainer.step(2));
+  trainer.on_step([&](const TrainProgress&) { other = true; });
+  CHECK(trainer.step(1));
+  CHECK(other);
 }
 
 TEST_CASE("a trainer refuses to train twice at a time, and lets a callback's exception out") {

@@ -19,11 +19,10 @@
 #include "raysplats/io.hpp"
 #include "run/checkpoint.hpp"
 #include "run/train_config.hpp"
-#include "trace/camera_tracer.hpp"
 #include "train/memory_estimate.hpp"
 #include "unit/fixture.hpp"
+#include "unit/train/photographed.hpp"
 #include "unit/train/short_training.hpp"
-#include "util/rng.hpp"
 
 using namespace raysplats;
 
@@ -32,49 +31,18 @@ namespace {
 constexpr int kWidth = 40;
 constexpr int kHeight = 32;
 
-// Photos of a few coloured Gaussians from a ring of cameras, in a folder that goes with the object.
-struct Scene {
-  TemporaryDirectory folder;
-  Context context{test_device()};
-  Dataset dataset;
-
-  Scene() {
-    std::filesystem::create_directories(folder / "images");
-    CounterRng rng(11, 3);
-    Gaussians truth;
-    truth.resize(60);
-    for (std::size_t i = 0; i < truth.size(); ++i) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        truth.means[3 * i + a] = static_cast<float>(1.2 * rng.uniform() - 0.6);
-        truth.log_scales[3 * i + a] = static_cast<float>(std::log(0.05 + 0.15 * rng.uniform()));
-        truth.sh[3 * i + a] = static_cast<float>(3.0 * rng.uniform() - 1.5);
-      }
-      truth.opacities[i] = 2.0f;
-    }
-    const DeviceGaussians gaussians =
-        DeviceGaussians::upload(context, truth, ScaleActivation::kExp);
-    CameraTracer tracer(context, TraceOptions{});
-    tracer.update(gaussians);
-    for (int i = 0; i < 10; ++i) {
-      const double angle = 0.628 * i;
-      View view;
-      view.camera = look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0 + 0.1 * i}, {0, 0, 0},
-                            {0, 0, 1}, kWidth, kHeight, 48);
-      view.camera.name = "view_" + std::to_string(i) + ".png";
-      view.source_camera = view.camera;
-      view.image_path = folder / "images" / view.camera.name;
-      view.test = i % 5 == 0;
-      tracer.forward(gaussians, view.camera);
-      Image rgb(kWidth, kHeight, 3);
-      const Image traced = tracer.download_image();
-      for (std::size_t p = 0; p < rgb.pixels(); ++p) {
-        for (std::size_t c = 0; c < 3; ++c) rgb.data[3 * p + c] = traced.data[4 * p + c];
-      }
-      write_image(view.image_path, rgb);
-      dataset.views.push_back(view);
-    }
-    dataset.root = folder.path();
+std::vector<Camera> cameras_around() {
+  std::vector<Camera> out;
+  for (int i = 0; i < 10; ++i) {
+    const double angle = 0.628 * i;
+    out.push_back(look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0 + 0.1 * i}, {0, 0, 0},
+                          {0, 0, 1}, kWidth, kHeight, 48));
   }
+  return out;
+}
+
+struct Photos : Photographed {
+  Photos() : Photographed(coloured_cloud(60, 0.6, 11), cameras_around()) {}
 };
 
 TrainOptions small_options() {
@@ -109,10 +77,10 @@ std::vector<std::string> lines_of(const std::filesystem::path& path) {
 }  // namespace
 
 TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = small_options();
   options.trace.deterministic = true;  // elsewhere than on CPUs gradients are atomic sums otherwise
-  Trainer straight(scene.context, scene.dataset, options, scene.folder / "straight");
+  Trainer straight(photos.context, photos.dataset, options, photos.folder / "straight");
   const TrainSummary summary = straight.run(false);
   CHECK(summary.iterations == 40);
   CHECK(summary.gaussians != 300);
@@ -122,23 +90,23 @@ TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
 
   // An interrupt after iteration 20 leaves exactly this checkpoint; density control took place in
   // 10 and 20.
-  const auto broken = scene.folder / "broken";
+  const auto broken = photos.folder / "broken";
   {
     TrainOptions checkpoints = options;
     checkpoints.checkpoint_every = 20;
     checkpoints.keep_checkpoints = 5;
-    Trainer first(scene.context, scene.dataset, checkpoints, broken);
+    Trainer first(photos.context, photos.dataset, checkpoints, broken);
     first.run(false);
     CHECK(list_checkpoints(broken).size() == 2);
     std::filesystem::remove(checkpoint_path(broken, 40));
   }
-  Trainer second(scene.context, scene.dataset, options, broken);
+  Trainer second(photos.context, photos.dataset, options, broken);
   second.resume(broken);
   CHECK(second.iteration() == 20);
   second.run(false);
   CHECK(second.iteration() == 40);
   check_equal(straight.gaussians().download(), second.gaussians().download());
-  const Checkpoint a = load_latest_checkpoint(scene.folder / "straight");
+  const Checkpoint a = load_latest_checkpoint(photos.folder / "straight");
   const Checkpoint b = load_latest_checkpoint(broken);
   CHECK(a.sections == b.sections);
   CHECK(a.optimiser_steps == 40);
@@ -149,20 +117,20 @@ TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
         1);
   TrainOptions other = options;
   other.sh_degree = 2;
-  Trainer misfit(scene.context, scene.dataset, other, broken);
+  Trainer misfit(photos.context, photos.dataset, other, broken);
   CHECK_THROWS_AS(misfit.resume(broken), UsageError);
 }
 
 TEST_CASE("rays that reach the cap on hits are counted over the whole run, resumed ones included") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = small_options();
   options.trace.max_hits = 25;
   options.trace.deterministic = true;  // two runs of atomic sums cap other rays
   const auto metrics_of = [](const std::filesystem::path& run) {
     return nlohmann::json::parse(std::ifstream(run / "metrics.json"));
   };
-  const auto straight = scene.folder / "straight";
-  Trainer(scene.context, scene.dataset, options, straight).run(false);
+  const auto straight = photos.folder / "straight";
+  Trainer(photos.context, photos.dataset, options, straight).run(false);
   // Half the pixels a side up to iteration 12.
   constexpr std::uint64_t kPixels = kWidth * kHeight;
   constexpr std::uint64_t kRays = 12 * kPixels / 4 + 28 * kPixels;
@@ -171,15 +139,15 @@ TEST_CASE("rays that reach the cap on hits are counted over the whole run, resum
   CHECK(capped > 4 * kPixels);  // more than any view has
   CHECK(capped < kRays);
 
-  const auto broken = scene.folder / "broken";
+  const auto broken = photos.folder / "broken";
   TrainOptions half = options;
   half.checkpoint_every = 20;
   half.keep_checkpoints = 5;
-  Trainer(scene.context, scene.dataset, half, broken).run(false);
+  Trainer(photos.context, photos.dataset, half, broken).run(false);
   std::filesystem::remove(checkpoint_path(broken, 40));
   for (int round = 0; round < 2; ++round) {  // at 20, then with nothing left to do
     CAPTURE(round);
-    Trainer again(scene.context, scene.dataset, options, broken);
+    Trainer again(photos.context, photos.dataset, options, broken);
     again.resume(broken);
     CHECK(again.iteration() == (round == 0 ? 20 : 40));
     again.run(false);
@@ -189,24 +157,24 @@ TEST_CASE("rays that reach the cap on hits are counted over the whole run, resum
 }
 
 TEST_CASE("a run resumed between two passes of density control ends with the same bytes") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = small_options();
   options.trace.deterministic = true;
   options.footprint = 3.0;  // nearly every axis is at its least size
   options.position_lr = {2e-2, 2e-2};
-  Trainer straight(scene.context, scene.dataset, options, scene.folder / "straight");
+  Trainer straight(photos.context, photos.dataset, options, photos.folder / "straight");
   straight.run(false);
-  const auto broken = scene.folder / "broken";
+  const auto broken = photos.folder / "broken";
   {
     TrainOptions checkpoints = options;
     checkpoints.checkpoint_every = 17;
     checkpoints.keep_checkpoints = 5;
-    Trainer first(scene.context, scene.dataset, checkpoints, broken);
+    Trainer first(photos.context, photos.dataset, checkpoints, broken);
     first.run(false);
     std::filesystem::remove(checkpoint_path(broken, 40));
     std::filesystem::remove(checkpoint_path(broken, 34));
   }
-  Trainer second(scene.context, scene.dataset, options, broken);
+  Trainer second(photos.context, photos.dataset, options, broken);
   second.resume(broken);
   CHECK(second.iteration() == 17);
   second.run(false);
@@ -227,14 +195,14 @@ TrainOptions measured_options() {
 }
 
 TEST_CASE("training improves held-out views") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = measured_options();
   // Single runs of eight tiny photos differ by decibels.
   constexpr std::uint64_t kSeeds = 24;
   double gain = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     options.seed = seed;
-    Trainer trainer(scene.context, scene.dataset, options, scene.folder / std::to_string(seed));
+    Trainer trainer(photos.context, photos.dataset, options, photos.folder / std::to_string(seed));
     const TrainSummary summary = trainer.run(false);
     REQUIRE(summary.evaluations.size() == 2);
     gain += (summary.evaluations[1].psnr - summary.evaluations[0].psnr) / kSeeds;
@@ -244,10 +212,10 @@ TEST_CASE("training improves held-out views") {
 }
 
 TEST_CASE("training leaves the files of a run") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = measured_options();
-  const auto folder = scene.folder / "run";
-  Trainer trainer(scene.context, scene.dataset, options, folder);
+  const auto folder = photos.folder / "run";
+  Trainer trainer(photos.context, photos.dataset, options, folder);
   trainer.set_command("train '\xFF'");
   const TrainSummary summary = trainer.run(false);
   REQUIRE(summary.evaluations.size() == 2);
@@ -307,34 +275,34 @@ TEST_CASE("training leaves the files of a run") {
 }
 
 TEST_CASE("a run without a length is planned by its photos, and refuses what is none") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = small_options();
   options.iterations = kFittedLength;
-  const Trainer fitted(scene.context, scene.dataset, options, scene.folder / "fitted");
+  const Trainer fitted(photos.context, photos.dataset, options, photos.folder / "fitted");
   CHECK(fitted.iterations() == 1000);
   // In order by itself, but not in 1000 iterations.
   options.resolution_schedule = {{4, 0.5}, {2, 400}};
-  CHECK_THROWS_AS(Trainer(scene.context, scene.dataset, options, scene.folder / "sizes"),
+  CHECK_THROWS_AS(Trainer(photos.context, photos.dataset, options, photos.folder / "sizes"),
                   UsageError);
   options.resolution_schedule = {};
   options.iterations = -5;
-  CHECK_THROWS_AS(Trainer(scene.context, scene.dataset, options, scene.folder / "none"),
+  CHECK_THROWS_AS(Trainer(photos.context, photos.dataset, options, photos.folder / "none"),
                   UsageError);
 }
 
 TEST_CASE("a signal ends the run with everything saved") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = small_options();
   options.iterations = 1000000;
   options.log_every = 1;
-  const auto folder = scene.folder / "run";
+  const auto folder = photos.folder / "run";
   const std::jthread killer([&folder](const std::stop_token& token) {
     while (!token.stop_requested() && lines_of(folder / "metrics.csv").size() < 3) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     if (!token.stop_requested()) std::raise(SIGTERM);
   });
-  Trainer trainer(scene.context, scene.dataset, options, folder);
+  Trainer trainer(photos.context, photos.dataset, options, folder);
   bool interrupted = false;
   try {
     trainer.run(false);
@@ -349,18 +317,18 @@ TEST_CASE("a signal ends the run with everything saved") {
 }
 
 TEST_CASE("a loss that is not finite stops the run and names the iteration") {
-  Scene scene;
+  Photos photos;
   Gaussians model;
   model.resize(1);
   model.log_scales = {-1, -1, -1};
   model.opacities = {3};
   model.sh = {1e30f, 1e30f, 1e30f};
-  write_ply(scene.folder / "start.ply", model);
+  write_ply(photos.folder / "start.ply", model);
   TrainOptions options = small_options();
-  options.init = (scene.folder / "start.ply").string();
+  options.init = (photos.folder / "start.ply").string();
   options.pixel_loss = PixelLoss::kL2;
   options.log_every = 1;
-  Trainer trainer(scene.context, scene.dataset, options, scene.folder / "run");
+  Trainer trainer(photos.context, photos.dataset, options, photos.folder / "run");
   std::string message;
   try {
     trainer.run(false);
@@ -371,20 +339,21 @@ TEST_CASE("a loss that is not finite stops the run and names the iteration") {
 }
 
 TEST_CASE("a least scale that a sigmoid does not reach is refused") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = small_options();
   options.scale_activation = ScaleActivation::kSigmoid;
   options.scale_min = 10.0;
-  CHECK_THROWS_AS(Trainer(scene.context, scene.dataset, options, scene.folder / "run"), UsageError);
+  CHECK_THROWS_AS(Trainer(photos.context, photos.dataset, options, photos.folder / "run"),
+                  UsageError);
   options.scale_min = 1e-3;
-  CHECK_NOTHROW(Trainer(scene.context, scene.dataset, options, scene.folder / "run"));
+  CHECK_NOTHROW(Trainer(photos.context, photos.dataset, options, photos.folder / "run"));
 }
 
 TEST_CASE("a device with too little memory is refused with the figures") {
-  Scene scene;
+  Photos photos;
   TrainOptions options = small_options();
   options.max_gaussians = 2000000000;
-  Trainer trainer(scene.context, scene.dataset, options, scene.folder / "run");
+  Trainer trainer(photos.context, photos.dataset, options, photos.folder / "run");
   std::string message;
   try {
     trainer.run(false);
@@ -393,11 +362,17 @@ TEST_CASE("a device with too little memory is refused with the figures") {
   }
   CHECK(message.find("MiB") != std::string::npos);
   CHECK(message.find("--max-gaussians") != std::string::npos);
-  DeviceInfo small = scene.context.device();
+  DeviceInfo small = photos.context.device();
   small.global_memory = std::uint64_t{4} << 30;
   small.max_allocation = 1 << 20;
   CHECK_THROWS_AS(check_memory(small_options(), {100000, 1000, 10}, small), ResourceError);
-  Dataset empty = scene.dataset;
+  Dataset empty = photos.dataset;
   for (View& view : empty.views) view.test = true;
-  CHECK_THROWS_AS(Trainer(scene.context, empty, small_options(), scene.folder / "run"), UsageError);
+  message.clear();
+  try {
+    const Trainer refused(photos.context, empty, small_options(), photos.folder / "run");
+  } catch (const UsageError& error) {
+    message = error.what();
+  }
+  CHECK(message.find("its files hold all of them out") != std::string::npos);
 }

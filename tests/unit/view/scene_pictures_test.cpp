@@ -17,7 +17,7 @@ namespace {
 
 const Camera kCamera = cube_camera(24, 24);
 
-/// Of colours, in decibels.
+/// How alike the colours of two pictures are, as PSNR in decibels.
 double likeness(const Image& a, const Image& b) {
   REQUIRE(a.data.size() == b.data.size());
   double sum = 0;

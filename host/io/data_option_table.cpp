@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/data_option_table.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+
+#include "raysplats/error.hpp"
+#include "util/number_text.hpp"
+
+namespace raysplats {
+namespace {
+
+// Squares of distances have to stay within single precision, and scenes are near their cameras,
+// which may be no farther than this either.
+constexpr double kFarthestOrigin = 1e9;
+
+void add_origin_option(OptionTable& table, DatasetOptions& options) {
+  table.add(
+      "origin",
+      "\"x,y,z\" in the data set's coordinates, from which the model's positions count; \"auto\" = "
+      "0, but near the cameras where the scene lies so far from 0 that single precision would blur "
+      "it (surveyed captures), which the run's configuration then names",
+      [&options](const OptionTable::Values& values) {
+        if (values.size() == 1 && values.front() == "auto") {
+          options.origin.reset();
+          return;
+        }
+        const std::vector<std::string> parts = option_items("origin", values);
+        std::array<double, 3> origin{};
+        for (std::size_t k = 0; k < parts.size() && k < origin.size(); ++k)
+          origin[k] = option_number<double>("origin", parts[k], -kFarthestOrigin, kFarthestOrigin);
+        if (parts.size() != origin.size()) {
+          throw UsageError(fmt::format("The option 'origin' is auto or three numbers, not '{}'",
+                                       fmt::join(values, " ")));
+        }
+        options.origin = origin;
+      },
+      [&options] {
+        if (!options.origin) return std::string("\"auto\"");
+        return fmt::format("[{}]", fmt::join(*options.origin, ", "));
+      });
+}
+
+}  // namespace
+
+void add_data_options(OptionTable& table, DatasetOptions& options) {
+  table.number("downscale", options.downscale, 1, 1024, "image sizes are divided by this");
+  table.number("test-every", options.test_every, 0, 1e9,
+               "every n-th view is held out when the data set has no split of its own; 0 = none");
+  table.flag("undistort", options.undistort,
+             "turn photos through lenses with OpenCV distortion into pinhole pictures; false = "
+             "their own pixels and rays");
+  table.choice<MaskUse>(
+      "masks", options.masks, {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
+      "what is black in the photos' masks: ignore (it counts neither in the loss nor in metrics) "
+      "or cutout (background, as transparent pixels are)");
+  table.choice<AlphaUse>(
+      "alpha", options.alpha,
+      {{"auto", AlphaUse::kAuto}, {"ignore", AlphaUse::kIgnore}, {"cutout", AlphaUse::kCutout}},
+      "what is transparent in photos: ignore (it counts neither in the loss nor in metrics), "
+      "cutout "
+      "(background) or auto (cutout where most photos have something transparent, but for a border "
+      "that is the same in all)");
+  add_origin_option(table, options);
+}
+
+std::vector<OptionRow> data_option_rows(DatasetOptions& options) {
+  OptionTable table;
+  add_data_options(table, options);
+  return table.take();
+}
+
+}  // namespace raysplats

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "io/transforms.hpp"
+#include "raysplats/dataset.hpp"
+
+namespace raysplats::io {
+
+/// What the lists of a nerfstudio file (train_filenames and the like) compare: inner_name() of the
+/// path of every frame.
+std::set<std::string> frame_names(const TransformsFile& file);
+
+/// Divides `views`, those of file.frames in their order, as the file's lists say, and leaves out
+/// those that are of neither side. Names of test_filenames are held out, or of val_filenames where
+/// there is no such list, also those that are to be trained on too, which is warned of. `names`: of
+/// all frames, also those whose photo is missing. False, with the views as they were, where there
+/// are no lists or all of them name every frame.
+bool divide_by_lists(const TransformsFile& file,
+                     const std::set<std::string>& names,
+                     std::vector<View>& views);
+
+}  // namespace raysplats::io

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "trace/packet_layout.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "raysplats/error.hpp"
+
+namespace raysplats {
+namespace {
+
+// Local memory that the kernels of a group take, with room to spare: rows of three floats per ray
+// (group_rows.h, group_backward.cl) and what is as long as the group is wide.
+std::uint64_t group_local_memory(int lanes) {
+  return 4096 + 420 * static_cast<std::uint64_t>(lanes);
+}
+
+// Fits one hardware thread of most GPUs; more rays share more rows, and their local memory leaves
+// room for fewer groups.
+constexpr int kGroupLanes = 32;
+
+bool takes_groups(const DeviceInfo& device, int lanes) {
+  return static_cast<std::size_t>(lanes) <= device.max_work_group_size &&
+         group_local_memory(lanes) <= device.local_memory;
+}
+
+PacketShape default_shape(const DeviceInfo& device, int lanes) {
+  const bool cpu = device.type == DeviceType::kCpu;
+  const PacketShape group =
+      device.has_subgroups && !cpu ? PacketShape::kSubgroup : PacketShape::kGroup;
+  if (lanes > 16) return group;
+  if (lanes > 0 || cpu) return PacketShape::kVector;
+  return takes_groups(device, kGroupLanes) ? group : PacketShape::kVector;
+}
+
+int default_lanes(const DeviceInfo& device, PacketShape shape) {
+  if (shape != PacketShape::kVector) return kGroupLanes;
+  const std::uint32_t own = device.float_vector_width;
+  if (device.type != DeviceType::kCpu || own < 2) return 1;
+  // Two of the device's vectors: what a packet does once is shared by more rays.
+  int lanes = 2;
+  while (lanes < 16 && static_cast<std::uint32_t>(lanes) <= own) lanes *= 2;
+  return lanes;
+}
+
+}  // namespace
+
+PacketShape tuned_shape(const DeviceTuning& tuning) {
+  if (!tuning.grouped) return PacketShape::kVector;
+  return tuning.subgroups ? PacketShape::kSubgroup : PacketShape::kGroup;
+}
+
+PacketLayout packet_layout(const DeviceInfo& device, const TraceOptions& options) {
+  PacketShape shape = options.packet_shape;
+  int lanes = options.packet_width;
+  const auto& tuning = device.tuning;
+  if (shape == PacketShape::kSubgroup && !device.has_subgroups) {
+    throw DeviceError(
+        fmt::format("{} has no subgroups (cl_khr_subgroups): choose --packet-shape group, vector "
+                    "or auto",
+                    device.name));
+  }
+  bool sized = shape == PacketShape::kSubgroup;
+  if (tuning && lanes == 0 && (shape == PacketShape::kAuto || shape == tuned_shape(*tuning)) &&
+      (device.has_subgroups || !tuning->subgroups)) {
+    shape = tuned_shape(*tuning);
+    lanes = tuning->packet_width;
+    sized = tuning->subgroups;
+  }
+  if (shape == PacketShape::kAuto) shape = default_shape(device, lanes);
+  if (lanes == 0) lanes = default_lanes(device, shape);
+
+  PacketLayout layout;
+  layout.grouped = shape != PacketShape::kVector;
+  layout.subgroups = shape == PacketShape::kSubgroup;
+  layout.sized = layout.subgroups && sized;
+  layout.lanes = lanes;
+  // Single rays are for devices that run many work-items at once: they have no room for queues.
+  layout.block = lanes > 1 && !layout.grouped ? 2 : 1;
+  switch (lanes) {
+    case 1:
+      break;
+    case 2:
+      layout.width = 2;
+      break;
+    case 4:
+      layout.width = layout.height = 2;
+      break;
+    case 8:
+      layout.width = 4;
+      layout.height = 2;
+      break;
+    case 16:
+      layout.width = layout.height = 4;
+      break;
+    case 32:
+      layout.width = 8;
+      layout.height = 4;
+      break;
+    case 64:
+      layout.width = layout.height = 8;
+      break;
+    default:
+      lanes = 0;
+  }
+  if (lanes == 0 || (layout.grouped ? lanes < 8 : lanes > 16)) {
+    throw UsageError(
+        layout.grouped
+            ? fmt::format("--packet-width {} in a group: choose 8, 16, 32 or 64", layout.lanes)
+            : fmt::format("--packet-width {}: choose 1, 2, 4, 8 or 16, or 32 or 64 in "
+                          "a group",
+                          layout.lanes));
+  }
+  if (layout.grouped && !takes_groups(device, lanes)) {
+    throw DeviceError(fmt::format(
+        "{} has {} work-items and {} bytes of local memory a work-group, packets of {} "
+        "work-items need more: choose --packet-shape vector or a smaller --packet-width",
+        device.name, device.max_work_group_size, device.local_memory, lanes));
+  }
+  // CPUs gain from shared lists of larger tiles; GPUs need many small groups.
+  const bool cpu = device.type == DeviceType::kCpu;
+  layout.tile = cpu ? 32 : 16;
+  layout.pending = cpu ? 96 : 48;
+  if (tuning && tuned_shape(*tuning) == shape && tuning->packet_width == lanes) {
+    layout.tile = tuning->tile;
+    layout.pending = tuning->pending;
+    layout.group = tuning->group;
+  }
+  return layout;
+}
+
+std::array<std::size_t, 2> packet_group(const PacketLayout& packet, std::size_t limit) {
+  std::array<std::size_t, 2> group{static_cast<std::size_t>(packet.tile / packet.width),
+                                   static_cast<std::size_t>(packet.tile / packet.height)};
+  if (packet.group > 0) limit = std::min(limit, static_cast<std::size_t>(packet.group));
+  while (group[0] * group[1] > std::max<std::size_t>(limit, 1)) {
+    std::size_t& longer = group[0] >= group[1] ? group[0] : group[1];
+    longer /= 2;
+  }
+  return group;
+}
+
+}  // namespace raysplats

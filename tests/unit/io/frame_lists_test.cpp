@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lists of a nerfstudio file, which say what is trained on and what is held out.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <string>
+
+#include "data_sets.hpp"
+#include "raysplats/dataset.hpp"
+#include "unit/log_capture.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+/// A list of the frames whose numbers these are.
+std::string list_of(const char* key, const std::string& numbers) {
+  std::string names;
+  for (const char number : numbers)
+    names += fmt::format("{}\"images/f{}.png\"", names.empty() ? "" : ", ", number);
+  return fmt::format("\"{}\": [{}], ", key, names);
+}
+
+/// Eight frames and these lists.
+Dataset dataset_of(const Scratch& scratch,
+                   const std::string& train,
+                   const std::string& validation,
+                   const std::string& test) {
+  std::string frames;
+  for (int i = 0; i < 8; ++i) {
+    const std::string name = fmt::format("images/f{}.png", i);
+    write_image(scratch / name, Image(10, 10, 3));
+    frames += fmt::format(R"({}{{"file_path": "{}", "transform_matrix": {}}})", i > 0 ? ", " : "",
+                          name, matrix_json(i));
+  }
+  write_bytes(scratch / "transforms.json",
+              "{\"w\": 10, \"h\": 10, \"fl_x\": 20, " + list_of("train_filenames", train) +
+                  list_of("val_filenames", validation) + list_of("test_filenames", test) +
+                  "\"frames\": [" + frames + "]}");
+  return load_dataset(scratch.path());
+}
+
+}  // namespace
+
+TEST_CASE("frames that are for validation only are said to be so") {
+  const Scratch scratch;
+  const LogCapture log;
+  CHECK(dataset_of(scratch, "01234", "5", "6").views.size() == 6);
+  CHECK(log.contains("1 of 8 frames"));
+  CHECK(log.contains("for validation only"));
+  CHECK(log.contains("are in none of its lists"));
+  CHECK(log.lines() == 2);
+}
+
+TEST_CASE("frames to train on that are in the list to test too are held out, which is told") {
+  const Scratch scratch;
+  const LogCapture log;
+  const Dataset dataset = dataset_of(scratch, "0123456", "7", "67");
+  CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{6, 7});
+  CHECK(log.contains("1 of 7 names"));
+  CHECK(log.contains("'images/f6.png' among them"));
+}
+
+TEST_CASE("lists that all name every frame count as none") {
+  const Scratch scratch;
+  const LogCapture log;
+  const Dataset dataset = dataset_of(scratch, "01234567", "01234567", "01234567");
+  CHECK(dataset.views.size() == 8);
+  CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{0});
+  CHECK(log.contains("they are not used"));
+  CHECK(log.lines() == 1);
+}

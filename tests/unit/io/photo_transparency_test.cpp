@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/photo_transparency.hpp"
+
+#include <doctest/doctest.h>
+
+#include <functional>
+#include <string>
+
+#include "data_sets.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+constexpr int kPhotos = 10;
+constexpr int kWidth = 40, kHeight = 30;
+
+using Alpha = std::function<float(int photo, int x, int y)>;
+
+// A square that moves from photo to photo, and air around it.
+float body(int photo, int x, int y) {
+  return x >= 5 + photo && x < 20 + photo && y >= 5 && y < 25 ? 1.0f : 0.0f;
+}
+
+// Two corners that a lens does not fill.
+float corners(int /*photo*/, int x, int y) { return x + y < 8 || x + y > 61 ? 0.0f : 1.0f; }
+
+// A data set of grey photos: transforms.json of nerfstudio, or `file` of another kind.
+void write_photos(const Scratch& scratch,
+                  const Alpha& alpha,
+                  const std::string& file = "transforms.json") {
+  std::string frames;
+  for (int photo = 0; photo < kPhotos; ++photo) {
+    Image image(kWidth, kHeight, 4, 0.5f);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) image.at(x, y, 3) = alpha(photo, x, y);
+    }
+    const std::string name = "photo_" + std::to_string(photo) + ".png";
+    write_image(scratch / name, image);
+    frames += std::string(photo > 0 ? ", " : "") + "{\"file_path\": \"" + name +
+              "\", \"transform_matrix\": " + matrix_json(photo) + "}";
+  }
+  write_bytes(scratch / file, "{\"camera_angle_x\": 0.8, \"frames\": [" + frames + "]}");
+}
+
+bool background(const Scratch& scratch, AlphaUse use = AlphaUse::kAuto) {
+  DatasetOptions options;
+  options.alpha = use;
+  return load_dataset(scratch.path(), options).alpha_is_background;
+}
+
+}  // namespace
+
+TEST_CASE("what is transparent around a body is background, whoever wrote the data set") {
+  for (const char* file : {"transforms.json", "transforms_train.json"}) {
+    CAPTURE(file);
+    const Scratch scratch;
+    write_photos(scratch, body, file);
+    CHECK(background(scratch));
+    CHECK(background(scratch, AlphaUse::kCutout));
+    CHECK_FALSE(background(scratch, AlphaUse::kIgnore));
+  }
+}
+
+TEST_CASE("photos without anything transparent are not cut out") {
+  for (const char* file : {"transforms.json", "transforms_train.json"}) {
+    CAPTURE(file);
+    const Scratch scratch;
+    write_photos(
+        scratch, [](int, int, int) { return 1.0f; }, file);
+    CHECK_FALSE(background(scratch));
+    CHECK(background(scratch, AlphaUse::kCutout));
+  }
+}
+
+TEST_CASE("few photos with something transparent, or few pixels of all, do not make cut-outs") {
+  const Scratch scratch;
+  write_photos(scratch,
+               [](int photo, int x, int y) { return photo % 5 == 0 ? body(photo, x, y) : 1.0f; });
+  CHECK_FALSE(background(scratch));
+  write_photos(scratch, [](int photo, int x, int y) { return x == photo && y == 3 ? 0.0f : 1.0f; });
+  CHECK_FALSE(background(scratch));
+}
+
+TEST_CASE("a border that all photos share is unknown, unless they are rendered or it is most") {
+  const Scratch scratch;
+  write_photos(scratch, corners);
+  const Dataset dataset = load_dataset(scratch.path());
+  CHECK(io::transparency(dataset.views) == io::Transparency::kBorder);
+  CHECK_FALSE(dataset.alpha_is_background);
+  CHECK(background(scratch, AlphaUse::kCutout));
+  // On a turntable what is symmetric has the same outline in all photos.
+  write_photos(scratch, [](int, int x, int y) { return body(5, x, y); });
+  CHECK(background(scratch));
+  const Scratch rendered;
+  write_photos(rendered, corners, "transforms_train.json");
+  CHECK(background(rendered));
+}
+
+TEST_CASE("a mask of cut-out photos is a plane of its own, whoever wrote the data set") {
+  const Scratch scratch;
+  write_photos(scratch, body);
+  Image mask(kWidth, kHeight, 1, 1.0f);
+  for (int x = 0; x < kWidth; ++x) mask.at(x, 0, 0) = 0.0f;
+  write_image(scratch / "masks/photo_3.png", mask);
+  const Dataset dataset = load_dataset(scratch.path());
+  CHECK(dataset.alpha_is_background);
+  CHECK_FALSE(dataset.views[2].mask_apart);
+  REQUIRE(dataset.views[3].mask_apart);
+  const ViewPicture picture = load_view_picture(dataset.views[3]);
+  CHECK(picture.weight.at(20, 0, 0) == 0.0f);
+  CHECK(picture.weight.at(20, 9, 0) == 1.0f);
+  CHECK(picture.rgba.at(10, 9, 3) == 1.0f);
+  CHECK(picture.rgba.at(2, 9, 3) == 0.0f);
+}
+
+TEST_CASE("a black mask is of a photo without the body, but leaves nothing where it ignores") {
+  const Scratch scratch;
+  write_photos(scratch, [](int, int, int) { return 1.0f; });
+  write_image(scratch / "masks/photo_3.png", Image(kWidth, kHeight, 1, 0.0f));
+  DatasetOptions options;
+  const Image ignored = load_view_image(load_dataset(scratch.path(), options).views[3]);
+  for (std::size_t i = 3; i < ignored.data.size(); i += 4) REQUIRE(ignored.data[i] == 0.0f);
+  options.masks = MaskUse::kCutout;
+  const Dataset dataset = load_dataset(scratch.path(), options);
+  CHECK(dataset.alpha_is_background);
+  const ViewPicture picture = load_view_picture(dataset.views[3]);
+  CHECK(picture.rgba.at(20, 9, 3) == 0.0f);
+  CHECK(picture.rgba.at(2, 1, 3) == 0.0f);
+}
