@@ -6,6 +6,7 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <system_error>
 
 #include "commands.hpp"
@@ -37,6 +38,7 @@ struct Options {
   std::string resume;
   std::string time;
   std::string quality;
+  std::set<std::string> chosen;  // keys whose values these two chose for a run that goes on
   bool overwrite = false;
   bool view = false;
   view::ViewerOptions viewer = view_options();
@@ -52,6 +54,9 @@ void check_choices(const CLI::App& command, Options& options) {
   if (chosen && options.resume == "latest" && !list_checkpoints(options.output).empty()) {
     spdlog::info("--time and --quality are not asked again: {} names what they chose",
                  (std::filesystem::path(options.output) / "config.toml").string());
+    options.chosen = {"iterations"};
+    if (!options.time.empty()) options.chosen.insert("end-iteration");
+    if (!options.quality.empty()) options.chosen.insert("downscale");
     options.time.clear();
     options.quality.clear();
   } else if (chosen && !options.resume.empty() && options.resume != "latest") {
@@ -211,7 +216,8 @@ void run(CLI::App& command, Options& options, const GlobalOptions& global) {
   if (!options.time.empty()) parse_duration("--time", options.time);  // before anything is loaded
   if (!options.resume.empty()) {
     apply_resumed_options(command, options.train,
-                          options.resume == "latest" ? options.output : options.resume);
+                          options.resume == "latest" ? options.output : options.resume,
+                          options.chosen);
   } else if (command.get_option("--iterations")->count() > 0 &&
              command.get_option("--end-iteration")->count() == 0) {
     options.train.end_iteration = 0;  // of a run by time, whose configuration --config has named

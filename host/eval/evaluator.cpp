@@ -69,12 +69,17 @@ Comparison compare(Image traced,
   return out;
 }
 
-// Makes the render equal to the photo where that does not count at all. How much the other pixels
-// count is for the means over them to say.
+// Makes the render nearly equal to the photo where that hardly counts, as at the edges of masks,
+// for windows that reach there and for LPIPS, which knows no mask. Pixels that count at least half
+// as much as the most are shown as they are: how much they count is for the means over them to say.
 void hide_masked_out(Comparison& pair) {
   if (pair.valid == 1.0) return;
+  const float most = *std::max_element(pair.mask.data.begin(), pair.mask.data.end());
+  if (!(most > 0.0f)) return;
   for (std::size_t i = 0; i < pair.render.data.size(); ++i) {
-    if (pair.mask.data[i / 3] == 0) pair.render.data[i] = pair.photo.data[i];
+    const float share = std::min(1.0f, 2.0f * pair.mask.data[i / 3] / most);
+    const float photo = pair.photo.data[i];
+    if (share < 1.0f) pair.render.data[i] = photo + share * (pair.render.data[i] - photo);
   }
 }
 

@@ -260,6 +260,8 @@ class ReducedRows : public PhotoRows {
 // Whether the numbers, of which 1 is white, are labels in integers up to `white`.
 bool are_labels(const std::vector<float>& values, float most, float white) {
   if (most * white < 0.5f || most * white > kMostLabel + 0.5f) return false;
+  // Above 1, what has no background is a dark grey: the black of videos is 16.
+  if (most * white > 1.5f && *std::min_element(values.begin(), values.end()) > 0.0f) return false;
   return std::all_of(values.begin(), values.end(), [&](float value) {
     const float label = value * white;
     return std::abs(label - std::round(label)) < 1e-3f;
@@ -315,6 +317,22 @@ MaskPlane mask_plane(const RawImage& mask) {
 }
 
 bool is_black(const RawImage& mask) {
+  const auto channels = static_cast<std::size_t>(mask.channels);
+  const bool covered = has_alpha(channels);
+  const std::size_t colors = covered ? channels - 1 : channels;
+  const bool shows = std::visit(
+      [&](const auto& numbers) {
+        for (std::size_t i = 0; i < numbers.size(); i += channels) {
+          if (covered && !(numbers[i + colors] > 0)) continue;
+          for (std::size_t c = 0; c < colors; ++c) {
+            if (numbers[i + c] > 0) return true;
+          }
+        }
+        return false;
+      },
+      mask.numbers);
+  // Mostly the first pixels tell; only black with alpha needs the whole plane.
+  if (shows || !covered) return !shows;
   const std::vector<float> values = mask_plane(mask).values;
   return std::all_of(values.begin(), values.end(), [](float value) { return value == 0.0f; });
 }

@@ -227,6 +227,9 @@ void check_last_row(const Scope& scope, const std::vector<std::array<double, 4>>
                          turned ? ", but its last column is: transpose the matrices" : ""));
 }
 
+/// Deviation from a rotation of one whose numbers have two decimals.
+constexpr double kRoundedTolerance = 2e-2;
+
 /// Reads the pose; whether its axes had another length than 1, which does not change what a camera
 /// sees: exporters of Blender write cameras that were scaled as objects.
 bool read_pose(const Scope& scope, const glm::dvec3& signs, TransformsFrame& frame) {
@@ -243,16 +246,17 @@ bool read_pose(const Scope& scope, const glm::dvec3& signs, TransformsFrame& fra
   for (int i = 0; i < 3; ++i) {
     const double length = glm::length(rotation[i]);
     if (!(length > kLeastAxis && length < 1.0 / kLeastAxis)) continue;
-    if (std::abs(length - 1.0) <= kRotationTolerance) continue;
+    if (std::abs(length * length - 1.0) <= kRotationTolerance) continue;
     rotation[i] /= length;
     scaled = true;
   }
-  if (!is_rotation(rotation)) {
+  if (!is_rotation(rotation, kRoundedTolerance)) {
     scope.fail(
         "the transform_matrix is no rotation with a translation (it shears, mirrors or is "
         "singular)");
   }
-  // Newton's iteration for the nearest rotation (Higham 1986); two steps end at rounding from 1e-3.
+  // Newton's iteration for the nearest rotation (Higham 1986); three steps end at rounding from
+  // 2e-2.
   for (int step = 0; step < 3; ++step) {
     rotation = 0.5 * (rotation + glm::transpose(glm::inverse(rotation)));
   }

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
@@ -39,12 +40,43 @@ std::optional<FramePhoto> frame_photo(const TransformsFile& file, const Transfor
   return std::nullopt;
 }
 
-/// The photos of a file's frames; frames without one leave the file.
+/// Whether two names of files can be of one: the whole of one is the end of the other, and says in
+/// which folder the file lies.
+bool may_be_same(const std::string& a, const std::string& b) {
+  const auto path_of = [](const std::string& name) {
+    return fs::path(inner_name(name)).replace_extension().generic_string();
+  };
+  const std::string x = path_of(a), y = path_of(b);
+  const std::string &end = x.size() < y.size() ? x : y, &whole = x.size() < y.size() ? y : x;
+  if (x == y) return true;
+  return end.find('/') != std::string::npos && whole.ends_with("/" + end);
+}
+
+/// The photos that frames have where they say, and the name that says so.
+std::map<fs::path, std::string> photos_in_place(
+    const TransformsFile& file, const std::vector<std::optional<FramePhoto>>& photos) {
+  std::map<fs::path, std::string> out;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    if (photos[i] && !photos[i]->moved) out.emplace(photos[i]->path, file.frames[i].file_path);
+  }
+  return out;
+}
+
+/// The photos of a file's frames; frames without one leave the file. A photo that is where another
+/// frame says is none that was moved: that of a frame which finds no other is missing.
 std::vector<FramePhoto> frame_photos(TransformsFile& file) {
   std::vector<FramePhoto> photos;
   std::vector<TransformsFrame> found, missing;
-  for (TransformsFrame& frame : file.frames) {
-    const auto photo = frame_photo(file, frame);
+  std::vector<std::optional<FramePhoto>> hits;
+  for (const TransformsFrame& frame : file.frames) hits.push_back(frame_photo(file, frame));
+  const std::map<fs::path, std::string> in_place = photos_in_place(file, hits);
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    TransformsFrame& frame = file.frames[i];
+    std::optional<FramePhoto>& photo = hits[i];
+    if (photo && photo->moved) {
+      const auto owner = in_place.find(photo->path);
+      if (owner != in_place.end() && !may_be_same(owner->second, frame.file_path)) photo.reset();
+    }
     if (photo) {
       frame.photo = photo->path;
       frame.moved = photo->moved;
@@ -137,7 +169,8 @@ void require_photos_of_their_own(const std::vector<const TransformsFile*>& files
     for (const TransformsFrame& frame : file->frames) {
       const auto [owner, is_new] = owners.emplace(frame.photo, &frame);
       const TransformsFrame& first = *owner->second;
-      if (is_new || first.file_path == frame.file_path || !(first.moved || frame.moved)) continue;
+      if (is_new || !(first.moved || frame.moved)) continue;
+      if (may_be_same(first.file_path, frame.file_path)) continue;
       refuse_shared_photo(first.file_path, frame.file_path, file->path.string(), frame.photo);
     }
   }

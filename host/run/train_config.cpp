@@ -191,12 +191,20 @@ std::function<bool(const std::string&)> given_on(const CLI::App& app) {
   return [&app](const std::string& key) { return app.get_option("--" + key)->count() > 0; };
 }
 
-// Sets the keys of --config that are not on the command line. Returns the names of all.
-std::set<std::string> apply_given_config(CLI::App& app, TrainOptions& options) {
+// Sets the keys of --config that are not on the command line and not in `chosen`. Returns the names
+// of all but these.
+std::set<std::string> apply_given_config(CLI::App& app,
+                                         TrainOptions& options,
+                                         const std::set<std::string>& chosen = {}) {
   const CLI::Option* config = app.get_option("--config");
   if (config->count() == 0) return {};
   const std::filesystem::path path = config->as<std::string>();
-  return read_text(file_text(path), path, options, given_on(app));
+  const auto given = given_on(app);
+  std::set<std::string> named =
+      read_text(file_text(path), path, options,
+                [&](const std::string& key) { return chosen.contains(key) || given(key); });
+  for (const std::string& key : chosen) named.erase(key);
+  return named;
 }
 
 // What a run wrote of its options; where it could not name them, what they were then.
@@ -223,8 +231,9 @@ std::string changes(TrainOptions before, TrainOptions after) {
   std::string out;
   for (std::size_t i = 0; i < are.size(); ++i) {
     const std::string was = were[i].text(), is = are[i].text();
-    const bool chosen = is == toml_text("auto") || (are[i].name == "color-range" && is == "0");
-    if (was != is && !chosen)
+    const bool fitted = is == toml_text("auto") || (are[i].name == "color-range" && is == "0") ||
+                        (are[i].name == "iterations" && after.iterations == kFittedLength);
+    if (was != is && !fitted)
       out += fmt::format("{}{} {} ({})", out.empty() ? "" : ", ", are[i].name, is, was);
   }
   return out;
@@ -258,7 +267,8 @@ void add_train_options(CLI::App& app, TrainOptions& options) {
 
 void apply_resumed_options(CLI::App& app,
                            TrainOptions& options,
-                           const std::filesystem::path& source) {
+                           const std::filesystem::path& source,
+                           const std::set<std::string>& chosen) {
   const std::optional<std::filesystem::path> run = run_folder_of(source);
   bool known = true;
   if (run && is_file(*run / kRunConfig)) {
@@ -269,7 +279,7 @@ void apply_resumed_options(CLI::App& app,
     known = false;
   }
   const TrainOptions before = options;
-  const std::set<std::string> named = apply_given_config(app, options);
+  const std::set<std::string> named = apply_given_config(app, options, chosen);
   // What the command line itself says is no surprise.
   if (const std::string other = changes(before, options); known && !other.empty())
     spdlog::warn("the run goes on with other options than it had, by --config: {}", other);

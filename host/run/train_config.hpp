@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <set>
 #include <string>
 
 #include "raysplats/train_options.hpp"
@@ -23,11 +24,13 @@ void add_train_options(CLI::App& app, TrainOptions& options);
 /// Completes the options of such an app, parsed before: those of the run that is resumed, from its
 /// config.toml, or without one from the checkpoint; above them the keys of --config, above these
 /// the command line. `source` is a run folder or a checkpoint file. What a run of an older version
-/// could not name keeps the value that it had then. Throws UsageError as parsing does, DataError
-/// for a damaged checkpoint.
+/// could not name keeps the value that it had then. Keys in `chosen` are the run's, whatever
+/// --config says of them: what it chose in their place is not to be chosen anew. Throws UsageError
+/// as parsing does, DataError for a damaged checkpoint.
 void apply_resumed_options(CLI::App& app,
                            TrainOptions& options,
-                           const std::filesystem::path& source);
+                           const std::filesystem::path& source,
+                           const std::set<std::string>& chosen = {});
 
 /// Reads a configuration file into `options`.
 void read_train_config(const std::filesystem::path& path, TrainOptions& options);

@@ -39,12 +39,12 @@ double strongest_term(const Camera& camera) {
 
 }  // namespace
 
-bool is_rotation(const glm::dmat3& matrix) {
+bool is_rotation(const glm::dmat3& matrix, double tolerance) {
   for (int a = 0; a < 3; ++a) {
     for (int b = 0; b < 3; ++b) {
       const double off = glm::dot(matrix[a], matrix[b]) - (a == b ? 1.0 : 0.0);
       // Written so that NaN is off.
-      if (!(std::abs(off) <= kRotationTolerance)) return false;
+      if (!(std::abs(off) <= tolerance)) return false;
     }
   }
   return glm::determinant(matrix) > 0.0;

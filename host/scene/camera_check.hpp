@@ -21,9 +21,9 @@ constexpr double most_fov(CameraModel model) {
 /// Deviation from a rotation that rounding may cause: of files, and of single precision.
 constexpr double kRotationTolerance = 1e-3;
 
-/// Whether the columns have length 1 and right angles, up to kRotationTolerance in any of their
-/// products, and do not mirror.
-bool is_rotation(const glm::dmat3& matrix);
+/// Whether the columns have length 1 and right angles, up to `tolerance` in any of their products,
+/// and do not mirror.
+bool is_rotation(const glm::dmat3& matrix, double tolerance = kRotationTolerance);
 
 /// Throws DataError, which names `what` ("the camera of a.png"), for a camera that no photo can
 /// have been taken with: one that is more than 1e9 from the origin or whose lens moves the corner

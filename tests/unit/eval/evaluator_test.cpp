@@ -190,6 +190,15 @@ TEST_CASE("evaluator: how bright a mask is where it counts does not matter") {
     CHECK(means.back().ssim == doctest::Approx(means[0].ssim).epsilon(1e-5));
   }
   CHECK(means[0].ssim < 0.995);
+  // Black as lossy files have it, 1 of 255, hides what is beneath it all the same.
+  Image lossy(kWidth, kHeight, 1, 1.0f / 255.0f);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 3; x < 10; ++x) lossy.at(x, y, 0) = 1.0f;
+  }
+  write_image(view.mask_path, lossy);
+  const EvaluationMetrics mean =
+      evaluate(render, scene.dataset, Split::kTest, kBackground, {}, options).mean;
+  CHECK(mean.ssim == doctest::Approx(means[0].ssim).epsilon(2e-3));
 }
 
 TEST_CASE("evaluator: equal pictures have a PSNR, and views without a pixel are left out") {

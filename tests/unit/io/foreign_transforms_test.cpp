@@ -280,6 +280,17 @@ TEST_CASE("two frames whose paths end alike are refused where one photo stands f
                  "'train/a.png' and 'test/a.png'"));
 }
 
+TEST_CASE("a photo of another frame is not taken for one that was deleted") {
+  const Scratch scratch;
+  write_scene(scratch, {"images/a.png", "images/b.png", "images/c.png", "old/a.png"},
+              {"images/a.png", "images/b.png", "images/c.png"});
+  CHECK(load_dataset(scratch.path()).views.size() == 3);
+  // Two spellings of one path are one photo in two frames.
+  const Scratch twice;
+  write_scene(twice, {"/old/s/images/a.png", "./images/a.png"}, {"images/a.png"});
+  CHECK(load_dataset(twice.path()).views.size() == 2);
+}
+
 TEST_CASE("terms of a lens that no camera here has are refused by name") {
   const auto with = [](const std::string& keys) {
     return cameras_error(file_of(kKeys + keys, frame_with(matrix_json(1))));

@@ -50,6 +50,9 @@ TEST_CASE("labels of several objects, whole numbers far below white, count whole
   CHECK(mask_of(1, Bytes{0, 1, 32}) == Floats{0, 1.0f / 255.0f, 32.0f / 255.0f});
   CHECK(mask_of(1, Shorts{0, 32, 300}) == Floats{0, 32.0f / 65535.0f, 300.0f / 65535.0f});
   CHECK(mask_of(1, Floats{0, 0.05f}) == Floats{0, 0.05f});
+  // Black as videos have it is no label.
+  CHECK(mask_of(1, Bytes{16, 16}) == Floats{16.0f / 255.0f, 16.0f / 255.0f});
+  CHECK(mask_of(1, Bytes{1, 1}) == Floats{1, 1});
 }
 
 TEST_CASE("a black mask with a shape in its alpha is that shape") {

@@ -9,6 +9,7 @@
 #include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
+#include "scene/camera_check.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 
@@ -215,6 +216,13 @@ TEST_CASE("small deviations from a rotation are removed, larger ones refused") {
       cameras_of(with_matrix("[[0.8, 0, 0.6, 1], [0, 1, 0, 2], [-0.6, 0, 0.8, 3]]")).front();
   CHECK(glm::length(scaled.center() - plain.center()) < 1e-12);
   for (int i = 0; i < 3; ++i) CHECK(glm::length(scaled.rotation[i] - plain.rotation[i]) < 1e-12);
+  // Axes between what is left as it is and what counts as scaled, and numbers of two decimals.
+  for (const char* matrix :
+       {"[[0.80056, 0, 0.60042, 1], [0, 1.0007, 0, 2], [-0.60042, 0, 0.80056, 3]]",
+        "[[0.72, -0.48, 0.5, 1], [0.57, 0.82, -0.03, 2], [-0.4, 0.3, 0.86, 3]]"}) {
+    CAPTURE(matrix);
+    CHECK(is_rotation(cameras_of(with_matrix(matrix)).front().rotation, 1e-12));
+  }
   CHECK(contains(cameras_error(with_matrix("[[1,0.1,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]")),
                  "no rotation"));
   CHECK(contains(cameras_error(with_matrix("[[0,0,0,0],[0,0,0,0],[0,0,0,0],[0,0,0,1]]")),

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -318,7 +319,9 @@ TEST_CASE("the command line beats the file, wherever --config stands") {
 namespace {
 
 // The options of a run that goes on from `source`, by a command line of these words.
-TrainOptions resumed(const std::filesystem::path& source, std::vector<std::string> words = {}) {
+TrainOptions resumed(const std::filesystem::path& source,
+                     std::vector<std::string> words = {},
+                     const std::set<std::string>& chosen = {}) {
   TrainOptions options;
   CLI::App app;
   std::string from;
@@ -326,7 +329,7 @@ TrainOptions resumed(const std::filesystem::path& source, std::vector<std::strin
   add_train_options(app, options);
   words.insert(words.end(), {"--resume", source.string()});
   app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
-  apply_resumed_options(app, options, source);
+  apply_resumed_options(app, options, source, chosen);
   return options;
 }
 
@@ -378,6 +381,13 @@ TEST_CASE("a resumed run keeps its options below those of a file and of the comm
   CHECK(resumed(folder / "run", {"--iterations", "1000", "--end-iteration", "950"}).end_iteration ==
         950);
 
+  // What the run chose in place of the file's keys stays.
+  const TrainOptions kept_length =
+      resumed(folder / "run", {"--config", (folder / "length.toml").string()},
+              {"iterations", "end-iteration"});
+  CHECK(kept_length.iterations == 900);
+  CHECK(kept_length.end_iteration == 850);
+
   // A checkpoint has them too: in a run without the file, and outside of one beside a file that is
   // not its run's.
   Checkpoint checkpoint;
@@ -407,6 +417,12 @@ TEST_CASE("a file that makes another run of the one that is resumed is said to, 
   of_run.background = "0,0,0";
   folder.write("run/config.toml", to_toml(of_run));
   // A background that the photos choose stays what they have chosen.
+  {
+    folder.write("fitted.toml", "iterations = -1\n");
+    const LogCapture log;
+    resumed(folder / "run", {"--config", (folder / "fitted.toml").string()});
+    CHECK(log.lines() == 0);
+  }
   folder.write("other.toml",
                "iterations = 48000\nseed = 7\nsh-degree = 1\nbackground = \"auto\"\n");
   const std::string file = (folder / "other.toml").string();
