@@ -383,7 +383,7 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   Evaluation evaluation(render, dataset, views, background, output, options);
   evaluation.measure_views();
   evaluation.write_telling_pictures();
-  const EvaluationReport report = evaluation.report();
+  EvaluationReport report = evaluation.report();
   evaluation.write_report(report);
   return report;
 }

@@ -99,7 +99,7 @@ std::optional<std::filesystem::path> data_set_of(const std::filesystem::path& fo
   if (io::looks_like_dataset(folder)) return folder;
   std::error_code error;
   const std::filesystem::path whole = std::filesystem::weakly_canonical(folder, error);
-  const std::optional<std::filesystem::path> root = io::enclosing_data_set(whole);
+  std::optional<std::filesystem::path> root = io::enclosing_data_set(whole);
   if (error || !root) return std::nullopt;
   std::set<std::filesystem::path> pictures = named_folders(*root);
   for (const char* name : kPictureFolders) pictures.insert(*root / name);

@@ -15,12 +15,12 @@ namespace {
 
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kBlock = 256;  // as in cl/trace/sky.cl
-constexpr int kMaxDegree = 4;
+constexpr std::size_t kMaxDegree = 4;
 
 // -1 for a number of coefficients that no degree has.
 int degree_of(std::size_t coefficients) {
-  for (int degree = 0; degree <= kMaxDegree; ++degree) {
-    if (coefficients == static_cast<std::size_t>((degree + 1) * (degree + 1))) return degree;
+  for (std::size_t degree = 0; degree <= kMaxDegree; ++degree) {
+    if (coefficients == (degree + 1) * (degree + 1)) return static_cast<int>(degree);
   }
   return -1;
 }
