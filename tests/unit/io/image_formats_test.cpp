@@ -32,6 +32,8 @@ std::vector<std::uint8_t> two_colors(bool alpha) {
     add(0);
     if (alpha) add(left ? 255 : 128);
   }
+  // OpenImageIO 2.4 reads rows as long as those of libheif, whatever the width, to write HEIF.
+  numbers.resize(numbers.size() + 256);
   return numbers;
 }
 
