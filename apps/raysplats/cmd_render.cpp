@@ -215,7 +215,6 @@ void render_model(const RenderFlags& options, const GlobalOptions& global) {
   TraceOptions trace = options.trace.over(trace_options(source));
   trace.depth = options.depth || options.hits;
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
-    output.check_memory(context.device(), ranks.size());
     const Model on_device(context, model);
     Tracer tracer(context, trace, mirrors_of(source));
     const FrameOptions share = share_of(ranks, output.options(), cameras.size());

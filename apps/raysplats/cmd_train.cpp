@@ -38,7 +38,6 @@ struct Options {
   std::string resume;
   std::string time;
   std::string quality;
-  std::set<std::string> chosen;  // keys whose values these two chose for a run that goes on
   bool overwrite = false;
   bool view = false;
   view::ViewerOptions viewer = view_options();
@@ -47,19 +46,21 @@ struct Options {
 };
 
 /// --time and --quality choose for a new run what its configuration then names. A command that
-/// begins a run or goes on with it may have them each time.
-void check_choices(const CLI::App& command, Options& options) {
+/// begins a run or goes on with it may have them each time: returns the keys whose values they
+/// chose for a run that goes on.
+std::set<std::string> check_choices(const CLI::App& command, Options& options) {
   const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
-  const bool chosen = !options.time.empty() || !options.quality.empty();
-  if (chosen && options.resume == "latest" && !list_checkpoints(options.output).empty()) {
+  std::set<std::string> chosen;
+  const bool asked = !options.time.empty() || !options.quality.empty();
+  if (asked && options.resume == "latest" && !list_checkpoints(options.output).empty()) {
     spdlog::info("--time and --quality are not asked again: {} names what they chose",
                  (std::filesystem::path(options.output) / "config.toml").string());
-    options.chosen = {"iterations"};
-    if (!options.time.empty()) options.chosen.insert("end-iteration");
-    if (!options.quality.empty()) options.chosen.insert("downscale");
+    chosen = {"iterations"};
+    if (!options.time.empty()) chosen.insert("end-iteration");
+    if (!options.quality.empty()) chosen.insert("downscale");
     options.time.clear();
     options.quality.clear();
-  } else if (chosen && !options.resume.empty() && options.resume != "latest") {
+  } else if (asked && !options.resume.empty() && options.resume != "latest") {
     throw UsageError(
         "--time and --quality are about new runs: a resumed one has its length, which "
         "--iterations changes");
@@ -73,6 +74,7 @@ void check_choices(const CLI::App& command, Options& options) {
   if (!options.time.empty() && given("--iterations")) {
     throw UsageError("--time and --iterations contradict each other: leave one of them out");
   }
+  return chosen;
 }
 
 Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device) {
@@ -212,12 +214,11 @@ void train(const CLI::App& command,
 }
 
 void run(CLI::App& command, Options& options, const GlobalOptions& global) {
-  check_choices(command, options);
+  const std::set<std::string> chosen = check_choices(command, options);
   if (!options.time.empty()) parse_duration("--time", options.time);  // before anything is loaded
   if (!options.resume.empty()) {
     apply_resumed_options(command, options.train,
-                          options.resume == "latest" ? options.output : options.resume,
-                          options.chosen);
+                          options.resume == "latest" ? options.output : options.resume, chosen);
   } else if (command.get_option("--iterations")->count() > 0 &&
              command.get_option("--end-iteration")->count() == 0) {
     options.train.end_iteration = 0;  // of a run by time, whose configuration --config has named

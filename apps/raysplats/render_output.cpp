@@ -32,7 +32,7 @@ RenderOutput::RenderOutput(const RenderFlags& flags,
                            std::size_t frames,
                            std::optional<double> fps,
                            bool closed)
-    : flags_(flags), cameras_(cameras), options_(flags.frame_options()) {
+    : flags_(flags), options_(flags.frame_options()) {
   options_.closed = closed;
   if (options_.files) {
     if (!flags.data.data.empty()) check_not_data(flags.output, flags.data.data);
@@ -80,23 +80,6 @@ std::string RenderOutput::left() const {
   if (flags_.output.empty()) return "frames: no video was written";
   return fmt::format("frames: what is in {} is whole{}", flags_.output,
                      flags_.video.empty() ? "" : ", and no video was written");
-}
-
-void RenderOutput::check_memory(const DeviceInfo& device, int ranks) const {
-  constexpr double kChannelBytes = 4.0 * sizeof(float);
-  const double samples = static_cast<double>(options_.supersample) * options_.supersample;
-  for (const Camera& camera : cameras_) {
-    const double pixels = static_cast<double>(camera.width) * camera.height;
-    // At the least: ranks may share the rows of a picture.
-    if (kChannelBytes * samples * pixels / ranks <= static_cast<double>(device.max_allocation))
-      continue;
-    throw ResourceError(fmt::format(
-        "A picture of {} x {} pixels{} is too large for {}: render smaller ones (--width, --height "
-        "or --downscale)",
-        camera.width, camera.height,
-        options_.supersample > 1 ? fmt::format(" with --supersample {}", options_.supersample) : "",
-        device.name));
-  }
 }
 
 }  // namespace raysplats::cli

@@ -19,7 +19,7 @@ CameraPathFile read_path(const RenderFlags& flags);
 /// before anything is traced.
 class RenderOutput {
  public:
-  /// `fps` and `closed` as the cameras say, which have to outlive it.
+  /// `fps` and `closed` as the cameras say.
   RenderOutput(const RenderFlags& flags,
                std::span<const Camera> cameras,
                std::size_t frames,
@@ -35,13 +35,9 @@ class RenderOutput {
   std::string name() const;
   /// The end of a sentence about an interrupted rendering: "frames: what is in DIR is whole".
   std::string left() const;
-  /// Throws ResourceError for a picture that the device cannot hold, whatever share of it each of
-  /// so many ranks traces.
-  void check_memory(const DeviceInfo& device, int ranks) const;
 
  private:
   const RenderFlags& flags_;
-  std::span<const Camera> cameras_;
   FrameOptions options_;
   std::unique_ptr<VideoFile> video_;
 };

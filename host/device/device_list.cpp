@@ -7,16 +7,10 @@
 #include <algorithm>
 
 #include "raysplats/error.hpp"
+#include "util/ascii.hpp"
 
 namespace raysplats {
 namespace {
-
-std::string lower(std::string text) {
-  for (char& c : text) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return text;
-}
 
 // Which are places in the list of devices, not parts of names.
 bool is_number(const std::string& text) {
@@ -42,7 +36,7 @@ std::vector<std::string> device_selectors(const std::string& list,
                                           parts.begin() + static_cast<std::ptrdiff_t>(last), ","));
       const bool named = !is_number(parts[first]) && !parts[last - 1].empty() &&
                          std::ranges::any_of(names, [&](const std::string& name) {
-                           return lower(name).find(lower(whole)) != std::string::npos;
+                           return ascii_lower(name).find(ascii_lower(whole)) != std::string::npos;
                          });
       if (named) break;
     }

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cstdlib>
 #include <string_view>
@@ -12,6 +11,7 @@
 #include "device/driver_trouble.hpp"
 #include "device/platform.hpp"
 #include "raysplats/error.hpp"
+#include "util/ascii.hpp"
 
 namespace raysplats {
 namespace {
@@ -25,12 +25,6 @@ std::string trimmed(std::string text) {
          (text.back() == '\0' || std::isspace(static_cast<unsigned char>(text.back())))) {
     text.pop_back();
   }
-  return text;
-}
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return text;
 }
 
@@ -240,7 +234,8 @@ DeviceInfo select_device(const std::string& selector) {
     return checked(devices[index]);
   }
   for (const DeviceInfo& info : devices) {
-    if (lower(info.name).find(lower(selector)) != std::string::npos) return checked(info);
+    if (ascii_lower(info.name).find(ascii_lower(selector)) != std::string::npos)
+      return checked(info);
   }
   throw UsageError(fmt::format(
       "--device {}: no device has that in its name; 'raysplats devices' lists them", selector));

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "util/ascii.hpp"
+
 namespace raysplats::io {
 namespace {
 
@@ -14,9 +16,8 @@ constexpr std::string_view kBase64 = ";base64";
 
 /// Schemes and the mark of base64 may be written in capitals.
 bool is_same(std::string_view text, std::string_view lower_case) {
-  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
   return std::equal(text.begin(), text.end(), lower_case.begin(), lower_case.end(),
-                    [&](char a, char b) { return lower(a) == b; });
+                    [&](char a, char b) { return ascii_lower(a) == b; });
 }
 
 /// The value of a digit (RFC 4648, section 4); -1 of what is none.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/image_file.hpp"
+#include "util/ascii.hpp"
 #include "util/file_kind.hpp"
 #include "util/path_text.hpp"
 
@@ -76,9 +77,8 @@ BareName without_marks(std::string_view name) {
 
 /// Whether two names differ in nothing but the case of A to Z.
 bool same_but_case(std::string_view a, std::string_view b) {
-  const auto small = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [&](char x, char y) { return small(x) == small(y); });
+                    [&](char x, char y) { return ascii_lower(x) == ascii_lower(y); });
 }
 
 /// Likewise, also where one has letters with marks and the other has these as two characters.

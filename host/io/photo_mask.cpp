@@ -13,6 +13,7 @@
 #include "io/photo_orientation.hpp"
 #include "io/transforms.hpp"
 #include "raysplats/error.hpp"
+#include "util/ascii.hpp"
 #include "util/file_kind.hpp"
 
 namespace raysplats::io {
@@ -57,14 +58,6 @@ fs::path mask_folder(const fs::path& root) {
   return {};
 }
 
-/// A to Z in small letters.
-std::string in_small_letters(std::string text) {
-  for (char& c : text) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return text;
-}
-
 void warn_of_dynamic_masks(const std::vector<View>& views, const fs::path& root) {
   std::size_t count = 0;
   fs::path first;
@@ -97,7 +90,7 @@ void MaskFinder::add(const fs::path& name) {
       ++known.ends[stem.substr(at)];
   };
   learn(exact_, path);
-  learn(small_, in_small_letters(path));
+  learn(small_, ascii_lower(path));
 }
 
 fs::path MaskFinder::find(const fs::path& name, const fs::path& photo) const {
@@ -107,7 +100,7 @@ fs::path MaskFinder::find(const fs::path& name, const fs::path& photo) const {
       root_.empty() ? fs::path(".") : root_.lexically_normal()));
   if (!folder_.empty()) {
     if (fs::path mask = find_in_folder(path, path, exact_); !mask.empty()) return mask;
-    if (fs::path mask = find_in_folder(stored, in_small_letters(stored), small_); !mask.empty())
+    if (fs::path mask = find_in_folder(stored, ascii_lower(stored), small_); !mask.empty())
       return mask;
   }
   fs::path beside = photo;

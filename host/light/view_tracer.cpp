@@ -202,6 +202,7 @@ void ViewTracer::forward(const DeviceGaussians& gaussians,
                          ViewSizes sizes) {
   Impl& self = *impl_;
   require_pixels(camera);
+  require_room(camera, self.context.device());
   if (by_rays(camera)) {
     forward_rays(gaussians, camera, keep);
     return;
@@ -238,6 +239,7 @@ RayTracer* ViewTracer::ray_tracer() { return impl_->rays ? &impl_->rays->tracer 
 void ViewTracer::forward_rays(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
   Impl& self = *impl_;
   require_pixels(camera);
+  require_room(camera, self.context.device());
   self.kept = false;
   self.by_rays = true;
   self.camera = camera;

@@ -99,6 +99,17 @@ void require_pixels(const Camera& camera) {
   }
 }
 
+void require_room(const Camera& camera, const DeviceInfo& device) {
+  constexpr double kPixelBytes = 4.0 * sizeof(float);
+  const double pixels = static_cast<double>(camera.width) * camera.height;
+  if (kPixelBytes * pixels <= static_cast<double>(device.max_allocation)) return;
+  throw ResourceError(
+      fmt::format("The picture of {} x {} pixels of camera '{}' is too large for {}, of which a "
+                  "buffer has {:.0f} MiB at most: ask for a smaller one",
+                  camera.width, camera.height, camera.name, device.name,
+                  static_cast<double>(device.max_allocation) / (1 << 20)));
+}
+
 ColorDirection color_direction(const Camera& camera) {
   return camera.model == CameraModel::kOrthographic ? ColorDirection::kRay
                                                     : ColorDirection::kFromOrigin;

@@ -31,6 +31,10 @@ RsLensCamera lens_camera(const Camera& camera, const Lens& lens);
 /// or with a rotation that is none.
 void require_pixels(const Camera& camera);
 
+/// Throws ResourceError for a camera whose picture, four floats a pixel, fits in no buffer of the
+/// device.
+void require_room(const Camera& camera, const DeviceInfo& device);
+
 /// Where rays of the camera take the colour of Gaussians from: seen from its centre, or along each
 /// ray where there is none.
 ColorDirection color_direction(const Camera& camera);

@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <exception>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -79,27 +78,21 @@ DepthCache::DepthCache(Context& context,
                        double unit,
                        std::size_t budget)
     : context_(context), unit_(unit), budget_(budget), entries_(views.size()) {
-  std::vector<std::exception_ptr> errors(views.size());
   std::vector<std::uint8_t> empty(views.size());  // maps that know nothing
   in_parallel(views.size(), [&](std::size_t i) {
     const View& view = dataset.views[views[i]];
     Entry& entry = entries_[i];
-    try {
-      entry.source = view;
-      entry.source.points.clear();
-      if (view.depth_path.empty()) {
-        entry.points = listed(io::view_depths(dataset, view, unit));
-      } else {
-        empty[i] = io::check_depth_map(view, unit) ? 0 : 1;
-      }
-    } catch (...) {
-      errors[i] = std::current_exception();
+    entry.source = view;
+    entry.source.points.clear();
+    if (view.depth_path.empty()) {
+      entry.points = listed(io::view_depths(dataset, view, unit));
+    } else {
+      empty[i] = io::check_depth_map(view, unit) ? 0 : 1;
     }
   });
   std::size_t empty_maps = 0;
   std::string first_empty;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    if (errors[i]) std::rethrow_exception(errors[i]);
     std::filesystem::path& map = entries_[i].source.depth_path;
     if (empty[i] != 0) {
       if (empty_maps++ == 0) first_empty = map.string();

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <set>
 #include <vector>
@@ -30,16 +29,10 @@ std::set<fs::path> black_masks(const std::vector<View>& views) {
   }
   const std::vector<fs::path> paths(masks.begin(), masks.end());
   std::vector<std::uint8_t> black(paths.size());
-  std::vector<std::exception_ptr> errors(paths.size());
   in_parallel(paths.size(), [&](std::size_t i) {
-    try {
-      black[i] = io::is_black(io::read_raw_image(paths[i])) ? 1 : 0;
-    } catch (...) {
-      errors[i] = std::current_exception();
-    }
+    black[i] = io::is_black(io::read_raw_image(paths[i])) ? 1 : 0;
   });
   for (std::size_t i = 0; i < paths.size(); ++i) {
-    if (errors[i]) std::rethrow_exception(errors[i]);
     if (black[i] == 0) masks.erase(paths[i]);
   }
   return masks;

@@ -14,10 +14,9 @@ namespace raysplats {
 
 /// A file that appears whole or not at all: everything goes to a temporary name in the same folder,
 /// commit() syncs and renames it over the target. Without commit() the temporary file is removed
-/// and the target keeps its old content. Where the target is a link, the file that
-/// it leads to is written. Failures
-/// throw DataError with the path and the system's reason (disk full, permissions), devices, pipes
-/// and folders too.
+/// and the target keeps its old content. Where the target is a link, the file that it leads to is
+/// written. Failures throw DataError with the path and the system's reason (disk full,
+/// permissions), devices, pipes and folders too.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path target);

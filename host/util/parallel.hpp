@@ -3,22 +3,36 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace raysplats {
 
-/// Calls work(i) for every i below `count` once, on all cores; `work` does not throw.
+/// Calls work(i) for every i below `count` once, on all cores. Where it throws, some of the others
+/// are left out, and what it threw for the least i is thrown when all cores have ended.
 template <class Work>
 void in_parallel(std::size_t count, const Work& work) {
   const std::size_t threads =
       std::min<std::size_t>(std::max(1u, std::thread::hardware_concurrency()), count);
-  std::vector<std::jthread> workers;
-  for (std::size_t t = 0; t < threads; ++t) {
-    workers.emplace_back([&, t] {
-      for (std::size_t i = t; i < count; i += threads) work(i);
-    });
+  using Failure = std::pair<std::size_t, std::exception_ptr>;
+  std::vector<Failure> failures(threads, {count, nullptr});
+  {
+    std::vector<std::jthread> workers;
+    for (std::size_t t = 0; t < threads; ++t) {
+      workers.emplace_back([&, t] {
+        std::size_t i = t;
+        try {
+          for (; i < count; i += threads) work(i);
+        } catch (...) {
+          failures[t] = {i, std::current_exception()};
+        }
+      });
+    }
   }
+  const auto first = std::ranges::min_element(failures, {}, &Failure::first);
+  if (first != failures.end() && first->second) std::rethrow_exception(first->second);
 }
 
 }  // namespace raysplats
