@@ -14,6 +14,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/morton_order.hpp"
+#include "scene/pixel_count.hpp"
 #include "side_by_side.hpp"
 
 namespace raysplats::peer {
@@ -200,8 +201,7 @@ void run(const Options& options) {
   };
   if (wants("camera")) {
     const CameraRays rays = camera_rays(camera);
-    const std::size_t pixels =
-        static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+    const std::size_t pixels = pixel_count(camera);
     trace_work("camera", {"ours", [&] { return ours.camera(camera); }}, rays.rays, rays.pixels,
                pixels);
   }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <initializer_list>
 #include <map>
@@ -17,6 +15,7 @@
 #include "bench/forecast.hpp"
 #include "bench/kernel_folders.hpp"
 #include "commands.hpp"
+#include "io/dataset_views.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -24,6 +23,7 @@
 #include "run/model_source.hpp"
 #include "synth/bench_scenes.hpp"
 #include "util/atomic_file.hpp"
+#include "util/number_text.hpp"
 #include "validators.hpp"
 #include "value_text.hpp"
 
@@ -74,9 +74,7 @@ Camera resized(Camera camera, int width, int height) {
 
 std::vector<Camera> read_views(const std::string& path) {
   if (!std::filesystem::is_directory(path)) return read_cameras(path);
-  std::vector<Camera> cameras;
-  for (const View& view : load_dataset(path).views) cameras.push_back(view.camera);
-  return cameras;
+  return cameras_of(load_dataset(path), Split::kAll);
 }
 
 // Most models are called point_cloud; their folders tell them apart.
@@ -162,6 +160,19 @@ void check_results(const Options& options, const std::filesystem::path& model) {
   }
 }
 
+/// Throws where the device fails at anything; the file is there already.
+void check_report(const DeviceReport& report, const std::string& file) {
+  std::vector<std::string> troubles;
+  if (!report.passed()) troubles.emplace_back("does not compute what it should");
+  if (report.failed > 0) {
+    troubles.push_back(fmt::format("fails in {}, which the report names under left_out",
+                                   counted(static_cast<double>(report.failed), "row")));
+  }
+  if (troubles.empty()) return;
+  throw DeviceError(fmt::format("The device {} {}: please send us {}, and see docs/gpu.md",
+                                report.device.name, fmt::join(troubles, " and "), file));
+}
+
 void run(const CLI::App& command, const Options& options) {
   check_used(command, options);
   check_alone(command, options);
@@ -208,13 +219,10 @@ void run(const CLI::App& command, const Options& options) {
   Context context(device, timed);
   if (!options.report.empty()) {
     const DeviceReport report = make_device_report(context, bench);
-    fmt::print("{}", device_report_text(report));
+    // First, so that no trouble with standard output loses it.
     write_text_file(options.report, device_report_json(report));
-    if (!report.passed()) {
-      throw DeviceError(fmt::format(
-          "The device {} does not compute what it should: please send us {}, and see docs/gpu.md",
-          device.name, options.report));
-    }
+    fmt::print("{}", device_report_text(report));
+    check_report(report, options.report);
     return;
   }
   if (options.forecast) {

@@ -4,13 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "commands.hpp"
 #include "eval/former_pictures.hpp"
@@ -23,10 +21,10 @@
 #include "raysplats/tracer.hpp"
 #include "render/bands.hpp"
 #include "render/output_check.hpp"
+#include "run/mirror_meshes.hpp"
 #include "run/model_source.hpp"
 #include "scene/morton_order.hpp"
 #include "shared_work.hpp"
-#include "train/mirror_meshes.hpp"
 #include "util/number_text.hpp"
 #include "util/output_directory.hpp"
 #include "validators.hpp"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <memory>
 
@@ -12,6 +11,7 @@
 #include "frame_progress.hpp"
 #include "io/camera_list.hpp"
 #include "io/data_origin.hpp"
+#include "io/dataset_views.hpp"
 #include "io/scene_camera.hpp"
 #include "io/scene_file.hpp"
 #include "options.hpp"
@@ -21,12 +21,12 @@
 #include "render/output_check.hpp"
 #include "render_flags.hpp"
 #include "render_output.hpp"
+#include "run/mirror_meshes.hpp"
 #include "run/model_source.hpp"
 #include "scene/camera_path.hpp"
 #include "scene/morton_order.hpp"
 #include "scene/orbit.hpp"
 #include "shared_work.hpp"
-#include "train/mirror_meshes.hpp"
 #include "util/number_text.hpp"
 #include "validators.hpp"
 

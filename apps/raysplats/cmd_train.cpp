@@ -16,9 +16,9 @@
 #include "render/output_check.hpp"
 #include "report/run_report.hpp"
 #include "run/checkpoint.hpp"
+#include "run/mirror_meshes.hpp"
 #include "run/train_config.hpp"
 #include "shared_work.hpp"
-#include "train/mirror_meshes.hpp"
 #include "train/quality_preset.hpp"
 #include "util/number_text.hpp"
 #include "util/progress.hpp"
@@ -89,6 +89,9 @@ Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device
   const bool sized = given("--downscale") || options.train.data.downscale != usual.data.downscale;
   if (sized || choice.downscale == 1) return dataset;
   options.train.data.downscale = choice.downscale;
+  spdlog::info(
+      "Photos are reduced {} times each way, as --quality {} does; --downscale 1 keeps them",
+      choice.downscale, options.quality);
   return load_dataset(options.data, options.train.data);
 }
 
@@ -160,7 +163,8 @@ void print_results(const TrainSummary& summary, const std::string& folder) {
   report(folder, "whole");
 }
 
-/// Runs to the end. One that is interrupted gets its page too, and who watches hears of any end.
+/// Runs to the end. One that is interrupted after its start gets its page too, and who watches
+/// hears of any end.
 TrainSummary run_to_end(Trainer& trainer,
                         const Options& options,
                         bool show_progress,
@@ -169,7 +173,7 @@ TrainSummary run_to_end(Trainer& trainer,
   try {
     return trainer.run(show_progress);
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kInterrupted) {
+    if (error.code() == ErrorCode::kInterrupted && trainer.iteration() > 0) {
       if (ranks.leads()) report(options.output, "saved");
       ranks.barrier();  // of processes, mpirun ends all when the first one fails
     }

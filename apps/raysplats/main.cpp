@@ -21,6 +21,7 @@
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "shared_work.hpp"
+#include "util/interrupt.hpp"
 #include "util/memory_limit.hpp"
 #include "util/standard_streams.hpp"
 
@@ -107,6 +108,7 @@ int main(int argc, char** argv) {
   // A file over the process's size limit is then a failed write like any other, not the end of the
   // process.
   std::signal(SIGXFSZ, SIG_IGN);
+  raysplats::keep_ignoring_hang_ups();
   std::set_terminate(end_of_process);
   raysplats::open_standard_streams();
   // Known here, because run() may end by an exception.

@@ -118,6 +118,18 @@ void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOp
                capped, rays, options.max_hits);
 }
 
+void tell_of_ended_paths(std::uint64_t ended, std::uint64_t camera_rays, int max_bounces) {
+  if (ended == 0) return;
+  if (ended > camera_rays / 100) {
+    spdlog::warn(
+        "{} paths of {} camera rays ended after --max-bounces {}: raise it for the rest of their "
+        "light",
+        ended, camera_rays, max_bounces);
+  } else {
+    spdlog::info("{} paths ended after --max-bounces {}", ended, max_bounces);
+  }
+}
+
 CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags, const std::string& split) {
   const std::string group = "Data set";
   CLI::Option* data = app.add_option("-d,--data", flags.data,
@@ -160,12 +172,6 @@ void DataFlags::check_used(bool orbit) const {
 
 void add_overwrite_flag(CLI::App& app, bool& flag, const std::string& help) {
   app.add_flag("--overwrite", flag, help);
-}
-
-std::vector<Camera> cameras_of(const Dataset& dataset, Split split) {
-  std::vector<Camera> cameras;
-  for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
-  return cameras;
 }
 
 DataError no_views(const DataFlags& flags) {

@@ -52,6 +52,9 @@ std::string with_compiling(const std::string& text, double seconds);
 
 /// One warning line when rays stopped at the cap on hits.
 void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOptions& options);
+/// One line when paths ended at their last surface: a warning where they may be seen, at more than
+/// one of a hundred of the camera's rays.
+void tell_of_ended_paths(std::uint64_t ended, std::uint64_t camera_rays, int max_bounces);
 
 /// A data set and which of its views to use at which size; what is not given is as in the model's
 /// run.
@@ -71,7 +74,6 @@ CLI::Option* add_data_flags(CLI::App& app,
                             DataFlags& flags,
                             const std::string& split = "test (default), train or all");
 DataError no_views(const DataFlags& flags);
-std::vector<Camera> cameras_of(const Dataset& dataset, Split split);
 
 /// --overwrite: outputs may take the place of what is there. `help` says of what.
 void add_overwrite_flag(

@@ -3,9 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <charconv>
-#include <cstdio>
-#include <filesystem>
-#include <memory>
 
 #include "frame_progress.hpp"
 #include "io/scene_loader.hpp"
@@ -217,10 +214,8 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
                warn_of_capped_rays(rays.capped_rays,
                                    rays.camera_rays + rays.continued_rays + rays.shadow_rays,
                                    loaded.scene.trace);
-               if (rays.ended_by_bounces > 0) {
-                 spdlog::info("{} paths ended after --max-bounces {}", rays.ended_by_bounces,
-                              loaded.scene.render.max_bounces);
-               }
+               tell_of_ended_paths(rays.ended_by_bounces, rays.camera_rays,
+                                   loaded.scene.render.max_bounces);
                print_summary(report, output.name(), context.build_seconds());
                if (flags.device.profile) fmt::print("{}", context.profile_table());
              });

@@ -17,6 +17,18 @@
 // Parts of the sums that train/photo_fit.cl keeps of a photo.
 #define RS_FIT_ITEMS 64
 
+// What becomes of a Gaussian in the new set of density control; the host's DensityRole tells more.
+#define RS_ROLE_KEEP 0u
+#define RS_ROLE_CLONE 1u
+#define RS_ROLE_FIRST_CHILD 2u
+#define RS_ROLE_SECOND_CHILD 3u
+#define RS_ROLE_FIRST_HALF 4u
+#define RS_ROLE_SECOND_HALF 5u
+#define RS_ROLE_PART 6u
+
+// In place of the row that a row of a new set comes from: it is new.
+#define RS_NO_SOURCE 0xffffffffu
+
 // One step of Adam for one group of parameters.
 typedef struct {
   rs_float beta1, rest1;  // rest = 1 - beta

@@ -15,6 +15,9 @@
 #ifndef ACCUMULATE
 #define ACCUMULATE 0
 #endif
+#if POSE && ACCUMULATE
+#error "gradients of a pose are those of one view"
+#endif
 
 // Sums the copies of the line gradients of LANES Gaussians into columns; true in lanes that a ray
 // touched.
@@ -88,9 +91,7 @@ __kernel void finalize_gradients(const uint begin,
         sum_copies(line_gradients + 16 * i, (size_t)finalize.gaussians * 16, finalize.copies, v);
   }
   if (!rs_any_of(touched)) {
-#if ACCUMULATE
-    return;
-#endif
+#if !ACCUMULATE
     clear_columns(g_means + 3 * i, 3);
     clear_columns(g_quaternions + 4 * i, 4);
     clear_columns(g_scales + 3 * i, 3);
@@ -99,6 +100,7 @@ __kernel void finalize_gradients(const uint begin,
     clear_columns(screen + 3 * i, 3);
 #if POSE
     clear_columns(pose + 6 * i, 6);
+#endif
 #endif
     return;
   }
@@ -112,7 +114,7 @@ __kernel void finalize_gradients(const uint begin,
   const fv depth = take_depth_gradient(line, touched, kind, v);
 #endif
   take_shape_gradient(line, kind, v);
-  line_gradient(&g, v, touched, kind, &view);
+  view_gradient(&g, v, touched, kind, &view);
 #if DEPTH_GRADIENT
   view.m[2] += depth;
 #endif
@@ -133,8 +135,8 @@ __kernel void finalize_gradients(const uint begin,
 #endif
   store_columns3(seen[0], seen[1], seen[2], screen + 3 * i);
 
-  ColourGradient colour;
-  colour_gradient(g.offset, line, v, touched, &colour);
+  ColorGradient color;
+  color_gradient(g.offset, line, v, touched, &color);
   ParameterGradient out;
   for (int j = 0; j < 3; ++j) out.mean[j] = 0;
   fv c[3 * SH_COEFFICIENTS];
@@ -142,14 +144,14 @@ __kernel void finalize_gradients(const uint begin,
   load_columns(sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS, 3 * RS_SH_FUNCTIONS, c);
   fv along[RS_SH_FUNCTIONS];
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
-    along[k] = c[3 * k] * colour.value[0] + c[3 * k + 1] * colour.value[1] +
-               c[3 * k + 2] * colour.value[2];
+    along[k] =
+        c[3 * k] * color.value[0] + c[3 * k + 1] * color.value[1] + c[3 * k + 2] * color.value[2];
   }
-  direction_gradient(&colour, along, out.mean);
+  direction_gradient(&color, along, out.mean);
 #endif
   for (int k = 0; k < RS_SH_FUNCTIONS; ++k) {
     for (int j = 0; j < 3; ++j) {
-      c[3 * k + j] = touched ? colour.basis[k] * colour.value[j] : (fv)(0.0f);
+      c[3 * k + j] = touched ? color.basis[k] * color.value[j] : (fv)(0.0f);
     }
   }
   for (int k = 3 * RS_SH_FUNCTIONS; k < 3 * SH_COEFFICIENTS; ++k) c[k] = (fv)(0.0f);

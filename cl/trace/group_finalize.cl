@@ -20,6 +20,9 @@
 #ifndef ACCUMULATE
 #define ACCUMULATE 0
 #endif
+#if POSE && ACCUMULATE
+#error "gradients of a pose are those of one view"
+#endif
 
 // Stages eight columns, from number `column` on, of the sums of the copies of the present rows'
 // line gradients; leaves them in the first copy and zeros in the others.
@@ -90,7 +93,7 @@ void store_sh_gradient(const int column,
   stage_store(staged, 0, count, g_sh, 3 * SH_COEFFICIENTS, column, ACCUMULATE);
 }
 
-// What parameter_gradient() needs of a Gaussian and line_gradient() does not, in the work-item's
+// What parameter_gradient() needs of a Gaussian and view_gradient() does not, in the work-item's
 // own row meanwhile. The barrier is for the compiler: behind it these numbers may have changed.
 void park(__local float* row, const ViewGaussian* g, const float* mean) {
   for (int j = 0; j < 3; ++j) {
@@ -151,12 +154,11 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   const size_t i = touched ? first + lane : first;
   const uint stored = ACCUMULATE ? touched : exists;
 
-  ColourGradient colour;
-  load_offset(i, means, &camera, colour.n);
-  colour_direction(&colour);
+  ColorGradient color;
+  load_offset(i, means, &camera, color.n);
+  color_direction(&color);
   for (int j = 0; j < 3; ++j)
-    colour.value[j] =
-        touched && RS_COLOR_PASSES(lines[i].v[13 + j], row[5 + j]) ? row[5 + j] : 0.0f;
+    color.value[j] = touched && RS_COLOR_PASSES(lines[i].v[13 + j], row[5 + j]) ? row[5 + j] : 0.0f;
   ParameterGradient out;
   for (int j = 0; j < 3; ++j) out.mean[j] = 0.0f;
 #if SH_DEGREE > 0
@@ -165,26 +167,26 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   barrier(CLK_LOCAL_MEM_FENCE);
   staged.present[lane] = touched;
   __global const float* coefficients = sh + first * 3 * SH_COEFFICIENTS;
-  add_along(0, coefficients, colour.value, &staged, along);
-  add_along(RS_STAGE, coefficients, colour.value, &staged, along);
-  add_along(2 * RS_STAGE, coefficients, colour.value, &staged, along);
-  add_along(3 * RS_STAGE, coefficients, colour.value, &staged, along);
-  add_along(4 * RS_STAGE, coefficients, colour.value, &staged, along);
-  add_along(5 * RS_STAGE, coefficients, colour.value, &staged, along);
-  add_along(6 * RS_STAGE, coefficients, colour.value, &staged, along);
-  direction_gradient(&colour, along, out.mean);
+  add_along(0, coefficients, color.value, &staged, along);
+  add_along(RS_STAGE, coefficients, color.value, &staged, along);
+  add_along(2 * RS_STAGE, coefficients, color.value, &staged, along);
+  add_along(3 * RS_STAGE, coefficients, color.value, &staged, along);
+  add_along(4 * RS_STAGE, coefficients, color.value, &staged, along);
+  add_along(5 * RS_STAGE, coefficients, color.value, &staged, along);
+  add_along(6 * RS_STAGE, coefficients, color.value, &staged, along);
+  direction_gradient(&color, along, out.mean);
 #endif
-  rs_sh_basis(SH_DEGREE, colour.n[0], colour.n[1], colour.n[2], colour.basis);
+  rs_sh_basis(SH_DEGREE, color.n[0], color.n[1], color.n[2], color.basis);
   barrier(CLK_LOCAL_MEM_FENCE);
   staged.present[lane] = stored;
   __global float* sh_gradient = g_sh + first * 3 * SH_COEFFICIENTS;
-  store_sh_gradient(0, colour.basis, colour.value, touched, &staged, sh_gradient);
-  store_sh_gradient(RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
-  store_sh_gradient(2 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
-  store_sh_gradient(3 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
-  store_sh_gradient(4 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
-  store_sh_gradient(5 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
-  store_sh_gradient(6 * RS_STAGE, colour.basis, colour.value, touched, &staged, sh_gradient);
+  store_sh_gradient(0, color.basis, color.value, touched, &staged, sh_gradient);
+  store_sh_gradient(RS_STAGE, color.basis, color.value, touched, &staged, sh_gradient);
+  store_sh_gradient(2 * RS_STAGE, color.basis, color.value, touched, &staged, sh_gradient);
+  store_sh_gradient(3 * RS_STAGE, color.basis, color.value, touched, &staged, sh_gradient);
+  store_sh_gradient(4 * RS_STAGE, color.basis, color.value, touched, &staged, sh_gradient);
+  store_sh_gradient(5 * RS_STAGE, color.basis, color.value, touched, &staged, sh_gradient);
+  store_sh_gradient(6 * RS_STAGE, color.basis, color.value, touched, &staged, sh_gradient);
 
   stage_fetch(line_gradients + 16 * first, 16, 0, 13, &staged);
   float v[16];
@@ -210,7 +212,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
 
   ViewGradient view;
   park(row, &g, out.mean);
-  line_gradient(&g, v, touched, kind, &view);
+  view_gradient(&g, v, touched, kind, &view);
 #if DEPTH_GRADIENT
   view.m[2] += depth;
 #endif

@@ -170,6 +170,206 @@ void group_push_rows(__local ForwardMemory* memory, uint closing, uint settled, 
 }
 #endif
 
+// What has become of the rows so far. Apart from OwnRows: beside what is indexed it would leave the
+// registers.
+typedef struct {
+  float settled;      // product over the settled rows, of this work-item's ray
+  uint settled_rows;  // how many these are
+  uint open;          // slots that are taken, a bit each
+  uint closed;        // slots that the last row closed: others may still read of them
+} RowProgress;
+
+// Tests the next `batch` candidates of the queue against the rays that are `alive`: a work-item its
+// own ray. Of each its nearest and farthest key are found afterwards. Returns whether any ray is.
+RS_GROUP_INLINE bool group_test_batch(__local ForwardMemory* memory,
+                                      const GroupCandidates* candidates,
+                                      const int lane,
+                                      const int batch,
+                                      __global const RsLine* restrict lines,
+                                      __global const uint* restrict references,
+                                      __global const float2* restrict limits,
+                                      const int alive,
+                                      const PacketState* p) {
+#if SUBGROUP
+  rs_group_barrier();
+#else
+  if (lane < RS_GROUP_BATCH) {
+    memory->found_first[lane] = as_uint(INFINITY);
+    memory->found_last[lane] = 0;
+  }
+  if (lane == 0) memory->alive = 0;
+  rs_group_barrier();
+#endif
+  for (int j = 0; j < batch; ++j) {
+    const uint k = memory->queue[(candidates->taken + j) % RS_GROUP_QUEUE];
+    const PacketHit hit = packet_hit(p, lines, references[k], limits[k].y, alive);
+    // Keys are not negative: their bits are in order.
+    const uint key = as_uint(hit.key) & 0x7fffffff;
+#if SUBGROUP
+    const uint nearest = sub_group_reduce_min(hit.hit ? key : as_uint(INFINITY));
+    const uint farthest = sub_group_reduce_max(hit.hit ? key : 0u);
+    if (lane == 0) {
+      memory->found_first[j] = nearest;
+      memory->found_last[j] = farthest;
+    }
+#else
+    if (hit.hit) {
+      atomic_min(&memory->found_first[j], key);
+      atomic_max(&memory->found_last[j], key);
+    }
+#endif
+  }
+#if SUBGROUP
+  const bool some_alive = sub_group_any(alive != 0);
+  rs_group_barrier();
+  return some_alive;
+#else
+  if (alive) atomic_or(&memory->alive, 1u);
+  rs_group_barrier();
+  return memory->alive != 0;
+#endif
+}
+
+// No candidate behind the next `batch` is nearer than this.
+float group_bound(const __local ForwardMemory* memory,
+                  const GroupCandidates* c,
+                  const int batch,
+                  __global const float2* restrict limits) {
+  if (c->queued - c->taken > (uint)batch)
+    return limits[memory->queue[(c->taken + batch) % RS_GROUP_QUEUE]].x;
+  return c->read < c->end ? limits[c->read].x : INFINITY;
+}
+
+// Puts `total` rows in the order of their nearest keys, from 0 on: the `waiting` ones, which lie
+// from `begin` on, and those of the batch. What no ray hits falls out.
+RS_GROUP_INLINE void group_order_rows(__local ForwardMemory* memory,
+                                      const GroupCandidates* candidates,
+                                      const int lane,
+                                      const int begin,
+                                      const int waiting,
+                                      const int total) {
+  __local WaitingRows* w = &memory->waiting;
+  // One number after the other: a work-item keeps few of them at a time. Those without a row take
+  // part with the last one, which they put nowhere.
+  int to[RS_WAITING_EACH];
+  uint moved[RS_WAITING_EACH];
+#pragma unroll
+  for (int n = 0; n < RS_WAITING_EACH; ++n) {
+    const int i = group_waiting_row(lane, n, total);
+    const float key = group_waiting_key(memory, begin, waiting, i);
+    const int others = lane + n * GROUP < total && key < INFINITY ? total : 0;
+    int place = others > 0 ? 0 : -1;
+    for (int j = 0; j < others; ++j) {
+      const float other = group_waiting_key(memory, begin, waiting, j);
+      place += other < key || (other == key && j < i);
+    }
+    to[n] = place;
+    moved[n] = i < waiting ? w->candidate[begin + i]
+                           : memory->queue[(candidates->taken + i - waiting) % RS_GROUP_QUEUE];
+  }
+  rs_group_barrier();
+#pragma unroll
+  for (int n = 0; n < RS_WAITING_EACH; ++n) {
+    const int i = group_waiting_row(lane, n, total);
+    if (to[n] >= 0) w->candidate[to[n]] = moved[n];
+    moved[n] = i < waiting ? as_uint(w->last_key[begin + i]) : memory->found_last[i - waiting];
+  }
+  rs_group_barrier();
+#pragma unroll
+  for (int n = 0; n < RS_WAITING_EACH; ++n) {
+    const int i = group_waiting_row(lane, n, total);
+    if (to[n] >= 0) w->last_key[to[n]] = as_float(moved[n]);
+    moved[n] = as_uint(group_waiting_key(memory, begin, waiting, i));
+  }
+  rs_group_barrier();
+#pragma unroll
+  for (int n = 0; n < RS_WAITING_EACH; ++n) {
+    if (to[n] >= 0) w->first_key[to[n]] = as_float(moved[n]);
+  }
+  rs_group_barrier();
+}
+
+// Settles the open rows of the slots `closing`, which have their places in the stream.
+RS_GROUP_INLINE void group_settle_rows(__local OpenRows* rows,
+                                       const int lane,
+                                       uint closing,
+                                       __global const RsLine* restrict lines,
+                                       const float min_transmittance,
+                                       const OwnRows* own,
+                                       RowProgress* progress,
+                                       PacketState* p,
+                                       const HitStream* stream) {
+  for (; closing != 0; closing &= closing - 1)
+    group_settle(rows, own, rs_lowest_bit(closing), lane, lines, min_transmittance, p,
+                 &progress->settled, stream);
+}
+
+// Opens the nearest row that waits, which is the r-th: the open ones that lie before it settle,
+// with the others it is compared. False where no slot is free.
+RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
+                                    const int lane,
+                                    const int r,
+                                    __global const RsLine* restrict lines,
+                                    __global const uint* restrict references,
+                                    __global const float2* restrict limits,
+                                    const float min_transmittance,
+                                    const int alive,
+                                    OwnRows* own,
+                                    RowProgress* progress,
+                                    PacketState* p,
+                                    HitStream* stream) {
+  __local OpenRows* rows = &memory->open;
+  __local const WaitingRows* w = &memory->waiting;
+  const float first_key = w->first_key[r];
+  const uint k = w->candidate[r];
+  const uint reference = references[k];
+  const PacketHit hit = packet_hit(p, lines, reference, limits[k].y, alive);
+  // Compared as integers (keys are not negative), less one where an equal key of a Gaussian with a
+  // higher index counts as farther.
+  const int order = as_int(hit.key) & 0x7fffffff;
+  uint closing = 0;
+  float before = 1.0f;
+  RS_TALLY(p, RS_TALLY_OPENED, 1);
+  RS_TALLY(p, RS_TALLY_COMPARED, popcount(progress->open));
+  for (uint rest = progress->open; rest != 0; rest &= rest - 1) {
+    const uint other = rs_lowest_bit(rest);
+    if (rows->last_key[other] < first_key) {
+      closing |= 1u << other;
+      continue;
+    }
+    const bool nearer = order - (reference < rows->reference[other] ? 1 : 0) <
+                        as_int(rs_row_get(rows->key, own->key, other, lane));
+    if (nearer) {
+      const float other_before = rs_row_get(rows->before, own->before, other, lane);
+      rs_row_set(rows->before, own->before, other, lane, other_before - other_before * hit.alpha);
+    } else {
+      before -= before * rs_row_get(rows->alpha, own->alpha, other, lane);
+    }
+  }
+  const uint free = ~(progress->open | progress->closed) & RS_ALL_SLOTS;
+  const bool fits = free != 0;
+  const uint slot = fits ? rs_lowest_bit(free) : 0;
+  const uint settling = (uint)popcount(closing);
+  if (lane == 0 && fits) {
+#if KEEP_HITS
+    group_push_rows(memory, closing, progress->settled_rows, stream);
+#endif
+    rows->last_key[slot] = w->last_key[r];
+    rows->reference[slot] = reference;
+    rows->settled[slot] = progress->settled_rows + settling;
+  }
+  rs_group_barrier();
+  group_settle_rows(rows, lane, fits ? closing : 0, lines, min_transmittance, own, progress, p,
+                    stream);
+  progress->settled_rows += settling;
+  progress->open = (progress->open & ~closing) | 1u << slot;
+  progress->closed = closing;
+  rs_row_set(rows->key, own->key, slot, lane, as_float(order));
+  rs_row_set(rows->alpha, own->alpha, slot, lane, hit.alpha);
+  rs_row_set(rows->before, own->before, slot, lane, before * progress->settled);
+  return fits;
+}
+
 // Traces the rays that are `traced`. False when they need more rows at once than there is room for,
 // or a ray has more than max_hits hits: fewer rays need less room, and group_passes.h has no such
 // limits. Work-item 0 alone pushes rows into its stream; all set them.
@@ -184,12 +384,8 @@ RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
                                    const int max_hits,
                                    PacketState* p,
                                    HitStream* stream) {
-  __local OpenRows* rows = &memory->open;
   OwnRows own;
-  float settled = 1.0f;
-  uint settled_rows = 0;
-  uint open = 0;    // slots that are taken, a bit each
-  uint closed = 0;  // of the last row: others may still read of them
+  RowProgress progress = {1.0f, 0, 0, 0};
   int alive = traced ? p->valid : 0;
   candidates->read = candidates->begin;
   candidates->queued = candidates->taken = 0;
@@ -201,54 +397,12 @@ RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
     const int queued = (int)(candidates->queued - candidates->taken);
     const int batch = min(min(queued, RS_GROUP_BATCH), WAITING - waiting);
     fits = batch > 0 || queued == 0;
-#if SUBGROUP
-    rs_group_barrier();
-#else
-    if (lane < RS_GROUP_BATCH) {
-      memory->found_first[lane] = as_uint(INFINITY);
-      memory->found_last[lane] = 0;
-    }
-    if (lane == 0) memory->alive = 0;
-    rs_group_barrier();
-#endif
-    for (int j = 0; j < batch; ++j) {
-      const uint k = memory->queue[(candidates->taken + j) % RS_GROUP_QUEUE];
-      const PacketHit hit = packet_hit(p, lines, references[k], limits[k].y, alive);
-      // Keys are not negative: their bits are in order.
-      const uint key = as_uint(hit.key) & 0x7fffffff;
-#if SUBGROUP
-      const uint nearest = sub_group_reduce_min(hit.hit ? key : as_uint(INFINITY));
-      const uint farthest = sub_group_reduce_max(hit.hit ? key : 0u);
-      if (lane == 0) {
-        memory->found_first[j] = nearest;
-        memory->found_last[j] = farthest;
-      }
-#else
-      if (hit.hit) {
-        atomic_min(&memory->found_first[j], key);
-        atomic_max(&memory->found_last[j], key);
-      }
-#endif
-    }
+    const bool some_alive =
+        group_test_batch(memory, candidates, lane, batch, lines, references, limits, alive, p);
     RS_TALLY(p, RS_TALLY_ROUNDS, 1);
     RS_TALLY(p, RS_TALLY_TESTED, batch);
-#if SUBGROUP
-    const bool some_alive = sub_group_any(alive != 0);
-#else
-    if (alive) atomic_or(&memory->alive, 1u);
-#endif
-    float bound = INFINITY;
-    if (queued > batch) {
-      bound = limits[memory->queue[(candidates->taken + batch) % RS_GROUP_QUEUE]].x;
-    } else if (candidates->read < candidates->end) {
-      bound = limits[candidates->read].x;
-    }
-    rs_group_barrier();
-#if !SUBGROUP
-    const bool some_alive = memory->alive != 0;
-#endif
+    const float bound = group_bound(memory, candidates, batch, limits);
     goes_on = some_alive && bound < INFINITY;
-    // Every row to the place that its nearest key has among all; what no ray hits has none.
     const int total = waiting + batch;
     int found = 0, ready = 0;
     for (int i = 0; i < total; ++i) {
@@ -259,110 +413,23 @@ RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
     if (!some_alive) ready = 0;
     RS_TALLY(p, RS_TALLY_FOUND, found - waiting);
     RS_TALLY(p, RS_TALLY_ORDERED, total * (1 + (total + GROUP - 1) / GROUP));
-    __local WaitingRows* w = &memory->waiting;
-    // One number after the other: a work-item keeps few of them at a time. Those without a row take
-    // part with the last one, which they put nowhere.
-    int to[RS_WAITING_EACH];
-    uint moved[RS_WAITING_EACH];
-#pragma unroll
-    for (int n = 0; n < RS_WAITING_EACH; ++n) {
-      const int i = group_waiting_row(lane, n, total);
-      const float key = group_waiting_key(memory, begin, waiting, i);
-      const int others = lane + n * GROUP < total && key < INFINITY ? total : 0;
-      int place = others > 0 ? 0 : -1;
-      for (int j = 0; j < others; ++j) {
-        const float other = group_waiting_key(memory, begin, waiting, j);
-        place += other < key || (other == key && j < i);
-      }
-      to[n] = place;
-      moved[n] = i < waiting ? w->candidate[begin + i]
-                             : memory->queue[(candidates->taken + i - waiting) % RS_GROUP_QUEUE];
-    }
-    rs_group_barrier();
-#pragma unroll
-    for (int n = 0; n < RS_WAITING_EACH; ++n) {
-      const int i = group_waiting_row(lane, n, total);
-      if (to[n] >= 0) w->candidate[to[n]] = moved[n];
-      moved[n] = i < waiting ? as_uint(w->last_key[begin + i]) : memory->found_last[i - waiting];
-    }
-    rs_group_barrier();
-#pragma unroll
-    for (int n = 0; n < RS_WAITING_EACH; ++n) {
-      const int i = group_waiting_row(lane, n, total);
-      if (to[n] >= 0) w->last_key[to[n]] = as_float(moved[n]);
-      moved[n] = as_uint(group_waiting_key(memory, begin, waiting, i));
-    }
-    rs_group_barrier();
-#pragma unroll
-    for (int n = 0; n < RS_WAITING_EACH; ++n) {
-      if (to[n] >= 0) w->first_key[to[n]] = as_float(moved[n]);
-    }
-    rs_group_barrier();
+    group_order_rows(memory, candidates, lane, begin, waiting, total);
     candidates->taken += batch;
-
-    for (int r = 0; r < ready && fits; ++r) {
-      const float first_key = w->first_key[r];
-      const uint k = w->candidate[r];
-      const uint reference = references[k];
-      const PacketHit hit = packet_hit(p, lines, reference, limits[k].y, alive);
-      // Compared as integers (keys are not negative), less one where an equal key of a Gaussian
-      // with a higher index counts as farther.
-      const int order = as_int(hit.key) & 0x7fffffff;
-      uint closing = 0;
-      float before = 1.0f;
-      RS_TALLY(p, RS_TALLY_OPENED, 1);
-      RS_TALLY(p, RS_TALLY_COMPARED, popcount(open));
-      for (uint rest = open; rest != 0; rest &= rest - 1) {
-        const uint other = rs_lowest_bit(rest);
-        if (rows->last_key[other] < first_key) {
-          closing |= 1u << other;
-          continue;
-        }
-        const bool nearer = order - (reference < rows->reference[other] ? 1 : 0) <
-                            as_int(rs_row_get(rows->key, own.key, other, lane));
-        if (nearer) {
-          const float other_before = rs_row_get(rows->before, own.before, other, lane);
-          rs_row_set(rows->before, own.before, other, lane,
-                     other_before - other_before * hit.alpha);
-        } else {
-          before -= before * rs_row_get(rows->alpha, own.alpha, other, lane);
-        }
-      }
-      const uint free = ~(open | closed) & RS_ALL_SLOTS;
-      fits = free != 0;
-      const uint slot = fits ? rs_lowest_bit(free) : 0;
-      const uint settling = (uint)popcount(closing);
-      if (lane == 0 && fits) {
-#if KEEP_HITS
-        group_push_rows(memory, closing, settled_rows, stream);
-#endif
-        rows->last_key[slot] = w->last_key[r];
-        rows->reference[slot] = reference;
-        rows->settled[slot] = settled_rows + settling;
-      }
-      rs_group_barrier();
-      for (uint rest = fits ? closing : 0; rest != 0; rest &= rest - 1)
-        group_settle(rows, &own, rs_lowest_bit(rest), lane, lines, min_transmittance, p, &settled,
-                     stream);
-      settled_rows += settling;
-      open = (open & ~closing) | 1u << slot;
-      closed = closing;
-      rs_row_set(rows->key, own.key, slot, lane, as_float(order));
-      rs_row_set(rows->alpha, own.alpha, slot, lane, hit.alpha);
-      rs_row_set(rows->before, own.before, slot, lane, before * settled);
-    }
+    for (int r = 0; r < ready && fits; ++r)
+      fits = group_open_row(memory, lane, r, lines, references, limits, min_transmittance, alive,
+                            &own, &progress, p, stream);
     begin = ready;
     waiting = found - ready;
     alive &= RS_MASK(p->T >= min_transmittance);
   }
   RS_TALLY(p, RS_TALLY_BOXES, (candidates->read - candidates->begin + GROUP - 1) / GROUP);
+  const uint left = fits ? progress.open : 0;
 #if KEEP_HITS
-  if (lane == 0 && fits) group_push_rows(memory, open, settled_rows, stream);
+  if (lane == 0) group_push_rows(memory, left, progress.settled_rows, stream);
 #endif
   rs_group_barrier();
-  for (uint rest = fits ? open : 0; rest != 0; rest &= rest - 1)
-    group_settle(rows, &own, rs_lowest_bit(rest), lane, lines, min_transmittance, p, &settled,
-                 stream);
+  group_settle_rows(&memory->open, lane, left, lines, min_transmittance, &own, &progress, p,
+                    stream);
   return rs_group_bits(memory->words, lane, !fits || (traced && p->hits > max_hits)) == 0;
 }
 

@@ -56,12 +56,12 @@ void load_pixels(Pixels* p,
 
 // What a pixel gains from each unit of T alpha that a Gaussian blends.
 fv rs_projected(const Pixels* p, __global const float* v, const PacketMeeting* m) {
-  const fv colour = v[13] * p->gR + v[14] * p->gG + v[15] * p->gB + p->gA;
+  const fv color = v[13] * p->gR + v[14] * p->gG + v[15] * p->gB + p->gA;
 #if DEPTH_GRADIENT
-  return colour + p->gS * (m->along / m->direction2);
+  return color + p->gS * (m->along / m->direction2);
 #else
   (void)m;
-  return colour;
+  return color;
 #endif
 }
 

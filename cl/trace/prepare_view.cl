@@ -104,11 +104,11 @@ fv least_peak(const ViewGaussian* g, const fv Q, const fv szz, const fv whitened
 
 #if GROUP
 // Adds the terms of RS_STAGE floats of the SH coefficients from number `column` on.
-void add_colour(const int column,
-                __global const float* sh,
-                const float* basis,
-                __local StagedRows* staged,
-                float* sum) {
+void add_color(const int column,
+               __global const float* sh,
+               const float* basis,
+               __local StagedRows* staged,
+               float* sum) {
   const int count = min(3 * RS_SH_FUNCTIONS - column, RS_STAGE);
   if (count <= 0) return;
   stage_fetch(sh, 3 * SH_COEFFICIENTS, column, count, staged);
@@ -121,26 +121,26 @@ void add_colour(const int column,
 }
 
 // Writes the colours of the visible Gaussians; `sh` starts at the group's first.
-void write_colour(const ViewGaussian* g,
-                  __global const float* sh,
-                  __local StagedRows* staged,
-                  float* colour) {
+void write_color(const ViewGaussian* g,
+                 __global const float* sh,
+                 __local StagedRows* staged,
+                 float* color) {
   const float* d = g->offset;
   const float inverse = 1.0f / sqrt(fmax(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], 1e-30f));
   float basis[RS_SH_FUNCTIONS];
   rs_sh_basis(SH_DEGREE, d[0] * inverse, d[1] * inverse, d[2] * inverse, basis);
   float sum[3] = {0.5f, 0.5f, 0.5f};
-  add_colour(0, sh, basis, staged, sum);
-  add_colour(RS_STAGE, sh, basis, staged, sum);
-  add_colour(2 * RS_STAGE, sh, basis, staged, sum);
-  add_colour(3 * RS_STAGE, sh, basis, staged, sum);
-  add_colour(4 * RS_STAGE, sh, basis, staged, sum);
-  add_colour(5 * RS_STAGE, sh, basis, staged, sum);
-  add_colour(6 * RS_STAGE, sh, basis, staged, sum);
-  for (int j = 0; j < 3; ++j) colour[j] = fmin(fmax(sum[j], 0.0f), RS_MAX_COLOR);
+  add_color(0, sh, basis, staged, sum);
+  add_color(RS_STAGE, sh, basis, staged, sum);
+  add_color(2 * RS_STAGE, sh, basis, staged, sum);
+  add_color(3 * RS_STAGE, sh, basis, staged, sum);
+  add_color(4 * RS_STAGE, sh, basis, staged, sum);
+  add_color(5 * RS_STAGE, sh, basis, staged, sum);
+  add_color(6 * RS_STAGE, sh, basis, staged, sum);
+  for (int j = 0; j < 3; ++j) color[j] = fmin(fmax(sum[j], 0.0f), RS_MAX_COLOR);
 }
 #else
-void write_colour(const ViewGaussian* g, __global const float* sh, fv* colour) {
+void write_color(const ViewGaussian* g, __global const float* sh, fv* color) {
   const fv* d = g->offset;
   const fv inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (fv)(1e-30f)));
   fv basis[RS_SH_FUNCTIONS];
@@ -154,9 +154,9 @@ void write_colour(const ViewGaussian* g, __global const float* sh, fv* colour) {
     b += basis[k] * c[3 * k + 2];
   }
   const fv most = (fv)(RS_MAX_COLOR);
-  colour[0] = smaller(larger(r, (fv)(0.0f)), most);
-  colour[1] = smaller(larger(green, (fv)(0.0f)), most);
-  colour[2] = smaller(larger(b, (fv)(0.0f)), most);
+  color[0] = smaller(larger(r, (fv)(0.0f)), most);
+  color[1] = smaller(larger(green, (fv)(0.0f)), most);
+  color[2] = smaller(larger(b, (fv)(0.0f)), most);
 }
 #endif
 
@@ -245,11 +245,11 @@ prepare_view(const uint begin,
 #if GROUP
   for (int k = 0; k < 13; ++k) staged.rows[lane][k] = v[k];
   stage_store(&staged, 0, 13, (__global float*)(lines + first), 16, 0, 0);
-  write_colour(&g, sh + first * 3 * SH_COEFFICIENTS, &staged, v + 13);
+  write_color(&g, sh + first * 3 * SH_COEFFICIENTS, &staged, v + 13);
   for (int k = 0; k < 3; ++k) staged.rows[lane][k] = v[13 + k];
   stage_store(&staged, 0, 3, (__global float*)(lines + first), 16, 13, 0);
 #else
-  write_colour(&g, sh + i * 3 * SH_COEFFICIENTS, v + 13);
+  write_color(&g, sh + i * 3 * SH_COEFFICIENTS, v + 13);
   store_columns(v, 16, (__global float*)(lines + i), 16);
 #endif
 }

@@ -9,11 +9,11 @@
 #include "trace/ray_block.h"
 
 // Room for hits, a multiple of LANES and at least 4 * LANES.
-#ifndef PENDING
-#define PENDING 64
+#ifndef RAY_HITS
+#define RAY_HITS 64
 #endif
 // Vectors of an evaluation begin anywhere and reach over the last entry.
-#define RS_PENDING_ROOM (PENDING + LANES)
+#define RS_PENDING_ROOM (RAY_HITS + LANES)
 
 typedef union {
   fv v[RS_PENDING_ROOM / LANES];
@@ -21,8 +21,8 @@ typedef union {
 } PendingFloats;
 
 typedef union {
-  iv v[PENDING / LANES];
-  int s[PENDING];
+  iv v[RAY_HITS / LANES];
+  int s[RAY_HITS];
 } PendingInts;
 
 typedef struct {
@@ -35,11 +35,11 @@ typedef struct {
 #if ADAPTIVE_RADIUS
   float half_quantile[RS_PENDING_ROOM];
 #endif
-  uint slot[PENDING];  // block times LANES plus lane
-  uint index[PENDING];
+  uint slot[RAY_HITS];  // block times LANES plus lane
+  uint index[RAY_HITS];
   // The colour of SH degree 0, read when the hit is found, so that blending never waits for memory.
-  float4 color[PENDING];
-  ushort order[PENDING];  // filled by pending_sort
+  float4 color[RAY_HITS];
+  ushort order[RAY_HITS];  // filled by pending_sort
   int size;
   int evaluated;  // entries before this one are
 } Pending;
@@ -200,8 +200,8 @@ void pending_cut(Pending* pending, float end) {
 
 // Keeps the entries order[first..first + count) and returns the product of their 1 - alpha.
 float pending_keep(Pending* pending, int first, int count) {
-  uint stays[PENDING / 32 + 1];
-  for (int k = 0; k < PENDING / 32 + 1; ++k) stays[k] = 0;
+  uint stays[RAY_HITS / 32 + 1];
+  for (int k = 0; k < RAY_HITS / 32 + 1; ++k) stays[k] = 0;
   for (int k = first; k < first + count; ++k) {
     const uint i = pending->order[k];
     stays[i / 32] |= 1u << i % 32;

@@ -154,10 +154,10 @@ RS_INLINE void walk_ray(
           hopeful *= 1.0f - block_opacity(block, lane);
         }
         const int room = state->room;
-        if (!(hopeful < scene->min_transmittance) && pending.size <= min(room, PENDING - LANES))
+        if (!(hopeful < scene->min_transmittance) && pending.size <= min(room, RAY_HITS - LANES))
           continue;
         remaining = hopeful = pending_evaluate(&pending, &range, half_quantile, remaining);
-        const bool full = pending.size > PENDING - LANES;
+        const bool full = pending.size > RAY_HITS - LANES;
         const bool enough = remaining < scene->min_transmittance || pending.size > room;
         if (!full && !(enough && 4 * (pending.size - sorted) > pending.size)) continue;
         const int end = sort_to_end(scene, state, &pending, &remaining);
@@ -171,7 +171,7 @@ RS_INLINE void walk_ray(
             if (pending.key.s[pending.order[count]] > key) break;
           }
         }
-        if (count <= PENDING - LANES) {
+        if (count <= RAY_HITS - LANES) {
           if (end > 0) pending_cut(&pending, range.end);
         } else {
           const float bound = RS_BOUND_SLACK * walk_bound(&walk);
@@ -180,8 +180,8 @@ RS_INLINE void walk_ray(
           blend_hits(scene, ray, basis, &pending, ready, state);
           if (state->stopped) break;
           int kept = count - ready;
-          if (kept > PENDING / 2) {
-            kept = PENDING / 2;
+          if (kept > RAY_HITS / 2) {
+            kept = RAY_HITS / 2;
             const int last = pending.order[ready + kept - 1];
             range.end = pending.key.s[last];
             range.end_index = pending.index[last];

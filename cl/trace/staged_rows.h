@@ -15,8 +15,13 @@
 // Odd, so that the same column of all rows lies on all banks, and so many that with `present` a row
 // takes 64 bytes: 16 groups of 64 fit 64 kB, four waves a SIMD of gfx9.
 #define RS_COLUMNS 15
-// SH coefficients at a time: whole colours.
+// SH coefficients at a time: whole colours. Kernels write a call for each of up to seven such
+// stages: in a loop their column would be no constant, and what it indexes would leave the
+// registers.
 #define RS_STAGE 12
+#if defined(SH_COEFFICIENTS) && 3 * SH_COEFFICIENTS > 7 * RS_STAGE
+#error "seven stages do not hold all SH coefficients"
+#endif
 
 typedef struct {
   float rows[GROUP][RS_COLUMNS];

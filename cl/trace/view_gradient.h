@@ -102,7 +102,7 @@ void general_gradient(const ViewGaussian* g, const fv* v, const iv general, View
 }
 
 // Gradients of what a line with gradient v, after take_shape_gradient(), was made of.
-void line_gradient(
+void view_gradient(
     const ViewGaussian* g, const fv* v, const iv touched, const iv kind, ViewGradient* out) {
   projective_gradient(g, v, out);
   const iv general = kind == RS_LINE_GENERAL;
@@ -174,22 +174,22 @@ typedef struct {
   fv inverse;  // 1 / |m - c|
   fv basis[RS_SH_FUNCTIONS];
   fv value[3];  // of R, G, B before they are clamped
-} ColourGradient;
+} ColorGradient;
 
 // Finds the direction of the colour from out->n = m - c.
-void colour_direction(ColourGradient* out) {
+void color_direction(ColorGradient* out) {
   fv* d = out->n;
   out->inverse = 1.0f / sqrt(larger(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], (fv)(1e-30f)));
 #pragma unroll
   for (int j = 0; j < 3; ++j) d[j] = d[j] * out->inverse;
 }
 
-void colour_gradient(
-    const fv* offset, const fv* line, const fv* v, const iv touched, ColourGradient* out) {
+void color_gradient(
+    const fv* offset, const fv* line, const fv* v, const iv touched, ColorGradient* out) {
   const fv zero = (fv)(0.0f);
 #pragma unroll
   for (int j = 0; j < 3; ++j) out->n[j] = offset[j];
-  colour_direction(out);
+  color_direction(out);
 #pragma unroll
   for (int j = 0; j < 3; ++j) {
     out->value[j] = (touched & RS_COLOR_PASSES(line[13 + j], v[13 + j])) ? v[13 + j] : zero;
@@ -199,17 +199,17 @@ void colour_gradient(
 
 // The share of the mean's gradient that comes from the colour; `along` holds per function the
 // product of its coefficients with that gradient.
-void direction_gradient(const ColourGradient* colour, const fv* along, fv* mean) {
-  const fv* n = colour->n;
+void direction_gradient(const ColorGradient* color, const fv* along, fv* mean) {
+  const fv* n = color->n;
   fv gn[3];
   rs_sh_gradient(SH_DEGREE, n[0], n[1], n[2], along, gn);
   const fv radial = gn[0] * n[0] + gn[1] * n[1] + gn[2] * n[2];
 #pragma unroll
-  for (int j = 0; j < 3; ++j) mean[j] = (gn[j] - radial * n[j]) * colour->inverse;
+  for (int j = 0; j < 3; ++j) mean[j] = (gn[j] - radial * n[j]) * color->inverse;
 }
 
 typedef struct {
-  fv mean[3];  // holds the share of the colour before
+  fv mean[3];  // holds the share of the color before
   fv quaternion[4];
   fv scale[3];
   fv opacity;

@@ -164,7 +164,7 @@ __kernel void adam_step(__global float* parameter,
 }
 
 // Row i of `to`, `width` floats, becomes row source[i] of `from`, or zeros where source[i] is
-// 0xffffffff. Launch: a work-item for every `span` floats of the new rows, which are in one row.
+// RS_NO_SOURCE. Launch: a work-item for every `span` floats of the new rows, which are in one row.
 __kernel void remap_rows(const __global float* from,
                          __global float* to,
                          const __global uint* source,
@@ -175,5 +175,5 @@ __kernel void remap_rows(const __global float* from,
   if (first >= (size_t)count * width) return;
   const uint old = source[first / width];
   const __global float* row = from + (size_t)old * width + first % width;
-  for (uint k = 0; k < span; ++k) to[first + k] = old == 0xffffffffu ? 0.0f : row[k];
+  for (uint k = 0; k < span; ++k) to[first + k] = old == RS_NO_SOURCE ? 0.0f : row[k];
 }

@@ -6,17 +6,11 @@
 
 #include "shared/activation.h"
 #include "shared/layout.h"
+#include "shared/train_layout.h"
 
 #ifndef SH_COEFFICIENTS
 #define SH_COEFFICIENTS 16
 #endif
-
-// What becomes of a Gaussian in the new set; host/train/density_plan.hpp names the same values.
-#define ROLE_KEEP 0u
-#define ROLE_CLONE 1u
-#define ROLE_FIRST_CHILD 2u
-#define ROLE_FIRST_HALF 4u
-#define ROLE_PART 6u
 
 // Halves of a split along the longest axis (as "Improved-GS", with the constants of LichtFeld
 // Studio's IGS+, arXiv 2603.08661): offset in standard deviations, what is left of the longest and
@@ -137,24 +131,24 @@ kernel void gather_gaussians(uint count,
   const float4 quaternion = vload4(from, quaternions);
   float3 scale = vload3(from, scales);
   float opacity = opacities[from];
-  if (role[i] == ROLE_PART) {
+  if (role[i] == RS_ROLE_PART) {
     const float3 s = scales_of(scale);
     mean += rotate(quaternion, s * child_offset(key_low, key_high, (uint)from, i));
-  } else if (role[i] >= ROLE_FIRST_HALF) {
+  } else if (role[i] >= RS_ROLE_FIRST_HALF) {
     float3 s = scales_of(scale);
     const float longest = fmax(s.x, fmax(s.y, s.z));
     const float3 axis = s.x == longest   ? (float3)(1.0f, 0.0f, 0.0f)
                         : s.y == longest ? (float3)(0.0f, 1.0f, 0.0f)
                                          : (float3)(0.0f, 0.0f, 1.0f);
-    const float side = role[i] == ROLE_FIRST_HALF ? HALF_OFFSET : -HALF_OFFSET;
+    const float side = role[i] == RS_ROLE_FIRST_HALF ? HALF_OFFSET : -HALF_OFFSET;
     mean += rotate(quaternion, side * longest * axis);
     s *= HALF_OTHERS + (HALF_LONGEST - HALF_OTHERS) * axis;
     scale = parameters_of_scales(s);
     opacity = half_opacity(opacity);
-  } else if (role[i] >= ROLE_FIRST_CHILD) {
+  } else if (role[i] >= RS_ROLE_FIRST_CHILD) {
     const float3 s = scales_of(scale);
     mean += rotate(quaternion,
-                   s * child_offset(key_low, key_high, (uint)from, role[i] - ROLE_FIRST_CHILD));
+                   s * child_offset(key_low, key_high, (uint)from, role[i] - RS_ROLE_FIRST_CHILD));
     scale = parameters_of_scales(s / split_factor);
   }
   vstore3(mean, to, new_means);

@@ -5,9 +5,13 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <optional>
 
 #include "bench/bench_cases.hpp"
 #include "bench/ceilings.hpp"
+#include "bench/kept_failure.hpp"
 #include "bench/operation.hpp"
 #include "bench/scene_bench.hpp"
 
@@ -15,6 +19,7 @@ namespace raysplats {
 namespace {
 
 constexpr const char* kNoTime = "it would not have ended in time";
+constexpr const char* kLimits = "the device's limits";
 
 std::uint64_t peak_process_bytes() {
   rusage usage{};
@@ -22,33 +27,67 @@ std::uint64_t peak_process_bytes() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
+// Does `work`; where failures are kept, one is the reason why `id` is left out.
+void keep_going(const BenchOptions& options,
+                const std::string& id,
+                BenchReport& report,
+                const std::function<void()>& work) {
+  if (!options.keep_failures) return work();
+  const std::string failure = failure_of(work);
+  if (!failure.empty()) report.left_out.push_back({id, failure, true});
+}
+
+void add_row(const BenchStage& stage,
+             const StageSamples& samples,
+             const BenchModel& model,
+             const BenchOptions& options,
+             BenchReport& report) {
+  const std::string id = id_of(stage.name, model.name, model.gaussians.size());
+  if (!samples.failure.empty()) {
+    report.left_out.push_back({id, samples.failure, true});
+  } else if (samples.seconds.empty()) {
+    report.left_out.push_back({id, samples.lacking.empty() ? kNoTime : samples.lacking});
+  } else {
+    keep_going(options, id, report, [&] {
+      report.rows.push_back(row_of(stage, samples, model.name, model.gaussians.size()));
+    });
+  }
+}
+
+// Measures the operations from number `first` on. Where one fails and that is kept, the number of
+// the next one.
+std::optional<std::size_t> measure_from(std::size_t first,
+                                        Context& context,
+                                        const BenchModel& model,
+                                        const BenchOptions& options,
+                                        const IdFilter& keep,
+                                        BenchReport& report) {
+  SceneBench bench(context, model, options);
+  std::vector<BenchOperation> operations =
+      selected(bench.operations(), keep, model.name, model.gaussians.size());
+  operations.erase(operations.begin(), operations.begin() + static_cast<std::ptrdiff_t>(first));
+  if (operations.empty()) return std::nullopt;
+  const auto out_of_time = [&] {
+    return options.deadline && std::chrono::steady_clock::now() >= *options.deadline;
+  };
+  const auto samples = run_operations(context, operations, options.repeat, options.min_seconds,
+                                      out_of_time, options.keep_failures);
+  for (std::size_t i = 0; i < operations.size(); ++i) {
+    for (std::size_t k = 0; k < operations[i].stages.size(); ++k)
+      add_row(operations[i].stages[k], samples[i][k], model, options, report);
+    if (!samples[i].front().failure.empty()) return first + i + 1;
+  }
+  return std::nullopt;
+}
+
+// What has failed may have left half of what the others share: they get a bench of their own.
 void measure(Context& context,
              const BenchModel& model,
              const BenchOptions& options,
              const IdFilter& keep,
              BenchReport& report) {
-  const std::size_t size = model.gaussians.size();
-  SceneBench bench(context, model, options);
-  const std::vector<BenchOperation> operations =
-      selected(bench.operations(), keep, model.name, size);
-  if (operations.empty()) return;
-  const auto out_of_time = [&] {
-    return options.deadline && std::chrono::steady_clock::now() >= *options.deadline;
-  };
-  const auto samples =
-      run_operations(context, operations, options.repeat, options.min_seconds, out_of_time);
-  for (std::size_t i = 0; i < operations.size(); ++i) {
-    for (std::size_t k = 0; k < operations[i].stages.size(); ++k) {
-      const BenchStage& stage = operations[i].stages[k];
-      if (samples[i][k].seconds.empty()) {
-        const std::string& lacking = samples[i][k].lacking;
-        report.left_out.push_back(
-            {id_of(stage.name, model.name, size), lacking.empty() ? kNoTime : lacking});
-      } else {
-        report.rows.push_back(row_of(stage, samples[i][k], model.name, size));
-      }
-    }
-  }
+  std::optional<std::size_t> next = 0;
+  while (next) next = measure_from(*next, context, model, options, keep, report);
 }
 
 }  // namespace
@@ -99,7 +138,8 @@ BenchReport run_bench(Context& context, const BenchOptions& options, const Bench
   require_rows(options, model);
   const IdFilter keep = id_filter(options.filter);
   BenchReport report = bench_header(context, options, model);
-  report.ceilings.fma_flops_per_second = measure_fma_rate(context);
+  keep_going(options, kLimits, report,
+             [&] { report.ceilings.fma_flops_per_second = measure_fma_rate(context); });
   if (model != nullptr) {
     spdlog::info("{}: {} Gaussians", model->name, model->gaussians.size());
     measure(context, *model, options, keep, report);
@@ -112,9 +152,11 @@ BenchReport run_bench(Context& context, const BenchOptions& options, const Bench
   report.peak_process_bytes = peak_process_bytes();
   report.peak_device_bytes = context.peak_allocated_bytes();
   // After the rows, because its buffers would count as theirs.
-  report.ceilings.copy_bytes_per_second = measure_copy_bandwidth(context);
-  report.ceilings.fma_flops_per_second =
-      std::max(report.ceilings.fma_flops_per_second, measure_fma_rate(context));
+  keep_going(options, kLimits, report, [&] {
+    report.ceilings.copy_bytes_per_second = measure_copy_bandwidth(context);
+    report.ceilings.fma_flops_per_second =
+        std::max(report.ceilings.fma_flops_per_second, measure_fma_rate(context));
+  });
   return report;
 }
 

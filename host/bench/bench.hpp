@@ -39,6 +39,8 @@ struct BenchOptions {
   std::uint64_t seed = 1;
   /// Nothing more is begun after this moment.
   std::optional<std::chrono::steady_clock::time_point> deadline;
+  /// What the device or a lack of memory makes fail is left out, with the error as reason.
+  bool keep_failures = false;
   TraceOptions trace;
 };
 

@@ -9,9 +9,9 @@
 
 #include "bench/bench_cases.hpp"
 #include "bench/cards.hpp"
+#include "bench/kept_failure.hpp"
 #include "bench/scene_bench.hpp"
 #include "device/device_json.hpp"
-#include "raysplats/error.hpp"
 
 namespace raysplats {
 namespace {
@@ -52,14 +52,33 @@ void add_speeds(const BenchReport& run, int width, int height, DeviceReport& rep
 // Counted by kernels of its own, which not every device can run.
 void add_model(Context& context, const BenchOptions& one, DeviceReport& report) {
   const BenchCase scene{one.scenes.front(), one.sizes.front()};
-  try {
+  const std::string failure = failure_of([&] {
     SceneBench bench(context, generated(scene, one), one);
     report.models.push_back(
         {scene.scene, scene.size, one.width, one.height, forecast_cards(bench.counts(true))});
-  } catch (const DeviceError& error) {
-    report.left_out.push_back(fmt::format("the model of speed of {}, {} Gaussians: {}", scene.scene,
-                                          scene.size, error.what()));
+  });
+  if (failure.empty()) return;
+  report.left_out.push_back(
+      fmt::format("the model of speed of {}, {} Gaussians: {}", scene.scene, scene.size, failure));
+}
+
+// Measures one scene of one size. False where nothing of it could be.
+bool add_run(Context& context, const BenchOptions& one, DeviceReport& report) {
+  const std::string failure = failure_of([&] { report.runs.push_back(run_bench(context, one)); });
+  if (!failure.empty()) {
+    report.left_out.push_back(fmt::format("{}, {} Gaussians, {}x{}: {}", one.scenes.front(),
+                                          one.sizes.front(), one.width, one.height, failure));
+    report.failed += bench_ids(one).size();
+    return false;
   }
+  const BenchReport& run = report.runs.back();
+  for (const std::string& line : left_out_lines(run))
+    report.left_out.push_back(fmt::format("{}x{}, {}", one.width, one.height, line));
+  report.failed += static_cast<std::size_t>(
+      std::count_if(run.left_out.begin(), run.left_out.end(),
+                    [](const BenchReport::LeftOut& row) { return row.failed; }));
+  add_speeds(run, one.width, one.height, report);
+  return true;
 }
 
 // The measured time of a row beside that of the cards.
@@ -129,7 +148,7 @@ DeviceReport make_device_report(Context& context,
   const Clock clock(context);
   DeviceReport report;
   report.device = context.device();
-  report.checks = run_self_test(context, options.trace);
+  report.checks = run_self_test(context, options.trace, true);
   std::vector<std::size_t> sizes = options.sizes;
   std::sort(sizes.begin(), sizes.end());
   for (const bool large : {false, true}) {
@@ -149,6 +168,7 @@ DeviceReport make_device_report(Context& context,
           continue;
         }
         BenchOptions one = options;
+        one.keep_failures = true;
         one.scenes = {scene};
         one.sizes = {size};
         one.width = width;
@@ -158,12 +178,9 @@ DeviceReport make_device_report(Context& context,
                        std::chrono::duration_cast<std::chrono::steady_clock::duration>(
                            std::chrono::duration<double>(most_seconds - clock.seconds()));
         const Clock run(context);
-        report.runs.push_back(run_bench(context, one));
-        for (const std::string& line : left_out_lines(report.runs.back()))
-          report.left_out.push_back(fmt::format("{}x{}, {}", width, height, line));
+        if (!add_run(context, one, report)) continue;
         before = run.measuring();
         size_before = size;
-        add_speeds(report.runs.back(), width, height, report);
         if (!large && clock.seconds() < most_seconds) add_model(context, one, report);
       }
     }
@@ -177,8 +194,10 @@ std::string device_report_text(const DeviceReport& report) {
   std::string out = fmt::format("{} ({}), {}\n", report.device.name,
                                 device_type_name(report.device.type), report.device.platform);
   for (const SelfTestCheck& check : report.checks) {
-    out += fmt::format("{:<40} {:>10.2e} of {:.0e} {}\n", check.name, check.error, check.limit,
-                       check.passed() ? "passed" : "FAILED");
+    out += check.failure.empty()
+               ? fmt::format("{:<40} {:>10.2e} of {:.0e} {}\n", check.name, check.error,
+                             check.limit, check.passed() ? "passed" : "FAILED")
+               : fmt::format("{:<40} FAILED: {}\n", check.name, check.failure);
   }
   for (const BenchReport& run : report.runs) {
     out += fmt::format("\n{}\n", run.options.at("resolution"));
@@ -200,6 +219,7 @@ std::string device_report_json(const DeviceReport& report) {
                       {"error", check.error},
                       {"limit", check.limit},
                       {"passed", check.passed()}});
+    if (!check.failure.empty()) checks.back()["failure"] = check.failure;
   }
   nlohmann::ordered_json runs = nlohmann::ordered_json::array();
   for (const BenchReport& run : report.runs)
@@ -215,10 +235,12 @@ std::string device_report_json(const DeviceReport& report) {
                                    {"training_iterations", speeds_json(report.iterations)},
                                    {"models", models},
                                    {"left_out", report.left_out},
+                                   {"failed", report.failed},
                                    {"compile_seconds", report.compile_seconds},
                                    {"seconds", report.seconds},
                                    {"runs", runs}};
-  return out.dump(2) + "\n";
+  // Errors hold what drivers say, which may be any bytes.
+  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace raysplats

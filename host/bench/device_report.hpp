@@ -39,6 +39,7 @@ struct DeviceReport {
   std::vector<Speed> iterations;      ///< of rows `iteration`
   std::vector<Model> models;          ///< of the runs at options' resolution
   std::vector<std::string> left_out;  ///< what, and why
+  std::size_t failed = 0;             ///< rows that are left out because they failed
   double compile_seconds = 0;
   double seconds = 0;  ///< of the whole
 
@@ -47,8 +48,9 @@ struct DeviceReport {
 
 /// Self-test, then all rows at options' resolution and views and iterations at 1600x1064, for every
 /// scene and size from the smallest on. What would by the sizes before take more than
-/// `most_seconds` in all is left out, and so are rows that have not begun by then. Needs a context
-/// with keep_launches; uses no network.
+/// `most_seconds` in all is left out, and so are rows that have not begun by then. What the device
+/// or a lack of memory makes fail is left out too, with the error, and the rest is measured. Needs
+/// a context with keep_launches; uses no network.
 DeviceReport make_device_report(Context& context,
                                 const BenchOptions& options,
                                 double most_seconds = 450.0);

@@ -40,6 +40,7 @@ DeviceVerdict examine(const DeviceInfo& device, const ContextOpener& open) {
                                 [](const SelfTestCheck& check) { return check.passed(); });
   } catch (const std::exception& error) {  // whatever its driver came up with
     verdict.text = fmt::format("fails: {}", error.what());
+    verdict.trouble = driver_trouble(device.platform);
   }
   return verdict;
 }
@@ -105,6 +106,10 @@ std::vector<std::string> advice_on(const Diagnosis& diagnosis) {
   const bool only_unwell = !diagnosis.devices.empty() && !diagnosis.any_works();
   for (const DeviceVerdict& verdict : diagnosis.devices) {
     if (verdict.works || !verdict.device.usable()) continue;
+    if (!verdict.trouble.empty()) {
+      advice.push_back(fmt::format("Device {} fails: {}", verdict.device.index, verdict.trouble));
+      continue;
+    }
     advice.push_back(fmt::format("Device {} is not to be trusted: update its driver ({}), {}",
                                  verdict.device.index, verdict.device.driver_version,
                                  only_unwell ? "or install pocl-opencl-icd to run on the CPU"

@@ -21,6 +21,7 @@ struct DeviceVerdict {
   DeviceInfo device;
   bool works = false;
   std::string text;            ///< "works", or what is wrong with it
+  std::string trouble;         ///< as driver_trouble() when the driver failed; else empty
   double seconds = 0;          ///< of the self-test, without compiling
   double compile_seconds = 0;  ///< of its kernels
   std::vector<SelfTestCheck> checks;

@@ -13,6 +13,7 @@
 #include "bench/processor_time.hpp"
 #include "bench/scene_bench.hpp"
 #include "raysplats/error.hpp"
+#include "util/clock.hpp"
 
 namespace raysplats {
 namespace {
@@ -24,10 +25,6 @@ constexpr std::size_t kMebi = std::size_t{1} << 20;
 // Sizes between which caches end.
 constexpr std::size_t kLevels[] = {32 << 10,   512 << 10,   2 * kMebi,  8 * kMebi,
                                    32 * kMebi, 128 * kMebi, 512 * kMebi};
-
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
 
 // What an operation and its stages took by the device's clock, and of it the processors' time.
 struct Spent {

@@ -5,16 +5,15 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <utility>
 
 #include "bench/bench_cases.hpp"
 #include "bench/scene_bench.hpp"
 #include "light/view_tracer.hpp"
+#include "scene/pixel_count.hpp"
 #include "trace/ray_tracer.hpp"
 #include "train/adam.hpp"
 #include "train/image_loss.hpp"
@@ -48,8 +47,7 @@ void add_step(Context& context,
   tracer.forward(gaussians, model.camera, true);
   out.push_back({way + "image", tracer.image().download()});
   CounterRng random(7, 1);
-  std::vector<std::uint32_t> photo(static_cast<std::size_t>(width) *
-                                   static_cast<std::size_t>(height));
+  std::vector<std::uint32_t> photo(pixel_count(width, height));
   for (std::uint32_t& pixel : photo) pixel = static_cast<std::uint32_t>(random.bits());
   Buffer<std::uint32_t> target(context, photo.size(), "photo");
   target.upload(photo);

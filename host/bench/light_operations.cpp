@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <memory>
-#include <utility>
 
 #include "bench/scene_state.hpp"
 #include "light/work.h"

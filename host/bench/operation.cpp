@@ -8,7 +8,9 @@
 #include <chrono>
 #include <exception>
 
+#include "bench/kept_failure.hpp"
 #include "raysplats/error.hpp"
+#include "util/clock.hpp"
 
 namespace raysplats {
 namespace {
@@ -16,10 +18,6 @@ namespace {
 constexpr const char* kWall = "wall";
 
 std::string counter_name(std::size_t stage) { return fmt::format("stage{}", stage); }
-
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
 
 // Runs the operation once and returns the host's seconds; adds each stage's seconds to `sums`.
 double run_once(Context& context, const BenchOperation& operation, std::vector<double>& sums) {
@@ -79,8 +77,10 @@ std::vector<std::vector<StageSamples>> run_operations(Context& context,
                                                       const std::vector<BenchOperation>& operations,
                                                       int repeat,
                                                       double min_seconds,
-                                                      const std::function<bool()>& out_of_time) {
+                                                      const std::function<bool()>& out_of_time,
+                                                      bool keep_failures) {
   std::exception_ptr failure;
+  std::size_t failed = 0;  // the operation that did
   std::vector<std::string> lacking(operations.size());
   std::vector<bool> warm(operations.size(), false);
   for (std::size_t n = 0; n < operations.size(); ++n) {
@@ -123,6 +123,7 @@ std::vector<std::vector<StageSamples>> run_operations(Context& context,
       } catch (...) {
         // The harness is no place to throw through.
         failure = std::current_exception();
+        failed = n;
         state.SkipWithError("failed");
         return;
       }
@@ -140,9 +141,17 @@ std::vector<std::vector<StageSamples>> run_operations(Context& context,
   Collector collector(operations);
   benchmark::RunSpecifiedBenchmarks(&collector, "all");
   benchmark::ClearRegisteredBenchmarks();
-  if (failure) std::rethrow_exception(failure);
+  std::string kept;
+  if (failure && keep_failures) {
+    kept = failure_of([&] { std::rethrow_exception(failure); });
+  } else if (failure) {
+    std::rethrow_exception(failure);
+  }
   for (std::size_t n = 0; n < operations.size(); ++n) {
-    for (StageSamples& stage : collector.samples[n]) stage.lacking = lacking[n];
+    for (StageSamples& stage : collector.samples[n]) {
+      stage.lacking = lacking[n];
+      if (n == failed) stage.failure = kept;
+    }
   }
   return collector.samples;
 }

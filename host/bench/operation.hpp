@@ -37,18 +37,20 @@ struct StageSamples {
   std::vector<double> seconds;  ///< one per repetition, by the stage's clock
   std::vector<double> wall;     ///< of the whole operation
   std::string lacking;          ///< why the device left it out, where it did
+  std::string failure;          ///< what it threw, where that is kept
 };
 
 /// Runs every operation: once to warm up, then `repeat` times as often as Google Benchmark finds
 /// necessary for `min_seconds` each. No repetition begins once `out_of_time()` says so; an
 /// operation that never began has no samples. The result is parallel to operations and their
 /// stages. Needs a context with keep_launches. What an operation throws ends the run and is thrown
-/// on, but for the device's refusal of one that is optional.
-std::vector<std::vector<StageSamples>> run_operations(
-    Context& context,
-    const std::vector<BenchOperation>& operations,
-    int repeat,
-    double min_seconds,
-    const std::function<bool()>& out_of_time = {});
+/// on, but for the device's refusal of one that is optional. With `keep_failures` what is of
+/// failure_of()'s kinds is told in the operation's samples instead; those behind it never began.
+std::vector<std::vector<StageSamples>> run_operations(Context& context,
+                                                      const std::vector<BenchOperation>& operations,
+                                                      int repeat,
+                                                      double min_seconds,
+                                                      const std::function<bool()>& out_of_time = {},
+                                                      bool keep_failures = false);
 
 }  // namespace raysplats

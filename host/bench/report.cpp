@@ -6,13 +6,12 @@
 #include <algorithm>
 
 #include "bench/format.hpp"
+#include "util/mebibytes.hpp"
 
 namespace raysplats {
 namespace {
 
 std::string percent(double share) { return share > 0 ? fmt::format("{:.1f}", 100 * share) : "-"; }
-
-double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
 
 }  // namespace
 
@@ -66,7 +65,7 @@ std::string bench_table(const BenchReport& report) {
   }
   for (const std::string& line : left_out_lines(report)) out += fmt::format("left out: {}\n", line);
   out += fmt::format("peak memory: process {:.1f} MiB, device buffers {:.1f} MiB\n",
-                     mebibytes(report.peak_process_bytes), mebibytes(report.peak_device_bytes));
+                     mib(report.peak_process_bytes), mib(report.peak_device_bytes));
   return out;
 }
 

@@ -66,6 +66,7 @@ struct BenchReport {
   struct LeftOut {
     std::string id;  ///< of the row
     std::string reason;
+    bool failed = false;  ///< by an error that was kept (BenchOptions::keep_failures)
   };
   std::vector<LeftOut> left_out;
 };

@@ -102,7 +102,8 @@ std::string bench_json(const BenchReport& report) {
       {"peak_process_bytes", report.peak_process_bytes},
       {"peak_device_bytes", report.peak_device_bytes},
       {"rows", rows}};
-  return out.dump(2) + "\n";
+  // Drivers' names and a model's file name may be any bytes.
+  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 BenchReport read_bench_report(const std::filesystem::path& path) {

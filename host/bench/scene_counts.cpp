@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <bit>
-#include <cmath>
 
 #include "bench/scene_state.hpp"
 #include "trace/packet_layout.hpp"

@@ -8,6 +8,7 @@
 
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "synth/bench_scenes.hpp"
 #include "trace/packet_layout.hpp"
 
@@ -34,8 +35,7 @@ class Course {
                                            ScaleActivation::kExp)) {
     options_.packet_width = 0;
     options_.traversal = Traversal::kAuto;  // the tuning's
-    const std::size_t pixels =
-        static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+    const std::size_t pixels = pixel_count(options.width, options.height);
     // A gradient without structure: all pixels pull, none alike.
     std::vector<float> gradient(4 * pixels);
     for (std::size_t i = 0; i < 3 * pixels; ++i) {

@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <string>
 #include <utility>
 
+#include "device/kernel.hpp"
 #include "raysplats/error.hpp"
 #include "shared/tree_layout.h"
 
@@ -24,8 +24,6 @@ constexpr std::size_t kGroup = 64;
 constexpr std::size_t kCpuOrderGroup = 256;
 constexpr std::size_t kOrderGroup = 64;
 constexpr std::size_t kMaxCount = std::size_t{1} << 31;
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 std::size_t ceil_div(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
 

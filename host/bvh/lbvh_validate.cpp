@@ -7,8 +7,6 @@
 #include <array>
 #include <cfloat>
 #include <cmath>
-#include <limits>
-#include <utility>
 
 #include "shared/tree_layout.h"
 
@@ -180,21 +178,6 @@ RsAabb node_box(const LbvhCopy& tree, std::size_t node) {
   return sum;
 }
 
-// Depth interval of a ray in a box.
-bool meets(const RsAabb& box, const double* origin, const double* direction) {
-  double near = 0;
-  double far = std::numeric_limits<double>::infinity();
-  for (int axis = 0; axis < 3; ++axis) {
-    if (box.lo[axis] > box.hi[axis]) return false;
-    double t0 = (static_cast<double>(box.lo[axis]) - origin[axis]) / direction[axis];
-    double t1 = (static_cast<double>(box.hi[axis]) - origin[axis]) / direction[axis];
-    if (t0 > t1) std::swap(t0, t1);
-    near = std::max(near, t0);
-    far = std::min(far, t1);
-  }
-  return near <= far;
-}
-
 }  // namespace
 
 std::vector<std::uint64_t> curve_codes(std::span<const RsAabb> boxes) {
@@ -293,26 +276,6 @@ std::string validate_lbvh(const LbvhCopy& tree, std::span<const RsAabb> boxes, L
   if (!equal(tree.child(begin, 0), node_box(tree, begin - 1)))
     return "The box of the scene is not the root's";
   return "";
-}
-
-LbvhVisits count_visits(const LbvhCopy& tree, const double* origin, const double* direction) {
-  LbvhVisits visits;
-  if (tree.count == 0) return visits;
-  std::vector<std::array<std::size_t, 2>> stack{{tree.level_sizes.size(), 0}};
-  while (!stack.empty()) {
-    const auto [level, number] = stack.back();
-    stack.pop_back();
-    ++visits.nodes;
-    for (std::size_t lane = 0; lane < tree.lanes; ++lane) {
-      if (!meets(tree.child(tree.level_begin[level] + number, lane), origin, direction)) continue;
-      if (level == 1) {
-        ++visits.blocks;
-      } else {
-        stack.push_back({level - 1, number * tree.lanes + lane});
-      }
-    }
-  }
-  return visits;
 }
 
 }  // namespace raysplats

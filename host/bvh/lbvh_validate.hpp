@@ -48,13 +48,4 @@ std::string validate_lbvh(const LbvhCopy& tree,
                           std::span<const RsAabb> boxes,
                           LeafOrder order = LeafOrder::kCurve);
 
-/// What rays meet on their way through the whole tree.
-struct LbvhVisits {
-  std::size_t nodes = 0;
-  std::size_t blocks = 0;
-};
-
-/// What the ray origin + t direction, t >= 0, visits; computed in double precision.
-LbvhVisits count_visits(const LbvhCopy& tree, const double* origin, const double* direction);
-
 }  // namespace raysplats

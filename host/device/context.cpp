@@ -165,16 +165,22 @@ bool is_over(const cl::Event& event) {
 
 void Context::Impl::collect_profile() {
   if (pending.empty()) return;
-  queue.finish();
-  for (const PendingLaunch& launch : pending) {
-    const std::uint64_t nanoseconds = launch.event.getProfilingInfo<CL_PROFILING_COMMAND_END>() -
-                                      launch.event.getProfilingInfo<CL_PROFILING_COMMAND_START>();
-    profiler.add(launch.kernel, nanoseconds);
-    if (options.keep_launches) {
-      launches.push_back({launch.program, launch.kernel, 1e-9 * static_cast<double>(nanoseconds)});
+  // A launch that failed has no times, and would have none the next time either.
+  const auto over = std::exchange(pending, {});
+  try {
+    queue.finish();
+    for (const PendingLaunch& launch : over) {
+      const std::uint64_t nanoseconds = launch.event.getProfilingInfo<CL_PROFILING_COMMAND_END>() -
+                                        launch.event.getProfilingInfo<CL_PROFILING_COMMAND_START>();
+      profiler.add(launch.kernel, nanoseconds);
+      if (options.keep_launches) {
+        launches.push_back(
+            {launch.program, launch.kernel, 1e-9 * static_cast<double>(nanoseconds)});
+      }
     }
+  } catch (const cl::Error& error) {
+    throw_cl_error(error, fmt::format("Timing the kernels of {}", info.name));
   }
-  pending.clear();
 }
 
 }  // namespace raysplats

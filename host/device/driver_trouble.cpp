@@ -3,7 +3,6 @@
 
 #include <dlfcn.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -14,6 +13,7 @@
 #include "device/cl.hpp"
 #include "raysplats/error.hpp"
 #include "util/memory_limit.hpp"
+#include "util/output_directory.hpp"
 
 namespace raysplats {
 namespace {
@@ -80,10 +80,7 @@ PoclCache pocl_cache() {
 // "the folder F of its cache, by VARIABLE, cannot be written (reason)"; empty when it can.
 std::string pocl_cache_trouble() {
   const PoclCache cache = pocl_cache();
-  std::error_code error;
-  fs::create_directories(cache.folder, error);
-  if (!error && ::access(cache.folder.c_str(), W_OK | X_OK) != 0)
-    error = std::error_code(errno, std::generic_category());
+  const std::error_code error = writing_trouble(cache.folder);
   if (!error) return "";
   return fmt::format("the folder {}{} of its cache cannot be written ({})", cache.folder.string(),
                      cache.variable.empty() ? "" : fmt::format(" ({})", cache.variable),
@@ -152,12 +149,9 @@ std::string why_no_devices() {
       fmt::join(platforms, ", "), memory_limit_remark());
 }
 
-std::string driver_trouble() {
-  for (const std::string& platform : platform_names()) {
-    if (!is_pocl(platform)) continue;
-    if (const std::string trouble = pocl_cache_trouble(); !trouble.empty())
-      return trouble + ", name one by POCL_CACHE_DIR";
-  }
+std::string driver_trouble(const std::string& platform) {
+  if (const std::string trouble = is_pocl(platform) ? pocl_cache_trouble() : ""; !trouble.empty())
+    return trouble + ", name one by POCL_CACHE_DIR";
   const std::string remark = memory_limit_remark();
   return remark.empty() ? "" : remark.substr(2) + ", allow it more or update the driver";
 }

@@ -31,9 +31,9 @@ bool is_pocl(const std::string& platform);
 /// a driver's library cannot be loaded, or a driver has no place for its cache.
 std::string why_no_devices();
 
-/// What keeps a driver from compiling though the source is right, for the end of a sentence: a
-/// cache folder that cannot be written, too little memory. Empty when nothing is found.
-std::string driver_trouble();
+/// What keeps the driver of a platform from compiling though the source is right, for the end of a
+/// sentence: a cache folder that cannot be written, too little memory. Empty when nothing is found.
+std::string driver_trouble(const std::string& platform);
 
 /// Throws DeviceError for surroundings in which a driver ends the whole process.
 void check_driver_surroundings();

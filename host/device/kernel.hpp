@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <tuple>
@@ -36,6 +37,10 @@ ArgumentPack<typename PackedArgument<Arguments>::type...> argument_pack(
     const Arguments&... arguments) {
   return {{arguments...}};
 }
+
+/// A count as kernels take it. Not checked: the device's largest allocation bounds how many records
+/// a buffer holds.
+inline std::uint32_t u32(std::size_t count) { return static_cast<std::uint32_t>(count); }
 
 /// Work-group local memory as a kernel argument.
 struct LocalMemory {

@@ -12,6 +12,7 @@
 #include "device/platform.hpp"
 #include "raysplats/error.hpp"
 #include "util/ascii.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -19,6 +20,8 @@ namespace {
 // The smallest work-group every launch can be cut down to.
 constexpr std::size_t kMinWorkGroup = 64;
 constexpr std::uint64_t kMinAllocation = 64ull << 20;
+// Numbers in the names of cards, as in RTX 4090 and RX 580, have at least so many digits.
+constexpr std::size_t kCardDigits = 3;
 
 std::string trimmed(std::string text) {
   while (!text.empty() &&
@@ -203,6 +206,10 @@ DeviceInfo select_device(const std::string& selector) {
   if (devices.empty()) {
     throw DeviceError(why_no_devices());
   }
+  return select_among(devices, selector);
+}
+
+DeviceInfo select_among(const std::vector<DeviceInfo>& devices, const std::string& selector) {
   if (selector.empty()) {
     for (const DeviceType wanted : {DeviceType::kGpu, DeviceType::kCpu}) {
       for (const DeviceInfo& info : devices) {
@@ -225,17 +232,20 @@ DeviceInfo select_device(const std::string& selector) {
   std::size_t index = 0;
   const auto [end, error] =
       std::from_chars(selector.data(), selector.data() + selector.size(), index);
-  if (error == std::errc() && end == selector.data() + selector.size()) {
-    if (index >= devices.size()) {
-      throw UsageError(
-          fmt::format("--device {}: there are {} devices; 'raysplats devices' lists them", selector,
-                      devices.size()));
+  const bool number = error == std::errc() && end == selector.data() + selector.size();
+  if (number && index < devices.size()) return checked(devices[index]);
+  // A number of fewer digits is an index that was mistaken, however many names have its digits.
+  if (!number || selector.size() >= kCardDigits) {
+    for (const DeviceInfo& info : devices) {
+      if (ascii_lower(info.name).find(ascii_lower(selector)) != std::string::npos)
+        return checked(info);
     }
-    return checked(devices[index]);
   }
-  for (const DeviceInfo& info : devices) {
-    if (ascii_lower(info.name).find(ascii_lower(selector)) != std::string::npos)
-      return checked(info);
+  if (number) {
+    throw UsageError(fmt::format(
+        "--device {}: there {} {}, counted from 0{}; 'raysplats devices' lists them", selector,
+        devices.size() == 1 ? "is" : "are", counted(static_cast<double>(devices.size()), "device"),
+        selector.size() >= kCardDigits ? ", and none has that in its name" : ""));
   }
   throw UsageError(fmt::format(
       "--device {}: no device has that in its name; 'raysplats devices' lists them", selector));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "device/cl.hpp"
@@ -15,5 +16,8 @@ struct PlatformDevice {
 
 /// Every device of every platform with its handle, in list_devices() order.
 std::vector<PlatformDevice> platform_devices();
+
+/// What select_device() chooses among `devices`, of which there is at least one.
+DeviceInfo select_among(const std::vector<DeviceInfo>& devices, const std::string& selector);
 
 }  // namespace raysplats

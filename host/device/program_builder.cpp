@@ -322,7 +322,7 @@ cl::Program ProgramBuilder::compile(const Build& build) const {
                     build.path, memory_limit_remark()));
   } catch (const cl::Error& error) {
     const std::string log = build_log(*program, device_);
-    const std::string trouble = driver_trouble();
+    const std::string trouble = driver_trouble(info_.platform);
     throw DeviceError(
         fmt::format("Kernel file {} does not compile on {} with '{}' ({}): {}{}{}", build.path,
                     info_.name, build.flags, cl_error_name(error.err()),

@@ -16,6 +16,8 @@
 #include <fstream>
 #include <thread>
 
+#include "util/output_directory.hpp"
+
 namespace raysplats {
 namespace {
 
@@ -158,10 +160,8 @@ ProgramCacheState program_cache_state(const std::filesystem::path& directory) {
   if (directory.empty()) return {0, 0, "neither XDG_CACHE_HOME nor HOME names a folder for it"};
   ProgramCacheState state;
   std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (!error && ::access(directory.c_str(), W_OK | X_OK) != 0)
-    error = std::error_code(errno, std::generic_category());
-  if (error) state.trouble = fmt::format("it cannot be written ({})", error.message());
+  if (const std::error_code trouble = writing_trouble(directory))
+    state.trouble = fmt::format("it cannot be written ({})", trouble.message());
   for (const std::filesystem::path& path : programs_in(directory)) {
     const std::uintmax_t bytes = std::filesystem::file_size(path, error);
     if (error) continue;  // removed meanwhile

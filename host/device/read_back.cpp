@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "device/read_back.hpp"
 
-#include <utility>
-
 #include "device/context_impl.hpp"
 
 namespace raysplats {

@@ -5,7 +5,6 @@
 
 #include <cstring>
 #include <list>
-#include <utility>
 #include <vector>
 
 #include "device/context_impl.hpp"

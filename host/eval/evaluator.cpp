@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <set>
 #include <utility>
@@ -14,9 +13,11 @@
 #include "eval/error_map.hpp"
 #include "eval/metrics.hpp"
 #include "eval/view_alignment.hpp"
+#include "io/dataset_views.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render/frame_writer.hpp"
+#include "scene/even_choice.hpp"
 #include "scene/sharpness.hpp"
 #include "trace/sky.hpp"
 #include "util/atomic_file.hpp"
@@ -177,19 +178,16 @@ EvaluationMetrics mean_of(const std::vector<EvaluationMetrics>& images) {
   return mean;
 }
 
-// `count` of the indices, evenly spread.
+// At most `count` of the indices, evenly spread; all of them for 0.
 std::vector<std::size_t> spread(const std::vector<std::size_t>& indices, std::size_t count) {
-  if (count == 0 || count >= indices.size()) return indices;
-  std::vector<std::size_t> out(count);
-  for (std::size_t i = 0; i < count; ++i) out[i] = indices[i * indices.size() / count];
+  if (count == 0) return indices;
+  std::vector<std::size_t> out = even_choice(indices.size(), count);
+  for (std::size_t& i : out) i = indices[i];
   return out;
 }
 
 std::vector<std::string> names_of(const Dataset& dataset, const std::vector<std::size_t>& views) {
-  std::vector<Camera> cameras;
-  cameras.reserve(views.size());
-  for (const std::size_t view : views) cameras.push_back(dataset.views[view].camera);
-  return frame_names(cameras);
+  return frame_names(cameras_of(dataset, views));
 }
 
 // One call of evaluate(): some views of a data set, by their numbers among those.

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
 #include <utility>
 
 #include "scene/camera_model.hpp"

@@ -7,8 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
-#include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>

@@ -9,13 +9,13 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <utility>
 
 #include "io/json_file.hpp"
 #include "io/scene_camera.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_check.hpp"
+#include "scene/camera_path.hpp"
 #include "scene/gaussian_transform.hpp"
 
 namespace raysplats {
@@ -71,11 +71,6 @@ double number(const std::filesystem::path& path,
   if (!(value >= low && value <= high))
     fail(path, fmt::format("has '{}' where a number from {} to {} belongs", key, low, high));
   return value;
-}
-
-bool flag(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_boolean() && found->get<bool>();
 }
 
 /// Numbers of a text, whatever else is between them.
@@ -171,7 +166,7 @@ Stored read_json(const std::filesystem::path& path) {
   out.fps = number(path, json, "fps", 1e-3, kMostFps, kFps);
   if (json.contains("seconds"))
     out.seconds = number(path, json, "seconds", 1e-3, kMostSeconds, std::nullopt);
-  out.path.closed = flag(json, "is_cycle");
+  out.path.closed = io::json_flag(json, "is_cycle");
   const auto list = [&](const char* key) -> const Json* {
     const auto found = json.find(key);
     return found != json.end() && found->is_array() && !found->empty() ? &*found : nullptr;
@@ -188,7 +183,7 @@ Stored read_json(const std::filesystem::path& path) {
     Keyframe key;
     set_pose(path, matrix_of(path, entry, frames ? "camera_to_world" : "matrix"), key);
     key.fov = number(path, entry, "fov", kLeastFov, 359.0, fov);
-    key.seconds = flag(entry, "override_transition_enabled")
+    key.seconds = io::json_flag(entry, "override_transition_enabled")
                       ? number(path, entry, "override_transition_sec", 0, kMostSeconds, transition)
                       : (frames ? 1.0 : transition);
     out.path.keys.push_back(key);

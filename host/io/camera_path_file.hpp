@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "raysplats/camera.hpp"
-#include "scene/camera_path.hpp"
 
 namespace raysplats {
 

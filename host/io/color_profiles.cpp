@@ -3,13 +3,13 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <string_view>
 
 #include "io/image_file.hpp"
 #include "raysplats/error.hpp"
+#include "scene/even_choice.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -32,9 +32,8 @@ std::string profile_of(const View& view) {
 }  // namespace
 
 void warn_of_color_profiles(std::span<const View> views) {
-  const std::size_t count = std::min(views.size(), kPhotos);
-  for (std::size_t i = 0; i < count; ++i) {
-    const View& view = views[i * views.size() / count];
+  for (const std::size_t i : even_choice(views.size(), kPhotos)) {
+    const View& view = views[i];
     const std::string profile = profile_of(view);
     if (profile.empty() || is_srgb(profile)) continue;
     spdlog::warn(

@@ -10,7 +10,6 @@
 #include <numbers>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"

@@ -2,7 +2,6 @@
 #include "io/data_origin.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>

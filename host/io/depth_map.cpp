@@ -20,6 +20,7 @@
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/photo_lens.hpp"
+#include "scene/pixel_count.hpp"
 #include "util/path_text.hpp"
 
 namespace raysplats::io {
@@ -29,10 +30,6 @@ namespace {
 // measure of depth.
 constexpr std::uint32_t kLeastTrack = 3;
 constexpr float kMostError = 2.0f;
-
-std::size_t area(int width, int height) {
-  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-}
 
 DepthMap read_array(const std::filesystem::path& path) {
   NpyArray array = read_npy(path);
@@ -101,7 +98,7 @@ DepthMap from_map(const DepthMap& map, const View& view) {
   const bool same_rays = camera.model == photo.model;
   const bool other_depths = counts_along_ray(camera) && !counts_along_ray(photo);
   DepthMap out{camera.width, camera.height, {}};
-  out.values.resize(area(camera.width, camera.height));
+  out.values.resize(pixel_count(camera.width, camera.height));
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       // As shares of the photo.
@@ -119,8 +116,9 @@ DepthMap from_map(const DepthMap& map, const View& view) {
       const auto column = static_cast<int>(std::floor(across * map.width));
       const auto row = static_cast<int>(std::floor(down * map.height));
       if (column < 0 || row < 0 || column >= map.width || row >= map.height) continue;
-      const float depth = map.values[area(map.width, row) + static_cast<std::size_t>(column)];
-      out.values[area(camera.width, y) + static_cast<std::size_t>(x)] =
+      const float depth =
+          map.values[pixel_count(map.width, row) + static_cast<std::size_t>(column)];
+      out.values[pixel_count(camera.width, y) + static_cast<std::size_t>(x)] =
           static_cast<float>(share * static_cast<double>(depth));
     }
   }
@@ -130,7 +128,7 @@ DepthMap from_map(const DepthMap& map, const View& view) {
 DepthMap from_points(const PointCloud& points, const View& view) {
   const Camera& camera = view.camera;
   DepthMap out{camera.width, camera.height, {}};
-  out.values.resize(area(camera.width, camera.height));
+  out.values.resize(pixel_count(camera.width, camera.height));
   for (const std::uint32_t number : view.points) {
     if (points.track_lengths[number] < kLeastTrack || points.errors[number] > kMostError) continue;
     const float* p = points.positions.data() + 3 * std::size_t{number};
@@ -138,8 +136,8 @@ DepthMap from_points(const PointCloud& points, const View& view) {
     const std::optional<glm::dvec2> at = project(camera, world);
     if (!at || !(at->x >= 0 && at->x < camera.width && at->y >= 0 && at->y < camera.height))
       continue;
-    float& value =
-        out.values[area(camera.width, static_cast<int>(at->y)) + static_cast<std::size_t>(at->x)];
+    float& value = out.values[pixel_count(camera.width, static_cast<int>(at->y)) +
+                              static_cast<std::size_t>(at->x)];
     const auto depth = static_cast<float>(depth_of(camera, world));
     if (depth > 0 && (value == 0 || depth < value)) value = depth;
   }
@@ -182,7 +180,7 @@ bool check_depth_map(const View& view, double unit) {
 DepthMap reduced(const DepthMap& depths, int width, int height) {
   if (depths.values.empty() || (width == depths.width && height == depths.height)) return depths;
   DepthMap out{width, height, {}};
-  out.values.resize(area(width, height));
+  out.values.resize(pixel_count(width, height));
   std::vector<float> known;
   for (int y = 0; y < height; ++y) {
     const int top = static_cast<int>(static_cast<std::int64_t>(y) * depths.height / height);
@@ -196,14 +194,14 @@ DepthMap reduced(const DepthMap& depths, int width, int height) {
       for (int row = top; row < bottom; ++row) {
         for (int column = left; column < right; ++column) {
           const float value =
-              depths.values[area(depths.width, row) + static_cast<std::size_t>(column)];
+              depths.values[pixel_count(depths.width, row) + static_cast<std::size_t>(column)];
           if (value > 0) known.push_back(value);
         }
       }
       if (known.empty()) continue;
       const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
       std::nth_element(known.begin(), middle, known.end());
-      out.values[area(width, y) + static_cast<std::size_t>(x)] = *middle;
+      out.values[pixel_count(width, y) + static_cast<std::size_t>(x)] = *middle;
     }
   }
   return out;

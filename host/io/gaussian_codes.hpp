@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "scene/activation.hpp"
 #include "shared/sh.h"
 
 /// How the numbers of a Gaussian are coded in files other than PLY.
@@ -24,13 +25,10 @@ constexpr float kFlatLogScale = -20.0f;
 /// square.
 constexpr float kMostLogScale = 40.0f;
 
-inline double opacity_of(float logit) {
-  return 1.0 / (1.0 + std::exp(-static_cast<double>(logit)));
-}
+inline double opacity_of(float logit) { return sigmoid(static_cast<double>(logit)); }
 
 inline float logit_of(double opacity) {
-  const double inside = std::clamp(opacity, kOpacityMargin, 1.0 - kOpacityMargin);
-  return static_cast<float>(std::log(inside / (1.0 - inside)));
+  return static_cast<float>(logit(std::clamp(opacity, kOpacityMargin, 1.0 - kOpacityMargin)));
 }
 
 /// The nearest of 0..255.

@@ -236,4 +236,9 @@ GltfContent take_content(GltfDocument& document,
   return content;
 }
 
+int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
+  const auto found = primitive.attributes.find(name);
+  return found == primitive.attributes.end() ? -1 : found->second;
+}
+
 }  // namespace raysplats::io

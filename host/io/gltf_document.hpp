@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace raysplats::io {
@@ -40,5 +41,8 @@ GltfContent take_content(GltfDocument& document,
                          const std::filesystem::path& path,
                          bool alone,
                          std::uint64_t limit);
+
+/// The accessor of an attribute, -1 for none.
+int attribute(const tinygltf::Primitive& primitive, const std::string& name);
 
 }  // namespace raysplats::io

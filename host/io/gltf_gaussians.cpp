@@ -11,6 +11,7 @@
 
 #include "io/broken_gaussians.hpp"
 #include "io/gaussian_codes.hpp"
+#include "io/gltf_document.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/gltf_model.hpp"
 #include "io/gltf_nodes.hpp"
@@ -34,11 +35,6 @@ const tinygltf::Value* splatting(const tinygltf::Primitive& primitive) {
 bool has_gaussians(const tinygltf::Mesh& mesh) {
   return std::any_of(mesh.primitives.begin(), mesh.primitives.end(),
                      [](const tinygltf::Primitive& each) { return splatting(each) != nullptr; });
-}
-
-int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
-  const auto found = primitive.attributes.find(name);
-  return found == primitive.attributes.end() ? -1 : found->second;
 }
 
 /// Whether all attributes have numbers of their own, beside what an extension may pack.

@@ -2,14 +2,15 @@
 #include "io/gltf_materials.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "io/image_file.hpp"
 #include "raysplats/error.hpp"
+#include "scene/mesh_edges.hpp"
 #include "util/srgb.hpp"
 
 namespace raysplats::io {
@@ -108,6 +109,16 @@ Rgb absorption(const tinygltf::ExtensionMap& extensions) {
   return result;
 }
 
+/// Whether alpha lets anything through.
+bool is_cut_out(const Image& image) {
+  const auto channels = static_cast<std::size_t>(image.channels);
+  if (channels % 2 != 0) return false;
+  for (std::size_t i = channels - 1; i < image.data.size(); i += channels) {
+    if (image.data[i] < 1.0f) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 const tinygltf::Material& GltfMaterials::source(int material) const {
@@ -124,9 +135,23 @@ std::uint32_t GltfMaterials::index(int material) {
   if (material == -1) {
     materials.emplace_back().name = "default";
   } else {
-    materials.push_back(map_material(source(material), material));
+    const tinygltf::Material& from = source(material);
+    materials.push_back(map_material(from, material));
+    const bool thick =
+        number(from.extensions, "KHR_materials_volume", "thicknessFactor", 0.0) > 0.0;
+    if (materials.back().kind == Material::Kind::kGlass && !thick) thin_.push_back(entry->second);
   }
   return entry->second;
+}
+
+void GltfMaterials::make_thin_glass(const Mesh& mesh) {
+  if (thin_.empty()) return;
+  const std::map<std::uint32_t, std::size_t> open = open_edges(mesh);
+  for (const std::uint32_t index : thin_) {
+    if (!open.contains(index)) continue;
+    materials[index].ior = 1.0f;
+    materials[index].absorption = {0, 0, 0};
+  }
 }
 
 GltfTextureUse GltfMaterials::texture_use(int material) const {
@@ -165,7 +190,11 @@ Image GltfMaterials::decode(int texture) const {
 int GltfMaterials::texture(int texture) {
   if (texture < 0) return -1;
   const auto [entry, added] = loaded_.emplace(texture, static_cast<int>(textures.size()));
-  if (added) textures.push_back(to_texture(decode(texture)));
+  if (added) {
+    const Image image = decode(texture);
+    if (is_cut_out(image)) cut_out_.insert(texture);
+    textures.push_back(to_texture(image));
+  }
   return entry->second;
 }
 
@@ -234,6 +263,13 @@ Material GltfMaterials::map_material(const tinygltf::Material& from, int number_
       specular != nullptr ? specular_glossiness(*specular) : metallic_roughness(from);
   for (std::size_t c = 0; c < 3; ++c) material.color[c] = encoded(surface.color[c]);
   material.texture = texture(surface.texture);
+  if (from.alphaMode != "OPAQUE" && cut_out_.contains(surface.texture) && !warned_of_alpha_) {
+    warned_of_alpha_ = true;
+    spdlog::warn(
+        "{}: the alpha of the texture of the material '{}' is left out: its triangles are seen "
+        "whole",
+        reader_.path().string(), material.name);
+  }
   const double alpha = from.alphaMode == "BLEND" ? surface.alpha : 1.0;
   const double strength = std::max(
       number(from.extensions, "KHR_materials_emissive_strength", "emissiveStrength", 1.0), 0.0);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,6 +55,10 @@ class GltfMaterials {
   std::uint32_t index(int material);
   /// Of a material's base colour texture; an empty attribute when it has none.
   GltfTextureUse texture_use(int material) const;
+  /// Glass without a volume (KHR_materials_volume with a thickness) is a thin sheet, which light
+  /// passes straight on: such is glass from here on that is open somewhere in the mesh. Exporters
+  /// leave the volume out of solid bodies as well, which stay what they are.
+  void make_thin_glass(const Mesh& mesh);
 
   std::vector<Material> materials;
   std::vector<Image> textures;
@@ -81,6 +86,9 @@ class GltfMaterials {
   std::map<int, std::uint32_t> used_;
   std::map<int, int> loaded_;
   std::map<int, std::array<double, 4>> means_;
+  std::set<int> cut_out_;            ///< textures that alpha makes see-through somewhere
+  std::vector<std::uint32_t> thin_;  ///< glass without a volume
+  bool warned_of_alpha_ = false;
 };
 
 }  // namespace raysplats::io

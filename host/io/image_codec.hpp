@@ -96,8 +96,9 @@ class ImageCodec {
   virtual std::unique_ptr<ImageDecoder> open(const std::string& format,
                                              const std::string& name,
                                              std::span<const std::byte> memory) const = 0;
-  /// Of a file that decodes, for photos, which become straight display values: depth maps, masks,
-  /// textures and environments are the numbers of their files. Throws DataError.
+  /// Of a file that decodes, for photos, which become straight display values, and for textures and
+  /// environments (read_texture()): depth maps and masks are the numbers of their files. Throws
+  /// DataError.
   virtual PhotoColors photo_colors(const std::string& path) const {
     static_cast<void>(path);
     return {};

@@ -65,4 +65,9 @@ nlohmann::json parse_json_object(std::span<const std::byte> bytes,
   return root;
 }
 
+bool json_flag(const nlohmann::json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_boolean() && found->get<bool>();
+}
+
 }  // namespace raysplats::io

@@ -23,4 +23,7 @@ nlohmann::json parse_json_object(std::span<const std::byte> bytes,
                                  const std::filesystem::path& path,
                                  int max_depth = kMaxJsonDepth);
 
+/// Whether an object has `key` and it is true.
+bool json_flag(const nlohmann::json& json, const char* key);
+
 }  // namespace raysplats::io

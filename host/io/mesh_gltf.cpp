@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
@@ -11,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/gltf_document.hpp"
 #include "io/gltf_materials.hpp"
 #include "io/gltf_model.hpp"
 #include "io/gltf_nodes.hpp"
@@ -48,7 +48,8 @@ class SceneWalk {
  public:
   SceneWalk(const GltfReader& reader, std::size_t most, SeenMaterials seen)
       : reader_(reader),
-        materials_(reader, std::move(seen)),
+        seen_(std::move(seen)),
+        materials_(reader, seen_),
         builder_(reader.path(), most),
         parts_(reader.model().meshes.size()) {}
 
@@ -59,6 +60,7 @@ class SceneWalk {
     }
     MeshFile file;
     file.mesh = builder_.finish();
+    materials_.make_thin_glass(file.mesh);
     file.materials = std::move(materials_.materials);
     file.textures = std::move(materials_.textures);
     return file;
@@ -91,12 +93,6 @@ class SceneWalk {
     placed_.emplace_back(static_cast<std::size_t>(mesh), matrix);
   }
 
-  /// The accessor of an attribute, -1 for none.
-  static int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
-    const auto found = primitive.attributes.find(name);
-    return found == primitive.attributes.end() ? -1 : found->second;
-  }
-
   Mesh read(const tinygltf::Primitive& primitive) {
     Mesh part;
     const int positions = attribute(primitive, "POSITION");
@@ -105,6 +101,7 @@ class SceneWalk {
     const int normals = attribute(primitive, "NORMAL");
     if (normals >= 0) part.normals = reader_.floats(normals, 3);
     const std::uint32_t material = materials_.index(primitive.material);
+    warn_of_colors(primitive, materials_.materials[material].name);
     const GltfTextureUse use = materials_.texture_use(primitive.material);
     const int uvs = use.attribute.empty() ? -1 : attribute(primitive, use.attribute);
     if (uvs >= 0) {
@@ -132,13 +129,24 @@ class SceneWalk {
     return part;
   }
 
+  /// Warns once of vertex colours.
+  void warn_of_colors(const tinygltf::Primitive& primitive, const std::string& material) {
+    if (warned_of_colors_ || attribute(primitive, "COLOR_0") < 0) return;
+    if (seen_ && !seen_(material)) return;
+    warned_of_colors_ = true;
+    spdlog::warn("{}: the colours of its vertices are left out: it has those of its materials",
+                 reader_.path().string());
+  }
+
   const GltfReader& reader_;
+  SeenMaterials seen_;
   GltfMaterials materials_;
   MeshBuilder builder_;
   std::vector<std::optional<std::vector<Mesh>>> parts_;     ///< of meshes, once they are used
   std::vector<std::pair<std::size_t, glm::dmat4>> placed_;  ///< meshes of nodes
   std::size_t vertices_ = 0;                                ///< of all that are placed
   std::size_t triangles_ = 0;
+  bool warned_of_colors_ = false;
 };
 
 }  // namespace

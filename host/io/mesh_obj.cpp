@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
@@ -90,8 +91,9 @@ void check_corner(std::string_view word, const TextReader& reader) {
 }
 
 /// Checks the numbers of the lines v, vt, vn and f: tinyobjloader reads what is no number as 0.
-/// Reads the material files on the way, unless the file stands alone.
-void check_lines(std::span<const std::byte> bytes,
+/// Reads the material files on the way, unless the file stands alone. Whether vertices have
+/// colours: red, green and blue behind their coordinates.
+bool check_lines(std::span<const std::byte> bytes,
                  const std::filesystem::path& path,
                  bool alone,
                  MtlMaterials& materials) {
@@ -102,10 +104,13 @@ void check_lines(std::span<const std::byte> bytes,
       reader.fail(fmt::format("{} is not finite", what));
     }
   };
+  bool colors = false;
   while (reader.next_line()) {
     const std::string_view key = reader.word();
     if (key == "v") {
       check("a coordinate of the vertex", 3);
+      for (int i = 0; i < 2 && !colors; ++i) reader.word();
+      colors = colors || !reader.word().empty();
     } else if (key == "vn") {
       check("a coordinate of the normal", 3);
     } else if (key == "vt") {
@@ -124,6 +129,7 @@ void check_lines(std::span<const std::byte> bytes,
       materials.add_library(reader.rest());
     }
   }
+  return colors;
 }
 
 /// A stream of bytes that stay where they are.
@@ -266,8 +272,8 @@ MeshFile read_obj(MeshBytes source) {
   std::vector<std::byte>& bytes = source.bytes;
   const std::filesystem::path& path = source.path;
   normalize(bytes, path);
-  MtlMaterials materials(path, std::move(source.seen));
-  check_lines(bytes, path, source.alone, materials);
+  MtlMaterials materials(path, source.seen);
+  const bool colors = check_lines(bytes, path, source.alone, materials);
   Collector collector(path, source.alone, materials);
   ByteStream buffer(bytes);
   std::istream stream(&buffer);
@@ -282,6 +288,13 @@ MeshFile read_obj(MeshBytes source) {
   MeshFile file;
   file.mesh = collector.finish();
   file.materials = std::move(materials.materials);
+  const bool seen = std::any_of(
+      file.materials.begin(), file.materials.end(),
+      [&](const Material& material) { return !source.seen || source.seen(material.name); });
+  if (colors && seen) {
+    spdlog::warn("{}: the colours of its vertices are left out: it has those of its materials",
+                 path.string());
+  }
   file.textures = std::move(materials.textures);
   return file;
 }

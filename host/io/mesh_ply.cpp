@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -12,6 +14,7 @@
 #include "io/mesh_builder.hpp"
 #include "io/mesh_file.hpp"
 #include "io/ply_file.hpp"
+#include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {
@@ -41,6 +44,26 @@ std::array<float, N> pick(std::span<const double> row, const std::array<std::siz
   std::array<float, N> values;
   for (std::size_t i = 0; i < N; ++i) values[i] = static_cast<float>(row[from[i]]);
   return values;
+}
+
+constexpr const char* kMaterial = "default";
+
+/// Warns of what shows on the mesh elsewhere.
+void warn_of_colors(const PlyFile& file, const MeshBytes& source) {
+  const std::string name = source.path.string();
+  if (file.has_later("face", "texcoord")) {
+    spdlog::warn(
+        "{}: the texture coordinates of its faces are left out: only those of vertices are read",
+        name);
+  }
+  if (source.seen && !source.seen(kMaterial)) return;
+  if (file.column("red") || file.column("diffuse_red") || file.has_later("face", "red")) {
+    spdlog::warn("{}: its colours are left out: it has those of its material", name);
+  }
+  if (const std::string texture = file.comment("TextureFile"); !texture.empty()) {
+    spdlog::warn("{}: its texture {} is left out: a material of the scene may have it", name,
+                 excerpt(texture));
+  }
 }
 
 }  // namespace
@@ -90,9 +113,10 @@ MeshFile read_ply_mesh(MeshBytes source) {
     throw DataError(
         fmt::format("{} has no faces (lists 'vertex_indices'): it holds no mesh", path.string()));
   }
+  warn_of_colors(file, source);
   MeshFile result;
   result.mesh = builder.finish();
-  result.materials.emplace_back().name = "default";
+  result.materials.emplace_back().name = kMaterial;
   return result;
 }
 

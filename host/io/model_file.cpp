@@ -5,12 +5,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <fstream>
 #include <span>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "io/gltf_gaussians.hpp"
 #include "io/model_formats.hpp"

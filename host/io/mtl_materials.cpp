@@ -12,8 +12,8 @@
 
 #include "io/byte_reader.hpp"
 #include "io/text_reader.hpp"
+#include "io/texture_file.hpp"
 #include "raysplats/error.hpp"
-#include "raysplats/io.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -127,6 +127,7 @@ void MtlMaterials::read_library(const std::filesystem::path& path) {
     known_.emplace(name, std::move(material));
     const std::string map = trimmed(mtl.diffuse_texname);
     if (!map.empty()) texture_paths_.emplace(name, relative_to(path, map));
+    if (!trimmed(mtl.alpha_texname).empty()) cut_out_.insert(name);
   }
 }
 
@@ -134,7 +135,7 @@ int MtlMaterials::texture(const std::filesystem::path& path, const std::string& 
   const auto [entry, added] = loaded_.emplace(path, static_cast<int>(textures.size()));
   if (added) {
     try {
-      textures.push_back(to_texture(read_image(path)));
+      textures.push_back(read_texture(path));
     } catch (const DataError& error) {
       throw DataError(fmt::format("The texture of the material '{}' of {} cannot be used: {}",
                                   material, obj_.string(), error.what()));
@@ -155,8 +156,13 @@ std::uint32_t MtlMaterials::index(std::string_view name) {
   if (found != known_.end()) {
     Material material = found->second;
     const auto path = texture_paths_.find(key);
-    if (path != texture_paths_.end() && (!seen_ || seen_(key)))
-      material.texture = texture(path->second, key);
+    const bool seen = !seen_ || seen_(key);
+    if (seen && path != texture_paths_.end()) material.texture = texture(path->second, key);
+    if (seen && !warned_of_cut_out_ && cut_out_.contains(key)) {
+      warned_of_cut_out_ = true;
+      spdlog::warn("{}: map_d of the material '{}' is left out: its triangles are seen whole",
+                   obj_.string(), key);
+    }
     materials.push_back(std::move(material));
   } else {
     if (!key.empty() && !known_.empty()) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -36,8 +37,8 @@ class MtlMaterials {
   /// that is missing is logged. Throws DataError when one cannot be read.
   void add_library(std::string_view names);
   /// Index in materials() of a material by the name that follows usemtl. An unknown name is logged
-  /// and gives the default material of that name. Throws DataError for a texture that is missing
-  /// or broken.
+  /// and gives the default material of that name; the first map_d, which nothing is made of, is
+  /// logged too. Throws DataError for a texture that is missing or broken.
   std::uint32_t index(std::string_view name);
 
   /// Maps all materials of the files, in the order of their names. Throws as index().
@@ -53,8 +54,10 @@ class MtlMaterials {
   SeenMaterials seen_;
   std::map<std::string, Material, std::less<>> known_;  ///< mapped, without textures
   std::map<std::string, std::filesystem::path, std::less<>> texture_paths_;  ///< by material
+  std::set<std::string, std::less<>> cut_out_;  ///< materials with a map_d
   std::map<std::string, std::uint32_t, std::less<>> used_;
   std::map<std::filesystem::path, int> loaded_;
+  bool warned_of_cut_out_ = false;
 };
 
 }  // namespace raysplats::io

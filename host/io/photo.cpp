@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "io/view_rows.hpp"
+#include "scene/pixel_count.hpp"
 #include "scene/sharpness.hpp"
 
 namespace raysplats::io {
@@ -84,8 +85,7 @@ double sharpness(const Photo& photo) {
 }
 
 std::size_t photo_bytes(const View& view) {
-  const auto pixels =
-      static_cast<std::size_t>(view.camera.width) * static_cast<std::size_t>(view.camera.height);
+  const std::size_t pixels = pixel_count(view.camera);
   return sizeof(std::uint32_t) * pixels *
          static_cast<std::size_t>(view.sample_bytes + (view.mask_apart ? 1 : 0));
 }

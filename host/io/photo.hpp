@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "raysplats/dataset.hpp"
+#include "scene/pixel_count.hpp"
 
 namespace raysplats::io {
 
@@ -19,9 +20,7 @@ struct Photo {
   bool weighted = false;  ///< a plane of weights follows (View::mask_apart)
   std::vector<std::uint32_t> words;
 
-  std::size_t pixels() const {
-    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  }
+  std::size_t pixels() const { return pixel_count(width, height); }
   std::size_t bytes() const { return words.size() * sizeof(std::uint32_t); }
   /// Straight RGBA of a pixel, in [0, 1].
   std::array<float, 4> at(int x, int y) const;

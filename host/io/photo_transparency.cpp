@@ -12,6 +12,7 @@
 
 #include "io/image_file.hpp"
 #include "raysplats/error.hpp"
+#include "scene/even_choice.hpp"
 #include "util/path_text.hpp"
 
 namespace raysplats::io {
@@ -72,13 +73,13 @@ Places transparent_places(const View& view) {
 }  // namespace
 
 Transparency transparency(std::span<const View> views) {
-  const std::size_t count = std::min(views.size(), kPhotos);
+  const std::vector<std::size_t> chosen = even_choice(views.size(), kPhotos);
   std::vector<Places> photos;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Places places = transparent_places(views[i * views.size() / count]);
+  for (const std::size_t i : chosen) {
+    const Places places = transparent_places(views[i]);
     if (share(places) >= kFew) photos.push_back(places);
   }
-  if (2 * photos.size() <= count) return Transparency::kNone;
+  if (2 * photos.size() <= chosen.size()) return Transparency::kNone;
   const bool border = std::all_of(photos.begin(), photos.end(), [&](const Places& places) {
     return share(places) <= kWidestBorder && share(places ^ photos.front()) <= kSame;
   });

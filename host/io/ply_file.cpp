@@ -85,6 +85,22 @@ bool PlyFile::has_later(std::string_view element) const {
                      [&](const LaterElement& each) { return each.name == element; });
 }
 
+bool PlyFile::has_later(std::string_view element, std::string_view property) const {
+  return std::any_of(later_.begin(), later_.end(), [&](const LaterElement& each) {
+    return each.name == element &&
+           std::any_of(each.properties.begin(), each.properties.end(),
+                       [&](const LaterProperty& p) { return p.name == property; });
+  });
+}
+
+std::string PlyFile::comment(std::string_view word) const {
+  TextReader reader(std::span<const std::byte>(bytes_).first(data_offset_), path_);
+  while (reader.next_line()) {
+    if (reader.word() == "comment" && reader.word() == word) return std::string(reader.rest());
+  }
+  return {};
+}
+
 std::optional<std::size_t> PlyFile::column(std::string_view name) const {
   const auto found = std::find_if(properties_.begin(), properties_.end(),
                                   [&](const PlyProperty& p) { return p.name == name; });

@@ -42,6 +42,9 @@ class PlyFile {
   std::optional<std::size_t> column(std::string_view name) const;
   /// The elements behind the table.
   bool has_later(std::string_view element) const;
+  bool has_later(std::string_view element, std::string_view property) const;
+  /// What follows a word in the first comment that begins with it; "" without one.
+  std::string comment(std::string_view word) const;
 
   /// Calls visit(row, values) for every row in order; values has one double per property.
   template <class Visit>

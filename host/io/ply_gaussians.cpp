@@ -7,7 +7,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>

@@ -11,6 +11,7 @@
 
 #include "io/camera_list.hpp"
 #include "io/data_origin.hpp"
+#include "io/dataset_views.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -148,12 +149,6 @@ std::vector<Camera> placed(const SceneCamera& camera) {
   return {out};
 }
 
-std::vector<Camera> views_of(const Dataset& dataset, Split split) {
-  std::vector<Camera> cameras;
-  for (const std::size_t i : dataset.indices(split)) cameras.push_back(dataset.views[i].camera);
-  return cameras;
-}
-
 std::vector<Camera> chosen(const SceneCamera& camera, std::vector<Camera> cameras) {
   if (cameras.empty()) {
     throw DataError(
@@ -188,7 +183,7 @@ std::vector<Camera> on_orbit(const SceneCamera& camera,
   shape.frames = camera.frames.value_or(frames);
   if (!camera.file.empty()) {
     const std::vector<Camera> photos =
-        views_of(load_dataset(camera.file, camera.data_settings.over(trained)), Split::kAll);
+        cameras_of(load_dataset(camera.file, camera.data_settings.over(trained)), Split::kAll);
     if (!camera.target) around.center = common_target(photos).value_or(extent.center);
     shape.up = camera.up.value_or(estimate_up(photos));
     shape = orbit_like(photos, around.center, shape);
@@ -292,8 +287,9 @@ std::vector<Camera> scene_cameras(const SceneCamera& camera,
       return cameras;
     }
     case Source::kData:
-      return chosen(camera, views_of(load_dataset(camera.file, camera.data_settings.over(trained)),
-                                     camera.split));
+      return chosen(
+          camera,
+          cameras_of(load_dataset(camera.file, camera.data_settings.over(trained)), camera.split));
     case Source::kGiven: {
       std::vector<Camera> cameras = camera.given;
       for (Camera& each : cameras) io::move_origin(each, origin_of(trained));

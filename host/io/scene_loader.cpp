@@ -2,6 +2,7 @@
 #include "io/scene_loader.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,12 +11,16 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <map>
+#include <set>
+#include <utility>
 
 #include "io/mesh_file.hpp"
+#include "io/texture_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "scene/mesh.hpp"
+#include "scene/mesh_edges.hpp"
 #include "scene/morton_order.hpp"
 #include "util/nearest_name.hpp"
 
@@ -99,18 +104,50 @@ bool is_seen(const SceneFile& file, const std::filesystem::path& mesh, const std
   });
 }
 
+/// Whether light is bent or absorbed within a body.
+bool has_inside(const Material& material) {
+  return material.kind == Material::Kind::kGlass &&
+         (material.ior != 1.0f || material.absorption != Rgb{0, 0, 0});
+}
+
+/// Warns of glass that light may enter but not leave again, once of every material of a file.
+class OpenGlass {
+ public:
+  void warn(const SceneMesh& entry, const Mesh& mesh, const std::vector<Material>& materials) {
+    std::vector<bool> used(materials.size());
+    for (const std::uint32_t material : mesh.materials) used[material] = true;
+    std::set<std::uint32_t> unknown;
+    for (std::uint32_t i = 0; i < used.size(); ++i) {
+      if (used[i] && has_inside(materials[i]) && known_.emplace(entry.file, i).second)
+        unknown.insert(i);
+    }
+    if (unknown.empty()) return;
+    for (const auto& [material, edges] : open_edges(mesh)) {
+      if (!unknown.contains(material)) continue;
+      spdlog::warn(
+          "{}: the glass of the material '{}' is open ({} edges with one triangle): it has an "
+          "inside only where it is closed",
+          entry.file.string(), materials[material].name, edges);
+    }
+  }
+
+ private:
+  std::set<std::pair<std::filesystem::path, std::uint32_t>> known_;
+};
+
 void load_meshes(const SceneFile& file, LoadedScene& out) {
   for (const SceneMaterial& each : file.materials) {
     std::vector<Image> textures;
     Material material = each.material;
     if (!each.texture.empty()) {
-      textures.push_back(io::to_texture(read_image(each.texture)));
+      textures.push_back(io::read_texture(each.texture));
       material.texture = 0;
     }
     append(out.scene, {material}, std::move(textures));
   }
   const std::size_t own = out.scene.materials.size();
   std::map<std::filesystem::path, Loaded> read;
+  OpenGlass open_glass;
   for (const SceneMesh& entry : file.meshes) {
     auto found = read.find(entry.file);
     if (found == read.end()) {
@@ -125,6 +162,7 @@ void load_meshes(const SceneFile& file, LoadedScene& out) {
     Mesh mesh = found->second.mesh;
     const std::vector<std::uint32_t> map = material_map(entry, found->second, out.scene, own);
     for (std::uint32_t& material : mesh.materials) material = map.at(material);
+    open_glass.warn(entry, mesh, out.scene.materials);
     if (entry.normals == SceneMesh::Normals::kFlat) mesh.normals.clear();
     if (entry.normals == SceneMesh::Normals::kSmooth) {
       // Edges are as sharp as they are in the world.
@@ -148,6 +186,7 @@ SceneExtent extent_of(const Scene& scene) {
       high = glm::max(high, corner);
     }
   }
+  if (!(low.x <= high.x)) return {};
   const double radius = 0.5 * glm::length(high - low);
   return {0.5 * (low + high), radius > 0.0 ? radius : 1.0};
 }
@@ -160,7 +199,7 @@ Environment load_environment(const SceneFile& file, const TraceOptions& trace) {
   if (sky) out.sky = trace.sky;
   out.color = from.color.value_or(image || sky ? Rgb{1, 1, 1} : trace.background);
   for (float& c : out.color) c *= std::exp2(from.exposure);
-  if (image) out.equirect = io::to_texture(read_image(from.image));
+  if (image) out.equirect = io::read_texture(from.image);
   const glm::dvec3 up = from.up.value_or(file.camera.up.value_or(glm::dvec3(0, -1, 0)));
   for (std::size_t k = 0; k < 3; ++k) out.up[k] = static_cast<float>(up[static_cast<int>(k)]);
   out.rotation = from.rotation;

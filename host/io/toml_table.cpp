@@ -20,12 +20,6 @@ namespace {
 constexpr std::uint64_t kMaxBytes = std::uint64_t{16} << 20;
 constexpr double kMaxInt = std::numeric_limits<int>::max();
 
-std::string dashed(std::string_view key) {
-  std::string out(key);
-  std::replace(out.begin(), out.end(), '_', '-');
-  return out;
-}
-
 /// What a range accepts, after "a number" or "three numbers"; "" where it accepts all.
 std::string range(double low, double high) {
   return number_words(false, low, high).substr(std::string_view("a number").size());
@@ -143,6 +137,12 @@ toml::table parse_toml(std::string_view text, const std::filesystem::path& path)
     throw UsageError(fmt::format("{} is no TOML: look for '[', quotes and keys without their rest",
                                  path.string()));
   }
+}
+
+std::string dashed(std::string_view key) {
+  std::string out(key);
+  std::replace(out.begin(), out.end(), '_', '-');
+  return out;
 }
 
 toml::table read_toml(const std::filesystem::path& path) {
@@ -334,11 +334,6 @@ std::optional<std::filesystem::path> TomlTable::existing(std::string_view key) {
 bool TomlTable::is_table(std::string_view key) {
   const toml::node* node = take(key);
   return node != nullptr && node->is_table();
-}
-
-bool TomlTable::is_text(std::string_view key) {
-  const toml::node* node = take(key);
-  return node != nullptr && node->is_string();
 }
 
 bool TomlTable::is_number(std::string_view key) {

@@ -37,6 +37,8 @@ toml::table parse_toml(std::string_view text, const std::filesystem::path& path)
 /// The whole text of a TOML file. Throws DataError when it cannot be read.
 std::string read_toml_text(const std::filesystem::path& path);
 
+/// A key with - in place of _.
+std::string dashed(std::string_view key);
 /// "a list", "true or false" and so on: what a value is, for messages.
 std::string type_name(const toml::node& node);
 /// A number, text or truth value as text, or a list of them; none for tables, dates and lists that
@@ -76,7 +78,6 @@ class TomlTable {
   void choice(std::string_view key, E& target, const std::vector<std::pair<std::string, E>>& names);
 
   bool is_table(std::string_view key);
-  bool is_text(std::string_view key);
   bool is_number(std::string_view key);
   /// Tables below this one; `list` are those of [[key]].
   std::optional<TomlTable> table(std::string_view key);

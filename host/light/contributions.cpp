@@ -9,6 +9,7 @@
 #include "raysplats/image.hpp"
 #include "raysplats/model.hpp"
 #include "raysplats/tracer.hpp"
+#include "scene/even_choice.hpp"
 #include "shared/sh.h"
 
 namespace raysplats {
@@ -38,10 +39,10 @@ std::vector<double> contributions(Context& context,
   trace.depth = false;
   const Model on_device(context, in_grey(model));
   Tracer tracer(context, trace, mirrors);
-  const std::size_t views = std::min(cameras.size(), kMostViews);
+  const std::vector<std::size_t> views = even_choice(cameras.size(), kMostViews);
   std::vector<double> out(model.size());
-  for (std::size_t v = 0; v < views; ++v) {
-    const Camera& view = cameras[v * cameras.size() / views];
+  for (const std::size_t v : views) {
+    const Camera& view = cameras[v];
     const double pixels = static_cast<double>(view.width) * view.height;
     const Camera camera = downscaled(view, std::max(1.0, std::sqrt(pixels / kMostPixels)));
     tracer.render(on_device, camera, true);
@@ -49,7 +50,7 @@ std::vector<double> contributions(Context& context,
     Image of_red(camera.width, camera.height, 4);
     for (std::size_t i = 0; i < of_red.pixels(); ++i) of_red.data[4 * i] = 1.0f;
     const Gaussians gradient = tracer.backward(on_device, of_red).parameters;
-    const double share = 1.0 / (RS_SH0 * static_cast<double>(of_red.pixels() * views));
+    const double share = 1.0 / (RS_SH0 * static_cast<double>(of_red.pixels() * views.size()));
     for (std::size_t i = 0; i < out.size(); ++i)
       out[i] += share * static_cast<double>(gradient.sh[3 * i]);
   }

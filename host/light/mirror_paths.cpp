@@ -3,14 +3,13 @@
 
 #include <fmt/format.h>
 
+#include "device/kernel.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 }  // namespace
 

@@ -14,6 +14,7 @@
 #include "trace/memory_shares.hpp"
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
+#include "util/mebibytes.hpp"
 
 namespace raysplats {
 namespace {
@@ -44,8 +45,6 @@ bool has_glass(const Scene& scene) {
   return std::any_of(scene.materials.begin(), scene.materials.end(),
                      [](const Material& m) { return m.kind == Material::Kind::kGlass; });
 }
-
-double mib(std::size_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
 
 }  // namespace
 

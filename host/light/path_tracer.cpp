@@ -11,12 +11,14 @@
 #include <optional>
 #include <span>
 
+#include "device/kernel.hpp"
 #include "light/first_hit_tracer.hpp"
 #include "light/path_memory.hpp"
 #include "light/surface_store.hpp"
 #include "parallel/scan.hpp"
 #include "raysplats/error.hpp"
 #include "scene/gaussian_check.hpp"
+#include "scene/pixel_count.hpp"
 #include "scene/pixel_places.hpp"
 #include "scene/render_option_table.hpp"
 #include "scene/row_share.hpp"
@@ -34,8 +36,6 @@ constexpr const char* kProgram = "light/path_tracer.cl";
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kTallyChunk = 1024;
 constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;  // rays between two looks at the watch
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 TraceOptions without_background(TraceOptions options) {
   options.background = {0, 0, 0};
@@ -77,10 +77,6 @@ class Unwatched {
 
 // What a watch ends a picture with.
 struct Stopped {};
-
-std::size_t pixels_of(const Camera& camera) {
-  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-}
 
 }  // namespace
 
@@ -257,7 +253,7 @@ bool PathTracer::Impl::light_on_gaussians() {
 // Rays of one sample that leave the centre of a camera share what they meet. Lights on Gaussians
 // need depths along rays, and Gaussians that shade others the leading one of every ray.
 bool PathTracer::Impl::by_packets(const Camera& camera) {
-  if (!memory.packets(pixels_of(camera)) || gaussians.count == 0 ||
+  if (!memory.packets(pixel_count(camera)) || gaussians.count == 0 ||
       walks_tree(options, context.device()))
     return false;
   const bool lit = light_on_gaussians();
@@ -277,7 +273,7 @@ void PathTracer::Impl::trace_packets(const Camera& camera, const std::function<v
   if (watch) packets->set_watch([&watch](double) { watch(); });
   packets->forward(gaussians, camera);
   statistics.capped_rays += packets->statistics().capped_rays;
-  packet_pixels = pixels_of(camera);
+  packet_pixels = pixel_count(camera);
   packet_axis = depth_axis(camera);
 }
 
@@ -393,7 +389,7 @@ PathTracer::FirstHits PathTracer::first_hits(const Camera& camera,
 
 PathTracer::FirstHits PathTracer::Impl::first_hits(const Camera& camera,
                                                    const std::function<bool(double)>& within) {
-  const std::size_t pixels = pixels_of(camera);
+  const std::size_t pixels = pixel_count(camera);
   const std::size_t batch = std::min(memory.batch(), within ? kWatchedBatch : pixels);
   if (!first) first.emplace(context, options);
   PathTracer::FirstHits out{Image(camera.width, camera.height, 3),

@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
+#include "device/kernel.hpp"
 #include "raysplats/error.hpp"
 #include "shared/tree_layout.h"
 #include "trace/ray_launch.hpp"
@@ -16,8 +16,6 @@ namespace {
 constexpr std::size_t kGroup = 64;
 // As in RayTracer: on CPUs a work-item traces several rays one after the other.
 constexpr std::size_t kCpuRaysPerItem = 64;
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 // Positions of the corners of all triangles, nine floats each.
 std::vector<float> corners_of(std::span<const Mesh> meshes) {

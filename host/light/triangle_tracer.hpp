@@ -9,10 +9,10 @@
 #include "bvh/lbvh.hpp"
 #include "device/buffer.hpp"
 #include "device/context.hpp"
+#include "raysplats/rays.hpp"
 #include "raysplats/scene.hpp"
 #include "shared/light_layout.h"
 #include "trace/launch_budget.hpp"
-#include "trace/ray_tracer.hpp"
 
 namespace raysplats {
 

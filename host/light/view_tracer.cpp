@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <array>
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
 #include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "device/kernel.hpp"
 #include "light/mirror_paths.hpp"
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "scene/planes.hpp"
 #include "scene/row_share.hpp"
 #include "trace/camera_rays.hpp"
@@ -31,8 +32,6 @@ constexpr std::size_t kPathBytes =
          2 * sizeof(RayBackward::ResultGradient) + 4);
 constexpr std::size_t kLeastBatch = 4096;
 constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 TraceOptions ray_options(TraceOptions options) {
   options.background = {0.0f, 0.0f, 0.0f};  // MirrorPaths adds it
@@ -60,10 +59,6 @@ void require_no_more_than_mirrors_show(const TraceOptions& options) {
         "Scenes with mirrors cannot be traced by tiles: choose traversal auto or bvh, or leave out "
         "the mirrors");
   }
-}
-
-std::size_t pixels_of(const Camera& camera) {
-  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
 }
 
 std::uint64_t count_of(const Buffer<std::uint32_t>& counter) {
@@ -224,8 +219,8 @@ void ViewTracer::forward(const DeviceGaussians& gaussians,
   self.by_rays = false;
   if (self.sky) {
     // backward() may trace parts again, over black.
-    self.image.ensure(self.context, 4 * pixels_of(camera), "image");
-    self.image.copy_from(self.packets.image(), 4 * pixels_of(camera));
+    self.image.ensure(self.context, 4 * pixel_count(camera), "image");
+    self.image.copy_from(self.packets.image(), 4 * pixel_count(camera));
     self.sky->show(camera, self.image);
   }
   self.own_image = self.sky.has_value();
@@ -260,13 +255,13 @@ void ViewTracer::Impl::trace_batch(const DeviceGaussians& gaussians,
   rays->tracer.set_near(RayNear::of(camera, options.near_depth));
   rays->generator.generate(camera, Lens{}, first, count, rays->paths.rays());
   rays->paths.trace(gaussians, count, color_direction(camera), options.background, counter);
-  rays_whole = count == pixels_of(camera);
+  rays_whole = count == pixel_count(camera);
 }
 
 void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep) {
   MirrorPaths& paths = rays->paths;
   rays->capped.clear();
-  const std::size_t pixels = pixels_of(camera);
+  const std::size_t pixels = pixel_count(camera);
   image.ensure(context, 4 * pixels, "image");
   if (options.depth) depth.ensure(context, 3 * pixels, "depth");
   const auto [top, bottom] = keep ? std::array<int, 2>{0, camera.height} : ray_rows();
@@ -332,10 +327,10 @@ void ViewTracer::backward(const DeviceGaussians& gaussians,
     throw UsageError(
         "ViewTracer::backward() must follow forward(keep = true) of the same Gaussians, unchanged");
   }
-  if (image_gradient.size() < 4 * pixels_of(self.camera)) {
+  if (image_gradient.size() < 4 * pixel_count(self.camera)) {
     throw UsageError(fmt::format(
         "The gradient of a picture of {} numbers has {}: give one for every channel of every pixel",
-        4 * pixels_of(self.camera), image_gradient.size()));
+        4 * pixel_count(self.camera), image_gradient.size()));
   }
   if (self.sky && pose != nullptr) {
     throw UsageError(
@@ -362,7 +357,7 @@ void ViewTracer::Impl::backward_rays(const DeviceGaussians& gaussians,
                                      PoseGradient* pose) {
   MirrorPaths& paths = rays->paths;
   if (pose != nullptr) *pose = {};
-  const std::size_t pixels = pixels_of(camera);
+  const std::size_t pixels = pixel_count(camera);
   rays->sums.begin(gaussians, RayScreen::of(camera), pixels * paths.segments());
   for (std::size_t first = 0; first < pixels; first += batch()) {
     const std::size_t count = std::min(batch(), pixels - first);

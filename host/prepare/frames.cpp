@@ -2,10 +2,14 @@
 #include "prepare/frames.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
 #include <optional>
 
 #include "raysplats/error.hpp"
@@ -23,24 +27,57 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kCandidates = 3;  ///< frames of which the sharpest is kept
 
-bool is_photo(const fs::path& path) {
-  const std::string extension = lower_extension(path);
-  constexpr std::array<const char*, 7> kKnown{".jpg",  ".jpeg", ".png", ".tif",
-                                              ".tiff", ".bmp",  ".webp"};
-  return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end() &&
-         !is_apple_double(path);
+/// Hears of every file in a folder and in those folders below it that `enters` takes; folders below
+/// that may not be read are passed over. Throws DataError when the folder itself cannot be read.
+void each_file(const fs::path& folder,
+               const std::function<bool(const fs::path&)>& enters,
+               const std::function<void(const fs::path&)>& hear) {
+  std::error_code error;
+  // The other iterator passes over the outermost folder as well.
+  const fs::directory_iterator readable(folder, error);
+  fs::recursive_directory_iterator at;
+  if (!error) {
+    at = fs::recursive_directory_iterator(folder, fs::directory_options::skip_permission_denied,
+                                          error);
+  }
+  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    if (is_folder(at->path()) && !enters(at->path())) at.disable_recursion_pending();
+    if (is_file(at->path())) hear(at->path());
+  }
+  if (error)
+    throw DataError(fmt::format("{} cannot be read: {}", folder.string(), error.message()));
 }
 
-/// Runs ffprobe with `wanted` for a video; `hear` gets every line.
+bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
+
+DataError no_video(const fs::path& video, const std::string& reason) {
+  return DataError(fmt::format("{} is no video that ffmpeg can read{}", video.string(), reason));
+}
+
+/// Runs ffprobe with `wanted` for a video; `hear` gets the name and the value of every entry.
 void probe(const fs::path& video,
            std::vector<std::string> wanted,
            const fs::path& log,
-           const std::function<void(std::string_view)>& hear,
+           const std::function<void(std::string_view, std::string_view)>& hear,
            const std::function<bool()>& stop) {
   wanted.insert(wanted.begin(), {"-v", "error"});
-  wanted.insert(wanted.end(),
-                {"-of", "default=noprint_wrappers=1:nokey=1", fs::absolute(video).string()});
-  run_program(find_program("ffprobe", "ffmpeg"), wanted, log, hear, stop);
+  wanted.insert(wanted.end(), {"-of", "default=noprint_wrappers=1", fs::absolute(video).string()});
+  run_program(
+      find_program("ffprobe", "ffmpeg"), wanted, log,
+      [&](std::string_view line) {
+        const std::size_t equals = line.find('=');
+        if (equals != std::string_view::npos) hear(line.substr(0, equals), line.substr(equals + 1));
+      },
+      stop);
+}
+
+/// Of "30000/1001"; 0 of "0/0", as files say that do not know.
+double ratio(std::string_view text) {
+  const std::size_t slash = text.find('/');
+  if (slash == std::string_view::npos) return 0.0;
+  const std::optional<double> over = parse_real(text.substr(0, slash));
+  const std::optional<double> under = parse_real(text.substr(slash + 1));
+  return over && under && *under > 0.0 ? *over / *under : 0.0;
 }
 
 /// By the times of its packets, for files that state no length, as browsers record them.
@@ -53,9 +90,10 @@ double seconds_of_packets(const fs::path& video,
   double last = 0.0;
   probe(
       video, {"-select_streams", "v:0", "-show_entries", "packet=pts_time"}, log,
-      [&](std::string_view line) {
+      [&](std::string_view name, std::string_view value) {
+        if (name != "pts_time") return;
         ++packets;
-        const std::optional<double> time = parse_real(line);
+        const std::optional<double> time = parse_real(value);
         if (!time) return;
         // Packets come in the order of decoding, which is not that of their times.
         first = timed == 0 ? *time : std::min(first, *time);
@@ -63,8 +101,7 @@ double seconds_of_packets(const fs::path& video,
         ++timed;
       },
       stop);
-  if (packets == 0)
-    throw DataError(fmt::format("{} is no video that ffmpeg can read", video.string()));
+  if (packets == 0) throw no_video(video, "");
   if (!(last > first)) {
     throw DataError(fmt::format(
         "{} states no length: if it is a video, write it anew with 'ffmpeg -i {} -c copy {}'",
@@ -74,17 +111,6 @@ double seconds_of_packets(const fs::path& video,
   return (last - first) * frames / (frames - 1.0);  // the last frame lasts as the others do
 }
 
-double seconds_of(const fs::path& video, const fs::path& log, const std::function<bool()>& stop) {
-  std::optional<double> stated;
-  probe(
-      video, {"-show_entries", "format=duration"}, log,
-      [&](std::string_view line) {
-        if (const std::optional<double> seconds = parse_real(line)) stated = seconds;
-      },
-      stop);
-  return stated && *stated > 0.0 ? *stated : seconds_of_packets(video, log, stop);
-}
-
 /// A path as a part of ffmpeg's patterns of names, in which a % starts a number.
 std::string in_pattern(const fs::path& path) {
   std::string out;
@@ -92,14 +118,41 @@ std::string in_pattern(const fs::path& path) {
   return out;
 }
 
+bool same_bytes(const fs::path& a, const fs::path& b) {
+  if (fs::file_size(a) != fs::file_size(b)) return false;
+  std::ifstream first(a, std::ios::binary);
+  std::ifstream second(b, std::ios::binary);
+  return std::equal(std::istreambuf_iterator<char>(first), {},
+                    std::istreambuf_iterator<char>(second));
+}
+
+void warn_of_high_range(const fs::path& video, const std::string& transfer) {
+  const bool hlg = transfer == "arib-std-b67";
+  if (!hlg && transfer != "smpte2084") return;
+  spdlog::warn(
+      "{} is an HDR video ({}), whose frames come out in pale colours: record without HDR, or make "
+      "an "
+      "SDR video of it first (docs/cli.md, 'prepare')",
+      video.string(), hlg ? "HLG" : "PQ");
+}
+
 }  // namespace
+
+bool is_photo(const fs::path& path) {
+  const std::string extension = lower_extension(path);
+  constexpr std::array<const char*, 7> kKnown{".jpg",  ".jpeg", ".png", ".tif",
+                                              ".tiff", ".bmp",  ".webp"};
+  return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end() &&
+         !is_apple_double(path);
+}
 
 std::vector<std::string> photos_in(const fs::path& folder) {
   std::vector<std::string> names;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file() && is_photo(entry.path()))
-      names.push_back(entry.path().filename().string());
-  }
+  each_file(
+      folder, [](const fs::path&) { return false; },
+      [&](const fs::path& file) {
+        if (is_photo(file)) names.push_back(file.filename().string());
+      });
   std::sort(names.begin(), names.end());
   return names;
 }
@@ -107,13 +160,14 @@ std::vector<std::string> photos_in(const fs::path& folder) {
 std::vector<std::string> photos_below(const fs::path& folder, const fs::path& without) {
   std::vector<std::string> names;
   std::error_code error;
-  for (fs::recursive_directory_iterator at(folder), end; at != end; ++at) {
-    const bool left_out =
-        at->path().filename().string().starts_with('.') || fs::equivalent(*at, without, error);
-    if (at->is_directory() && left_out) at.disable_recursion_pending();
-    if (at->is_regular_file() && is_photo(at->path()))
-      names.push_back(at->path().lexically_relative(folder).generic_string());
-  }
+  each_file(
+      folder,
+      [&](const fs::path& below) {
+        return !is_hidden(below) && !fs::equivalent(below, without, error);
+      },
+      [&](const fs::path& file) {
+        if (is_photo(file)) names.push_back(file.lexically_relative(folder).generic_string());
+      });
   std::sort(names.begin(), names.end());
   return names;
 }
@@ -122,17 +176,12 @@ std::map<std::string, std::size_t> unread_pictures(const fs::path& folder, bool 
   constexpr std::array<const char*, 12> kUnread{".heic", ".heif", ".avif", ".jxl", ".dng", ".cr2",
                                                 ".cr3",  ".nef",  ".arw",  ".raf", ".orf", ".rw2"};
   std::map<std::string, std::size_t> out;
-  std::error_code error;
-  for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end;
-       at.increment(error)) {
-    std::error_code ignored;
-    const bool hidden = at->path().filename().string().starts_with('.');
-    if (at->is_directory(ignored) && (!below || hidden)) at.disable_recursion_pending();
-    const std::string extension = lower_extension(at->path());
-    if (at->is_regular_file(ignored) &&
-        std::find(kUnread.begin(), kUnread.end(), extension) != kUnread.end())
-      ++out[extension];
-  }
+  each_file(
+      folder, [&](const fs::path& inner) { return below && !is_hidden(inner); },
+      [&](const fs::path& file) {
+        const std::string extension = lower_extension(file);
+        if (std::find(kUnread.begin(), kUnread.end(), extension) != kUnread.end()) ++out[extension];
+      });
   return out;
 }
 
@@ -153,45 +202,90 @@ void copy_photos(const fs::path& from,
   }
 }
 
+VideoFacts video_facts(const fs::path& video,
+                       const fs::path& log,
+                       const std::function<bool()>& stop) {
+  VideoFacts facts;
+  bool pictures = false;
+  try {
+    probe(
+        video,
+        {"-select_streams", "v:0", "-show_entries",
+         "stream=avg_frame_rate,color_transfer:format=duration"},
+        log,
+        [&](std::string_view name, std::string_view value) {
+          if (name == "avg_frame_rate") {
+            pictures = true;
+            facts.rate = ratio(value);
+          }
+          if (name == "color_transfer") facts.transfer = value;
+          if (name == "duration") facts.seconds = parse_real(value).value_or(0.0);
+        },
+        stop);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kRuntime) throw;
+    throw no_video(video, fmt::format(": {}", error.what()));
+  }
+  if (!pictures) throw no_video(video, "");
+  if (!(facts.seconds > 0.0)) facts.seconds = seconds_of_packets(video, log, stop);
+  return facts;
+}
+
 void take_frames(const fs::path& video,
+                 const VideoFacts& facts,
                  const fs::path& images,
                  std::size_t count,
                  const fs::path& log,
                  const std::function<bool(std::size_t, std::size_t)>& watch) {
-  const std::size_t total = kCandidates * count;
-  const fs::path ffmpeg = find_program("ffmpeg", "ffmpeg");
-  const double seconds = seconds_of(video, log, [&] { return !watch(0, total); });
+  warn_of_high_range(video, facts.transfer);
+  // A rate above the video's own repeats frames. Twice that one still meets every frame of a video
+  // whose rate varies.
+  double rate = static_cast<double>(kCandidates * count) / facts.seconds;
+  if (facts.rate > 0.0) rate = std::min(rate, 2.0 * facts.rate);
+  const auto total = static_cast<std::size_t>(std::lround(rate * facts.seconds));
   const fs::path all = images.parent_path() / "frames.part";
   fs::remove_all(all);
   fs::create_directories(all);
   std::size_t made = 0;
   run_program(
-      ffmpeg,
+      find_program("ffmpeg", "ffmpeg"),
       {"-nostdin", "-hide_banner", "-v", "error", "-progress", "pipe:1", "-i",
        fs::absolute(video).string(), "-vf",
        // A JPEG does not say by which matrix its colours were made: all readers take BT.601's.
-       fmt::format("fps={:.6f},scale=out_color_matrix=bt601:out_range=full",
-                   static_cast<double>(total) / seconds),
-       "-q:v", "2", in_pattern(fs::absolute(all)) + "/frame_%06d.jpg"},
+       fmt::format("fps={:.6f},scale=out_color_matrix=bt601:out_range=full", rate), "-q:v", "2",
+       in_pattern(fs::absolute(all)) + "/frame_%06d.jpg"},
       log,
       [&](std::string_view line) {
         if (line.starts_with("frame="))
           std::from_chars(line.data() + 6, line.data() + line.size(), made);
       },
       [&] { return !watch(std::min(made, total), total); });
-  const std::vector<std::string> names = photos_in(all);
+  std::vector<std::string> names = photos_in(all);
   if (names.empty()) throw DataError(fmt::format("{} has no frames", video.string()));
+  // Repeated frames would be the same photo for training and for evaluation.
+  names.erase(std::unique(names.begin(), names.end(),
+                          [&](const std::string& a, const std::string& b) {
+                            return same_bytes(all / a, all / b);
+                          }),
+              names.end());
+  if (names.size() < count) {
+    spdlog::info("{} has {}, not the {} asked for: all are taken", video.string(),
+                 counted(static_cast<double>(names.size()), "different frame"), count);
+  }
+  const std::size_t photos = std::min(count, names.size());
   fs::create_directories(images);
-  for (std::size_t first = 0; first < names.size(); first += kCandidates) {
+  for (std::size_t photo = 0; photo < photos; ++photo) {
+    const std::size_t first = photo * names.size() / photos;
+    const std::size_t end = (photo + 1) * names.size() / photos;
     std::size_t best = first;
     double most = -1.0;
-    for (std::size_t i = first; i < std::min(first + kCandidates, names.size()); ++i) {
+    for (std::size_t i = first; i < end; ++i) {
       const double sharp = sharpness(read_image(all / names[i]));
       if (sharp > most) best = i;
       most = std::max(most, sharp);
     }
     fs::rename(all / names[best], images / names[best]);
-    if (!watch(first, names.size())) {
+    if (!watch(end, names.size())) {
       throw Error(ErrorCode::kInterrupted,
                   "Interrupted among the frames of the video: the same command starts them anew");
     }

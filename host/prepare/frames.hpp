@@ -11,10 +11,12 @@
 
 namespace raysplats {
 
-/// Names of the files in a folder that are photos by their extension, sorted.
+/// Whether a file is a photo by its extension.
+bool is_photo(const std::filesystem::path& path);
+/// Names of the photos in a folder, sorted. Throws DataError when it cannot be read.
 std::vector<std::string> photos_in(const std::filesystem::path& folder);
 /// Names of the photos in a folder and, as "folder/photo", in all folders below it but for hidden
-/// ones and `without`, sorted.
+/// ones, `without` and those that may not be read, sorted. Throws as photos_in().
 std::vector<std::string> photos_below(const std::filesystem::path& folder,
                                       const std::filesystem::path& without = {});
 /// Number of files by extension that are pictures of cameras and phones in formats that are not
@@ -27,9 +29,23 @@ void copy_photos(const std::filesystem::path& from,
                  const std::vector<std::string>& names,
                  const std::function<void(std::size_t done)>& done);
 
-/// Fills `images` with `count` sharp frames of a video. Throws as run_program(), and DataError for
-/// a file that is none and for one of unknown length.
+/// What ffprobe says of a video.
+struct VideoFacts {
+  double seconds = 0;
+  double rate = 0;       ///< frames a second on average; 0 = unknown
+  std::string transfer;  ///< ffmpeg's name of the curve of its brightness
+};
+
+/// Throws as run_program() when it is stopped, and DataError for a file that is no video and for
+/// one of unknown length.
+VideoFacts video_facts(const std::filesystem::path& video,
+                       const std::filesystem::path& log,
+                       const std::function<bool()>& stop);
+
+/// Fills `images` with `count` sharp frames of a video, or with all it has, which a line of the log
+/// says. Warns of HDR. Throws as run_program(), and DataError for a video without frames.
 void take_frames(const std::filesystem::path& video,
+                 const VideoFacts& facts,
                  const std::filesystem::path& images,
                  std::size_t count,
                  const std::filesystem::path& log,

@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <fstream>
 #include <iterator>
@@ -18,6 +19,8 @@
 #include "prepare/frames.hpp"
 #include "raysplats/error.hpp"
 #include "util/atomic_file.hpp"
+#include "util/file_kind.hpp"
+#include "util/file_lock.hpp"
 #include "util/number_text.hpp"
 #include "util/output_directory.hpp"
 #include "util/program.hpp"
@@ -71,38 +74,77 @@ std::string state_of(const fs::path& file) {
                      fs::last_write_time(file).time_since_epoch().count());
 }
 
-/// The folder that is made, and which of its steps are done with which settings.
+/// A path in one spelling: whole, without links and a separator at its end.
+std::string place_of(const fs::path& path) {
+  std::error_code error;
+  fs::path place = fs::weakly_canonical(fs::absolute(path), error);
+  if (error) place = fs::absolute(path).lexically_normal();
+  return (place.has_filename() ? place : place.parent_path()).string();
+}
+
+/// The file of a step that is done, which holds its settings.
+fs::path mark_of(const fs::path& data, const std::string& step) { return data / "prepare" / step; }
+
+/// What the mark of the images says that they were made from, in the spelling of then; empty
+/// without a mark.
+std::string former_input(const fs::path& data, const fs::path& input) {
+  std::ifstream stream(mark_of(data, "images"));
+  const std::string text((std::istreambuf_iterator<char>(stream)), {});
+  const std::string place = place_of(input);
+  return text.starts_with(place + "\n") ? place : text.substr(0, text.find('\n'));
+}
+
+/// Each is made from those before it.
+constexpr std::array<const char*, 4> kSteps{"images", "features", "matches", "model"};
+
+/// The folder that is made, which no other run writes to meanwhile, and which of its steps are done
+/// with which settings.
 class Work {
  public:
-  Work(fs::path data, const PrepareWatch& watch) : data_(std::move(data)), watch_(watch) {
-    make_output_directory(data_);
+  Work(const fs::path& data, const PrepareWatch& watch)
+      : data_(made(data)), lock_(data_ / ".lock"), watch_(watch) {
     make_output_directory(data_ / "prepare");
   }
 
-  /// Whether a step is still to be done with these settings, or follows one that was done anew.
+  /// Whether a step is still to be done with these settings.
   bool due(const std::string& name, const std::string& settings) const {
-    std::ifstream stream(mark(name));
+    std::ifstream stream(mark_of(data_, name));
     const std::string before((std::istreambuf_iterator<char>(stream)), {});
-    return anew_ || !stream || before != settings;
+    return !stream || before != settings;
   }
-  /// Runs `action` if the step is due.
+  /// Runs `action` if the step is due, and makes all later steps due.
   template <class Action>
   void step(const std::string& name, const std::string& settings, Action action) {
     if (!due(name, settings)) return;
-    anew_ = true;
-    fs::remove(mark(name));
+    forget(name);
     action();
-    write_text_file(mark(name), settings);
+    write_text_file(mark_of(data_, name), settings);
+  }
+  /// Makes a step due and all later ones, even when this run ends before it comes to them.
+  void forget(const std::string& name) const {
+    const auto from = std::find(kSteps.begin(), kSteps.end(), name);
+    std::for_each(from, kSteps.end(), [&](const char* step) { fs::remove(mark_of(data_, step)); });
   }
   void colmap(const std::vector<std::string>& arguments,
               const std::string& step,
               const std::function<void(std::string_view, std::size_t& done)>& count,
               std::size_t total) {
     std::size_t done = 0;
+    std::string trouble;
     run_program(
         find_program("colmap", "colmap"), arguments, log(),
-        [&](std::string_view line) { count(line, done); },
+        [&](std::string_view line) {
+          if (trouble.empty() && contains(line, "SQLite error")) trouble = line;
+          count(line, done);
+        },
         [&] { return !watch_(step, done, total); });
+    // COLMAP 3.8 goes on without what its database could not take, as on a full disk.
+    if (!trouble.empty()) {
+      throw Error(ErrorCode::kRuntime,
+                  fmt::format("The database of colmap could not be written: {} (all it said is in "
+                              "{})",
+                              trouble, log().string()));
+    }
   }
   /// What COLMAP says of the options of a command.
   std::string colmap_help(const std::string& command) const {
@@ -115,6 +157,7 @@ class Work {
     }
     return text;
   }
+  const fs::path& data() const { return data_; }
   fs::path operator/(const char* name) const { return data_ / name; }
   std::string text(const char* name) const { return (data_ / name).string(); }
   fs::path log() const { return data_ / "prepare.log"; }
@@ -123,39 +166,57 @@ class Work {
   }
 
  private:
-  fs::path mark(const std::string& name) const { return data_ / "prepare" / name; }
+  static fs::path made(const fs::path& data) {
+    make_output_directory(data);
+    return data;
+  }
 
   fs::path data_;
+  FileLock lock_;
   const PrepareWatch& watch_;
-  bool anew_ = false;
 };
+
+/// Removes the images that are to be made anew, and before them the poses of what they showed;
+/// check_output() has let in nobody else's.
+void remove_former(const Work& work) {
+  fs::remove_all(work / "sparse");
+  fs::remove_all(work / "images");
+}
 
 std::vector<std::string> gather_images(const fs::path& input,
                                        const std::vector<std::string>& given,
                                        const PrepareOptions& options,
                                        Work& work) {
   const bool video = !fs::is_directory(input);
-  std::string settings = fs::absolute(input).string() + "\n";
+  const fs::path images = work / "images";
+  const bool whole = video || std::all_of(given.begin(), given.end(), [&](const std::string& name) {
+                       return is_file(images / name);
+                     });
+  if (!whole) work.forget("images");
+  const std::string former = former_input(work.data(), input);
+  std::string settings = (former.empty() ? place_of(input) : former) + "\n";
   // A video and photos that have come, gone or changed since are to be seen.
   if (video) settings += fmt::format("{} frames\n{}\n", options.frames, state_of(input));
   for (const std::string& name : given)
     settings += fmt::format("{} {}\n", name, state_of(input / name));
-  const fs::path images = work / "images";
   work.step("images", settings, [&] {
     write_text_file(work / "prepare/own", "images and sparse are made by raysplats prepare\n");
-    fs::remove_all(images);
     if (video) {
-      take_frames(input, images, options.frames, work.log(),
+      const VideoFacts facts =
+          video_facts(input, work.log(), [&] { return !work.watch("video", 0, 0); });
+      remove_former(work);
+      take_frames(input, facts, images, options.frames, work.log(),
                   [&](std::size_t done, std::size_t of) { return work.watch("frames", done, of); });
       return;
     }
+    remove_former(work);
     copy_photos(input, images, given, [&](std::size_t done) {
       if (!work.watch("photos", done, given.size()))
         throw Error(ErrorCode::kInterrupted,
                     "Interrupted among the photos: the same command copies them anew");
     });
   });
-  return photos_below(images);
+  return video ? photos_in(images) : given;
 }
 
 std::string model_settings(const ColmapPlan& plan) {
@@ -251,14 +312,21 @@ void place(const ColmapPlan& plan, Work& work) {
     const fs::path part = work / "sparse.part";
     fs::remove_all(part);
     fs::create_directories(part);
-    work.colmap(
-        {"mapper", "--database_path", work.text("database.db"), "--image_path", work.text("images"),
-         "--output_path", part.string()},
-        "poses",
-        [](std::string_view line, std::size_t& done) {
-          done = std::max(done, placed_photos(line));
-        },
-        plan.photos);
+    bool none = false;
+    try {
+      work.colmap(
+          {"mapper", "--database_path", work.text("database.db"), "--image_path",
+           work.text("images"), "--output_path", part.string()},
+          "poses",
+          [&](std::string_view line, std::size_t& done) {
+            none = none || contains(line, "failed to create sparse model");
+            done = std::max(done, placed_photos(line));
+          },
+          plan.photos);
+    } catch (const Error& error) {
+      // Without a model COLMAP ends with an error, as it does for others.
+      if (error.code() != ErrorCode::kRuntime || !none) throw;
+    }
     if (!fs::exists(part) || fs::is_empty(part)) {
       throw DataError(
           fmt::format("COLMAP found no poses for the {} photos: they have to overlap by more than "
@@ -310,13 +378,19 @@ std::vector<std::string> chosen_photos(const fs::path& input,
                                   below)));
 }
 
-/// Refuses a folder that belongs to something else: photos that are read, or images, models and
-/// cameras that would be removed or taken for those that are made here.
+/// Refuses a folder that belongs to something else: photos that are read, what was made from other
+/// photos, or images, models and cameras of somebody else that would be removed or taken for those
+/// that are made here.
 void check_output(const fs::path& input, const fs::path& data) {
   std::error_code error;
   if (fs::equivalent(input, data / "images", error) || fs::equivalent(input, data, error))
     throw UsageError(fmt::format("{} is what is read: give another folder with -o", data.string()));
-  if (fs::exists(data / "prepare/own", error)) return;
+  if (fs::exists(data / "prepare/own", error)) {
+    const std::string former = former_input(data, input);
+    if (former.empty() || place_of(former) == place_of(input)) return;
+    throw DataError(fmt::format("{} was made from {}: give another folder with -o, or remove it",
+                                data.string(), former));
+  }
   for (const char* name : {"images", "sparse", "database.db", "transforms.json",
                            "transforms_train.json", "transforms_test.json"}) {
     if (!fs::exists(data / name, error)) continue;
@@ -336,14 +410,19 @@ Prepared prepare_data(const fs::path& input,
     throw DataError(
         fmt::format("{} does not exist: name a folder of photos or a video", input.string()));
   const bool video = !fs::is_directory(input);
+  if (video && is_photo(input))
+    throw DataError(fmt::format("{} is a photo: name its folder", input.string()));
   find_program("colmap", "colmap");
   if (video) find_program("ffmpeg", "ffmpeg");
   const std::vector<std::string> given =
       video ? std::vector<std::string>{} : chosen_photos(input, data, options);
   check_output(input, data);
+  ColmapPlan plan;
+  // A photo that is none is told by its own name, and before anything is removed.
+  if (!video) plan = plan_colmap(input, given, options, video);
   Work work(data, watch);
   const std::vector<std::string> photos = gather_images(input, given, options, work);
-  const ColmapPlan plan = plan_colmap(work / "images", photos, options, video);
+  if (video) plan = plan_colmap(work / "images", photos, options, video);
   if (!video) tell_matching(options, plan, work);
   tell_time(plan, work);
   find_features(options, plan, work);

@@ -53,9 +53,9 @@ using PrepareWatch =
 /// log says beforehand how long COLMAP will take, roughly, and others what was left out or chosen
 /// by the number of photos. Steps that `data` has already from the same input, by its sizes and
 /// times of writing, with the same options are not done again. Throws UsageError for a missing
-/// program and for inputs that are neither; DataError for a folder without photos, for one that
-/// cannot be made, for a video of unknown length, for data made from something else, and when no
-/// pose was found; Error when a program fails or is interrupted.
+/// program; DataError for inputs that are neither, for a folder without photos, for one that cannot
+/// be made or that another run writes to, for a video of unknown length, for data made from
+/// something else, and when no pose was found; Error when a program fails or is interrupted.
 Prepared prepare_data(const std::filesystem::path& input,
                       const std::filesystem::path& data,
                       const PrepareOptions& options,

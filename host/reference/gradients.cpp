@@ -2,13 +2,13 @@
 #include "reference/gradients.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
 
 #include "raysplats/error.hpp"
 #include "reference/sky.hpp"
+#include "scene/pixel_count.hpp"
 
 namespace raysplats::reference {
 namespace {
@@ -139,8 +139,7 @@ Gradient render_gradient(const Parameters& parameters,
                          const TraceOptions& options,
                          const Camera& camera,
                          std::span<const double> image_gradient) {
-  const auto pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels = pixel_count(camera);
   if (image_gradient.size() != 4 * pixels) {
     throw UsageError(
         "the image gradient does not have 4 planes of the camera's size, pass height x width x 4 "

@@ -8,6 +8,7 @@
 #include "reference/environment.hpp"
 #include "reference/tracer.hpp"
 #include "reference/triangles.hpp"
+#include "scene/pixel_count.hpp"
 
 namespace raysplats::reference {
 
@@ -79,9 +80,7 @@ struct LightRender {
   std::vector<double> margin;
   std::vector<double> chance;
 
-  std::size_t pixels() const {
-    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  }
+  std::size_t pixels() const { return pixel_count(width, height); }
 };
 
 /// One ray through the centre of every pixel. Throws UsageError for cameras other than pinholes.

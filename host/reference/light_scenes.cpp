@@ -131,4 +131,10 @@ Material white(Material::Kind kind) {
   return out;
 }
 
+Material glass(float ior) {
+  Material out = white(Material::Kind::kGlass);
+  out.ior = ior;
+  return out;
+}
+
 }  // namespace raysplats::reference

@@ -41,5 +41,6 @@ Gaussians gaussian_cloud(std::size_t count,
 
 /// A material of one kind with colour 1, for tests in which it must not lose light.
 Material white(Material::Kind kind);
+Material glass(float ior);
 
 }  // namespace raysplats::reference

@@ -32,4 +32,15 @@ Camera cube_camera(int width, int height) {
   return camera;
 }
 
+Camera posed(
+    CameraModel model, int width, int height, double fx, double fy, const Distortion& distortion) {
+  Camera camera = look_at({1.5, -0.7, 2.0}, {-0.3, 0.4, 0.1}, {0.1, -1, 0.2}, width, height, fx);
+  camera.fy = fy;
+  camera.cx += 3.25;
+  camera.cy -= 1.75;
+  camera.model = model;
+  camera.distortion = distortion;
+  return camera;
+}
+
 }  // namespace raysplats::reference

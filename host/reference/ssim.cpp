@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 
 namespace raysplats::reference {
 namespace {
@@ -77,7 +78,7 @@ void check_sizes(std::span<const double> image,
                  int width,
                  int height) {
   if (width <= 0 || height <= 0 || image.size() != target.size() ||
-      image.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+      image.size() != pixel_count(width, height)) {
     throw UsageError(
         "the images compared by SSIM differ in size, pass two of width x height numbers");
   }

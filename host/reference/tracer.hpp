@@ -7,6 +7,7 @@
 
 #include "raysplats/camera.hpp"
 #include "reference/gaussian.hpp"
+#include "scene/pixel_count.hpp"
 
 namespace raysplats::reference {
 
@@ -82,9 +83,7 @@ struct Render {
   std::uint64_t hits = 0;
   std::uint64_t signature = 0;  ///< hash of every ray's sequence of Gaussian indices
 
-  std::size_t pixels() const {
-    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  }
+  std::size_t pixels() const { return pixel_count(width, height); }
 };
 
 /// Direction (X, Y, 1) of a pixel's centre in camera axes: t is then the depth along the camera's z

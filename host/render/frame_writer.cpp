@@ -15,6 +15,7 @@
 #include "render/bands.hpp"
 #include "render/previews.hpp"
 #include "render/shutter.hpp"
+#include "util/clock.hpp"
 #include "util/srgb.hpp"
 
 namespace raysplats {
@@ -212,9 +213,7 @@ FrameReport write_frames(Tracer& tracer,
     FrameLayers layers;
     if (options.depth) layers.depth = average_depth(samples.depth, options.supersample);
     if (options.hits) layers.hits = box_average(samples.hits, options.supersample);
-    report.trace_seconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
-        (tracer.context().build_seconds() - built);
+    report.trace_seconds += seconds_since(start) - (tracer.context().build_seconds() - built);
     report.capped_rays += samples.capped_rays;
     // What follows is left to the one that leads.
     if (!ranks.leads()) {

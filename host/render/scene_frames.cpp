@@ -11,6 +11,7 @@
 #include "render/bands.hpp"
 #include "render/previews.hpp"
 #include "render/shutter.hpp"
+#include "util/clock.hpp"
 
 namespace raysplats {
 namespace {
@@ -80,9 +81,7 @@ SceneReport write_scene_frames(PathTracer& tracer,
     const double built = tracer.context().build_seconds();
     const auto start = std::chrono::steady_clock::now();
     Image rgba = exposed(tracer, scene, i, options, report.rays, within);
-    report.trace_seconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
-        (tracer.context().build_seconds() - built);
+    report.trace_seconds += seconds_since(start) - (tracer.context().build_seconds() - built);
     if (ranks.all_reduce_or(rgba.pixels() == 0)) break;
     collect_rows(ranks, tracer.rows(), rgba);
     // What follows is left to the one that leads.

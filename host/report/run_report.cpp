@@ -19,6 +19,7 @@
 #include "report/run_files.hpp"
 #include "report/run_warnings.hpp"
 #include "run/train_config.hpp"
+#include "scene/activation.hpp"
 #include "util/atomic_file.hpp"
 #include "util/number_text.hpp"
 
@@ -107,7 +108,7 @@ std::string model_histograms(const fs::path& run) {
   std::vector<double> opacities, sizes;
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* scales = model.log_scales.data() + 3 * i;
-    opacities.push_back(1.0 / (1.0 + std::exp(-static_cast<double>(model.opacities[i]))));
+    opacities.push_back(sigmoid(static_cast<double>(model.opacities[i])));
     sizes.push_back(static_cast<double>(*std::max_element(scales, scales + 3)) / std::log(10.0));
   }
   if (sizes.empty()) return "";

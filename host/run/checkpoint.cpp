@@ -10,7 +10,6 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <span>
 
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <tuple>
 #include <vector>
 
 #include "io/model_file.hpp"
@@ -66,6 +67,19 @@ SkyLight trained_sky(const ModelSource& source) {
         source.file.string());
   }
   return source.sky;
+}
+
+bool tells(const ModelSource& source) { return source.trained || source.header; }
+
+// Whether two models want other hits, or in another order.
+bool hits_differ(const ModelSource& a, const ModelSource& b) {
+  const auto hits_of = [](const ModelSource& source) {
+    const TraceOptions trace =
+        source.trained ? source.trained->trace : source.header.value_or(peak_order());
+    return std::tuple(trace.hit_order, trace.quantile, trace.adaptive_radius,
+                      trace.min_transmittance, trace.max_hits);
+  };
+  return hits_of(a) != hits_of(b);
 }
 
 // What somebody who named a folder without a run may have meant.
@@ -175,21 +189,23 @@ TraceOptions trace_options(const ModelSource& source) {
 }
 
 void find_models(SceneFile& scene) {
-  std::optional<ModelSource> first;  // that tells, or else of all
-  glm::dmat4 first_transform(1.0);
+  if (scene.models.empty()) return;
+  std::vector<ModelSource> sources;
   for (SceneModel& model : scene.models) {
-    const ModelSource source = find_model(model.file);
-    model.file = source.file;
-    const bool tells = source.trained || source.header;
-    const bool told = first && (first->trained || first->header);
-    if (first && (!tells || told)) continue;
-    first = source;
-    first_transform = model.transform;
+    sources.push_back(find_model(model.file));
+    model.file = sources.back().file;
   }
-  if (!first) return;
+  const auto telling = std::find_if(sources.begin(), sources.end(), tells);
+  const auto first = telling == sources.end() ? sources.begin() : telling;
   scene.trained = trace_options(*first);
-  scene.trained.sky = transformed(scene.trained.sky, first_transform);
+  scene.trained.sky = transformed(
+      scene.trained.sky, scene.models[static_cast<std::size_t>(first - sources.begin())].transform);
   scene.trained_data = dataset_options(*first);
+  if (std::any_of(sources.begin(), sources.end(),
+                  [&](const ModelSource& source) { return hits_differ(source, *first); })) {
+    spdlog::info("all models are traced as {} wants it, although others want it otherwise",
+                 first->file.string());
+  }
 }
 
 }  // namespace raysplats

@@ -12,7 +12,6 @@
 #include <set>
 #include <sstream>
 #include <string_view>
-#include <utility>
 
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
@@ -70,12 +69,6 @@ std::string file_text(const std::filesystem::path& path) {
   }
 }
 
-std::string dashed(std::string_view key) {
-  std::string out(key);
-  std::replace(out.begin(), out.end(), '_', '-');
-  return out;
-}
-
 std::vector<std::string> names_of(const std::vector<OptionRow>& keys) {
   std::vector<std::string> names;
   names.reserve(keys.size());
@@ -91,7 +84,7 @@ void read_keys(const toml::table& table,
                std::set<std::string>& seen,
                const std::function<bool(const std::string&)>& skip) {
   for (const auto& [written, node] : table) {
-    const std::string name = dashed(written.str());
+    const std::string name = io::dashed(written.str());
     const auto fail = [&, &node = node](const std::string& message) {
       throw UsageError(
           fmt::format("{}, line {}: {}", path.string(), node.source().begin.line, message));

@@ -380,12 +380,13 @@ void add_density_options(TrainTable& t, TrainOptions& o) {
            "start, else 0 up to 100 steps for each photo, rising to 0.01 at 200");
   t.number("opacity-reg", o.opacity_reg, 0, 1e3,
            "weight of the mean opacity in the loss of the mcmc strategy");
-  t.number("scale-reg", o.scale_reg, 0, 1e3,
-           "weight of the mean standard deviation, over the scene extent, in the loss of the mcmc "
-           "strategy");
+  t.number(
+      "scale-reg", o.scale_reg, 0, 1e3,
+      "weight of the mean standard deviation, over the distance of what the cameras see, in the "
+      "loss of the mcmc strategy");
   t.number("mcmc-noise", o.mcmc_noise, 0, 1e6,
            "noise that the mcmc strategy adds to the means of Gaussians whose opacity is near "
-           "0.005, times their covariance over the scene extent; falls as position-lr does");
+           "0.005, times their covariance over the same distance; falls as position-lr does");
   t.number("footprint", o.footprint, 0, 10,
            "least standard deviation of a Gaussian, in pixels of the view that resolves it best; 0 "
            "= none");

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <initializer_list>
 
 #include "raysplats/error.hpp"
 

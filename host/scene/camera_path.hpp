@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "raysplats/camera.hpp"
-#include "scene/orbit.hpp"
 
 namespace raysplats {
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "scene/activation.hpp"
+
 namespace raysplats {
 namespace {
 
@@ -46,7 +48,7 @@ std::vector<std::uint32_t> within(const Gaussians& model, const Bounds& box) {
 
 std::vector<std::uint32_t> with_opacity(const Gaussians& model, double least) {
   return kept(model, [&](std::uint32_t i) {
-    return 1.0 / (1.0 + std::exp(-static_cast<double>(model.opacities[i]))) >= least;
+    return sigmoid(static_cast<double>(model.opacities[i])) >= least;
   });
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "scene/activation.hpp"
 #include "scene/statistics.hpp"
 
 namespace raysplats {
@@ -41,7 +42,7 @@ ModelSummary summarize(const Gaussians& model) {
 
   double sum = 0.0;
   for (const float logit : model.opacities) {
-    const double opacity = 1.0 / (1.0 + std::exp(-static_cast<double>(logit)));
+    const double opacity = sigmoid(static_cast<double>(logit));
     sum += opacity;
     const double bin = opacity * static_cast<double>(ModelSummary::kOpacityBins);
     ++out.opacity_histogram[std::min(static_cast<std::size_t>(bin),

@@ -14,9 +14,11 @@
 #include <numbers>
 
 #include "raysplats/error.hpp"
+#include "scene/activation.hpp"
 #include "scene/camera_check.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/statistics.hpp"
+#include "scene/view_axes.hpp"
 
 namespace raysplats {
 namespace {
@@ -100,7 +102,7 @@ SceneExtent scene_extent(const Gaussians& model) {
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* mean = &model.means[3 * i];
     if (!std::isfinite(mean[0]) || !std::isfinite(mean[1]) || !std::isfinite(mean[2])) continue;
-    const double opacity = 1.0 / (1.0 + std::exp(-static_cast<double>(model.opacities[i])));
+    const double opacity = sigmoid(static_cast<double>(model.opacities[i]));
     for (std::size_t k = 0; k < 3; ++k) axes[k].push_back(static_cast<double>(mean[k]));
     weights.push_back(std::isfinite(opacity) ? opacity : 0.0);
     indices.push_back(i);
@@ -150,26 +152,17 @@ double field_of_view(const Camera& camera, CameraModel as) {
 
 std::optional<glm::dvec3> common_target(std::span<const Camera> cameras) {
   if (cameras.empty()) return std::nullopt;
-  // The squared distance of x from an axis through c along d is |P (x - c)|^2 with P = I - d d^T.
-  glm::dmat3 sum(0.0);
-  glm::dvec3 right(0.0);
-  for (const Camera& camera : cameras) {
-    const glm::dvec3 axis = glm::transpose(camera.rotation) * glm::dvec3(0.0, 0.0, 1.0);
-    const glm::dmat3 across = glm::dmat3(1.0) - glm::outerProduct(axis, axis);
-    sum += across;
-    right += across * camera.center();
-  }
+  const AxesFit fit = fit_axes(cameras);
   const auto count = static_cast<double>(cameras.size());
-  const glm::dmat3 inverse = glm::inverse(sum);
+  const glm::dmat3 inverse = glm::inverse(fit.normal);
   double norm = 0.0;
   for (int k = 0; k < 3; ++k) norm += glm::dot(inverse[k], inverse[k]);
   // The smallest eigenvalue of the mean, within a factor of the square root of 3; NaN fails too.
   if (!(1.0 / (std::sqrt(norm) * count) >= kLeastSpread)) return std::nullopt;
-  const glm::dvec3 target = inverse * right;
+  const glm::dvec3 target = inverse * fit.right;
   double behind = 0.0;
   for (const Camera& camera : cameras) {
-    const glm::dvec3 axis = glm::transpose(camera.rotation) * glm::dvec3(0.0, 0.0, 1.0);
-    if (!(glm::dot(target - camera.center(), axis) > 0.0)) ++behind;
+    if (!(glm::dot(target - camera.center(), view_axis(camera)) > 0.0)) ++behind;
   }
   if (behind >= kMostBehind * count) return std::nullopt;
   return target;

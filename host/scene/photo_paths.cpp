@@ -9,6 +9,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/camera_path.hpp"
+#include "scene/orbit.hpp"
 
 namespace raysplats {
 namespace {

@@ -2,8 +2,6 @@
 #include "scene/polygon.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <limits>

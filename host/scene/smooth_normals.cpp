@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,43 +11,14 @@
 #include <map>
 #include <numbers>
 #include <numeric>
-#include <tuple>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "scene/mesh.hpp"
+#include "scene/mesh_edges.hpp"
 
 namespace raysplats {
 namespace {
-
-using Key = std::array<std::uint32_t, 3>;
-
-struct KeyHash {
-  std::size_t operator()(const Key& key) const {
-    std::uint64_t hash = 0;
-    for (const std::uint32_t word : key) {
-      hash = (hash ^ word) * 0x9e3779b97f4a7c15ull;
-      hash ^= hash >> 29;
-    }
-    return static_cast<std::size_t>(hash);
-  }
-};
-
-/// Per vertex the number of its position: equal positions have equal numbers.
-std::vector<std::uint32_t> position_numbers(const Mesh& mesh) {
-  std::unordered_map<Key, std::uint32_t, KeyHash> numbers;
-  numbers.reserve(mesh.vertex_count());
-  std::vector<std::uint32_t> result(mesh.vertex_count());
-  for (std::size_t i = 0; i < result.size(); ++i) {
-    Key key;
-    for (std::size_t c = 0; c < 3; ++c) {
-      key[c] = std::bit_cast<std::uint32_t>(mesh.positions[3 * i + c] + 0.0f);  // -0 becomes 0
-    }
-    result[i] = numbers.emplace(key, static_cast<std::uint32_t>(numbers.size())).first->second;
-  }
-  return result;
-}
 
 /// Disjoint sets with path halving (Tarjan and van Leeuwen 1984).
 class Sets {
@@ -65,32 +35,6 @@ class Sets {
  private:
   std::vector<std::size_t> parent_;
 };
-
-/// An edge of a triangle by the numbers of its ends' positions, the smaller one first.
-struct Edge {
-  std::uint32_t low;
-  std::uint32_t high;
-  std::size_t low_corner;   ///< corner (3 x triangle + k) at the end `low`
-  std::size_t high_corner;  ///< and at `high`
-};
-
-std::vector<Edge> sorted_edges(const Mesh& mesh) {
-  const std::vector<std::uint32_t> numbers = position_numbers(mesh);
-  std::vector<Edge> edges;
-  edges.reserve(mesh.triangles.size());
-  for (std::size_t triangle = 0; triangle < mesh.triangle_count(); ++triangle) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      std::size_t a = 3 * triangle + k;
-      std::size_t b = 3 * triangle + (k + 1) % 3;
-      if (numbers[mesh.triangles[a]] > numbers[mesh.triangles[b]]) std::swap(a, b);
-      edges.push_back({numbers[mesh.triangles[a]], numbers[mesh.triangles[b]], a, b});
-    }
-  }
-  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
-    return std::tie(a.low, a.high, a.low_corner) < std::tie(b.low, b.high, b.low_corner);
-  });
-  return edges;
-}
 
 /// Outward unit normals of the placed triangles (zero where there is no area) and the corners'
 /// angles.
@@ -130,15 +74,15 @@ void add_smooth_normals(Mesh& mesh, double crease_degrees, const glm::dmat3& pla
   const Faces faces = measure(mesh, placement);
   // A normal is placed by the inverse transpose, so the transpose takes it back.
   const glm::dmat3 back = glm::transpose(placement);
-  const std::vector<Edge> edges = sorted_edges(mesh);
+  const std::vector<MeshEdge> edges = sorted_edges(mesh);
   // The tolerance keeps an edge of exactly the crease angle smooth.
   const double least_cosine =
       std::cos(std::clamp(crease_degrees, 0.0, 180.0) * std::numbers::pi / 180.0) - 1e-6;
   const std::size_t corners = mesh.triangles.size();
   Sets sets(corners);
   for (std::size_t i = 1; i < edges.size(); ++i) {
-    const Edge& a = edges[i - 1];
-    const Edge& b = edges[i];
+    const MeshEdge& a = edges[i - 1];
+    const MeshEdge& b = edges[i];
     if (a.low != b.low || a.high != b.high) continue;
     const glm::dvec3& na = faces.normals[a.low_corner / 3];
     const glm::dvec3& nb = faces.normals[b.low_corner / 3];

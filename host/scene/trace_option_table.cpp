@@ -9,11 +9,10 @@
 #include <utility>
 
 #include "raysplats/error.hpp"
+#include "util/mebibytes.hpp"
 
 namespace raysplats {
 namespace {
-
-constexpr std::size_t kMiBShift = 20;
 
 const std::vector<std::pair<std::string, PacketShape>>& packet_shapes() {
   static const std::vector<std::pair<std::string, PacketShape>> shapes{
@@ -111,9 +110,9 @@ void add_trace_options(OptionTable& t, TraceOptions& o) {
       [&o](const OptionTable::Values& values) {
         const std::string& text = option_value("memory-budget", values);
         const auto mib = option_number<std::int64_t>("memory-budget", text, 0, 1e9);
-        o.memory_budget = static_cast<std::size_t>(mib) << kMiBShift;
+        o.memory_budget = static_cast<std::size_t>(mib) * kMiB;
       },
-      [&o] { return std::to_string(o.memory_budget >> kMiBShift); });
+      [&o] { return std::to_string(o.memory_budget / kMiB); });
   t.choice<GradientSum>(
       "gradient-sum", o.gradient_sum,
       {{"auto", GradientSum::kAuto},

@@ -8,6 +8,7 @@
 #include "raysplats/error.hpp"
 #include "scene/camera_check.hpp"
 #include "scene/camera_model.hpp"
+#include "scene/pixel_count.hpp"
 #include "shared/layout.h"
 
 namespace raysplats {
@@ -129,8 +130,7 @@ void CameraRays::generate(const Camera& camera,
                           std::size_t first_pixel,
                           std::size_t count,
                           Buffer<Ray>& rays) {
-  const std::size_t pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels = pixel_count(camera);
   if (first_pixel > pixels || count > pixels - first_pixel || pixels > UINT32_MAX) {
     throw UsageError(
         fmt::format("Rays of the pixels {} to {} cannot be made of a picture of {} x {}: ask for "

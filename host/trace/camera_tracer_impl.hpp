@@ -10,6 +10,7 @@
 #include <functional>
 #include <vector>
 
+#include "scene/pixel_count.hpp"
 #include "scene/row_share.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/candidate_lists.hpp"
@@ -85,9 +86,7 @@ struct CameraTracer::Impl {
   }
   float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
   float screen_y() const { return static_cast<float>(camera.height) / (2.0f * camera.fy); }
-  std::size_t pixels() const {
-    return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-  }
+  std::size_t pixels() const { return pixel_count(camera.width, camera.height); }
   std::size_t packet_count() const {
     return static_cast<std::size_t>((camera.width + packet().width - 1) / packet().width) *
            static_cast<std::size_t>((camera.height + packet().height - 1) / packet().height);

@@ -7,7 +7,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <numbers>
 
@@ -159,8 +158,9 @@ void CandidateLists::prepare(const DeviceGaussians& gaussians,
 }
 
 std::size_t CandidateLists::allowed(std::size_t budget) const {
-  return std::min<std::size_t>(
-      {budget / kBytesPerCandidate, context_->device().max_allocation / 16, kMaxCandidates});
+  // The largest buffer is that of the boxes: four floats each, and those of the padding.
+  const std::size_t boxes = context_->device().max_allocation / (4 * sizeof(float)) - kBoxPadding;
+  return std::min<std::size_t>({budget / kBytesPerCandidate, boxes, kMaxCandidates});
 }
 
 // Leaves the number of candidates at the end of offsets_.

@@ -20,7 +20,7 @@ struct PacketLayout {
   int height = 1;    ///< pixels
   int block = 1;     ///< packets a side that one work-item of the forward pass traces
   int tile = 16;     ///< pixels
-  int pending = 64;  ///< entries of the per-lane sorted list
+  int pending = 64;  ///< rows, or entries of a lane's sorted list, at once
   int group = 0;     ///< most work-items of a work-group; 0 = all packets of a tile
 };
 

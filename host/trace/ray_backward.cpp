@@ -7,6 +7,7 @@
 #include <glm/vec3.hpp>
 #include <numbers>
 
+#include "device/kernel.hpp"
 #include "raysplats/error.hpp"
 #include "trace/gaussian_kernel.hpp"
 #include "trace/launch_budget.hpp"
@@ -19,8 +20,6 @@ constexpr const char* kGradients = "trace/ray_gradients.cl";
 constexpr std::size_t kGroup = 64;
 // Rays that a work-item takes one after the other on CPUs.
 constexpr std::size_t kCpuChunk = 64;
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 }  // namespace
 

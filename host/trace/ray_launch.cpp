@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kGroup = 64;
 // Hits that a ray keeps before it blends: in private memory on CPUs, else in local memory, of which
 // a group of 64 then takes 7.5 KiB, so that eight groups fit 64 KiB.
-constexpr int kPending = 256;
+constexpr int kRayHits = 256;
 constexpr int kKept = 10;
 // Lanes for which tree_walk.h has a trail.
 constexpr int kTrailLanes = 4;
@@ -68,7 +68,7 @@ BuildOptions ray_walk_build(const DeviceInfo& device,
   if (keeps_trail(device, lanes)) {
     build.define("KEPT", kKept).define("SH_DEGREE", sh_degree);
   } else {
-    build.define("PENDING", kPending);
+    build.define("RAY_HITS", kRayHits);
   }
   return build;
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "device/kernel.hpp"
 #include "raysplats/error.hpp"
 #include "trace/launch_budget.hpp"
 #include "trace/memory_shares.hpp"
@@ -20,8 +21,6 @@ constexpr std::size_t kRayBytes = sizeof(Ray) + sizeof(RayResult);
 // On CPUs a work-item traces several rays one after the other: OpenCL implementations there give
 // every work-item of a group its own private memory, which would not stay in the cache.
 constexpr std::size_t kCpuRaysPerItem = 64;
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 // RsRayWalk::color_from_origin.
 constexpr std::int32_t kFlagPerRay = 2;

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "bvh/gaussian_bounds.hpp"
+#include "device/kernel.hpp"
 #include "raysplats/error.hpp"
 #include "shared/tree_layout.h"
 
@@ -13,8 +14,6 @@ namespace raysplats {
 namespace {
 
 constexpr std::size_t kGroup = 64;
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 }  // namespace
 

@@ -10,6 +10,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
+#include "scene/activation.hpp"
 #include "shared/tree_layout.h"
 
 namespace raysplats {
@@ -34,7 +35,7 @@ bool half_widths(const Gaussians& model,
                        number(model.quaternions[4 * i + 2]), number(model.quaternions[4 * i + 3]));
   if (!(glm::length(raw) > 0)) return false;
   const glm::dmat3 rotation = glm::mat3_cast(glm::normalize(raw));
-  const double alpha = 1 / (1 + std::exp(-number(model.opacities[i])));
+  const double alpha = sigmoid(number(model.opacities[i]));
   double quantile = number(options.quantile);
   if (options.adaptive_radius) quantile = std::min(quantile, 2 * std::log(255 * alpha));
   if (!(quantile > 0) || (options.adaptive_radius && alpha * 255 < kMargin)) return false;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "trace/camera_rays.hpp"
 
 namespace raysplats {
@@ -29,10 +30,6 @@ SkyLight by_coefficient(const std::vector<float>& numbers) {
   SkyLight out(numbers.size() / 3);
   for (std::size_t i = 0; i < numbers.size(); ++i) out[i / 3][i % 3] = numbers[i];
   return out;
-}
-
-std::size_t pixels_of(const Camera& camera) {
-  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
 }
 
 }  // namespace
@@ -78,7 +75,7 @@ Kernel Sky::kernel(const char* name, const Camera& camera) const {
 }
 
 void Sky::show(const Camera& camera, const Buffer<float>& image) {
-  const std::size_t pixels = pixels_of(camera);
+  const std::size_t pixels = pixel_count(camera);
   kernel("show_sky", camera)
       .launch(Range::linear(pixels, kGroup), lens_camera(camera, Lens{}), coefficients_,
               static_cast<std::uint32_t>(pixels), image);
@@ -87,7 +84,7 @@ void Sky::show(const Camera& camera, const Buffer<float>& image) {
 const Buffer<float>& Sky::backward(const Camera& camera,
                                    const Buffer<float>& image,
                                    const Buffer<float>& image_gradient) {
-  const std::size_t pixels = pixels_of(camera);
+  const std::size_t pixels = pixel_count(camera);
   const std::size_t blocks = (pixels + kBlock - 1) / kBlock;
   image_gradient_.ensure(context_, 4 * pixels, "gradient over black");
   image_gradient_.copy_from(image_gradient, 4 * pixels);

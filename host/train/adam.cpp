@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "device/kernel.hpp"
 #include "raysplats/error.hpp"
 #include "train/lanes.hpp"
 
@@ -19,8 +20,6 @@ constexpr char kProgram[] = "train/adam.cl";
 constexpr std::size_t kBlock = 256;
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kCachedFloats = std::size_t{1} << 20;
-
-std::uint32_t u32(std::size_t value) { return static_cast<std::uint32_t>(value); }
 
 }  // namespace
 

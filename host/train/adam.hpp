@@ -54,7 +54,7 @@ class Adam {
             const Buffer<std::uint32_t>* guard = nullptr);
 
   /// After densification: Gaussian i continues with the moments of the old Gaussian source[i], or
-  /// with zeros when that is 0xffffffff.
+  /// with zeros when that is RS_NO_SOURCE.
   void remap(const Buffer<std::uint32_t>& source, std::size_t new_count);
   /// Zeroes the moments of one group (after an opacity reset).
   void reset(ParameterGroup group);

@@ -9,7 +9,9 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
+#include "scene/even_choice.hpp"
 #include "scene/statistics.hpp"
+#include "scene/view_axes.hpp"
 
 namespace raysplats {
 namespace {
@@ -18,14 +20,19 @@ constexpr std::size_t kLeastCameras = 8;  // of which one may be a stray
 constexpr std::size_t kOneStrayIn = 20;
 constexpr double kStrayFactor = 8.0;
 
-glm::dvec3 view_axis(const Camera& camera) {
-  return glm::transpose(camera.rotation) * glm::dvec3(0, 0, 1);
-}
-
 glm::dvec3 mean_center(std::span<const Camera> cameras) {
   glm::dvec3 sum(0.0);
   for (const Camera& camera : cameras) sum += camera.center();
   return cameras.empty() ? sum : sum / static_cast<double>(cameras.size());
+}
+
+// How far from their mean the farthest of the cameras stands.
+double radius_of(std::span<const Camera> cameras) {
+  const glm::dvec3 center = mean_center(cameras);
+  double radius = 0;
+  for (const Camera& camera : cameras)
+    radius = std::max(radius, glm::distance(camera.center(), center));
+  return radius;
 }
 
 std::vector<Camera> usual(std::span<const Camera> cameras) {
@@ -69,32 +76,39 @@ std::vector<std::size_t> usual_cameras(std::span<const Camera> cameras) {
   return out;
 }
 
-double camera_extent(std::span<const Camera> all) {
-  const std::vector<Camera> cameras = usual(all);
-  const glm::dvec3 center = mean_center(cameras);
-  double radius = 0;
-  for (const Camera& camera : cameras)
-    radius = std::max(radius, glm::distance(camera.center(), center));
+double camera_extent(std::span<const Camera> cameras) {
+  const double radius = radius_of(usual(cameras));
   return radius > 1e-6 ? 1.1 * radius : 1.0;
 }
 
-Region visible_region(std::span<const Camera> all) {
-  const std::vector<Camera> cameras = usual(all);
-  const Region around{mean_center(cameras), 3.0 * camera_extent(cameras)};
-  // Least squares over the distances to the view axes: sum (I - d d^T) p = sum (I - d d^T) c.
-  glm::dmat3 normal(0.0);
-  glm::dvec3 right(0.0);
-  for (const Camera& camera : cameras) {
-    const glm::dvec3 d = view_axis(camera);
-    const glm::dmat3 projector = glm::dmat3(1.0) - glm::outerProduct(d, d);
-    normal += projector;
-    right += projector * camera.center();
+double scene_extent(std::span<const Camera> cameras, const PointCloud& points) {
+  constexpr std::size_t kMostPoints = 10000;
+  constexpr double kOnePlace = 1e-3;  // of the distance of the points
+  const double extent = camera_extent(cameras);
+  const glm::dvec3 center = mean_center(usual(cameras));
+  std::vector<double> distances;
+  for (const std::size_t i : even_choice(points.size(), kMostPoints)) {
+    const float* p = &points.positions[3 * i];
+    const double distance = glm::distance(glm::dvec3(p[0], p[1], p[2]), center);
+    if (std::isfinite(distance)) distances.push_back(distance);
   }
+  if (distances.empty()) return extent;
+  const std::array<double, 1> half{0.5};
+  const double middle = quantiles(std::move(distances), half)[0];
+  const bool one_place = cameras.size() < 2 || radius_of(usual(cameras)) < kOnePlace * middle;
+  return one_place && middle > 0 ? middle : extent;
+}
+
+Region visible_region(std::span<const Camera> all, double extent) {
+  const std::vector<Camera> cameras = usual(all);
+  const Region around{mean_center(cameras), 3.0 * extent};
+  const AxesFit fit = fit_axes(cameras);
   const auto count = static_cast<double>(cameras.size());
-  // Parallel axes leave the depth open.
-  if (cameras.size() < 2 || std::abs(glm::determinant(normal)) < 1e-4 * count * count * count)
+  // Parallel axes leave the depth open. The start needs it roughly, an orbit's middle does not bear
+  // as much noise: common_target() gives up earlier.
+  if (cameras.size() < 2 || std::abs(glm::determinant(fit.normal)) < 1e-4 * count * count * count)
     return around;
-  const glm::dvec3 target = glm::inverse(normal) * right;
+  const glm::dvec3 target = glm::inverse(fit.normal) * fit.right;
   std::vector<double> half_sides;
   for (const Camera& camera : cameras) {
     const double depth = glm::dot(target - camera.center(), view_axis(camera));
@@ -111,9 +125,9 @@ Region visible_region(std::span<const Camera> all) {
   return {target, *middle};
 }
 
-double motion_extent(std::span<const Camera> cameras) {
+double motion_extent(std::span<const Camera> cameras, double extent) {
   constexpr double kMostHalves = 5.0;  // usual lenses have 0.5 to 4.7
-  return std::min(camera_extent(cameras), kMostHalves * visible_region(cameras).half_side);
+  return std::min(extent, kMostHalves * visible_region(cameras, extent).half_side);
 }
 
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {

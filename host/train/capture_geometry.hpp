@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
 
 namespace raysplats {
 
@@ -21,6 +22,10 @@ std::vector<std::size_t> usual_cameras(std::span<const Camera> cameras);
 /// number.
 double camera_extent(std::span<const Camera> cameras);
 
+/// The same, but where the cameras stand in one place beside what they see (a tripod, a scanner's
+/// station) the median distance of the points from there: the one length that is known then.
+double scene_extent(std::span<const Camera> cameras, const PointCloud& points);
+
 /// An axis-aligned cube, world units.
 struct Region {
   glm::dvec3 center{0.0};
@@ -31,12 +36,12 @@ struct Region {
 /// nearest to all view axes in the least-squares sense lies in front of at least 3 of 4 cameras) it
 /// is the cube about that point that the median camera sees at the point's depth; otherwise the
 /// cube of three scene extents about the mean camera centre. Stray cameras have no say.
-Region visible_region(std::span<const Camera> cameras);
+Region visible_region(std::span<const Camera> cameras, double extent);
 
 /// What the learning rate of the means is relative to: the scene extent, or five times half of what
 /// the median camera sees across at the point that most look at, where that is less. Telephoto
 /// lenses stand far apart around something small, which steps by their distance would tear apart.
-double motion_extent(std::span<const Camera> cameras);
+double motion_extent(std::span<const Camera> cameras, double extent);
 
 /// From the point to the nearest camera; infinite without cameras.
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point);

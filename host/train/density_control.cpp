@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "raysplats/error.hpp"
+#include "scene/activation.hpp"
 #include "train/mcmc.hpp"
 #include "train/schedule.hpp"
 #include "util/rng.hpp"
@@ -248,11 +248,12 @@ void DensityControl::fade_opacities(DeviceGaussians& gaussians) {
   context_.kernel(kProgram, "fade_opacity")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               static_cast<float>(decay_), static_cast<float>(kLeastOpacity), gaussians.opacities);
+  gaussians.changed(context_);
 }
 
 void DensityControl::reset_opacities(DeviceGaussians& gaussians) {
   const double value = options_.opacity_reset_value;
-  const auto limit = static_cast<float>(std::log(value / (1.0 - value)));
+  const auto limit = static_cast<float>(logit(value));
   context_.kernel(kProgram, "limit_opacity")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               limit, gaussians.opacities);

@@ -6,14 +6,13 @@
 #include <cmath>
 #include <utility>
 
+#include "scene/activation.hpp"
 #include "scene/morton_order.hpp"
 
 namespace raysplats {
 namespace {
 
 enum class Fate : std::uint8_t { kKeep, kClone, kSplit, kHalve, kPrune };
-
-double sigmoid(double x) { return 1.0 / (1.0 + std::exp(-x)); }
 
 struct Candidate {
   float score;
@@ -78,6 +77,40 @@ void arrange(std::span<const float> means, const std::vector<Fate>& fates, Densi
   }
 }
 
+// The first reason that all rules know for removing Gaussian i; null for none.
+template <class Rules>
+std::size_t* reason_of(DensityPlan& plan,
+                       std::span<const float> means,
+                       std::span<const float> scales,
+                       std::span<const float> opacities,
+                       const Rules& rules,
+                       std::size_t i) {
+  return !is_finite(means, scales, opacities, i)         ? &plan.not_finite
+         : is_outside(rules.bounds, means, i)            ? &plan.outside
+         : !(sigmoid(opacities[i]) >= rules.min_opacity) ? &plan.faint
+                                                         : nullptr;
+}
+
+// Removes and counts the Gaussian that there is a reason for; false without one.
+bool prunes(std::size_t* reason, Fate& fate, DensityPlan& plan) {
+  if (reason == nullptr) return false;
+  fate = Fate::kPrune;
+  ++*reason;
+  ++plan.pruned;
+  return true;
+}
+
+// Each candidate that there is room for below `target` adds one to what is left.
+void finish(DensityPlan& plan,
+            std::vector<Candidate>& candidates,
+            std::size_t target,
+            std::span<const float> means,
+            std::vector<Fate>& fates) {
+  const std::size_t survivors = fates.size() - plan.pruned;
+  choose(candidates, target > survivors ? target - survivors : 0, fates, plan);
+  arrange(means, fates, plan);
+}
+
 }  // namespace
 
 // A sum is finite when all of its terms are.
@@ -96,7 +129,7 @@ bool is_outside(const std::optional<Bounds>& bounds, std::span<const float> mean
 std::vector<std::uint32_t> DensityPlan::state_source() const {
   std::vector<std::uint32_t> out(source);
   for (std::size_t i = 0; i < out.size(); ++i) {
-    if (role[i] != static_cast<std::uint32_t>(DensityRole::kKeep)) out[i] = 0xffffffffu;
+    if (role[i] != static_cast<std::uint32_t>(DensityRole::kKeep)) out[i] = RS_NO_SOURCE;
   }
   return out;
 }
@@ -125,19 +158,13 @@ DensityPlan plan_density(std::span<const float> means,
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < count; ++i) {
     const double size = size_of(&scales[3 * i], rules);
-    const bool finite = is_finite(means, scales, opacities, i);
-    std::size_t* const reason = !finite                                         ? &plan.not_finite
-                                : is_outside(rules.bounds, means, i)            ? &plan.outside
-                                : !(sigmoid(opacities[i]) >= rules.min_opacity) ? &plan.faint
-                                : !(rules.max_size <= 0 || size <= rules.max_size) ? &plan.large
-                                : !(rules.min_size <= 0 || size >= rules.min_size) ? &plan.small
-                                                                                   : nullptr;
-    if (reason != nullptr) {
-      fates[i] = Fate::kPrune;
-      ++*reason;
-      ++plan.pruned;
-      continue;
+    std::size_t* reason = reason_of(plan, means, scales, opacities, rules, i);
+    if (reason == nullptr) {
+      reason = !(rules.max_size <= 0 || size <= rules.max_size)   ? &plan.large
+               : !(rules.min_size <= 0 || size >= rules.min_size) ? &plan.small
+                                                                  : nullptr;
     }
+    if (prunes(reason, fates[i], plan)) continue;
     const float views = statistics[2 * i + 1];
     const float score = views > 0 ? statistics[2 * i] / views : 0.0f;
     if (views > 0 && score >= rules.gradient) {
@@ -145,11 +172,7 @@ DensityPlan plan_density(std::span<const float> means,
       fates[i] = size > rules.split_size ? Fate::kSplit : Fate::kClone;
     }
   }
-
-  const std::size_t survivors = count - plan.pruned;
-  const std::size_t room = rules.max_count > survivors ? rules.max_count - survivors : 0;
-  choose(candidates, room, fates, plan);
-  arrange(means, fates, plan);
+  finish(plan, candidates, rules.max_count, means, fates);
   return plan;
 }
 
@@ -164,25 +187,15 @@ DensityPlan plan_budget(std::span<const float> means,
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < count; ++i) {
     const float views = statistics[2 * i + 1];
-    std::size_t* const reason = !is_finite(means, scales, opacities, i)         ? &plan.not_finite
-                                : is_outside(rules.bounds, means, i)            ? &plan.outside
-                                : !(sigmoid(opacities[i]) >= rules.min_opacity) ? &plan.faint
-                                : !(views > 0 || !rules.remove_unseen)          ? &plan.unseen
-                                                                                : nullptr;
-    if (reason != nullptr) {
-      fates[i] = Fate::kPrune;
-      ++*reason;
-      ++plan.pruned;
-      continue;
-    }
+    std::size_t* reason = reason_of(plan, means, scales, opacities, rules, i);
+    if (reason == nullptr && rules.remove_unseen && !(views > 0)) reason = &plan.unseen;
+    if (prunes(reason, fates[i], plan)) continue;
     if (views > 0 && statistics[2 * i] > 0) {
       candidates.push_back({statistics[2 * i] / views, static_cast<std::uint32_t>(i)});
       fates[i] = Fate::kHalve;
     }
   }
-  const std::size_t survivors = count - plan.pruned;
-  choose(candidates, rules.target > survivors ? rules.target - survivors : 0, fates, plan);
-  arrange(means, fates, plan);
+  finish(plan, candidates, rules.target, means, fates);
   return plan;
 }
 

@@ -10,18 +10,19 @@
 
 #include "raysplats/trace_options.hpp"
 #include "raysplats/train_options.hpp"
+#include "shared/train_layout.h"
 
 namespace raysplats {
 
-/// What becomes of a Gaussian in the new set; cl/train/density_control.cl names the same values.
+/// What becomes of a Gaussian in the new set.
 enum class DensityRole : std::uint32_t {
-  kKeep = 0,
-  kClone = 1,
-  kFirstChild = 2,
-  kSecondChild = 3,
-  kFirstHalf = 4,
-  kSecondHalf = 5,
-  kPart = 6,  ///< of 3DGS-MCMC; what it shares with the others follows (apply_shares())
+  kKeep = RS_ROLE_KEEP,
+  kClone = RS_ROLE_CLONE,
+  kFirstChild = RS_ROLE_FIRST_CHILD,
+  kSecondChild = RS_ROLE_SECOND_CHILD,
+  kFirstHalf = RS_ROLE_FIRST_HALF,
+  kSecondHalf = RS_ROLE_SECOND_HALF,
+  kPart = RS_ROLE_PART,  ///< of 3DGS-MCMC; what it shares with the others follows (apply_shares())
 };
 
 /// Thresholds of one pass of density control, in world units.
@@ -56,7 +57,7 @@ struct DensityPlan {
   /// Of the pruned, by the first of these that holds.
   std::size_t not_finite = 0, outside = 0, faint = 0, large = 0, small = 0, unseen = 0;
   std::size_t refused = 0;  ///< candidates left as they are because of max_count
-  /// source[i] where i keeps its state, 0xffffffff where it is new.
+  /// source[i] where i keeps its state, RS_NO_SOURCE where it is new.
   std::vector<std::uint32_t> state_source() const;
   bool changes() const { return cloned + split + pruned > 0; }
   /// What the user can do when too many are pruned: about the most frequent reason.

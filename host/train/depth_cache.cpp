@@ -10,16 +10,13 @@
 #include <utility>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "util/parallel.hpp"
 
 namespace raysplats {
 namespace {
 
-std::size_t area(int width, int height) {
-  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-}
-
-std::size_t map_bytes(int width, int height) { return area(width, height) * sizeof(float); }
+std::size_t map_bytes(int width, int height) { return pixel_count(width, height) * sizeof(float); }
 
 bool has_size(const DeviceDepths& depths, const SizedView& wanted) {
   return depths.width == wanted.width && depths.height == wanted.height;

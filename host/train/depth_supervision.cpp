@@ -7,15 +7,14 @@
 #include <cstdint>
 
 #include "raysplats/error.hpp"
-#include "train/memory_estimate.hpp"
+#include "scene/pixel_count.hpp"
+#include "util/mebibytes.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr const char* kProgram = "train/depth_supervision.cl";
 constexpr std::size_t kGroup = 64;
-
-double mib(std::size_t bytes) { return static_cast<double>(bytes) / static_cast<double>(kMiB); }
 
 }  // namespace
 
@@ -52,8 +51,7 @@ void DepthSupervision::backward(const SizedView& view,
                                 const Buffer<float>& depth,
                                 const DevicePhoto& photo,
                                 Buffer<float>& image_gradient) {
-  const std::size_t pixels =
-      static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height);
+  const std::size_t pixels = pixel_count(view.width, view.height);
   const DeviceDepths& target = cache_.get(view);
   if (gradient_.size() < pixels) gradient_ = Buffer<float>(context_, pixels, "depth gradient");
   if (target.known == 0 || target.listed) gradient_.clear(pixels);

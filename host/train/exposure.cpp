@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 
 namespace raysplats {
 namespace {
@@ -11,10 +12,6 @@ namespace {
 constexpr const char* kProgram = "train/exposure.cl";
 constexpr std::size_t kGroup = 64;   // GROUP of cl/train/exposure.cl
 constexpr std::size_t kBlock = 256;  // and its BLOCK
-
-std::size_t pixels_of(int width, int height) {
-  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-}
 
 }  // namespace
 
@@ -35,7 +32,7 @@ const Buffer<float>& Exposure::apply(const Buffer<float>& image,
                                      std::size_t view,
                                      int width,
                                      int height) {
-  const std::size_t pixels = pixels_of(width, height);
+  const std::size_t pixels = pixel_count(width, height);
   picture_.ensure(context_, 4 * pixels, "exposed picture");
   apply_.launch(Range::linear(pixels, kGroup), image, deltas_, picture_,
                 static_cast<std::uint32_t>(pixels), static_cast<std::uint32_t>(view));
@@ -43,7 +40,7 @@ const Buffer<float>& Exposure::apply(const Buffer<float>& image,
 }
 
 void Exposure::backward(Buffer<float>& gradient, std::size_t view, int width, int height) {
-  const std::size_t pixels = pixels_of(width, height);
+  const std::size_t pixels = pixel_count(width, height);
   backward_.launch(Range::linear(pixels, kGroup), deltas_, gradient,
                    static_cast<std::uint32_t>(pixels), static_cast<std::uint32_t>(view));
 }
@@ -55,7 +52,7 @@ void Exposure::observe(const Buffer<float>& image,
                        int width,
                        int height,
                        std::size_t slot) {
-  const std::size_t pixels = pixels_of(width, height);
+  const std::size_t pixels = pixel_count(width, height);
   const std::size_t blocks = (pixels + kBlock - 1) / kBlock;
   partials_.ensure(context_, kSums * blocks, "exposure sums");
   moments_.launch(Range::linear(blocks, kGroup), image, photo.words, partials_,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/activation.hpp"
 
 namespace raysplats {
 namespace {
@@ -24,7 +25,7 @@ constexpr float kNoLimit = std::numeric_limits<float>::infinity();
 // The number that is trained for a standard deviation; a sigmoid has none from 1 on.
 float scale_parameter(double size, ScaleActivation activation) {
   if (activation == ScaleActivation::kExp) return static_cast<float>(std::log(size));
-  return size < 1.0 ? static_cast<float>(std::log(size / (1.0 - size))) : kNoLimit;
+  return size < 1.0 ? static_cast<float>(logit(size)) : kNoLimit;
 }
 
 BuildOptions build_options(const DeviceGaussians& gaussians) {

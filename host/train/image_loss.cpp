@@ -3,12 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "train/lanes.hpp"
 
 namespace raysplats {
@@ -162,7 +161,7 @@ void ImageLoss::evaluate(const Buffer<float>& image,
                          int width,
                          int height,
                          Buffer<float>& gradient) {
-  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const std::size_t pixels = pixel_count(width, height);
   if (width <= 0 || height <= 0 || image.size() < 4 * pixels ||
       photo.words.size() < photo.words_of(pixels)) {
     throw UsageError(

@@ -7,13 +7,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/vec3.hpp>
 #include <optional>
 #include <utility>
 
 #include "io/model_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/activation.hpp"
+#include "scene/even_choice.hpp"
 #include "scene/gaussian_selection.hpp"
 #include "scene/kd_tree.hpp"
 #include "shared/sh.h"
@@ -28,6 +29,13 @@ namespace {
 
 // Fewer points leave most of the photos without a start.
 constexpr std::size_t kFewPoints = 1000;
+constexpr double kStartShare = 0.5;  // of the limit that points, or random places, may take
+constexpr double kPhotoShare = 0.3;  // of the limit that a start from photos takes
+
+// A part of the Gaussians that a run may have, one at least.
+std::size_t share_of(std::size_t limit, double part) {
+  return std::max<std::size_t>(1, static_cast<std::size_t>(part * static_cast<double>(limit)));
+}
 
 // The finite points within the box, each place once: equal neighbours would leave a point no size.
 PointCloud distinct_points(const PointCloud& points, const std::optional<Bounds>& bounds) {
@@ -57,24 +65,21 @@ PointCloud distinct_points(const PointCloud& points, const std::optional<Bounds>
 PointCloud subset(const PointCloud& points, std::size_t limit) {
   if (points.size() <= limit) return points;
   PointCloud out;
-  for (std::size_t i = 0; i < limit; ++i) append_point(points, i * points.size() / limit, out);
+  for (const std::size_t i : even_choice(points.size(), limit)) append_point(points, i, out);
   return out;
 }
 
 // At most `limit` of the model's Gaussians, evenly spread over their order.
 Gaussians subset(const Gaussians& model, std::size_t limit) {
   if (model.size() <= limit) return model;
-  std::vector<std::uint32_t> indices(limit);
-  for (std::size_t i = 0; i < limit; ++i)
-    indices[i] = static_cast<std::uint32_t>(i * model.size() / limit);
-  return gathered(model, indices);
+  const std::vector<std::size_t> chosen = even_choice(model.size(), limit);
+  return gathered(model, std::vector<std::uint32_t>(chosen.begin(), chosen.end()));
 }
 
 // How far away what the cameras look at is, as far as they tell.
-double guessed_depth(std::span<const Camera> cameras, const Region& region) {
+double guessed_depth(std::span<const Camera> cameras, const Region& region, double extent) {
   // Cameras in one place have no middle to be distant from.
   const double middle = median_distance(cameras, region.center);
-  const double extent = camera_extent(cameras);
   return middle > 1e-3 * extent ? middle : extent;
 }
 
@@ -88,7 +93,7 @@ PointCloud photo_points(const Dataset& dataset,
                         std::size_t count,
                         double unsure,
                         std::uint64_t seed) {
-  const double guess = guessed_depth(cameras, region);
+  const double guess = guessed_depth(cameras, region, scene_extent(cameras, dataset.points));
   if (dataset.alpha_is_background) {
     PointCloud hull = carved_points(photos, region, count, seed);
     if (hull.size() > 0) return hull;
@@ -136,7 +141,8 @@ Beside photos_beside(const PointCloud& points,
   const double shown = opaque_share(many);
   spdlog::debug("{:.1f} % of the photos count", 100 * shown);
   if (shown < kMostlyShown) return by_points;
-  const double guess = guessed_depth(cameras, visible_region(cameras));
+  const double extent = scene_extent(cameras, dataset.points);
+  const double guess = guessed_depth(cameras, visible_region(cameras, extent), extent);
   const DepthRange depths = swept_depths(many, guess, options.seed);
   const SweepProbe probe = probe_sweep(many, depths, options.seed);
   spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * probe.agreed);
@@ -197,7 +203,8 @@ PointCloud start_points(const Dataset& dataset,
     if (!plausible(match)) {
       spdlog::warn(
           "the sparse points of {} are not where the photos show them ({}): they may be in other "
-          "units or axes, and the start takes points from the photos instead; --init colmap takes "
+          "units or axes, or coloured by photos of another brightness, and the start takes points "
+          "from the photos instead; --init colmap takes "
           "those of the data set",
           dataset.root.string(), match_text(match));
       return {};
@@ -207,6 +214,87 @@ PointCloud start_points(const Dataset& dataset,
   if (!colorless(points)) return points;
   spdlog::info("the sparse points have no colours of their own: they start with the photos'");
   return colored_by_photos(std::move(points), photos(PhotoChoice::kSome));
+}
+
+// The model of the file that options.init names.
+Gaussians given_model(const Dataset& dataset,
+                      std::span<const Camera> cameras,
+                      std::size_t limit,
+                      const TrainOptions& options) {
+  constexpr double kLeastSeen = 0.01;  // what photos of a model's scene see more of
+  Gaussians model = with_sh_degree(read_model(options.init), options.sh_degree);
+  const std::array<double, 3> origin = io::model_origin(options.init);
+  for (std::size_t i = 0; i < model.means.size(); ++i) {
+    model.means[i] = static_cast<float>(static_cast<double>(model.means[i]) +
+                                        (origin[i % 3] - dataset.origin[i % 3]));
+  }
+  model = inside(model, about_origin(options.bounds, dataset.origin));
+  if (model.size() > 0 && seen_share(model.means, cameras) < kLeastSeen) {
+    spdlog::warn(
+        "the photos see less than {:.0f} % of the Gaussians of {}: it is in other coordinates "
+        "than the data set",
+        100 * kLeastSeen, options.init);
+  }
+  if (model.size() > limit) {
+    spdlog::warn(
+        "{} has {} Gaussians, but this run may have {}: it starts from an even choice of them "
+        "(--max-gaussians)",
+        options.init, model.size(), limit);
+  }
+  return subset(model, limit);
+}
+
+// What sparse points give to a start.
+struct SparseStart {
+  PointCloud points;
+  PointCloud sparse;  // all, where photos give more beside an even choice of them
+  Beside beside;
+  std::size_t count = 0;  // of points that the photos give
+  bool enough = false;    // without those
+};
+
+// `count`: of points that photos give where sparse ones do not tell that fewer do.
+SparseStart sparse_start(const Dataset& dataset,
+                         std::span<const Camera> cameras,
+                         const PhotoSource& photos,
+                         std::size_t limit,
+                         std::size_t count,
+                         const TrainOptions& options) {
+  constexpr std::size_t kMostBeside = 10000;  // points of photos: more take seconds to find
+  SparseStart out;
+  out.points = start_points(dataset, cameras, photos, count, options);
+  out.beside = photos_beside(out.points, dataset, cameras, photos, options);
+  const bool in_their_places = out.beside.part == Beside::Part::kInTheirPlaces;
+  out.count = in_their_places ? std::min(count, kMostBeside) : count;
+  const bool alone = out.beside.part == Beside::Part::kNothing;
+  const std::size_t half = share_of(limit, kStartShare);
+  const std::size_t others = half - std::min(out.count, half);
+  const std::size_t most =
+      alone ? half : std::max(share_of(limit, kStartShare - kPhotoShare), others);
+  if (out.points.size() > most) {
+    spdlog::info(
+        "the start takes {} of {} sparse points, so that at most {} Gaussians have room to grow "
+        "(--max-gaussians)",
+        most, out.points.size(), limit);
+  }
+  // Sizes follow from the distances between the points that are left.
+  if (options.init == "colmap" || (alone && out.points.size() > 0 &&
+                                   out.points.size() >= std::min(kFewPoints, out.count / 2))) {
+    out.points = subset(out.points, most);
+    out.enough = true;
+  } else if (!alone) {
+    spdlog::info("{}: the start takes {} points from the photos as well",
+                 out.beside.part == Beside::Part::kAll
+                     ? "the sparse points lie on a part of what the photos show"
+                     : "most of what the photos show tells its depth",
+                 out.count);
+    out.sparse = out.points;
+    out.points = subset(out.points, most);
+  } else if (out.points.size() > 0) {
+    spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
+                 out.points.size(), out.count);
+  }
+  return out;
 }
 
 }  // namespace
@@ -228,18 +316,20 @@ Gaussians gaussians_from_points(const PointCloud& points,
   model.resize(finite.size());
   const std::vector<float> distances = neighbour_distances(finite.positions);
   const auto stride = 3 * static_cast<std::size_t>(sh_coefficients(sh_degree));
-  const auto logit = static_cast<float>(std::log(opacity / (1.0 - opacity)));
-  const double least = kMinScale * camera_extent(cameras);
+  const auto parameter = static_cast<float>(logit(opacity));
+  const double least = kMinScale * scene_extent(cameras, finite);
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* p = finite.positions.data() + 3 * i;
     const double most = kMaxScale * nearest_distance(cameras, {p[0], p[1], p[2]});
-    const double scale = std::max(std::min(static_cast<double>(distances[i]), most), least);
+    // One that has no neighbours, or all of them in its place, may be as large as any.
+    const double size = distances[i] > 0 ? static_cast<double>(distances[i]) : most;
+    const double scale = std::max(std::min(size, most), least);
     for (std::size_t a = 0; a < 3; ++a) {
       model.means[3 * i + a] = p[a];
       model.log_scales[3 * i + a] = static_cast<float>(std::log(scale));
       model.sh[stride * i + a] = static_cast<float>((finite.colors[3 * i + a] - 0.5) / RS_SH0);
     }
-    model.opacities[i] = logit;
+    model.opacities[i] = parameter;
   }
   return model;
 }
@@ -282,15 +372,9 @@ Gaussians initial_model(const Dataset& dataset,
                         const PhotoSource& photos,
                         std::size_t limit,
                         const TrainOptions& options) {
-  constexpr double kStartShare = 0.5;    // of the limit that points, or random places, may take
-  constexpr double kPhotoShare = 0.3;    // of the limit that a start from photos takes
   constexpr double kUnsureShare = 0.25;  // of points of photos everywhere: those in no clear depth
   constexpr double kUnsureBeside = 0.1;  // of those in places of sparse ones: more are only slower
-  constexpr std::size_t kMostBeside =
-      10000;                           // points of photos, of which more take seconds to find
-  constexpr double kLeastSeen = 0.01;  // of a given model: what photos of its scene see more of
   const bool has_points = dataset.points.size() > 0;
-  const std::optional<Bounds> bounds = about_origin(options.bounds, dataset.origin);
   if (options.init == "colmap" && !has_points) {
     throw UsageError(
         fmt::format("The data set {} has no sparse points to start from: use --init photos",
@@ -298,85 +382,42 @@ Gaussians initial_model(const Dataset& dataset,
   }
   const bool by_name = options.init == "auto" || options.init == "colmap" ||
                        options.init == "random" || options.init == "photos";
-  if (!by_name) {
-    Gaussians model = with_sh_degree(read_model(options.init), options.sh_degree);
-    const std::array<double, 3> origin = io::model_origin(options.init);
-    for (std::size_t i = 0; i < model.means.size(); ++i) {
-      model.means[i] = static_cast<float>(static_cast<double>(model.means[i]) +
-                                          (origin[i % 3] - dataset.origin[i % 3]));
-    }
-    model = inside(model, bounds);
-    if (model.size() > 0 && seen_share(model.means, cameras) < kLeastSeen) {
-      spdlog::warn(
-          "the photos see less than {:.0f} % of the Gaussians of {}: it is in other coordinates "
-          "than the data set",
-          100 * kLeastSeen, options.init);
-    }
-    if (model.size() > limit) {
-      spdlog::warn(
-          "{} has {} Gaussians, but this run may have {}: it starts from an even choice of them "
-          "(--max-gaussians)",
-          options.init, model.size(), limit);
-    }
-    return subset(model, limit);
-  }
-  const auto share = [limit](double part) {
-    return std::max<std::size_t>(1, static_cast<std::size_t>(part * static_cast<double>(limit)));
-  };
+  if (!by_name) return given_model(dataset, cameras, limit, options);
   const auto start = [&](const PointCloud& points) {
     return inside(gaussians_from_points(points, options.sh_degree, start_opacity(options), cameras),
-                  bounds);
+                  about_origin(options.bounds, dataset.origin));
   };
-  std::size_t count = options.init_count > 0
-                          ? std::min(limit, static_cast<std::size_t>(options.init_count))
-                          : share(clears_random_start(options) ? kStartShare : kPhotoShare);
-  PointCloud points, sparse;  // of `sparse` an even choice is taken
-  Beside beside;
-  if (has_points && (options.init == "auto" || options.init == "colmap")) {
-    points = start_points(dataset, cameras, photos, count, options);
-    beside = photos_beside(points, dataset, cameras, photos, options);
-    const bool alone = beside.part == Beside::Part::kNothing;
-    if (beside.part == Beside::Part::kInTheirPlaces) count = std::min(count, kMostBeside);
-    const std::size_t others = share(kStartShare) - std::min(count, share(kStartShare));
-    const std::size_t most =
-        alone ? share(kStartShare) : std::max(share(kStartShare - kPhotoShare), others);
-    if (points.size() > most) {
-      spdlog::info(
-          "the start takes {} of {} sparse points, so that at most {} Gaussians have room to grow "
-          "(--max-gaussians)",
-          most, points.size(), limit);
-    }
-    // Sizes follow from the distances between the points that are left.
-    if (options.init == "colmap" || (alone && points.size() >= std::min(kFewPoints, count / 2)))
-      return start(subset(points, most));
-    if (!alone) {
-      spdlog::info("{}: the start takes {} points from the photos as well",
-                   beside.part == Beside::Part::kAll
-                       ? "the sparse points lie on a part of what the photos show"
-                       : "most of what the photos show tells its depth",
-                   count);
-      sparse = points;
-      points = subset(points, most);
-    } else if (points.size() > 0) {
-      spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
-                   points.size(), count);
-    }
+  const std::size_t count =
+      options.init_count > 0
+          ? std::min(limit, static_cast<std::size_t>(options.init_count))
+          : share_of(limit, clears_random_start(options) ? kStartShare : kPhotoShare);
+  SparseStart begun;
+  begun.count = count;
+  if (has_points && (options.init == "auto" || options.init == "colmap"))
+    begun = sparse_start(dataset, cameras, photos, limit, count, options);
+  if (begun.enough) return start(begun.points);
+  if (options.init_count > 0 && static_cast<std::size_t>(options.init_count) > limit) {
+    spdlog::warn(
+        "--init-count asks for {} Gaussians, but this run may have {}: it starts with no more "
+        "(--max-gaussians)",
+        options.init_count, limit);
   }
-  const Region region = visible_region(cameras);
+  const double extent = scene_extent(cameras, dataset.points);
+  const Region region = visible_region(cameras, extent);
   if (options.init == "random") {
     return start(scattered_points(photos(PhotoChoice::kAll), region,
-                                  depths_around(guessed_depth(cameras, region)), count,
-                                  options.seed));
+                                  depths_around(guessed_depth(cameras, region, extent)),
+                                  begun.count, options.seed));
   }
   const std::vector<SmallPhoto>& told =
-      photos(beside.part == Beside::Part::kNothing ? PhotoChoice::kAll : PhotoChoice::kMany);
-  const std::size_t room = std::min(count, limit - std::min(limit, points.size()));
-  const bool in_their_places = beside.part == Beside::Part::kInTheirPlaces;
-  PointCloud seen = photo_points(dataset, cameras, region, told, beside.depths, room,
+      photos(begun.beside.part == Beside::Part::kNothing ? PhotoChoice::kAll : PhotoChoice::kMany);
+  const std::size_t room = std::min(begun.count, limit - std::min(limit, begun.points.size()));
+  const bool in_their_places = begun.beside.part == Beside::Part::kInTheirPlaces;
+  PointCloud seen = photo_points(dataset, cameras, region, told, begun.beside.depths, room,
                                  in_their_places ? kUnsureBeside : kUnsureShare, options.seed);
-  if (in_their_places) seen = beside_points(seen, sparse, photos(PhotoChoice::kSome));
-  for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, points);
-  return start(points);
+  if (in_their_places) seen = beside_points(seen, begun.sparse, photos(PhotoChoice::kSome));
+  for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, begun.points);
+  return start(begun.points);
 }
 
 }  // namespace raysplats

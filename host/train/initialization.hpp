@@ -19,8 +19,9 @@ namespace raysplats {
 
 /// Isotropic Gaussians at the points: the scale is the mean distance of the three nearest
 /// neighbours, as in 3DGS, at least 1e-4 of the cameras' extent and at most 0.1 of the distance to
-/// the nearest camera (what stands alone far away may be large, before a camera it may not); band 0
-/// holds the colours. Points that are not finite are left out.
+/// the nearest camera (what stands alone far away may be large, before a camera it may not), which
+/// a point takes that no neighbour is apart from; band 0 holds the colours. Points that are not
+/// finite are left out.
 Gaussians gaussians_from_points(const PointCloud& points,
                                 int sh_degree,
                                 double opacity,
@@ -49,10 +50,10 @@ enum class PhotoChoice { kAll, kMany, kSome };
 using PhotoSource = std::function<const std::vector<SmallPhoto>&(PhotoChoice)>;
 
 /// The model a run starts from, by options.init, at most `limit` Gaussians (an even subset of more;
-/// of points and photos at most half of it, so that there is room to grow), all within
-/// options.bounds. Sparse points that photos contradict (plausible()) are left out by `auto`, with
-/// a warning. Throws UsageError when the data set has no points and `colmap` is asked for,
-/// DataError for a bad PLY.
+/// of points and photos at most half of it, so that there is room to grow; all of it, with a
+/// warning, where options.init_count asks for more), all within options.bounds. Sparse points that
+/// photos contradict (plausible()) are left out by `auto`, with a warning. Throws UsageError
+/// when the data set has no points and `colmap` is asked for, DataError for a bad PLY.
 Gaussians initial_model(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const PhotoSource& photos,

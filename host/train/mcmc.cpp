@@ -19,8 +19,8 @@ Kernel kernel(Context& context, const char* name, const DeviceGaussians& gaussia
 
 }  // namespace
 
-Mcmc::Mcmc(Context& context, const TrainOptions& options, double extent)
-    : context_(context), options_(options), extent_(extent) {}
+Mcmc::Mcmc(Context& context, const TrainOptions& options, double length)
+    : context_(context), options_(options), length_(length) {}
 
 void Mcmc::add_regularisation(const DeviceGaussians& gaussians,
                               GaussianGradients& gradients,
@@ -30,7 +30,7 @@ void Mcmc::add_regularisation(const DeviceGaussians& gaussians,
   kernel(context_, "mcmc_press", gaussians)
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               static_cast<float>(options_.opacity_reg / count),
-              static_cast<float>(options_.scale_reg / (3.0 * count * extent_)), guard,
+              static_cast<float>(options_.scale_reg / (3.0 * count * length_)), guard,
               gaussians.opacities, gaussians.scales, gradients.opacities, gradients.scales);
 }
 
@@ -45,7 +45,7 @@ void Mcmc::add_noise(DeviceGaussians& gaussians,
   kernel(context_, "mcmc_noise", gaussians)
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
               static_cast<std::uint32_t>(key), static_cast<std::uint32_t>(key >> 32),
-              static_cast<float>(options_.mcmc_noise * decay / extent_), guard,
+              static_cast<float>(options_.mcmc_noise * decay / length_), guard,
               gaussians.quaternions, gaussians.scales, gaussians.opacities, gaussians.means);
   gaussians.changed(context_);
 }

@@ -12,20 +12,20 @@
 namespace raysplats {
 
 /// What 3DGS-MCMC (Kheradmand et al. 2024) does in every step beside the gradient's: see
-/// cl/train/mcmc.cl. Both are free of scale: sizes count in units of `extent` (camera_extent()).
+/// cl/train/mcmc.cl. Both are free of scale: sizes count in units of `length` (subject_length()).
 /// Everything random is a function of seed, iteration and Gaussian.
 class Mcmc {
  public:
-  Mcmc(Context& context, const TrainOptions& options, double extent);
+  Mcmc(Context& context, const TrainOptions& options, double length);
 
   /// Adds the gradients of opacity-reg times the mean opacity and of scale-reg times the mean
-  /// standard deviation over the extent.
+  /// standard deviation over the length.
   void add_regularisation(const DeviceGaussians& gaussians,
                           GaussianGradients& gradients,
                           const Buffer<std::uint32_t>& guard);
 
   /// After the step of `iteration`: moves the means of faint Gaussians by mcmc-noise times their
-  /// covariance over the extent times normal numbers; as position-lr falls, so does this.
+  /// covariance over the length times normal numbers; as position-lr falls, so does this.
   void add_noise(DeviceGaussians& gaussians,
                  std::int64_t iteration,
                  const Buffer<std::uint32_t>& guard);
@@ -33,7 +33,7 @@ class Mcmc {
  private:
   Context& context_;
   const TrainOptions& options_;  // the run's: iterations may be fixed after this was made
-  double extent_;
+  double length_;
 };
 
 /// Gives every Gaussian its share (RelocationPlan::shares); enqueues without waiting.

@@ -24,6 +24,7 @@
 #include "trace/ray_backward.hpp"
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
+#include "util/mebibytes.hpp"
 
 namespace raysplats {
 namespace {
@@ -101,8 +102,6 @@ std::size_t packet_bytes(const TrainOptions& options,
                   CandidateLists::with_headroom(pairs) * CandidateLists::kBytesPerCandidate) +
          std::min(shares.packet_gradients(), demand.gaussians * copies * sizeof(RsLine));
 }
-
-double mib(std::size_t bytes) { return static_cast<double>(bytes) / static_cast<double>(kMiB); }
 
 }  // namespace
 

@@ -8,8 +8,6 @@
 
 namespace raysplats {
 
-constexpr std::size_t kMiB = std::size_t{1} << 20;  ///< bytes in the unit of budgets
-
 /// What a training run wants to hold.
 struct MemoryDemand {
   std::size_t gaussians = 0;    ///< most that it may reach

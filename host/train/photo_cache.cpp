@@ -5,6 +5,8 @@
 #include <memory>
 #include <utility>
 
+#include "scene/pixel_count.hpp"
+
 namespace raysplats {
 namespace {
 
@@ -66,7 +68,7 @@ DevicePhoto PhotoCache::get(std::size_t view, int width, int height) {
   const DevicePhoto whole{entry.words, entry.planes, entry.weighted};
   if (entry.width == width && entry.height == height) return whole;
   const DevicePhoto small{reduced_, kFloatPlanes, entry.weighted};
-  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const std::size_t pixels = pixel_count(width, height);
   reduced_.ensure(context_, small.words_of(pixels), "reduced photo");
   if (!reduce_) reduce_ = context_.kernel("train/photo_cache.cl", "reduce_photo");
   reduce_.launch(Range::linear(pixels, kGroup), entry.words, reduced_, entry.planes,

@@ -7,7 +7,6 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 #include <iterator>
 
 #include "scene/camera_model.hpp"

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "io/view_loader.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/statistics.hpp"
 
@@ -129,6 +130,17 @@ double opaque_share(std::span<const SmallPhoto> photos) {
     sum += static_cast<double>(opaque) / static_cast<double>(pixels);
   }
   return photos.empty() ? 1.0 : sum / static_cast<double>(photos.size());
+}
+
+bool shows_anything(std::span<const SmallPhoto> photos) {
+  return std::any_of(photos.begin(), photos.end(), [](const SmallPhoto& photo) {
+    for (int y = 0; y < photo.picture->height; ++y) {
+      for (int x = 0; x < photo.picture->width; ++x) {
+        if (photo.picture->at(x, y)[3] > 0) return true;
+      }
+    }
+    return false;
+  });
 }
 
 std::array<float, 3> typical_color(std::span<const SmallPhoto> photos) {

@@ -3,12 +3,15 @@
 
 #include <array>
 #include <cstddef>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "io/view_loader.hpp"
+#include "io/photo.hpp"
 #include "raysplats/dataset.hpp"
 
 namespace raysplats {
@@ -43,6 +46,9 @@ void balance(std::span<SmallPhoto> photos);
 
 /// Mean share of the pixels that show something: alpha at least one half.
 double opaque_share(std::span<const SmallPhoto> photos);
+
+/// Whether a pixel of a photo shows anything, however faint: alpha above 0.
+bool shows_anything(std::span<const SmallPhoto> photos);
 
 /// The colour that is least wrong where photos say nothing: one that a fifth of the pixels share to
 /// 8 of 256 steps (a studio's ground, a blown-out sky), else the mean colour. Alpha is the weight

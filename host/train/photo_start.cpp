@@ -3,11 +3,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include "train/photo_pixel.hpp"

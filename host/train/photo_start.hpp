@@ -6,8 +6,8 @@
 #include <span>
 
 #include "raysplats/dataset.hpp"
+#include "train/capture_geometry.hpp"
 #include "train/depth_range.hpp"
-#include "train/initialization.hpp"
 #include "train/photo_set.hpp"
 
 namespace raysplats {

@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/plane_sweep.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 #include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/statistics.hpp"
 #include "train/photo_match.hpp"
 #include "train/photo_pixel.hpp"
 #include "train/point_cloud.hpp"
+#include "util/interrupt.hpp"
 #include "util/parallel.hpp"
 #include "util/rng.hpp"
 
@@ -28,6 +31,7 @@ namespace {
 constexpr std::uint64_t kSweepStream = 0x7377656570;
 constexpr std::uint64_t kProbeStream = 0x70726f6265;
 constexpr std::size_t kTriesPerPoint = 4;
+constexpr std::size_t kManyPoints = 50'000;  // that take long to find
 
 constexpr double kLeastBase = 1e-3;    // between them, of the distance of what they show
 constexpr double kColourWidths = 0.3;  // of a photo, that black and white in a channel are apart
@@ -49,9 +53,20 @@ constexpr double kMuchNearer = 0.65;  // than the typical one, as a share of it
 constexpr double kMuchFarther = 2.0;
 constexpr double kEnd = 1.25;  // times the nearest or farthest depth: an end of a range
 
-glm::dvec3 axis_of(const SmallPhoto& photo) {
-  const Camera& camera = photo.camera;
-  return camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height).direction;
+// From where a photo looks where. The axis of a fisheye inverts its lens, so all are found once.
+struct Pose {
+  glm::dvec3 center, axis;
+};
+
+std::vector<Pose> poses_of(std::span<const SmallPhoto> photos) {
+  std::vector<Pose> out;
+  out.reserve(photos.size());
+  for (const SmallPhoto& photo : photos) {
+    const Camera& camera = photo.camera;
+    const CameraRay ray = camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height);
+    out.push_back({camera.center(), ray.direction});
+  }
+  return out;
 }
 
 // The kMostCompared photos with the lowest ranks.
@@ -65,16 +80,15 @@ std::vector<std::size_t> foremost(std::vector<std::pair<double, std::size_t>> ra
 }
 
 // The photos that see most of what a photo sees from somewhere else: near centres, like axes.
-std::vector<std::size_t> neighbours_of(std::span<const SmallPhoto> photos,
+std::vector<std::size_t> neighbours_of(std::span<const Pose> poses,
                                        std::size_t index,
                                        double distance) {
   std::vector<std::pair<double, std::size_t>> ranked;
-  for (std::size_t i = 0; i < photos.size(); ++i) {
-    const double base =
-        glm::distance(photos[i].camera.center(), photos[index].camera.center()) / distance;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const double base = glm::distance(poses[i].center, poses[index].center) / distance;
     // Two photos from the same place say nothing about depth.
     if (i == index || base < kLeastBase) continue;
-    const double turn = 1.0 - glm::dot(axis_of(photos[i]), axis_of(photos[index]));
+    const double turn = 1.0 - glm::dot(poses[i].axis, poses[index].axis);
     ranked.emplace_back(std::abs(base - 0.15) + 2.0 * turn, i);
   }
   return foremost(std::move(ranked));
@@ -121,14 +135,19 @@ class Sweep {
         std::uint64_t seed,
         std::uint64_t stream = kSweepStream)
       : photos_(photos), depths_(depths), seed_(seed), stream_(stream), neighbours_(photos.size()) {
-    for (std::size_t i = 0; i < photos.size(); ++i)
-      neighbours_[i] = neighbours_of(photos, i, depths.typical);
+    const std::vector<Pose> poses = poses_of(photos);
+    in_parallel(photos.size(),
+                [&](std::size_t i) { neighbours_[i] = neighbours_of(poses, i, depths.typical); });
   }
 
   void take(std::size_t count) {
     const std::size_t before = samples_.size();
     samples_.resize(before + count);
     in_parallel(count, [&](std::size_t i) {
+      if (interrupt_requested()) {
+        throw Error(ErrorCode::kInterrupted,
+                    "Interrupted while the start was made: nothing is trained, and nothing saved");
+      }
       samples_[before + i] = sweep_pixel(photos_, neighbours_, depths_, seed_, stream_, before + i);
     });
     for (std::size_t i = before; i < samples_.size(); ++i) {
@@ -190,14 +209,14 @@ class AgreedPlaces {
 };
 
 // Photos that look the same way, those farthest apart first.
-std::vector<std::size_t> distant_neighbours(std::span<const SmallPhoto> photos,
+std::vector<std::size_t> distant_neighbours(std::span<const Pose> poses,
                                             std::size_t index,
                                             double distance) {
   std::vector<std::pair<double, std::size_t>> ranked;
-  for (std::size_t i = 0; i < photos.size(); ++i) {
-    const double base = glm::distance(photos[i].camera.center(), photos[index].camera.center());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const double base = glm::distance(poses[i].center, poses[index].center);
     const bool apart = i != index && base >= kLeastBase * distance;
-    if (apart && 1.0 - glm::dot(axis_of(photos[i]), axis_of(photos[index])) < kProbeTurn)
+    if (apart && 1.0 - glm::dot(poses[i].axis, poses[index].axis) < kProbeTurn)
       ranked.emplace_back(-base, i);
   }
   return foremost(std::move(ranked));
@@ -294,13 +313,14 @@ DepthRange depths_around(double typical) {
 
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed) {
   const DepthRange around = depths_around(guess);
-  std::vector<std::vector<std::size_t>> neighbours(photos.size());
-  for (std::size_t i = 0; i < photos.size(); ++i)
-    neighbours[i] = distant_neighbours(photos, i, guess);
-  const bool one_place = std::all_of(photos.begin(), photos.end(), [&](const SmallPhoto& photo) {
-    return glm::distance(photo.camera.center(), photos[0].camera.center()) < kLeastBase * guess;
+  const std::vector<Pose> poses = poses_of(photos);
+  const bool one_place = std::all_of(poses.begin(), poses.end(), [&](const Pose& pose) {
+    return glm::distance(pose.center, poses[0].center) < kLeastBase * guess;
   });
   if (photos.size() > 1 && one_place) return open_range(guess);
+  std::vector<std::vector<std::size_t>> neighbours(photos.size());
+  in_parallel(photos.size(),
+              [&](std::size_t i) { neighbours[i] = distant_neighbours(poses, i, guess); });
   std::vector<Probe> probes(kProbes);
   in_parallel(kProbes, [&](std::size_t i) {
     probes[i] =
@@ -347,10 +367,16 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
                         std::size_t count,
                         double unsure,
                         std::uint64_t seed) {
-  const auto fog = static_cast<std::size_t>(unsure * static_cast<double>(count));
+  // Photos that tell no depth at all give a start as well, however small it is.
+  const auto wanted = static_cast<std::size_t>(unsure * static_cast<double>(count));
+  const std::size_t fog = std::min(count, std::max<std::size_t>(unsure > 0 ? 1 : 0, wanted));
   Sweep sweep(photos, depths, seed);
   // Until there are enough of both kinds; where depths are open, or few agree, not before all
   // tries.
+  if (count >= kManyPoints) {
+    spdlog::info("the start looks for {} points in {} photos, at up to {} pixels", count,
+                 photos.size(), kTriesPerPoint * count);
+  }
   const auto enough = [&] {
     return !depths.open && sweep.agreed() >= count - fog && sweep.vague() >= fog;
   };

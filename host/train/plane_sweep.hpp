@@ -37,10 +37,11 @@ SweepProbe probe_sweep(std::span<const SmallPhoto> photos,
 /// sweep, Collins 1996, over single pixels with their surroundings, which photos are looked up for
 /// turned and scaled as they see them) and which one of two of these photos, swept from its side,
 /// finds as well (the check of consistency of multi-view stereo). Of the pixels that no depth
-/// explains clearly, the share `unsure` of `count` at most (all, where the range is open) are taken
-/// as well, so that everything seen has something in front of it: one half at random depths, the
-/// other as deep as what agreed and is most like them in place and colour, unless the range is
-/// open. Colours are the photos'.
+/// explains clearly, the share `unsure` of `count` at most (one at least unless it is 0; all, where
+/// the range is open) are taken as well, so that everything seen has something in front of it: one
+/// half at random depths, the other as deep as what agreed and is most like them in place and
+/// colour, unless the range is open. Colours are the photos'. Throws Error (kInterrupted) when a
+/// signal is marked (InterruptGuard), as all sweeps do.
 PointCloud swept_points(std::span<const SmallPhoto> photos,
                         const DepthRange& depths,
                         std::size_t count,

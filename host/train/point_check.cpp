@@ -9,10 +9,10 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "scene/camera_model.hpp"
+#include "scene/even_choice.hpp"
 #include "train/point_cloud.hpp"
 #include "util/parallel.hpp"
 
@@ -73,9 +73,8 @@ class PointCells {
  public:
   PointCells(const PointCloud& points, const SmallPhoto& photo, int side)
       : cells_(photo, side), taken_(cells_.count()) {
-    const std::size_t looks = std::min(kMostPlaces, points.size());
-    for (std::size_t k = 0; k < looks; ++k) {
-      const auto place = photo.sees(triple(points.positions, k * points.size() / looks));
+    for (const std::size_t i : even_choice(points.size(), kMostPlaces)) {
+      const auto place = photo.sees(triple(points.positions, i));
       if (place) taken_[cells_.at(*place)] = true;
     }
   }
@@ -99,9 +98,8 @@ class PhotoBeforePoints {
       : photo_(&photo),
         cells_(photo, kNearCell),
         nearest_(cells_.count(), std::numeric_limits<double>::infinity()) {
-    looks = std::min(looks, points.size());
-    for (std::size_t k = 0; k < looks; ++k) {
-      const glm::dvec3 world = scale * triple(points.positions, k * points.size() / looks);
+    for (const std::size_t i : even_choice(points.size(), looks)) {
+      const glm::dvec3 world = scale * triple(points.positions, i);
       const auto place = photo.sees(world);
       if (!place) continue;
       double& nearest = nearest_[cells_.at(*place)];
@@ -151,11 +149,12 @@ std::optional<double> color_difference(const PointCloud& points,
   std::size_t looks = 0;
   double own_sum = 0, other_sum = 0, apart = 0;
   std::vector<double> own, other;
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = k * points.size() / count;
+  const std::vector<std::size_t> chosen = even_choice(points.size(), count);
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const std::size_t i = chosen[k];
     const glm::dvec3 world = scale * triple(points.positions, i);
     // The colour of a point half the cloud away.
-    const std::size_t j = (k + count / 2) % count * points.size() / count;
+    const std::size_t j = chosen[(k + chosen.size() / 2) % chosen.size()];
     const glm::dvec3 color = triple(points.colors, i), wrong = triple(points.colors, j);
     own.clear(), other.clear();
     for (const PhotoBeforePoints& photo : shown) {
@@ -177,18 +176,17 @@ std::optional<double> color_difference(const PointCloud& points,
 }  // namespace
 
 double seen_share(const std::vector<float>& positions, std::span<const Camera> cameras) {
-  const std::size_t points = positions.size() / 3;
-  const std::size_t count = std::min(kLooks, points);
-  if (count == 0) return 0;
+  const std::vector<std::size_t> chosen = even_choice(positions.size() / 3, kLooks);
+  if (chosen.empty()) return 0;
   std::size_t seen = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const glm::dvec3 world = triple(positions, k * points / count);
+  for (const std::size_t i : chosen) {
+    const glm::dvec3 world = triple(positions, i);
     seen += std::any_of(cameras.begin(), cameras.end(),
                         [&](const Camera& camera) { return sees(camera, world); })
                 ? 1
                 : 0;
   }
-  return static_cast<double>(seen) / static_cast<double>(count);
+  return static_cast<double>(seen) / static_cast<double>(chosen.size());
 }
 
 PointMatch match_points(const PointCloud& points,

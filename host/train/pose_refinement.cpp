@@ -173,4 +173,10 @@ std::vector<double> subject_distances(std::span<const Camera> cameras,
   return out;
 }
 
+double subject_length(std::span<const Camera> cameras, const PointCloud& points, double extent) {
+  const double half = 0.5;
+  return std::max(extent, quantiles(subject_distances(cameras, points, extent),
+                                    std::span<const double>(&half, 1))[0]);
+}
+
 }  // namespace raysplats

@@ -34,7 +34,7 @@ class PoseRefinement {
     std::vector<float> deltas, first, second, steps;
   };
 
-  /// `extent` is the length that a turn by one radian is weighed against (camera_extent()),
+  /// `extent` is the length that a turn by one radian is weighed against (scene_extent()),
   /// `distances` are those of what the cameras see (subject_distances()). `prior` is the weight of
   /// half the squared correction (radians and extents) beside a photo's loss: errors of poses are
   /// small and do not agree between photos. It holds the motions of which the photos tell next to
@@ -74,5 +74,9 @@ class PoseRefinement {
 std::vector<double> subject_distances(std::span<const Camera> cameras,
                                       const PointCloud& points,
                                       double extent);
+
+/// The median of these distances, at least `extent`: a length of what the cameras see, however near
+/// to each other they stand.
+double subject_length(std::span<const Camera> cameras, const PointCloud& points, double extent);
 
 }  // namespace raysplats

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "eval/metrics.hpp"
+
 namespace raysplats {
 namespace {
 
@@ -12,7 +14,7 @@ constexpr int kViewsToJudge = 3;  // reports of views that were reported before
 
 void PsnrRise::note(std::size_t view, int divisor, double psnr) {
   const auto [first, is_new] = first_.try_emplace(std::pair(view, divisor), psnr);
-  if (is_new) return;
+  if (is_new || first->second >= kMostPsnr) return;
   most_ = std::max(most_.value_or(psnr - first->second), psnr - first->second);
   ++seen_again_;
 }

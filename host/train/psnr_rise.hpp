@@ -12,7 +12,8 @@ namespace raysplats {
 /// reach, so a view is compared with itself.
 class PsnrRise {
  public:
-  /// A view, at the divisor of its resolution, was reported with this PSNR in decibels.
+  /// A view, at the divisor of its resolution, was reported with this PSNR in decibels. One that
+  /// begins with the greatest PSNR that is told (kMostPsnr) cannot rise and does not count.
   void note(std::size_t view, int divisor, double psnr);
   /// The most that a view has gained over its first report, in decibels; none before enough views
   /// returned to judge.

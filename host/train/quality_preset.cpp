@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
+#include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/statistics.hpp"
 #include "train/schedule.hpp"
 
 namespace raysplats {
@@ -16,7 +19,7 @@ namespace {
 struct Level {
   std::int64_t passes;       // over the training photos
   std::int64_t least, most;  // iterations
-  int side;                  // longest side of a photo on CPUs, in pixels
+  int side;                  // longest side of the usual photo on CPUs, in pixels
 };
 
 constexpr std::array<Level, 4> kLevels{{{4, 300, 1000, 240},
@@ -45,11 +48,14 @@ Quality parse_quality(const std::string& name) {
 QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device) {
   const Level& level = kLevels[static_cast<std::size_t>(quality)];
   const std::vector<std::size_t> views = dataset.indices(Split::kTrain);
-  int longest = 1;
+  // Of the usual photo: a panorama among phone photos must not shrink them all.
+  std::vector<double> sides;
   for (const std::size_t i : views) {
     const Camera& camera = dataset.views[i].camera;
-    longest = std::max({longest, camera.width, camera.height});
+    sides.push_back(std::max(camera.width, camera.height));
   }
+  const std::array<double, 1> half{0.5};
+  const int longest = std::max(1, static_cast<int>(quantiles(std::move(sides), half)[0]));
   const int side = level.side * (device == DeviceType::kCpu ? 1 : kFasterDevices);
   QualityChoice out;
   // Few photos are known by heart before the least of a level is over.

@@ -26,8 +26,8 @@ struct QualityChoice {
 };
 
 /// `dataset` at its full size. Iterations are passes over the training photos within limits, the
-/// lower of which gives way to what few photos ask for (run_length()); photos are reduced to a
-/// longest side that is half as long on CPUs as elsewhere.
+/// lower of which gives way to what few photos ask for (run_length()); photos are reduced as the
+/// median one of their longest sides asks for, which may be half as long on CPUs as elsewhere.
 QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device);
 
 }  // namespace raysplats

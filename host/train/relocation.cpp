@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/activation.hpp"
 #include "scene/morton_order.hpp"
 #include "util/rng.hpp"
 
@@ -13,8 +14,6 @@ namespace {
 constexpr std::uint64_t kDrawStream = 0x72656c6f63;
 constexpr std::size_t kMostParts = 51;
 constexpr double kLeastOpacity = 0.005, kMostOpacity = 1.0 - 1e-6;
-
-double sigmoid(double x) { return 1.0 / (1.0 + std::exp(-x)); }
 
 }  // namespace
 
@@ -74,8 +73,7 @@ RelocationPlan plan_relocation(std::span<const float> means,
     std::array<float, 2> share{};
     if (shared) {
       const EqualShare equal = equal_share(sigmoid(opacities[i]), parts[i]);
-      share = {static_cast<float>(std::log(equal.opacity / (1.0 - equal.opacity))),
-               static_cast<float>(equal.scale)};
+      share = {static_cast<float>(logit(equal.opacity)), static_cast<float>(equal.scale)};
     }
     const auto role = static_cast<std::uint32_t>(shared ? DensityRole::kPart : DensityRole::kKeep);
     plan.source.insert(plan.source.end(), parts[i], i);

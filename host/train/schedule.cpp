@@ -172,6 +172,7 @@ std::int64_t steady_from(const TrainOptions& options) {
                options.sh_degree * options.sh_degree_interval.of(options.iterations));
   for (const ResolutionStep& step : options.resolution_schedule)
     from = std::max(from, step.until.of(options.iterations));
+  if (options.flat) from = std::max(from, RunShare(kFlatUntil).of(options.iterations));
   return from;
 }
 

@@ -73,7 +73,7 @@ int resolution_divisor(const TrainOptions& options, std::int64_t iteration);
 std::int64_t last_iteration(const TrainOptions& options);
 
 /// The iteration from which on steps are alike: photos have their full size, all SH bands are on,
-/// and density control is over.
+/// density control is over, and flat Gaussians are flat.
 std::int64_t steady_from(const TrainOptions& options);
 
 /// Until when a run by time takes the time of such steps, which then tells when it will end.

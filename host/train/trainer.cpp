@@ -3,29 +3,23 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <span>
 #include <utility>
 
+#include "io/dataset_views.hpp"
 #include "io/photo.hpp"
 #include "raysplats/error.hpp"
 #include "run/dataset_fingerprint.hpp"
+#include "run/mirror_meshes.hpp"
 #include "run/train_config.hpp"
 #include "train/ignored_photos.hpp"
 #include "train/memory_estimate.hpp"
-#include "train/mirror_meshes.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/mebibytes.hpp"
 
 namespace raysplats {
 namespace {
-
-std::vector<Camera> cameras_of(const Dataset& dataset, const std::vector<std::size_t>& views) {
-  std::vector<Camera> cameras;
-  cameras.reserve(views.size());
-  for (const std::size_t view : views) cameras.push_back(dataset.views[view].camera);
-  return cameras;
-}
 
 std::vector<View> views_of(const Dataset& dataset, const std::vector<std::size_t>& indices) {
   std::vector<View> views;
@@ -63,10 +57,6 @@ TrainOptions with_length(TrainOptions options, const Dataset& dataset) {
 
 }  // namespace
 
-std::size_t pixels_of(const Camera& camera) {
-  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-}
-
 Trainer::Impl::Impl(Context& device,
                     Dataset data,
                     const TrainOptions& train_options,
@@ -82,8 +72,8 @@ Trainer::Impl::Impl(Context& device,
       train_views(dataset.indices(Split::kTrain)),
       test_views(dataset.indices(Split::kTest)),
       train_cameras(cameras_of(dataset, train_views)),
-      extent(camera_extent(train_cameras)),
-      motion(motion_extent(train_cameras)),
+      extent(scene_extent(train_cameras, dataset.points)),
+      motion(motion_extent(train_cameras, extent)),
       cut_out(dataset.alpha_is_background),
       fingerprint(dataset_fingerprint(dataset, options.depth_weight > 0)),
       background(background_color(options, cut_out)),
@@ -116,10 +106,27 @@ Trainer::Impl::Impl(Context& device,
   }
   options.data.origin = dataset.origin;
   apply_options();
-  if (options.strategy == DensityStrategy::kMcmc) mcmc.emplace(device, options, extent);
+  if (options.strategy == DensityStrategy::kMcmc)
+    mcmc.emplace(device, options, subject_length(train_cameras, dataset.points, extent));
   if (options.exposure) exposure.emplace(device, train_views.size(), slots.size());
   reset_sky();
   reset_poses();
+  check_views_and_options();
+  if (options.depth_weight > 0) {
+    require_depth_gradients();
+    depths.emplace(device, dataset, train_views, options.depth_weight, options.depth_unit,
+                   PictureBudget::of(options, dataset, train_views).depths);
+  }
+  if (apart.size() < static_cast<std::size_t>(options.validate_views)) {
+    throw UsageError(fmt::format(
+        "The option 'validate-views' = {} leaves less than {} of the {} training views to train "
+        "on: keep fewer apart",
+        options.validate_views, kLeastTrained, train_views.size()));
+  }
+}
+
+// That there are views to train on, and that they allow the options.
+void Trainer::Impl::check_views_and_options() const {
   if (options.scale_activation == ScaleActivation::kSigmoid && options.scale_min * extent >= 1) {
     throw UsageError(
         fmt::format("The option 'scale-min' = {} is {:.3g} units of this data set, and with "
@@ -138,17 +145,6 @@ Trainer::Impl::Impl(Context& device,
         by_option             ? "--test-every 1 holds all of them out"
         : !test_views.empty() ? "its files hold all of them out; let them name some for training"
                               : "its files name none to train on"));
-  }
-  if (options.depth_weight > 0) {
-    require_depth_gradients();
-    depths.emplace(device, dataset, train_views, options.depth_weight, options.depth_unit,
-                   PictureBudget::of(options, dataset, train_views).depths);
-  }
-  if (apart.size() < static_cast<std::size_t>(options.validate_views)) {
-    throw UsageError(fmt::format(
-        "The option 'validate-views' = {} leaves less than {} of the {} training views to train "
-        "on: keep fewer apart",
-        options.validate_views, kLeastTrained, train_views.size()));
   }
 }
 
@@ -187,7 +183,7 @@ void Trainer::on_step(std::function<void(const TrainProgress&)> callback) {
   impl_->callback = std::move(callback);
 }
 
-void Trainer::stop() { impl_->stop_asked = true; }
+void Trainer::stop() { impl_->asked.stop = true; }
 
 EvaluationRow Trainer::evaluate() {
   Impl& self = *impl_;
@@ -204,7 +200,7 @@ EvaluationRow Trainer::evaluate() {
 void Trainer::save() {
   Impl& self = *impl_;
   if (self.busy) {
-    self.save_asked = true;
+    self.asked.save = true;
     return;
   }
   const auto turn = self.context.lock();

@@ -20,6 +20,7 @@
 #include "device/read_back.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/evaluation.hpp"
 #include "raysplats/trainer.hpp"
 #include "run/checkpoint.hpp"
 #include "run/run_folder.hpp"
@@ -51,8 +52,6 @@
 
 namespace raysplats {
 
-/// Pixels of a camera's picture.
-std::size_t pixels_of(const Camera& camera);
 /// Photos decoded ahead of their turn.
 constexpr std::size_t kReadAhead = 8;
 
@@ -66,6 +65,23 @@ struct ViewSlot {
 struct LastView {
   ImageLoss::Value loss;
   CameraTracer::Statistics work;
+};
+
+/// The clocks of a run.
+struct RunClock {
+  Stopwatch training, evaluating;
+  std::optional<double> run_seconds = {};     ///< that fit_time() was given
+  std::optional<double> steady_seconds = {};  ///< of training, when the last steps began
+  std::int64_t row_iteration = 0;             ///< of the last row of progress
+  double row_seconds = 0;                     ///< of training, then
+};
+
+/// What a run is asked to do between two steps.
+struct Asked {
+  std::atomic<bool> stop = false;
+  std::atomic<bool> save = false;
+  bool stop_wished = false;  ///< before a step, by this rank; with several ranks
+  bool stop_agreed = false;  ///< after it: by any of them
 };
 
 /// A step that is enqueued and may not be done, with what its beginning found on the host.
@@ -84,6 +100,9 @@ struct Trainer::Impl {
        std::filesystem::path run_path,
        bool replace,
        Communicator* others);
+
+  // trainer.cpp: what views and options do not allow together.
+  void check_views_and_options() const;
 
   // trainer_start.cpp: from a data set to the first step.
   void start();
@@ -125,6 +144,7 @@ struct Trainer::Impl {
 
   // trainer_pilot.cpp: how long a run will take.
   struct Pilot;
+  struct PilotSteps;
   void check_not_begun(const char* function) const;
   void apply_options();
   double predicted_seconds(const Pilot& pilot, std::int64_t iterations, std::size_t most) const;
@@ -163,6 +183,9 @@ struct Trainer::Impl {
   void report(Progress& progress);
   void evaluate_views(bool last);
   bool is_evaluated(bool last) const;
+  EvaluationRow measure(const Dataset& views,
+                        const std::filesystem::path& folder,
+                        EvaluationOptions choice);
   void set_background();
   TraceOptions trace_options();                  // that the model looks right with
   const DeviceGaussians& model_to_show() const;  // the mean of the last steps, if they have begun
@@ -178,6 +201,9 @@ struct Trainer::Impl {
   // trainer_resume.cpp: checkpoints.
   void resume(const std::filesystem::path& source);
   void restore_from(const std::filesystem::path& source);
+  void check_fits(const Checkpoint& checkpoint) const;
+  void choose_folder(const std::filesystem::path& place, const Checkpoint& checkpoint);
+  void restore_parts(const Checkpoint& checkpoint);
   void check_data_options(const Checkpoint& checkpoint) const;
   void check_newer_models(std::int64_t from) const;
   void write_state(const std::filesystem::path& path);
@@ -261,20 +287,12 @@ struct Trainer::Impl {
   std::optional<TrainOptions> resumed;           // options of the run that resume() has brought
   std::shared_ptr<const nlohmann::json> former;  // metrics.json before this object's first start()
   PsnrRise rise;
-  Stopwatch training{context};
-  Stopwatch evaluating{context};
-  std::optional<double> run_seconds;     // that fit_time() was given
-  std::optional<double> steady_seconds;  // of training, when the last steps began
+  RunClock clock{Stopwatch(context), Stopwatch(context)};
   double last_loss = 0;
-  std::int64_t row_iteration = 0;
-  double row_seconds = 0;
 
   std::function<void(const TrainProgress&)> callback;
   RunWatcher* watcher = nullptr;
-  std::atomic<bool> stop_asked = false;
-  std::atomic<bool> save_asked = false;
-  bool stop_wished = false;        // before a step, by this rank; with several ranks
-  bool stop_agreed = false;        // after it: by any of them
+  Asked asked;
   std::atomic<bool> busy = false;  // in run() or step()
   bool stepped = false;            // since this object was made
   bool reads_ahead = true;         // photos, before their turn
@@ -290,7 +308,7 @@ struct Trainer::Impl {
   struct Busy {
     explicit Busy(Impl& impl) : busy(impl.busy) {
       if (busy.exchange(true)) refuse_while_busy();
-      impl.stop_asked = false;
+      impl.asked.stop = false;
     }
     ~Busy() { busy = false; }
     Busy(const Busy&) = delete;

@@ -57,11 +57,11 @@ struct Trainer::Impl::Loop {
 // Work that is no training, when all steps are done.
 void Trainer::Impl::untimed(const Loop& loop, const std::function<void()>& work) {
   finish_steps();
-  training.stop();
+  clock.training.stop();
   loop.progress.suspend();
   work();
   loop.progress.resume();
-  training.start();
+  clock.training.start();
 }
 
 // Up to `until` completed iterations. The first thing is what the newest one lacks because an error
@@ -86,7 +86,7 @@ void Trainer::Impl::run_iterations(std::int64_t until, const Loop& loop) {
 
 // One step and what is said of it. Returns whether the run is to end with this iteration.
 bool Trainer::Impl::run_iteration(const Loop& loop) {
-  if (ranks.size() > 1) stop_wished = loop.interrupted() || stop_asked;
+  if (ranks.size() > 1) asked.stop_wished = loop.interrupted() || asked.stop;
   send_sampled_step();
   fit_end_to_time();
   const bool last = iteration == last_iteration(options);
@@ -97,7 +97,7 @@ bool Trainer::Impl::run_iteration(const Loop& loop) {
     untimed(loop, [&] { hear({iteration, last_iteration(options), gaussians.count}); });
   }
   // Asked once: a signal that comes later is seen after the next step. Ranks end together.
-  return ranks.size() > 1 ? stop_agreed : loop.interrupted() || stop_asked;
+  return ranks.size() > 1 ? asked.stop_agreed : loop.interrupted() || asked.stop;
 }
 
 // Whether a run of these options writes a model there, whatever happens to it.
@@ -137,12 +137,12 @@ bool Trainer::Impl::finish_iteration(const Loop& loop, bool stop, bool anew) {
   } else {
     control_density();
   }
-  const bool asked = save_asked.exchange(false);
-  if (asked && !saves) untimed(loop, [this] { save_model(); });
+  const bool save_now = asked.save.exchange(false);
+  if (save_now && !saves) untimed(loop, [this] { save_model(); });
   const bool keeps = loop.scheduled &&
                      (stop || last || every(options.checkpoint_every, iteration)) &&
                      (anew || !is_file(checkpoint_path(run.path(), iteration)));
-  if (asked || keeps) untimed(loop, [this] { save_checkpoint(); });
+  if (save_now || keeps) untimed(loop, [this] { save_checkpoint(); });
   if (watcher && !stop && watcher->wants_look())
     untimed(loop, [&] { let_watcher_look(loop.interrupted); });
   return stop;
@@ -150,7 +150,7 @@ bool Trainer::Impl::finish_iteration(const Loop& loop, bool stop, bool anew) {
 
 // Lets the watcher look at the state between two steps, and hold it as long as it wishes.
 void Trainer::Impl::let_watcher_look(const std::function<bool()>& interrupted) {
-  const auto stopping = [&] { return stop_asked || interrupted(); };
+  const auto stopping = [&] { return asked.stop || interrupted(); };
   RunWish wish;
   do {
     wish = watcher->look(
@@ -169,26 +169,26 @@ void Trainer::Impl::run_and_rescue(std::int64_t until,
                                    const std::function<bool()>& interrupted) {
   Progress progress("Training", last_iteration(options), iteration,
                     show_progress ? stderr : nullptr);
-  row_iteration = iteration;
-  row_seconds = training.seconds();
-  training.start();
+  clock.row_iteration = iteration;
+  clock.row_seconds = clock.training.seconds();
+  clock.training.start();
   try {
     run_iterations(until, {scheduled, progress, interrupted});
   } catch (const Error& error) {
-    training.stop();
+    clock.training.stop();
     if (error.code() == ErrorCode::kRuntime) throw;  // the model itself is at fault
     throw_with(error, rescue());
   } catch (const std::bad_alloc&) {
-    training.stop();
+    clock.training.stop();
     throw_with(ResourceError("The host has no memory left: use smaller images (--downscale) or a "
                              "smaller --image-budget"),
                rescue());
   } catch (...) {  // of a callback
-    training.stop();
+    clock.training.stop();
     spdlog::warn("a callback failed after iteration {}: {}", iteration, rescue());
     throw;
   }
-  training.stop();
+  clock.training.stop();
   progress.finish();
 }
 
@@ -219,7 +219,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
         judged_psnr(run.evaluations().back(), options.exposure), best->iteration,
         judged_psnr(*best, options.exposure));
   }
-  if (!complete && !stop_asked && !ended) {
+  if (!complete && !asked.stop && !ended) {
     throw Error(
         ErrorCode::kInterrupted,
         fmt::format("Interrupted at iteration {}; everything is saved: continue with --resume {}",
@@ -229,8 +229,8 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   summary.iterations = iteration;
   summary.gaussians = gaussians.count;
   summary.loss = last_loss;
-  summary.training_seconds = training.seconds();
-  summary.evaluation_seconds = evaluating.seconds();
+  summary.training_seconds = clock.training.seconds();
+  summary.evaluation_seconds = clock.evaluating.seconds();
   summary.kernel_build_seconds = context.build_seconds();
   summary.evaluations = run.evaluations();
   return summary;

@@ -3,13 +3,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <set>
 #include <thread>
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "train/run_time.hpp"
 #include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"
@@ -47,7 +46,7 @@ const std::vector<ResolutionStep>& coarse_schedule() {
 
 double mean_pixels(const std::vector<Camera>& cameras) {
   double sum = 0;
-  for (const Camera& camera : cameras) sum += static_cast<double>(pixels_of(camera));
+  for (const Camera& camera : cameras) sum += static_cast<double>(pixel_count(camera));
   return sum / static_cast<double>(cameras.size());
 }
 
@@ -96,88 +95,102 @@ double Trainer::Impl::predicted_seconds(const Pilot& pilot,
                                    rates, first, limit);
 }
 
+// Steps of a pilot, with how long they took.
+struct Trainer::Impl::PilotSteps {
+  Impl& impl;
+  double seconds;  // for all of them
+  Pilot& pilot;
+  std::vector<StepSample> samples = {};
+  std::size_t timed = 0;  // steps of the last kind
+  double spent = 0;       // without the photos, which the run has to get as well
+  double photo_seconds = 0;
+  std::set<std::size_t> read = {};  // views
+
+  StepSample step();
+  LoadRates stage(double until);
+};
+
+StepSample Trainer::Impl::PilotSteps::step() {
+  const int divisor = resolution_divisor(impl.options, impl.iteration);
+  Camera camera;
+  for (std::size_t slot = 0; slot < impl.slots.size(); ++slot) {
+    if (!impl.share.holds(slot)) continue;
+    const std::size_t view = impl.order.at(impl.turn_of(slot));
+    camera = divisor > 1 ? downscaled(impl.train_cameras[view], divisor) : impl.train_cameras[view];
+    const Timer photo(impl.context);
+    impl.photo_cache.get(view, camera.width, camera.height);
+    if (impl.depths) impl.depths->prepare({view, camera.width, camera.height});
+    impl.context.finish();
+    if (read.insert(view).second) photo_seconds += photo.seconds();
+  }
+  const Timer timer(impl.context);
+  impl.send_step();
+  impl.finish_steps();
+  const double seconds_of_step = timer.seconds();
+  spent += seconds_of_step;
+  // Its views are taken to be like the last one.
+  const auto views = static_cast<double>(impl.slots.size());
+  const auto work = impl.tracer.statistics();
+  return {
+      {views * static_cast<double>(pixel_count(camera)), static_cast<double>(impl.gaussians.count),
+       static_cast<double>(sh_coefficients(impl.gaussians.active_sh_degree)),
+       views * static_cast<double>(work.hits), views * static_cast<double>(work.candidates)},
+      seconds_of_step};
+}
+
+// Times steps of one kind until the share `until` of the time is spent. The first step of a kind
+// compiles kernels and makes buffers: it does not count. A few views come again and again: reading
+// photos would slow down a CPU that trains.
+LoadRates Trainer::Impl::PilotSteps::stage(double until) {
+  const std::int64_t first_step = impl.iteration;
+  step();
+  const std::size_t begin = samples.size();
+  // The first rank's clock counts for all.
+  for (int i = 0; i < kLeastSteps || impl.ranks.broadcast_value(0, spent < until * seconds); ++i) {
+    impl.iteration = first_step + i % kViews;
+    samples.push_back(step());
+  }
+  const std::span<const StepSample> own = std::span(samples).subspan(begin);
+  const LoadRates met = LoadRates::of(own);
+  pilot.per_work = impl.ranks.broadcast_value(0, seconds_per_work(own));
+  timed = own.size();
+  return {impl.ranks.broadcast_value(0, met.hits), impl.ranks.broadcast_value(0, met.candidates)};
+}
+
 // Times steps from the start on the device: coarse ones, ones at full size, and ones with as many
 // Gaussians as the run will have at its end. `run`: the seconds of the run, if they are given.
 void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot& pilot) {
-  std::vector<StepSample> samples;
-  double spent = 0;  // without the photos, which the run has to get as well
-  double photo_seconds = 0;
-  std::set<std::size_t> read;  // views
-  std::size_t timed = 0;       // steps of the last kind
-  const auto timed_step = [&] {
-    const int divisor = resolution_divisor(options, iteration);
-    Camera camera;
-    for (std::size_t slot = 0; slot < slots.size(); ++slot) {
-      if (!share.holds(slot)) continue;
-      const std::size_t view = order.at(turn_of(slot));
-      camera = divisor > 1 ? downscaled(train_cameras[view], divisor) : train_cameras[view];
-      const Timer photo(context);
-      photo_cache.get(view, camera.width, camera.height);
-      if (depths) depths->prepare({view, camera.width, camera.height});
-      context.finish();
-      if (read.insert(view).second) photo_seconds += photo.seconds();
-    }
-    const Timer timer(context);
-    send_step();
-    finish_steps();
-    const double seconds_of_step = timer.seconds();
-    spent += seconds_of_step;
-    // Its views are taken to be like the last one.
-    const auto views = static_cast<double>(slots.size());
-    const auto work = tracer.statistics();
-    return StepSample{
-        {views * static_cast<double>(pixels_of(camera)), static_cast<double>(gaussians.count),
-         static_cast<double>(sh_coefficients(gaussians.active_sh_degree)),
-         views * static_cast<double>(work.hits), views * static_cast<double>(work.candidates)},
-        seconds_of_step};
-  };
-  // The first step of a kind compiles kernels and makes buffers: it does not count. A few views
-  // come again and again: reading photos would slow down a CPU that trains.
-  const auto stage = [&](double until) {
-    const std::int64_t first_step = iteration;
-    timed_step();
-    const std::size_t begin = samples.size();
-    // The first rank's clock counts for all.
-    for (int i = 0; i < kLeastSteps || ranks.broadcast_value(0, spent < until * seconds); ++i) {
-      iteration = first_step + i % kViews;
-      samples.push_back(timed_step());
-    }
-    const std::span<const StepSample> own = std::span(samples).subspan(begin);
-    const LoadRates met = LoadRates::of(own);
-    pilot.per_work = ranks.broadcast_value(0, seconds_per_work(own));
-    timed = own.size();
-    return LoadRates{ranks.broadcast_value(0, met.hits), ranks.broadcast_value(0, met.candidates)};
-  };
+  PilotSteps steps{*this, seconds, pilot};
   iteration = 0;
   reads_ahead = false;
-  pilot.at_start = pilot.at_full_size = stage(kCoarseShare);
+  pilot.at_start = pilot.at_full_size = steps.stage(kCoarseShare);
   const auto rough = [&](std::int64_t iterations) {
     return predicted_seconds(pilot, iterations, gaussians.count);
   };
   if (run || rough(options.iterations) > kShortRun) {
     const std::int64_t middle = options.iterations / 2;
     iteration = middle;
-    pilot.at_full_size = stage(kFullShare);
+    pilot.at_full_size = steps.stage(kFullShare);
     const std::size_t most =
         most_gaussians(run ? iterations_within(*run, kLeastIterations, rough) : options.iterations);
     for (int pass = 0; pass < kMostPasses && density.accumulates_at(0) && gaussians.count < most;
          ++pass)
       apply_plan(density.split_evenly(gaussians, most));
-    pilot.at_full_size = stage(1);
+    pilot.at_full_size = steps.stage(1);
   }
   spdlog::debug(
       "the last {} of {} timed steps took {:.3g} us a unit of work; {:.3g} hits a pixel and {:.3g} "
       "candidates a Gaussian at first, {:.3g} and {:.3g} with {} Gaussians; a photo is read in "
       "{:.3g} ms",
-      timed, samples.size(), 1e6 * pilot.per_work, pilot.at_start.hits, pilot.at_start.candidates,
-      pilot.at_full_size.hits, pilot.at_full_size.candidates, gaussians.count,
-      1e3 * photo_seconds / static_cast<double>(read.size()));
+      steps.timed, steps.samples.size(), 1e6 * pilot.per_work, pilot.at_start.hits,
+      pilot.at_start.candidates, pilot.at_full_size.hits, pilot.at_full_size.candidates,
+      gaussians.count, 1e3 * steps.photo_seconds / static_cast<double>(steps.read.size()));
   // The run reads several at a time, each rank its own.
   const std::size_t readers =
       std::min<std::size_t>(kReadAhead, std::max(1u, std::thread::hardware_concurrency()));
   pilot.photo_seconds = ranks.broadcast_value(
-      0, photo_seconds /
-             static_cast<double>(read.size() * readers * static_cast<std::size_t>(ranks.size())));
+      0, steps.photo_seconds / static_cast<double>(steps.read.size() * readers *
+                                                   static_cast<std::size_t>(ranks.size())));
 }
 
 // Everything as it was before the first step.
@@ -211,7 +224,7 @@ void Trainer::Impl::begin_programs(std::initializer_list<int> degrees) {
 
 Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<double> run_time) {
   if (!continues && !overwrite && ranks.leads()) check_no_run(run.path());
-  const Timer clock(context);
+  const Timer timer(context);
   Pilot pilot;
   const std::size_t most = limit();
   check_room(0, most);
@@ -221,7 +234,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   choose_color_range();
   first_model = new_model(most);
   std::optional<Gaussians> made = first_model;
-  pilot.start_seconds = ranks.broadcast_value(0, clock.seconds());
+  pilot.start_seconds = ranks.broadcast_value(0, timer.seconds());
   upload_first_model(most);
   pilot.first = gaussians.count;
   if (cut_out) pilot.opaque_share = opaque_share(photos(PhotoChoice::kAll));
@@ -234,7 +247,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   }
   undo_pilot();
   first_model = std::move(made);
-  pilot.seconds = ranks.broadcast_value(0, clock.seconds());
+  pilot.seconds = ranks.broadcast_value(0, timer.seconds());
   return pilot;
 }
 
@@ -278,8 +291,8 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
   first_model.reset();  // it was made for another limit
   apply_options();
   options.end_iteration = 0;
-  training.set(pilot.seconds);
-  run_seconds = seconds;
+  clock.training.set(pilot.seconds);
+  clock.run_seconds = seconds;
   return {options.iterations, static_cast<std::size_t>(options.max_gaussians),
           pilot.seconds + duration(options.iterations)};
 }
@@ -288,19 +301,19 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
 // time that is left tells how many more there can be. What the steps do depends on the schedules
 // alone, so that a run which is given this end from the beginning has the same bytes.
 void Trainer::Impl::fit_end_to_time() {
-  if (!run_seconds) return;
+  if (!clock.run_seconds) return;
   const std::int64_t from = steady_from(options);
   const std::int64_t until = timed_until(options);
   if (iteration == from) {
     finish_steps();
-    steady_seconds = training.seconds();
+    clock.steady_seconds = clock.training.seconds();
     return;
   }
-  if (!steady_seconds || iteration != until || iteration >= options.iterations) return;
+  if (!clock.steady_seconds || iteration != until || iteration >= options.iterations) return;
   finish_steps();
-  const double now = training.seconds();
-  const double more =
-      (*run_seconds - now) / (now - *steady_seconds) * static_cast<double>(until - from);
+  const double now = clock.training.seconds();
+  const double more = (*clock.run_seconds - now) / (now - *clock.steady_seconds) *
+                      static_cast<double>(until - from);
   const auto latest = kLatestEnd * static_cast<double>(options.iterations);
   const double end =
       std::clamp(static_cast<double>(iteration) + more, static_cast<double>(iteration) + 1, latest);

@@ -64,8 +64,9 @@ bool Trainer::Impl::sum_views() {
     sum.wait();
     const std::vector<std::uint32_t> capped = guard.step_capped().download();
     StepWord sum_of_all{0, 0, 0};
-    for (const StepWord& word : ranks.all_gather(StepWord{
-             std::uint64_t{capped[1]} << 32 | capped[0], guard.marked(), stop_wished ? 1u : 0u})) {
+    for (const StepWord& word :
+         ranks.all_gather(StepWord{std::uint64_t{capped[1]} << 32 | capped[0], guard.marked(),
+                                   asked.stop_wished ? 1u : 0u})) {
       sum_of_all.capped_rays += word.capped_rays;
       sum_of_all.mark |= word.mark;
       sum_of_all.stop |= word.stop;
@@ -78,7 +79,7 @@ bool Trainer::Impl::sum_views() {
       return false;
     }
     guard.set_step_capped(sum_of_all.capped_rays);
-    stop_agreed = sum_of_all.stop != 0;
+    asked.stop_agreed = sum_of_all.stop != 0;
     exchange_slots();
   }
   if (slots.size() > 1) sum.finish(gradients);

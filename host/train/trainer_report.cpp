@@ -60,17 +60,16 @@ void Trainer::Impl::report(Progress& progress) {
   last_loss = value.total;
   const double psnr = std::min(value.psnr, kMostPsnr);
   rise.note(order.at(last_turn()), resolution_divisor(options, iteration - 1), psnr);
-  const double seconds = training.seconds();
-  const double elapsed = seconds - row_seconds;
-  const TrainRow row{
-      iteration,       seconds,
-      value.total,     psnr,
-      gaussians.count, elapsed > 0 ? static_cast<double>(iteration - row_iteration) / elapsed : 0.0,
-      work.candidates, work.hits};
+  const double seconds = clock.training.seconds();
+  const double elapsed = seconds - clock.row_seconds;
+  const double speed =
+      elapsed > 0 ? static_cast<double>(iteration - clock.row_iteration) / elapsed : 0.0;
+  const TrainRow row{iteration,       seconds, value.total,     psnr,
+                     gaussians.count, speed,   work.candidates, work.hits};
   run.append(row);
   if (watcher) watcher->noted(row);
-  row_iteration = iteration;
-  row_seconds = seconds;
+  clock.row_iteration = iteration;
+  clock.row_seconds = seconds;
   progress.update(iteration,
                   fmt::format("loss {:.4f}, PSNR {:.2f} of this view, {} Gaussians{}", value.total,
                               psnr, gaussians.count, capped_share(counts.capped_rays)));
@@ -104,10 +103,11 @@ void Trainer::Impl::warn_of_no_progress() const {
       PsnrRise::kLeast, dataset.root.string());
 }
 
-// Traces the test views; the time counts as evaluation, not as training.
-void Trainer::Impl::evaluate_views(bool last) {
-  if (test_views.empty()) return;
-  evaluating.start();
+// Measures the model by the views of a data set that are held out, of which each rank traces a
+// share. Pictures go to `folder`.
+EvaluationRow Trainer::Impl::measure(const Dataset& views,
+                                     const std::filesystem::path& folder,
+                                     EvaluationOptions choice) {
   set_background();
   DeviceGaussians room;
   const DeviceGaussians& model = model_to_measure(room);
@@ -115,25 +115,40 @@ void Trainer::Impl::evaluate_views(bool last) {
     tracer.forward(model, camera);
     return tracer.download_image();
   };
-  EvaluationOptions choice;
   choice.ranks = &ranks;
+  const EvaluationReport report =
+      raysplats::evaluate(render, views, Split::kTest, background, folder, choice);
+  EvaluationRow row;
+  row.iteration = iteration;
+  row.training_seconds = clock.training.seconds();
+  row.psnr = report.mean.psnr;
+  row.ssim = report.mean.ssim;
+  row.views = report.images.size();
+  row.gaussians = model.count;
+  row.psnr_corrected = report.mean.psnr_corrected;
+  row.psnr_all = report.mean.psnr_all;
+  row.psnr_aligned = report.mean.psnr_aligned;
+  return row;
+}
+
+// Measures the test views; the time counts as evaluation, not as training.
+void Trainer::Impl::evaluate_views(bool last) {
+  if (test_views.empty()) return;
+  clock.evaluating.start();
+  EvaluationOptions choice;
   choice.max_views = last ? 0 : static_cast<std::size_t>(options.eval_views);
   choice.max_pictures = static_cast<std::size_t>(options.eval_renders);
   choice.align = last && options.poses;
-  const EvaluationReport report = raysplats::evaluate(render, dataset, Split::kTest, background,
-                                                      run.evaluation_folder(iteration), choice);
-  run.record({iteration, training.seconds(), report.mean.psnr, report.mean.ssim,
-              report.images.size(), model.count, report.mean.psnr_corrected, report.mean.psnr_all,
-              report.mean.psnr_aligned});
+  const EvaluationRow row = measure(dataset, run.evaluation_folder(iteration), choice);
+  run.record(row);
   if (watcher) watcher->evaluated(run.evaluations().back());
   write_metrics(false);
-  evaluating.stop();
+  clock.evaluating.stop();
   spdlog::info("iteration {}: PSNR {:.2f} dB, SSIM {:.4f} over {} test views after {} of training",
-               iteration, report.mean.psnr, report.mean.ssim, report.images.size(),
-               format_duration(training.seconds()));
-  if (report.mean.psnr_aligned) {
+               iteration, row.psnr, row.ssim, row.views, format_duration(clock.training.seconds()));
+  if (row.psnr_aligned) {
     spdlog::info("with cameras moved to where they fit the photos best, PSNR is {:.2f} dB",
-                 *report.mean.psnr_aligned);
+                 *row.psnr_aligned);
   }
 }
 
@@ -201,8 +216,8 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"gaussians", gaussians.count},
                      {"most_gaussians", density.limit()},
                      {"loss", last_loss},
-                     {"training_seconds", training.seconds()},
-                     {"evaluation_seconds", evaluating.seconds()},
+                     {"training_seconds", clock.training.seconds()},
+                     {"evaluation_seconds", clock.evaluating.seconds()},
                      {"kernel_build_seconds", context.build_seconds()},
                      {"traced_rays", traced_rays},
                      {"capped_rays", counts.capped_rays},

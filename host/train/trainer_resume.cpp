@@ -149,20 +149,8 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   }
 }
 
-void Trainer::Impl::restore_from(const std::filesystem::path& source) {
-  const bool own = source == "latest";
-  const std::filesystem::path place = own ? run.path() : source;
-  if (own && list_checkpoints(place).empty()) {
-    check_newer_models(0);
-    spdlog::info("{} holds no checkpoint yet: the run starts anew", place.string());
-    continues = true;
-    return;
-  }
-  // Nobody else has a folder that is not there yet, and it is made when there is a state to go on
-  // from.
-  std::optional<FolderUse> use;
-  if (is_folder(run.path())) use.emplace(*this);
-  const Checkpoint checkpoint = load_latest_checkpoint(place);
+// Whether the state is one of this run: of its seed, data, options of data and length.
+void Trainer::Impl::check_fits(const Checkpoint& checkpoint) const {
   if (checkpoint.seed != options.seed) {
     throw UsageError(fmt::format(
         "The checkpoint was made with seed {}, not {}: resume with the configuration of the run",
@@ -181,6 +169,11 @@ void Trainer::Impl::restore_from(const std::filesystem::path& source) {
         "earlier checkpoint",
         checkpoint.iteration, last_iteration(options)));
   }
+}
+
+// Tells whether the run goes on in its own folder, where nothing may have come after the state.
+void Trainer::Impl::choose_folder(const std::filesystem::path& place,
+                                  const Checkpoint& checkpoint) {
   const bool file = is_file(place);
   const std::optional<std::filesystem::path> folder = run_folder_of(place);
   std::error_code error;
@@ -193,11 +186,10 @@ void Trainer::Impl::restore_from(const std::filesystem::path& source) {
         "latest, choose another folder, or drop what came after iteration {} by --overwrite",
         run.path().string(), files.back().filename().string(), checkpoint.iteration));
   }
-  if (!checkpoint.config.empty()) resumed = parse_train_config(checkpoint.config);
-  if (continues) check_newer_models(checkpoint.iteration);
-  restore_joined_views(checkpoint);
-  restore_state(context, checkpoint, options, gaussians, adam, density);
-  restore_mean(checkpoint, options, gaussians, mean);
+}
+
+// What the state holds besides Gaussians, moments and their mean.
+void Trainer::Impl::restore_parts(const Checkpoint& checkpoint) {
   const auto lows = checkpoint.sections.find("footprint");
   if (lows != checkpoint.sections.end() && lows->second.size() == gaussians.count) {
     footprint.restore(lows->second);
@@ -218,6 +210,30 @@ void Trainer::Impl::restore_from(const std::filesystem::path& source) {
       throw DataError("The checkpoint lacks the sky of its run: resume from another one");
     tracer.sky()->set(coefficients);
   }
+}
+
+void Trainer::Impl::restore_from(const std::filesystem::path& source) {
+  const bool own = source == "latest";
+  const std::filesystem::path place = own ? run.path() : source;
+  if (own && list_checkpoints(place).empty()) {
+    check_newer_models(0);
+    spdlog::info("{} holds no checkpoint yet: the run starts anew", place.string());
+    continues = true;
+    return;
+  }
+  // Nobody else has a folder that is not there yet, and it is made when there is a state to go on
+  // from.
+  std::optional<FolderUse> use;
+  if (is_folder(run.path())) use.emplace(*this);
+  const Checkpoint checkpoint = load_latest_checkpoint(place);
+  check_fits(checkpoint);
+  choose_folder(place, checkpoint);
+  if (!checkpoint.config.empty()) resumed = parse_train_config(checkpoint.config);
+  if (continues) check_newer_models(checkpoint.iteration);
+  restore_joined_views(checkpoint);
+  restore_state(context, checkpoint, options, gaussians, adam, density);
+  restore_mean(checkpoint, options, gaussians, mean);
+  restore_parts(checkpoint);
   // What the run began with, black in those of older versions.
   if (options.background == "auto" && resumed) options.background = resumed->background;
   background = background_color(options, cut_out);
@@ -230,7 +246,8 @@ void Trainer::Impl::restore_from(const std::filesystem::path& source) {
   skipped_before = checkpoint.skipped_updates;
   iteration = checkpoint.iteration;
   pass_due = checkpoint.pass_due;
-  if (folder) training.set(recorded_seconds(*folder, iteration));
+  if (const std::optional<std::filesystem::path> folder = run_folder_of(place))
+    clock.training.set(recorded_seconds(*folder, iteration));
   started = true;
   whole = true;
 }

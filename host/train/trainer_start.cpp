@@ -6,8 +6,10 @@
 
 #include "run/former_metrics.hpp"
 #include "run/train_config.hpp"
+#include "scene/even_choice.hpp"
 #include "scene/gaussian_selection.hpp"
 #include "scene/morton_order.hpp"
+#include "scene/pixel_count.hpp"
 #include "train/flat_start.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
@@ -29,9 +31,8 @@ constexpr std::size_t kManyPhotos = 100;  // that tell of depth
 constexpr double kLeastShown = 0.01;      // of the photos, for a start to be without a reason
 
 std::vector<std::size_t> evenly_spread(const std::vector<std::size_t>& all, std::size_t most) {
-  std::vector<std::size_t> out;
-  const std::size_t count = std::min(most, all.size());
-  for (std::size_t i = 0; i < count; ++i) out.push_back(all[i * all.size() / count]);
+  std::vector<std::size_t> out = even_choice(all.size(), most);
+  for (std::size_t& i : out) i = all[i];
   return out;
 }
 
@@ -55,6 +56,14 @@ void note_many_passes(const TrainOptions& options, std::size_t photos) {
       "them; without -n and --time a run has {}",
       counted(last_iteration(options), "iteration"), photos,
       views / static_cast<std::int64_t>(photos), asked);
+}
+
+// `shown`: the share of the photos that counts.
+[[noreturn]] void refuse_transparent(double shown) {
+  throw UsageError(fmt::format(
+      "The first model has no Gaussians, because masks or transparent pixels leave {:.2g} % of the "
+      "photos: give masks that are white where photos count",
+      100 * shown));
 }
 
 // Iterations that were asked for by their number and that the run does not reach.
@@ -141,7 +150,7 @@ std::int64_t Trainer::Impl::last_turn() const { return iteration * options.views
 std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {
   if (options.max_gaussians > 0) return static_cast<std::size_t>(options.max_gaussians);
   double pixels = 0;
-  for (const Camera& camera : train_cameras) pixels += static_cast<double>(pixels_of(camera));
+  for (const Camera& camera : train_cameras) pixels += static_cast<double>(pixel_count(camera));
   pixels /= static_cast<double>(train_cameras.size());
   if (cut_out) pixels *= opaque_share(photos(PhotoChoice::kAll));
   const std::size_t fitting =
@@ -169,7 +178,7 @@ void Trainer::Impl::check_room(std::size_t count, std::size_t most) const {
 
 std::size_t Trainer::Impl::largest_photo() const {
   std::size_t pixels = 0;
-  for (const Camera& camera : train_cameras) pixels = std::max(pixels, pixels_of(camera));
+  for (const Camera& camera : train_cameras) pixels = std::max(pixels, pixel_count(camera));
   return pixels;
 }
 
@@ -210,9 +219,14 @@ void Trainer::Impl::require_depth_gradients() const {
   }
 }
 
-// A model to start from, with at most that many Gaussians.
+// A model to start from, with at most that many Gaussians. Points in random places need no photo
+// that shows them, but training does. Some photos tell that as a rule, without the others.
 Gaussians Trainer::Impl::new_model(std::size_t most) {
   check_room(0, most);
+  if (cut_out && !shows_anything(photos(PhotoChoice::kSome)) &&
+      !shows_anything(photos(PhotoChoice::kAll))) {
+    refuse_transparent(0);
+  }
   Gaussians model = initial_model(
       dataset, train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
       most, options);
@@ -220,12 +234,7 @@ Gaussians Trainer::Impl::new_model(std::size_t most) {
   if (options.bounds)
     throw UsageError("No Gaussian of the start lies within --bounds: give a larger box");
   const double shown = opaque_share(photos(PhotoChoice::kAll));
-  if (shown < kLeastShown) {
-    throw UsageError(fmt::format(
-        "The first model has no Gaussians, because masks or transparent pixels leave {:.2g} % of "
-        "the photos: give masks that are white where photos count",
-        100 * shown));
-  }
+  if (shown < kLeastShown) refuse_transparent(shown);
   throw UsageError("The first model has no Gaussians: use --init random");
 }
 
@@ -253,7 +262,7 @@ void Trainer::Impl::upload_first_model(std::size_t most) {
 void Trainer::Impl::load_former_metrics() {
   if (former) return;
   former = run.former_metrics();
-  evaluating.set(former_number(*former, "evaluation_seconds"));
+  clock.evaluating.set(former_number(*former, "evaluation_seconds"));
   const TrainOptions& before = resumed ? *resumed : options;
   for (const TrainRow& row : run.former_rows()) {
     last_loss = row.loss;

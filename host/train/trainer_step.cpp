@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "run/train_config.hpp"
+#include "scene/pixel_count.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
 
@@ -85,7 +86,7 @@ void Trainer::Impl::enqueue_step() {
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     const ViewSlot& one = slots[slot];
     const Camera& full = train_cameras[one.view];
-    traced_rays += pixels_of(divisor > 1 ? downscaled(full, divisor) : full);
+    traced_rays += pixel_count(divisor > 1 ? downscaled(full, divisor) : full);
     if (exposure) exposure->step(one.view, slot, options.exposure_damping, guard.mark());
     if (poses && iteration < pose_end(options))
       poses->step(one.view, one.pose_gradient, learning_rate(options.pose_lr, options, iteration));

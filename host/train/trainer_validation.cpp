@@ -73,42 +73,30 @@ bool Trainer::Impl::is_validated() const {
 // told exposure and pose of photos that were not trained on, so neither counts where it is found
 // for the others: the better a model, the more an error of a pose would cost it.
 void Trainer::Impl::validate_views() {
-  evaluating.start();
+  clock.evaluating.start();
   Dataset validation = dataset;
   validation.views.clear();
   for (const std::size_t i : apart) {
     validation.views.push_back(dataset.views[train_views[i]]);
     validation.views.back().test = true;
   }
-  set_background();
-  DeviceGaussians room;
-  const DeviceGaussians& model = model_to_measure(room);
-  const auto render = [&](const Camera& camera) {
-    tracer.forward(model, camera);
-    return tracer.download_image();
-  };
   EvaluationOptions choice;
-  choice.ranks = &ranks;
   choice.align = options.poses;
   choice.align_colors = exposure.has_value();
-  const EvaluationReport report =
-      raysplats::evaluate(render, validation, Split::kTest, background, {}, choice);
-  const double psnr =
-      report.mean.psnr_aligned.value_or(exposure ? report.mean.psnr_corrected : report.mean.psnr);
+  EvaluationRow row = measure(validation, {}, choice);
+  row.psnr = row.psnr_aligned.value_or(exposure ? row.psnr_corrected : row.psnr);
   const std::vector<EvaluationRow>& rows = run.validations();
   std::int64_t former = 0;
   if (!rows.empty()) former = best_of(rows).iteration;
-  run.record_validation({iteration, training.seconds(), psnr, report.mean.ssim,
-                         report.images.size(), model.count, report.mean.psnr_corrected,
-                         report.mean.psnr_all, report.mean.psnr_aligned});
+  run.record_validation(row);
   if (best_of(rows).iteration == iteration) {
     save_model();
     if (former > 0 && !is_scheduled(options, former)) run.remove_model(former);
   }
   write_metrics(false);
-  evaluating.stop();
-  spdlog::info("iteration {}: PSNR {:.2f} dB over {} validation views{}{}", iteration, psnr,
-               report.images.size(), options.poses ? ", each from where it fits its photo" : "",
+  clock.evaluating.stop();
+  spdlog::info("iteration {}: PSNR {:.2f} dB over {} validation views{}{}", iteration, row.psnr,
+               row.views, options.poses ? ", each from where it fits its photo" : "",
                exposure ? ", in its photo's colours" : "");
 }
 

@@ -23,6 +23,11 @@ void sync_folder(const std::filesystem::path& folder) {
   ::close(directory);
 }
 
+// What fsync() fails with where the file system does not know it, which is no fault of the file.
+bool means_no_sync(int reason) {
+  return reason == EINVAL || reason == ENOSYS || reason == EOPNOTSUPP;
+}
+
 // .NAME.NUMBER.tmp or .NAME.NUMBER.tmp.EXTENSION, as AtomicFile makes them.
 bool is_temporary_name(const std::string& name) {
   const std::size_t mark = name.rfind(".tmp");
@@ -111,7 +116,7 @@ void AtomicFile::write_at(std::uint64_t offset, const void* data, std::size_t by
 }
 
 void AtomicFile::commit() {
-  if (::fsync(descriptor_) != 0) fail("be synced");
+  if (::fsync(descriptor_) != 0 && !means_no_sync(errno)) fail("be synced");
   const int descriptor = descriptor_;
   descriptor_ = -1;
   if (::close(descriptor) != 0) fail("be closed");

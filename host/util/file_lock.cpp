@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -28,6 +29,12 @@ std::string holder_of(int descriptor) {
   return digits.empty() ? "" : fmt::format(" (process {})", digits);
 }
 
+// What flock() fails with where nobody can have a lock: file systems of networks and of user space,
+// lock services that do not run.
+bool means_no_locks(int reason) {
+  return reason == ENOSYS || reason == EOPNOTSUPP || reason == ENOLCK || reason == EINVAL;
+}
+
 }  // namespace
 
 FileLock::FileLock(const std::filesystem::path& path)
@@ -40,11 +47,15 @@ FileLock::FileLock(const std::filesystem::path& path)
   do {
     result = ::flock(descriptor_, LOCK_EX | LOCK_NB);
   } while (result != 0 && errno == EINTR);
-  if (result != 0) {
-    const int reason = errno;
+  const int reason = result != 0 ? errno : 0;
+  const std::string folder = path.parent_path().string();
+  if (means_no_locks(reason)) {
+    spdlog::warn(
+        "{} is on a file system without locks ({}): two runs into it would not notice each other",
+        folder, std::strerror(reason));
+  } else if (reason != 0) {
     const std::string holder = holder_of(descriptor_);
     ::close(descriptor_);
-    const std::string folder = path.parent_path().string();
     if (reason != EWOULDBLOCK)
       throw DataError(fmt::format("{} cannot be locked: {}", folder, std::strerror(reason)));
     throw DataError(fmt::format(

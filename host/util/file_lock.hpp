@@ -7,7 +7,8 @@
 namespace raysplats {
 
 /// A file that one process at a time holds. The system drops the lock when the process ends,
-/// however it ends, so that a file left behind locks nobody out.
+/// however it ends, so that a file left behind locks nobody out. Where the file system knows no
+/// locks nobody is kept out, which a warning says.
 class FileLock {
  public:
   /// Makes the file and takes the lock without waiting. Throws DataError that names the file and,

@@ -14,24 +14,44 @@ namespace {
 // A signal handler can reach nothing but a variable of static storage. It runs in any thread, the
 // driver's own among them.
 std::atomic<bool> interrupted{false};
+std::atomic<bool> asked{false};  // by SIGINT or SIGTERM
 std::atomic<int> guards{0};
 std::atomic<bool> announced{false};  // whether somebody sees what the handler says
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler must not take locks");
 
-// The second signal ends the process at once, whichever of the two it is: delivered again when the
-// handler returns, it meets the default action.
+bool ignores_hang_ups() {
+  struct sigaction present {};
+  return sigaction(SIGHUP, nullptr, &present) == 0 && present.sa_handler == SIG_IGN;
+}
+
+// As the program began, by nohup. LLVM in drivers sets a handler of its own afterwards.
+const bool began_ignoring = ignores_hang_ups();
+
+// What reads our output, such as tee, may have been ended by the same signal. Without a reader
+// writing then fails; the default action would end the process before anything is saved.
+void outlive_readers() {
+  struct sigaction present {};
+  if (sigaction(SIGPIPE, nullptr, &present) == 0 && present.sa_handler == SIG_DFL)
+    std::signal(SIGPIPE, SIG_IGN);
+}
+
+// The second of SIGINT and SIGTERM ends the process at once, whichever of the two it is: delivered
+// again when the handler returns, it meets the default action. SIGHUP does not count: where a
+// terminal goes it comes from the system and from the shell, and SIGTERM may come beside it.
 extern "C" void mark_interrupt(int signal) {
-  if (interrupted.exchange(true)) {
+  if (signal != SIGHUP && asked.exchange(true)) {
     std::signal(signal, SIG_DFL);
     std::raise(signal);
     return;
   }
-  if (!announced) return;
+  interrupted = true;
+  const int error = errno;
+  outlive_readers();
   constexpr std::string_view kText =
       "\nInterrupted: stopping as soon as what is done can be kept; once more stops at once\n";
-  const int error = errno;
   // There is nothing to do where it fails.
-  if (::write(STDERR_FILENO, kText.data(), kText.size()) < 0) errno = error;
+  if (announced && signal != SIGHUP && ::write(STDERR_FILENO, kText.data(), kText.size()) < 0)
+    errno = error;
   errno = error;
 }
 
@@ -39,7 +59,7 @@ extern "C" void mark_interrupt(int signal) {
 
 InterruptGuard::InterruptGuard() : outer_(guards++ == 0) {
   if (!outer_) return;
-  interrupted = false;
+  interrupted = asked = false;
   announced = ::isatty(STDERR_FILENO) == 1;
   struct sigaction action {};
   action.sa_handler = mark_interrupt;
@@ -47,6 +67,8 @@ InterruptGuard::InterruptGuard() : outer_(guards++ == 0) {
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, &previous_int_);
   sigaction(SIGTERM, &action, &previous_term_);
+  if (began_ignoring || ignores_hang_ups()) action.sa_handler = SIG_IGN;
+  sigaction(SIGHUP, &action, &previous_hup_);
 }
 
 InterruptGuard::~InterruptGuard() {
@@ -54,8 +76,19 @@ InterruptGuard::~InterruptGuard() {
   if (!outer_) return;
   sigaction(SIGINT, &previous_int_, nullptr);
   sigaction(SIGTERM, &previous_term_, nullptr);
+  sigaction(SIGHUP, &previous_hup_, nullptr);
 }
 
 bool InterruptGuard::requested() const { return interrupted; }
+
+void keep_ignoring_hang_ups() {
+  if (!began_ignoring) return;
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGHUP);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+}
+
+bool interrupt_requested() { return guards > 0 && interrupted; }
 
 }  // namespace raysplats

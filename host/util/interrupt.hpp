@@ -5,9 +5,11 @@
 
 namespace raysplats {
 
-/// While one lives, SIGINT and SIGTERM only set a mark that long work polls, and say so at once on
-/// a terminal; a second signal ends the process as usual. One that is made while another lives, in
-/// this thread or others, shares its mark and must not outlive it.
+/// While one lives, SIGINT, SIGTERM and SIGHUP only set a mark that long work polls, and the first
+/// two say so at once on a terminal; a second one of these two ends the process as usual. SIGHUP
+/// stays ignored where it was (nohup). From the first signal on SIGPIPE is ignored for good, so
+/// that the work ends well though nobody reads what it says any more. One that is made while
+/// another lives, in this thread or others, shares its mark and must not outlive it.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -22,6 +24,15 @@ class InterruptGuard {
   bool outer_ = false;  // the first of those that live
   struct sigaction previous_int_ {};
   struct sigaction previous_term_ {};
+  struct sigaction previous_hup_ {};
 };
+
+/// For the begin of main(): where SIGHUP is ignored (nohup) it stays so, though drivers set
+/// handlers that break off what they compile.
+void keep_ignoring_hang_ups();
+
+/// For work deep below whoever holds a guard: whether a signal has arrived since the first of those
+/// that live was made. False where there is none.
+bool interrupt_requested();
 
 }  // namespace raysplats

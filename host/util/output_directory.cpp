@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "util/output_directory.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "raysplats/error.hpp"
 
@@ -20,6 +23,10 @@ namespace {
   throw DataError(fmt::format("The output folder {} cannot be {} ({}): choose another",
                               path.string(), what, reason));
 }
+
+constexpr std::size_t kTrialBytes = std::size_t{256} << 10;  // a large compiled kernel
+
+std::error_code last_error() { return {errno, std::generic_category()}; }
 
 std::string message_of(std::errc code) { return std::make_error_code(code).message(); }
 
@@ -44,6 +51,27 @@ void check_output_directory(const std::filesystem::path& path) {
     refuse(path, "created", message_of(std::errc::not_a_directory));
   if (::access(place.c_str(), W_OK | X_OK) != 0)
     refuse(path, whole ? "written to" : "created", std::strerror(errno));
+}
+
+std::error_code writing_trouble(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return error;
+  std::string name = (folder / ".trial.XXXXXX").string();
+  const int descriptor = ::mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor < 0) return last_error();
+  const std::vector<char> bytes(kTrialBytes);
+  for (std::size_t done = 0; !error && done < bytes.size();) {
+    const ssize_t written = ::write(descriptor, bytes.data() + done, bytes.size() - done);
+    if (written >= 0) {
+      done += static_cast<std::size_t>(written);
+    } else if (errno != EINTR) {
+      error = last_error();
+    }
+  }
+  if (::close(descriptor) != 0 && !error) error = last_error();
+  ::unlink(name.c_str());
+  return error;
 }
 
 }  // namespace raysplats

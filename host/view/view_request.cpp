@@ -11,6 +11,7 @@
 #include <numbers>
 #include <string>
 
+#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "scene/trace_option_table.hpp"
@@ -41,11 +42,6 @@ double number(const Json& value, const char* what, double low, double high) {
   const double x = value.get<double>();
   if (!(x >= low && x <= high)) refuse(fmt::format("has '{}' out of range", what));
   return x;
-}
-
-bool flag(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_boolean() && found->get<bool>();
 }
 
 std::string text(const Json& json, const char* key) {
@@ -120,8 +116,8 @@ ViewRequest view_of(const Json& json, int max_side) {
   camera.width = std::max(1, static_cast<int>(std::lround(cut * size[0])));
   camera.height = std::max(1, static_cast<int>(std::lround(cut * size[1])));
   set_lens(camera, json);
-  request.moving = flag(json, "moving");
-  request.png = flag(json, "png");
+  request.moving = io::json_flag(json, "moving");
+  request.png = io::json_flag(json, "png");
   if (json.contains("output")) {
     const std::string output = text(json, "output");
     if (output == "depth") {
@@ -223,7 +219,8 @@ Message parse_message(std::string_view message, int max_side) {
   }
   if (type == "leave") return Leave{};
   if (type == "mesh") return offer_of(json);
-  if (type == "place") return PlaceMesh{mesh_of(json), placement_of(json), flag(json, "moving")};
+  if (type == "place")
+    return PlaceMesh{mesh_of(json), placement_of(json), io::json_flag(json, "moving")};
   if (type == "remove") return RemoveMesh{mesh_of(json)};
   if (type == "meshes") return MeshQuestion{};
   if (type == "scene") {

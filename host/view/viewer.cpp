@@ -13,6 +13,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
+#include "util/clock.hpp"
 #include "view/picture_file.hpp"
 #include "view/viewer_impl.hpp"
 
@@ -25,10 +26,6 @@ constexpr int kLastQuality = 94;
 /// From one wish of a page to the next: screens show no more, and whoever wishes more gets the
 /// newest of them.
 constexpr std::chrono::nanoseconds kWishTime{1'000'000'000 / 60};
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Pictures are sent at 1, 2, 4, 8, ... samples, and at the last one.
 bool worth_sending(std::uint64_t samples, std::uint64_t most) {

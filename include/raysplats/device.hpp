@@ -17,7 +17,7 @@ struct DeviceTuning {
   bool grouped = false;    ///< packets are work-groups, not vectors
   int packet_width = 1;    ///< rays of a packet: 1, 2, 4, 8 or 16, in groups 8, 16, 32 or 64
   int tile = 16;           ///< pixels along a side of the tiles that share a candidate list
-  int pending = 48;        ///< entries of a ray's sorted list
+  int pending = 48;        ///< rows, or entries of a lane's sorted list, at once
   int group = 0;           ///< most work-items of a work-group; 0 = all packets of a tile
   bool bvh = false;        ///< camera rays walk the hierarchy one by one instead
   bool subgroups = false;  ///< of work-groups: each is one subgroup
@@ -58,7 +58,8 @@ struct DeviceInfo {
 std::vector<DeviceInfo> list_devices();
 
 /// The device that `selector` names: an index, a part of its name (case is ignored), or "" for the
-/// first usable GPU, else the first usable CPU, else any usable device.
+/// first usable GPU, else the first usable CPU, else any usable device. A number that is no index
+/// and has three digits or more is a part of the name too: "4090".
 /// Throws DeviceError with the remedy when there is none, UsageError when the selector fits no
 /// device.
 DeviceInfo select_device(const std::string& selector);

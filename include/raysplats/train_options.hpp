@@ -176,7 +176,7 @@ struct TrainOptions {
   std::int64_t max_gaussians = 0;  ///< most Gaussians; 0 = by photos, iterations and memory
   double opacity_decay = kFitted;  ///< taken off every opacity in each pass; as pass_decay()
   double opacity_reg = 0.01;       ///< weight of the mean opacity in the loss of kMcmc
-  double scale_reg = 0.01;         ///< weight of the mean size over the extent in the loss of kMcmc
+  double scale_reg = 0.01;         ///< weight of the mean relative size in the loss of kMcmc
   double mcmc_noise = 80.0;        ///< strength of the noise on faint Gaussians' means with kMcmc
   double footprint = 0.3;          ///< least standard deviation in pixels; 0 = off
   double scale_min = 0.0;          ///< least standard deviation, times the scene extent; 0 = off

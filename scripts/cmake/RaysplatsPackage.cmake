@@ -54,7 +54,7 @@ on GPUs of every vendor and on CPUs.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME raysplats-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "raysplats (= ${PROJECT_VERSION}), ocl-icd-opencl-dev, opencl-clhpp-headers, libglm-dev, libfmt-dev, libspdlog-dev, \
+    "raysplats (= ${PROJECT_VERSION}), pkg-config, ocl-icd-opencl-dev, opencl-clhpp-headers, libglm-dev, libfmt-dev, libspdlog-dev, \
 nlohmann-json3-dev, libxxhash-dev, libtinyobjloader-dev, libtinygltf-dev, libtomlplusplus-dev, zlib1g-dev, libzstd-dev, libwebp-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers, static libraries and the CMake package of RaySplats-CL.")
 # Of its own, because who has one computer needs no MPI.

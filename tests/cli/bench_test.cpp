@@ -104,6 +104,29 @@ TEST_CASE("bench writes one file for the owner of a device to send") {
   check_refused({"bench", "--report", folder / "file/report.json", "-q"}, 3, "file");
 }
 
+TEST_CASE("the file for the owner of a device to send is written whatever fails") {
+  for (const int n : {1, 250}) {
+    CAPTURE(n);
+    const TemporaryFolder folder;
+    const Outcome outcome = raysplats_program(
+        {"bench", "--report", folder / "report.json", "--sizes", "300", "--resolution", "64x48",
+         "--repeat", "1", "--filter", "^(sort|adam)/", "-q"},
+        {{{"RAYSPLATS_FAIL_LAUNCH", std::to_string(n)}}});
+    INFO(outcome.err);
+    const nlohmann::json json = nlohmann::json::parse(read_file(folder / "report.json"));
+    const bool passed = json.at("self_test_passed").get<bool>();
+    const auto failed = json.at("failed").get<std::size_t>();
+    CHECK((n > 1 || !passed));
+    CHECK(outcome.code == (passed && failed == 0 ? 0 : 4));
+    // Which launch that is depends on the device; on most it is one of a row.
+    if (failed > 0) {
+      CHECK(contains(outcome.err, "fails in 1 row, which the report names under left_out"));
+      CHECK(contains(json.at("left_out").at(0).get<std::string>(), "Launching kernel"));
+    }
+    CHECK(json.at("runs").size() == 2);
+  }
+}
+
 TEST_CASE("bench compares two folders of kernels") {
   const TemporaryFolder folder;
   const std::string kernels = std::string(RAYSPLATS_SOURCE_DIR) + "/cl";

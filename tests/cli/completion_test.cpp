@@ -13,10 +13,10 @@
 
 namespace {
 
-using Words = std::set<std::string>;
+using Choices = std::set<std::string>;
 
 /// What bash offers after the words of a line, the last of which is being typed.
-Words offered(const TemporaryFolder& folder, const std::vector<std::string>& line) {
+Choices offered(const TemporaryFolder& folder, const std::vector<std::string>& line) {
   std::string script = "source '" + (folder / "raysplats.bash") + "'\nCOMP_WORDS=(";
   for (const std::string& word : line) script += "'" + word + "' ";
   script += ")\nCOMP_CWORD=" + std::to_string(line.size() - 1) + "\ncd '" + folder.path().string() +
@@ -26,7 +26,7 @@ Words offered(const TemporaryFolder& folder, const std::vector<std::string>& lin
       "bash --noprofile --norc '" + (folder / "ask.sh") + "' > '" + (folder / "answer") + "' 2>&1";
   REQUIRE(std::system(command.c_str()) == 0);
   std::istringstream lines(read_file(folder / "answer"));
-  Words words;
+  Choices words;
   for (std::string word; std::getline(lines, word);) words.insert(word);
   return words;
 }
@@ -44,20 +44,20 @@ TEST_CASE("bash completes commands, options, words of options and files") {
   write_file(folder / "raysplats.bash", outcome.out);
   write_file(folder / "garden.ply", "");
   write_file(folder / "my *.ply", "");
-  CHECK(offered(folder, {"raysplats", "info", "my"}) == Words{"my *.ply"});
-  CHECK(offered(folder, {"raysplats", "tr"}) == Words{"train", "trace"});
+  CHECK(offered(folder, {"raysplats", "info", "my"}) == Choices{"my *.ply"});
+  CHECK(offered(folder, {"raysplats", "tr"}) == Choices{"train", "trace"});
   CHECK(offered(folder, {"raysplats", "train", "--val"}) ==
-        Words{"--validate-every", "--validate-views"});
+        Choices{"--validate-every", "--validate-views"});
   CHECK(offered(folder, {"raysplats", "render", "m.ply", "--format", ""}) ==
-        Words{"exr", "png", "jpg"});
-  CHECK(offered(folder, {"raysplats", "render", "gar"}) == Words{"garden.ply"});
-  CHECK(offered(folder, {"raysplats", "train", "d", "-o", "gar"}) == Words{"garden.ply"});
+        Choices{"exr", "png", "jpg"});
+  CHECK(offered(folder, {"raysplats", "render", "gar"}) == Choices{"garden.ply"});
+  CHECK(offered(folder, {"raysplats", "train", "d", "-o", "gar"}) == Choices{"garden.ply"});
   // Arguments of a few words, commands below commands, and values that are no files.
-  CHECK(offered(folder, {"raysplats", "completion", ""}) == Words{"bash", "fish", "zsh"});
-  CHECK(offered(folder, {"raysplats", "bench", ""}) == Words{"compare"});
-  CHECK(offered(folder, {"raysplats", "bench", "--json", "gar"}) == Words{"garden.ply"});
-  CHECK(offered(folder, {"raysplats", "bench", "compare", "gar"}) == Words{"garden.ply"});
-  CHECK(offered(folder, {"raysplats", "train", "--device", ""}) == Words{""});
+  CHECK(offered(folder, {"raysplats", "completion", ""}) == Choices{"bash", "fish", "zsh"});
+  CHECK(offered(folder, {"raysplats", "bench", ""}) == Choices{"compare"});
+  CHECK(offered(folder, {"raysplats", "bench", "--json", "gar"}) == Choices{"garden.ply"});
+  CHECK(offered(folder, {"raysplats", "bench", "compare", "gar"}) == Choices{"garden.ply"});
+  CHECK(offered(folder, {"raysplats", "train", "--device", ""}) == Choices{""});
 }
 
 TEST_CASE("fish completes the same, where it is installed") {
@@ -71,15 +71,15 @@ TEST_CASE("fish completes the same, where it is installed") {
         "' fish -c \"source a.fish; complete -C '" + line + "'\" 2>/dev/null | cut -f1 > answer";
     REQUIRE(std::system(command.c_str()) == 0);
     std::istringstream lines(read_file(folder / "answer"));
-    Words words;
+    Choices words;
     for (std::string word; std::getline(lines, word);) words.insert(word);
     return words;
   };
-  CHECK(fish("raysplats completion ") == Words{"bash", "fish", "zsh"});
-  CHECK(fish("raysplats bench com") == Words{"compare"});
-  CHECK(fish("raysplats info gar") == Words{"garden.ply"});
-  CHECK(fish("raysplats bench compare gar") == Words{"garden.ply"});
-  CHECK(fish("raysplats train --quality me") == Words{"medium"});
+  CHECK(fish("raysplats completion ") == Choices{"bash", "fish", "zsh"});
+  CHECK(fish("raysplats bench com") == Choices{"compare"});
+  CHECK(fish("raysplats info gar") == Choices{"garden.ply"});
+  CHECK(fish("raysplats bench compare gar") == Choices{"garden.ply"});
+  CHECK(fish("raysplats train --quality me") == Choices{"medium"});
   CHECK(fish("raysplats train --device gar").empty());
 }
 

@@ -21,13 +21,6 @@ using Names = std::vector<std::string>;
 constexpr double kUntrained = 17.5;
 constexpr double kTrained = 18.0;
 
-Outcome succeed(const std::vector<std::string>& arguments) {
-  Outcome outcome = raysplats_program(arguments);
-  INFO(outcome.err);
-  REQUIRE(outcome.code == 0);
-  return outcome;
-}
-
 double psnr_of(const std::string& model, const std::string& data, const std::string& output) {
   succeed({"eval", model, "--data", data, "-o", output, "-q"});
   const nlohmann::json metrics =

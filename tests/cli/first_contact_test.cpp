@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -14,19 +15,6 @@
 namespace fs = std::filesystem;
 
 namespace {
-
-using Words = std::vector<std::string>;
-
-Words operator+(Words first, const Words& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
-
-void succeed(const Words& arguments) {
-  const Outcome outcome = raysplats_program(arguments);
-  INFO(outcome.err);
-  REQUIRE(outcome.code == 0);
-}
 
 /// A data set of a few tiny photos, made once.
 const std::string& data() {
@@ -387,6 +375,41 @@ TEST_CASE("where no device is found the cause is named") {
   CHECK(outcome.code == 4);
   CHECK(contains(outcome.err, folder / "locked"));
   CHECK(contains(outcome.err, "cannot be written"));
+}
+
+TEST_CASE("a full disk below the driver's cache is named, and no driver is to be updated") {
+  SKIP_TEST_UNLESS(contains(raysplats_program({"devices"}).out, "Portable Computing Language"),
+                   "there is no PoCL");
+  SKIP_TEST_UNLESS(std::system("unshare --map-root-user --mount mount -t tmpfs none /mnt "
+                               "> /dev/null 2>&1") == 0,
+                   "no file system may be mounted here");
+  const TemporaryFolder folder;
+  const std::string disk = folder / "disk";
+  fs::create_directories(disk);
+  write_file(folder / "model.ply", ply_file(2));
+  Surroundings full{{{"XDG_CACHE_HOME", disk}}};
+  full.launcher =
+      Words{"/usr/bin/env",
+            "unshare",
+            "--map-root-user",
+            "--mount",
+            "sh",
+            "-c",
+            "mount -t tmpfs -o size=1m none \"$0\" && { cat /dev/zero > \"$0/rest\" 2> /dev/null; "
+            "exec \"$@\"; }",
+            disk};
+  const Words render{"render", folder / "model.ply", "--orbit", "1",  "--width",
+                     "16",     "--height",           "16",      "-o", folder / "frames"};
+  for (const Words& command : {render, Words{"doctor"}}) {
+    const Outcome outcome = raysplats_program(command, full);
+    INFO(outcome.err);
+    CHECK(outcome.code == 4);
+    const std::string said = outcome.out + outcome.err;
+    CHECK(contains(said,
+                   "of its cache cannot be written (No space left on device), name one by "
+                   "POCL_CACHE_DIR"));
+    CHECK_FALSE(contains(said, "update"));
+  }
 }
 
 #ifndef __SANITIZE_ADDRESS__  // it takes terabytes of addresses itself

@@ -19,8 +19,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Words = std::vector<std::string>;
-
 constexpr int kSize = 16;
 
 /// Four photos for training and one that is held out.
@@ -52,6 +50,22 @@ void add_mask(const std::string& data, int width, int height, float value) {
   nlohmann::json json = training_file(data);
   json["frames"][1]["mask_path"] = "mask.png";
   write_file(data + "/transforms_train.json", json.dump());
+}
+
+/// Changes every pixel of all photos.
+template <class Paint>
+void paint_photos(const std::string& data, const Paint& paint) {
+  for (const char* const split : {"train", "test"}) {
+    for (const fs::directory_entry& file : fs::directory_iterator(data + "/" + split)) {
+      if (file.path().extension() != ".png") continue;
+      raysplats::Image photo = raysplats::read_image(file.path());
+      REQUIRE(photo.channels == 4);
+      for (int y = 0; y < photo.height; ++y) {
+        for (int x = 0; x < photo.width; ++x) paint(photo, x, y);
+      }
+      raysplats::write_image(file.path(), photo);
+    }
+  }
 }
 
 /// The photo as a lens out of focus had shown it: a Gaussian of `sigma` pixels over it.
@@ -160,6 +174,44 @@ TEST_CASE(
           }
           raysplats::write_image(data + "/train/r_2.png", photo);
         }) == "train/r_2.png.");
+}
+
+TEST_CASE(
+    "photos that are transparent everywhere are refused before training, faint ones are not") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  make_data(data);
+  paint_photos(data,
+               [](raysplats::Image& photo, int x, int y) { photo.at(x, y, 3) = 100.0f / 255.0f; });
+  check_trains(train(data, folder / "faint"), "iterations, up to");
+  paint_photos(data, [](raysplats::Image& photo, int x, int y) { photo.at(x, y, 3) = 0; });
+  for (const char* const init : {"auto", "random"}) {
+    CAPTURE(init);
+    check_refusal(train(data, folder / init, {"-q", "--init", init}), 2,
+                  "masks or transparent pixels leave 0 % of the photos");
+    CHECK(!fs::exists(folder / init));
+  }
+}
+
+TEST_CASE("photos of one colour are learned from the beginning, whatever the cap") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data";
+  make_data(data);
+  paint_photos(data, [](raysplats::Image& photo, int x, int y) {
+    photo.at(x, y, 0) = 0.2f;
+    photo.at(x, y, 1) = 0.6f;
+    photo.at(x, y, 2) = 0.4f;
+    photo.at(x, y, 3) = 1;
+  });
+  for (const char* const most : {"10", "500"}) {
+    CAPTURE(most);
+    const Outcome outcome =
+        raysplats_program({"train", data, "-o", folder / most, "-n", "40", "--log-every", "1",
+                           "--init", "photos", "--max-gaussians", most});
+    INFO(outcome.err);
+    CHECK(outcome.code == 0);
+    CHECK(!contains(outcome.err, "learned nothing"));
+  }
 }
 
 TEST_CASE("masks that cannot belong to their photo are refused with their name") {

@@ -12,13 +12,6 @@
 
 namespace {
 
-using Words = std::vector<std::string>;
-
-Words operator+(Words first, const Words& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
-
 void refuse(const Words& arguments, const std::string& message) {
   check_refused(arguments, 2, message);
 }

@@ -14,8 +14,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Words = std::vector<std::string>;
-
 void generate(const std::string& folder) {
   REQUIRE(raysplats_program(
               {"generate", folder, "--size", "8", "--train-views", "3", "--test-views", "2", "-q"})

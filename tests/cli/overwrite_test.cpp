@@ -12,8 +12,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Words = std::vector<std::string>;
-
 /// What the commands read, and how each is told to write a file.
 class Place {
  public:

@@ -21,6 +21,7 @@
 #include "program.hpp"
 #include "raysplats/io.hpp"
 #include "scene/gaussian_transform.hpp"
+#include "util/file_lock.hpp"
 
 namespace {
 
@@ -76,14 +77,17 @@ Apart compare(const fs::path& found, const fs::path& stored) {
   return out;
 }
 
-/// Places a.png and b.png, but not c.png. Says nothing of its options.
+/// Places a.png and b.png, but not c.png. Says nothing of its options. $FAIL is the command that
+/// fails, "no model", or "full" and the command whose database finds a full disk.
 constexpr const char* kColmap = R"sh(#!/bin/sh
 case "$*" in *" -h") exit 0 ;; esac
 echo "$@" >> "$CALLS"
 [ -n "$FAIL" ] && [ "$1" = "$FAIL" ] && { echo "the disk is on fire"; exit 7; }
+[ "full $1" = "$FAIL" ] && echo "SQLite error [database.cc, line 9]: database or disk is full" >&2
 case $1 in
 feature_extractor) echo "Processed file [1/3]"; echo "Processed file [3/3]" ;;
 mapper)
+  [ "$FAIL" = "no model" ] && { echo "ERROR: failed to create sparse model"; exit 1; }
   while [ "$1" != --output_path ]; do shift; done
   mkdir -p "$2/0"
   echo "Registering image #1 (1)"
@@ -135,12 +139,15 @@ class Stage {
     write("bin/colmap3", kColmap);
     write("bin/colmap", "#!/bin/sh\noptions='" + options + "'\n" + kNewerColmap);
   }
-  /// walk.mp4, an FFmpeg that takes three frames of it, and an ffprobe that says `length` and, of
-  /// the packets, `packets`.
-  void write_video(const std::string& length, const std::string& packets) const {
+  /// walk.mp4, an FFmpeg that takes three frames of it, and an ffprobe that says `length`, `stream`
+  /// and, of the packets, `packets`.
+  void write_video(const std::string& length,
+                   const std::string& packets,
+                   const std::string& stream = "avg_frame_rate=0/0\\n") const {
     write_file(path("walk.mp4"), "a video");
-    write("bin/ffprobe", "#!/bin/sh\ncase \"$*\" in\n*format=duration*) printf '" + length +
-                             "\\n' ;;\n*) printf '" + packets + "' ;;\nesac\n");
+    write("bin/ffprobe", "#!/bin/sh\ncase \"$*\" in\n*format=duration*) printf '" + stream +
+                             "duration=" + length + "\\n' ;;\n*) printf '" + packets +
+                             "' ;;\nesac\n");
     raysplats::write_image(path("flat.jpg"), raysplats::Image(8, 6, 3, 0.5f));
     write("bin/ffmpeg",
           "#!/bin/sh\necho \"$@\" >> \"$CALLS\"\nfor last; do :; done\n"
@@ -217,6 +224,120 @@ TEST_CASE("prepare goes on after the last finished step") {
   CHECK(!contains(calls, "feature_extractor"));
   CHECK(!contains(calls, "matcher"));
   CHECK(contains(calls, "mapper"));
+}
+
+TEST_CASE("prepare leaves no poses of other photos beside those that it could not finish") {
+  const Stage stage;
+  const auto prepared = [&](const std::string& fail) {
+    return stage.run({stage.path("photos"), "-o", stage.path("data")}, fail);
+  };
+  CHECK(prepared("").code == 0);
+  const std::string former = read_file(stage.path("data/images/b.png"));
+  // One that is none is told by its own name, and the data set stays as it was.
+  raysplats::write_image(stage.path("photos/b.png"), raysplats::Image(16, 12, 3, 0.25f));
+  write_file(stage.path("photos/c.png"), "no picture");
+  check_refusal(prepared(""), 3, stage.path("photos/c.png"));
+  CHECK(read_file(stage.path("data/images/b.png")) == former);
+  CHECK(fs::exists(stage.path("data/sparse/0/images.txt")));
+  fs::copy_file(stage.path("photos/a.png"), stage.path("photos/c.png"),
+                fs::copy_options::overwrite_existing);
+  stage.calls();
+  CHECK(prepared("feature_extractor").code == 1);
+  CHECK(read_file(stage.path("data/images/b.png")) == read_file(stage.path("photos/b.png")));
+  CHECK(!fs::exists(stage.path("data/sparse")));
+  for (const char* later : {"features", "matches", "model"})
+    CHECK(!fs::exists(stage.path("data/prepare/" + std::string(later))));
+  CHECK(prepared("").code == 0);
+  CHECK(contains(stage.calls(), "mapper"));
+  // Nor where somebody has taken a photo away from what was copied.
+  fs::remove(stage.path("data/images/c.png"));
+  CHECK(prepared("").code == 0);
+  CHECK(fs::exists(stage.path("data/images/c.png")));
+  CHECK(contains(stage.calls(), "feature_extractor"));
+}
+
+TEST_CASE("prepare knows the photos by any spelling, and keeps what others have become") {
+  const Stage stage;
+  const auto prepared = [&](const std::string& input) {
+    Surroundings there;
+    there.environment = {{"PATH", stage.path("bin") + ":/usr/bin:/bin"},
+                         {"CALLS", stage.path("calls")}};
+    there.folder = stage.path("");
+    return raysplats_program({"prepare", input, "-o", "data"}, there);
+  };
+  CHECK(prepared("photos").code == 0);
+  stage.calls();
+  fs::create_directory_symlink("photos", stage.path("link"));
+  const Words spellings{"photos/", "./photos", "photos/../photos",
+                        "link",    "link/",    stage.path("photos/")};
+  for (const std::string& spelling : spellings) {
+    CAPTURE(spelling);
+    CHECK(prepared(spelling).code == 0);
+    CHECK(stage.calls().empty());
+  }
+  // As marks were written that name the folder as it was given.
+  const std::string mark = stage.path("data/prepare/images");
+  const std::string written = read_file(mark);
+  write_file(mark, stage.path("./link/") + written.substr(written.find('\n')));
+  CHECK(prepared("photos").code == 0);
+  CHECK(stage.calls().empty());
+  CHECK(contains(read_file(mark), "./link/\n"));
+
+  fs::copy(stage.path("photos"), stage.path("other"));
+  raysplats::write_image(stage.path("other/a.png"), raysplats::Image(16, 12, 3, 0.25f));
+  const std::string photo = read_file(stage.path("data/images/a.png"));
+  check_refusal(prepared("other"), 3, "data was made from " + stage.path("./link/"));
+  CHECK(read_file(stage.path("data/images/a.png")) == photo);
+  CHECK(stage.calls().empty());
+}
+
+TEST_CASE("two runs of prepare do not write to one folder") {
+  const Stage stage;
+  fs::create_directories(stage.path("data"));
+  const raysplats::FileLock lock(stage.path("data/.lock"));
+  check_refusal(stage.run({stage.path("photos"), "-o", stage.path("data")}), 3,
+                "is in use by another run");
+  CHECK(stage.calls().empty());
+}
+
+TEST_CASE("prepare says what is wrong with photos without poses, and sees a full disk") {
+  const Stage stage;
+  const std::vector<std::string> words{stage.path("photos"), "-o", stage.path("data")};
+  const Outcome none = stage.run(words, "no model");
+  CHECK(none.code == 3);
+  CHECK(contains(none.err, "COLMAP found no poses for the 3 photos: they have to overlap"));
+  CHECK(contains(none.err, "prepare.log"));
+  for (const std::string step : {"feature_extractor", "exhaustive_matcher"}) {
+    const Outcome full = stage.run({stage.path("photos"), "-o", stage.path(step)}, "full " + step);
+    CHECK(full.code == 1);
+    CHECK(contains(full.err, "database or disk is full"));
+    stage.calls();
+    CHECK(stage.run({stage.path("photos"), "-o", stage.path(step)}).code == 0);
+    CHECK(contains(stage.calls(), step));
+  }
+}
+
+TEST_CASE("prepare passes over folders that may not be read") {
+  const Stage stage;
+  fs::create_directories(stage.path("photos/lost+found"));
+  raysplats::write_image(stage.path("photos/z/d.png"), raysplats::Image(8, 6, 3, 0.5f));
+  fs::permissions(stage.path("photos/lost+found"), fs::perms::none);
+  Surroundings there;
+  there.environment = {{"PATH", stage.path("bin") + ":/usr/bin:/bin"},
+                       {"CALLS", stage.path("calls")}};
+  there.permissions_count = true;
+  const Words words{"prepare", stage.path("photos"), "-o", stage.path("data")};
+  const Outcome outcome = raysplats_program(words, there);
+  INFO(outcome.err);
+  CHECK(outcome.code == 0);
+  const Outcome below = raysplats_program(words + Words{"--subfolders"}, there);
+  CHECK(below.code == 0);
+  CHECK(contains(below.out, "of 4 photos"));
+  fs::permissions(stage.path("photos"), fs::perms::none);
+  const Outcome locked = raysplats_program(words, there);
+  fs::permissions(stage.path("photos"), fs::perms::owner_all);
+  fs::permissions(stage.path("photos/lost+found"), fs::perms::owner_all);
+  check_refusal(locked, 3, "photos cannot be read");
 }
 
 TEST_CASE("prepare shares a camera among photos of one size") {
@@ -296,20 +417,18 @@ TEST_CASE("prepare finds the axis of a lens that has photos enough") {
 TEST_CASE("prepare takes the sharpest of every three frames of a video") {
   const Stage stage;
   write_file(stage.path("walk.mp4"), "a video");
-  stage.write("bin/ffprobe", "#!/bin/sh\necho 12.5\n");
-  // Two groups of three frames, of which the second and the first have an edge.
-  raysplats::Image flat(8, 6, 3, 0.5f);
-  raysplats::Image sharp = flat;
-  for (int y = 0; y < 6; ++y) sharp.at(4, y, 0) = 1.0f;
-  raysplats::write_image(stage.path("flat.jpg"), flat);
-  raysplats::write_image(stage.path("sharp.jpg"), sharp);
+  stage.write("bin/ffprobe", "#!/bin/sh\necho avg_frame_rate=30/1\necho duration=12.5\n");
   std::string script =
       "#!/bin/sh\necho \"$@\" >> \"$CALLS\"\nfor last; do :; done\n"
       "cd \"$(dirname \"$last\")\" || exit 1\n";
-  const char* kinds[] = {"flat", "sharp", "flat", "sharp", "flat", "flat", "flat", "flat", "sharp"};
-  for (int i = 0; i < 9; ++i) {
-    script += "cp '" + stage.path(std::string(kinds[i]) + ".jpg") + "' frame_00000" +
-              std::to_string(i + 1) + ".jpg\n";
+  // Three groups of three frames, of each of which one has an edge.
+  for (int i = 1; i <= 9; ++i) {
+    raysplats::Image frame(8, 6, 3, 0.1f + 0.05f * static_cast<float>(i));
+    const bool sharp = i == 2 || i == 4 || i == 9;
+    for (int y = 0; sharp && y < 6; ++y) frame.at(4, y, 0) = 1.0f;
+    const std::string name = "frame_00000" + std::to_string(i) + ".jpg";
+    raysplats::write_image(stage.path(name), frame);
+    script += "cp '" + stage.path(name) + "' .\n";
   }
   stage.write("bin/ffmpeg", script);
   const Outcome outcome =
@@ -378,12 +497,17 @@ TEST_CASE("prepare takes the length of a video that states none from its packets
   const auto prepared = [&] {
     return stage.run({stage.path("walk.mp4"), "-o", stage.path("data"), "--frames", "3"});
   };
-  stage.write_video("N/A", "0.5\\n0.9\\n0.7\\nN/A\\n1.3\\n1.1\\n");
+  const auto packets = [](const std::vector<std::string>& times) {
+    std::string said;
+    for (const std::string& time : times) said += "pts_time=" + time + "\\n";
+    return said;
+  };
+  stage.write_video("N/A", packets({"0.5", "0.9", "0.7", "N/A", "1.3", "1.1"}));
   const Outcome outcome = prepared();
   INFO(outcome.err);
   CHECK(outcome.code == 0);
   CHECK(contains(stage.calls(), "fps=9.000000"));  // 9 frames of five times 0.2 s
-  stage.write_video("N/A", "N/A\\nN/A\\n");
+  stage.write_video("N/A", packets({"N/A", "N/A"}));
   const Outcome without = prepared();
   CHECK(without.code == 3);
   CHECK(contains(without.err, "walk.mp4 states no length"));
@@ -400,8 +524,9 @@ TEST_CASE("the real FFmpeg keeps the colours of a video, in folders of any name"
   fs::create_directories(folder);
   const std::string clip = folder + "/red.mp4";
   const std::string make =
-      "ffmpeg -nostdin -v error -f lavfi -i color=0xC8281E:s=64x48:r=10:d=1 -vf "
-      "format=gbrp,scale=out_color_matrix=bt709:flags=accurate_rnd -pix_fmt yuv420p "
+      "ffmpeg -nostdin -v error -f lavfi -i color=0xC8281E:s=64x48:r=10:d=1 "
+      "-f lavfi -i testsrc2=s=16x16:r=10:d=1 -filter_complex "
+      "'overlay,format=gbrp,scale=out_color_matrix=bt709:flags=accurate_rnd' -pix_fmt yuv420p "
       "-colorspace bt709 -color_primaries bt709 -color_trc bt709 -c:v mpeg4 -q:v 2 '" +
       clip + "'";
   SKIP_TEST_UNLESS(std::system(make.c_str()) == 0, "there is no ffmpeg that writes MPEG-4");
@@ -415,6 +540,45 @@ TEST_CASE("the real FFmpeg keeps the colours of a video, in folders of any name"
     constexpr float kExpected[] = {200, 40, 30};
     for (int c = 0; c < 3; ++c)
       CHECK(std::abs(255.0f * image.at(32, 24, c) - kExpected[c]) <= 4.0f);
+  }
+}
+
+TEST_CASE("prepare asks a video for no more frames than it has, and warns of HDR") {
+  const Stage stage;
+  const auto prepared = [&] {
+    return stage.run({stage.path("walk.mp4"), "-o", stage.path("data"), "--frames", "100"});
+  };
+  stage.write_video("5", "", "avg_frame_rate=3/2\\ncolor_transfer=bt709\\n");
+  const Outcome outcome = prepared();
+  INFO(outcome.err);
+  CHECK(outcome.code == 0);
+  CHECK(contains(stage.calls(), "fps=3.000000"));
+  // All that the stand-in makes are the same.
+  CHECK(entries(stage.path("data/images")) == 1);
+  CHECK(contains(outcome.err, "walk.mp4 has 1 different frame, not the 100 asked for"));
+  CHECK(!contains(outcome.err, "HDR"));
+  for (const std::string transfer : {"arib-std-b67", "smpte2084"}) {
+    fs::remove_all(stage.path("data"));
+    stage.write_video("5", "", "color_transfer=" + transfer + "\\navg_frame_rate=3/2\\n");
+    CHECK(contains(prepared().err, "warning: " + stage.path("walk.mp4") + " is an HDR video"));
+  }
+}
+
+TEST_CASE("the real FFmpeg gives no frame of a video twice, also where its rate varies") {
+  const Stage stage;
+  for (const std::string frames : {"1", "not(eq(mod(n,4),1))"}) {
+    const std::string clip = stage.path("clip.mp4");
+    const std::string make =
+        "ffmpeg -nostdin -y -v error -f lavfi -i testsrc2=s=64x48:r=10:d=1.2 -vf \"select='" +
+        frames + "'\" -vsync vfr -c:v mpeg4 -q:v 2 '" + clip + "'";
+    SKIP_TEST_UNLESS(std::system(make.c_str()) == 0, "there is no ffmpeg that writes MPEG-4");
+    const std::size_t count = frames == "1" ? 12 : 9;
+    const Outcome outcome =
+        stage.run({clip, "-o", stage.path(std::to_string(count)), "--frames", "50"});
+    INFO(outcome.err);
+    CHECK(outcome.code == 0);
+    CHECK(entries(stage.path(std::to_string(count)) + "/images") == count);
+    CHECK(contains(outcome.err, std::to_string(count) + " different frames, not the 50"));
   }
 }
 
@@ -470,6 +634,20 @@ TEST_CASE("prepare says in one sentence what is missing") {
   const Outcome nowhere = stage.run({stage.path("photos"), "-o", "/proc/raysplats"});
   check_refusal(nowhere, 3, "The output folder /proc/raysplats cannot be created");
   CHECK(!contains(nowhere.err, "filesystem error"));
+  // A photo is no video, nor is what ffprobe does not know or finds no pictures in.
+  check_refusal(stage.run({stage.path("photos/a.png"), "-o", stage.path("data")}), 3,
+                "a.png is a photo: name its folder");
+  CHECK(!fs::exists(stage.path("data")));
+  stage.write_video("12.5", "", "");
+  const std::vector<std::string> video{stage.path("walk.mp4"), "-o", stage.path("no video")};
+  const Outcome sound = stage.run(video);
+  CHECK(sound.code == 3);
+  CHECK(contains(sound.err, "walk.mp4 is no video that ffmpeg can read"));
+  stage.write("bin/ffprobe", "#!/bin/sh\necho 'Invalid data found'\nexit 1\n");
+  const Outcome text = stage.run(video);
+  CHECK(text.code == 3);
+  CHECK(contains(text.err, "walk.mp4 is no video that ffmpeg can read: "));
+  CHECK(contains(text.err, "Invalid data found"));
   // Images of somebody else are not touched.
   write_file(stage.path("mine/images/x.png"), "mine");
   check_refusal(stage.run({stage.path("photos"), "-o", stage.path("mine")}), 3, "another folder");

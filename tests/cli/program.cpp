@@ -15,8 +15,8 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
-#include <stdexcept>
 #include <system_error>
+#include <utility>
 
 namespace fs = std::filesystem;
 
@@ -60,6 +60,9 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
   ::close(err_file);
   if (surroundings.closed_out) ::close(STDOUT_FILENO);
   if (surroundings.closed_err) ::close(STDERR_FILENO);
+  // Whatever the tests themselves are run by.
+  std::signal(SIGHUP, surroundings.nohup ? SIG_IGN : SIG_DFL);
+  std::signal(SIGPIPE, SIG_DFL);
   if (!surroundings.folder.empty() && ::chdir(surroundings.folder.c_str()) != 0) ::_exit(126);
   for (const auto& [name, value] : surroundings.environment)
     ::setenv(name.c_str(), value.c_str(), 1);
@@ -72,7 +75,8 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
     if (::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(126);
   }
   if (surroundings.permissions_count && ::geteuid() == 0 &&
-      ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0) != 0) {
+      (::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0) != 0 ||
+       ::prctl(PR_CAPBSET_DROP, CAP_DAC_READ_SEARCH, 0, 0, 0) != 0)) {
     ::_exit(126);
   }
   ::execv(argv[0], argv.data());
@@ -84,6 +88,11 @@ RunningProgram::~RunningProgram() {
   if (ended_) return;
   ::kill(process_, SIGKILL);
   ::waitpid(process_, nullptr, 0);
+}
+
+void RunningProgram::hang_up() {
+  read_terminal();
+  ::close(std::exchange(terminal_, -1));
 }
 
 void RunningProgram::read_terminal() const {
@@ -127,6 +136,13 @@ Outcome RunningProgram::wait() {
 Outcome raysplats_program(const std::vector<std::string>& arguments,
                           const Surroundings& surroundings) {
   return RunningProgram(arguments, surroundings).wait();
+}
+
+Outcome succeed(const Words& arguments) {
+  Outcome outcome = raysplats_program(arguments);
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  return outcome;
 }
 
 TemporaryFolder::TemporaryFolder() {

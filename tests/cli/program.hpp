@@ -11,6 +11,13 @@
 #include <utility>
 #include <vector>
 
+using Words = std::vector<std::string>;
+
+inline Words operator+(Words first, const Words& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
 /// What the program left behind.
 struct Outcome {
   int code = -1;    ///< exit code; 128 + signal when a signal ended it
@@ -26,12 +33,13 @@ struct Surroundings {
   /// driver writes files of its own when kernels are built.
   std::function<bool()> full_once = {};
   rlim_t memory_limit = RLIM_INFINITY;  ///< bytes of address space, as by ulimit -v
-  bool permissions_count = false;       ///< even for root: what may not be written cannot be
+  bool permissions_count = false;       ///< even for root: what may not be read or written cannot be
   std::string out_file = {};            ///< where standard output goes, such as /dev/full
   std::string err_file = {};            ///< where standard error goes
   bool terminal = false;                ///< standard error is one, 80 columns wide
   bool closed_out = false;              ///< as by >&-
   bool closed_err = false;
+  bool nohup = false;                      ///< SIGHUP is ignored
   std::string folder = {};                 ///< to run in; the test's own when empty
   std::vector<std::string> launcher = {};  ///< what starts the program, such as mpirun -n 2
 };
@@ -39,6 +47,9 @@ struct Surroundings {
 /// Runs `raysplats` with `arguments` and waits for it.
 Outcome raysplats_program(const std::vector<std::string>& arguments,
                           const Surroundings& surroundings = {});
+
+/// Runs it and requires that it ends with 0.
+Outcome succeed(const Words& arguments);
 
 /// An empty folder that is removed with everything in it.
 class TemporaryFolder {
@@ -65,6 +76,8 @@ class RunningProgram {
   RunningProgram& operator=(const RunningProgram&) = delete;
 
   pid_t process() const { return process_; }
+  /// Closes its terminal, without a signal.
+  void hang_up();
   /// What it has written to standard error so far.
   std::string errors() const;
   /// Whether it has not ended yet.

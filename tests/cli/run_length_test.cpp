@@ -4,20 +4,10 @@
 
 #include <fstream>
 #include <string>
-#include <vector>
 
 #include "program.hpp"
 
 namespace {
-
-using Words = std::vector<std::string>;
-
-Outcome succeed(const Words& arguments) {
-  Outcome outcome = raysplats_program(arguments);
-  INFO(outcome.err);
-  REQUIRE(outcome.code == 0);
-  return outcome;
-}
 
 /// The value of a key in the configuration of a run.
 std::string value_of(const std::string& run, const std::string& key) {

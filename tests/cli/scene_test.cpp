@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -124,6 +122,9 @@ TEST_CASE("a scene with a mirror is rendered") {
   CHECK(redder(0, 10) > 1);
   render(kModel + "[environment]\ncolor = [0.1, 0.2, 0.6]\n" + kCamera, "without");
   CHECK(difference(picture("without/frame_0000.png"), mirror) > 0.001);
+  // Paths that end at the mirror are many.
+  const Outcome cut = render(kModel + kMesh + kCamera, "cut", {"--max-bounces", "1"});
+  CHECK(cut.err.find("ended after --max-bounces 1") != std::string::npos);
 
   // A turning cube: single frames are those of the whole animation.
   const std::string turning = kModel + kMesh + kCamera + "[animation]\nframes = 3\n";

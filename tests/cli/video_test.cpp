@@ -18,13 +18,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using Words = std::vector<std::string>;
-
-Words operator+(Words first, const Words& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
-
 /// Writes a model of three balls; `render` of an orbit of `frames` small pictures of it.
 Words orbit(const TemporaryFolder& folder, const std::string& frames) {
   const std::string path = folder / "balls.ply";

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // An image of any format. The first byte asks for right checksums in the chunks of a PNG, which
 // chance would never find.
-#include <cstring>
 #include <vector>
 
 #include "fuzz/fuzz_target.hpp"

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdlib>
 #include <span>
-#include <string>
 
 #include "fuzz/fuzz_target.hpp"
 #include "io/mesh_file.hpp"

@@ -44,7 +44,7 @@ TEST_CASE("devices of a list share frames and views, and change neither") {
     const Outcome shared = raysplats_program(orbit.command(devices) + Words{"--device", devices});
     INFO(shared.err);
     REQUIRE(shared.code == 0);
-    CHECK(has(shared.out, "5 frames in"));
+    CHECK(contains(shared.out, "5 frames in"));
     CHECK(files_of(orbit.folder / devices) == expected);
   }
   const Outcome one = raysplats_program(orbit.evaluation("eval one"));
@@ -67,7 +67,7 @@ TEST_CASE("lists of devices that make no sense are refused") {
     const Outcome outcome = raysplats_program(orbit.command("no") + Words{"--device", devices});
     CHECK(outcome.code == 2);
     CHECK(one_sentence(outcome));
-    CHECK(has(outcome.err, words));
+    CHECK(contains(outcome.err, words));
   }
 }
 
@@ -95,7 +95,7 @@ TEST_CASE("ranks draw bands of a frame where there are fewer frames than ranks")
       const Outcome shared = raysplats_program(command(out) + Words{"--device", devices});
       INFO(shared.err);
       REQUIRE(shared.code == 0);
-      CHECK(has(shared.out, "2 frames in"));
+      CHECK(contains(shared.out, "2 frames in"));
       CHECK(files_of(orbit.folder / out) == files_of(orbit.folder / one));
     }
   }
@@ -133,7 +133,7 @@ TEST_CASE("ranks draw bands of a scene with meshes where there are fewer frames 
       const Outcome shared = raysplats_program(command(out) + Words{"--device", devices});
       INFO(shared.err);
       REQUIRE(shared.code == 0);
-      CHECK(has(shared.out, "2 frames in"));
+      CHECK(contains(shared.out, "2 frames in"));
       CHECK(files_of(orbit.folder / out) == files_of(orbit.folder / one));
     }
   }
@@ -164,7 +164,7 @@ TEST_CASE("a video is for one rank") {
                          orbit.folder / "a.gif", "--device", "0,0", "-q"});
   CHECK(outcome.code == 2);
   CHECK(one_sentence(outcome));
-  CHECK(has(outcome.err, "--video is written by one rank"));
+  CHECK(contains(outcome.err, "--video is written by one rank"));
   CHECK_FALSE(std::filesystem::exists(orbit.folder / "a.gif"));
 }
 
@@ -178,7 +178,7 @@ MPI_TEST_CASE("processes of mpirun share frames and views, and change neither") 
     const Outcome shared = raysplats_program(orbit.command(frames), mpirun(ranks));
     INFO(shared.err);
     REQUIRE(shared.code == 0);
-    CHECK(has(shared.out, "5 frames in"));
+    CHECK(contains(shared.out, "5 frames in"));
     CHECK(files_of(orbit.folder / frames) == files_of(orbit.folder / "one"));
     const std::string eval = "eval " + std::to_string(ranks);
     const Outcome judged = raysplats_program(orbit.evaluation(eval), mpirun(ranks));
@@ -195,12 +195,12 @@ MPI_TEST_CASE("what is wrong for all processes is said once") {
   INFO(missing.err);
   CHECK(missing.code == 3);
   CHECK(sentences(missing.err) == 1);
-  CHECK(has(missing.err, "none.ply"));
+  CHECK(contains(missing.err, "none.ply"));
   const Outcome single = raysplats_program({"info", orbit.model}, mpirun(3));
   INFO(single.err);
   CHECK(single.code == 2);
   CHECK(sentences(single.err) == 1);
-  CHECK(has(single.err, "'raysplats info' works in one process, and mpirun has started 3"));
+  CHECK(contains(single.err, "'raysplats info' works in one process, and mpirun has started 3"));
 }
 
 TEST_CASE("a program that cannot join the processes of mpirun says so") {
@@ -213,10 +213,10 @@ TEST_CASE("a program that cannot join the processes of mpirun says so") {
   CHECK(one_sentence(outcome));
   if (kHaveMpi) {
     CHECK(outcome.code == 1);
-    CHECK(has(outcome.err, "none.so"));
+    CHECK(contains(outcome.err, "none.so"));
   } else {
     CHECK(outcome.code == 2);
-    CHECK(has(outcome.err, "was built without MPI, and each of the 2 processes"));
+    CHECK(contains(outcome.err, "was built without MPI, and each of the 2 processes"));
   }
   // The other one leaves the word to the first.
   launched.environment[1].second = "1";

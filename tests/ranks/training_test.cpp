@@ -44,7 +44,7 @@ bool same_run(const std::string& a, const std::string& b) {
   const auto measures = [](const std::string& run) {
     return read_file(run + "/eval/iteration_30/metrics.json");
   };
-  return same_result(a, b) && has(losses, "30,") && losses == losses_of(b) &&
+  return same_result(a, b) && contains(losses, "30,") && losses == losses_of(b) &&
          !measures(a).empty() && measures(a) == measures(b) && entries(a) == entries(b);
 }
 
@@ -97,8 +97,8 @@ TEST_CASE("devices of a list train the model of one") {
       INFO(shared.err);
       REQUIRE(shared.code == 0);
       CHECK(same_run(run, folder / (name + " one")));
-      CHECK(has(shared.out, "for each step: "));
-      CHECK(has(shared.out, "ms beside other work"));
+      CHECK(contains(shared.out, "for each step: "));
+      CHECK(contains(shared.out, "ms beside other work"));
     }
   }
 }
@@ -140,7 +140,7 @@ TEST_CASE("the parts of a processor train as one of them does") {
   const TemporaryFolder folder;
   const Surroundings halves{.environment = {{"RAYSPLATS_CPU_PARTS", "2"}}};
   const Outcome devices = raysplats_program({"devices"}, halves);
-  SKIP_TEST_UNLESS(devices.code == 0 || !has(devices.err, "compute units, give a number"),
+  SKIP_TEST_UNLESS(devices.code == 0 || !contains(devices.err, "compute units, give a number"),
                    "one core alone cannot be divided");
   INFO(devices.err);
   REQUIRE(devices.code == 0);
@@ -165,7 +165,7 @@ TEST_CASE("ranks without a view are refused") {
       raysplats_program(tiny_training(folder / "run") + Words{"--device", "0,0"});
   CHECK(outcome.code == 2);
   CHECK(one_sentence(outcome));
-  CHECK(has(outcome.err, "'views-per-step' = 1 leaves some without one"));
+  CHECK(contains(outcome.err, "'views-per-step' = 1 leaves some without one"));
   CHECK_FALSE(std::filesystem::exists(checkpoint_of(folder / "run", 5)));
 }
 
@@ -198,7 +198,7 @@ MPI_TEST_CASE("the time of a run is the same for all processes") {
                         mpirun(2));
   INFO(outcome.err);
   CHECK(outcome.code == 0);
-  CHECK(has(outcome.out, "iterations in"));
+  CHECK(contains(outcome.out, "iterations in"));
 }
 
 MPI_TEST_CASE("processes with other options or data than the first do not train") {
@@ -210,7 +210,7 @@ MPI_TEST_CASE("processes with other options or data than the first do not train"
   INFO(outcome.err);
   CHECK(outcome.code == 1);
   CHECK(sentences(outcome.err) == 1);
-  CHECK(has(outcome.err, "rank 1 has another model than rank 0"));
+  CHECK(contains(outcome.err, "rank 1 has another model than rank 0"));
 }
 
 MPI_TEST_CASE("a signal to mpirun saves the run and ends all processes") {
@@ -246,8 +246,9 @@ MPI_TEST_CASE("when a process is killed the others end within seconds, and whole
     INFO(outcome.err);
     CHECK(outcome.code != 0);
     CHECK(sentences(outcome.err) == 1);
-    CHECK(has(outcome.err, "Rank " + std::to_string(killed) + " of the 3 that share this work"));
-    CHECK(has(outcome.err, "--resume"));
+    CHECK(
+        contains(outcome.err, "Rank " + std::to_string(killed) + " of the 3 that share this work"));
+    CHECK(contains(outcome.err, "--resume"));
     const std::int64_t reached = raysplats::load_latest_checkpoint(run).iteration;
     for (const auto& path : raysplats::list_checkpoints(run)) raysplats::read_checkpoint(path);
     const Outcome resumed = raysplats_program(

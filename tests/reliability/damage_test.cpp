@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sys/stat.h>
 
-#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <string>
@@ -30,8 +29,8 @@ TEST_CASE("a damaged checkpoint is passed over with a warning, and the result is
   const Outcome outcome = raysplats_program(arguments);
   INFO(outcome.err);
   REQUIRE(outcome.code == 0);
-  CHECK(has(outcome.err, "step_000000030.rsck is truncated"));
-  CHECK(has(outcome.err, "step_000000025.rsck is damaged"));
+  CHECK(contains(outcome.err, "step_000000030.rsck is truncated"));
+  CHECK(contains(outcome.err, "step_000000025.rsck is damaged"));
   CHECK(temporaries(run) == 0);
   CHECK(read_file(model_of(run)) == read_file(model_of(undisturbed())));
 
@@ -57,7 +56,7 @@ TEST_CASE("other data, a newer file and a folder without checkpoints") {
   INFO(other.err);
   CHECK(other.code == 2);
   CHECK(one_sentence(other));
-  CHECK(has(other.err, "other data"));
+  CHECK(contains(other.err, "other data"));
 
   std::string newer = read_file(checkpoint_of(run, 25));
   newer[8] = 3;
@@ -67,7 +66,7 @@ TEST_CASE("other data, a newer file and a folder without checkpoints") {
   INFO(refused.err);
   CHECK(refused.code == 3);
   CHECK(one_sentence(refused));
-  CHECK(has(refused.err, "version 3"));
+  CHECK(contains(refused.err, "version 3"));
 
   // 'latest' of an empty folder is a start, so that one command line serves first and later tries.
   const Outcome fresh =
@@ -92,7 +91,7 @@ TEST_CASE("a full disk ends the run with exit code 3 and whole files, and the ru
   INFO(outcome.err);
   CHECK(outcome.code == 3);
   CHECK(one_sentence(outcome));
-  CHECK(has(outcome.err, "File too large"));
+  CHECK(contains(outcome.err, "File too large"));
   CHECK(temporaries(run) == 0);
   CHECK(!fs::exists(model_of(run)));
   REQUIRE(raysplats_program(arguments).code == 0);
@@ -115,7 +114,7 @@ TEST_CASE("a read-only folder ends the run with exit code 3 and changes nothing"
     INFO(outcome.err);
     CHECK(outcome.code == 3);
     CHECK(one_sentence(outcome));
-    CHECK(has(outcome.err, run));
+    CHECK(contains(outcome.err, run));
     CHECK(temporaries(run) == 0);
     CHECK(read_file(checkpoint_of(run, 25)) == before);
   }

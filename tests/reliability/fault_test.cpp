@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstring>
 #include <filesystem>
-#include <limits>
 #include <string>
 
 #include "raysplats/error.hpp"
@@ -23,9 +22,9 @@ void check_fault(const std::string& variable, int n, int code) {
   CHECK(temporaries(folder.path()) == 0);
   for (const auto& path : raysplats::list_checkpoints(run))
     CHECK_NOTHROW(raysplats::read_checkpoint(path));
-  if (has(outcome.err, "is saved")) {
+  if (contains(outcome.err, "is saved")) {
     const std::int64_t newest = raysplats::load_latest_checkpoint(run).iteration;
-    CHECK(has(outcome.err, "iteration " + std::to_string(newest) + " is saved"));
+    CHECK(contains(outcome.err, "iteration " + std::to_string(newest) + " is saved"));
   }
   if (n == 1) return;  // nothing had begun
   const Outcome resumed = raysplats_program(tiny_training(run) + Words{"--resume", "latest"});
@@ -96,7 +95,7 @@ TEST_CASE("a loss that stays infinite stops the run with a dump and the model as
   INFO(outcome.err);
   CHECK(outcome.code == 1);
   CHECK(one_sentence(outcome));
-  CHECK(has(outcome.err, "10 steps in a row by iteration 14"));
+  CHECK(contains(outcome.err, "10 steps in a row by iteration 14"));
   const std::filesystem::path dump = std::filesystem::path(run) / "dump";
   for (const char* name : {"state.rsck", "picture.exr", "step.json"})
     CHECK(std::filesystem::exists(dump / name));

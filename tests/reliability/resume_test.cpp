@@ -30,8 +30,8 @@ TEST_CASE("a resumed run has its options, wherever they are written") {
   broken_off(filed);
   write_file(folder / "rows.toml", "log-every = 20\n");
   check(filed, go_on(filed, "latest", {"--config", folder / "rows.toml"}));
-  CHECK(has(read_file(filed + "/config.toml"), "log-every = 20\n"));
-  CHECK(has(read_file(filed + "/config.toml"), "max-gaussians = 600\n"));
+  CHECK(contains(read_file(filed + "/config.toml"), "log-every = 20\n"));
+  CHECK(contains(read_file(filed + "/config.toml"), "max-gaussians = 600\n"));
 
   const std::string bare = folder / "bare";
   broken_off(bare);
@@ -53,7 +53,7 @@ TEST_CASE("a run whose evaluation cannot be written goes on later as if nothing 
   INFO(outcome.err);
   CHECK(outcome.code == 3);
   CHECK(one_sentence(outcome));
-  CHECK(has(outcome.err, "iteration 16 is saved"));
+  CHECK(contains(outcome.err, "iteration 16 is saved"));
   fs::remove(run + "/eval/iteration_16");
   REQUIRE(go_on(run, "latest").code == 0);
   CHECK(read_file(model_of(run)) == read_file(model_of(undisturbed())));

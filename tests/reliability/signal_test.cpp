@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -51,9 +53,9 @@ bool every_checkpoint_is_whole(const std::string& run) {
 
 }  // namespace
 
-TEST_CASE("SIGINT and SIGTERM finish the iteration, save and end with 130") {
+TEST_CASE("SIGINT, SIGTERM and SIGHUP finish the iteration, save and end with 130") {
   const TemporaryFolder folder;
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     CAPTURE(signal);
     const std::string run = folder / std::to_string(signal);
     RunningProgram program(endless(run));
@@ -63,15 +65,64 @@ TEST_CASE("SIGINT and SIGTERM finish the iteration, save and end with 130") {
     INFO(outcome.err);
     CHECK(outcome.code == 130);
     CHECK(one_sentence(outcome));
-    CHECK(has(outcome.err, "--resume"));
+    CHECK(contains(outcome.err, "--resume"));
     const raysplats::Checkpoint newest = raysplats::load_latest_checkpoint(run);
-    CHECK(has(outcome.err, "iteration " + std::to_string(newest.iteration)));
+    CHECK(contains(outcome.err, "iteration " + std::to_string(newest.iteration)));
     CHECK(std::filesystem::exists(model_of(run, static_cast<int>(newest.iteration))));
     CHECK(temporaries(run) == 0);
     const std::string page = run + "/report.html";
     REQUIRE(std::filesystem::exists(page));
-    CHECK(has(read_file(page), "Not over"));
-    CHECK(has(outcome.out, "Report: " + page));
+    CHECK(contains(read_file(page), "Not over"));
+    CHECK(contains(outcome.out, "Report: " + page));
+  }
+}
+
+TEST_CASE("a run whose terminal is closed saves all, and one under nohup goes on") {
+  const TemporaryFolder folder;
+  const auto is_saved = [](const std::string& run) {
+    const raysplats::Checkpoint newest = raysplats::load_latest_checkpoint(run);
+    return std::filesystem::exists(model_of(run, static_cast<int>(newest.iteration))) &&
+           std::filesystem::exists(run + "/report.html") && temporaries(run) == 0;
+  };
+  SUBCASE("its own") {
+    Surroundings there;
+    there.terminal = true;
+    RunningProgram program(endless(folder / "run"), there);
+    wait_for_checkpoint(program, folder / "run");
+    program.hang_up();
+    // The system and the shell both say so, and some systems end what is left of a session.
+    for (const int signal : {SIGHUP, SIGHUP, SIGTERM})
+      REQUIRE(::kill(program.process(), signal) == 0);
+    CHECK(program.wait().code == 130);
+    CHECK(is_saved(folder / "run"));
+  }
+  SUBCASE("that of a program which reads what it prints, as in train | tee") {
+    const std::string pipe = folder / "pipe";
+    REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+    const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    REQUIRE(reader >= 0);
+    Surroundings there;
+    there.out_file = there.err_file = pipe;
+    RunningProgram program(endless(folder / "run"), there);
+    wait_for_checkpoint(program, folder / "run");
+    REQUIRE(::close(reader) == 0);
+    REQUIRE(::kill(program.process(), SIGHUP) == 0);
+    CHECK(program.wait().code == 130);
+    CHECK(is_saved(folder / "run"));
+  }
+  SUBCASE("nohup") {
+    Surroundings there;
+    there.nohup = true;
+    RunningProgram program(endless(folder / "run"), there);
+    wait_for_checkpoint(program, folder / "run");
+    REQUIRE(::kill(program.process(), SIGHUP) == 0);
+    const auto reached = [&] {
+      return raysplats::load_latest_checkpoint(folder / "run").iteration;
+    };
+    for (const std::int64_t begin = reached(); reached() < begin + 20;) {
+      REQUIRE(program.runs());
+      std::this_thread::sleep_for(10ms);
+    }
   }
 }
 
@@ -86,8 +137,8 @@ TEST_CASE("an interrupted run whose report cannot be written says and ends the s
   const Outcome outcome = program.wait();
   INFO(outcome.err);
   CHECK(outcome.code == 130);
-  CHECK(has(outcome.err, "Interrupted at iteration"));
-  CHECK(has(outcome.err, "--resume"));
+  CHECK(contains(outcome.err, "Interrupted at iteration"));
+  CHECK(contains(outcome.err, "--resume"));
 }
 
 TEST_CASE("a second signal of another kind ends the run at once with whole files") {
@@ -147,14 +198,14 @@ TEST_CASE("a signal ends a long frame between its samples, with 130 though it is
              "[[mesh]]\nfile = \"wall.obj\"\n[camera]\nposition = [0, 0, -4]\ntarget = [0, 0, 0]\n"
              "width = 300\nheight = 300\n[render]\nsamples = 65536\n");
   RunningProgram program({"render", folder / "scene.toml", "-o", folder / "frames"});
-  while (program.runs() && !has(program.errors(), "% of this frame"))
+  while (program.runs() && !contains(program.errors(), "% of this frame"))
     std::this_thread::sleep_for(10ms);
   REQUIRE(::kill(program.process(), SIGINT) == 0);
   const Outcome outcome = program.wait();
   INFO(outcome.err);
   CHECK(outcome.signal == 0);
   CHECK(outcome.code == 130);
-  CHECK(has(outcome.err, "Interrupted after 0 of 1 frames"));
+  CHECK(contains(outcome.err, "Interrupted after 0 of 1 frames"));
   CHECK(entries(folder / "frames") == 0);
 }
 
@@ -169,17 +220,17 @@ TEST_CASE("a signal ends a long frame of a model, is told of at once and ends wi
                                  "-o", folder / "frames"} +
                                how,
                            terminal);
-    while (program.runs() && !has(program.errors(), "% of this frame"))
+    while (program.runs() && !contains(program.errors(), "% of this frame"))
       std::this_thread::sleep_for(10ms);
     REQUIRE(::kill(program.process(), SIGINT) == 0);
-    while (program.runs() && !has(program.errors(), "once more stops at once"))
+    while (program.runs() && !contains(program.errors(), "once more stops at once"))
       std::this_thread::sleep_for(10ms);
     const Outcome outcome = program.wait();
     INFO(outcome.err);
-    CHECK(has(outcome.err, "Interrupted: stopping as soon as"));
+    CHECK(contains(outcome.err, "Interrupted: stopping as soon as"));
     CHECK(outcome.signal == 0);
     CHECK(outcome.code == 130);
-    CHECK(has(outcome.err, "Interrupted after 0 of 1 frames"));
+    CHECK(contains(outcome.err, "Interrupted after 0 of 1 frames"));
     CHECK(entries(folder / "frames") == 0);
   }
 }
@@ -192,13 +243,13 @@ TEST_CASE("a signal ends an evaluation within a view, with 130") {
               .code == 0);
   RunningProgram program({"eval", folder / "model.ply", "--data", folder / "data", "-o",
                           folder / "eval", "--traversal", "bvh"});
-  while (program.runs() && !has(program.errors(), "% of this frame"))
+  while (program.runs() && !contains(program.errors(), "% of this frame"))
     std::this_thread::sleep_for(10ms);
   REQUIRE(::kill(program.process(), SIGINT) == 0);
   const Outcome outcome = program.wait();
   INFO(outcome.err);
   CHECK(outcome.code == 130);
-  CHECK(has(outcome.err, "Interrupted after 0 of 1 views"));
+  CHECK(contains(outcome.err, "Interrupted after 0 of 1 views"));
   CHECK(entries(folder / "eval") == 0);
 }
 
@@ -212,8 +263,8 @@ TEST_CASE("a folder takes one run at a time, and a lock that was left behind non
     INFO(second.err);
     CHECK(second.code == 3);
     CHECK(one_sentence(second));
-    CHECK(has(second.err, run));
-    CHECK(has(second.err, "process " + std::to_string(first.process())));
+    CHECK(contains(second.err, run));
+    CHECK(contains(second.err, "process " + std::to_string(first.process())));
   }
   CHECK(first.runs());
   REQUIRE(::kill(first.process(), SIGKILL) == 0);

@@ -5,20 +5,8 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "program.hpp"
-
-using Words = std::vector<std::string>;
-
-inline Words operator+(Words first, const Words& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
-
-inline bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 /// A data set of a few small photos, made once.
 inline const std::string& tiny_data() {
@@ -107,6 +95,6 @@ inline void broken_off(const std::string& run) {
 inline std::size_t temporaries(const std::filesystem::path& folder) {
   std::size_t count = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
-    count += has(entry.path().filename().string(), ".tmp") ? 1 : 0;
+    count += contains(entry.path().filename().string(), ".tmp") ? 1 : 0;
   return count;
 }

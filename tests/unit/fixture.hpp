@@ -17,4 +17,11 @@ inline DeviceInfo test_device() {
 
 inline Context make_test_context() { return Context(test_device()); }
 
+/// One for all cases of a program that need none of their own.
+inline Context& shared_test_context() {
+  // Not static: at the end of the program it has to go before what a driver keeps per thread.
+  thread_local Context instance(test_device());
+  return instance;
+}
+
 }  // namespace raysplats

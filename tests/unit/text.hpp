@@ -12,14 +12,19 @@ inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// The message of the DataError that `action` throws; "" when it throws none.
-inline std::string data_error(const std::function<void()>& action) {
+/// The message of the E that `action` throws; "" when it throws none.
+template <class E>
+std::string message_of(const std::function<void()>& action) {
   try {
     action();
-  } catch (const DataError& error) {
+  } catch (const E& error) {
     return error.what();
   }
   return "";
+}
+
+inline std::string data_error(const std::function<void()>& action) {
+  return message_of<DataError>(action);
 }
 
 }  // namespace raysplats::test

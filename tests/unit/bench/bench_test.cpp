@@ -6,7 +6,9 @@
 #include <cmath>
 #include <set>
 
+#include "bench/ceilings.hpp"
 #include "bench/operation.hpp"
+#include "device/fault_injection.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
 #include "unit/bench/report_fixture.hpp"
@@ -134,4 +136,58 @@ TEST_CASE("operations: launches go to their stages and failures come out") {
   CHECK_THROWS_WITH_AS(run_operations(context, {broken, operation}, 2, 1e-4), "broken on purpose",
                        DataError);
   CHECK(run_operations(context, {operation}, 1, 1e-4).size() == 1);
+}
+
+TEST_CASE("operations: failures of device and memory are kept where that is asked for") {
+  Context context(test_device(), timed_options());
+  const BenchOperation good{{}, {}, [] {}, {{"good", {}, true, {}}}};
+  const BenchOperation refused{
+      [] { throw DeviceError("refused"); }, {}, [] {}, {{"refused", {}, true, {}}}, true};
+  int run = 0;
+  const BenchOperation late{{},
+                            {},
+                            [&] {
+                              if (++run > 2) throw ResourceError("memory is at its end");
+                            },
+                            {{"late", {}, true, {}}, {"too", {}, true, {}}}};
+  const auto keep = [&](const std::vector<BenchOperation>& operations) {
+    return run_operations(context, operations, 3, 1e-9, {}, true);
+  };
+  const auto samples = keep({good, refused, late, good});
+  CHECK(samples[0][0].seconds.size() == 3);
+  CHECK(samples[0][0].failure.empty());
+  CHECK(samples[1][0].lacking == "refused");
+  CHECK(samples[1][0].failure.empty());
+  for (const StageSamples& stage : samples[2]) CHECK(stage.failure == "memory is at its end");
+  CHECK(samples[3][0].failure.empty());
+  CHECK(samples[3][0].seconds.empty());
+  const BenchOperation wrong{
+      {}, {}, [] { throw UsageError("of another kind"); }, {{"wrong", {}, true, {}}}};
+  CHECK_THROWS_WITH_AS(keep({wrong}), "of another kind", UsageError);
+}
+
+TEST_CASE("bench: the other rows are measured where one fails") {
+  Context context(test_device(), timed_options());
+  BenchOptions options = tiny_bench(1);
+  options.filter = "^(sort|bounds|adam)/";
+  options.keep_failures = true;
+  measure_fma_rate(context);  // its programs are there: the next one is that of the first row
+  context.faults().arm(Fault::kBuild, 1);
+  const BenchReport report = run_bench(context, options);
+  REQUIRE(report.left_out.size() == 1);
+  CHECK(report.left_out[0].id == "sort/random/1000");
+  CHECK(report.left_out[0].failed);
+  CHECK_FALSE(report.left_out[0].reason.empty());
+  REQUIRE(report.rows.size() == 2);
+  CHECK(report.rows[0].name == "bounds");
+  CHECK(report.rows[1].name == "adam");
+
+  context.faults().arm(Fault::kLaunch, 1);
+  const BenchReport unlimited = run_bench(context, options);
+  REQUIRE(unlimited.left_out.size() == 1);
+  CHECK(unlimited.left_out[0].id == "the device's limits");
+  CHECK(unlimited.rows.size() == 3);
+  options.keep_failures = false;
+  context.faults().arm(Fault::kLaunch, 1);
+  CHECK_THROWS_AS(run_bench(context, options), DeviceError);
 }

@@ -13,6 +13,7 @@
 
 #include "bench/cards.hpp"
 #include "bench/kernel_folders.hpp"
+#include "device/fault_injection.hpp"
 #include "raysplats/error.hpp"
 #include "unit/bench/report_fixture.hpp"
 #include "unit/fixture.hpp"
@@ -64,6 +65,29 @@ TEST_CASE("a device's report holds its self-test, every size that fits the time,
   wrong.checks[3].error = std::numeric_limits<double>::quiet_NaN();
   CHECK(!wrong.passed());
   CHECK(device_report_text(wrong).find("FAILED") != std::string::npos);
+}
+
+TEST_CASE("a device's report is made where the self-test fails, of whatever bytes") {
+  Context context(test_device(), timed_options());
+  BenchOptions options = tiny_bench(1);
+  options.filter = "^(sort|adam)/";
+  context.faults().arm(Fault::kLaunch, 1);
+  DeviceReport report = make_device_report(context, options, 0.0);
+  CHECK(!report.passed());
+  REQUIRE(report.checks.size() == 8);
+  CHECK(report.checks[0].failure.find("Launching kernel") != std::string::npos);
+  CHECK(!report.checks[0].passed());
+  CHECK(report.checks[1].name.starts_with("tree"));
+  CHECK(report.checks[7].passed());
+  CHECK(report.failed == 0);
+  CHECK(device_report_text(report).find("FAILED: Launching kernel") != std::string::npos);
+  report.left_out = {"what a driver says: \xff"};
+  report.failed = 1;
+  const nlohmann::json json = nlohmann::json::parse(device_report_json(report));
+  CHECK(json.at("device").at("name") == context.device().name);
+  CHECK(json.at("self_test").at(0).at("failure") == report.checks[0].failure);
+  CHECK(json.at("failed") == 1);
+  CHECK(json.at("left_out").at(0).get<std::string>().starts_with("what a driver says: "));
 }
 
 TEST_CASE("two folders of kernels are compared by what they compute, then by time in turns") {

@@ -9,14 +9,12 @@
 
 #include "raysplats/error.hpp"
 #include "unit/temporary_directory.hpp"
+#include "unit/text.hpp"
 
 using namespace raysplats;
+using test::contains;
 
 namespace {
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 DeviceVerdict sound_device(DeviceType type, const std::string& vendor) {
   DeviceVerdict verdict;
@@ -51,6 +49,16 @@ TEST_CASE("a device that cannot be opened is a verdict, not an end") {
   CHECK(diagnosis.devices[0].text == "fails: the compiler fell over");
   CHECK(contains(diagnosis_text(diagnosis), "advice           Device 0 is not to be trusted"));
   CHECK(contains(diagnosis.advice.back(), "pocl-opencl-icd"));
+}
+
+TEST_CASE("a driver that fails by its surroundings is not to be updated") {
+  Diagnosis diagnosis;
+  diagnosis.devices = {sound_device(DeviceType::kCpu, "Intel")};
+  diagnosis.devices[0].works = false;
+  diagnosis.devices[0].trouble = "the folder of its cache cannot be written";
+  const std::vector<std::string> advice = advice_on(diagnosis);
+  REQUIRE(advice.size() == 1);
+  CHECK(advice[0] == "Device 0 fails: the folder of its cache cannot be written");
 }
 
 TEST_CASE("wrong numbers and what is no number are named with error and limit") {

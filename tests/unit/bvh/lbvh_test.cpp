@@ -11,6 +11,7 @@
 #include <limits>
 #include <numeric>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "bvh/lbvh_validate.hpp"
@@ -110,17 +111,62 @@ Boxes clumps(std::size_t count, std::size_t far, double distance, double size = 
   return boxes;
 }
 
+// What rays meet on their way through the whole tree.
+struct Visits {
+  std::size_t nodes = 0;
+  std::size_t blocks = 0;
+};
+
+// Whether the ray origin + t direction, t >= 0, meets a box.
+bool meets(const RsAabb& box,
+           const std::array<double, 3>& origin,
+           const std::array<double, 3>& direction) {
+  double near = 0;
+  double far = std::numeric_limits<double>::infinity();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (box.lo[axis] > box.hi[axis]) return false;
+    double t0 = (static_cast<double>(box.lo[axis]) - origin[axis]) / direction[axis];
+    double t1 = (static_cast<double>(box.hi[axis]) - origin[axis]) / direction[axis];
+    if (t0 > t1) std::swap(t0, t1);
+    near = std::max(near, t0);
+    far = std::min(far, t1);
+  }
+  return near <= far;
+}
+
+Visits count_visits(const LbvhCopy& tree,
+                    const std::array<double, 3>& origin,
+                    const std::array<double, 3>& direction) {
+  Visits visits;
+  if (tree.count == 0) return visits;
+  std::vector<std::array<std::size_t, 2>> stack{{tree.level_sizes.size(), 0}};
+  while (!stack.empty()) {
+    const auto [level, number] = stack.back();
+    stack.pop_back();
+    ++visits.nodes;
+    for (std::size_t lane = 0; lane < tree.lanes; ++lane) {
+      if (!meets(tree.child(tree.level_begin[level] + number, lane), origin, direction)) continue;
+      if (level == 1) {
+        ++visits.blocks;
+      } else {
+        stack.push_back({level - 1, number * tree.lanes + lane});
+      }
+    }
+  }
+  return visits;
+}
+
 // Of rays from all sides through the middle of [-1, 1]^3.
-LbvhVisits visits_of(const LbvhCopy& tree) {
+Visits visits_of(const LbvhCopy& tree) {
   CounterRng rng(23, 4);
-  LbvhVisits sum;
+  Visits sum;
   for (int i = 0; i < 200; ++i) {
     std::array<double, 3> origin{}, direction{};
     for (std::size_t a = 0; a < 3; ++a) {
       origin[a] = 2 * rng.normal();
       direction[a] = rng.uniform() - 0.5 - origin[a];
     }
-    const LbvhVisits one = count_visits(tree, origin.data(), direction.data());
+    const Visits one = count_visits(tree, origin, direction);
     sum.nodes += one.nodes;
     sum.blocks += one.blocks;
   }
@@ -259,12 +305,12 @@ TEST_CASE("lbvh: a few boxes far away cost rays at most half as many visits agai
     // Boxes that overlap as Gaussians do: a ray meets some twenty of them.
     constexpr double kSize = 6;
     check_tree(tree, clumps(count, 0, 0, kSize));
-    const LbvhVisits alone = visits_of(tree.copy());
+    const Visits alone = visits_of(tree.copy());
     CHECK(alone.blocks > 1000);
     for (const double distance : {1e2, 1e4, 1e6, 1e7, 1e20}) {
       const Boxes boxes = clumps(count, 20, distance, kSize);
       check_tree(tree, boxes);
-      const LbvhVisits visits = visits_of(tree.copy());
+      const Visits visits = visits_of(tree.copy());
       CAPTURE(lanes);
       CAPTURE(distance);
       CHECK(double(visits.nodes) <= 1.5 * double(alone.nodes));

@@ -14,8 +14,10 @@
 #include "device/kernel_sources.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
+#include "unit/text.hpp"
 
 using namespace raysplats;
+using test::contains;
 
 namespace {
 
@@ -64,18 +66,9 @@ struct Sorts {
   // What the launch of no work-items says of its arguments; "" when they are right.
   template <class... Arguments>
   std::string fault(const Arguments&... arguments) {
-    try {
-      kernel.launch(Range::linear(0, 1), arguments...);
-    } catch (const DeviceError& error) {
-      return error.what();
-    }
-    return "";
+    return test::message_of<DeviceError>([&] { kernel.launch(Range::linear(0, 1), arguments...); });
   }
 };
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 // Kernels of a program with all that it includes.
 std::vector<std::string> kernel_names(const std::string& path) {

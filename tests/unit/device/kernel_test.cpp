@@ -19,8 +19,11 @@
 #include "device/profiler.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
+#include "unit/text.hpp"
 
 using namespace raysplats;
+using test::contains;
+using test::message_of;
 
 namespace {
 
@@ -28,21 +31,6 @@ ContextOptions uncached() {
   ContextOptions options;
   options.kernel_cache = false;
   return options;
-}
-
-// what() of the DeviceError that `action` throws; "" when it throws none.
-template <class Action>
-std::string device_error(const Action& action) {
-  try {
-    action();
-  } catch (const DeviceError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 // What other code writes to standard error while `action` runs.
@@ -86,12 +74,14 @@ TEST_CASE("kernel source: includes are resolved once, from a folder when it is n
   CHECK(source.find("first") == source.rfind("first"));
   CHECK(contains(source, "#line 1 \"sub/b.h\""));
   CHECK(contains(source, "#line 3 \"a.cl\""));
-  CHECK(contains(device_error([] { resolve_kernel_source("missing.cl"); }), "missing.cl"));
+  CHECK(
+      contains(message_of<DeviceError>([] { resolve_kernel_source("missing.cl"); }), "missing.cl"));
 }
 
 TEST_CASE("kernel source: the built-in files, and a name that is none") {
   CHECK(contains(resolve_kernel_source("parallel/layout_probe.cl"), "RsAabb"));
-  CHECK(contains(device_error([] { resolve_kernel_source("no/such.cl"); }), "no/such.cl"));
+  CHECK(
+      contains(message_of<DeviceError>([] { resolve_kernel_source("no/such.cl"); }), "no/such.cl"));
 }
 
 TEST_CASE("kernel: a compile error shows file, line and the compiler's message") {
@@ -103,7 +93,7 @@ TEST_CASE("kernel: a compile error shows file, line and the compiler's message")
       "#include \"good.h\"\n__kernel void f(__global int* a) {\n  a[0] = undeclared_name;\n}\n");
   Context context(test_device(), uncached());
   const std::string message =
-      device_error([&] { context.kernel("broken.cl", "f").argument_count(); });
+      message_of<DeviceError>([&] { context.kernel("broken.cl", "f").argument_count(); });
   CHECK(contains(message, "broken.cl:3"));
   CHECK(contains(message, "undeclared_name"));
   CHECK(contains(message, context.device().name));
@@ -135,23 +125,23 @@ TEST_CASE("kernel: wrong launches are refused with the kernel's name") {
   folder.write("scale.cl", kScale);
   folder.write("shared/compat.h", "");
   Context context(test_device(), uncached());
-  CHECK(
-      contains(device_error([&] { context.kernel("scale.cl", "no_such_kernel").argument_count(); }),
-               "no_such_kernel"));
+  CHECK(contains(message_of<DeviceError>(
+                     [&] { context.kernel("scale.cl", "no_such_kernel").argument_count(); }),
+                 "no_such_kernel"));
   Kernel kernel = context.kernel("scale.cl", "scale");
   Buffer<std::int32_t> data(context, 10, "data");
   const std::string count =
-      device_error([&] { kernel.launch(Range::linear(10, 1), data, std::int32_t{1}); });
+      message_of<DeviceError>([&] { kernel.launch(Range::linear(10, 1), data, std::int32_t{1}); });
   CHECK(contains(count, "scale takes 3 arguments, 2 were given"));
-  const std::string empty = device_error([&] {
+  const std::string empty = message_of<DeviceError>([&] {
     kernel.launch(Range::linear(10, 1), Buffer<std::int32_t>(), std::int32_t{1}, std::uint32_t{1});
   });
   CHECK(contains(empty, "Argument 0 of kernel scale"));
-  const std::string size = device_error(
+  const std::string size = message_of<DeviceError>(
       [&] { kernel.launch(Range::linear(10, 1), data, std::int64_t{1}, std::uint32_t{1}); });
   CHECK(contains(size, "Argument 1 of kernel scale"));
   const std::size_t group = 2 * context.device().max_work_group_size;
-  const std::string range = device_error(
+  const std::string range = message_of<DeviceError>(
       [&] { kernel.launch(Range::linear(1, group), data, std::int32_t{1}, std::uint32_t{1}); });
   CHECK(contains(range, "scale"));
   CHECK(contains(range, std::to_string(group)));

@@ -6,9 +6,8 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <fstream>
 #include <functional>
-#include <iterator>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -27,17 +26,6 @@ Bytes pattern(std::size_t size, unsigned seed) {
   Bytes bytes(size);
   for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<unsigned char>(i * 31 + seed);
   return bytes;
-}
-
-std::string read_all(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
-std::vector<fs::path> entries(const fs::path& directory) {
-  std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(directory)) found.push_back(entry.path());
-  return found;
 }
 
 // PoCL is not asked for binaries while it keeps kernels itself.
@@ -79,7 +67,7 @@ TEST_CASE("program cache: damaged entries are not loaded") {
   const ProgramCache cache(folder.path().string());
   cache.store("key", pattern(1000, 1));
   const fs::path file = entries(folder.path()).at(0);
-  const std::string good = read_all(file);
+  const std::string good = read_bytes(file);
   for (const std::size_t size : {0u, 5u, 23u, 24u, 500u}) {
     folder.write(file.filename().string(), good.substr(0, size));
     CHECK_FALSE(cache.load("key").has_value());
@@ -130,7 +118,7 @@ TEST_CASE("program cache: a context fills it, uses it and repairs it") {
   CHECK(expected > 1);
   REQUIRE(entries(folder.path()).size() == 1);
   const fs::path file = entries(folder.path())[0];
-  const std::string good = read_all(file);
+  const std::string good = read_bytes(file);
   const auto written = fs::last_write_time(file);
   CHECK(probe(folder.path()) == expected);
   CHECK(fs::last_write_time(file) == written);  // a hit writes nothing
@@ -140,8 +128,8 @@ TEST_CASE("program cache: a context fills it, uses it and repairs it") {
         std::string()}) {
     folder.write(file.filename().string(), bad);
     CHECK(probe(folder.path()) == expected);
-    CHECK(read_all(file).size() > 100);
-    CHECK(read_all(file) != bad);
+    CHECK(read_bytes(file).size() > 100);
+    CHECK(read_bytes(file) != bad);
   }
 }
 

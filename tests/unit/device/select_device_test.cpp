@@ -9,6 +9,7 @@
 #include <string>
 
 #include "device/context.hpp"
+#include "device/platform.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 
@@ -59,6 +60,30 @@ TEST_CASE("select device: selectors that fit nothing") {
   CHECK_THROWS_AS(select_device("99999999999999999999999999"), UsageError);
   CHECK_THROWS_AS(select_device("-1"), UsageError);
   CHECK_THROWS_AS(select_device("no such device"), UsageError);
+}
+
+TEST_CASE("select device: a card by the number in its name") {
+  DeviceInfo first;
+  first.name = "NVIDIA A100-SXM4-40GB";
+  DeviceInfo second = first;
+  second.index = 1;
+  second.name = "NVIDIA GeForce RTX 4090";
+  CHECK(select_among({first, second}, "4090").index == 1);
+  CHECK(select_among({first, second}, "100").index == 0);
+  CHECK(select_among({first, second}, "1").index == 1);
+  // An index that is not there is none of the digits of a name.
+  for (const char* selector : {"4", "40", "90"})
+    CHECK_THROWS_AS(select_among({first, second}, selector), UsageError);
+  CHECK_THROWS_WITH_AS(select_among({first}, "1"),
+                       "--device 1: there is 1 device, counted from 0; 'raysplats devices' lists "
+                       "them",
+                       UsageError);
+  CHECK_THROWS_WITH_AS(select_among({first, second}, "3080"),
+                       "--device 3080: there are 2 devices, counted from 0, and none has that in "
+                       "its name; 'raysplats devices' lists them",
+                       UsageError);
+  first.problems = {"it is big-endian"};
+  CHECK_THROWS_AS(select_among({first, second}, "100"), DeviceError);
 }
 
 TEST_CASE("select device: without any platform the message says what to install") {

@@ -3,8 +3,7 @@
 
 #include <doctest/doctest.h>
 
-#include <fstream>
-#include <iterator>
+#include <string>
 
 #include "device/context.hpp"
 #include "raysplats/error.hpp"
@@ -24,11 +23,6 @@ DeviceInfo device(const std::string& name, const std::string& driver = "1.0") {
 }
 
 const DeviceTuning kTuning{false, 8, 16, 64, 32, true};
-
-std::string text_of(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 }  // namespace
 
@@ -55,7 +49,7 @@ TEST_CASE("tuning: stored per device, driver and version, and found again") {
   CHECK(TuningStore(directory).find(device("A")) == DeviceTuning{false, 16, 64, 96, 0});
 
   // An entry of another version of the program is left alone and not used.
-  std::string text = text_of(store.path());
+  std::string text = read_bytes(store.path());
   const std::string version = std::string("\"raysplats\": \"");
   for (std::size_t at = text.find(version); at != std::string::npos;
        at = text.find(version, at + 1)) {
@@ -75,7 +69,7 @@ TEST_CASE("tuning: a broken file is ignored with one line, and replaced") {
   const TemporaryDirectory folder;
   const std::string directory = folder.path().string();
   TuningStore(directory).store(device("A"), kTuning);
-  const std::string good = text_of(folder.path() / "tuning.json");
+  const std::string good = read_bytes(folder.path() / "tuning.json");
   const auto replaced = [&](const std::string& from, const std::string& to) {
     std::string text = good;
     const std::size_t at = text.find(from);

@@ -8,7 +8,6 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
-#include <vector>
 
 #include "eval/metrics.hpp"
 #include "raysplats/camera.hpp"

@@ -3,12 +3,11 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <limits>
 
-#include "data_sets.hpp"
 #include "io/colmap_model.hpp"
 #include "raysplats/dataset.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "model_bytes.hpp"
 #include "scene/morton_order.hpp"
+#include "unit/io/model_bytes.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -8,25 +8,12 @@
 
 #include "io/gaussian_codes.hpp"
 #include "io/model_file.hpp"
-#include "model_bytes.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "scene/morton_order.hpp"
+#include "unit/io/model_bytes.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
-
-namespace {
-
-std::string usage_error(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const UsageError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-}  // namespace
 
 TEST_CASE("a file is what its first bytes say") {
   const Scratch scratch;
@@ -43,7 +30,7 @@ TEST_CASE("a file is what its first bytes say") {
   CHECK(contains(data_error([&] { read_model(scratch / "a.txt"); }), "no model that is known"));
   CHECK(contains(data_error([&] { read_model(scratch / "none.spz"); }), "does not exist"));
   for (const char* name : {"a.obj", "a", "a.compressed.spz.x", "a.gltf"})
-    CHECK(contains(usage_error([&] { write_model(scratch / name, model); }), ".splat"));
+    CHECK(contains(message_of<UsageError>([&] { write_model(scratch / name, model); }), ".splat"));
 }
 
 TEST_CASE("conversion moves, crops and thins in the stated order") {
@@ -87,7 +74,7 @@ TEST_CASE("conversion turns what is up to -y, harmonics as well") {
   const double length = std::sqrt(0.5);
   CHECK(farthest(changed(pointer, changes).means, {0, static_cast<float>(-length), 0}) < 1e-6);
   changes.up = glm::dvec3(0.0);
-  CHECK(contains(usage_error([&] { changed(model, changes); }), "up 0,0,0"));
+  CHECK(contains(message_of<UsageError>([&] { changed(model, changes); }), "up 0,0,0"));
 }
 
 TEST_CASE("changes out of range are refused, and half a box is half of space") {
@@ -96,7 +83,7 @@ TEST_CASE("changes out of range are refused, and half a box is half of space") {
   const auto refused = [&](const auto& change) {
     ModelChanges changes;
     change(changes);
-    return usage_error([&] { changed(model, changes); });
+    return message_of<UsageError>([&] { changed(model, changes); });
   };
   CHECK(contains(refused([](ModelChanges& c) { c.scale = 0.0; }), "scale is above 0"));
   CHECK(contains(refused([](ModelChanges& c) { c.scale = std::nan(""); }), "scale is above 0"));
@@ -142,9 +129,9 @@ TEST_CASE("conversion refuses what would be lost") {
   const Conversion done = convert("b.splat", {}, false);
   CHECK(done.written == 3);
   CHECK(contains(done.losses, "8 bits"));
-  CHECK(contains(usage_error([&] { convert("b.splat", {}, false); }), "--overwrite"));
+  CHECK(contains(message_of<UsageError>([&] { convert("b.splat", {}, false); }), "--overwrite"));
   CHECK(convert("b.splat", {}, true).read == 3);
-  CHECK(contains(usage_error([&] { convert("a.ply", {}, true); }), "what is read"));
+  CHECK(contains(message_of<UsageError>([&] { convert("a.ply", {}, true); }), "what is read"));
   ModelChanges fewer;
   fewer.max_gaussians = 2;
   CHECK(convert("c.ply", {}, false).losses == "nothing is lost");
@@ -152,7 +139,8 @@ TEST_CASE("conversion refuses what would be lost") {
   fs::remove(scratch / "c.ply");
   ModelChanges nothing;
   nothing.crop = Bounds{{100, 100, 100}, {101, 101, 101}};
-  CHECK(contains(usage_error([&] { convert("c.ply", nothing, false); }), "None of the 3"));
+  CHECK(
+      contains(message_of<UsageError>([&] { convert("c.ply", nothing, false); }), "None of the 3"));
   CHECK(!fs::exists(scratch / "c.ply"));
 }
 

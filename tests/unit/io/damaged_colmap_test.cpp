@@ -2,11 +2,9 @@
 // COLMAP models of which a part that nobody needs is damaged or unknown.
 #include <doctest/doctest.h>
 
-#include <string>
-
-#include "data_sets.hpp"
 #include "io/colmap_model.hpp"
 #include "raysplats/dataset.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

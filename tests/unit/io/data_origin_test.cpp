@@ -12,8 +12,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <vector>
 
-#include "data_sets.hpp"
 #include "raysplats/io.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 

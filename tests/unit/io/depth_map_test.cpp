@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

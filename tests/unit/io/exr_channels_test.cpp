@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

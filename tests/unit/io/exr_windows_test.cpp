@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "data_sets.hpp"
 #include "io/image_file.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 

@@ -3,12 +3,11 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstdint>
 #include <sstream>
 #include <string>
 
-#include "model_bytes.hpp"
+#include "unit/io/model_bytes.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

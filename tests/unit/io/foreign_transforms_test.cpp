@@ -3,15 +3,14 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <string>
 #include <vector>
 
-#include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "gltf_fixture.hpp"
 #include "io/data_uri.hpp"
 #include "io/mesh_file.hpp"
+#include "unit/io/gltf_fixture.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "io/mesh_file.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 
 namespace raysplats::test {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "gltf_fixture.hpp"
 #include "io/mesh_file.hpp"
 #include "io/model_formats.hpp"
-#include "model_bytes.hpp"
 #include "scene/gaussian_transform.hpp"
+#include "unit/io/gltf_fixture.hpp"
+#include "unit/io/model_bytes.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

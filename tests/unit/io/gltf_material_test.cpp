@@ -5,9 +5,10 @@
 #include <numbers>
 #include <string>
 
-#include "gltf_fixture.hpp"
 #include "io/mesh_file.hpp"
 #include "raysplats/io.hpp"
+#include "unit/io/gltf_fixture.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -98,13 +99,15 @@ TEST_CASE("glTF materials: the specular lobe has the strength and width of the r
 TEST_CASE("glTF materials: transmission makes glass with its index and absorption") {
   json material = pbr(0.0, 0.0);
   material["extensions"]["KHR_materials_transmission"]["transmissionFactor"] = 0.5;
+  material["extensions"]["KHR_materials_volume"]["thicknessFactor"] = 0.1;
   const Material glass = mapped(material);
   CHECK(glass.kind == Kind::kGlass);
   CHECK(glass.ior == 1.5f);
   check_color(glass.color, 1.0, kHalf, 0.0);
   CHECK(glass.absorption == Rgb{0, 0, 0});
   material["extensions"]["KHR_materials_ior"]["ior"] = 1.33;
-  material["extensions"]["KHR_materials_volume"] = {{"attenuationDistance", 2.0},
+  material["extensions"]["KHR_materials_volume"] = {{"thicknessFactor", 0.1},
+                                                    {"attenuationDistance", 2.0},
                                                     {"attenuationColor", {1.0, 0.5, 0.0}}};
   const Material tinted = mapped(material);
   CHECK(tinted.ior == 1.33f);
@@ -116,6 +119,66 @@ TEST_CASE("glTF materials: transmission makes glass with its index and absorptio
   CHECK(mapped(material).kind == Kind::kTransparent);
   material["extensions"]["KHR_materials_transmission"]["transmissionFactor"] = 1.0;
   CHECK(mapped(material).kind == Kind::kGlass);
+}
+
+TEST_CASE("glTF materials: light goes straight through open glass without a volume") {
+  const auto glass_of = [](const json& volume, const std::vector<std::uint16_t>& corners) {
+    json material = pbr(0.0, 0.0);
+    material["extensions"]["KHR_materials_transmission"]["transmissionFactor"] = 1.0;
+    if (!volume.is_null()) material["extensions"]["KHR_materials_volume"] = volume;
+    GltfFile file;
+    const int positions = file.add_vec3({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
+    const int indices = file.add_indices(corners);
+    json& primitive = file.add_mesh(positions);
+    primitive["indices"] = indices;
+    primitive["material"] = 0;
+    file.json["materials"].push_back(material);
+    return read_gltf_mesh(file.glb()).materials.at(0);
+  };
+  const std::vector<std::uint16_t> pane{0, 1, 2}, body{0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  const json without, thin{{"attenuationDistance", 2.0}, {"attenuationColor", {0.5, 0.5, 0.5}}};
+  json thick = thin;
+  thick["thicknessFactor"] = 0.1;
+  for (const json& volume : {without, thin}) {
+    const Material straight = glass_of(volume, pane);
+    CHECK(straight.kind == Kind::kGlass);
+    CHECK(straight.ior == 1.0f);
+    CHECK(straight.absorption == Rgb{0, 0, 0});
+    check_color(straight.color, 1.0, kHalf, 0.0);
+    CHECK(glass_of(volume, body).ior == 1.5f);
+  }
+  CHECK(glass_of(thin, body).absorption[0] > 0.0f);
+  CHECK(glass_of(thick, pane).ior == 1.5f);
+  CHECK(glass_of(thick, pane).absorption[0] > 0.0f);
+}
+
+TEST_CASE("glTF materials: alpha of a texture that would cut out is left out with one warning") {
+  const auto lines = [](const std::string& mode, float alpha) {
+    const Scratch scratch;
+    Image leaf(2, 1, 4, 1.0f);
+    leaf.data[7] = alpha;
+    write_image(scratch / "leaf.png", leaf);
+    json material = base_texture({{"index", 0}});
+    material["name"] = "leaf";
+    material["alphaMode"] = mode;
+    GltfFile file = textured(material);
+    file.json["images"].push_back({{"uri", "leaf.png"}});
+    file.json["materials"].push_back(material);
+    json& primitives = file.json["meshes"][0]["primitives"];
+    primitives.push_back(primitives[0]);
+    primitives[1]["material"] = 1;
+    write_bytes(scratch / "m.glb", file.glb());
+    const LogCapture log;
+    io::read_mesh(scratch / "m.glb");
+    CHECK(log.contains("m.glb: the alpha of the texture of the material 'leaf'") ==
+          (log.lines() > 0));
+    return log.lines();
+  };
+  for (const std::string mode : {"MASK", "BLEND"}) {
+    CHECK(lines(mode, 0.0f) == 1);
+    CHECK(lines(mode, 1.0f) == 0);
+  }
+  CHECK(lines("OPAQUE", 0.0f) == 0);
 }
 
 TEST_CASE("glTF materials: blended alpha makes transparent, even of metal") {
@@ -333,7 +396,8 @@ TEST_CASE("glTF materials: hostile numbers stay in range") {
   CHECK(mild.opacity == 0.0f);
   CHECK(mild.roughness == 1.0f);
   material["extensions"]["KHR_materials_transmission"]["transmissionFactor"] = 1e300;
-  material["extensions"]["KHR_materials_volume"] = {{"attenuationDistance", 1e-300},
+  material["extensions"]["KHR_materials_volume"] = {{"thicknessFactor", 1e300},
+                                                    {"attenuationDistance", 1e-300},
                                                     {"attenuationColor", {-1.0, 1e300, 0.5}}};
   const Material glass = mapped(material);
   CHECK(glass.ior == 1.0f);

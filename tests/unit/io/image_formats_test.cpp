@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "io/image_file.hpp"
-#include "photo_view.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/photo_view.hpp"
+#include "unit/io/scratch.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

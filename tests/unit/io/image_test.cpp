@@ -13,7 +13,7 @@
 #include "io/image_file.hpp"
 #include "io/image_header.hpp"
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

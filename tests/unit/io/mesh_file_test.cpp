@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "scene/mesh.hpp"
-#include "scratch.hpp"
 #include "skip_test.hpp"
+#include "unit/io/scratch.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -7,9 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "gltf_fixture.hpp"
 #include "io/mesh_file.hpp"
 #include "raysplats/io.hpp"
+#include "unit/io/gltf_fixture.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -131,6 +132,24 @@ TEST_CASE("glTF: nodes move their meshes, mirrors keep them outward") {
   CHECK(read_gltf_mesh(file.glb()).mesh.positions == Floats{0, 0, 0, 1, 0, 0, 0, 1, 0});
   file.json.erase("scenes");
   CHECK(read_gltf_mesh(file.glb()).mesh.triangle_count() == 3);
+}
+
+TEST_CASE("glTF: colours of vertices are left out with one warning") {
+  GltfFile file = GltfFile::square();
+  const LogCapture log;
+  read_gltf_mesh(file.glb());
+  CHECK(log.lines() == 0);
+  const int colors = file.add_vec3(Floats(12, 0.5f));
+  json& primitives = file.json["meshes"][0]["primitives"];
+  primitives[0]["attributes"]["COLOR_0"] = colors;
+  primitives.push_back(primitives[0]);
+  CHECK(read_gltf_mesh(file.glb()).mesh.triangle_count() == 4);
+  CHECK(log.lines() == 1);
+  CHECK(log.contains("m.glb: the colours of its vertices are left out"));
+  const Scratch scratch;
+  write_bytes(scratch / "m.glb", file.glb());
+  io::read_mesh(scratch / "m.glb", [](const std::string&) { return false; });
+  CHECK(log.lines() == 1);
 }
 
 TEST_CASE("glTF: broken scenes are rejected") {

@@ -7,7 +7,8 @@
 
 #include "io/mesh_file.hpp"
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -149,6 +150,22 @@ TEST_CASE("OBJ: comments may follow numbers, and are no part of a continued line
   CHECK(named.materials.at(0).name == "a#1");
 }
 
+TEST_CASE("OBJ: colours of vertices are left out with one warning") {
+  const std::string faces = "usemtl a\nf 1 2 3\n";
+  const LogCapture log;
+  read("v 0 0 0\nv 1 0 0 1\nv 0 1 0 1 # 0 0\n" + faces);
+  CHECK(log.lines() == 0);
+  const std::string colored = "v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\n" + faces;
+  CHECK(read(colored).mesh.positions == std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0});
+  CHECK(log.lines() == 1);
+  CHECK(log.contains("m.obj: the colours of its vertices are left out"));
+  // Nobody would see them where all materials are replaced.
+  const Scratch scratch;
+  write_bytes(scratch / "m.obj", colored);
+  io::read_mesh(scratch / "m.obj", [](const std::string& name) { return name != "a"; });
+  CHECK(log.lines() == 1);
+}
+
 TEST_CASE("OBJ: what is malformed is named") {
   CHECK(contains(error_of("v 0 0 0\nv 0 nan 0\nv 1 0 0\nf 1 2 3\n"), "not finite in line 2"));
   CHECK(contains(error_of("v 0 0 0\nv 0 1 inf\nv 1 0 0\nf 1 2 3\n"), "line 2"));
@@ -222,6 +239,16 @@ TEST_CASE("OBJ: MTL materials map row by row") {
   const Material glow = mapped("Kd 0.5 0 0\nKe 1 0 0\n");
   CHECK(glow.kind == Kind::kDiffuse);
   CHECK(glow.emission == Rgb{1, 0, 0});
+}
+
+TEST_CASE("OBJ: the first map_d of an MTL that is used is left out with a warning") {
+  const std::string mtl = "newmtl a\nmap_d leaf.png\nnewmtl b\nmap_d -clamp on leaf.png\n";
+  const LogCapture log;
+  read("mtllib m.mtl\n" + kSquare + "usemtl c\nf 1 2 3\n", mtl + "newmtl c\n");
+  CHECK(log.lines() == 0);
+  read("mtllib m.mtl\n" + kSquare + "usemtl b\nf 1 2 3\nusemtl a\nf 1 2 3\n", mtl);
+  CHECK(log.lines() == 1);
+  CHECK(log.contains("m.obj: map_d of the material 'b' is left out"));
 }
 
 TEST_CASE("OBJ: hostile numbers of an MTL stay in range") {

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "io/mesh_file.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -105,6 +105,31 @@ TEST_CASE("PLY meshes: normals and texture coordinates") {
       "0 0 0 0 0 2 0 0\n1 0 0 0 0 0 1 0.25\n0 1 0 0 1 0 0 1\n3 0 1 2\n");
   CHECK(file.mesh.normals == std::vector<float>{0, 0, 1, 0, 0, 1, 0, 1, 0});
   CHECK(file.mesh.uvs == std::vector<float>{0, 1, 1, 0.75f, 0, 0});
+}
+
+TEST_CASE("PLY meshes: colours and textures are left out with a warning") {
+  const auto read_colored = [](const std::string& comment, const std::string& color,
+                               const std::string& of_faces, const std::string& face) {
+    read("ply\nformat ascii 1.0\n" + comment +
+         "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n" + color +
+         "element face 1\nproperty list uchar int vertex_indices\n" + of_faces + "end_header\n" +
+         (color.empty() ? "0 0 0\n1 0 0\n0 1 0\n" : "0 0 0 9\n1 0 0 9\n0 1 0 9\n") + "3 0 1 2" +
+         face + "\n");
+  };
+  const auto lines = [&](const auto&... parts) {
+    const LogCapture log;
+    read_colored(parts...);
+    CHECK(log.contains("m.ply") == (log.lines() > 0));
+    return log.lines();
+  };
+  CHECK(lines("comment made by hand\n", "", "", "") == 0);
+  CHECK(lines("", "property uchar red\n", "", "") == 1);
+  CHECK(lines("", "", "property uchar red\n", " 9") == 1);
+  CHECK(lines("", "", "property list uchar float texcoord\n", " 6 0 0 1 0 0 1") == 1);
+  CHECK(lines("comment TextureFile a b.png\n", "", "", "") == 1);
+  const LogCapture log;
+  read_colored("comment TextureFile a b.png\n", "", "", "");
+  CHECK(log.contains("texture a b.png is left out"));
 }
 
 TEST_CASE("PLY meshes: what is malformed is named") {

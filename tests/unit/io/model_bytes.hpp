@@ -4,8 +4,6 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <cstdint>
-#include <functional>
 #include <initializer_list>
 #include <span>
 #include <string>
@@ -13,7 +11,7 @@
 
 #include "raysplats/gaussians.hpp"
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "data_sets.hpp"
 #include "io/image_file.hpp"
 #include "io/photo.hpp"
-#include "photo_view.hpp"
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/data_sets.hpp"
+#include "unit/io/photo_view.hpp"
+#include "unit/io/scratch.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

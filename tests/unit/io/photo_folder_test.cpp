@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <string>
 
-#include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;

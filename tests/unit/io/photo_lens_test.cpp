@@ -4,7 +4,6 @@
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -12,12 +11,12 @@
 #include <numbers>
 #include <vector>
 
-#include "data_sets.hpp"
 #include "io/colmap_model.hpp"
 #include "io/depth_map.hpp"
 #include "io/transforms.hpp"
 #include "raysplats/dataset.hpp"
 #include "scene/camera_model.hpp"
+#include "unit/io/data_sets.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

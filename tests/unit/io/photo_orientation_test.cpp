@@ -10,7 +10,7 @@
 
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -14,7 +14,7 @@
 #include "io/image_file.hpp"
 #include "raysplats/io.hpp"
 #include "scene/sharpness.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

@@ -6,10 +6,10 @@
 #include <functional>
 #include <string>
 
-#include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "unit/io/data_sets.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

@@ -12,7 +12,7 @@
 #include "io/gaussian_codes.hpp"
 #include "io/ply_points.hpp"
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 

@@ -9,8 +9,9 @@
 #include "io/view_loader.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "scene/pixel_count.hpp"
 #include "skip_test.hpp"
+#include "unit/io/scratch.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -66,8 +67,7 @@ void check_dataset(const fs::path& root, const Expected& expected) {
   io::ViewLoader loader(dataset.views, std::size_t{1} << 30);
   loader.prefetch(dataset.indices(Split::kAll));
   for (std::size_t i = 0; i < dataset.views.size(); ++i) {
-    CHECK(loader.get(i)->words.size() ==
-          static_cast<std::size_t>(expected.width) * static_cast<std::size_t>(expected.height));
+    CHECK(loader.get(i)->words.size() == pixel_count(expected.width, expected.height));
   }
   std::printf(
       "%-40s /%g: %zu train, %zu test, %d x %d, %zu points, opened in %.3f s, all views in %.2f "

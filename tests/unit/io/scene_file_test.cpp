@@ -5,16 +5,15 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <glm/trigonometric.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "data_sets.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_model.hpp"
-#include "scratch.hpp"
+#include "unit/io/data_sets.hpp"
+#include "unit/io/scratch.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

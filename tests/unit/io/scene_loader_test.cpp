@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <random>
 #include <sstream>
 #include <string>
@@ -13,7 +14,8 @@
 
 #include "raysplats/io.hpp"
 #include "reference/scenes.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -227,7 +229,8 @@ TEST_CASE("scene loader: environment, sizes and options") {
   const Environment sky = load_scene(file).scene.environment;
   CHECK(sky.color == Rgb{4, 4, 4});
   CHECK(sky.equirect.channels == 3);
-  CHECK(sky.equirect.data[0] == 2.0f);
+  // The curve goes on above white.
+  CHECK(sky.equirect.data[0] == doctest::Approx(1.055 * std::pow(2.0, 1 / 2.4) - 0.055));
   CHECK(sky.up == std::array<float, 3>{0, 0, 1});
 
   file = folder.read(model + "[trace]\nbackground = [1, 0.5, 0]\nmax-hits = 7\n" + kCamera +
@@ -245,6 +248,99 @@ TEST_CASE("scene loader: environment, sizes and options") {
   file.width.reset();
   file.downscale = 4;
   CHECK(load_scene(file).cameras[0].width == 10);
+}
+
+TEST_CASE("scene loader: environments and textures of light show as those of display values") {
+  const Folder folder;
+  Image display(4, 2, 3), light(4, 2, 3);
+  for (std::size_t i = 0; i < display.data.size(); ++i) {
+    const double value = 0.1 * static_cast<double>(i);  // to 2.3
+    display.data[i] = static_cast<float>(value);
+    light.data[i] = static_cast<float>(value <= 0.04045 ? value / 12.92
+                                                        : std::pow((value + 0.055) / 1.055, 2.4));
+  }
+  const fs::path& scratch = folder.scratch().path();
+  write_image(scratch / "display.exr", display, {}, ColorSpace::kDisplay);
+  write_image(scratch / "light.exr", light, {}, ColorSpace::kLinear);
+  write_image(scratch / "unsaid.exr", light);
+  write_bytes(scratch / "exr.obj",
+              "mtllib exr.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+  for (const std::string name : {"display.exr", "light.exr", "unsaid.exr"}) {
+    CAPTURE(name);
+    write_bytes(scratch / "exr.mtl", "newmtl a\nmap_Kd " + name + "\n");
+    const Scene scene =
+        folder
+            .load(
+                "[[mesh]]\nfile = 'exr.obj'\n[[material]]\nname = 'own'\nkind = 'mirror'\n"
+                "texture = '" +
+                name + "'\n[environment]\nimage = '" + name + "'\n" + kCamera)
+            .scene;
+    REQUIRE(scene.textures.size() == 2);
+    for (const Image* picture :
+         {&scene.environment.equirect, &scene.textures[0], &scene.textures[1]}) {
+      REQUIRE(picture->data.size() == display.data.size());
+      for (std::size_t i = 0; i < display.data.size(); ++i)
+        CHECK(std::abs(picture->data[i] - display.data[i]) < 1e-5f);
+    }
+  }
+}
+
+TEST_CASE("scene loader: texels that no light can have are brought into range and told of") {
+  const Folder folder;
+  const float infinity = std::numeric_limits<float>::infinity();
+  Image sun(5, 1, 3, 1.0f);
+  sun.data[0] = -1e-3f;
+  sun.data[3] = 2e6f;
+  sun.data[4] = infinity;
+  sun.data[7] = std::numeric_limits<float>::quiet_NaN();
+  sun.data[9] = -infinity;
+  const std::string text =
+      "[[mesh]]\nfile = 'sheet.obj'\n[environment]\nimage = 'sun.exr'\n" + kCamera;
+  for (const ColorSpace space : {ColorSpace::kDisplay, ColorSpace::kLinear}) {
+    write_image(folder.scratch() / "sun.exr", sun, {}, space);
+    const LogCapture log;
+    const std::vector<float> data = folder.load(text).scene.environment.equirect.data;
+    const double most =
+        space == ColorSpace::kDisplay ? 1e6 : 1.055 * std::pow(1e6, 1 / 2.4) - 0.055;
+    const std::vector<double> expected{0, 1, 1, most, most, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1};
+    REQUIRE(data.size() == expected.size());
+    for (std::size_t i = 0; i < data.size(); ++i) CHECK(data[i] == doctest::Approx(expected[i]));
+    CHECK(log.contains("sun.exr"));
+    CHECK(log.contains("4 of 5 texels"));
+  }
+  const LogCapture log;
+  folder.load("[[mesh]]\nfile = 'sheet.obj'\n[environment]\nimage = 'sky.exr'\n" + kCamera);
+  CHECK(log.lines() == 0);
+}
+
+TEST_CASE("scene loader: open glass that bends or absorbs light is told of, once") {
+  const Folder folder;
+  write_bytes(folder.scratch() / "wedge.obj",
+              "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  const auto told = [&](const std::string& file, const std::string& glass) {
+    const std::string mesh = "[[mesh]]\nfile = '" + file + "'\nmaterial = 'pane'\n";
+    const LogCapture log;
+    folder.load(mesh + mesh + "[[material]]\nname = 'pane'\n" + glass + kCamera);
+    CHECK(log.lines() == (log.contains("is open (4 edges") ? 1 : 0));
+    return log.contains("sheet.obj: the glass of the material 'pane' is open (4 edges with one");
+  };
+  CHECK(told("sheet.obj", "kind = 'glass'\n"));
+  CHECK(told("sheet.obj", "kind = 'glass'\nior = 1\nabsorption = 2\n"));
+  CHECK_FALSE(told("sheet.obj", "kind = 'glass'\nior = 1\n"));
+  CHECK_FALSE(told("sheet.obj", "kind = 'mirror'\n"));
+  CHECK_FALSE(told("wedge.obj", "kind = 'glass'\n"));
+}
+
+TEST_CASE("scene loader: an orbit around nothing has a camera") {
+  const Folder folder;
+  Gaussians nothing;
+  nothing.resize(0);
+  write_ply(folder.scratch() / "nothing.ply", nothing);
+  const LoadedScene loaded =
+      folder.load("[[model]]\nfile = 'nothing.ply'\n[camera]\norbit = { frames = 2 }\n");
+  CHECK(loaded.frames() == 2);
+  CHECK(loaded.extent.radius > 0.0);
+  for (const Camera& camera : loaded.cameras) CHECK(std::isfinite(glm::length(camera.translation)));
 }
 
 TEST_CASE("scene loader: a smooth mesh can be turned, scaled and mirrored in every way") {

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 
@@ -18,18 +17,6 @@ namespace raysplats::test {
 namespace fs = std::filesystem;
 
 using Scratch = TemporaryDirectory;
-
-inline void write_bytes(const fs::path& path, const std::string& bytes) {
-  fs::create_directories(path.parent_path());
-  // Some file systems flush to disk when a file is truncated, but not when it is removed.
-  fs::remove(path);
-  std::ofstream(path, std::ios::binary) << bytes;
-}
-
-inline std::string read_bytes(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return std::string(std::istreambuf_iterator<char>(stream), {});
-}
 
 /// Appends the little-endian bytes of a number.
 template <class T>

@@ -8,8 +8,8 @@
 #include "deflated_zip.hpp"
 #include "io/webp_texture.hpp"
 #include "io/zip_archive.hpp"
-#include "model_bytes.hpp"
 #include "scene/morton_order.hpp"
+#include "unit/io/model_bytes.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

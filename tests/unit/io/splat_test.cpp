@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <limits>
 
-#include "model_bytes.hpp"
+#include "unit/io/model_bytes.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;

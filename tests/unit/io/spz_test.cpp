@@ -6,8 +6,8 @@
 
 #include "io/compression.hpp"
 #include "io/spz_codes.hpp"
-#include "model_bytes.hpp"
 #include "scene/gaussian_transform.hpp"
+#include "unit/io/model_bytes.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 

@@ -6,10 +6,10 @@
 #include <glm/matrix.hpp>
 #include <string>
 
-#include "data_sets.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
+#include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 

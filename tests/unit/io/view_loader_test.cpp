@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "raysplats/io.hpp"
-#include "scratch.hpp"
+#include "unit/io/scratch.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

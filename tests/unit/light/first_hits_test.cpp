@@ -4,10 +4,10 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "light_fixture.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/tracer.hpp"
 #include "scene/camera_model.hpp"
+#include "unit/light/light_fixture.hpp"
 
 using namespace raysplats;
 using reference::rectangle;

@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
-#include "light_fixture.hpp"
+#include "unit/light/light_fixture.hpp"
 
 using namespace raysplats;
 using reference::rectangle;

@@ -4,9 +4,9 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
-#include <vector>
 
 #include "raysplats/path_tracer.hpp"
 #include "reference/light.hpp"
@@ -15,6 +15,8 @@
 #include "unit/trace/trace_fixture.hpp"
 
 namespace raysplats {
+
+inline const Camera kCamera = reference::cube_camera(24, 24);
 
 /// Forty Gaussians in the cube [-1, 1]^3, with room between them to see what lies behind, under a
 /// dim sky.

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "light_fixture.hpp"
 #include "raysplats/error.hpp"
+#include "unit/light/light_fixture.hpp"
 
 using namespace raysplats;
 

@@ -1,24 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <glm/geometric.hpp>
 #include <limits>
 
-#include "light_fixture.hpp"
 #include "raysplats/error.hpp"
+#include "unit/light/light_fixture.hpp"
 
 using namespace raysplats;
 using reference::ball;
 using reference::box;
 using reference::cube_camera;
+using reference::glass;
 using reference::rectangle;
 using reference::white;
 
 namespace {
-
-Material glass(float ior) {
-  Material out = white(Material::Kind::kGlass);
-  out.ior = ior;
-  return out;
-}
 
 Scene white_sky() {
   Scene scene;
@@ -66,8 +60,6 @@ double share_beyond_three_sigma(const Estimate& found, const std::vector<double>
   REQUIRE(counted > 50);
   return static_cast<double>(beyond) / static_cast<double>(counted);
 }
-
-const Camera kCamera = cube_camera(24, 24);
 
 /// Facets with smooth normals keep a few rays in by total reflection, for good: `lost` of all.
 void check_white_sky(const Camera& camera, int segments, double lost) {

@@ -3,7 +3,6 @@
 #include <glm/matrix.hpp>
 #include <limits>
 #include <stdexcept>
-#include <string>
 
 #include "raysplats/error.hpp"
 #include "raysplats/tracer.hpp"

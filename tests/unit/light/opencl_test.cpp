@@ -9,9 +9,12 @@
 #include "device/platform.hpp"
 #include "raysplats/error.hpp"
 #include "reference/scenes.hpp"
+#include "unit/text.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
+using test::contains;
+using test::message_of;
 
 namespace {
 
@@ -42,20 +45,6 @@ struct Own {
   cl::Context context;
   cl::CommandQueue queue;
 };
-
-template <class Function>
-std::string refusal(const Function& function) {
-  try {
-    function();
-  } catch (const UsageError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 }  // namespace
 
@@ -107,13 +96,14 @@ TEST_CASE("a queue and buffers of the caller's trace what the host's arrays trac
 }
 
 TEST_CASE("queues and buffers that do not fit are refused") {
-  CHECK(contains(refusal([] { make_context(nullptr); }), "no command queue"));
+  CHECK(contains(message_of<UsageError>([] { make_context(nullptr); }), "no command queue"));
   const Own unordered(CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE);
-  CHECK(contains(refusal([&] { make_context(unordered.queue()); }), "out of order"));
+  CHECK(contains(message_of<UsageError>([&] { make_context(unordered.queue()); }), "out of order"));
   const Own own;
   ContextOptions timed;
   timed.profile = true;
-  CHECK(contains(refusal([&] { make_context(own.queue(), timed); }), "CL_QUEUE_PROFILING_ENABLE"));
+  CHECK(contains(message_of<UsageError>([&] { make_context(own.queue(), timed); }),
+                 "CL_QUEUE_PROFILING_ENABLE"));
 
   const auto context = make_context(own.queue());
   const Gaussians gaussians = reference::random_scene(20, 7, 0);
@@ -125,17 +115,22 @@ TEST_CASE("queues and buffers that do not fit are refused") {
   const cl::Buffer elsewhere = other.buffer(std::vector<float>(1000));
   GaussianBuffers buffers{large(), large(), large(), large(), nullptr};
   const std::uint64_t revision = model.revision();
-  CHECK(contains(refusal([&] { copy_gaussians(buffers, model); }), "sh"));
+  CHECK(contains(message_of<UsageError>([&] { copy_gaussians(buffers, model); }), "sh"));
   buffers.sh = large();
   buffers.means = small();
-  CHECK(contains(refusal([&] { copy_gaussians(buffers, model); }), "240 are needed"));
-  CHECK(contains(refusal([&] { copy_gaussians(model, buffers); }), "240 are needed"));
+  CHECK(
+      contains(message_of<UsageError>([&] { copy_gaussians(buffers, model); }), "240 are needed"));
+  CHECK(
+      contains(message_of<UsageError>([&] { copy_gaussians(model, buffers); }), "240 are needed"));
   buffers.means = elsewhere();
-  CHECK(contains(refusal([&] { copy_gaussians(buffers, model); }), "another cl_context"));
+  CHECK(contains(message_of<UsageError>([&] { copy_gaussians(buffers, model); }),
+                 "another cl_context"));
   CHECK(model.revision() == revision);
   CHECK(model.download().means == gaussians.means);
-  CHECK(contains(refusal([&] { trace(tracer, model, small(), 2, large()); }), "64 are needed"));
-  CHECK(contains(refusal([&] { trace(tracer, model, large(), 2, nullptr); }), "missing"));
+  CHECK(contains(message_of<UsageError>([&] { trace(tracer, model, small(), 2, large()); }),
+                 "64 are needed"));
+  CHECK(contains(message_of<UsageError>([&] { trace(tracer, model, large(), 2, nullptr); }),
+                 "missing"));
 }
 
 TEST_CASE("launches keep to their time on a caller's queue that takes no times as well") {

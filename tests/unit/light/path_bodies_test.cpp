@@ -1,25 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bodies that light goes on from: mirrors, glass and veils, against the reference.
-#include "light_fixture.hpp"
+#include "unit/light/light_fixture.hpp"
 
 using namespace raysplats;
 using reference::ball;
 using reference::box;
 using reference::cube_camera;
+using reference::glass;
 using reference::rectangle;
 using reference::white;
-
-namespace {
-
-Material glass(float ior) {
-  Material out = white(Material::Kind::kGlass);
-  out.ior = ior;
-  return out;
-}
-
-const Camera kCamera = cube_camera(24, 24);
-
-}  // namespace
 
 TEST_CASE("mirrors") {
   Context context = make_test_context();

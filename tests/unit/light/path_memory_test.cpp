@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "light/path_memory.hpp"
 
-#include "light_fixture.hpp"
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
+#include "unit/light/light_fixture.hpp"
 
 using namespace raysplats;
 using reference::ball;
@@ -20,8 +21,7 @@ double bytes_held(const Scene& scene, const Camera& camera) {
 
 double estimated(const Scene& scene, const Camera& camera) {
   const PathMemory memory(scene, make_test_context().device());
-  return static_cast<double>(memory.total(static_cast<std::size_t>(camera.width) *
-                                          static_cast<std::size_t>(camera.height)));
+  return static_cast<double>(memory.total(pixel_count(camera)));
 }
 
 /// All rays one by one: what packets take at most is more than they mostly do.

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "light/view_tracer.hpp"
-#include "light_fixture.hpp"
 #include "raysplats/error.hpp"
 #include "trace/camera_tracer.hpp"
+#include "unit/light/light_fixture.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -25,12 +25,6 @@ using reference::box;
 using reference::cube_camera;
 using reference::rectangle;
 using reference::white;
-
-namespace {
-
-const Camera kCamera = cube_camera(24, 24);
-
-}  // namespace
 
 TEST_CASE("Gaussians alone are drawn along their rays before the environment [small]") {
   Context context = make_test_context();

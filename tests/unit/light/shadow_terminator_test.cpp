@@ -6,11 +6,10 @@
 #include <cstdint>
 #include <cstring>
 #include <numbers>
-#include <vector>
 
 #include "light/surface_store.hpp"
-#include "light_fixture.hpp"
 #include "trace/camera_rays.hpp"
+#include "unit/light/light_fixture.hpp"
 
 using namespace raysplats;
 using reference::ball;

@@ -12,6 +12,7 @@
 #include "reference/sky.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/gaussian_transform.hpp"
+#include "scene/pixel_count.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;
@@ -85,8 +86,7 @@ void check_view(Context& context,
                 const TraceOptions& options,
                 const Camera& camera,
                 bool by_rays) {
-  const std::size_t pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels = pixel_count(camera);
   std::vector<float> gradient = random_image_gradient(pixels, 7);
   const Expected expected = expected_of(reference::Parameters(model), options, camera, gradient);
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
@@ -112,7 +112,7 @@ void check_view(Context& context,
   CHECK(wrong == 0);
   CHECK(compared * 2 > pixels);
   CHECK(seen > pixels / 8);
-  check_gradients(got.gradients, expected.gradients, 1e-3);
+  CHECK_ERRORS(errors_of(got.gradients, expected.gradients), 1e-3);
   REQUIRE(tracer.sky() != nullptr);
   CHECK(relative_error(tracer.sky()->gradient().download(), expected.sky) < 1e-3);
 }

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -14,42 +13,18 @@
 
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
+#include "unit/text.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
+using test::message_of;
 
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-std::vector<Ray> random_rays(std::size_t count, std::uint64_t seed) {
-  CounterRng rng(seed, 6);
-  std::vector<Ray> rays(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const glm::dvec3 o = 2.0 * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
-    const glm::dvec3 target = 0.5 * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
-    const glm::dvec3 d = (target - o) * std::exp(rng.normal());
-    for (int k = 0; k < 3; ++k) {
-      rays[i].origin[k] = static_cast<float>(o[k]);
-      rays[i].direction[k] = static_cast<float>(d[k]);
-    }
-    rays[i].t_min = i % 3 == 0 ? 0.2f : 0.0f;
-    rays[i].t_max = i % 4 == 0 ? rays[i].t_min + 1.0f : kInfinity;
-  }
-  return rays;
-}
-
 glm::dvec3 vec(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
-
-std::string message_of(const auto& call) {
-  try {
-    call();
-  } catch (const UsageError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 double loss_of(const reference::RayTrace& trace, const RayResultGradient& g) {
   double loss = static_cast<double>(g.alpha) * trace.alpha;
@@ -94,7 +69,7 @@ TEST_CASE("gradients of rays equal central differences of a double reference [sm
                                     static_cast<double>(ray.t_min), static_cast<double>(ray.t_max),
                                     mode);
       };
-      const std::vector<Ray> rays = random_rays(150, 32);
+      const std::vector<Ray> rays = random_rays(150, 32, 2.0, 0.5, kInfinity);
       CounterRng rng(33, 1);
       std::vector<RayResultGradient> gradients(rays.size());
       for (RayResultGradient& g : gradients) g = random_gradient(rng);
@@ -241,7 +216,7 @@ TEST_CASE("a tracer follows its model, and refuses gradients of a state that is 
   Model model(context, gaussians);
   Tracer tracer(context);
   const Camera camera = reference::cube_camera(24, 20);
-  const std::vector<Ray> rays = random_rays(50, 38);
+  const std::vector<Ray> rays = random_rays(50, 38, 2.0, 0.5, kInfinity);
   const Image before = tracer.render(model, camera, true);
   tracer.trace(model, rays, ColorDirection::kRay, true);
   const std::uint64_t revision = model.revision();
@@ -316,7 +291,8 @@ TEST_CASE("a tracer with a mirror sees, and differentiates, what a camera behind
   CHECK(std::sqrt(off / size) < 1e-3);
 
   const std::vector<Ray> ray{{{0, 0, 0}, 0, {0, 0, 1}, kInfinity}};
-  CHECK(message_of([&] { tracer.trace(model, ray); }).find("mirrors") != std::string::npos);
+  CHECK(message_of<UsageError>([&] { tracer.trace(model, ray); }).find("mirrors") !=
+        std::string::npos);
 }
 
 TEST_CASE("a picture can be stopped while it is drawn") {
@@ -388,10 +364,11 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
 
   Gaussians wrong = gaussians;
   wrong.quaternions.pop_back();
-  CHECK(message_of([&] { Model(context, wrong); }).find("quaternions") != std::string::npos);
+  CHECK(message_of<UsageError>([&] { Model(context, wrong); }).find("quaternions") !=
+        std::string::npos);
   wrong = gaussians;
   wrong.sh_degree = 2;
-  CHECK(message_of([&] { model.assign(wrong); }).find("sh") != std::string::npos);
+  CHECK(message_of<UsageError>([&] { model.assign(wrong); }).find("sh") != std::string::npos);
   wrong.sh_degree = 5;
   CHECK_THROWS_AS(Model(context, wrong), UsageError);
   wrong = gaussians;
@@ -402,7 +379,7 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
   const Ray good{{0, 0, -3}, 0, {0, 0, 1}, kInfinity};
   const auto refused = [&](const Ray& bad) {
     const std::vector<Ray> rays{good, bad};
-    return message_of([&] { tracer.trace(model, rays); });
+    return message_of<UsageError>([&] { tracer.trace(model, rays); });
   };
   CHECK(refused(good).empty());
   Ray bad = good;
@@ -454,7 +431,7 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
     Camera broken = camera;
     broken.model = lens;
     broken.translation.y = static_cast<double>(kNan);
-    CHECK(message_of([&] { tracer.render(model, broken); }).find("not finite") !=
+    CHECK(message_of<UsageError>([&] { tracer.render(model, broken); }).find("not finite") !=
           std::string::npos);
     broken = camera;
     broken.model = lens;
@@ -464,8 +441,9 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
       broken = camera;
       broken.model = lens;
       for (int k = 0; k < 3; ++k) broken.rotation[k] *= factors[k];
-      CHECK(message_of([&] { tracer.render(model, broken); }).find("scales, shears or mirrors") !=
-            std::string::npos);
+      CHECK(message_of<UsageError>([&] {
+              tracer.render(model, broken);
+            }).find("scales, shears or mirrors") != std::string::npos);
       CHECK_THROWS_AS(tracer.normals(model, broken), UsageError);
     }
     // What single precision and a step along a tangent leave of a rotation.
@@ -476,7 +454,7 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
   }
 
   for (const float value : {kNan, kInfinity}) {
-    CHECK(message_of([&] {
+    CHECK(message_of<UsageError>([&] {
             tracer.set_background({0, value, 0});
           }).find("not finite") != std::string::npos);
     TraceOptions behind;
@@ -487,7 +465,7 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
 
   Context second = make_test_context();
   const Model elsewhere(second, gaussians);
-  CHECK(message_of([&] { tracer.render(elsewhere, camera); }).find("another context") !=
+  CHECK(message_of<UsageError>([&] { tracer.render(elsewhere, camera); }).find("another context") !=
         std::string::npos);
   CHECK_THROWS_AS(tracer.trace(elsewhere, rays), UsageError);
 
@@ -505,7 +483,7 @@ TEST_CASE("threads that share a context take turns") {
   Context context = make_test_context();
   const Model model(context, reference::random_scene(300, 40, 1));
   const Camera camera = reference::cube_camera(32, 24);
-  const std::vector<Ray> rays = random_rays(64, 41);
+  const std::vector<Ray> rays = random_rays(64, 41, 2.0, 0.5, kInfinity);
   Tracer tracer(context);
   const Image expected = tracer.render(model, camera);
   const std::vector<RayResult> results = tracer.trace(model, rays);

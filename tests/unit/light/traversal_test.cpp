@@ -44,7 +44,7 @@ TEST_CASE("camera rays through the tree have the picture and the gradients of th
         const Traced b = trace_and_differentiate(context, tree, gaussians, camera, gradient);
         CHECK(compare(a.image, expected).maximum < 2e-3);
         CHECK(compare(b.image, expected).maximum < 2e-3);
-        check_gradients(b.gradients, a.gradients, 1e-3);
+        CHECK_ERRORS(errors_of(b.gradients, a.gradients), 1e-3);
       }
     }
   }

@@ -22,22 +22,9 @@ using reference::Triangle;
 
 namespace {
 
-constexpr float kFar = std::numeric_limits<float>::max();
-
 glm::dvec3 origin_of(const Ray& ray) { return {ray.origin[0], ray.origin[1], ray.origin[2]}; }
 glm::dvec3 direction_of(const Ray& ray) {
   return {ray.direction[0], ray.direction[1], ray.direction[2]};
-}
-
-Ray make_ray(const glm::dvec3& o, const glm::dvec3& d, float t_min = 0.0f, float t_max = kFar) {
-  Ray ray{};
-  for (int j = 0; j < 3; ++j) {
-    ray.origin[j] = static_cast<float>(o[j]);
-    ray.direction[j] = static_cast<float>(d[j]);
-  }
-  ray.t_min = t_min;
-  ray.t_max = t_max;
-  return ray;
 }
 
 /// Triangles of many sizes anywhere in the cube [-1, 1]^3.
@@ -58,7 +45,7 @@ Mesh triangle_soup(std::size_t count, std::uint64_t seed, double size) {
   return mesh;
 }
 
-std::vector<Ray> random_rays(std::size_t count, std::uint64_t seed) {
+std::vector<Ray> axis_rays(std::size_t count, std::uint64_t seed) {
   CounterRng rng(seed, 2);
   std::vector<Ray> rays;
   rays.reserve(count);
@@ -170,7 +157,7 @@ void check_against_brute_force(Context& context,
 
 TEST_CASE("a million rays meet the triangles that brute force finds") {
   Context context = make_test_context();
-  check_against_brute_force(context, {triangle_soup(16, 1, 0.5)}, random_rays(1000000, 1));
+  check_against_brute_force(context, {triangle_soup(16, 1, 0.5)}, axis_rays(1000000, 1));
 }
 
 TEST_CASE("every width of the tree finds the same [small]") {
@@ -180,7 +167,7 @@ TEST_CASE("every width of the tree finds the same [small]") {
     check_against_brute_force(context,
                               {triangle_soup(700, 2, 0.08), triangle_soup(333, 3, 0.05),
                                reference::ball({0.2, 0.1, 0}, 0.7, 9, 0, false)},
-                              random_rays(4000, 2), lanes);
+                              axis_rays(4000, 2), lanes);
   }
 }
 
@@ -188,7 +175,7 @@ TEST_CASE("a few triangles are met in trees of every width [tiny]") {
   Context context = make_test_context();
   for (const int lanes : {4, 8, 16}) {
     CAPTURE(lanes);
-    check_against_brute_force(context, {triangle_soup(70, 4, 0.5)}, random_rays(60, 3), lanes);
+    check_against_brute_force(context, {triangle_soup(70, 4, 0.5)}, axis_rays(60, 3), lanes);
   }
 }
 
@@ -199,7 +186,7 @@ TEST_CASE("trees of every depth and fill are sound") {
     TriangleTracer tracer(context);
     const std::vector<Mesh> meshes = {triangle_soup(count, 40 + count, 0.2)};
     tracer.build(meshes);
-    const std::vector<Ray> rays = random_rays(count > 1000 ? 1000 : 4000, count);
+    const std::vector<Ray> rays = axis_rays(count > 1000 ? 1000 : 4000, count);
     const Agreement a =
         compare_all(reference::triangles_of(meshes), rays, trace(context, tracer, rays));
     CHECK(a.different == 0);
@@ -305,7 +292,7 @@ TEST_CASE("light that passes is the product over the crossed triangles [small]")
     materials[i].shadow = opacities.back();
     triangles[i].material = i;
   }
-  std::vector<Ray> rays = random_rays(4000, 9);
+  std::vector<Ray> rays = axis_rays(4000, 9);
   std::vector<std::int32_t> skipped;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     skipped.push_back(i % 2 == 0 ? -1 : static_cast<std::int32_t>(rng.below(triangles.size())));
@@ -414,7 +401,7 @@ TEST_CASE("degenerate triangles are never met and hide nothing [small]") {
     // Three different points on a line of exact numbers.
     add({-1, 0.5, 0.25}, {0, 0.5, 0.25}, {2, 0.5, 0.25});
   }
-  std::vector<Ray> rays = random_rays(5000, 12);
+  std::vector<Ray> rays = axis_rays(5000, 12);
   for (int i = 0; i < 500; ++i) {  // many of them through the line
     const glm::dvec3 o(rng.normal(), rng.normal(), 3);
     rays.push_back(make_ray(o, glm::dvec3(rng.uniform(), 0.5, 0.25) - o));

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <doctest/doctest.h>
-
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -10,19 +8,6 @@
 #include "unit/trace/trace_fixture.hpp"
 
 namespace raysplats {
-
-template <class Expected>
-void check_gradients(const HostGradients& got, const Expected& expected, double limit) {
-  const auto check = [&](const char* what, const std::vector<float>& a, const auto& b) {
-    CAPTURE(what);
-    CHECK(relative_error(a, std::vector<double>(b.begin(), b.end())) < limit);
-  };
-  check("means", got.means, expected.means);
-  check("quaternions", got.quaternions, expected.quaternions);
-  check("scales", got.scales, expected.scales);
-  check("opacities", got.opacities, expected.opacities);
-  check("sh", got.sh, expected.sh);
-}
 
 struct Traced {
   Image image;

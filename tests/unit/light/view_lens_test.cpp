@@ -57,8 +57,9 @@ void check_lens(Context& context, const Gaussians& model, CameraModel lens, int 
     CHECK(got.image.data[4 * i + 3] == doctest::Approx(expected[i].alpha).epsilon(2e-3));
   }
   CHECK(compared > pixels / 2);
-  check_gradients(got.gradients, reference::ray_gradient(parameters, options, queries, wide, mode),
-                  1e-3);
+  CHECK_ERRORS(
+      errors_of(got.gradients, reference::ray_gradient(parameters, options, queries, wide, mode)),
+      1e-3);
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ TEST_CASE("a pinhole's gradients ray by ray are those of packets") {
   const Traced expected = trace_and_differentiate(context, packets, gaussians, camera, gradient);
   const Traced got = trace_and_differentiate(context, rays, gaussians, camera, gradient, true);
   CHECK(compare(got.image, render).maximum < 2e-3);
-  check_gradients(got.gradients, expected.gradients, 1e-3);
+  CHECK_ERRORS(errors_of(got.gradients, expected.gradients), 1e-3);
 
   // In batches that are traced again; 58 x 66 pixels are less than one.
   const Camera large = look_at({0.4, -0.6, -4.0}, {0, 0, 0}, {0, 1, 0}, 110, 90, 150);
@@ -42,7 +42,7 @@ TEST_CASE("a pinhole's gradients ray by ray are those of packets") {
   const Traced whole = trace_and_differentiate(context, rays, gaussians, large, noise, true);
   const Traced parts = trace_and_differentiate(context, batches, gaussians, large, noise, true);
   CHECK(whole.image.data == parts.image.data);
-  check_gradients(parts.gradients, whole.gradients, 1e-4);
+  CHECK_ERRORS(errors_of(parts.gradients, whole.gradients), 1e-4);
   // Exact sums do not notice the batches.
   options.gradient_sum = tight.gradient_sum = GradientSum::kExact;
   ViewTracer exact(context, options), exact_batches(context, tight);

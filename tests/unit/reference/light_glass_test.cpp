@@ -20,12 +20,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-Material glass(float ior) {
-  Material out = white(Material::Kind::kGlass);
-  out.ior = ior;
-  return out;
-}
-
 Scene plain_scene() {
   Scene scene;
   scene.render.ambient = {0, 0, 0};

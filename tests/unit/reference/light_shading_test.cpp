@@ -4,7 +4,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
-#include <vector>
 
 #include "reference/light.hpp"
 #include "reference/light_scenes.hpp"

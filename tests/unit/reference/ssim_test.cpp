@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -60,7 +61,7 @@ TEST_CASE("one pixel has the closed form of its window weight") {
 TEST_CASE("the gradient of SSIM equals finite differences") {
   for (const auto& [width, height] :
        {std::pair(13, 14), std::pair(5, 3), std::pair(1, 1), std::pair(23, 2)}) {
-    const auto size = static_cast<std::size_t>(width * height);
+    const std::size_t size = pixel_count(width, height);
     auto image = noise(size, 3);
     const auto target = noise(size, 4);
     const auto gradient = ssim_gradient(image, target, width, height);

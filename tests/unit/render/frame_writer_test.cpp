@@ -12,6 +12,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render/previews.hpp"
+#include "scene/pixel_count.hpp"
 #include "trace/camera_tracer.hpp"
 #include "unit/fixture.hpp"
 
@@ -44,8 +45,7 @@ std::vector<float> exr_channel(const fs::path& path, const std::string& name) {
   const OIIO::ImageSpec& spec = file->spec();
   const int channel = spec.channelindex(name);
   REQUIRE(channel >= 0);
-  std::vector<float> values(static_cast<std::size_t>(spec.width) *
-                            static_cast<std::size_t>(spec.height));
+  std::vector<float> values(pixel_count(spec.width, spec.height));
   REQUIRE(file->read_image(0, 0, channel, channel + 1, OIIO::TypeDesc::FLOAT, values.data()));
   return values;
 }

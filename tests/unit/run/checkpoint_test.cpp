@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -40,11 +39,6 @@ Checkpoint sample(std::int64_t iteration) {
   c.sections["empty"] = {};
   c.sections["sh"] = std::vector<float>(1000, 0.25f);
   return c;
-}
-
-std::string read_file(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
 }  // namespace
@@ -95,7 +89,7 @@ TEST_CASE("sections are made one behind the other while the file is written, whi
   Checkpoint head = c;
   head.sections.clear();
   write_checkpoint(folder / "parts.rsck", head, sections);
-  CHECK(read_file(folder / "parts.rsck") == read_file(folder / "whole.rsck"));
+  CHECK(read_bytes(folder / "parts.rsck") == read_bytes(folder / "whole.rsck"));
   CHECK(asked == std::vector<std::string>{"empty", "means", "sh"});
 
   // One that cannot be made leaves no file.
@@ -132,7 +126,7 @@ TEST_CASE("every truncation and every flipped bit is noticed") {
   Checkpoint c = sample(1);
   c.sections["sh"].resize(4);
   write_checkpoint(path, c);
-  const std::string good = read_file(path);
+  const std::string good = read_bytes(path);
   const auto rejected = [&](const std::string& content) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << content;
     try {
@@ -181,7 +175,7 @@ TEST_CASE("the newest valid checkpoint is found and old ones go") {
   }
   CHECK(load_latest_checkpoint(folder.path()).iteration == 1000);
   CHECK(load_latest_checkpoint(checkpoint_path(folder.path(), 100)).iteration == 100);
-  std::string bad = read_file(checkpoint_path(folder.path(), 1000));
+  std::string bad = read_bytes(checkpoint_path(folder.path(), 1000));
   bad.back() = static_cast<char>(bad.back() + 1);
   write_text_file(checkpoint_path(folder.path(), 1000), bad);
   CHECK(load_latest_checkpoint(folder.path()).iteration == 200);

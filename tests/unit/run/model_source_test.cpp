@@ -11,6 +11,7 @@
 #include "raysplats/io.hpp"
 #include "run/run_folder.hpp"
 #include "run/train_config.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/temporary_directory.hpp"
 
 using namespace raysplats;
@@ -123,8 +124,15 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   scene.models.resize(2);
   scene.models[0].file = other;
   scene.models[1].file = moved;
+  const LogCapture log;
   find_models(scene);
   CHECK(scene.trained.quantile == shown.quantile);
+  CHECK(log.lines() == 1);
+  CHECK(log.contains("all models are traced as " + moved.string() + " wants it"));
+  scene.models[0].file = moved;
+  find_models(scene);
+  CHECK(log.lines() == 1);
+  scene.models[0].file = other;
   scene.models[1].file = other;
   find_models(scene);
   CHECK(scene.trained.hit_order == HitOrder::kPeak);

@@ -8,23 +8,15 @@
 #include <numbers>
 #include <vector>
 
+#include "reference/scenes.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
+using reference::posed;
 
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-Camera posed(CameraModel model, int width, int height, double fx, double fy, Distortion d = {}) {
-  Camera camera = look_at({1.5, -0.7, 2.0}, {-0.3, 0.4, 0.1}, {0.1, -1, 0.2}, width, height, fx);
-  camera.fy = fy;
-  camera.cx += 3.25;
-  camera.cy -= 1.75;
-  camera.model = model;
-  camera.distortion = d;
-  return camera;
-}
 
 /// A camera at the origin that looks along z.
 Camera plain(CameraModel model, int width, int height, double focal, Distortion d = {}) {

@@ -3,7 +3,6 @@
 
 #include <doctest/doctest.h>
 
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
@@ -12,6 +11,7 @@
 #include <numbers>
 #include <string>
 
+#include "scene/mesh_edges.hpp"
 #include "unit/text.hpp"
 #include "util/rng.hpp"
 
@@ -246,6 +246,32 @@ TEST_CASE("back-to-back triangles keep a normal each, unused vertices get any un
     }
   }
   CHECK(glm::length(at(mesh.normals, 3)) == doctest::Approx(1.0));
+}
+
+TEST_CASE("edges are open where no other triangle has both ends at the same positions") {
+  // A tetrahedron whose vertices are all apart, with -0 for one 0; the last face has a material.
+  Mesh body;
+  for (const int corner : {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3}) {
+    body.triangles.push_back(static_cast<std::uint32_t>(body.vertex_count()));
+    for (int c = 1; c <= 3; ++c) body.positions.push_back(corner == c ? 1.0f : 0.0f);
+  }
+  body.positions[0] = -0.0f;
+  body.positions[1] = -2e-7f;  // as rounding leaves it at the seam of a sphere
+  body.materials = {0, 0, 0, 4};
+  using Open = std::map<std::uint32_t, std::size_t>;
+  CHECK(open_edges(body).empty());
+  Mesh open = body;
+  open.triangles.resize(9);
+  open.materials.resize(3);
+  CHECK(open_edges(open) == Open{{0, 3}});
+  Mesh lonely = body;
+  lonely.triangles.erase(lonely.triangles.begin(), lonely.triangles.begin() + 9);
+  lonely.materials = {4};
+  CHECK(open_edges(lonely) == Open{{4, 3}});
+  // A triangle without area opens nothing.
+  body.triangles.insert(body.triangles.end(), {0, 0, 1});
+  body.materials.push_back(7);
+  CHECK(open_edges(body).empty());
 }
 
 TEST_CASE("normals without direction are replaced and the others normalized") {

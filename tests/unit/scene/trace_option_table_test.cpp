@@ -7,6 +7,7 @@
 #include <string>
 
 #include "raysplats/error.hpp"
+#include "unit/text.hpp"
 
 using namespace raysplats;
 
@@ -14,13 +15,9 @@ namespace {
 
 std::string refusal(const char* name, const std::vector<std::string>& values) {
   TraceSettings settings;
-  try {
-    settings.set(name, values);
-  } catch (const UsageError& error) {
-    CHECK_FALSE(settings.has(name));
-    return error.what();
-  }
-  return "";
+  const std::string message = test::message_of<UsageError>([&] { settings.set(name, values); });
+  CHECK(settings.has(name) == message.empty());
+  return message;
 }
 
 }  // namespace

@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include "scene/pixel_count.hpp"
 #include "skip_test.hpp"
 #include "trace/gradient_sums.hpp"
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 
 namespace {
-
-struct Errors {
-  double means, quaternions, scales, opacities, sh;
-  double worst() const { return std::max({means, quaternions, scales, opacities, sh}); }
-};
 
 HostGradients gradients_on_device(Context& context,
                                   const Gaussians& model,
@@ -36,11 +32,11 @@ std::vector<float> without_ties(std::vector<float> gradient, const reference::Re
   return gradient;
 }
 
-Errors compare_gradients(Context& context,
-                         const Gaussians& model,
-                         const TraceOptions& options,
-                         const Camera& camera,
-                         ScaleActivation activation = ScaleActivation::kExp) {
+GradientErrors compare_gradients(Context& context,
+                                 const Gaussians& model,
+                                 const TraceOptions& options,
+                                 const Camera& camera,
+                                 ScaleActivation activation = ScaleActivation::kExp) {
   const reference::Parameters parameters(model, activation);
   const reference::Render render = reference::render(parameters, options, camera);
   const std::vector<float> image_gradient =
@@ -50,41 +46,17 @@ Errors compare_gradients(Context& context,
       reference::render_gradient(parameters, options, camera, wide);
   const HostGradients got =
       gradients_on_device(context, model, options, camera, activation, image_gradient);
-  return {relative_error(got.means, expected.parameters.means),
-          relative_error(got.quaternions, expected.parameters.quaternions),
-          relative_error(got.scales, expected.parameters.scales),
-          relative_error(got.opacities, expected.parameters.opacities),
-          relative_error(got.sh, expected.parameters.sh)};
+  return errors_of(got, expected.parameters);
 }
 
-#define CHECK_ERRORS(errors, limit)                                                  \
-  do {                                                                               \
-    const Errors e_ = errors;                                                        \
-    INFO("means ", e_.means, " quaternions ", e_.quaternions, " scales ", e_.scales, \
-         " opacities ", e_.opacities, " sh ", e_.sh);                                \
-    CHECK(e_.worst() < (limit));                                                     \
-  } while (false)
-
-void check_every_variant(Gaussians model, const Camera& camera) {
+void check_every_variant(const Gaussians& model, const Camera& camera) {
   Context context = make_test_context();
-  // Sigmoid scales stay below 1.
-  for (float& scale : model.log_scales) scale = std::min(scale, -0.2f);
-  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
-    for (const bool adaptive : {false, true}) {
-      for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
-        CAPTURE(static_cast<int>(order));
-        CAPTURE(adaptive);
-        CAPTURE(static_cast<int>(activation));
-        TraceOptions options;
-        options.hit_order = order;
-        options.adaptive_radius = adaptive;
-        options.background = {0.25f, 0.5f, 1.0f};
-        CHECK_ERRORS(compare_gradients(context, model, options, camera, activation), 1e-3);
+  for_every_variant(
+      model, [&](const Gaussians& bounded, TraceOptions options, ScaleActivation activation) {
+        CHECK_ERRORS(compare_gradients(context, bounded, options, camera, activation), 1e-3);
         options.packet_shape = PacketShape::kGroup;
-        CHECK_ERRORS(compare_gradients(context, model, options, camera, activation), 1e-3);
-      }
-    }
-  }
+        CHECK_ERRORS(compare_gradients(context, bounded, options, camera, activation), 1e-3);
+      });
 }
 
 }  // namespace
@@ -136,9 +108,9 @@ TEST_CASE("what raises a clamped colour passes where it is asked for [small]") {
     TraceOptions options;
     options.raise_clamped = raises;
     CHECK_ERRORS(compare_gradients(context, dark, options, camera), 1e-3);
-    const HostGradients found = gradients_on_device(
-        context, dark, options, camera, ScaleActivation::kExp,
-        std::vector<float>(4 * static_cast<std::size_t>(camera.width * camera.height), -1.0f));
+    const HostGradients found =
+        gradients_on_device(context, dark, options, camera, ScaleActivation::kExp,
+                            std::vector<float>(4 * pixel_count(camera), -1.0f));
     for (std::size_t i = 0; i < dark.size(); i += 2)
       moved[raises] += std::abs(static_cast<double>(found.sh[3 * i]));
   }
@@ -206,14 +178,7 @@ TEST_CASE("packet widths, every way of adding and recomputed hits give the same 
     CAPTURE(what);
     const HostGradients got =
         gradients_on_device(context, model, variant, camera, ScaleActivation::kExp, image_gradient);
-    const auto error = [](const std::vector<float>& a, const std::vector<float>& b) {
-      return relative_error(a, std::vector<double>(b.begin(), b.end()));
-    };
-    CHECK(error(got.means, base.means) < 1e-4);
-    CHECK(error(got.quaternions, base.quaternions) < 1e-4);
-    CHECK(error(got.scales, base.scales) < 1e-4);
-    CHECK(error(got.opacities, base.opacities) < 1e-4);
-    CHECK(error(got.sh, base.sh) < 1e-4);
+    CHECK_ERRORS(errors_of(got, base), 1e-4);
   };
   for (const Packet& packet : packets({1, 2, 4, 8}, {8, 32, 64})) {
     CAPTURE(packet);

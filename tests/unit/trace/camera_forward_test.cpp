@@ -8,7 +8,7 @@
 #include "raysplats/error.hpp"
 #include "trace/candidate_lists.hpp"
 #include "trace/view_sizes.h"
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 
@@ -29,24 +29,12 @@ void check_against_reference(Context& context,
   CHECK(difference.maximum < 2e-3);
 }
 
-void check_every_variant(Gaussians model, const Camera& camera) {
+void check_every_variant(const Gaussians& model, const Camera& camera) {
   Context context = make_test_context();
-  // Sigmoid scales stay below 1.
-  for (float& scale : model.log_scales) scale = std::min(scale, -0.2f);
-  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
-    for (const bool adaptive : {false, true}) {
-      for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
-        CAPTURE(static_cast<int>(order));
-        CAPTURE(adaptive);
-        CAPTURE(static_cast<int>(activation));
-        TraceOptions options;
-        options.hit_order = order;
-        options.adaptive_radius = adaptive;
-        options.background = {0.25f, 0.5f, 1.0f};
-        check_against_reference(context, model, options, camera, activation);
-      }
-    }
-  }
+  for_every_variant(model, [&](const Gaussians& bounded, const TraceOptions& options,
+                               ScaleActivation activation) {
+    check_against_reference(context, bounded, options, camera, activation);
+  });
 }
 
 }  // namespace
@@ -450,6 +438,29 @@ TEST_CASE("lists that 32 bits cannot count are refused before anything is writte
   overflow.clear();
   lists.build_ahead(boxes, converted, {0, 0, 256, 255}, std::size_t{1} << 30, counters, overflow);
   CHECK(overflow.read(0) == 1);
+}
+
+TEST_CASE("lists with all the room that the largest buffer gives fit it, padding included") {
+  DeviceInfo device = test_device();
+  device.max_allocation = 1 << 20;  // boxes of 65536 candidates, 16 of them padding
+  Context context(device);
+  constexpr std::size_t kCount = 100;
+  Gaussians model = reference::random_scene(kCount, 17, 0);
+  for (std::size_t i = 0; i < 3 * kCount; ++i) model.means[i] = model.log_scales[i] = 0.0f;
+  Camera camera = reference::cube_camera(30, 30);
+  camera.fx = camera.fy = 200.0;
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const Buffer<RsAabb> boxes(context, kCount, "boxes");
+  const RsCamera converted = device_camera(camera, 0.0f);
+  CandidateLists lists(context, 1);
+  lists.prepare(gaussians, converted, {}, TraceOptions{});
+  Buffer<std::uint32_t> counters(context, RS_COUNT_WORDS, "counters");
+  counters.clear();
+  // Every Gaussian meets every tile of one pixel: 60000 of them, for which a quarter more would be
+  // too much.
+  REQUIRE(lists.build(boxes, converted, {0, 0, 30, 20}, std::size_t{1} << 30, counters));
+  CHECK(counters.read(RS_COUNT_CANDIDATES) == 600 * kCount);
+  CHECK_FALSE(lists.build(boxes, converted, {0, 0, 30, 22}, std::size_t{1} << 30, counters));
 }
 
 TEST_CASE("pictures as wide as can be are traced to their last pixel") {

@@ -13,23 +13,15 @@
 #include <numbers>
 
 #include "scene/camera_model.hpp"
+#include "scene/pixel_count.hpp"
 #include "scene/pixel_places.hpp"
 #include "shared/random.h"
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
+using reference::posed;
 
 namespace {
-
-Camera posed(CameraModel model, int width, int height, double fx, double fy, Distortion d = {}) {
-  Camera camera = look_at({1.5, -0.7, 2.0}, {-0.3, 0.4, 0.1}, {0.1, -1, 0.2}, width, height, fx);
-  camera.fy = fy;
-  camera.cx += 3.25;
-  camera.cy -= 1.75;
-  camera.model = model;
-  camera.distortion = d;
-  return camera;
-}
 
 /// Numbers as calibrations of phones, action cameras and 180 and 220 degree lenses give them.
 std::vector<Camera> cameras() {
@@ -50,8 +42,7 @@ std::vector<Camera> cameras() {
 std::vector<Ray> make_rays(Context& context, const Camera& camera, const Lens& lens = {}) {
   CameraRays generator(context);
   Buffer<Ray> rays;
-  const std::size_t pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels = pixel_count(camera);
   generator.generate(camera, lens, 0, pixels, rays);
   std::vector<Ray> out(pixels);
   rays.download(std::span<Ray>(out));

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <vector>
 
 #include "scene/camera_model.hpp"
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 

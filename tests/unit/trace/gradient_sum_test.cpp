@@ -9,8 +9,8 @@
 #include "trace/exact_sum.h"
 #include "trace/gradient_sums.hpp"
 #include "trace/launch_budget.hpp"
-#include "trace_fixture.hpp"
 #include "unit/log_capture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 

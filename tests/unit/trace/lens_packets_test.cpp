@@ -8,10 +8,11 @@
 
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
+#include "scene/pixel_count.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/lens_tiles.hpp"
 #include "trace/ray_backward.hpp"
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 
@@ -123,16 +124,6 @@ std::vector<float> gradient_without_ties(const Expected& expected) {
   return gradient;
 }
 
-void check_gradients(const HostGradients& got,
-                     const reference::Parameters& expected,
-                     double limit) {
-  CHECK(relative_error(got.means, expected.means) < limit);
-  CHECK(relative_error(got.quaternions, expected.quaternions) < limit);
-  CHECK(relative_error(got.scales, expected.scales) < limit);
-  CHECK(relative_error(got.opacities, expected.opacities) < limit);
-  CHECK(relative_error(got.sh, expected.sh) < limit);
-}
-
 reference::Parameters expected_gradient(const reference::Parameters& parameters,
                                         const TraceOptions& options,
                                         const Expected& expected,
@@ -159,8 +150,9 @@ void check_view(Context& context, const View& view, const Gaussians& model, Trac
   tracer.forward(gaussians, view.camera, true);
   check_picture(tracer.download_image(), tracer.download_depth(), expected);
   const std::vector<float> gradient = gradient_without_ties(expected);
-  check_gradients(backward(context, tracer, gaussians, gradient),
-                  expected_gradient(parameters, options, expected, gradient), 1e-3);
+  CHECK_ERRORS(errors_of(backward(context, tracer, gaussians, gradient),
+                         expected_gradient(parameters, options, expected, gradient)),
+               1e-3);
 }
 
 }  // namespace
@@ -303,17 +295,7 @@ TEST_CASE("the screen gradients of a lens are those of its rays one by one") {
     GaussianGradients out;
     ray_backward.finish(gaussians, out);
     const HostGradients single(out);
-    std::vector<float> screen, absolute;
-    std::vector<double> expected_screen, expected_absolute;
-    for (std::size_t i = 0; i < model.size(); ++i) {
-      CHECK(packets.screen[3 * i + 2] == single.screen[3 * i + 2]);
-      screen.push_back(packets.screen[3 * i]);
-      absolute.push_back(packets.screen[3 * i + 1]);
-      expected_screen.push_back(single.screen[3 * i]);
-      expected_absolute.push_back(single.screen[3 * i + 1]);
-    }
-    CHECK(relative_error(screen, expected_screen) < 0.08);
-    CHECK(relative_error(absolute, expected_absolute) < 0.1);
+    check_screen(packets, single, 0.08, 0.1);
   }
 }
 
@@ -328,8 +310,7 @@ TEST_CASE("tiles of a lens are on the faces that see them, until the lens change
     // Every pixel's tangent coordinates on the face of its tile are its ray.
     const std::vector<RsLensTile> tiles = lens.tiles().download();
     const std::vector<float> tangents = lens.tangents().download();
-    const auto pixels =
-        static_cast<std::size_t>(view.camera.width) * static_cast<std::size_t>(view.camera.height);
+    const std::size_t pixels = pixel_count(view.camera);
     std::size_t wrong = 0, blind = 0;
     for (std::size_t i = 0; i < pixels; ++i) {
       const int x = static_cast<int>(i) % view.camera.width;

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 

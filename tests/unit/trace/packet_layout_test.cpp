@@ -3,6 +3,10 @@
 
 #include <doctest/doctest.h>
 
+#include <cstdint>
+#include <initializer_list>
+#include <utility>
+
 #include "raysplats/error.hpp"
 
 using namespace raysplats;
@@ -96,6 +100,27 @@ TEST_CASE("packet shape: groups on GPUs, and where they are asked for") {
   CHECK(packet_layout(device, width_of(0)).lanes == 64);
   CHECK(packet_layout(device, width_of(0, PacketShape::kVector)).lanes == 16);
   CHECK(packet_layout(device, width_of(0, PacketShape::kVector)).tile == 32);
+}
+
+TEST_CASE("packet shape: groups where the local memory of compiled kernels is there") {
+  for (const std::uint64_t local_memory : {16384, 32768, 65536}) {
+    CAPTURE(local_memory);
+    DeviceInfo gpu = gpu_of(local_memory);
+    CHECK(packet_layout(gpu, width_of(0)).grouped);
+    CHECK(packet_layout(gpu, width_of(0)).lanes == 32);
+    CHECK(packet_layout(gpu, width_of(64)).lanes == 64);
+    gpu.has_subgroups = true;
+    CHECK(packet_layout(gpu, width_of(0)).subgroups);
+    CHECK(packet_layout(gpu, width_of(64)).lanes == 64);
+  }
+  CHECK_FALSE(packet_layout(gpu_of(8192), width_of(0)).grouped);
+  // The largest of scripts/gpu/baseline.json and, for 8, of ForwardMemory.
+  for (const auto& [lanes, bytes] : std::initializer_list<std::pair<int, std::uint64_t>>{
+           {8, 2976}, {16, 4640}, {32, 7840}, {64, 15136}}) {
+    CAPTURE(lanes);
+    CHECK_THROWS_AS(packet_layout(gpu_of(bytes), width_of(lanes, PacketShape::kGroup)),
+                    DeviceError);
+  }
 }
 
 TEST_CASE("packet shape: subgroups where the device has them") {

@@ -14,7 +14,7 @@
 
 #include "raysplats/error.hpp"
 #include "trace/ray_tracer.hpp"
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 

@@ -4,41 +4,14 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <limits>
 
 #include "raysplats/error.hpp"
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 
 namespace {
-
-constexpr float kFar = std::numeric_limits<float>::max();
-
-struct Errors {
-  double means, quaternions, scales, opacities, sh;
-  double worst() const { return std::max({means, quaternions, scales, opacities, sh}); }
-};
-
-#define CHECK_ERRORS(errors, limit)                                                  \
-  do {                                                                               \
-    const Errors e_ = errors;                                                        \
-    INFO("means ", e_.means, " quaternions ", e_.quaternions, " scales ", e_.scales, \
-         " opacities ", e_.opacities, " sh ", e_.sh);                                \
-    CHECK(e_.worst() < (limit));                                                     \
-  } while (false)
-
-template <class Expected>
-Errors errors_of(const HostGradients& got, const Expected& expected) {
-  const auto error = [](const std::vector<float>& a, const auto& b) {
-    return relative_error(a, std::vector<double>(b.begin(), b.end()));
-  };
-  return {error(got.means, expected.means), error(got.quaternions, expected.quaternions),
-          error(got.scales, expected.scales), error(got.opacities, expected.opacities),
-          error(got.sh, expected.sh)};
-}
 
 using Gradients = std::vector<RayBackward::ResultGradient>;
 
@@ -49,24 +22,6 @@ Gradients random_gradients(std::size_t count, std::uint64_t seed) {
     for (float& value : g) value = static_cast<float>(rng.normal());
   }
   return out;
-}
-
-// Rays from in and around the cube towards its inside, some of them short.
-std::vector<Ray> random_rays(std::size_t count, std::uint64_t seed, double spread = 1.0) {
-  CounterRng rng(seed, 6);
-  std::vector<Ray> rays(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const glm::dvec3 o = spread * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
-    const glm::dvec3 target = 0.6 * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
-    const glm::dvec3 d = (target - o) * std::exp(rng.normal());
-    for (int k = 0; k < 3; ++k) {
-      rays[i].origin[k] = static_cast<float>(o[k]);
-      rays[i].direction[k] = static_cast<float>(d[k]);
-    }
-    rays[i].t_min = i % 3 == 0 ? 0.2f : 0.0f;
-    rays[i].t_max = i % 4 == 0 ? rays[i].t_min + 1.0f : kFar;
-  }
-  return rays;
 }
 
 reference::RayQuery query_of(const Ray& ray) {
@@ -132,13 +87,13 @@ Gradients gradients_without_ties(const reference::Parameters& parameters,
   return gradients;
 }
 
-Errors compare_gradients(Context& context,
-                         const Gaussians& model,
-                         const TraceOptions& options,
-                         const std::vector<Ray>& rays,
-                         ColorDirection direction,
-                         ScaleActivation activation = ScaleActivation::kExp,
-                         int lanes = 0) {
+GradientErrors compare_gradients(Context& context,
+                                 const Gaussians& model,
+                                 const TraceOptions& options,
+                                 const std::vector<Ray>& rays,
+                                 ColorDirection direction,
+                                 ScaleActivation activation = ScaleActivation::kExp,
+                                 int lanes = 0) {
   const reference::Parameters parameters(model, activation);
   const Gradients gradients = gradients_without_ties(parameters, options, rays, direction);
   std::vector<reference::RayQuery> queries;
@@ -318,13 +273,7 @@ TEST_CASE("the gradients of camera rays are those of the camera tracer") {
     for (int x = 0; x < camera.width; ++x) {
       const glm::dvec3 d =
           glm::transpose(camera.rotation) * reference::pixel_direction(camera, x, y);
-      Ray ray{};
-      for (int k = 0; k < 3; ++k) {
-        ray.origin[k] = static_cast<float>(camera.center()[k]);
-        ray.direction[k] = static_cast<float>(d[k]);
-      }
-      ray.t_max = kFar;
-      rays.push_back(ray);
+      rays.push_back(make_ray(camera.center(), d));
     }
   }
   const Gradients gradients = gradients_without_ties(reference::Parameters(model), options, rays,
@@ -356,17 +305,7 @@ TEST_CASE("the gradients of camera rays are those of the camera tracer") {
   CHECK_ERRORS(errors_of(got, expected), 1e-3);
   // What the camera tracer leaves out of the mean's screen gradient, the change of the outline's
   // shape, is of the order of size over distance.
-  std::vector<float> screen, absolute;
-  std::vector<double> expected_screen, expected_absolute;
-  for (std::size_t i = 0; i < model.size(); ++i) {
-    CHECK(got.screen[3 * i + 2] == expected.screen[3 * i + 2]);
-    screen.push_back(got.screen[3 * i]);
-    absolute.push_back(got.screen[3 * i + 1]);
-    expected_screen.push_back(expected.screen[3 * i]);
-    expected_absolute.push_back(expected.screen[3 * i + 1]);
-  }
-  CHECK(relative_error(screen, expected_screen) < 0.05);
-  CHECK(relative_error(absolute, expected_absolute) < 0.05);
+  check_screen(got, expected, 0.05, 0.05);
 }
 
 TEST_CASE("several batches of rays add up, and a new begin starts from zero") {

@@ -7,26 +7,13 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 
 namespace {
 
-constexpr float kFar = std::numeric_limits<float>::max();
-
-Ray make_ray(const glm::dvec3& o, const glm::dvec3& d, float t_min = 0.0f, float t_max = kFar) {
-  Ray ray{};
-  for (int j = 0; j < 3; ++j) {
-    ray.origin[j] = static_cast<float>(o[j]);
-    ray.direction[j] = static_cast<float>(d[j]);
-  }
-  ray.t_min = t_min;
-  ray.t_max = t_max;
-  return ray;
-}
-
-std::vector<Ray> random_rays(std::size_t count, std::uint64_t seed) {
+std::vector<Ray> axis_rays(std::size_t count, std::uint64_t seed) {
   CounterRng rng(seed, 5);
   std::vector<Ray> rays;
   for (std::size_t i = 0; i < count; ++i) {
@@ -94,7 +81,7 @@ void check_rays(Context& context,
 TEST_CASE("arbitrary rays equal the double reference [small]") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(300, 31, 2);
-  const std::vector<Ray> rays = random_rays(200, 1);
+  const std::vector<Ray> rays = axis_rays(200, 1);
   for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
     for (const ColorDirection direction : {ColorDirection::kRay, ColorDirection::kFromOrigin}) {
       CAPTURE(static_cast<int>(order));
@@ -114,9 +101,9 @@ TEST_CASE("rays with more hits than the buffer, and capped rays") {
   for (float& opacity : model.opacities) opacity = -4.0f;
   TraceOptions options;
   options.min_transmittance = 1e-6f;
-  check_rays(context, model, options, random_rays(60, 2), ColorDirection::kRay);
+  check_rays(context, model, options, axis_rays(60, 2), ColorDirection::kRay);
   options.max_hits = 70;
-  check_rays(context, model, options, random_rays(60, 3), ColorDirection::kRay);
+  check_rays(context, model, options, axis_rays(60, 3), ColorDirection::kRay);
 }
 
 TEST_CASE("camera rays and arbitrary rays see the same") {
@@ -160,7 +147,7 @@ TEST_CASE("no Gaussians and no rays") {
   RayTracer tracer(context, options);
   tracer.update(gaussians);
   CHECK(tracer.trace(gaussians, {}).empty());
-  const std::vector<RayResult> result = tracer.trace(gaussians, random_rays(3, 4));
+  const std::vector<RayResult> result = tracer.trace(gaussians, axis_rays(3, 4));
   CHECK(result[2].color[1] == 0.25f);
   CHECK(result[2].hits == 0);
 }
@@ -247,7 +234,7 @@ TEST_CASE("a scene a million units from the origin still equals the reference") 
 TEST_CASE("every vector width traces the same") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(700, 51, 1);
-  const std::vector<Ray> rays = random_rays(120, 11);
+  const std::vector<Ray> rays = axis_rays(120, 11);
   for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
     for (const int lanes : {4, 8, 16}) {
       CAPTURE(static_cast<int>(order));
@@ -274,8 +261,7 @@ TEST_CASE("counts around full blocks and full nodes") {
       Gaussians model = reference::random_scene(count, 60 + count, 0);
       // Small counts get large Gaussians, which few rays would find.
       for (float& scale : model.log_scales) scale = std::min(scale, std::log(0.4f));
-      check_rays(context, model, TraceOptions{}, random_rays(40, count), ColorDirection::kRay,
-                 lanes);
+      check_rays(context, model, TraceOptions{}, axis_rays(40, count), ColorDirection::kRay, lanes);
     }
   }
 }
@@ -288,7 +274,7 @@ TEST_CASE("opaque Gaussians stop rays where the reference stops them") {
     CAPTURE(stop);
     TraceOptions options;
     options.min_transmittance = stop;
-    check_rays(context, model, options, random_rays(150, 12), ColorDirection::kRay);
+    check_rays(context, model, options, axis_rays(150, 12), ColorDirection::kRay);
   }
 }
 
@@ -299,7 +285,7 @@ TEST_CASE("a few hits at most") {
     CAPTURE(most);
     TraceOptions options;
     options.max_hits = most;
-    check_rays(context, model, options, random_rays(100, 13), ColorDirection::kRay);
+    check_rays(context, model, options, axis_rays(100, 13), ColorDirection::kRay);
   }
 }
 
@@ -312,7 +298,7 @@ TEST_CASE("rays with many times more hits than there is room for") {
   TraceOptions options;
   options.min_transmittance = 1e-6f;
   options.max_hits = 2000;
-  std::vector<Ray> rays = random_rays(24, 14);
+  std::vector<Ray> rays = axis_rays(24, 14);
   for (Ray& ray : rays) ray.t_max = kFar;
   std::vector<Ray> outside = rays;
   for (Ray& ray : outside) {
@@ -418,7 +404,7 @@ TEST_CASE("Gaussians with NaN or infinity are never met") {
         mixed.opacities[i] = std::numeric_limits<float>::quiet_NaN();
     }
   }
-  const std::vector<Ray> rays = random_rays(100, 15);
+  const std::vector<Ray> rays = axis_rays(100, 15);
   for (const int lanes : {4, 8, 16}) {
     RayTracer tracer(context, TraceOptions{}, lanes);
     const DeviceGaussians gaussians =
@@ -432,7 +418,7 @@ TEST_CASE("a refitted tree gives what a built one gives") {
   Context context = make_test_context();
   Gaussians model = reference::random_scene(900, 57, 0);
   DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  const std::vector<Ray> rays = random_rays(150, 16);
+  const std::vector<Ray> rays = axis_rays(150, 16);
   for (const int lanes : {4, 16}) {
     RayTracer tracer(context, TraceOptions{}, lanes);
     tracer.update(gaussians);
@@ -460,7 +446,7 @@ TEST_CASE("rays on the device, in batches of any size, give the same bits") {
   RayTracer tracer(context, TraceOptions{});
   tracer.update(gaussians);
   // Large batches are traced in another order than small ones.
-  const std::vector<Ray> rays = random_rays(6000, 17);
+  const std::vector<Ray> rays = axis_rays(6000, 17);
   Buffer<Ray> buffer(context, rays.size() + 5, "rays");
   buffer.upload(rays);
   Buffer<RayResult> results;

@@ -12,8 +12,8 @@
 
 #include "raysplats/error.hpp"
 #include "skip_test.hpp"
-#include "trace_fixture.hpp"
 #include "unit/temporary_directory.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 

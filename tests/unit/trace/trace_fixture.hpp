@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/vec3.hpp>
+#include <limits>
 #include <ostream>
-#include <string>
 #include <vector>
 
 #include "device/context.hpp"
 #include "raysplats/device.hpp"
+#include "raysplats/rays.hpp"
 #include "reference/gradients.hpp"
 #include "reference/scenes.hpp"
 #include "reference/tracer.hpp"
@@ -116,6 +118,115 @@ struct HostGradients {
         screen(g.screen.download()) {}
   bool operator==(const HostGradients&) const = default;
 };
+
+/// Relative errors of gradients.
+struct GradientErrors {
+  double means, quaternions, scales, opacities, sh;
+
+  /// 1e30 where one is no number.
+  double worst() const {
+    double out = 0;
+    for (const double error : {means, quaternions, scales, opacities, sh})
+      out = std::max(out, error <= 1e30 ? error : 1e30);
+    return out;
+  }
+};
+
+template <class Expected>
+GradientErrors errors_of(const HostGradients& got, const Expected& expected) {
+  const auto error = [](const std::vector<float>& a, const auto& b) {
+    return relative_error(a, std::vector<double>(b.begin(), b.end()));
+  };
+  return {error(got.means, expected.means), error(got.quaternions, expected.quaternions),
+          error(got.scales, expected.scales), error(got.opacities, expected.opacities),
+          error(got.sh, expected.sh)};
+}
+
+#define CHECK_ERRORS(errors, limit)                                                  \
+  do {                                                                               \
+    const GradientErrors e_ = errors;                                                \
+    INFO("means ", e_.means, " quaternions ", e_.quaternions, " scales ", e_.scales, \
+         " opacities ", e_.opacities, " sh ", e_.sh);                                \
+    CHECK(e_.worst() < (limit));                                                     \
+  } while (false)
+
+/// Compares what density control reads: gradient in the picture, its absolute sum and the count.
+inline void check_screen(const HostGradients& got,
+                         const HostGradients& expected,
+                         double limit,
+                         double limit_absolute) {
+  std::vector<float> screen, absolute;
+  std::vector<double> expected_screen, expected_absolute;
+  REQUIRE(got.screen.size() == expected.screen.size());
+  for (std::size_t i = 0; i < got.screen.size(); i += 3) {
+    CHECK(got.screen[i + 2] == expected.screen[i + 2]);
+    screen.push_back(got.screen[i]);
+    absolute.push_back(got.screen[i + 1]);
+    expected_screen.push_back(expected.screen[i]);
+    expected_absolute.push_back(expected.screen[i + 1]);
+  }
+  CHECK(relative_error(screen, expected_screen) < limit);
+  CHECK(relative_error(absolute, expected_absolute) < limit_absolute);
+}
+
+/// Calls `check(model, options, activation)` for every order of hits, kind of radius and activation
+/// of scales.
+template <class Check>
+void for_every_variant(Gaussians model, const Check& check) {
+  // Sigmoid scales stay below 1.
+  for (float& scale : model.log_scales) scale = std::min(scale, -0.2f);
+  for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+    for (const bool adaptive : {false, true}) {
+      for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
+        CAPTURE(static_cast<int>(order));
+        CAPTURE(adaptive);
+        CAPTURE(static_cast<int>(activation));
+        TraceOptions options;
+        options.hit_order = order;
+        options.adaptive_radius = adaptive;
+        options.background = {0.25f, 0.5f, 1.0f};
+        check(model, options, activation);
+      }
+    }
+  }
+}
+
+/// The end of a ray that has none.
+constexpr float kFar = std::numeric_limits<float>::max();
+
+inline Ray make_ray(const glm::dvec3& o,
+                    const glm::dvec3& d,
+                    float t_min = 0.0f,
+                    float t_max = kFar) {
+  Ray ray{};
+  for (int k = 0; k < 3; ++k) {
+    ray.origin[k] = static_cast<float>(o[k]);
+    ray.direction[k] = static_cast<float>(d[k]);
+  }
+  ray.t_min = t_min;
+  ray.t_max = t_max;
+  return ray;
+}
+
+/// Rays from places of this spread around the origin towards targets of another, some of them
+/// short, the others up to `far`.
+inline std::vector<Ray> random_rays(std::size_t count,
+                                    std::uint64_t seed,
+                                    double spread = 1.0,
+                                    double target_spread = 0.6,
+                                    float far = kFar) {
+  CounterRng rng(seed, 6);
+  std::vector<Ray> rays;
+  rays.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 o = spread * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
+    const glm::dvec3 target = target_spread * glm::dvec3(rng.normal(), rng.normal(), rng.normal());
+    const glm::dvec3 d = (target - o) * std::exp(rng.normal());
+    const float t_min = i % 3 == 0 ? 0.2f : 0.0f;
+    rays.push_back(make_ray(o, d, t_min, i % 4 == 0 ? t_min + 1.0f : far));
+  }
+  return rays;
+}
 
 /// What the last forward pass of a tracer gives for this gradient of its picture (planar).
 inline HostGradients backward(Context& context,

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "trace_fixture.hpp"
+#include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "shared/train_layout.h"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
 
@@ -244,7 +245,7 @@ TEST_CASE("adam: remap moves moments with their Gaussians, reset zeroes one grou
 
   std::vector<std::uint32_t> source;
   for (std::uint32_t i = 0; i < 90; i += 2) source.push_back(i);
-  for (std::uint32_t i = 89; i > 20; --i) source.push_back(i % 3 == 0 ? 0xffffffffu : i);
+  for (std::uint32_t i = 89; i > 20; --i) source.push_back(i % 3 == 0 ? RS_NO_SOURCE : i);
   Buffer<std::uint32_t> sources(context(), source.size(), "sources");
   sources.upload(source);
   adam.remap(sources, source.size());
@@ -256,7 +257,7 @@ TEST_CASE("adam: remap moves moments with their Gaussians, reset zeroes one grou
     for (std::size_t i = 0; i < source.size(); ++i) {
       for (std::size_t k = 0; k < f.width[g]; ++k) {
         const bool zero =
-            source[i] == 0xffffffffu || kParameterGroups[g] == ParameterGroup::kOpacities;
+            source[i] == RS_NO_SOURCE || kParameterGroups[g] == ParameterGroup::kOpacities;
         const std::size_t old = source[i] * f.width[g] + k;
         CHECK(static_cast<double>(first[i * f.width[g] + k]) ==
               doctest::Approx(zero ? 0 : f.twin.first[g][old]).epsilon(1e-6));

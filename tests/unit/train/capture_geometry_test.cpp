@@ -3,18 +3,33 @@
 
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <glm/geometric.hpp>
+#include <span>
+#include <vector>
 
-#include "test_photos.hpp"
+#include "unit/train/test_photos.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
+
+namespace {
+
+Region region_of(std::span<const Camera> cameras) {
+  return visible_region(cameras, camera_extent(cameras));
+}
+
+double motion_of(std::span<const Camera> cameras) {
+  return motion_extent(cameras, camera_extent(cameras));
+}
+
+}  // namespace
 
 TEST_CASE(
     "the region is the cube that inward cameras see, and surrounds cameras without a common "
     "target") {
   const glm::dvec3 target(3, -2, 1);
-  const Region inward = visible_region(ring(12, 4.0, target));
+  const Region inward = region_of(ring(12, 4.0, target));
   CHECK(glm::distance(inward.center, target) < 1e-6);
   const double distance = 4.0 * std::sqrt(1 + 0.16);
   CHECK(inward.half_side == doctest::Approx(distance * 40.0 / 160.0));
@@ -23,7 +38,7 @@ TEST_CASE(
   for (int i = 0; i < 5; ++i) {
     parallel.push_back(look_at({i, 0, 0}, {static_cast<double>(i), 10, 0}, {0, 0, 1}, 80, 80, 80));
   }
-  const Region along = visible_region(parallel);
+  const Region along = region_of(parallel);
   CHECK(along.center.x == doctest::Approx(2.0));
   CHECK(along.half_side == doctest::Approx(3.0 * 1.1 * 2.0));
 
@@ -32,7 +47,7 @@ TEST_CASE(
     outward.push_back(
         look_at(camera.center(), 2.0 * camera.center() - target, {0, 0, 1}, 80, 80, 80));
   }
-  CHECK(visible_region(outward).half_side == doctest::Approx(3.0 * camera_extent(outward)));
+  CHECK(region_of(outward).half_side == doctest::Approx(3.0 * camera_extent(outward)));
   CHECK(camera_extent(ring(12, 4.0, target)) == doctest::Approx(4.4));
   CHECK(camera_extent(std::vector<Camera>(1)) > 0);
 }
@@ -40,15 +55,15 @@ TEST_CASE(
 TEST_CASE("means move by what cameras see where these stand far away, else by their spread") {
   const glm::dvec3 target(3, -2, 1);
   const std::vector<Camera> usual = ring(12, 4.0, target);
-  CHECK(motion_extent(usual) == camera_extent(usual));
+  CHECK(motion_of(usual) == camera_extent(usual));
   std::vector<Camera> telephoto = ring(12, 40.0, target);
   for (Camera& camera : telephoto) camera.fx = camera.fy = 10 * camera.fx;
-  CHECK(motion_extent(telephoto) == doctest::Approx(5 * visible_region(usual).half_side));
+  CHECK(motion_of(telephoto) == doctest::Approx(5 * region_of(usual).half_side));
   CHECK(camera_extent(telephoto) == doctest::Approx(44.0));
   // Without a common target nothing says what they look at.
   for (Camera& camera : telephoto)
     camera.translation = -(camera.rotation * (2.0 * target - camera.center()));
-  CHECK(motion_extent(telephoto) == camera_extent(telephoto));
+  CHECK(motion_of(telephoto) == camera_extent(telephoto));
 }
 
 TEST_CASE("cameras far from all others have no say in lengths, as long as they are exceptions") {
@@ -59,7 +74,7 @@ TEST_CASE("cameras far from all others have no say in lengths, as long as they a
   cameras[7] = look_at({500, 80, 3}, target, {0, 0, 1}, 80, 100, 160);
   CHECK(stray_cameras(cameras) == std::vector<std::size_t>{7});
   CHECK(camera_extent(cameras) == doctest::Approx(camera_extent(sound)).epsilon(0.1));
-  CHECK(glm::distance(visible_region(cameras).center, target) < 1e-6);
+  CHECK(glm::distance(region_of(cameras).center, target) < 1e-6);
   // A second one of twenty is a part of the capture, and so is one within the reach of others.
   cameras[8] = cameras[7];
   CHECK(stray_cameras(cameras).empty());
@@ -72,4 +87,35 @@ TEST_CASE("cameras far from all others have no say in lengths, as long as they a
   std::vector<Camera> tripod(12, cameras[0]);
   tripod.push_back(cameras[1]);
   CHECK(stray_cameras(tripod).empty());
+}
+
+TEST_CASE("cameras in one place count lengths by what they see, in any unit") {
+  for (const double unit : {1e-3, 1.0, 1e3}) {
+    CAPTURE(unit);
+    PointCloud points;
+    for (int i = 0; i < 60; ++i) {
+      const double angle = 0.1 * i;
+      for (const double value : {std::cos(angle), std::sin(angle), 0.0})
+        points.positions.push_back(static_cast<float>(5 * unit * value));
+    }
+    // One point that is not finite and one far away say nothing.
+    for (const float value : {NAN, 0.0f, 0.0f, 1e30f, 0.0f, 0.0f})
+      points.positions.push_back(value);
+    points.colors.resize(points.positions.size());
+    std::vector<Camera> cameras;
+    for (int i = 0; i < 12; ++i) {
+      const double angle = 0.5 * i;
+      cameras.push_back(look_at({1e-4 * unit * i, 0, 0},
+                                {unit * std::cos(angle), unit * std::sin(angle), 0}, {0, 0, 1}, 80,
+                                80, 80));
+    }
+    CHECK(scene_extent(cameras, points) == doctest::Approx(5 * unit).epsilon(0.01));
+    CHECK(scene_extent(std::vector<Camera>{cameras[0]}, points) ==
+          doctest::Approx(5 * unit).epsilon(0.01));
+    // Without points nothing is known.
+    CHECK(scene_extent(cameras, {}) == camera_extent(cameras));
+    // Nor do points count where cameras stand apart.
+    const std::vector<Camera> apart = ring(12, unit, {0, 0, 0});
+    CHECK(scene_extent(apart, points) == camera_extent(apart));
+  }
 }

@@ -324,6 +324,19 @@ TEST_CASE("Gaussians that are not finite are removed and an empty result is an e
   CHECK(advice(wide).find("lower --prune-scale-min") != std::string::npos);
 }
 
+TEST_CASE("a refinement that takes off opacities alone makes another model [small] [tiny]") {
+  Context context(test_device());
+  DeviceGaussians gaussians = DeviceGaussians::upload(
+      context, model_of({0.1, 0.1, 0.1}, {0.9, 0.5, 0.3}), ScaleActivation::kExp);
+  TrainOptions options = growth(10, 50, 3);
+  options.opacity_decay = 0.01;
+  DensityControl control(context, options, 1.0, 1);
+  const auto revision = gaussians.revision;
+  CHECK(!control.refine(gaussians, 10).changes());
+  CHECK(gaussians.opacities.download()[1] == doctest::Approx(logit(0.49)));
+  CHECK(gaussians.revision != revision);
+}
+
 TEST_CASE("opacity reset lowers and never raises [small] [tiny]") {
   Context context(test_device());
   DeviceGaussians gaussians = DeviceGaussians::upload(

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "unit/fixture.hpp"
 #include "unit/io/scratch.hpp"
 #include "unit/log_capture.hpp"
@@ -90,8 +91,7 @@ Dataset with_points(std::size_t count, int width, int height, std::uint32_t poin
 
 std::vector<float> on_every_pixel(const DeviceDepths& depths) {
   if (!depths.listed) return depths.depths.download();
-  std::vector<float> out(static_cast<std::size_t>(depths.width) *
-                         static_cast<std::size_t>(depths.height));
+  std::vector<float> out(pixel_count(depths.width, depths.height));
   const std::vector<std::uint32_t> pixels = depths.pixels.download();
   const std::vector<float> values = depths.depths.download();
   for (std::size_t i = 0; i < depths.known; ++i) out.at(pixels[i]) = values[i];

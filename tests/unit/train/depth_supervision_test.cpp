@@ -3,8 +3,6 @@
 
 #include <doctest/doctest.h>
 
-#include <array>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 

@@ -24,11 +24,6 @@ constexpr int kHeight = 37;
 constexpr std::size_t kPixels = kWidth * kHeight;
 constexpr std::size_t kViews = 5;
 
-Context& context() {
-  static Context device{test_device()};
-  return device;
-}
-
 std::vector<float> noise(std::size_t count, std::uint64_t stream, double low, double high) {
   CounterRng rng(3, stream);
   std::vector<float> out(count);
@@ -157,11 +152,11 @@ struct Photo {
 }  // namespace
 
 TEST_CASE("exposure: pictures, gradients and fits agree with double precision [small]") {
-  Exposure exposure(context(), kViews, 2);
+  Exposure exposure(shared_test_context(), kViews, 2);
   Reference reference(kViews);
-  Buffer<float> image(context(), 4 * kPixels, "image");
-  Buffer<float> gradient(context(), 4 * kPixels, "gradient");
-  Buffer<std::uint32_t> guard(context(), 1, "guard");
+  Buffer<float> image(shared_test_context(), 4 * kPixels, "image");
+  Buffer<float> gradient(shared_test_context(), 4 * kPixels, "gradient");
+  Buffer<std::uint32_t> guard(shared_test_context(), 1, "guard");
   guard.upload(std::vector<std::uint32_t>{0});
   const std::array<float, 3> behind{0.25f, 0.5f, 0.875f};
   for (std::size_t turn = 0; turn < 12; ++turn) {
@@ -184,7 +179,7 @@ TEST_CASE("exposure: pictures, gradients and fits agree with double precision [s
     // Weights from a plane, from alpha, and none.
     const int planes = turn % 3 == 0 ? 1 : turn % 3 == 1 ? 2 : 4;
     Photo photo(90 + turn, planes, turn % 2 == 0);
-    Buffer<std::uint32_t> words(context(), photo.words.size(), "photo");
+    Buffer<std::uint32_t> words(shared_test_context(), photo.words.size(), "photo");
     words.upload(photo.words);
     const bool cut_out = turn % 4 < 2;
     exposure.observe(image, {words, planes, photo.weighted}, cut_out, behind, kWidth, kHeight,
@@ -211,13 +206,13 @@ TEST_CASE("exposure: pictures, gradients and fits agree with double precision [s
 }
 
 TEST_CASE("exposure: the mean of any number of photos is taken off [small]") {
-  Buffer<float> image(context(), 4 * kPixels, "image");
-  Buffer<std::uint32_t> guard(context(), 1, "guard");
+  Buffer<float> image(shared_test_context(), 4 * kPixels, "image");
+  Buffer<std::uint32_t> guard(shared_test_context(), 1, "guard");
   guard.upload(std::vector<std::uint32_t>{0});
   const std::vector<float> picture = noise(4 * kPixels, 21, 0.0, 1.0);
   image.upload(picture);
   const Photo photo(22, 4, true);
-  Buffer<std::uint32_t> words(context(), photo.words.size(), "photo");
+  Buffer<std::uint32_t> words(shared_test_context(), photo.words.size(), "photo");
   words.upload(photo.words);
   for (const std::size_t views : {1, 2, 63, 64, 65, 1000}) {
     CAPTURE(views);
@@ -225,7 +220,7 @@ TEST_CASE("exposure: the mean of any number of photos is taken off [small]") {
     std::vector<float> before(12 * views);
     for (std::size_t i = 0; i < before.size(); ++i)
       before[i] = static_cast<float>(1.0 + 0.5 * std::sin(12.9898 * static_cast<double>(i)));
-    Exposure exposure(context(), views);
+    Exposure exposure(shared_test_context(), views);
     exposure.restore(before);
     Reference reference(views);
     reference.deltas.assign(before.begin(), before.end());
@@ -253,7 +248,7 @@ TEST_CASE("exposure: the mean of any number of photos is taken off [small]") {
 }
 
 TEST_CASE("exposure: sums of pictures of few and many blocks agree with double precision [small]") {
-  Exposure exposure(context(), 1);
+  Exposure exposure(shared_test_context(), 1);
   // 256 pixels make a block, and 64 blocks a row.
   for (const std::size_t pixels : {100, 16384, 16640, 33000}) {
     CAPTURE(pixels);
@@ -261,8 +256,8 @@ TEST_CASE("exposure: sums of pictures of few and many blocks agree with double p
     const std::vector<float> photo = noise(4 * pixels, 32, 0.0, 1.0);
     std::vector<std::uint32_t> bits(4 * pixels);
     for (std::size_t i = 0; i < bits.size(); ++i) bits[i] = std::bit_cast<std::uint32_t>(photo[i]);
-    Buffer<float> image(context(), picture.size(), "image");
-    Buffer<std::uint32_t> words(context(), bits.size(), "photo");
+    Buffer<float> image(shared_test_context(), picture.size(), "image");
+    Buffer<std::uint32_t> words(shared_test_context(), bits.size(), "photo");
     image.upload(picture);
     words.upload(bits);
     exposure.observe(image, {words, 4, false}, false, {0, 0, 0}, static_cast<int>(pixels), 1);
@@ -291,9 +286,9 @@ TEST_CASE("exposure: sums of pictures of few and many blocks agree with double p
 
 TEST_CASE(
     "exposure: a photo's colours are found in a few visits, whatever the scene shows [small]") {
-  Exposure exposure(context(), kViews);
-  Buffer<float> image(context(), 4 * kPixels, "image");
-  Buffer<std::uint32_t> guard(context(), 1, "guard");
+  Exposure exposure(shared_test_context(), kViews);
+  Buffer<float> image(shared_test_context(), 4 * kPixels, "image");
+  Buffer<std::uint32_t> guard(shared_test_context(), 1, "guard");
   guard.upload(std::vector<std::uint32_t>{0});
   const std::vector<float> picture = noise(4 * kPixels, 7, 0.1, 0.6);
   image.upload(picture);
@@ -306,7 +301,7 @@ TEST_CASE(
           photo.set(c, i, static_cast<float>(gain) * picture[c * kPixels + i]);
       }
       for (std::size_t i = 0; i < kPixels; ++i) photo.set(3, i, 1.0f);
-      Buffer<std::uint32_t> words(context(), photo.words.size(), "photo");
+      Buffer<std::uint32_t> words(shared_test_context(), photo.words.size(), "photo");
       words.upload(photo.words);
       exposure.observe(image, {words, 4, false}, false, {0, 0, 0}, kWidth, kHeight);
       exposure.step(view, 0, 0.002, guard);
@@ -322,15 +317,15 @@ TEST_CASE(
 }
 
 TEST_CASE("exposure: marked steps and photos of which nothing counts change nothing [small]") {
-  Exposure exposure(context(), kViews);
-  Buffer<float> image(context(), 4 * kPixels, "image");
-  Buffer<std::uint32_t> guard(context(), 1, "guard");
+  Exposure exposure(shared_test_context(), kViews);
+  Buffer<float> image(shared_test_context(), 4 * kPixels, "image");
+  Buffer<std::uint32_t> guard(shared_test_context(), 1, "guard");
   const auto step = [&](Exposure& target, std::size_t view, std::uint32_t mark, float weight) {
     guard.upload(std::vector<std::uint32_t>{mark});
     image.upload(noise(4 * kPixels, 1, 0.0, 1.0));
     Photo photo(2, 4, true);
     for (std::size_t i = 0; i < kPixels; ++i) photo.set(4, i, weight);
-    Buffer<std::uint32_t> words(context(), photo.words.size(), "photo");
+    Buffer<std::uint32_t> words(shared_test_context(), photo.words.size(), "photo");
     words.upload(photo.words);
     target.observe(image, {words, 4, true}, true, {0, 0, 0}, kWidth, kHeight);
     target.step(view, 0, 0.02, guard);
@@ -342,11 +337,11 @@ TEST_CASE("exposure: marked steps and photos of which nothing counts change noth
   CHECK(exposure.deltas() == before);
   step(exposure, 2, 0, 0.0f);
   CHECK(exposure.deltas() == before);
-  Exposure other(context(), kViews);
+  Exposure other(shared_test_context(), kViews);
   other.restore(before);
   step(exposure, 3, 0, 0.5f);
   step(other, 3, 0, 0.5f);
   CHECK(exposure.deltas() == other.deltas());
   CHECK(exposure.deltas() != before);
-  CHECK_THROWS_AS(Exposure(context(), kViews + 1).restore(before), DataError);
+  CHECK_THROWS_AS(Exposure(shared_test_context(), kViews + 1).restore(before), DataError);
 }

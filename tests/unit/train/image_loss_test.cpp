@@ -8,12 +8,12 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <utility>
 #include <vector>
 
 #include "raysplats/error.hpp"
 #include "reference/ssim.hpp"
+#include "scene/pixel_count.hpp"
 #include "unit/failed_allocation.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
@@ -37,9 +37,7 @@ struct Scene {
   int planes = 1;
   bool weighted = false;
 
-  std::size_t pixels() const {
-    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  }
+  std::size_t pixels() const { return pixel_count(width, height); }
 };
 
 // Smooth image with noise and a photo that differs from it; alpha in whole steps and between.
@@ -47,7 +45,7 @@ Scene make_scene(int width, int height, std::uint64_t seed, bool random_alpha) {
   Scene s;
   s.width = width;
   s.height = height;
-  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const std::size_t pixels = pixel_count(width, height);
   s.image.resize(4 * pixels);
   s.target.resize(pixels);
   CounterRng rng(seed, 1);

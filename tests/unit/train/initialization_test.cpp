@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
 
 #include "raysplats/error.hpp"
-#include "test_photos.hpp"
+#include "unit/log_capture.hpp"
+#include "unit/train/test_photos.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -36,10 +36,19 @@ TEST_CASE("points become Gaussians with their colour, clamped scales and the opa
   // Far from everything: a tenth of the distance to the nearest camera at most.
   CHECK(std::exp(model.log_scales[9]) == doctest::Approx(0.1 * std::sqrt(30.0 * 30 + 2 * 50 * 50)));
   PointCloud pair;
-  pair.positions = {0, 0, 0, 0, 0, 0};
+  pair.positions = {0, 0, 0, 1e-4f, 0, 0};
   pair.colors.assign(6, 0.5f);
-  CHECK(std::exp(gaussians_from_points(pair, 0, 0.1, cameras).log_scales[0]) ==
-        doctest::Approx(22.0 * 1e-4));
+  const auto first_size = [&cameras](const PointCloud& of) {
+    return std::exp(gaussians_from_points(of, 0, 0.1, cameras).log_scales[0]);
+  };
+  CHECK(first_size(pair) == doctest::Approx(22.0 * 1e-4));
+  // Without a distance to a neighbour: the most.
+  pair.positions[3] = 0;
+  CHECK(first_size(pair) == doctest::Approx(2.0));
+  PointCloud one;
+  one.positions.assign(3, 0.0f);
+  one.colors.assign(3, 0.5f);
+  CHECK(first_size(one) == doctest::Approx(2.0));
 }
 
 TEST_CASE("points that few photos show or that fit them badly are left out when enough remain") {
@@ -131,7 +140,13 @@ TEST_CASE("the first model follows the options") {
   CHECK(few.sh.size() == 7 * 12);
   options.init = "random";
   options.init_count = 50;
-  CHECK(first(7).size() == 7);
+  {
+    const LogCapture log;
+    CHECK(first(50).size() == 50);
+    CHECK(log.lines() == 0);
+    CHECK(first(7).size() == 7);
+    CHECK(log.contains("--init-count asks for 50 Gaussians, but this run may have 7"));
+  }
   options.init = "/nowhere/model.ply";
   CHECK_THROWS_AS(first(1000), DataError);
 }

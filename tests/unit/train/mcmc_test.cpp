@@ -24,11 +24,6 @@ constexpr double kExtent = 4;
 
 double sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 
-Context& context() {
-  static Context instance(test_device());
-  return instance;
-}
-
 Gaussians random_model(std::uint64_t seed, std::size_t count = kCount) {
   CounterRng rng(seed, 4);
   Gaussians model;
@@ -41,7 +36,7 @@ Gaussians random_model(std::uint64_t seed, std::size_t count = kCount) {
 }
 
 Buffer<std::uint32_t> guard_of(std::uint32_t word) {
-  Buffer<std::uint32_t> guard(context(), 1, "guard");
+  Buffer<std::uint32_t> guard(shared_test_context(), 1, "guard");
   guard.upload(std::vector<std::uint32_t>{word});
   return guard;
 }
@@ -59,15 +54,16 @@ TEST_CASE("pressure adds the gradients of mean opacity and mean size [small]") {
   options.scale_reg = 0.7;
   for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
     Gaussians model = random_model(1);
-    const DeviceGaussians gaussians = DeviceGaussians::upload(context(), model, activation);
+    const DeviceGaussians gaussians =
+        DeviceGaussians::upload(shared_test_context(), model, activation);
     const std::vector<float> parameters = gaussians.scales.download();
     GaussianGradients gradients;
-    gradients.opacities = Buffer<float>(context(), kCount, "opacities");
-    gradients.scales = Buffer<float>(context(), 3 * kCount, "scales");
+    gradients.opacities = Buffer<float>(shared_test_context(), kCount, "opacities");
+    gradients.scales = Buffer<float>(shared_test_context(), 3 * kCount, "scales");
     const std::vector<float> before(3 * kCount, 0.25f);
     gradients.opacities.upload(std::span(before).first(kCount));
     gradients.scales.upload(before);
-    Mcmc mcmc(context(), options, kExtent);
+    Mcmc mcmc(shared_test_context(), options, kExtent);
     mcmc.add_regularisation(gaussians, gradients, guard_of(1));
     CHECK(gradients.scales.download() == before);
     mcmc.add_regularisation(gaussians, gradients, guard_of(0));
@@ -109,8 +105,10 @@ TEST_CASE("noise is normal, shaped by the covariance, for faint Gaussians, and f
   const auto moved = [&](double unit, std::int64_t iteration, std::uint32_t word) {
     Gaussians scaled = many;
     for (float& v : scaled.log_scales) v += static_cast<float>(std::log(unit));
-    DeviceGaussians gaussians = DeviceGaussians::upload(context(), scaled, ScaleActivation::kExp);
-    Mcmc(context(), options, kExtent * unit).add_noise(gaussians, iteration, guard_of(word));
+    DeviceGaussians gaussians =
+        DeviceGaussians::upload(shared_test_context(), scaled, ScaleActivation::kExp);
+    Mcmc(shared_test_context(), options, kExtent * unit)
+        .add_noise(gaussians, iteration, guard_of(word));
     return gaussians.means.download();
   };
   CHECK(moved(1, 50, 1) == many.means);
@@ -146,10 +144,10 @@ TEST_CASE("noise is normal, shaped by the covariance, for faint Gaussians, and f
 TEST_CASE("shares replace opacity and size where they are given [small]") {
   for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
     const Gaussians model = random_model(7, 3);
-    DeviceGaussians gaussians = DeviceGaussians::upload(context(), model, activation);
+    DeviceGaussians gaussians = DeviceGaussians::upload(shared_test_context(), model, activation);
     const std::vector<float> before = gaussians.scales.download();
     const std::vector<std::array<float, 2>> shares{{0, 0}, {-1.5f, 0.5f}, {0, 0}};
-    apply_shares(context(), shares, gaussians);
+    apply_shares(shared_test_context(), shares, gaussians);
     const std::vector<float> after = gaussians.scales.download();
     const std::vector<float> opacities = gaussians.opacities.download();
     CHECK(opacities == std::vector<float>{model.opacities[0], -1.5f, model.opacities[2]});
@@ -177,8 +175,9 @@ TEST_CASE("parts of a Gaussian are drawn from it, what is whole stays where it i
   options.strategy = DensityStrategy::kMcmc;
   options.max_gaussians = kMany;
   options.densify_every = 10;
-  DeviceGaussians gaussians = DeviceGaussians::upload(context(), many, ScaleActivation::kExp);
-  DensityControl control(context(), options, kExtent, 10);
+  DeviceGaussians gaussians =
+      DeviceGaussians::upload(shared_test_context(), many, ScaleActivation::kExp);
+  DensityControl control(shared_test_context(), options, kExtent, 10);
   const DensityPlan plan = control.refine(gaussians, 10);
   REQUIRE(gaussians.count == kMany);
   const std::vector<float> means = gaussians.means.download();

@@ -2,11 +2,9 @@
 // Whole runs of the mcmc strategy, and of runs in a box.
 #include <doctest/doctest.h>
 
-#include <cmath>
 #include <filesystem>
 #include <string>
 
-#include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
@@ -23,11 +21,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Context& context() {
-  static Context instance(test_device());
-  return instance;
-}
-
 TrainOptions mcmc_options() {
   TrainOptions options = short_training(400);
   options.strategy = DensityStrategy::kMcmc;
@@ -43,14 +36,14 @@ TEST_CASE("the mcmc strategy learns, grows to its limit and resumes exactly") {
   const fs::path data = folder.path() / "data", broken = folder.path() / "broken";
   make_photos(data, 40, 12, 3);
   TrainOptions options = mcmc_options();
-  Trainer straight(context(), load_dataset(data), options, folder.path() / "straight");
+  Trainer straight(shared_test_context(), load_dataset(data), options, folder.path() / "straight");
   const TrainSummary mcmc = straight.run(false);
   CHECK(mcmc.gaussians > 1400);
   CHECK(mcmc.gaussians <= 1500);
 
   TrainOptions budget = options;
   budget.strategy = DensityStrategy::kBudget;
-  Trainer other(context(), load_dataset(data), budget, folder.path() / "budget");
+  Trainer other(shared_test_context(), load_dataset(data), budget, folder.path() / "budget");
   const TrainSummary plain = other.run(false);
   MESSAGE("mcmc " << mcmc.evaluations.back().psnr << " dB, budget " << plain.evaluations.back().psnr
                   << " dB");
@@ -59,10 +52,10 @@ TEST_CASE("the mcmc strategy learns, grows to its limit and resumes exactly") {
 
   options.checkpoint_every = 170;  // between two passes
   options.keep_checkpoints = 9;
-  Trainer(context(), load_dataset(data), options, broken).run(false);
+  Trainer(shared_test_context(), load_dataset(data), options, broken).run(false);
   for (const char* later : {"340", "400"})
     fs::remove(broken / "checkpoints" / ("step_000000" + std::string(later) + ".rsck"));
-  Trainer resumed(context(), load_dataset(data), options, broken);
+  Trainer resumed(shared_test_context(), load_dataset(data), options, broken);
   resumed.resume("latest");
   CHECK(resumed.iteration() == 170);
   resumed.run(false);
@@ -81,7 +74,7 @@ TEST_CASE("a run in a box starts, grows and ends in it") {
     options.strategy = strategy;
     options.bounds = Bounds{{-0.4, -0.3, -2}, {0.4, 0.5, 2}};
     const fs::path run = folder.path() / std::to_string(static_cast<int>(strategy));
-    Trainer trainer(context(), load_dataset(data), options, run);
+    Trainer trainer(shared_test_context(), load_dataset(data), options, run);
     const EvaluationRow row = trainer.run(false).evaluations.back();
     const fs::path ply = run / "point_cloud/iteration_150/point_cloud.ply";
     const Gaussians model = read_ply(ply);
@@ -95,8 +88,8 @@ TEST_CASE("a run in a box starts, grows and ends in it") {
     // What was measured is what was saved.
     CHECK(row.gaussians == model.size());
     const TraceOptions trace = read_ply_options(ply).value();
-    Tracer tracer(context(), trace);
-    const Model saved(context(), model);
+    Tracer tracer(shared_test_context(), trace);
+    const Model saved(shared_test_context(), model);
     const EvaluationReport report =
         evaluate([&](const Camera& camera) { return tracer.render(saved, camera); },
                  load_dataset(data), Split::kTest, trace.background);
@@ -106,6 +99,6 @@ TEST_CASE("a run in a box starts, grows and ends in it") {
   }
   TrainOptions options = mcmc_options();
   options.bounds = Bounds{{90, 90, 90}, {91, 91, 91}};
-  Trainer nowhere(context(), load_dataset(data), options, folder.path() / "nowhere");
+  Trainer nowhere(shared_test_context(), load_dataset(data), options, folder.path() / "nowhere");
   CHECK_THROWS_AS(nowhere.run(false), UsageError);
 }

@@ -10,11 +10,13 @@
 
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "trace/camera_tracer.hpp"
 #include "train/adam.hpp"
 #include "train/density_control.hpp"
 #include "train/footprint.hpp"
 #include "unit/trace/trace_fixture.hpp"
+#include "util/mebibytes.hpp"
 
 using namespace raysplats;
 
@@ -67,7 +69,7 @@ std::size_t bytes_of_rays(const Gaussians& model,
                           const Mirrors& mirrors) {
   Context context = make_test_context();
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(width);
+  const std::size_t pixels = pixel_count(width, width);
   Buffer<float> image_gradient(context, 4 * pixels, "image gradient");
   image_gradient.clear();
   const std::size_t before = context.allocated_bytes();
@@ -84,7 +86,7 @@ std::size_t bytes_of_rays(const Gaussians& model,
 std::size_t bytes_of_packets(const Gaussians& model, int width, const TraceOptions& options) {
   Context context = make_test_context();
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(width);
+  const std::size_t pixels = pixel_count(width, width);
   Buffer<float> image_gradient(context, 4 * pixels, "image gradient");
   image_gradient.clear();
   const std::size_t before = context.allocated_bytes();
@@ -230,10 +232,8 @@ TEST_CASE("what packets take is never more than estimated") {
       const auto gaussians = static_cast<std::size_t>(count);
       const std::size_t got =
           bytes_of_packets(reference::random_scene(gaussians, 44, 0), width, options.trace);
-      const MemoryEstimate estimate = estimate_memory(
-          options,
-          {gaussians, static_cast<std::size_t>(width) * static_cast<std::size_t>(width), 3},
-          device);
+      const MemoryEstimate estimate =
+          estimate_memory(options, {gaussians, pixel_count(width, width), 3}, device);
       CHECK(got <= estimate.tracing + estimate.hits);
     }
   }
@@ -260,7 +260,7 @@ TEST_CASE("what views traced ray by ray take is estimated to an eighth") {
           trace.gradient_sum = sum;
           trace.memory_budget = std::size_t{256} << 20;
           const auto gaussians = static_cast<std::size_t>(count);
-          const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(width);
+          const std::size_t pixels = pixel_count(width, width);
           const auto got =
               static_cast<double>(bytes_of_rays(reference::random_scene(gaussians, 41, degree),
                                                 width, trace, mirrored ? wall() : Mirrors{}));

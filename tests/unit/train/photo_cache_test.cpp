@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "raysplats/io.hpp"
+#include "scene/pixel_count.hpp"
 #include "unit/fixture.hpp"
 #include "unit/io/scratch.hpp"
 #include "util/rng.hpp"
@@ -110,7 +111,7 @@ TEST_CASE("a reduced photo is the average over areas, of unrounded sums") {
         REQUIRE(photo.planes == 4);
         REQUIRE(photo.weighted == weighted);
         const std::vector<std::uint32_t> words = photo.words.download();
-        const auto pixels = static_cast<std::size_t>(size.width * size.height);
+        const std::size_t pixels = pixel_count(size.width, size.height);
         REQUIRE(words.size() == photo.words_of(pixels));
         double worst = 0;
         for (int y = 0; y < size.height; ++y) {

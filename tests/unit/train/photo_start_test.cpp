@@ -6,15 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
-#include <memory>
 #include <vector>
 
 #include "scene/camera_model.hpp"
-#include "test_photos.hpp"
 #include "train/initialization.hpp"
 #include "train/plane_sweep.hpp"
+#include "unit/train/test_photos.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -215,4 +213,36 @@ TEST_CASE("few sparse points get company from the photos, up to the limit") {
   CHECK(first(500) <= 500);
   options.init = "colmap";
   CHECK(first(1000) == 60);
+}
+
+TEST_CASE("however small the limit, photos give a start") {
+  Dataset dataset;
+  std::vector<SmallPhoto> photos = photos_of_wall();
+  std::vector<Camera> cameras;
+  for (const SmallPhoto& photo : photos) cameras.push_back(photo.camera);
+  const auto first = [&](std::size_t limit) {
+    return initial_model(dataset, cameras, [&photos](PhotoChoice) -> const auto& { return photos; },
+                         limit, {})
+        .size();
+  };
+  // In place of points that no photo sees.
+  for (int i = 0; i < 60; ++i) {
+    dataset.points.positions.insert(dataset.points.positions.end(),
+                                    {-10.0f, 0.01f * static_cast<float>(i), 0.1f});
+    dataset.points.colors.insert(dataset.points.colors.end(), {0.5f, 0.5f, 0.5f});
+  }
+  for (const std::size_t limit : {1u, 3u, 6u, 10u}) {
+    CAPTURE(limit);
+    CHECK(first(limit) > 0);
+    CHECK(first(limit) <= limit);
+  }
+  // Where they are of one colour, which tells no depth.
+  dataset.points = {};
+  for (SmallPhoto& photo : photos)
+    photo = photo_of(photo.camera, [](const CameraRay&) { return glm::dvec4(0.3, 0.5, 0.2, 1); });
+  for (const std::size_t limit : {1u, 3u, 6u, 10u}) {
+    CAPTURE(limit);
+    CHECK(first(limit) > 0);
+    CHECK(first(limit) <= limit);
+  }
 }

@@ -5,14 +5,17 @@
 
 #include <array>
 #include <cmath>
+#include <csignal>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <vector>
 
+#include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
-#include "test_photos.hpp"
+#include "unit/train/test_photos.hpp"
+#include "util/interrupt.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -138,6 +141,24 @@ TEST_CASE("photos without a common view give no sure points and do not fail") {
   const PointCloud points = swept_points(one, {0.4, 2.0, 20.0}, 100, 0.25, 1);
   CHECK(points.size() == 25);
   for (const float p : points.positions) CHECK(std::isfinite(p));
+}
+
+TEST_CASE("a signal ends a sweep, and the next one is whole") {
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  const auto sweep = [&photos] { return swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5); };
+  {
+    const InterruptGuard guard;
+    CHECK(sweep().size() > 0);
+    std::raise(SIGINT);
+    ErrorCode code = ErrorCode::kRuntime;
+    try {
+      sweep();
+    } catch (const Error& error) {
+      code = error.code();
+    }
+    CHECK(code == ErrorCode::kInterrupted);
+  }
+  CHECK(sweep().size() > 0);
 }
 
 TEST_CASE("cameras on a tripod look at what is far away") {

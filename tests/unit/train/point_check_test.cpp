@@ -8,11 +8,11 @@
 
 #include "scene/camera_model.hpp"
 #include "scene/statistics.hpp"
-#include "test_photos.hpp"
 #include "train/initialization.hpp"
 #include "train/photo_start.hpp"
 #include "train/plane_sweep.hpp"
 #include "train/point_cloud.hpp"
+#include "unit/train/test_photos.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

@@ -177,6 +177,11 @@ TEST_CASE("what a camera sees lies at its points, else where all look, else at t
     for (int k = 0; k < 3; ++k) points.positions.push_back(static_cast<float>(p[k]));
   }
   CHECK(subject_distances(cameras, points, kExtent)[0] == doctest::Approx(7.0).epsilon(0.01));
+  // Cameras that stand near to each other see far; never less than where they stand.
+  const std::vector<Camera> near{cameras[0], cameras[0], cameras[0]};
+  CHECK(subject_length(near, points, 0.01) == doctest::Approx(7.0).epsilon(0.01));
+  CHECK(subject_length(near, points, 30.0) == 30.0);
+  CHECK(subject_length(cameras, {}, kExtent) == doctest::Approx(kExtent).epsilon(0.2));
   CHECK(subject_distances(std::vector<Camera>{cameras[0]}, {}, kExtent)[0] == kExtent);
 }
 

@@ -3,6 +3,8 @@
 
 #include <doctest/doctest.h>
 
+#include "eval/metrics.hpp"
+
 using namespace raysplats;
 
 TEST_CASE("PSNR rise: it is judged when three views were seen again, at one size") {
@@ -20,4 +22,17 @@ TEST_CASE("PSNR rise: it is judged when three views were seen again, at one size
   rise.note(0, 2, 30.5);
   CHECK(*rise.most() == doctest::Approx(0.5));
   CHECK(!rise.learned_nothing());
+}
+
+TEST_CASE("PSNR rise: views that are perfect from the beginning are not judged") {
+  PsnrRise rise;
+  for (int pass = 0; pass < 3; ++pass) {
+    for (const std::size_t view : {0u, 1u, 2u}) rise.note(view, 1, kMostPsnr);
+  }
+  CHECK(!rise.most().has_value());
+  CHECK(!rise.learned_nothing());
+  for (int pass = 0; pass < 2; ++pass) {
+    for (const std::size_t view : {3u, 4u, 5u}) rise.note(view, 1, 20.0);
+  }
+  CHECK(rise.learned_nothing());
 }

@@ -35,4 +35,8 @@ TEST_CASE("higher qualities train longer on larger photos, within the capture's 
   CHECK(choose_quality(Quality::kMedium, dataset, DeviceType::kCpu).iterations == 2400);
   CHECK(choose_quality(Quality::kHigh, dataset, DeviceType::kCpu).iterations == 120 * 24);
   CHECK_THROWS_AS(parse_quality("best"), UsageError);
+  // One large photo among small ones says nothing of them.
+  for (View& view : dataset.views) view.camera.width = 135, view.camera.height = 240;
+  dataset.views[3].camera.width = 2160, dataset.views[3].camera.height = 3840;
+  CHECK(choose_quality(Quality::kLow, dataset, DeviceType::kCpu).downscale == 1);
 }

@@ -9,7 +9,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
-#include "train/mirror_meshes.hpp"
+#include "run/mirror_meshes.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/photographed.hpp"
 #include "util/atomic_file.hpp"

@@ -9,28 +9,25 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
 #include "run/checkpoint.hpp"
 #include "trace/device_gaussians.hpp"
 #include "unit/fixture.hpp"
+#include "unit/text.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/atomic_file.hpp"
 
 using namespace raysplats;
+using test::contains;
+using test::message_of;
 namespace fs = std::filesystem;
 
 namespace {
 
 constexpr int kIterations = 40;
 constexpr std::int64_t kTooMany = 2'000'000'000;  // Gaussians, for any device
-
-Context& context() {
-  static Context instance(test_device());
-  return instance;
-}
 
 // Forty iterations with density control after each tenth up to the thirtieth, and a checkpoint
 // after each twentieth.
@@ -61,8 +58,8 @@ struct Place {
   std::unique_ptr<Trainer> trainer(const TrainOptions& options,
                                    const char* name,
                                    bool overwrite = false) const {
-    return std::make_unique<Trainer>(context(), load_dataset(folder / "data"), options, run(name),
-                                     overwrite);
+    return std::make_unique<Trainer>(shared_test_context(), load_dataset(folder / "data"), options,
+                                     run(name), overwrite);
   }
   std::unique_ptr<Trainer> resumed(const TrainOptions& options, const char* name) const {
     auto out = trainer(options, name);
@@ -73,12 +70,7 @@ struct Place {
   std::string broken(const TrainOptions& options, const char* name, int iteration) const {
     const fs::path way = blocked(name, iteration);
     write_text_file(way, "in the way");
-    std::string message;
-    try {
-      trainer(options, name)->run(false);
-    } catch (const DataError& error) {
-      message = error.what();
-    }
+    const std::string message = message_of<DataError>([&] { trainer(options, name)->run(false); });
     fs::remove(way);
     return message;
   }
@@ -93,20 +85,6 @@ struct Place {
     return nlohmann::json::parse(std::ifstream(run(name) / "metrics.json"));
   }
 };
-
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
-template <class Failure, class Work>
-std::string refusal(const Work& work) {
-  try {
-    work();
-  } catch (const Failure& error) {
-    return error.what();
-  }
-  return "";
-}
 
 }  // namespace
 
@@ -123,7 +101,7 @@ TEST_CASE("a run that broke off in an evaluation goes on as if it had not") {
     CAPTURE(iteration);
     const std::string name = "broken" + std::to_string(iteration);
     const std::string message = place.broken(options, name.c_str(), iteration);
-    CHECK(has(message, "iteration " + std::to_string(iteration) + " is saved"));
+    CHECK(contains(message, "iteration " + std::to_string(iteration) + " is saved"));
     CHECK(load_latest_checkpoint(place.run(name.c_str())).pass_due == (iteration == 20));
     const auto resumed = place.resumed(options, name.c_str());
     const TrainSummary summary = resumed->run(false);
@@ -159,7 +137,7 @@ TEST_CASE("a final evaluation that failed comes when the run is resumed, and onc
   TrainOptions options = growing();
   options.eval_at = {20};
   const std::string message = place.broken(options, "run", kIterations);
-  CHECK(has(message, "iteration 40 is saved"));
+  CHECK(contains(message, "iteration 40 is saved"));
   REQUIRE(fs::exists(place.model("run", kIterations)));
   const TrainSummary summary = place.resumed(options, "run")->run(false);
   REQUIRE(summary.evaluations.size() == 2);
@@ -188,14 +166,14 @@ TEST_CASE("a run that is refused for its memory removes nothing of the one that 
   const std::string metrics = place.metrics("run").dump();
   options.max_gaussians = kTooMany;
   const auto refused = [&](Trainer& trainer) {
-    return refusal<ResourceError>([&] { trainer.run(false); });
+    return message_of<ResourceError>([&] { trainer.run(false); });
   };
   const auto fresh = place.trainer(options, "run", true);
-  CHECK(has(refusal<ResourceError>([&] { fresh->estimate(0.01); }), "--max-gaussians"));
-  CHECK(has(refused(*fresh), "--max-gaussians"));
+  CHECK(contains(message_of<ResourceError>([&] { fresh->estimate(0.01); }), "--max-gaussians"));
+  CHECK(contains(refused(*fresh), "--max-gaussians"));
   const auto resumed = place.trainer(options, "run", true);
   resumed->resume(checkpoint_path(place.run("run"), 20));
-  CHECK(has(refused(*resumed), "--max-gaussians"));
+  CHECK(contains(refused(*resumed), "--max-gaussians"));
   CHECK(fs::exists(place.model("run", kIterations)));
   CHECK(fs::exists(checkpoint_path(place.run("run"), kIterations)));
   CHECK(place.metrics("run").dump() == metrics);
@@ -220,9 +198,10 @@ TEST_CASE("a run of another length leaves no newer model of the one that it goes
     CAPTURE(length);
     options.iterations = length;
     options.save_at = {};
-    const std::string message = refusal<UsageError>([&] { (void)place.resumed(options, "run"); });
-    CHECK(has(message, "a model of iteration 28"));
-    CHECK(has(message, "--overwrite"));
+    const std::string message =
+        message_of<UsageError>([&] { (void)place.resumed(options, "run"); });
+    CHECK(contains(message, "a model of iteration 28"));
+    CHECK(contains(message, "--overwrite"));
     CHECK(fs::exists(newer));
   }
   options.iterations = kIterations;
@@ -244,7 +223,8 @@ TEST_CASE("a run of another length leaves no newer model of the one that it goes
   // A folder without a checkpoint is begun anew, but not by a shorter run.
   fs::remove_all(place.run("run") / "checkpoints");
   options.iterations = 12;
-  CHECK(has(refusal<UsageError>([&] { (void)place.resumed(options, "run"); }), "iteration 24"));
+  CHECK(contains(message_of<UsageError>([&] { (void)place.resumed(options, "run"); }),
+                 "iteration 24"));
 }
 
 TEST_CASE("a run says the same of itself when it is resumed halfway and when it is over") {

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <string>
 
-#include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
@@ -17,15 +16,6 @@
 
 using namespace raysplats;
 namespace fs = std::filesystem;
-
-namespace {
-
-Context& context() {
-  static Context instance(test_device());
-  return instance;
-}
-
-}  // namespace
 
 TEST_CASE("an estimate leaves no trace in the run, whatever its strategy and options") {
   const TemporaryDirectory folder;
@@ -40,9 +30,11 @@ TEST_CASE("an estimate leaves no trace in the run, whatever its strategy and opt
     options.trace.deterministic = true;
     options.max_gaussians = 900;
     const std::string name = std::to_string(static_cast<int>(strategy));
-    Trainer plain(context(), load_dataset(data), options, folder.path() / ("plain" + name));
+    Trainer plain(shared_test_context(), load_dataset(data), options,
+                  folder.path() / ("plain" + name));
     plain.run(false);
-    Trainer estimated(context(), load_dataset(data), options, folder.path() / ("estimated" + name));
+    Trainer estimated(shared_test_context(), load_dataset(data), options,
+                      folder.path() / ("estimated" + name));
     const RunEstimate estimate = estimated.estimate(0.3);
     CHECK(estimate.iterations == 60);
     CHECK(estimate.seconds > 0);
@@ -72,9 +64,10 @@ TEST_CASE("an estimate looks at the photos that the run's background comes from"
     CAPTURE(name);
     options.background = name == "sky" ? "sky" : "auto";
     options.exposure = name == "exposure";
-    Trainer plain(context(), load_dataset(data), options, folder.path() / ("plain " + name));
+    Trainer plain(shared_test_context(), load_dataset(data), options,
+                  folder.path() / ("plain " + name));
     plain.run(false);
-    Trainer estimated(context(), load_dataset(data), options,
+    Trainer estimated(shared_test_context(), load_dataset(data), options,
                       folder.path() / ("estimated " + name));
     estimated.estimate(0.1);
     estimated.run(false);
@@ -89,7 +82,7 @@ TEST_CASE("a run by time names its length, and a replay of its configuration giv
   make_photos(data, 48, 8, 1);
   TrainOptions options = short_training(10000);
   options.trace.deterministic = true;
-  Trainer trainer(context(), load_dataset(data), options, run);
+  Trainer trainer(shared_test_context(), load_dataset(data), options, run);
   CHECK_THROWS_AS(trainer.fit_time(0), UsageError);
   CHECK_THROWS_AS(trainer.fit_time(1e-4), UsageError);
   const RunEstimate estimate = trainer.fit_time(4);
@@ -107,7 +100,7 @@ TEST_CASE("a run by time names its length, and a replay of its configuration giv
   CHECK(replayed.iterations == estimate.iterations);
   CHECK(replayed.end_iteration == summary.iterations);  // once the last steps were timed
   CHECK(replayed.max_gaussians == static_cast<std::int64_t>(estimate.gaussians));
-  Trainer again(context(), load_dataset(data), replayed, folder.path() / "again");
+  Trainer again(shared_test_context(), load_dataset(data), replayed, folder.path() / "again");
   again.run(false);
   check_equal(trainer.model(), again.model());
 }
@@ -117,7 +110,7 @@ TEST_CASE("a run by time of few iterations sees small photos for longer, unless 
   const fs::path data = folder.path() / "data";
   make_photos(data, 256, 8, 1);
   const auto planned = [&](const TrainOptions& options, const std::string& name) {
-    Trainer trainer(context(), load_dataset(data), options, folder.path() / name);
+    Trainer trainer(shared_test_context(), load_dataset(data), options, folder.path() / name);
     trainer.fit_time(4);
     trainer.step();
     trainer.save();
@@ -141,11 +134,11 @@ TEST_CASE("a run ends where it is told to, with the schedules of its iterations"
   TrainOptions options = short_training(60);
   options.trace.deterministic = true;
   options.average_from = 0;  // else each ends with the mean of its own last steps
-  Trainer whole(context(), load_dataset(data), options, folder.path() / "whole");
+  Trainer whole(shared_test_context(), load_dataset(data), options, folder.path() / "whole");
   for (const std::int64_t end : {50, 60}) {
     CAPTURE(end);
     options.end_iteration = end;
-    Trainer early(context(), load_dataset(data), options,
+    Trainer early(shared_test_context(), load_dataset(data), options,
                   folder.path() / ("end" + std::to_string(end)));
     CHECK(early.run(false).iterations == end);
     CHECK_FALSE(early.step());
@@ -154,11 +147,11 @@ TEST_CASE("a run ends where it is told to, with the schedules of its iterations"
     check_equal(early.model(), whole.model());
   }
   options.end_iteration = 70;
-  Trainer late(context(), load_dataset(data), options, folder.path() / "late");
+  Trainer late(shared_test_context(), load_dataset(data), options, folder.path() / "late");
   CHECK(late.run(false).iterations == 70);
   options.end_iteration = 0;
   options.iterations = 60;
-  Trainer shorter(context(), load_dataset(data), options, folder.path() / "late", true);
+  Trainer shorter(shared_test_context(), load_dataset(data), options, folder.path() / "late", true);
   CHECK_THROWS_AS(shorter.resume(folder.path() / "late"), UsageError);
 }
 
@@ -170,7 +163,7 @@ TEST_CASE("a long run of few photos is told how long they ask for") {
     CAPTURE(iterations);
     TrainOptions options = short_training(iterations);
     const LogCapture log;
-    Trainer trainer(context(), load_dataset(data), options,
+    Trainer trainer(shared_test_context(), load_dataset(data), options,
                     folder.path() / std::to_string(iterations));
     trainer.step();
     CHECK(log.contains("without -n and --time a run has 1000") == (iterations > 2000));

@@ -298,7 +298,9 @@ TEST_CASE("a random background is a function of seed and iteration, for cut-out 
   CHECK(step_background(options, false, white, 5) == std::array<float, 3>{0, 0, 0});
 }
 
-TEST_CASE("steps are alike once photos are whole, bands are on and density control is over") {
+TEST_CASE(
+    "steps are alike once photos are whole, bands are on, density control is over and flat "
+    "Gaussians are flat") {
   TrainOptions options;
   options.iterations = 1000;
   options.densify_until = 0.5;
@@ -309,6 +311,11 @@ TEST_CASE("steps are alike once photos are whole, bands are on and density contr
   CHECK(steady_from(options) == 700);
   options.sh_degree_interval = 0.25;
   CHECK(steady_from(options) == 750);
+  options.flat = true;
+  CHECK(steady_from(options) == 800);
+  CHECK(flat_thickness(options, steady_from(options) - 1) == doctest::Approx(0.01));
+  CHECK(timed_until(options) > 800);  // no run by time ends before it
+  options.flat = false;
   CHECK(last_iteration(options) == 1000);
   options.end_iteration = 800;
   CHECK(last_iteration(options) == 800);

@@ -2,9 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <vector>
 

@@ -2,14 +2,13 @@
 #include <doctest/doctest.h>
 
 #include <cstdlib>
-#include <filesystem>
 #include <string>
 
 #include "device/context.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
-#include "short_training.hpp"
 #include "unit/fixture.hpp"
+#include "unit/train/short_training.hpp"
 
 using namespace raysplats;
 

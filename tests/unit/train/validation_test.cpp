@@ -6,14 +6,12 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
@@ -32,11 +30,6 @@ namespace {
 
 constexpr int kSize = 32;
 constexpr int kTrainViews = 8;
-
-Context& context() {
-  static Context instance(test_device());
-  return instance;
-}
 
 void make_noise_of(const fs::path& photo) {
   Image image = read_image(photo);
@@ -96,7 +89,7 @@ TEST_CASE("test photos influence no run: with noise in their place it gives the 
   const auto trained = [&](const std::string& name) {
     TrainOptions options = options_of(60, 2);
     options.eval_at = {0.5};
-    Trainer trainer(context(), load_dataset(data), options, folder.path() / name);
+    Trainer trainer(shared_test_context(), load_dataset(data), options, folder.path() / name);
     const double psnr = trainer.run(false).evaluations.back().psnr;
     return std::pair(trainer.model(), psnr);
   };
@@ -113,7 +106,8 @@ TEST_CASE("validation photos influence nothing until nine tenths of the run, the
   make_photos(data, kSize, kTrainViews, 1);
   std::vector<Gaussians> early, late;
   for (const char* name : {"clean", "noise"}) {
-    Trainer trainer(context(), load_dataset(data), options_of(40, 2), folder.path() / name);
+    Trainer trainer(shared_test_context(), load_dataset(data), options_of(40, 2),
+                    folder.path() / name);
     trainer.step(36);
     early.push_back(trainer.model());
     trainer.step(4);
@@ -133,7 +127,7 @@ TEST_CASE("validation is recorded, resumed runs end with the same bytes, the bes
                  broken = folder.path() / "broken";
   make_photos(data, kSize, kTrainViews, 1);
   TrainOptions options = options_of(100, 2);
-  Trainer whole(context(), load_dataset(data), options, straight);
+  Trainer whole(shared_test_context(), load_dataset(data), options, straight);
   whole.run(false);
   const nlohmann::json rows = metrics_of(straight).at("validations");
   REQUIRE(rows.size() == 9);
@@ -151,10 +145,10 @@ TEST_CASE("validation is recorded, resumed runs end with the same bytes, the bes
 
   options.checkpoint_every = 45;
   options.keep_checkpoints = 9;
-  Trainer(context(), load_dataset(data), options, broken).run(false);
+  Trainer(shared_test_context(), load_dataset(data), options, broken).run(false);
   fs::remove(broken / "checkpoints/step_000000100.rsck");
   fs::remove(broken / "checkpoints/step_000000090.rsck");
-  Trainer resumed(context(), load_dataset(data), options, broken);
+  Trainer resumed(shared_test_context(), load_dataset(data), options, broken);
   resumed.resume("latest");
   CHECK(resumed.iteration() == 45);
   resumed.run(false);
@@ -165,7 +159,7 @@ TEST_CASE("validation is recorded, resumed runs end with the same bytes, the bes
 
   TrainOptions other = options;
   other.validate_views = 3;
-  Trainer misfit(context(), load_dataset(data), other, broken);
+  Trainer misfit(shared_test_context(), load_dataset(data), other, broken);
   CHECK_THROWS_AS(misfit.resume("latest"), UsageError);
 }
 
@@ -191,7 +185,7 @@ TEST_CASE(
       TrainOptions options = options_of(40, 2);
       options.poses = kind.poses;
       options.exposure = kind.exposure;
-      Trainer(context(), dataset, options, run / "run").run(false);
+      Trainer(shared_test_context(), dataset, options, run / "run").run(false);
       psnr.push_back(metrics_of(run / "run").at("validations").back().at("psnr"));
     }
     // Darker photos have smaller errors. As they are, they would lose 4 dB by the turn and 9 by
@@ -207,12 +201,12 @@ TEST_CASE("validation views that were trained on stay in the loss of a longer ru
   const fs::path data = folder.path() / "data", run = folder.path() / "run";
   make_photos(data, kSize, kTrainViews, 1);
   TrainOptions options = options_of(40, 2);
-  Trainer first(context(), load_dataset(data), options, run);
+  Trainer first(shared_test_context(), load_dataset(data), options, run);
   first.run(false);
   const std::string warning = "stay in the loss and judge no more";
   const auto resumed = [&](const char* name, const fs::path& source, bool warned) {
-    auto trainer =
-        std::make_unique<Trainer>(context(), load_dataset(data), options, folder.path() / name);
+    auto trainer = std::make_unique<Trainer>(shared_test_context(), load_dataset(data), options,
+                                             folder.path() / name);
     const LogCapture log;
     trainer->resume(source);
     CHECK(log.contains(warning) == warned);
@@ -220,7 +214,7 @@ TEST_CASE("validation views that were trained on stay in the loss of a longer ru
   };
 
   // As long as it was to be, a run goes on as if it had not been interrupted.
-  Trainer broken(context(), load_dataset(data), options, folder.path() / "broken");
+  Trainer broken(shared_test_context(), load_dataset(data), options, folder.path() / "broken");
   broken.step(38);
   broken.save();
   const auto rest = resumed("rest", folder.path() / "broken", false);
@@ -242,7 +236,7 @@ TEST_CASE("validation views that were trained on stay in the loss of a longer ru
 
   // In the same folder the judgements of the shorter run remain.
   const nlohmann::json before = metrics_of(run).at("validations");
-  Trainer longer(context(), load_dataset(data), options, run);
+  Trainer longer(shared_test_context(), load_dataset(data), options, run);
   longer.resume("latest");
   longer.run(false);
   CHECK(metrics_of(run).at("validations") == before);
@@ -261,7 +255,7 @@ TEST_CASE("a run that no longer gains ends when its patience does, with its resu
     *rate = {0, 0};
   options.densify_until = 0;
   options.footprint = 0;
-  Trainer trainer(context(), load_dataset(data), options, run);
+  Trainer trainer(shared_test_context(), load_dataset(data), options, run);
   const TrainSummary summary = trainer.run(false);
   CHECK(summary.iterations == 30);
   CHECK(metrics_of(run).at("complete") == true);
@@ -272,7 +266,7 @@ TEST_CASE("a run that no longer gains ends when its patience does, with its resu
   // It stays over when it is resumed, until it is given more patience.
   for (const auto& [patience, end] : {std::pair{2, 30}, std::pair{3, 40}}) {
     options.patience = patience;
-    Trainer resumed(context(), load_dataset(data), options, run);
+    Trainer resumed(shared_test_context(), load_dataset(data), options, run);
     resumed.resume("latest");
     CHECK(resumed.run(false).iterations == end);
     CHECK(metrics_of(run).at("complete") == true);
@@ -284,10 +278,12 @@ TEST_CASE("validation needs views, and patience validation") {
   const TemporaryDirectory folder;
   const fs::path data = folder.path() / "data";
   make_photos(data, kSize, 4, 1);
-  CHECK_THROWS_AS(Trainer(context(), load_dataset(data), options_of(10, 3), folder.path() / "run"),
-                  UsageError);
+  CHECK_THROWS_AS(
+      Trainer(shared_test_context(), load_dataset(data), options_of(10, 3), folder.path() / "run"),
+      UsageError);
   TrainOptions options = options_of(10, 0);
   options.patience = 1;
-  CHECK_THROWS_AS(Trainer(context(), load_dataset(data), options, folder.path() / "run"),
-                  UsageError);
+  CHECK_THROWS_AS(
+      Trainer(shared_test_context(), load_dataset(data), options, folder.path() / "run"),
+      UsageError);
 }

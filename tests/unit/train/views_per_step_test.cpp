@@ -2,7 +2,6 @@
 // Steps of several views: the sum of their gradients, and runs that are made of such steps.
 #include <doctest/doctest.h>
 
-#include <cmath>
 #include <filesystem>
 
 #include "raysplats/context.hpp"

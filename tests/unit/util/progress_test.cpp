@@ -81,3 +81,20 @@ TEST_CASE("an interrupt is noted while a guard lives") {
   std::raise(SIGTERM);
   CHECK(fresh.requested());
 }
+
+TEST_CASE("a terminal that goes is an interrupt too, however often it says so, but not for nohup") {
+  const auto before = std::signal(SIGHUP, SIG_DFL);
+  if (before != SIG_IGN) {  // else the tests themselves run under nohup
+    const InterruptGuard guard;
+    for (int i = 0; i < 3; ++i) std::raise(SIGHUP);
+    CHECK(guard.requested());
+    std::raise(SIGTERM);  // as systems send it beside
+  }
+  CHECK((std::signal(SIGHUP, SIG_IGN) == SIG_DFL));
+  {
+    const InterruptGuard guard;
+    std::raise(SIGHUP);
+    CHECK(!guard.requested());
+  }
+  CHECK((std::signal(SIGHUP, before) == SIG_IGN));
+}

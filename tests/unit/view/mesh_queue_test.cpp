@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <variant>
-#include <vector>
 
 #include "raysplats/error.hpp"
 

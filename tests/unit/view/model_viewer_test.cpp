@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "page_client.hpp"
 #include "raysplats/error.hpp"
 #include "skip_test.hpp"
 #include "unit/fixture.hpp"
+#include "unit/view/page_client.hpp"
 
 using namespace raysplats;
 using namespace raysplats::view;

@@ -10,12 +10,9 @@
 using namespace raysplats;
 using namespace raysplats::view;
 using reference::ball;
-using reference::cube_camera;
 using reference::white;
 
 namespace {
-
-const Camera kCamera = cube_camera(24, 24);
 
 /// How alike the colours of two pictures are, as PSNR in decibels.
 double likeness(const Image& a, const Image& b) {

@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "page_client.hpp"
 #include "raysplats/error.hpp"
 #include "skip_test.hpp"
+#include "unit/view/page_client.hpp"
 #include "view/viewer.hpp"
 
 using namespace raysplats;

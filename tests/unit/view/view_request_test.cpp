@@ -11,6 +11,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/camera_model.hpp"
+#include "unit/text.hpp"
 
 using namespace raysplats;
 using namespace raysplats::view;
@@ -31,13 +32,9 @@ ViewRequest view_of(const json& message, int max_side = 1000) {
 }
 
 std::string refusal(const std::string& text) {
-  try {
-    parse_message(text, 1000);
-  } catch (const UsageError& error) {
-    CHECK(std::string(error.what()).find('\n') == std::string::npos);
-    return error.what();
-  }
-  return "";
+  const std::string message = test::message_of<UsageError>([&] { parse_message(text, 1000); });
+  CHECK(message.find('\n') == std::string::npos);
+  return message;
 }
 
 /// The sound message with one member replaced.

@@ -15,9 +15,9 @@
 #include <thread>
 #include <vector>
 
-#include "page_client.hpp"
 #include "raysplats/error.hpp"
 #include "skip_test.hpp"
+#include "unit/view/page_client.hpp"
 
 using namespace raysplats;
 using namespace raysplats::view;

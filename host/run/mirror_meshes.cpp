@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/mirror_meshes.hpp"
+#include "run/mirror_meshes.hpp"
 
 #include <spdlog/spdlog.h>
 
