@@ -165,8 +165,8 @@ void check_report(const DeviceReport& report, const std::string& file) {
   std::vector<std::string> troubles;
   if (!report.passed()) troubles.emplace_back("does not compute what it should");
   if (report.failed > 0) {
-    troubles.push_back(fmt::format("fails in {}, which the report names under left_out",
-                                   counted(static_cast<double>(report.failed), "row")));
+    troubles.push_back(fmt::format("fails in {} of what is measured, named under left_out",
+                                   counted(static_cast<double>(report.failed), "part")));
   }
   if (troubles.empty()) return;
   throw DeviceError(fmt::format("The device {} {}: please send us {}, and see docs/gpu.md",

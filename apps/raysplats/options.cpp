@@ -10,6 +10,7 @@
 
 #include "logging.hpp"
 #include "scene/option_flags.hpp"
+#include "util/number_text.hpp"
 #include "util/progress.hpp"
 #include "validators.hpp"
 
@@ -120,13 +121,13 @@ void warn_of_capped_rays(std::uint64_t capped, std::uint64_t rays, const TraceOp
 
 void tell_of_ended_paths(std::uint64_t ended, std::uint64_t camera_rays, int max_bounces) {
   if (ended == 0) return;
-  if (ended > camera_rays / 100) {
-    spdlog::warn(
-        "{} paths of {} camera rays ended after --max-bounces {}: raise it for the rest of their "
-        "light",
-        ended, camera_rays, max_bounces);
+  if (100 * ended > camera_rays) {
+    spdlog::warn("{} of {} ended after --max-bounces {}: raise it for the rest of their light",
+                 counted(static_cast<double>(ended), "path"),
+                 counted(static_cast<double>(camera_rays), "camera ray"), max_bounces);
   } else {
-    spdlog::info("{} paths ended after --max-bounces {}", ended, max_bounces);
+    spdlog::info("{} ended after --max-bounces {}", counted(static_cast<double>(ended), "path"),
+                 max_bounces);
   }
 }
 

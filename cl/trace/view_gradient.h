@@ -209,7 +209,7 @@ void direction_gradient(const ColorGradient* color, const fv* along, fv* mean) {
 }
 
 typedef struct {
-  fv mean[3];  // holds the share of the color before
+  fv mean[3];  // holds the share of the colour before
   fv quaternion[4];
   fv scale[3];
   fv opacity;

@@ -131,8 +131,7 @@ void warn_of_high_range(const fs::path& video, const std::string& transfer) {
   if (!hlg && transfer != "smpte2084") return;
   spdlog::warn(
       "{} is an HDR video ({}), whose frames come out in pale colours: record without HDR, or make "
-      "an "
-      "SDR video of it first (docs/cli.md, 'prepare')",
+      "an SDR video of it first (docs/cli.md, 'prepare')",
       video.string(), hlg ? "HLG" : "PQ");
 }
 
@@ -211,13 +210,14 @@ VideoFacts video_facts(const fs::path& video,
     probe(
         video,
         {"-select_streams", "v:0", "-show_entries",
-         "stream=avg_frame_rate,color_transfer:format=duration"},
+         "stream=avg_frame_rate,r_frame_rate,color_transfer:format=duration"},
         log,
         [&](std::string_view name, std::string_view value) {
           if (name == "avg_frame_rate") {
             pictures = true;
             facts.rate = ratio(value);
           }
+          if (name == "r_frame_rate") facts.densest_rate = ratio(value);
           if (name == "color_transfer") facts.transfer = value;
           if (name == "duration") facts.seconds = parse_real(value).value_or(0.0);
         },
@@ -238,10 +238,12 @@ void take_frames(const fs::path& video,
                  const fs::path& log,
                  const std::function<bool(std::size_t, std::size_t)>& watch) {
   warn_of_high_range(video, facts.transfer);
-  // A rate above the video's own repeats frames. Twice that one still meets every frame of a video
-  // whose rate varies.
+  // A rate above the video's own repeats frames. That of its densest part, or twice the mean of one
+  // that varies little, still meets every frame. (Some files state their clock's, 90 000.)
+  constexpr double kMostRate = 240.0;
   double rate = static_cast<double>(kCandidates * count) / facts.seconds;
-  if (facts.rate > 0.0) rate = std::min(rate, 2.0 * facts.rate);
+  if (facts.rate > 0.0)
+    rate = std::min(rate, std::max(2.0 * facts.rate, std::min(facts.densest_rate, kMostRate)));
   const auto total = static_cast<std::size_t>(std::lround(rate * facts.seconds));
   const fs::path all = images.parent_path() / "frames.part";
   fs::remove_all(all);
@@ -259,7 +261,7 @@ void take_frames(const fs::path& video,
         if (line.starts_with("frame="))
           std::from_chars(line.data() + 6, line.data() + line.size(), made);
       },
-      [&] { return !watch(std::min(made, total), total); });
+      [&] { return !watch(std::min(made, total), 2 * total); });
   std::vector<std::string> names = photos_in(all);
   if (names.empty()) throw DataError(fmt::format("{} has no frames", video.string()));
   // Repeated frames would be the same photo for training and for evaluation.
@@ -269,7 +271,7 @@ void take_frames(const fs::path& video,
                           }),
               names.end());
   if (names.size() < count) {
-    spdlog::info("{} has {}, not the {} asked for: all are taken", video.string(),
+    spdlog::info("{} gives {}, not the {} asked for: all are taken", video.string(),
                  counted(static_cast<double>(names.size()), "different frame"), count);
   }
   const std::size_t photos = std::min(count, names.size());
@@ -285,7 +287,7 @@ void take_frames(const fs::path& video,
       most = std::max(most, sharp);
     }
     fs::rename(all / names[best], images / names[best]);
-    if (!watch(end, names.size())) {
+    if (!watch(total + end * total / names.size(), 2 * total)) {
       throw Error(ErrorCode::kInterrupted,
                   "Interrupted among the frames of the video: the same command starts them anew");
     }

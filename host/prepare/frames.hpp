@@ -32,8 +32,9 @@ void copy_photos(const std::filesystem::path& from,
 /// What ffprobe says of a video.
 struct VideoFacts {
   double seconds = 0;
-  double rate = 0;       ///< frames a second on average; 0 = unknown
-  std::string transfer;  ///< ffmpeg's name of the curve of its brightness
+  double rate = 0;          ///< frames a second on average; 0 = unknown
+  double densest_rate = 0;  ///< where they follow each other fastest; 0 = unknown
+  std::string transfer;     ///< ffmpeg's name of the curve of its brightness
 };
 
 /// Throws as run_program() when it is stopped, and DataError for a file that is no video and for

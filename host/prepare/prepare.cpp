@@ -330,8 +330,7 @@ void place(const ColmapPlan& plan, Work& work) {
     if (!fs::exists(part) || fs::is_empty(part)) {
       throw DataError(
           fmt::format("COLMAP found no poses for the {} photos: they have to overlap by more than "
-                      "half and to be "
-                      "sharp (what it said is in {})",
+                      "half and to be sharp (what it said is in {})",
                       plan.photos, work.log().string()));
     }
     if (plan.finds_axis) find_axis(part, work);

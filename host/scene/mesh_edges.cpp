@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <tuple>
 #include <unordered_map>
 #include <utility>
@@ -40,15 +41,63 @@ std::vector<std::uint32_t> position_numbers(const Mesh& mesh) {
   return result;
 }
 
-// Positions in millionths of the mesh's size: those that differ by rounding alone, as at the seam
-// of a sphere, are one.
-Mesh rounded(Mesh mesh) {
-  constexpr float kSteps = 1e6f;
+// The mesh with one position for those that differ by rounding alone, as at the seam of a sphere:
+// by less than a millionth of its size along every axis.
+Mesh joined(Mesh mesh) {
+  constexpr double kRounding = 1e-6;
+  // So wide that few positions lie as near to a cell's border as they may lie to each other.
+  constexpr double kCell = 64;  // times that
   if (mesh.positions.empty()) return mesh;
   const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end());
-  const float step = (*high - *low) / kSteps;
-  if (!(step > 0)) return mesh;
-  for (float& position : mesh.positions) position = std::round(position / step);
+  const double near = kRounding * (static_cast<double>(*high) - *low);
+  if (!(near > 0)) return mesh;
+  using Cell = std::array<std::int64_t, 3>;
+  struct CellHash {
+    std::size_t operator()(const Cell& cell) const {
+      std::uint64_t hash = 0;
+      for (const std::int64_t at : cell) {
+        hash = (hash ^ static_cast<std::uint64_t>(at)) * 0x9e3779b97f4a7c15ull;
+        hash ^= hash >> 29;
+      }
+      return static_cast<std::size_t>(hash);
+    }
+  };
+  std::unordered_multimap<Cell, std::size_t, CellHash> firsts;  // vertices that stand for others
+  firsts.reserve(mesh.vertex_count());
+  for (std::size_t i = 0; i < mesh.vertex_count(); ++i) {
+    float* const p = &mesh.positions[3 * i];
+    Cell from, to;
+    for (std::size_t c = 0; c < 3; ++c) {
+      from[c] = static_cast<std::int64_t>(std::floor((p[c] - *low - near) / (kCell * near)));
+      to[c] = static_cast<std::int64_t>(std::floor((p[c] - *low + near) / (kCell * near)));
+    }
+    const auto same = [&](std::size_t other) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (std::abs(static_cast<double>(p[c]) - mesh.positions[3 * other + c]) > near)
+          return false;
+      }
+      return true;
+    };
+    std::optional<std::size_t> first;
+    Cell at;
+    for (at[0] = from[0]; at[0] <= to[0]; ++at[0]) {
+      for (at[1] = from[1]; at[1] <= to[1]; ++at[1]) {
+        for (at[2] = from[2]; at[2] <= to[2] && !first; ++at[2]) {
+          const auto [begin, end] = firsts.equal_range(at);
+          const auto found =
+              std::find_if(begin, end, [&](const auto& f) { return same(f.second); });
+          if (found != end) first = found->second;
+        }
+      }
+    }
+    if (first) {
+      std::copy_n(&mesh.positions[3 * *first], 3, p);
+      continue;
+    }
+    for (std::size_t c = 0; c < 3; ++c)
+      at[c] = static_cast<std::int64_t>(std::floor((p[c] - *low) / (kCell * near)));
+    firsts.emplace(at, i);
+  }
   return mesh;
 }
 
@@ -73,7 +122,7 @@ std::vector<MeshEdge> sorted_edges(const Mesh& mesh) {
 }
 
 std::map<std::uint32_t, std::size_t> open_edges(const Mesh& mesh) {
-  const std::vector<MeshEdge> edges = sorted_edges(rounded(mesh));
+  const std::vector<MeshEdge> edges = sorted_edges(joined(mesh));
   const auto alike = [](const MeshEdge& a, const MeshEdge& b) {
     return a.low == b.low && a.high == b.high;
   };

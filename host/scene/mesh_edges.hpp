@@ -23,7 +23,8 @@ struct MeshEdge {
 std::vector<MeshEdge> sorted_edges(const Mesh& mesh);
 
 /// By material the number of edges of its triangles to which no other triangle comes, of whatever
-/// material; ends that differ by rounding alone are one. Materials without any, whose bodies are closed, are left out. O(T log T).
+/// material; ends that differ by rounding alone are one. Materials without any, whose bodies are
+/// closed, are left out. O(T log T).
 std::map<std::uint32_t, std::size_t> open_edges(const Mesh& mesh);
 
 }  // namespace raysplats

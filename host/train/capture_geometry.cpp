@@ -19,6 +19,7 @@ namespace {
 constexpr std::size_t kLeastCameras = 8;  // of which one may be a stray
 constexpr std::size_t kOneStrayIn = 20;
 constexpr double kStrayFactor = 8.0;
+constexpr double kOnePlace = 1e-3;  // of what cameras see: nearer than this is no distance
 
 glm::dvec3 mean_center(std::span<const Camera> cameras) {
   glm::dvec3 sum(0.0);
@@ -83,7 +84,6 @@ double camera_extent(std::span<const Camera> cameras) {
 
 double scene_extent(std::span<const Camera> cameras, const PointCloud& points) {
   constexpr std::size_t kMostPoints = 10000;
-  constexpr double kOnePlace = 1e-3;  // of the distance of the points
   const double extent = camera_extent(cameras);
   const glm::dvec3 center = mean_center(usual(cameras));
   std::vector<double> distances;
@@ -112,7 +112,8 @@ Region visible_region(std::span<const Camera> all, double extent) {
   std::vector<double> half_sides;
   for (const Camera& camera : cameras) {
     const double depth = glm::dot(target - camera.center(), view_axis(camera));
-    if (depth <= 0) continue;
+    // The axes of cameras in one place meet there.
+    if (!(depth > kOnePlace * extent)) continue;
     // A panorama sees everything around it, parallel rays see as much at every depth.
     if (camera.model == CameraModel::kEquirectangular) return around;
     const double reach = camera.model == CameraModel::kOrthographic ? 1.0 : depth;

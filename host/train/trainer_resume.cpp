@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <cmath>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -168,6 +169,12 @@ void Trainer::Impl::check_fits(const Checkpoint& checkpoint) const {
         "The run is at iteration {} already, beyond --iterations {}: raise them, or resume from an "
         "earlier checkpoint",
         checkpoint.iteration, last_iteration(options)));
+  }
+  if (checkpoint.scene_extent > 0 && std::abs(checkpoint.scene_extent - extent) > 1e-6 * extent) {
+    spdlog::warn(
+        "the checkpoint of iteration {} is of another version, which counted lengths by {:.6g} in "
+        "place of {:.6g}: rates and sizes change from here on",
+        checkpoint.iteration, checkpoint.scene_extent, extent);
   }
 }
 

@@ -120,7 +120,7 @@ TEST_CASE("the file for the owner of a device to send is written whatever fails"
     CHECK(outcome.code == (passed && failed == 0 ? 0 : 4));
     // Which launch that is depends on the device; on most it is one of a row.
     if (failed > 0) {
-      CHECK(contains(outcome.err, "fails in 1 row, which the report names under left_out"));
+      CHECK(contains(outcome.err, "fails in 1 part of what is measured, named under left_out"));
       CHECK(contains(json.at("left_out").at(0).get<std::string>(), "Launching kernel"));
     }
     CHECK(json.at("runs").size() == 2);

@@ -22,25 +22,38 @@ namespace {
 
 using Names = std::set<std::string>;
 
-/// What each module may include directly besides itself, which is what it is linked with; whatever
-/// these may include it may too.
-std::map<std::string, Names> read_modules(const fs::path& root) {
-  // Files of scripts/cmake make these two.
-  std::map<std::string, Names> below{{"mpi", {"comm"}}, {"images", {"io"}}};
+struct Modules {
+  /// What each may include directly besides itself, which is what it is linked with; whatever these
+  /// may include it may too.
+  std::map<std::string, Names> below;
+  /// "A on B" where B is none of those that were made before A.
+  Names upwards;
+};
+
+Modules read_modules(const fs::path& root) {
+  Modules out;
   std::ifstream stream(root / "CMakeLists.txt");
   const std::string text(std::istreambuf_iterator<char>(stream), {});
   const std::regex call("raysplats_module\\((\\w+) DEPENDS([^)]*)\\)"), name("raysplats_(\\w+)");
   const std::sregex_iterator end;
   for (std::sregex_iterator found(text.begin(), text.end(), call); found != end; ++found) {
-    Names& names = below[(*found)[1]];
-    const std::string depends = (*found)[2];
-    for (std::sregex_iterator at(depends.begin(), depends.end(), name); at != end; ++at)
-      names.insert((*at)[1]);
+    const std::string module = (*found)[1], depends = (*found)[2];
+    Names names;
+    for (std::sregex_iterator at(depends.begin(), depends.end(), name); at != end; ++at) {
+      const std::string other = (*at)[1];
+      if (!out.below.contains(other)) out.upwards.insert(module + " on " + other);
+      names.insert(other);
+    }
+    out.below[module] = names;
   }
-  return below;
+  // Files of scripts/cmake make these two.
+  out.below["mpi"] = {"comm"};
+  out.below["images"] = {"io"};
+  return out;
 }
 
-const std::map<std::string, Names> kBelow = read_modules(RAYSPLATS_SOURCE_DIR);
+const Modules kModules = read_modules(RAYSPLATS_SOURCE_DIR);
+const std::map<std::string, Names>& kBelow = kModules.below;
 
 /// The module that a public header is the face of.
 const std::map<std::string, std::string> kFaces{
@@ -226,7 +239,10 @@ class Tree {
 
 TEST_CASE("the order of the modules is read from the build") {
   CHECK(kBelow.size() > 20);
+  CHECK(kModules.upwards == Names{});
   CHECK(kBelow.at("util").empty());
+  CHECK(kBelow.at("scene") == Names{"util"});
+  CHECK(!kBelow.at("trace").contains("io"));
   CHECK(kBelow.at("io") == Names{"scene"});  // over several lines
   CHECK(kBelow.at("bench") == Names{"train", "synth", "reference"});
 }

@@ -61,7 +61,7 @@ TEST_CASE("lists of devices that make no sense are refused") {
   for (const auto& [devices, words] :
        std::map<std::string, std::string>{{"0,,0", "names nothing beside a comma"},
                                           {"0,", "names nothing beside a comma"},
-                                          {"0,99", "there are"},
+                                          {"0,99", "counted from 0"},
                                           {"0,nothing of the kind", "no device has that"}}) {
     CAPTURE(devices);
     const Outcome outcome = raysplats_program(orbit.command("no") + Words{"--device", devices});

@@ -103,13 +103,22 @@ TEST_CASE("cameras in one place count lengths by what they see, in any unit") {
       points.positions.push_back(value);
     points.colors.resize(points.positions.size());
     std::vector<Camera> cameras;
-    for (int i = 0; i < 12; ++i) {
-      const double angle = 0.5 * i;
-      cameras.push_back(look_at({1e-4 * unit * i, 0, 0},
-                                {unit * std::cos(angle), unit * std::sin(angle), 0}, {0, 0, 1}, 80,
-                                80, 80));
+    for (const double step : {0.0, 1e-4}) {
+      CAPTURE(step);
+      cameras.clear();
+      for (int i = 0; i < 12; ++i) {
+        const double angle = 0.1 * i;
+        const glm::dvec3 center(step * unit * i, 0, 0);
+        cameras.push_back(
+            look_at(center, center + unit * glm::dvec3(std::cos(angle), std::sin(angle), 0.1 * i),
+                    {0, 0, 1}, 80, 80, 80));
+      }
+      const double extent = scene_extent(cameras, points);
+      CHECK(extent == doctest::Approx(5 * unit).epsilon(0.01));
+      // Their axes meet where they stand, which is nothing that they look at.
+      CHECK(motion_extent(cameras, extent) == extent);
+      CHECK(visible_region(cameras, extent).half_side == doctest::Approx(3 * extent));
     }
-    CHECK(scene_extent(cameras, points) == doctest::Approx(5 * unit).epsilon(0.01));
     CHECK(scene_extent(std::vector<Camera>{cameras[0]}, points) ==
           doctest::Approx(5 * unit).epsilon(0.01));
     // Without points nothing is known.
