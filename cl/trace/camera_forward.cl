@@ -34,8 +34,8 @@ __kernel void trace_forward(RS_LIST_ARGUMENTS,
                             volatile __global uint* restrict counters) {
   const RsCamera camera = camera_argument;
   const RsForward forward = forward_argument;
-  const float min_transmittance = forward.min_transmittance;
-  const int max_hits = forward.max_hits;
+  const PacketScene scene = {lines, references, limits, forward.min_transmittance,
+                             forward.max_hits};
   const float4 background =
       (float4)(forward.background[0], forward.background[1], forward.background[2], 0.0f);
   const int window_x = get_global_id(0) * (BLOCK * PACKET_WIDTH);
@@ -96,12 +96,10 @@ __kernel void trace_forward(RS_LIST_ARGUMENTS,
     packet_clear(&p);
     stream_restart(&stream);
     iv capped = (iv)(0);
-    if (!trace_in_rows(&candidates, lines, references, limits, min_transmittance, max_hits, &p,
-                       &stream)) {
+    if (!trace_in_rows(&candidates, scene, &p, &stream)) {
       packet_clear(&p);
       stream_restart(&stream);
-      capped = trace_sorted(&candidates, lines, references, limits, min_transmittance, max_hits, &p,
-                            &stream);
+      capped = trace_sorted(&candidates, scene, &p, &stream);
     }
 
     packet_store(&p, image, depth_image, transmittances, width, height, px, py, background);

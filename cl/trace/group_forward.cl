@@ -63,8 +63,8 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   __local ForwardMemory memory;
   const RsCamera camera = camera_argument;
   const RsForward forward = forward_argument;
-  const float min_transmittance = forward.min_transmittance;
-  const int max_hits = forward.max_hits;
+  const PacketScene scene = {lines, references, limits, forward.min_transmittance,
+                             forward.max_hits};
   const float4 background =
       (float4)(forward.background[0], forward.background[1], forward.background[2], 0.0f);
   const int lane = rs_group_lane();
@@ -127,15 +127,13 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
 #if KEEP_HITS
     if (lane == 0) memory.stream_begin = memory.stream_end;
 #endif
-    bool done = group_in_rows(&memory, &candidates, lane, mine, lines, references, limits,
-                              min_transmittance, max_hits, &p, &stream);
+    bool done = group_in_rows(&memory, &candidates, lane, mine, scene, &p, &stream);
     if (!done && mine) packet_clear(&p);
 #if KEEP_HITS
     if (!done && lane == 0) memory.stream_end = memory.stream_begin;
 #endif
     const bool alone = !done && part <= RS_LEAST_PART;
-    if (group_in_passes(&memory, &candidates, lane, alone && mine && p.valid, lines, references,
-                        limits, min_transmittance, max_hits, &p, &stream))
+    if (group_in_passes(&memory, &candidates, lane, alone && mine && p.valid, scene, &p, &stream))
       capped = true;
     if (done || alone) {
       first += part;

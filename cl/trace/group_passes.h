@@ -35,22 +35,20 @@ void pass_set(
 // The nearest hits behind (key, reference), by one work-item for itself.
 RS_GROUP_INLINE void find_behind(const GroupCandidates* c,
                                  const PacketState* p,
-                                 __global const RsLine* restrict lines,
-                                 __global const uint* restrict references,
-                                 __global const float2* restrict limits,
+                                 const PacketScene scene,
                                  const float last_key,
                                  const int last_reference,
                                  const PassHits* hits) {
   const int lane = hits->lane;
   for (int i = 0; i < RS_PASS_HITS; ++i) pass_set(hits, i, INFINITY, 0.0f, 0.0f);
   for (uint k = c->begin; k < c->end; ++k) {
-    if (limits[k].x > hits->key[RS_PASS_HITS - 1][lane]) break;
+    if (scene.limits[k].x > hits->key[RS_PASS_HITS - 1][lane]) break;
     __global const float* box = c->boxes + k;
     if (!(box[0] <= c->x1 && box[c->stride] <= c->y1 && box[2 * c->stride] >= c->x0 &&
           box[3 * c->stride] >= c->y0))
       continue;
-    const uint reference = references[k];
-    const PacketHit found = packet_hit(p, lines, reference, limits[k].y, -1);
+    const uint reference = scene.references[k];
+    const PacketHit found = packet_hit(p, scene, reference, scene.limits[k].y, -1);
     if (!found.hit || !(found.alpha > 0.0f)) continue;
     const float key = fabs(found.key);
     if (key < last_key || (key == last_key && (int)reference <= last_reference)) continue;
@@ -70,11 +68,7 @@ RS_GROUP_INLINE bool group_in_passes(__local ForwardMemory* memory,
                                      const GroupCandidates* candidates,
                                      const int lane,
                                      bool alive,
-                                     __global const RsLine* restrict lines,
-                                     __global const uint* restrict references,
-                                     __global const float2* restrict limits,
-                                     const float min_transmittance,
-                                     const int max_hits,
+                                     const PacketScene scene,
                                      PacketState* p,
                                      HitStream* stream) {
   bool capped = false;
@@ -85,11 +79,11 @@ RS_GROUP_INLINE bool group_in_passes(__local ForwardMemory* memory,
   bool goes_on = true;
   while (goes_on) {
     if (alive && (next == RS_PASS_HITS || !(hits.key[next][lane] < INFINITY))) {
-      find_behind(candidates, p, lines, references, limits, last_key, last_reference, &hits);
+      find_behind(candidates, p, scene, last_key, last_reference, &hits);
       next = 0;
     }
     alive = alive && hits.key[next][lane] < INFINITY;
-    capped = capped || (alive && p->hits >= max_hits);
+    capped = capped || (alive && p->hits >= scene.max_hits);
     alive = alive && !capped;
     bool mine = alive;
 #if KEEP_HITS
@@ -111,11 +105,12 @@ RS_GROUP_INLINE bool group_in_passes(__local ForwardMemory* memory,
 #endif
     if (mine) {
       const uint reference = as_uint(hits.reference[next][lane]);
-      packet_blend(p, lines[reference >> 1].v, reference & 1, -1, p->T, hits.alpha[next][lane]);
+      packet_blend(p, scene.lines[reference >> 1].v, reference & 1, -1, p->T,
+                   hits.alpha[next][lane]);
       last_key = hits.key[next][lane];
       last_reference = (int)reference;
       ++next;
-      alive = p->T >= min_transmittance;
+      alive = p->T >= scene.min_transmittance;
     }
   }
 #if !KEEP_HITS

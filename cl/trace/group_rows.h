@@ -127,16 +127,15 @@ void group_settle(__local OpenRows* rows,
                   const OwnRows* own,
                   const uint slot,
                   const int lane,
-                  __global const RsLine* restrict lines,
-                  const float min_transmittance,
+                  const PacketScene scene,
                   PacketState* p,
                   float* settled,
                   const HitStream* stream) {
   const uint reference = rows->reference[slot];
   const float alpha = rs_row_get(rows->alpha, own->alpha, slot, lane);
   const float before = rs_row_get(rows->before, own->before, slot, lane);
-  const int mine = RS_MASK(alpha > 0.0f) & RS_MASK(before >= min_transmittance);
-  packet_blend(p, lines[reference >> 1].v, reference & 1, mine, before, alpha);
+  const int mine = RS_MASK(alpha > 0.0f) & RS_MASK(before >= scene.min_transmittance);
+  packet_blend(p, scene.lines[reference >> 1].v, reference & 1, mine, before, alpha);
   *settled -= *settled * alpha;
 #if KEEP_HITS
   group_stream_set(stream, lane, rows->stream_row[slot], mine ? before : 0.0f);
@@ -185,9 +184,7 @@ RS_GROUP_INLINE bool group_test_batch(__local ForwardMemory* memory,
                                       const GroupCandidates* candidates,
                                       const int lane,
                                       const int batch,
-                                      __global const RsLine* restrict lines,
-                                      __global const uint* restrict references,
-                                      __global const float2* restrict limits,
+                                      const PacketScene scene,
                                       const int alive,
                                       const PacketState* p) {
 #if SUBGROUP
@@ -202,7 +199,7 @@ RS_GROUP_INLINE bool group_test_batch(__local ForwardMemory* memory,
 #endif
   for (int j = 0; j < batch; ++j) {
     const uint k = memory->queue[(candidates->taken + j) % RS_GROUP_QUEUE];
-    const PacketHit hit = packet_hit(p, lines, references[k], limits[k].y, alive);
+    const PacketHit hit = packet_hit(p, scene, scene.references[k], scene.limits[k].y, alive);
     // Keys are not negative: their bits are in order.
     const uint key = as_uint(hit.key) & 0x7fffffff;
 #if SUBGROUP
@@ -234,10 +231,10 @@ RS_GROUP_INLINE bool group_test_batch(__local ForwardMemory* memory,
 float group_bound(const __local ForwardMemory* memory,
                   const GroupCandidates* c,
                   const int batch,
-                  __global const float2* restrict limits) {
+                  const PacketScene scene) {
   if (c->queued - c->taken > (uint)batch)
-    return limits[memory->queue[(c->taken + batch) % RS_GROUP_QUEUE]].x;
-  return c->read < c->end ? limits[c->read].x : INFINITY;
+    return scene.limits[memory->queue[(c->taken + batch) % RS_GROUP_QUEUE]].x;
+  return c->read < c->end ? scene.limits[c->read].x : INFINITY;
 }
 
 // Puts `total` rows in the order of their nearest keys, from 0 on: the `waiting` ones, which lie
@@ -293,15 +290,13 @@ RS_GROUP_INLINE void group_order_rows(__local ForwardMemory* memory,
 RS_GROUP_INLINE void group_settle_rows(__local OpenRows* rows,
                                        const int lane,
                                        uint closing,
-                                       __global const RsLine* restrict lines,
-                                       const float min_transmittance,
+                                       const PacketScene scene,
                                        const OwnRows* own,
                                        RowProgress* progress,
                                        PacketState* p,
                                        const HitStream* stream) {
   for (; closing != 0; closing &= closing - 1)
-    group_settle(rows, own, rs_lowest_bit(closing), lane, lines, min_transmittance, p,
-                 &progress->settled, stream);
+    group_settle(rows, own, rs_lowest_bit(closing), lane, scene, p, &progress->settled, stream);
 }
 
 // Opens the nearest row that waits, which is the r-th: the open ones that lie before it settle,
@@ -309,10 +304,7 @@ RS_GROUP_INLINE void group_settle_rows(__local OpenRows* rows,
 RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
                                     const int lane,
                                     const int r,
-                                    __global const RsLine* restrict lines,
-                                    __global const uint* restrict references,
-                                    __global const float2* restrict limits,
-                                    const float min_transmittance,
+                                    const PacketScene scene,
                                     const int alive,
                                     OwnRows* own,
                                     RowProgress* progress,
@@ -322,8 +314,8 @@ RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
   __local const WaitingRows* w = &memory->waiting;
   const float first_key = w->first_key[r];
   const uint k = w->candidate[r];
-  const uint reference = references[k];
-  const PacketHit hit = packet_hit(p, lines, reference, limits[k].y, alive);
+  const uint reference = scene.references[k];
+  const PacketHit hit = packet_hit(p, scene, reference, scene.limits[k].y, alive);
   // Compared as integers (keys are not negative), less one where an equal key of a Gaussian with a
   // higher index counts as farther.
   const int order = as_int(hit.key) & 0x7fffffff;
@@ -359,8 +351,7 @@ RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
     rows->settled[slot] = progress->settled_rows + settling;
   }
   rs_group_barrier();
-  group_settle_rows(rows, lane, fits ? closing : 0, lines, min_transmittance, own, progress, p,
-                    stream);
+  group_settle_rows(rows, lane, fits ? closing : 0, scene, own, progress, p, stream);
   progress->settled_rows += settling;
   progress->open = (progress->open & ~closing) | 1u << slot;
   progress->closed = closing;
@@ -377,11 +368,7 @@ RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
                                    GroupCandidates* candidates,
                                    const int lane,
                                    const bool traced,
-                                   __global const RsLine* restrict lines,
-                                   __global const uint* restrict references,
-                                   __global const float2* restrict limits,
-                                   const float min_transmittance,
-                                   const int max_hits,
+                                   const PacketScene scene,
                                    PacketState* p,
                                    HitStream* stream) {
   OwnRows own;
@@ -397,11 +384,10 @@ RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
     const int queued = (int)(candidates->queued - candidates->taken);
     const int batch = min(min(queued, RS_GROUP_BATCH), WAITING - waiting);
     fits = batch > 0 || queued == 0;
-    const bool some_alive =
-        group_test_batch(memory, candidates, lane, batch, lines, references, limits, alive, p);
+    const bool some_alive = group_test_batch(memory, candidates, lane, batch, scene, alive, p);
     RS_TALLY(p, RS_TALLY_ROUNDS, 1);
     RS_TALLY(p, RS_TALLY_TESTED, batch);
-    const float bound = group_bound(memory, candidates, batch, limits);
+    const float bound = group_bound(memory, candidates, batch, scene);
     goes_on = some_alive && bound < INFINITY;
     const int total = waiting + batch;
     int found = 0, ready = 0;
@@ -416,11 +402,10 @@ RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
     group_order_rows(memory, candidates, lane, begin, waiting, total);
     candidates->taken += batch;
     for (int r = 0; r < ready && fits; ++r)
-      fits = group_open_row(memory, lane, r, lines, references, limits, min_transmittance, alive,
-                            &own, &progress, p, stream);
+      fits = group_open_row(memory, lane, r, scene, alive, &own, &progress, p, stream);
     begin = ready;
     waiting = found - ready;
-    alive &= RS_MASK(p->T >= min_transmittance);
+    alive &= RS_MASK(p->T >= scene.min_transmittance);
   }
   RS_TALLY(p, RS_TALLY_BOXES, (candidates->read - candidates->begin + GROUP - 1) / GROUP);
   const uint left = fits ? progress.open : 0;
@@ -428,9 +413,8 @@ RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
   if (lane == 0) group_push_rows(memory, left, progress.settled_rows, stream);
 #endif
   rs_group_barrier();
-  group_settle_rows(&memory->open, lane, left, lines, min_transmittance, &own, &progress, p,
-                    stream);
-  return rs_group_bits(memory->words, lane, !fits || (traced && p->hits > max_hits)) == 0;
+  group_settle_rows(&memory->open, lane, left, scene, &own, &progress, p, stream);
+  return rs_group_bits(memory->words, lane, !fits || (traced && p->hits > scene.max_hits)) == 0;
 }
 
 #endif

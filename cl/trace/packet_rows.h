@@ -50,9 +50,7 @@ typedef struct {
 __attribute__((always_inline)) int rows_find(Rows* rows,
                                              Slots* slots,
                                              const PacketState* p,
-                                             __global const RsLine* lines,
-                                             __global const uint* references,
-                                             __global const float2* limits,
+                                             const PacketScene scene,
                                              const uint* candidates,
                                              const int size,
                                              const iv among,
@@ -66,16 +64,16 @@ __attribute__((always_inline)) int rows_find(Rows* rows,
 #pragma unroll
     for (int i = 0; i < RS_TOGETHER; ++i) {
       const uint k = candidates[min(j + i, size - 1)];  // the last again where there are no more
-      reference[i] = references[k];
-      quantile[i] = limits[k].y;
+      reference[i] = scene.references[k];
+      quantile[i] = scene.limits[k].y;
       general |= reference[i] & 1;
     }
     PacketHit hits[RS_TOGETHER];
     if (general) {
       for (int i = 0; i < RS_TOGETHER; ++i)
-        hits[i] = packet_hit(p, lines, reference[i], quantile[i], among);
+        hits[i] = packet_hit(p, scene, reference[i], quantile[i], among);
     } else {
-      packet_hits(p, lines, reference, quantile, RS_TOGETHER, false, among, hits);
+      packet_hits(p, scene.lines, reference, quantile, RS_TOGETHER, false, among, hits);
     }
     float first[RS_TOGETHER], last[RS_TOGETHER];
 #pragma unroll
@@ -116,16 +114,15 @@ int row_wait(Slots* slots, const ushort slot, const float first_key) {
 // Blends an open row whose place is known; `settled` is the product over such rows per lane.
 void row_settle(const Rows* rows,
                 const ushort slot,
-                __global const RsLine* restrict lines,
-                const float min_transmittance,
+                const PacketScene scene,
                 PacketState* p,
                 fv* settled,
                 HitStream* stream) {
   const uint reference = rows->reference[slot];
   const fv alpha = rows->alpha[slot];
   const fv before = rows->before[slot];
-  const iv mine = RS_MASK(alpha > 0.0f) & RS_MASK(before >= min_transmittance);
-  packet_blend(p, lines[reference >> 1].v, reference & 1, mine, before, alpha);
+  const iv mine = RS_MASK(alpha > 0.0f) & RS_MASK(before >= scene.min_transmittance);
+  packet_blend(p, scene.lines[reference >> 1].v, reference & 1, mine, before, alpha);
   *settled -= *settled * alpha;
 #if KEEP_HITS
   stream_set(stream, rows->stream_row[slot], select((fv)(0.0f), before, mine));
@@ -137,11 +134,7 @@ void row_settle(const Rows* rows,
 // False when the packet needs more rows at once or a wider window than there is room for, or a ray
 // has more than max_hits hits: packet_sorted.h has no such limits.
 bool trace_in_rows(Candidates* candidates,
-                   __global const RsLine* restrict lines,
-                   __global const uint* restrict references,
-                   __global const float2* restrict limits,
-                   const float min_transmittance,
-                   const int max_hits,
+                   const PacketScene scene,
                    PacketState* p,
                    HitStream* stream) {
   Rows rows;
@@ -158,14 +151,14 @@ bool trace_in_rows(Candidates* candidates,
     int size = 0;
     for (; size < RS_BATCH && next != candidates->end; ++size) {
       batch[size] = next;
-      RS_PREFETCH_READ(lines + (references[next] >> 1));
+      RS_PREFETCH_READ(scene.lines + (scene.references[next] >> 1));
       next = candidates_next(candidates);
     }
     if (slots.free_count <= size) return false;
     float first_key[RS_BATCH + 1];
     ushort found[RS_BATCH + 1];
-    const int found_count = rows_find(&rows, &slots, p, lines, references, limits, batch, size,
-                                      alive, found, first_key);
+    const int found_count =
+        rows_find(&rows, &slots, p, scene, batch, size, alive, found, first_key);
     RS_TALLY(p, RS_TALLY_ROUNDS, 1);
     RS_TALLY(p, RS_TALLY_TESTED, (size + RS_TOGETHER - 1) / RS_TOGETHER * RS_TOGETHER);
     RS_TALLY(p, RS_TALLY_FOUND, found_count);
@@ -175,7 +168,7 @@ bool trace_in_rows(Candidates* candidates,
       (void)passed;
     }
     const bool draining = next == candidates->end;
-    const float bound = draining ? INFINITY : limits[next].x;
+    const float bound = draining ? INFINITY : scene.limits[next].x;
     while (slots.waiting_count > 0 && slots.first_key[slots.waiting_count - 1] <= bound) {
       const float first_key = slots.first_key[--slots.waiting_count];
       const ushort slot = slots.waiting[slots.waiting_count];
@@ -193,7 +186,7 @@ bool trace_in_rows(Candidates* candidates,
       for (int i = 0; i < open_count; ++i) {
         const ushort other = slots.open[i];
         if (rows.last_key[other] < first_key) {
-          row_settle(&rows, other, lines, min_transmittance, p, &settled, stream);
+          row_settle(&rows, other, scene, p, &settled, stream);
           slots.free[slots.free_count++] = other;
           continue;
         }
@@ -206,7 +199,7 @@ bool trace_in_rows(Candidates* candidates,
         oldest = min(oldest, rows.number[other]);
       }
       if (left < open_count) {
-        alive = p->valid & RS_MASK(p->T >= min_transmittance);
+        alive = p->valid & RS_MASK(p->T >= scene.min_transmittance);
         slots.open_count = left;
         if (!rs_any(alive)) break;
       }
@@ -223,8 +216,8 @@ bool trace_in_rows(Candidates* candidates,
     if (draining) break;
   }
   for (int i = 0; i < slots.open_count; ++i)
-    row_settle(&rows, slots.open[i], lines, min_transmittance, p, &settled, stream);
-  return !rs_any(RS_MASK(p->hits > max_hits));
+    row_settle(&rows, slots.open[i], scene, p, &settled, stream);
+  return !rs_any(RS_MASK(p->hits > scene.max_hits));
 }
 
 #endif

@@ -84,7 +84,7 @@ void insert_sorted(Pending* pending, fv key, fv alpha, iv reference) {
 void blend_entry(const Pending* pending,
                  const int h,
                  const iv active,
-                 __global const RsLine* restrict lines,
+                 const PacketScene scene,
                  PacketState* p,
                  HitStream* stream) {
   uint rest = rs_lane_bits(active);
@@ -97,17 +97,13 @@ void blend_entry(const Pending* pending,
 #else
     (void)stream;
 #endif
-    packet_blend(p, lines[reference >> 1].v, reference & 1, mine, p->T, pending->alpha[h]);
+    packet_blend(p, scene.lines[reference >> 1].v, reference & 1, mine, p->T, pending->alpha[h]);
   }
 }
 
 // Returns the lanes that lost a hit to max_hits.
 iv trace_sorted(Candidates* candidates,
-                __global const RsLine* restrict lines,
-                __global const uint* restrict references,
-                __global const float2* restrict limits,
-                const float min_transmittance,
-                const int max_hits,
+                const PacketScene scene,
                 PacketState* p,
                 HitStream* stream) {
   Pending pending;
@@ -125,7 +121,7 @@ iv trace_sorted(Candidates* candidates,
     for (;;) {
       const uint k = candidates_next(candidates);
       const bool draining = k == candidates->end;
-      const float bound = draining ? INFINITY : limits[k].x;
+      const float bound = draining ? INFINITY : scene.limits[k].x;
       while (pending.head < pending.size &&
              (draining || rs_all(RS_MASK(pending.key[pending.head] <= bound)))) {
         const int h = pending.head++;
@@ -133,17 +129,17 @@ iv trace_sorted(Candidates* candidates,
         if (dropped)
           active &= comes_before(pending.key[h], pending.reference[h], limit.key, limit.reference);
         if (!rs_any(active)) continue;
-        capped |= active & RS_MASK(p->hits >= max_hits);
-        active &= RS_MASK(p->hits < max_hits);
+        capped |= active & RS_MASK(p->hits >= scene.max_hits);
+        active &= RS_MASK(p->hits < scene.max_hits);
         last.key = select(last.key, pending.key[h], active);
         last.reference = select(last.reference, pending.reference[h], active);
-        blend_entry(&pending, h, active, lines, p, stream);
-        alive &= RS_MASK(p->T >= min_transmittance) & ~capped;
+        blend_entry(&pending, h, active, scene, p, stream);
+        alive &= RS_MASK(p->T >= scene.min_transmittance) & ~capped;
       }
       if (draining || !rs_any(alive)) break;
 
-      const uint reference = references[k];
-      const PacketHit found = packet_hit(p, lines, reference, limits[k].y, alive);
+      const uint reference = scene.references[k];
+      const PacketHit found = packet_hit(p, scene, reference, scene.limits[k].y, alive);
       fv key = found.key;
       iv hit = found.hit;
       if (!first_pass) hit &= ~comes_before(key, (iv)(reference), start.key, start.reference + 1);

@@ -16,6 +16,16 @@
 // Candidates tested together.
 #define RS_TOGETHER (PACKET > 1 ? 4 : 1)
 
+// What packets are traced through: the lines of all Gaussians, the list of the tile (its
+// candidates' references, least depths and quantiles), and where a ray ends.
+typedef struct {
+  __global const RsLine* lines;
+  __global const uint* references;
+  __global const float2* limits;
+  float min_transmittance;
+  int max_hits;
+} PacketScene;
+
 typedef struct {
   fv X, Y;
   fv T;       // transmittance behind the last hit
@@ -165,15 +175,15 @@ __attribute__((always_inline)) static void packet_hits(const PacketState* p,
 
 // What the packet's rays meet of one candidate.
 PacketHit packet_hit(const PacketState* p,
-                     __global const RsLine* restrict lines,
+                     const PacketScene scene,
                      const uint reference,
                      const float quantile,
                      const iv among) {
   PacketHit hit;
   if (reference & 1) {
-    packet_hits(p, lines, &reference, &quantile, 1, true, among, &hit);
+    packet_hits(p, scene.lines, &reference, &quantile, 1, true, among, &hit);
   } else {
-    packet_hits(p, lines, &reference, &quantile, 1, false, among, &hit);
+    packet_hits(p, scene.lines, &reference, &quantile, 1, false, among, &hit);
   }
   return hit;
 }

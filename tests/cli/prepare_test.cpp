@@ -570,8 +570,9 @@ TEST_CASE("the real FFmpeg gives no frame of a video twice, also where its rate 
   // All of 12, 9 of them, and a burst of 4 that 2 slow ones follow.
   const std::vector<std::pair<std::string, std::size_t>> kinds{
       {"1", 12}, {"not(eq(mod(n,4),1))", 9}, {"lt(n,4)+eq(n,7)+eq(n,11)", 6}};
-  for (const auto& [frames, count] : kinds) {
-    CAPTURE(frames);
+  for (const auto& kind : kinds) {
+    const auto [frames, count] = kind;
+    CAPTURE(kind.first);
     const std::string clip = stage.path("clip.mp4");
     const std::string make =
         "ffmpeg -nostdin -y -v error -f lavfi -i testsrc2=s=64x48:r=10:d=1.2 -vf \"select='" +

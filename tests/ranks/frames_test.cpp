@@ -63,8 +63,8 @@ TEST_CASE("lists of devices that make no sense are refused") {
                                           {"0,", "names nothing beside a comma"},
                                           {"0,99", "counted from 0"},
                                           {"0,nothing of the kind", "no device has that"}}) {
-    CAPTURE(devices);
     const Outcome outcome = raysplats_program(orbit.command("no") + Words{"--device", devices});
+    INFO(outcome.err);
     CHECK(outcome.code == 2);
     CHECK(one_sentence(outcome));
     CHECK(contains(outcome.err, words));

@@ -122,7 +122,8 @@ TEST_CASE("what photos have of their own is shared too") {
         Kind{"the classic rules",
              tiny_data(),
              {"--strategy", "adc", "--opacity-reset-every", "10"}}}) {
-    CAPTURE(name);
+    const std::string kind = name;
+    CAPTURE(kind);
     const auto train = [&, data = data, words = words](const std::string& run, const Words& more) {
       Words training = shared_training(run, 3) + words + more;
       training[1] = data;

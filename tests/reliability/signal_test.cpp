@@ -144,8 +144,8 @@ TEST_CASE("an interrupted run whose report cannot be written says and ends the s
 TEST_CASE("a second signal of another kind ends the run at once with whole files") {
   const TemporaryFolder folder;
   for (const auto& [first, second] : {std::pair{SIGINT, SIGTERM}, {SIGTERM, SIGINT}}) {
-    CAPTURE(second);
     const std::string run = folder / std::to_string(second);
+    CAPTURE(run);
     RunningProgram program(endless(run));
     wait_for_checkpoint(program, run);
     // Both wait while the process is stopped, and are delivered together.

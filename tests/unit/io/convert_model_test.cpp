@@ -271,7 +271,8 @@ TEST_CASE("rotations are kept as exactly as is said") {
        {std::tuple("a.spz", io::ModelFormat::kSpz, 670),
         std::tuple("a.compressed.ply", io::ModelFormat::kCompressedPly, 670),
         std::tuple("a.sog", io::ModelFormat::kSog, 170)}) {
-    CAPTURE(name);
+    const std::string file = name;
+    CAPTURE(file);
     CHECK(median_angle(name) == doctest::Approx(1.0 / step).epsilon(0.06));
     CHECK(contains(io::losses(format, model), "rotations to 1/" + std::to_string(step)));
   }

@@ -117,9 +117,9 @@ TEST_CASE("packet shape: groups where the local memory of compiled kernels is th
   // The largest of scripts/gpu/baseline.json and, for 8, of ForwardMemory.
   for (const auto& [lanes, bytes] : std::initializer_list<std::pair<int, std::uint64_t>>{
            {8, 2976}, {16, 4640}, {32, 7840}, {64, 15136}}) {
-    CAPTURE(lanes);
-    CHECK_THROWS_AS(packet_layout(gpu_of(bytes), width_of(lanes, PacketShape::kGroup)),
-                    DeviceError);
+    const DeviceInfo device = gpu_of(bytes);
+    CAPTURE(device.local_memory);
+    CHECK_THROWS_AS(packet_layout(device, width_of(lanes, PacketShape::kGroup)), DeviceError);
   }
 }
 
