@@ -32,6 +32,9 @@ bool ParameterMean::add(const TrainOptions& options,
                         std::int64_t iteration,
                         const Buffer<std::uint32_t>& guard) {
   if (iteration <= mean_from(options)) return false;
+  // Other Gaussians have no mean with those before, and no room in it: steps that are timed before
+  // a run come to its end with more and more of them.
+  if (known() && mean_.count != gaussians.count) restart(iteration - 1);
   if (!known() && iteration > first(options) + 1) restart(iteration - 1);
   const std::int64_t before = first(options);
   const std::int64_t samples = std::max<std::int64_t>(last_iteration(options) - before, 1);

@@ -150,6 +150,15 @@ TEST_CASE("marked steps leave the mean as it is, repeated ones count once [small
   walk.step();
   mean.add(options, walk.gaussians, from + 7, walk.guard);
   CHECK(numbers(mean.model()) == numbers(walk.gaussians));
+  // So it is where nobody says that they are others.
+  walk.gaussians.count = kCount / 2;
+  walk.step();
+  mean.add(options, walk.gaussians, from + 8, walk.guard);
+  CHECK(mean.model().count == kCount / 2);
+  walk.gaussians.count = kCount;
+  walk.step();
+  mean.add(options, walk.gaussians, from + 9, walk.guard);
+  CHECK(numbers(mean.model()) == numbers(walk.gaussians));
 }
 
 TEST_CASE("a run ends with the mean of its last models, resumed or not") {
