@@ -127,8 +127,8 @@ Environment with_drawn_sky(const Environment& environment) {
 
 RsEnvironment environment_record(const Environment& environment) {
   const Image& image = environment.equirect;
-  if (image.pixels() > 0 && image.channels != 3) {
-    throw UsageError("The environment's picture must have three channels");
+  if (image.pixels() > 0 && (image.channels != 3 || image.data.size() != 3 * image.pixels())) {
+    throw UsageError("The environment's picture must have three channels, all of them in its data");
   }
   const Frame frame = frame_of(environment);
   RsEnvironment out{};

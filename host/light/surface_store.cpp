@@ -106,8 +106,9 @@ SurfaceStore::SurfaceStore(Context& context, const Scene& scene)
   std::vector<RsTexture> textures;
   std::vector<float> texels;
   for (const Image& image : scene.textures) {
-    if (image.channels != 3 || image.pixels() == 0) {
-      throw UsageError("A texture must have three channels and at least one texel");
+    if (image.channels != 3 || image.pixels() == 0 || image.data.size() != 3 * image.pixels()) {
+      throw UsageError(
+          "A texture must have three channels and at least one texel, all of them in its data");
     }
     check_light(image.data, "A texture");
     textures.push_back(

@@ -370,6 +370,18 @@ TEST_CASE("environment pictures and textures") {
   check_picture(context, scene, kCamera, "a texture", kLitByPicture);
 }
 
+TEST_CASE("pictures without all of their data are refused") {
+  Context context = make_test_context();
+  Scene scene = cloud_scene(2);
+  scene.environment.equirect = waves(64, 32);
+  scene.environment.equirect.data.pop_back();
+  CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
+  scene = cloud_scene(2);
+  scene.textures = {waves(8, 8)};
+  scene.textures[0].data.clear();
+  CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
+}
+
 TEST_CASE("an environment that is not finite is refused, and so is a camera that scales") {
   Context context = make_test_context();
   const Scene sound = cloud_scene(2);
