@@ -12,34 +12,44 @@
 namespace raysplats {
 namespace {
 
-void check_array(const char* name, const std::vector<float>& values, std::size_t expected) {
-  if (values.size() != expected) {
-    throw UsageError(fmt::format(
-        "The Gaussians have {} numbers of {} where {} are needed: give every array its size",
-        values.size(), name, expected));
-  }
+void check_size(const char* name, const std::vector<float>& values, std::size_t expected) {
+  if (values.size() == expected) return;
+  throw UsageError(fmt::format(
+      "The Gaussians have {} numbers of {} where {} are needed: give every array its size",
+      values.size(), name, expected));
+}
+
+void check_finite(const char* name, const std::vector<float>& values) {
   const auto bad =
       std::find_if(values.begin(), values.end(), [](float value) { return !std::isfinite(value); });
-  if (bad != values.end()) {
-    throw DataError(fmt::format("Number {} of the Gaussians' {} is not finite: remove or mend it",
-                                bad - values.begin(), name));
-  }
+  if (bad == values.end()) return;
+  throw DataError(fmt::format("Number {} of the Gaussians' {} is not finite: remove or mend it",
+                              bad - values.begin(), name));
 }
 
 }  // namespace
 
-void check_gaussians(const Gaussians& gaussians) {
+void check_sizes(const Gaussians& gaussians) {
   if (gaussians.sh_degree < 0 || gaussians.sh_degree > 4) {
     throw UsageError(
         fmt::format("The Gaussians have SH degree {}: 0 to 4 are possible", gaussians.sh_degree));
   }
   const std::size_t n = gaussians.size();
-  check_array("means", gaussians.means, 3 * n);
-  check_array("quaternions", gaussians.quaternions, 4 * n);
-  check_array("log_scales", gaussians.log_scales, 3 * n);
-  check_array("opacities", gaussians.opacities, n);
-  check_array("sh", gaussians.sh,
-              3 * n * static_cast<std::size_t>(sh_coefficients(gaussians.sh_degree)));
+  check_size("means", gaussians.means, 3 * n);
+  check_size("quaternions", gaussians.quaternions, 4 * n);
+  check_size("log_scales", gaussians.log_scales, 3 * n);
+  check_size("opacities", gaussians.opacities, n);
+  check_size("sh", gaussians.sh,
+             3 * n * static_cast<std::size_t>(sh_coefficients(gaussians.sh_degree)));
+}
+
+void check_gaussians(const Gaussians& gaussians) {
+  check_sizes(gaussians);
+  check_finite("means", gaussians.means);
+  check_finite("quaternions", gaussians.quaternions);
+  check_finite("log_scales", gaussians.log_scales);
+  check_finite("opacities", gaussians.opacities);
+  check_finite("sh", gaussians.sh);
 }
 
 }  // namespace raysplats

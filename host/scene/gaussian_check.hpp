@@ -5,8 +5,10 @@
 
 namespace raysplats {
 
-/// Throws UsageError when the arrays do not fit each other or the SH degree is not 0 to 4,
-/// DataError when a number is not finite.
+/// Throws UsageError when the arrays do not fit each other or the SH degree is not 0 to 4.
+void check_sizes(const Gaussians& gaussians);
+
+/// The same, and DataError when a number is not finite.
 void check_gaussians(const Gaussians& gaussians);
 
 }  // namespace raysplats

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/gaussian_check.hpp"
 #include "scene/gaussian_selection.hpp"
 #include "scene/gaussian_transform.hpp"
 
@@ -69,6 +70,7 @@ glm::dmat4 movement(const ModelChanges& changes) {
 }
 
 Gaussians changed(Gaussians model, const ModelChanges& changes) {
+  check_sizes(model);
   if (changes.min_opacity && !(*changes.min_opacity >= 0.0 && *changes.min_opacity <= 1.0))
     throw UsageError(fmt::format("min-opacity is 0 to 1, not {}", *changes.min_opacity));
   if (changes.sh_degree && (*changes.sh_degree < 0 || *changes.sh_degree > kMaxShDegree))

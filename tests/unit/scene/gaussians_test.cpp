@@ -5,6 +5,9 @@
 
 #include <numeric>
 
+#include "raysplats/error.hpp"
+#include "raysplats/model_changes.hpp"
+
 using namespace raysplats;
 
 namespace {
@@ -65,4 +68,16 @@ TEST_CASE("gaussians: bands are added as zeros and dropped from the end") {
     }
   }
   CHECK(with_sh_degree(numbered(3, 0), 1).sh.empty());
+}
+
+TEST_CASE("gaussians: what does not fit together is refused before it is changed") {
+  ModelChanges turn;
+  turn.rotate_degrees = {10, 0, 0};
+  CHECK_NOTHROW(changed(numbered(1, 2), turn));
+  Gaussians model = numbered(1, 2);
+  model.quaternions.clear();
+  CHECK_THROWS_AS(changed(model, turn), UsageError);
+  model = numbered(1, 2);
+  model.sh.pop_back();
+  CHECK_THROWS_AS(changed(model, turn), UsageError);
 }
