@@ -28,8 +28,8 @@ struct ModelChanges {
 
 /// The model with these changes; what is left keeps its order, and harmonics turn as well. Throws
 /// UsageError for a number out of range, an `up` of length 0 and a box whose least is above its
-/// greatest, for another number of contributions than of Gaussians, and for arrays of Gaussians that
-/// do not fit each other.
+/// greatest, for another number of contributions than of Gaussians, and for arrays of Gaussians
+/// that do not fit each other.
 Gaussians changed(Gaussians model, const ModelChanges& changes);
 
 }  // namespace raysplats
