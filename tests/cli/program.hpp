@@ -33,11 +33,11 @@ struct Surroundings {
   /// driver writes files of its own when kernels are built.
   std::function<bool()> full_once = {};
   rlim_t memory_limit = RLIM_INFINITY;  ///< bytes of address space, as by ulimit -v
-  bool permissions_count = false;       ///< even for root: what may not be read or written cannot be
-  std::string out_file = {};            ///< where standard output goes, such as /dev/full
-  std::string err_file = {};            ///< where standard error goes
-  bool terminal = false;                ///< standard error is one, 80 columns wide
-  bool closed_out = false;              ///< as by >&-
+  bool permissions_count = false;  ///< even for root: what may not be read or written cannot be
+  std::string out_file = {};       ///< where standard output goes, such as /dev/full
+  std::string err_file = {};       ///< where standard error goes
+  bool terminal = false;           ///< standard error is one, 80 columns wide
+  bool closed_out = false;         ///< as by >&-
   bool closed_err = false;
   bool nohup = false;                      ///< SIGHUP is ignored
   std::string folder = {};                 ///< to run in; the test's own when empty
