@@ -46,8 +46,7 @@ std::array<double, 3> origin_of_doubles(const PlyFile& file) {
     for (const std::size_t column : position) points.push_back(values[column]);
     log_sizes.push_back(log_size);
   });
-  const double half = 0.5;
-  const double detail = std::exp(quantiles(std::move(log_sizes), std::span(&half, 1))[0]);
+  const double detail = std::exp(median(std::move(log_sizes)));
   const glm::dvec3 origin = fitting_origin(points, detail);
   return {origin.x, origin.y, origin.z};
 }

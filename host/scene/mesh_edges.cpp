@@ -5,7 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <optional>
+#include <span>
 #include <tuple>
 #include <unordered_map>
 #include <utility>
@@ -14,12 +14,14 @@ namespace raysplats {
 namespace {
 
 using Key = std::array<std::uint32_t, 3>;
+using Cell = std::array<std::int64_t, 3>;
 
-struct KeyHash {
-  std::size_t operator()(const Key& key) const {
+struct WordsHash {
+  template <class Word>
+  std::size_t operator()(const std::array<Word, 3>& words) const {
     std::uint64_t hash = 0;
-    for (const std::uint32_t word : key) {
-      hash = (hash ^ word) * 0x9e3779b97f4a7c15ull;
+    for (const Word word : words) {
+      hash = (hash ^ static_cast<std::uint64_t>(word)) * 0x9e3779b97f4a7c15ull;
       hash ^= hash >> 29;
     }
     return static_cast<std::size_t>(hash);
@@ -28,7 +30,7 @@ struct KeyHash {
 
 /// Per vertex the number of its position: equal positions have equal numbers.
 std::vector<std::uint32_t> position_numbers(const Mesh& mesh) {
-  std::unordered_map<Key, std::uint32_t, KeyHash> numbers;
+  std::unordered_map<Key, std::uint32_t, WordsHash> numbers;
   numbers.reserve(mesh.vertex_count());
   std::vector<std::uint32_t> result(mesh.vertex_count());
   for (std::size_t i = 0; i < result.size(); ++i) {
@@ -41,63 +43,68 @@ std::vector<std::uint32_t> position_numbers(const Mesh& mesh) {
   return result;
 }
 
-// The mesh with one position for those that differ by rounding alone, as at the seam of a sphere:
-// by less than a millionth of its size along every axis.
+/// Vertices that stand for those within `near` of them along every axis.
+class NearVertices {
+ public:
+  NearVertices(std::span<const float> positions, double near) : positions_(positions), near_(near) {
+    firsts_.reserve(positions.size() / 3);
+  }
+  /// The one that stands for vertex i; i itself, from now on, where there is none.
+  std::size_t first(std::size_t i) {
+    const Cell from = cell(i, -near_), to = cell(i, near_);
+    Cell at;
+    for (at[0] = from[0]; at[0] <= to[0]; ++at[0]) {
+      for (at[1] = from[1]; at[1] <= to[1]; ++at[1]) {
+        for (at[2] = from[2]; at[2] <= to[2]; ++at[2]) {
+          const auto [begin, end] = firsts_.equal_range(at);
+          const auto found =
+              std::find_if(begin, end, [&](const auto& each) { return is_near(i, each.second); });
+          if (found != end) return found->second;
+        }
+      }
+    }
+    firsts_.emplace(cell(i, 0.0), i);
+    return i;
+  }
+
+ private:
+  // So wide that few positions lie nearer to a cell's border than they may lie to each other.
+  static constexpr double kWidth = 64;  // times `near`
+
+  Cell cell(std::size_t i, double moved) const {
+    Cell out;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double position = static_cast<double>(positions_[3 * i + c]) + moved;
+      out[c] = static_cast<std::int64_t>(std::floor(position / (kWidth * near_)));
+    }
+    return out;
+  }
+  bool is_near(std::size_t i, std::size_t other) const {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double apart = static_cast<double>(positions_[3 * i + c]) - positions_[3 * other + c];
+      if (std::abs(apart) > near_) return false;
+    }
+    return true;
+  }
+
+  std::span<const float> positions_;
+  double near_;
+  std::unordered_multimap<Cell, std::size_t, WordsHash> firsts_;
+};
+
+// The mesh with one vertex for those whose positions differ by rounding alone, as at the seam of a
+// sphere: by less than a millionth of its size along every axis.
 Mesh joined(Mesh mesh) {
   constexpr double kRounding = 1e-6;
-  // So wide that few positions lie as near to a cell's border as they may lie to each other.
-  constexpr double kCell = 64;  // times that
   if (mesh.positions.empty()) return mesh;
   const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end());
   const double near = kRounding * (static_cast<double>(*high) - *low);
   if (!(near > 0)) return mesh;
-  using Cell = std::array<std::int64_t, 3>;
-  struct CellHash {
-    std::size_t operator()(const Cell& cell) const {
-      std::uint64_t hash = 0;
-      for (const std::int64_t at : cell) {
-        hash = (hash ^ static_cast<std::uint64_t>(at)) * 0x9e3779b97f4a7c15ull;
-        hash ^= hash >> 29;
-      }
-      return static_cast<std::size_t>(hash);
-    }
-  };
-  std::unordered_multimap<Cell, std::size_t, CellHash> firsts;  // vertices that stand for others
-  firsts.reserve(mesh.vertex_count());
-  for (std::size_t i = 0; i < mesh.vertex_count(); ++i) {
-    float* const p = &mesh.positions[3 * i];
-    Cell from, to;
-    for (std::size_t c = 0; c < 3; ++c) {
-      from[c] = static_cast<std::int64_t>(std::floor((p[c] - *low - near) / (kCell * near)));
-      to[c] = static_cast<std::int64_t>(std::floor((p[c] - *low + near) / (kCell * near)));
-    }
-    const auto same = [&](std::size_t other) {
-      for (std::size_t c = 0; c < 3; ++c) {
-        if (std::abs(static_cast<double>(p[c]) - mesh.positions[3 * other + c]) > near)
-          return false;
-      }
-      return true;
-    };
-    std::optional<std::size_t> first;
-    Cell at;
-    for (at[0] = from[0]; at[0] <= to[0]; ++at[0]) {
-      for (at[1] = from[1]; at[1] <= to[1]; ++at[1]) {
-        for (at[2] = from[2]; at[2] <= to[2] && !first; ++at[2]) {
-          const auto [begin, end] = firsts.equal_range(at);
-          const auto found =
-              std::find_if(begin, end, [&](const auto& f) { return same(f.second); });
-          if (found != end) first = found->second;
-        }
-      }
-    }
-    if (first) {
-      std::copy_n(&mesh.positions[3 * *first], 3, p);
-      continue;
-    }
-    for (std::size_t c = 0; c < 3; ++c)
-      at[c] = static_cast<std::int64_t>(std::floor((p[c] - *low) / (kCell * near)));
-    firsts.emplace(at, i);
-  }
+  NearVertices vertices(mesh.positions, near);
+  std::vector<std::uint32_t> firsts(mesh.vertex_count());
+  for (std::size_t i = 0; i < firsts.size(); ++i)
+    firsts[i] = static_cast<std::uint32_t>(vertices.first(i));
+  for (std::uint32_t& vertex : mesh.triangles) vertex = firsts[vertex];
   return mesh;
 }
 

@@ -35,10 +35,9 @@ ModelSummary summarize(const Gaussians& model) {
     ratios[i] = high - low;
   }
   constexpr std::array<double, 5> kScales{0.0, 0.05, 0.5, 0.95, 1.0};
-  constexpr std::array<double, 1> kMedian{0.5};
   const std::vector<double> scales = quantiles(std::move(logs), kScales);
   for (std::size_t k = 0; k < scales.size(); ++k) out.scale_quantiles[k] = std::exp(scales[k]);
-  out.median_anisotropy = std::exp(quantiles(std::move(ratios), kMedian)[0]);
+  out.median_anisotropy = std::exp(median(std::move(ratios)));
 
   double sum = 0.0;
   for (const float logit : model.opacities) {

@@ -33,11 +33,6 @@ constexpr double kLeastSpread = 0.03;
 constexpr double kMostBehind = 0.2;  // share of the cameras that may look away from their target
 constexpr double kFarAway = 4.0;     // times the median: what reaches further is background
 
-double median(std::vector<double> values) {
-  const double half = 0.5;
-  return quantiles(std::move(values), std::span<const double>(&half, 1))[0];
-}
-
 void check(const OrbitOptions& options) {
   if (options.frames < 1) {
     throw UsageError(

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <utility>
 
 namespace raysplats {
 
@@ -48,6 +49,11 @@ std::vector<double> quantiles(std::vector<double> values, std::span<const double
     out[k] = values[low] + share * (next - values[low]);
   }
   return out;
+}
+
+double median(std::vector<double> values) {
+  const double half = 0.5;
+  return quantiles(std::move(values), std::span(&half, 1))[0];
 }
 
 }  // namespace raysplats

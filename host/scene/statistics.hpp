@@ -13,5 +13,7 @@ double weighted_quantile(std::span<const double> values, std::span<const double>
 /// Quantiles of equally weighted values, linearly interpolated, one per entry of `q` (each 0..1);
 /// zeros for no values. O(N) for each of them.
 std::vector<double> quantiles(std::vector<double> values, std::span<const double> q);
+/// The quantile 0.5.
+double median(std::vector<double> values);
 
 }  // namespace raysplats

@@ -2,14 +2,16 @@
 #include "train/capture_geometry.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "scene/even_choice.hpp"
+#include "scene/orbit.hpp"
 #include "scene/statistics.hpp"
 #include "scene/view_axes.hpp"
 
@@ -46,12 +48,11 @@ std::vector<Camera> usual(std::span<const Camera> cameras) {
 
 std::vector<std::size_t> stray_cameras(std::span<const Camera> cameras) {
   if (cameras.size() < kLeastCameras) return {};
-  const std::array<double, 1> half{0.5};
   glm::dvec3 middle;
   std::vector<double> values(cameras.size());
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < cameras.size(); ++i) values[i] = cameras[i].center()[axis];
-    middle[axis] = quantiles(values, half)[0];
+    middle[axis] = median(values);
   }
   for (std::size_t i = 0; i < cameras.size(); ++i)
     values[i] = glm::distance(cameras[i].center(), middle);
@@ -93,8 +94,7 @@ double scene_extent(std::span<const Camera> cameras, const PointCloud& points) {
     if (std::isfinite(distance)) distances.push_back(distance);
   }
   if (distances.empty()) return extent;
-  const std::array<double, 1> half{0.5};
-  const double middle = quantiles(std::move(distances), half)[0];
+  const double middle = median(std::move(distances));
   const bool one_place = cameras.size() < 2 || radius_of(usual(cameras)) < kOnePlace * middle;
   return one_place && middle > 0 ? middle : extent;
 }
@@ -146,6 +146,36 @@ double median_distance(std::span<const Camera> cameras, const glm::dvec3& point)
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
   return *middle;
+}
+
+std::vector<double> subject_distances(std::span<const Camera> cameras,
+                                      const PointCloud& points,
+                                      double extent) {
+  const std::optional<glm::dvec3> target = common_target(cameras);
+  constexpr std::size_t kMostPoints = 4000;
+  constexpr double kLeastDistance = 0.01;  // in extents
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / kMostPoints);
+  std::vector<double> out;
+  out.reserve(cameras.size());
+  for (const Camera& camera : cameras) {
+    const auto depth = [&](const glm::dvec3& point) {
+      return (camera.rotation * point + camera.translation).z;
+    };
+    std::vector<double> depths;
+    for (std::size_t i = 0; i < points.size(); i += stride) {
+      const float* p = &points.positions[3 * i];
+      const double z = depth({p[0], p[1], p[2]});
+      if (z > kLeastDistance * extent) depths.push_back(z);
+    }
+    double distance = target ? depth(*target) : 0.0;
+    if (!depths.empty()) distance = median(std::move(depths));
+    out.push_back(distance > kLeastDistance * extent ? distance : extent);
+  }
+  return out;
+}
+
+double subject_length(std::span<const Camera> cameras, const PointCloud& points, double extent) {
+  return std::max(extent, median(subject_distances(cameras, points, extent)));
 }
 
 }  // namespace raysplats

@@ -49,4 +49,14 @@ double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point
 /// Median of the distances from the point to the cameras, each at least 1e-6.
 double median_distance(std::span<const Camera> cameras, const glm::dvec3& point);
 
+/// How far along its axis what a camera sees lies: the median depth of the points before it,
+/// without points the depth of what all cameras look at (common_target()), else `extent`.
+std::vector<double> subject_distances(std::span<const Camera> cameras,
+                                      const PointCloud& points,
+                                      double extent);
+
+/// The median of these distances, at least `extent`: a length of what the cameras see, however near
+/// to each other they stand.
+double subject_length(std::span<const Camera> cameras, const PointCloud& points, double extent);
+
 }  // namespace raysplats

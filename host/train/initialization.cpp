@@ -76,10 +76,11 @@ Gaussians subset(const Gaussians& model, std::size_t limit) {
   return gathered(model, std::vector<std::uint32_t>(chosen.begin(), chosen.end()));
 }
 
-// How far away what the cameras look at is, as far as they tell.
-double guessed_depth(std::span<const Camera> cameras, const Region& region, double extent) {
+// How far away what the cameras look at is, as far as they and the points of the data set tell.
+double guessed_depth(std::span<const Camera> cameras, const PointCloud& points) {
+  const double extent = scene_extent(cameras, points);
   // Cameras in one place have no middle to be distant from.
-  const double middle = median_distance(cameras, region.center);
+  const double middle = median_distance(cameras, visible_region(cameras, extent).center);
   return middle > 1e-3 * extent ? middle : extent;
 }
 
@@ -93,7 +94,7 @@ PointCloud photo_points(const Dataset& dataset,
                         std::size_t count,
                         double unsure,
                         std::uint64_t seed) {
-  const double guess = guessed_depth(cameras, region, scene_extent(cameras, dataset.points));
+  const double guess = guessed_depth(cameras, dataset.points);
   if (dataset.alpha_is_background) {
     PointCloud hull = carved_points(photos, region, count, seed);
     if (hull.size() > 0) return hull;
@@ -141,8 +142,7 @@ Beside photos_beside(const PointCloud& points,
   const double shown = opaque_share(many);
   spdlog::debug("{:.1f} % of the photos count", 100 * shown);
   if (shown < kMostlyShown) return by_points;
-  const double extent = scene_extent(cameras, dataset.points);
-  const double guess = guessed_depth(cameras, visible_region(cameras, extent), extent);
+  const double guess = guessed_depth(cameras, dataset.points);
   const DepthRange depths = swept_depths(many, guess, options.seed);
   const SweepProbe probe = probe_sweep(many, depths, options.seed);
   spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * probe.agreed);
@@ -402,11 +402,10 @@ Gaussians initial_model(const Dataset& dataset,
         "(--max-gaussians)",
         options.init_count, limit);
   }
-  const double extent = scene_extent(cameras, dataset.points);
-  const Region region = visible_region(cameras, extent);
+  const Region region = visible_region(cameras, scene_extent(cameras, dataset.points));
   if (options.init == "random") {
     return start(scattered_points(photos(PhotoChoice::kAll), region,
-                                  depths_around(guessed_depth(cameras, region, extent)),
+                                  depths_around(guessed_depth(cameras, dataset.points)),
                                   begun.count, options.seed));
   }
   const std::vector<SmallPhoto>& told =

@@ -18,7 +18,7 @@
 namespace raysplats {
 
 /// Isotropic Gaussians at the points: the scale is the mean distance of the three nearest
-/// neighbours, as in 3DGS, at least 1e-4 of the cameras' extent and at most 0.1 of the distance to
+/// neighbours, as in 3DGS, at least 1e-4 of scene_extent() and at most 0.1 of the distance to
 /// the nearest camera (what stands alone far away may be large, before a camera it may not), which
 /// a point takes that no neighbour is apart from; band 0 holds the colours. Points that are not
 /// finite are left out.

@@ -138,7 +138,7 @@ double apart(std::span<const SmallPhoto> photos,
     const auto a = project(photos[i].camera, from), b = project(photos[i].camera, to);
     if (a && b) found.push_back(glm::distance(*a, *b));
   }
-  return found.empty() ? 0 : quantiles(found, std::array<double, 1>{0.5})[0];
+  return median(std::move(found));
 }
 
 // The depths at which a pixel is looked for. Through a long lens photos show together but a small

@@ -273,7 +273,7 @@ Agreement agreement(std::span<const SmallPhoto> photos,
         sample.depth < kEnd * depths.nearest || kEnd * sample.depth > depths.farthest;
     out.inside += at_end ? 0 : 1;
   }
-  if (found.size() >= kFewProbes) out.depth = quantiles(found, std::array<double, 1>{0.5})[0];
+  if (found.size() >= kFewProbes) out.depth = median(std::move(found));
   return out;
 }
 

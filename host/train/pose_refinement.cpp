@@ -6,12 +6,9 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
-#include <optional>
 #include <utility>
 
 #include "raysplats/error.hpp"
-#include "scene/orbit.hpp"
-#include "scene/statistics.hpp"
 #include "train/capture_geometry.hpp"
 
 namespace raysplats {
@@ -20,8 +17,6 @@ namespace {
 constexpr double kBeta1 = 0.9;
 constexpr double kBeta2 = 0.999;
 constexpr double kEpsilon = 1e-15;
-constexpr std::size_t kMostPoints = 4000;  // that tell how far a camera sees
-constexpr double kLeastDistance = 0.01;    // of what a camera sees, in extents
 
 glm::dvec3 turn_of(const std::vector<float>& deltas, std::size_t view) {
   const float* d = &deltas[PoseRefinement::kNumbers * view];
@@ -144,39 +139,6 @@ void PoseRefinement::restore(const State& state) {
     throw DataError("The poses of the checkpoint are not of as many photos as the data set has");
   }
   state_ = state;
-}
-
-std::vector<double> subject_distances(std::span<const Camera> cameras,
-                                      const PointCloud& points,
-                                      double extent) {
-  const std::optional<glm::dvec3> target = common_target(cameras);
-  const std::size_t stride = std::max<std::size_t>(1, points.size() / kMostPoints);
-  std::vector<double> out;
-  out.reserve(cameras.size());
-  for (const Camera& camera : cameras) {
-    const auto depth = [&](const glm::dvec3& point) {
-      return (camera.rotation * point + camera.translation).z;
-    };
-    std::vector<double> depths;
-    for (std::size_t i = 0; i < points.size(); i += stride) {
-      const float* p = &points.positions[3 * i];
-      const double z = depth({p[0], p[1], p[2]});
-      if (z > kLeastDistance * extent) depths.push_back(z);
-    }
-    double distance = target ? depth(*target) : 0.0;
-    if (!depths.empty()) {
-      const double half = 0.5;
-      distance = quantiles(std::move(depths), std::span<const double>(&half, 1))[0];
-    }
-    out.push_back(distance > kLeastDistance * extent ? distance : extent);
-  }
-  return out;
-}
-
-double subject_length(std::span<const Camera> cameras, const PointCloud& points, double extent) {
-  const double half = 0.5;
-  return std::max(extent, quantiles(subject_distances(cameras, points, extent),
-                                    std::span<const double>(&half, 1))[0]);
 }
 
 }  // namespace raysplats

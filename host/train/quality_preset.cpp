@@ -54,8 +54,7 @@ QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType
     const Camera& camera = dataset.views[i].camera;
     sides.push_back(std::max(camera.width, camera.height));
   }
-  const std::array<double, 1> half{0.5};
-  const int longest = std::max(1, static_cast<int>(quantiles(std::move(sides), half)[0]));
+  const int longest = std::max(1, static_cast<int>(median(std::move(sides))));
   const int side = level.side * (device == DeviceType::kCpu ? 1 : kFasterDevices);
   QualityChoice out;
   // Few photos are known by heart before the least of a level is over.

@@ -55,8 +55,7 @@ double seconds_per_work(std::span<const StepSample> samples) {
       speeds.push_back(s.seconds / step_work(s.load));
   }
   if (speeds.empty()) throw UsageError("No step was timed: there is nothing to estimate from");
-  const double half = 0.5;
-  return quantiles(std::move(speeds), std::span<const double>(&half, 1))[0];
+  return median(std::move(speeds));
 }
 
 LoadRates LoadRates::of(std::span<const StepSample> samples) {

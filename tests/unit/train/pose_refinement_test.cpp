@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "raysplats/error.hpp"
+#include "train/capture_geometry.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

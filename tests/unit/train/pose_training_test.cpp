@@ -11,6 +11,7 @@
 #include "raysplats/device.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
+#include "train/capture_geometry.hpp"
 #include "train/pose_refinement.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
