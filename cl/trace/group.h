@@ -49,11 +49,24 @@
 #define RS_GROUP_KERNEL RS_WAVE_OF_16 __attribute__((reqd_work_group_size(GROUP, 1, 1)))
 #endif
 
-// Rows of hits that are open at once, at most 32.
-#ifndef OPEN
-#define OPEN 32
+// Packets are traced by two launches, one after the other. The first keeps few rows of hits, so
+// that many groups are resident, and leaves packets that need more to the second (CROWDED 1), which
+// keeps twice as many and skips what is done.
+#ifndef CROWDED
+#define CROWDED 0
 #endif
-#define RS_ALL_SLOTS ((uint)((1ul << OPEN) - 1))
+// Rows of hits that are open at once, and sets of them: a bit each.
+#if CROWDED
+#define OPEN 64
+#define RS_ALL_SLOTS (~0ul)
+typedef ulong RowSet;
+#else
+#define OPEN 32
+#define RS_ALL_SLOTS (~0u)
+typedef uint RowSet;
+#endif
+#define RS_SLOT(slot) ((RowSet)1 << (slot))
+uint rs_first_slot(const RowSet rows) { return 8 * sizeof(RowSet) - 1 - (uint)clz(rows & -rows); }
 // The first of them lie in local memory, a column per work-item; the others, which few packets
 // need, in private memory: it is the local memory of a group that decides how many are resident.
 #ifndef OPEN_LOCAL

@@ -10,7 +10,9 @@
 
 #include "trace/arguments.h"
 // Rows of less than the forward pass keeps: more of them find room in local memory.
+#ifndef OPEN_LOCAL
 #define OPEN_LOCAL 24
+#endif
 
 #include "trace/group.h"
 #include "trace/hit_stream.h"
@@ -162,21 +164,22 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
   const float sky = background.x * p.gR + background.y * p.gG + background.z * p.gB;
   OwnBackwardRows own;
   ClosedHit closed = {0.0f, 0.0f};
-  uint open = 0;  // slots that are taken, a bit each
+  RowSet open = 0;  // slots that are taken, a bit each
   // Rows are numbered downwards from a number that no window reaches below.
   uint number = 0x80000000u;
-  uint chunk = tail.x;
-  uint used = tail.y;
+  const bool crowded = (tail.y & RS_STREAM_CROWDED) != 0;
+  uint chunk = crowded == (CROWDED != 0) ? tail.x : RS_NO_CHUNK;
+  uint used = tail.y & ~RS_STREAM_CROWDED;
   while (chunk != RS_NO_CHUNK) {
     const size_t first = (size_t)chunk * CHUNK;
     for (uint n = used - 1; n > 0; --n, --number) {
-      uint closing = 0;
-      for (uint rest = open; rest != 0; rest &= rest - 1) {
-        if (memory->oldest[rs_lowest_bit(rest)] > number) closing |= rest & -rest;
+      RowSet closing = 0;
+      for (RowSet rest = open; rest != 0; rest &= rest - 1) {
+        if (memory->oldest[rs_first_slot(rest)] > number) closing |= rest & -rest;
       }
       open &= ~closing;
       for (; closing != 0; closing &= closing - 1)
-        close_row(memory, &own, lane, rs_lowest_bit(closing), &p, T, T_last, sky, lines, sums,
+        close_row(memory, &own, lane, rs_first_slot(closing), &p, T, T_last, sky, lines, sums,
                   &closed);
       const uint2 row = pool[first + n];
       const float before = pool_transmittance[(first + n) * GROUP + lane];
@@ -187,8 +190,8 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
       // Hits too faint to change the transmittance tie with the one behind them. Whatever ties has
       // one sum, that of all of them, so that it does not matter which is taken for the nearest.
       ClosedHit tied = {0.0f, 0.0f};
-      for (uint rest = open; rest != 0; rest &= rest - 1) {
-        const uint slot = rs_lowest_bit(rest);
+      for (RowSet rest = open; rest != 0; rest &= rest - 1) {
+        const uint slot = rs_first_slot(rest);
         const float other = rs_row_get(memory->before, own.before, slot, lane);
         const bool farther = other < before;
         if (farther ? other <= next.before : before <= 0.0f) continue;
@@ -205,8 +208,8 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
         }
       }
       if (tied.before > 0.0f) next = tied;
-      const uint slot = rs_lowest_bit(~open & RS_ALL_SLOTS);
-      open |= 1u << slot;
+      const uint slot = rs_first_slot(~open & RS_ALL_SLOTS);
+      open |= RS_SLOT(slot);
       rs_row_set(memory->before, own.before, slot, lane, before);
       rs_row_set(memory->from_here, own.from_here, slot, lane, next.from_here + mine);
       if (lane == 0) {
@@ -219,7 +222,7 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
     used = CHUNK;
   }
   for (; open != 0; open &= open - 1)
-    close_row(memory, &own, lane, rs_lowest_bit(open), &p, T, T_last, sky, lines, sums, &closed);
+    close_row(memory, &own, lane, rs_first_slot(open), &p, T, T_last, sky, lines, sums, &closed);
 }
 
 RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // trace_forward_group: what trace_forward does, with a packet per work-group (group.h).
 //   global size: GROUP times the packets in x, the packets in y, from the window's first tile on
-// Packets beyond the limits of group_rows.h start again in parts, and the least parts in passes
-// (group_passes.h).
+// What is beyond the limits of group_rows.h waits for a launch with CROWDED, and beyond that takes
+// passes (group_passes.h).
 #ifndef TILE
 #define TILE 16
 #endif
@@ -15,9 +15,6 @@
 #include "trace/group.h"
 #include "trace/group_passes.h"
 #include "trace/group_rows.h"
-
-// Rays that are not tried in smaller parts.
-#define RS_LEAST_PART 4
 
 #if LENS
 // Outermost rays of the packet.
@@ -52,6 +49,9 @@ void outermost_rays(__local ForwardMemory* memory,
 }
 #endif
 
+// Stands for the opacity of pixels that are left to the launch with CROWDED.
+#define RS_LEFT -1.0f
+
 // counters: chunks wanted, rays that stopped at max_hits, hits (two words).
 RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
                                                   RS_VIEW_ARGUMENTS,
@@ -75,11 +75,14 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   const int column = window_x / TILE, row = window_y / TILE;
   const uint picture_tiles_x = (camera.width + TILE - 1) / TILE;
   const uint tile = row * forward.window[2] + column;
-  const bool works =
-      column < forward.window[2] && row < forward.window[3] && group_x < camera.width &&
-      group_y < camera.height &&
-      rs_on_face(tiles, face,
-                 (row + forward.window[1]) * picture_tiles_x + column + forward.window[0]);
+  __global float* opacities = image + 3 * (size_t)camera.width * camera.height;
+  bool works = column < forward.window[2] && row < forward.window[3] && group_x < camera.width &&
+               group_y < camera.height &&
+               rs_on_face(tiles, face,
+                          (row + forward.window[1]) * picture_tiles_x + column + forward.window[0]);
+#if CROWDED
+  works = works && opacities[(size_t)group_y * camera.width + group_x] == RS_LEFT;
+#endif
 
   const int px = group_x + lane % RS_GROUP_WIDTH;
   const int py = group_y + lane / RS_GROUP_WIDTH;
@@ -119,36 +122,27 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
   tally_clear(stream.tally);
 #endif
 
-  // All rays together; where that does not fit, half as many of them, and so on.
+  bool done = group_in_rows(&memory, &candidates, lane, scene, &p, &stream);
+  if (!done) packet_clear(&p);
+#if KEEP_HITS
+  if (!done && lane == 0) memory.stream_end = (uint2)(RS_NO_CHUNK, CHUNK);
+#endif
   bool capped = false;
-  int first = 0, part = GROUP;
-  while (first < GROUP) {
-    const bool mine = lane >= first && lane < first + part;
-#if KEEP_HITS
-    if (lane == 0) memory.stream_begin = memory.stream_end;
+#if CROWDED
+  capped = group_in_passes(&memory, &candidates, lane, !done && p.valid, scene, &p, &stream);
+  done = true;
 #endif
-    bool done = group_in_rows(&memory, &candidates, lane, mine, scene, &p, &stream);
-    if (!done && mine) packet_clear(&p);
-#if KEEP_HITS
-    if (!done && lane == 0) memory.stream_end = memory.stream_begin;
-#endif
-    const bool alone = !done && part <= RS_LEAST_PART;
-    if (group_in_passes(&memory, &candidates, lane, alone && mine && p.valid, scene, &p, &stream))
-      capped = true;
-    if (done || alone) {
-      first += part;
-    } else {
-      part /= 2;
-    }
-  }
 
-  if (works) {
+  if (works && done) {
     packet_store(&p, image, depth_image, transmittances, camera.width, camera.height, px, py,
                  background);
+  } else if (works) {
+    rs_store_pixels(opacities, camera.width, camera.height, px, py, RS_LEFT);
   }
 #if KEEP_HITS
   if (works && lane == 0)
-    stream_ends[rs_group_number(camera.width, group_x, group_y)] = memory.stream_end;
+    stream_ends[rs_group_number(camera.width, group_x, group_y)] =
+        (uint2)(memory.stream_end.x, memory.stream_end.y | (CROWDED ? RS_STREAM_CROWDED : 0));
 #else
   (void)stream_ends;
 #endif

@@ -21,10 +21,9 @@
 #define RS_GROUP_BATCH (GROUP < 16 ? GROUP : 16)
 // Candidates found and not tested yet: a power of two.
 #define RS_GROUP_QUEUE (2 * GROUP)
-// Rows that wait, those of a batch included. More rays meet more Gaussians at once; where the list
-// is full they are traced in parts, and every part has rows of its own.
+// Rows that wait, those of a batch included. More rays meet more Gaussians at once.
 #ifndef WAITING
-#define WAITING (GROUP > 32 ? 128 : 64)
+#define WAITING ((GROUP > 32 ? 128 : 64) << (CROWDED ? 1 : 0))
 #endif
 
 // A row has for each ray the key, alpha, 0 where it misses, and the product over the nearer hits so
@@ -62,12 +61,13 @@ typedef struct {
   uint found_first[RS_GROUP_BATCH];  // keys of a batch, as integers
   uint found_last[RS_GROUP_BATCH];
   uint queue[RS_GROUP_QUEUE];
+  uint batch_reference[RS_GROUP_BATCH];
+  float batch_quantile[RS_GROUP_BATCH];
   uint words[2];
   uint taken;
   uint alive;
 #if KEEP_HITS
-  // Chunk of the stream and what is used of it, for work-item 0: now, and where a part began.
-  uint2 stream_end, stream_begin;
+  uint2 stream_end;  // chunk of the stream and what is used of it, for work-item 0
 #endif
 } ForwardMemory;
 
@@ -81,24 +81,35 @@ typedef struct {
   uint queued, taken;    // entries of the queue, counted from the start
 } GroupCandidates;
 
-// Reads on until there is a batch, or the list ends. A box per work-item.
+// Reads on, where the work-items are told to and the list goes on: a box each.
+RS_GROUP_INLINE void group_fetch_boxes(__local ForwardMemory* memory,
+                                       GroupCandidates* c,
+                                       const int lane,
+                                       const bool reads) {
+  const uint k = c->read + lane;
+  bool meets = false;
+  if (reads && k < c->end) {
+    __global const float* box = c->boxes + k;
+    meets = box[0] <= c->x1 && box[c->stride] <= c->y1 && box[2 * c->stride] >= c->x0 &&
+            box[3 * c->stride] >= c->y0;
+  }
+  const ulong bits = rs_group_bits(memory->words, lane, meets);
+  const uint place = (uint)popcount(bits & ((1ul << lane) - 1));
+  if (meets) memory->queue[(c->queued + place) % RS_GROUP_QUEUE] = k;
+  c->queued += (uint)popcount(bits);
+  c->read += reads ? GROUP : 0;
+}
+
+// Whether the queue lacks a batch that the list still has.
+bool group_wants_boxes(const GroupCandidates* c) {
+  return c->queued - c->taken < RS_GROUP_BATCH && c->read < c->end;
+}
+
+// Reads on until there is a batch, or the list ends.
 RS_GROUP_INLINE void group_fetch(__local ForwardMemory* memory,
                                  GroupCandidates* c,
                                  const int lane) {
-  while (c->queued - c->taken < RS_GROUP_BATCH && c->read < c->end) {
-    const uint k = c->read + lane;
-    bool meets = false;
-    if (k < c->end) {
-      __global const float* box = c->boxes + k;
-      meets = box[0] <= c->x1 && box[c->stride] <= c->y1 && box[2 * c->stride] >= c->x0 &&
-              box[3 * c->stride] >= c->y0;
-    }
-    const ulong bits = rs_group_bits(memory->words, lane, meets);
-    const uint place = (uint)popcount(bits & ((1ul << lane) - 1));
-    if (meets) memory->queue[(c->queued + place) % RS_GROUP_QUEUE] = k;
-    c->queued += (uint)popcount(bits);
-    c->read += GROUP;
-  }
+  while (group_wants_boxes(c)) group_fetch_boxes(memory, c, lane, true);
 }
 
 float group_waiting_key(const __local ForwardMemory* memory,
@@ -159,10 +170,13 @@ uint group_push(__local ForwardMemory* memory,
 
 // Reserves places in the stream, for work-item 0: for the rows of the slots `closing`, which settle
 // now.
-void group_push_rows(__local ForwardMemory* memory, uint closing, uint settled, HitStream* stream) {
+void group_push_rows(__local ForwardMemory* memory,
+                     RowSet closing,
+                     uint settled,
+                     HitStream* stream) {
   __local OpenRows* rows = &memory->open;
   for (; closing != 0; closing &= closing - 1, ++settled) {
-    const uint slot = rs_lowest_bit(closing);
+    const uint slot = rs_first_slot(closing);
     rows->stream_row[slot] =
         group_push(memory, rows->reference[slot], settled - rows->settled[slot], stream);
   }
@@ -174,9 +188,24 @@ void group_push_rows(__local ForwardMemory* memory, uint closing, uint settled, 
 typedef struct {
   float settled;      // product over the settled rows, of this work-item's ray
   uint settled_rows;  // how many these are
-  uint open;          // slots that are taken, a bit each
-  uint closed;        // slots that the last row closed: others may still read of them
+  RowSet open;        // slots that are taken, a bit each
+  RowSet closed;      // slots that the last row closed: others may still read of them
 } RowProgress;
+
+// Fetches what the next `batch` candidates of the queue are, a work-item each: the test of one then
+// waits for its line alone.
+RS_GROUP_INLINE void group_stage_batch(__local ForwardMemory* memory,
+                                       const GroupCandidates* candidates,
+                                       const int lane,
+                                       const int batch,
+                                       const PacketScene scene) {
+  rs_group_barrier();
+  if (lane < batch) {
+    const uint k = memory->queue[(candidates->taken + lane) % RS_GROUP_QUEUE];
+    memory->batch_reference[lane] = scene.references[k];
+    memory->batch_quantile[lane] = scene.limits[k].y;
+  }
+}
 
 // Tests the next `batch` candidates of the queue against the rays that are `alive`: a work-item its
 // own ray. Of each its nearest and farthest key are found afterwards. Returns whether any ray is.
@@ -187,6 +216,7 @@ RS_GROUP_INLINE bool group_test_batch(__local ForwardMemory* memory,
                                       const PacketScene scene,
                                       const int alive,
                                       const PacketState* p) {
+  group_stage_batch(memory, candidates, lane, batch, scene);
 #if SUBGROUP
   rs_group_barrier();
 #else
@@ -198,8 +228,8 @@ RS_GROUP_INLINE bool group_test_batch(__local ForwardMemory* memory,
   rs_group_barrier();
 #endif
   for (int j = 0; j < batch; ++j) {
-    const uint k = memory->queue[(candidates->taken + j) % RS_GROUP_QUEUE];
-    const PacketHit hit = packet_hit(p, scene, scene.references[k], scene.limits[k].y, alive);
+    const PacketHit hit =
+        packet_hit(p, scene, memory->batch_reference[j], memory->batch_quantile[j], alive);
     // Keys are not negative: their bits are in order.
     const uint key = as_uint(hit.key) & 0x7fffffff;
 #if SUBGROUP
@@ -289,14 +319,14 @@ RS_GROUP_INLINE void group_order_rows(__local ForwardMemory* memory,
 // Settles the open rows of the slots `closing`, which have their places in the stream.
 RS_GROUP_INLINE void group_settle_rows(__local OpenRows* rows,
                                        const int lane,
-                                       uint closing,
+                                       RowSet closing,
                                        const PacketScene scene,
                                        const OwnRows* own,
                                        RowProgress* progress,
                                        PacketState* p,
                                        const HitStream* stream) {
   for (; closing != 0; closing &= closing - 1)
-    group_settle(rows, own, rs_lowest_bit(closing), lane, scene, p, &progress->settled, stream);
+    group_settle(rows, own, rs_first_slot(closing), lane, scene, p, &progress->settled, stream);
 }
 
 // Opens the nearest row that waits, which is the r-th: the open ones that lie before it settle,
@@ -319,14 +349,14 @@ RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
   // Compared as integers (keys are not negative), less one where an equal key of a Gaussian with a
   // higher index counts as farther.
   const int order = as_int(hit.key) & 0x7fffffff;
-  uint closing = 0;
+  RowSet closing = 0;
   float before = 1.0f;
   RS_TALLY(p, RS_TALLY_OPENED, 1);
   RS_TALLY(p, RS_TALLY_COMPARED, popcount(progress->open));
-  for (uint rest = progress->open; rest != 0; rest &= rest - 1) {
-    const uint other = rs_lowest_bit(rest);
+  for (RowSet rest = progress->open; rest != 0; rest &= rest - 1) {
+    const uint other = rs_first_slot(rest);
     if (rows->last_key[other] < first_key) {
-      closing |= 1u << other;
+      closing |= RS_SLOT(other);
       continue;
     }
     const bool nearer = order - (reference < rows->reference[other] ? 1 : 0) <
@@ -338,9 +368,9 @@ RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
       before -= before * rs_row_get(rows->alpha, own->alpha, other, lane);
     }
   }
-  const uint free = ~(progress->open | progress->closed) & RS_ALL_SLOTS;
+  const RowSet free = ~(progress->open | progress->closed) & RS_ALL_SLOTS;
   const bool fits = free != 0;
-  const uint slot = fits ? rs_lowest_bit(free) : 0;
+  const uint slot = fits ? rs_first_slot(free) : 0;
   const uint settling = (uint)popcount(closing);
   if (lane == 0 && fits) {
 #if KEEP_HITS
@@ -353,7 +383,7 @@ RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
   rs_group_barrier();
   group_settle_rows(rows, lane, fits ? closing : 0, scene, own, progress, p, stream);
   progress->settled_rows += settling;
-  progress->open = (progress->open & ~closing) | 1u << slot;
+  progress->open = (progress->open & ~closing) | RS_SLOT(slot);
   progress->closed = closing;
   rs_row_set(rows->key, own->key, slot, lane, as_float(order));
   rs_row_set(rows->alpha, own->alpha, slot, lane, hit.alpha);
@@ -361,19 +391,18 @@ RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
   return fits;
 }
 
-// Traces the rays that are `traced`. False when they need more rows at once than there is room for,
-// or a ray has more than max_hits hits: fewer rays need less room, and group_passes.h has no such
-// limits. Work-item 0 alone pushes rows into its stream; all set them.
+// Traces the rays. False when they need more rows at once than there is room for, or a ray has more
+// than max_hits hits: group_passes.h has no such limits. Work-item 0 alone pushes rows into its
+// stream; all set them.
 RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
                                    GroupCandidates* candidates,
                                    const int lane,
-                                   const bool traced,
                                    const PacketScene scene,
                                    PacketState* p,
                                    HitStream* stream) {
   OwnRows own;
   RowProgress progress = {1.0f, 0, 0, 0};
-  int alive = traced ? p->valid : 0;
+  int alive = p->valid;
   candidates->read = candidates->begin;
   candidates->queued = candidates->taken = 0;
   int begin = 0, waiting = 0;
@@ -408,13 +437,13 @@ RS_GROUP_INLINE bool group_in_rows(__local ForwardMemory* memory,
     alive &= RS_MASK(p->T >= scene.min_transmittance);
   }
   RS_TALLY(p, RS_TALLY_BOXES, (candidates->read - candidates->begin + GROUP - 1) / GROUP);
-  const uint left = fits ? progress.open : 0;
+  const RowSet left = fits ? progress.open : 0;
 #if KEEP_HITS
   if (lane == 0) group_push_rows(memory, left, progress.settled_rows, stream);
 #endif
   rs_group_barrier();
   group_settle_rows(&memory->open, lane, left, scene, &own, &progress, p, stream);
-  return rs_group_bits(memory->words, lane, !fits || (traced && p->hits > scene.max_hits)) == 0;
+  return rs_group_bits(memory->words, lane, !fits || p->hits > scene.max_hits) == 0;
 }
 
 #endif

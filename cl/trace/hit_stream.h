@@ -29,6 +29,8 @@
 // Demand is not counted beyond this: the cursor must not come round to chunks that are taken.
 #define RS_MOST_CHUNKS 0x80000000u
 #define RS_NO_ROW 0xffffffffu
+// Of where a group's stream ends, beside the rows used: it has rows for a launch with CROWDED.
+#define RS_STREAM_CROWDED 0x80000000u
 
 typedef struct {
   __global uint2* pool;            // (Gaussian reference, window)

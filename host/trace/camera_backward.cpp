@@ -86,9 +86,9 @@ void CameraTracer::Impl::backward_tile_rows(const DeviceGaussians& gaussians,
   launch_backward(image_gradient, row, rows);
 }
 
-Kernel CameraTracer::Impl::backward_kernel(int lens,
-                                           const GradientSumChoice& choice,
-                                           bool with_depth) {
+std::vector<Kernel> CameraTracer::Impl::backward_pass(int lens,
+                                                      const GradientSumChoice& choice,
+                                                      bool with_depth) {
   BuildOptions build = kernels.build(lens);
   build.define("DEPTH_GRADIENT", with_depth ? 1 : 0);
   return kernels.backward(choice.define(build, context.device()));
@@ -97,7 +97,7 @@ Kernel CameraTracer::Impl::backward_kernel(int lens,
 void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
-  Kernel kernel = backward_kernel(lens_kind, sums.choice(), depth_gradient != nullptr);
+  std::vector<Kernel> launched = backward_pass(lens_kind, sums.choice(), depth_gradient != nullptr);
   RsBackward pass{};
   pass.gaussians = static_cast<std::uint32_t>(count);
   pass.copies = static_cast<std::uint32_t>(sums.copies());
@@ -109,14 +109,17 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   pass.limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet().lanes));
   const bool shared = !sums.is_private();
   in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    const Range range =
-        shared ? kernels.range(kernel, 1, camera.width, {lists.tiles_x(), first, number})
-               : Range{{sums.copies() * kernels.items(), 1, 1}, {kernels.items(), 1, 1}, {}};
     // Shared sums find their rows by the offset of the launch.
     pass.tile_row = shared ? row : row + first;
     pass.tile_rows = number;
-    kernel.launch(range, view_arguments(), pass, streams.arguments(), lists.lines(), image_gradient,
-                  depth_gradient != nullptr ? *depth_gradient : no_depth_gradient, sums.target());
+    for (Kernel& kernel : launched) {
+      const Range range =
+          shared ? kernels.range(kernel, 1, camera.width, {lists.tiles_x(), first, number})
+                 : Range{{sums.copies() * kernels.items(), 1, 1}, {kernels.items(), 1, 1}, {}};
+      kernel.launch(range, view_arguments(), pass, streams.arguments(), lists.lines(),
+                    image_gradient, depth_gradient != nullptr ? *depth_gradient : no_depth_gradient,
+                    sums.target());
+    }
   });
 }
 

@@ -66,27 +66,27 @@ void CameraTracer::Impl::trace_window(const DeviceGaussians& gaussians,
   launch_forward(window, keep);
 }
 
-Kernel& CameraTracer::Impl::forward_kernel(int lens, bool keep) {
+std::vector<Kernel>& CameraTracer::Impl::forward_pass(int lens, bool keep) {
   const int variant =
       (options.depth ? 1 : 0) | (options.hit_order == HitOrder::kPeak ? 2 : 0) | lens << 2;
   if (variant != forward_variant) {
     forward_variant = variant;
     forward_kernels = {};
   }
-  Kernel& kernel = forward_kernels[keep ? 1 : 0];
-  if (!kernel) {
+  std::vector<Kernel>& pass = forward_kernels[keep ? 1 : 0];
+  if (pass.empty()) {
     BuildOptions build = kernels.build(lens);
     build.define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
         .define("WITH_DEPTH", options.depth ? 1 : 0)
         .define("KEEP_HITS", keep ? 1 : 0);
     if (counters.size() > RS_COUNT_WORDS) build.define("COUNT_WORK", 1);
-    kernel = kernels.forward(build);
+    pass = kernels.forward(build);
   }
-  return kernel;
+  return pass;
 }
 
 void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
-  Kernel& kernel = forward_kernel(lens_kind, keep);
+  std::vector<Kernel>& launched = forward_pass(lens_kind, keep);
   const auto rows = static_cast<std::uint32_t>(window.rows);
   const auto columns = static_cast<std::uint32_t>(window.columns);
   LaunchBudget& budget = watch && !forward_budget.bounded() ? watched_budget : forward_budget;
@@ -102,9 +102,11 @@ void CameraTracer::Impl::launch_forward(const TileWindow& window, bool keep) {
   pass.max_hits = options.max_hits;
   pass.pool_capacity = keep ? room : 0;
   in_bands(context, budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    kernel.launch(kernels.range(kernel, packet().block, camera.width, {columns, first, number}),
-                  lists.arguments(), view_arguments(), pass, streams.arguments(), image, depth,
-                  counters);
+    for (Kernel& kernel : launched) {
+      kernel.launch(kernels.range(kernel, packet().block, camera.width, {columns, first, number}),
+                    lists.arguments(), view_arguments(), pass, streams.arguments(), image, depth,
+                    counters);
+    }
     if (!watch) return;
     context.finish();
     watched_tiles += std::size_t{number} * columns;

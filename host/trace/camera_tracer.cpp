@@ -80,9 +80,9 @@ void CameraTracer::Impl::begin_programs(const DeviceGaussians& gaussians,
   if (variant == begun_variant) return;
   begun_variant = variant;
   lists.begin_programs(gaussians, lens, options);
-  forward_kernel(lens, keep);
+  forward_pass(lens, keep);
   if (!keep) return;
-  backward_kernel(lens, sum_choice(gaussians.count), with_depth);
+  backward_pass(lens, sum_choice(gaussians.count), with_depth);
   finalize_kernel(gaussians, lens, with_depth, false, false);
 }
 

@@ -38,7 +38,7 @@ struct CameraTracer::Impl {
   void trace_tile_rows(const DeviceGaussians& gaussians, std::uint32_t row, std::uint32_t rows);
   void trace_window(const DeviceGaussians& gaussians, const TileWindow& window, bool keep);
   void launch_forward(const TileWindow& window, bool keep);
-  Kernel& forward_kernel(int lens, bool keep);
+  std::vector<Kernel>& forward_pass(int lens, bool keep);
 
   // camera_backward.cpp: from hits to gradients of lines, and from those to parameters.
   void backward_face(const DeviceGaussians& gaussians, const Buffer<float>& image_gradient);
@@ -46,7 +46,7 @@ struct CameraTracer::Impl {
                           const Buffer<float>& image_gradient,
                           std::uint32_t row,
                           std::uint32_t rows);
-  Kernel backward_kernel(int lens, const GradientSumChoice& choice, bool with_depth);
+  std::vector<Kernel> backward_pass(int lens, const GradientSumChoice& choice, bool with_depth);
   GaussianKernel finalize_kernel(
       const DeviceGaussians& gaussians, int lens, bool with_depth, bool accumulate, bool pose);
   GradientSumChoice sum_choice(std::size_t gaussians) const {
@@ -113,8 +113,8 @@ struct CameraTracer::Impl {
   Camera view;                    // of the last forward()
   int lens_kind = RS_LENS_PINHOLE;
   int face = 0;
-  RsCamera camera{};                      // of the face that is being traced
-  std::array<Kernel, 2> forward_kernels;  // without and with kept hits
+  RsCamera camera{};                                   // of the face that is being traced
+  std::array<std::vector<Kernel>, 2> forward_kernels;  // without and with kept hits
   int forward_variant = -1;
   Buffer<float> image;
   Buffer<float> depth;

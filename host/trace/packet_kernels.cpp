@@ -25,17 +25,31 @@ BuildOptions PacketKernels::build(int lens_kind) const {
   return build;
 }
 
-Kernel PacketKernels::forward(const BuildOptions& build) {
-  if (layout_.grouped) return group_kernel("trace/group_forward.cl", "trace_forward_group", build);
+std::vector<Kernel> PacketKernels::forward(const BuildOptions& build) {
+  if (layout_.grouped) {
+    return group_kernels("trace/group_forward.cl", "trace_forward_group", build,
+                         layout_.crowded_rows[0]);
+  }
   BuildOptions own = build;
   own.define("BLOCK", layout_.block).define("PENDING", layout_.pending);
-  return context_.kernel("trace/camera_forward.cl", "trace_forward", own);
+  return {context_.kernel("trace/camera_forward.cl", "trace_forward", own)};
 }
 
-Kernel PacketKernels::backward(const BuildOptions& build) {
-  if (layout_.grouped)
-    return group_kernel("trace/group_backward.cl", "trace_backward_group", build);
-  return context_.kernel("trace/camera_backward.cl", "trace_backward", build);
+std::vector<Kernel> PacketKernels::backward(const BuildOptions& build) {
+  if (layout_.grouped) {
+    return group_kernels("trace/group_backward.cl", "trace_backward_group", build,
+                         layout_.crowded_rows[1]);
+  }
+  return {context_.kernel("trace/camera_backward.cl", "trace_backward", build)};
+}
+
+std::vector<Kernel> PacketKernels::group_kernels(const char* file,
+                                                 const char* name,
+                                                 const BuildOptions& build,
+                                                 int crowded_rows) {
+  BuildOptions crowded = build;
+  crowded.define("CROWDED", 1).define("OPEN_LOCAL", crowded_rows);
+  return {group_kernel(file, name, build), group_kernel(file, name, crowded)};
 }
 
 // A kernel of a group's packet, with subgroups where the packet has them. Only the compiled kernel

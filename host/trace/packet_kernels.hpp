@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "device/build_options.hpp"
 #include "device/context.hpp"
@@ -32,16 +33,21 @@ class PacketKernels {
 
   /// What the kernels of both passes are built with, besides their own.
   BuildOptions build(int lens_kind) const;
-  /// trace_forward or trace_forward_group.
-  Kernel forward(const BuildOptions& build);
-  /// trace_backward or trace_backward_group.
-  Kernel backward(const BuildOptions& build);
+  /// The kernels of a pass, in the order of their launches: trace_forward, or trace_forward_group
+  /// and the same again for the packets that the first one has left, which need more room.
+  std::vector<Kernel> forward(const BuildOptions& build);
+  /// The same of trace_backward or trace_backward_group.
+  std::vector<Kernel> backward(const BuildOptions& build);
 
   /// A work-item for every block x block packets, or a work-group for every packet, of a picture
   /// that is `width` pixels wide.
   Range range(const Kernel& kernel, int block, int width, const TileRows& tiles) const;
 
  private:
+  std::vector<Kernel> group_kernels(const char* file,
+                                    const char* name,
+                                    const BuildOptions& build,
+                                    int crowded_rows);
   Kernel group_kernel(const char* file, const char* name, const BuildOptions& build);
 
   Context& context_;

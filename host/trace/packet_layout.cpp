@@ -23,6 +23,15 @@ std::uint64_t group_local_memory(int lanes) {
 // room for fewer groups.
 constexpr int kGroupLanes = 32;
 
+// Open rows that find room there, of the 64 of a crowded packet, at `bytes` a ray and row: as
+// above, with twice the rows that wait.
+int crowded_rows(const DeviceInfo& device, int lanes, std::uint64_t bytes) {
+  const auto rays = static_cast<std::uint64_t>(lanes);
+  const std::uint64_t others = 3072 + 48 * rays;
+  const std::uint64_t room = device.local_memory > others ? device.local_memory - others : 0;
+  return static_cast<int>(std::clamp<std::uint64_t>(room / (bytes * rays) / 8 * 8, 8, 64));
+}
+
 bool takes_groups(const DeviceInfo& device, int lanes) {
   return static_cast<std::size_t>(lanes) <= device.max_work_group_size &&
          group_local_memory(lanes) <= device.local_memory;
@@ -130,6 +139,8 @@ PacketLayout packet_layout(const DeviceInfo& device, const TraceOptions& options
     layout.pending = tuning->pending;
     layout.group = tuning->group;
   }
+  if (layout.grouped)
+    layout.crowded_rows = {crowded_rows(device, lanes, 12), crowded_rows(device, lanes, 8)};
   return layout;
 }
 

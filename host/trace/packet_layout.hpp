@@ -22,6 +22,9 @@ struct PacketLayout {
   int tile = 16;     ///< pixels
   int pending = 64;  ///< rows, or entries of a lane's sorted list, at once
   int group = 0;     ///< most work-items of a work-group; 0 = all packets of a tile
+  /// Rows of crowded packets (CROWDED in cl/trace/group.h) that local memory holds, in the forward
+  /// and in the backward pass.
+  std::array<int, 2> crowded_rows{};
 };
 
 /// Lanes and shape as the options say; what they leave open is the device's tuning, or without one

@@ -11,6 +11,8 @@ COMPILER = ["-cl-mad-enable"]
 # a device with subgroups is tried with, 2 what it is asked for by name.
 CAMERA = dict(LANES=1, TILE=16, CHUNK=16, LENS=0)
 GROUP_CAMERA = dict(CAMERA, GROUP=32)
+# packet_kernels.cpp: what the first launch leaves, on a device with 32 kB of local memory or more.
+CROWDED = dict(CROWDED=1, OPEN_LOCAL=64)
 GROUP_FORWARD = dict(GROUP_CAMERA, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 FORWARD = dict(CAMERA, BLOCK=1, PENDING=48, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 # candidate_lists.cpp, gaussian_kernel.cpp.
@@ -34,10 +36,12 @@ CHUNKS = dict(GROUP=256)
 PROGRAMS = [
     ("group forward train", "trace/group_forward.cl", dict(GROUP_FORWARD, KEEP_HITS=1)),
     ("group forward train 64", "trace/group_forward.cl", dict(GROUP_FORWARD, KEEP_HITS=1, GROUP=64)),
+    ("group forward train crowded", "trace/group_forward.cl", dict(GROUP_FORWARD, KEEP_HITS=1, **CROWDED)),
     ("group forward render", "trace/group_forward.cl", GROUP_FORWARD),
     ("group forward depth", "trace/group_forward.cl", dict(GROUP_FORWARD, PEAK_ORDER=0, WITH_DEPTH=1)),
     ("group forward around", "trace/group_forward.cl", dict(GROUP_FORWARD, LENS=2, KEEP_HITS=1)),
     ("group backward atomic", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC)),
+    ("group backward atomic crowded", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC, **CROWDED)),
     ("group backward atomic 64", "trace/group_backward.cl", dict(GROUP_CAMERA, **ATOMIC, GROUP=64)),
     ("group backward swap", "trace/group_backward.cl", dict(GROUP_CAMERA, **SWAP)),
     ("group backward exact", "trace/group_backward.cl", dict(GROUP_CAMERA, **EXACT)),

@@ -154,6 +154,27 @@ TEST_CASE("gradients of packets that are sorted because rays reach the cap on hi
   }
 }
 
+// Ellipsoids around one place, which overlap in depth from the first to the last: as many rows are
+// open at once as there are Gaussians.
+TEST_CASE("gradients of packets with more rows open than either launch of a group keeps") {
+  Context context = make_test_context();
+  for (const std::size_t count : {20, 50, 150}) {
+    CAPTURE(count);
+    Gaussians model = reference::random_scene(count, 5, 1);
+    for (float& mean : model.means) mean *= 0.05f;
+    for (float& scale : model.log_scales) scale = 0.2f * scale + std::log(0.4f);
+    for (float& opacity : model.opacities) opacity = -4.0f;
+    TraceOptions options;
+    options.min_transmittance = 1e-6f;
+    for (const Packet& packet : packets({16}, {8, 32, 64})) {
+      CAPTURE(packet);
+      CHECK_ERRORS(
+          compare_gradients(context, model, packet.over(options), reference::cube_camera(12, 10)),
+          1e-3);
+    }
+  }
+}
+
 TEST_CASE("gradients from a camera inside the scene") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(400, 24, 1);
