@@ -53,7 +53,8 @@ void add_speeds(const BenchReport& run, int width, int height, DeviceReport& rep
 void add_model(Context& context, const BenchOptions& one, DeviceReport& report) {
   const BenchCase scene{one.scenes.front(), one.sizes.front()};
   const std::string failure = failure_of([&] {
-    SceneBench bench(context, generated(scene, one), one);
+    const BenchModel model = generated(scene, one);
+    SceneBench bench(context, model, one);
     report.models.push_back(
         {scene.scene, scene.size, one.width, one.height, forecast_cards(bench.counts(true))});
   });

@@ -15,7 +15,9 @@ namespace raysplats {
 /// operation needs is made when it is prepared, and kept.
 class SceneBench {
  public:
+  /// `model` and `options` have to outlive it.
   SceneBench(Context& context, const BenchModel& model, const BenchOptions& options);
+  SceneBench(Context& context, const BenchModel&& model, const BenchOptions& options) = delete;
   ~SceneBench();
 
   /// They refer to this object.

@@ -13,8 +13,10 @@
 
 #include "bench/cards.hpp"
 #include "bench/kernel_folders.hpp"
+#include "bench/scene_bench.hpp"
 #include "device/fault_injection.hpp"
 #include "raysplats/error.hpp"
+#include "synth/bench_scenes.hpp"
 #include "unit/bench/report_fixture.hpp"
 #include "unit/fixture.hpp"
 
@@ -44,7 +46,14 @@ TEST_CASE("a device's report holds its self-test, every size that fits the time,
   CHECK(json.at("device").at("name") == context.device().name);
   CHECK(json.at("runs").at(1).at("rows").size() == report.runs[1].rows.size());
   REQUIRE(report.models.size() == 1);
-  for (const double rate : report.models[0].cards.iterations) CHECK(rate > 1.0);
+  BenchOptions counted = options;
+  counted.width = report.models[0].width;
+  counted.height = report.models[0].height;
+  const BenchModel model{"random",
+                         bench_scene("random", options.sizes[0], options.seed, options.sh_degree),
+                         bench_camera(counted.width, counted.height), true};
+  CHECK(report.models[0].cards.iterations ==
+        forecast_cards(SceneBench(context, model, counted).counts(true)).iterations);
   CHECK(json.at("models").at(0).at("rows").at("forward").size() == cards().size());
   CHECK(device_report_text(report).find("measured here: adam") != std::string::npos);
   CHECK(device_report_text(report).find("self-test passed") != std::string::npos);

@@ -94,6 +94,7 @@ TEST_CASE("kernel: a compile error shows file, line and the compiler's message")
   Context context(test_device(), uncached());
   const std::string message =
       message_of<DeviceError>([&] { context.kernel("broken.cl", "f").argument_count(); });
+  CAPTURE(message);
   CHECK(contains(message, "broken.cl:3"));
   CHECK(contains(message, "undeclared_name"));
   CHECK(contains(message, context.device().name));
