@@ -96,7 +96,7 @@ Outcome Stage::run(const Words& arguments, const std::string& fail) const {
 }
 
 std::string Stage::calls() const {
-  const std::string text = fs::exists(path("calls")) ? read_file(path("calls")) : "";
+  std::string text = fs::exists(path("calls")) ? read_file(path("calls")) : "";
   fs::remove(path("calls"));
   return text;
 }

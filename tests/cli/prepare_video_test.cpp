@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `prepare` of videos, with a stand-in for FFmpeg and with the real one.
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <array>
 #include <cmath>
@@ -128,9 +129,10 @@ TEST_CASE("the real FFmpeg gives no frame of a video twice, also where its rate 
     const auto [frames, count] = kind;
     CAPTURE(kind.first);
     const std::string clip = stage.path("clip.mp4");
-    const std::string make =
-        "ffmpeg -nostdin -y -v error -f lavfi -i testsrc2=s=64x48:r=10:d=1.2 -vf \"select='" +
-        frames + "'\" -vsync vfr -c:v mpeg4 -q:v 2 '" + clip + "'";
+    const std::string make = fmt::format(
+        "ffmpeg -nostdin -y -v error -f lavfi -i testsrc2=s=64x48:r=10:d=1.2 -vf \"select='{}'\" "
+        "-vsync vfr -c:v mpeg4 -q:v 2 '{}'",
+        frames, clip);
     SKIP_TEST_UNLESS(std::system(make.c_str()) == 0, "there is no ffmpeg that writes MPEG-4");
     const Outcome outcome =
         stage.run({clip, "-o", stage.path(std::to_string(count)), "--frames", "50"});
