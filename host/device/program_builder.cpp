@@ -265,7 +265,7 @@ cl::Program ProgramBuilder::make(const Build& build,
   if (const std::optional<cl::Program> cached = from_cache(build)) return *cached;
   // One process at a time: the others find the result, and some drivers fail when several compile
   // the same source.
-  const std::shared_ptr<ProgramCache::BuildLock> lock = lock_builds();
+  const ProgramCache::BuildLock lock(cache_.directory(), build.key);
   if (const std::optional<cl::Program> cached = from_cache(build)) return *cached;
   if (compiling() && apart_) {
     if (const std::optional<cl::Program> made = compile_apart(build, process)) return *made;
@@ -353,14 +353,4 @@ std::optional<cl::Program> ProgramBuilder::from_cache(const Build& build) const 
 }
 
 // Shared by those who compile at the same time in this context.
-std::shared_ptr<ProgramCache::BuildLock> ProgramBuilder::lock_builds() {
-  const std::lock_guard lock(builds_mutex_);
-  std::shared_ptr<ProgramCache::BuildLock> builds = builds_.lock();
-  if (!builds) {
-    builds = std::make_shared<ProgramCache::BuildLock>(cache_.directory());
-    builds_ = builds;
-  }
-  return builds;
-}
-
 }  // namespace raysplats

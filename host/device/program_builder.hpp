@@ -68,7 +68,6 @@ class ProgramBuilder {
                                            std::optional<CompilerProcess>& process);
   void store(const Build& build, const cl::Program& program) const;
   std::optional<cl::Program> from_cache(const Build& build) const;
-  std::shared_ptr<ProgramCache::BuildLock> lock_builds();
 
   cl::Context context_;
   cl::Device device_;
@@ -85,8 +84,6 @@ class ProgramBuilder {
   std::size_t running_ = 0;
   std::size_t told_ = 0;  // programs that were announced
   bool ends_ = false;
-  std::mutex builds_mutex_;
-  std::weak_ptr<ProgramCache::BuildLock> builds_;
   std::vector<std::thread> threads_;
 };
 

@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/file.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -51,17 +50,26 @@ std::filesystem::path default_cache_directory() {
   return {};
 }
 
-ProgramCache::BuildLock::BuildLock(const std::filesystem::path& directory)
-    : descriptor_(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+// A byte of one file for every key: two that share one wait for each other, which costs time alone.
+ProgramCache::BuildLock::BuildLock(const std::filesystem::path& directory, const std::string& key)
+    : descriptor_(-1) {
+  if (directory.empty()) return;
+  descriptor_ = ::open((directory / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor_ < 0) return;
+  struct flock range {};
+  range.l_type = F_WRLCK;
+  range.l_whence = SEEK_SET;
+  range.l_start = static_cast<off_t>(XXH3_64bits(key.data(), key.size()) >> 33);
+  range.l_len = 1;
   const auto start = std::chrono::steady_clock::now();
   bool told = false;
-  while (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0 && (errno == EWOULDBLOCK || errno == EINTR)) {
+  while (::fcntl(descriptor_, F_OFD_SETLK, &range) != 0 &&
+         (errno == EAGAIN || errno == EACCES || errno == EINTR)) {
     const auto waited = std::chrono::steady_clock::now() - start;
     if (waited > kMostWait) return;  // one that was stopped holds it for good
     if (waited > kToldWait && !told) {
       told = true;
-      spdlog::info("waiting for another process that compiles kernels for {}", directory.string());
+      spdlog::info("waiting for another process that compiles a kernel for {}", directory.string());
     }
     std::this_thread::sleep_for(kPoll);
   }

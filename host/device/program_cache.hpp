@@ -30,12 +30,13 @@ class ProgramCache {
   void remove(const std::string& key) const;
   const std::filesystem::path& directory() const { return directory_; }
 
-  /// Keeps other processes and threads from compiling for this cache; gone with its process. Waits
-  /// for its turn, and says so when that is long, for three minutes at most. Without a directory,
-  /// or where the file system knows no locks, nothing is kept from anybody.
+  /// Keeps others, processes and threads, from compiling the program of a key for this cache; gone
+  /// with its process. Waits for its turn, and says so when that is long, for three minutes at
+  /// most. Without a directory, or where the file system knows no locks, nothing is kept from
+  /// anybody.
   class BuildLock {
    public:
-    explicit BuildLock(const std::filesystem::path& directory);
+    BuildLock(const std::filesystem::path& directory, const std::string& key);
     ~BuildLock();
     BuildLock(const BuildLock&) = delete;
     BuildLock& operator=(const BuildLock&) = delete;

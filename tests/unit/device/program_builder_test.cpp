@@ -12,6 +12,7 @@
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
+#include "device/program_cache.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
 
@@ -53,10 +54,7 @@ class Folder {
       told.emplace_back(number, program);
     };
   }
-  std::size_t cached() const {
-    return static_cast<std::size_t>(
-        std::distance(fs::directory_iterator(options.cache_directory), fs::directory_iterator()));
-  }
+  std::size_t cached() const { return program_cache_state(options.cache_directory).programs; }
   // A program for ContextOptions::compiler.
   fs::path script(const std::string& lines) {
     fs::path path = folder_.path() / "compiler";
