@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,6 +32,11 @@ struct Options {
 };
 
 void run(const Options& options) {
+  if (std::filesystem::path(options.output).extension() == ".npy") {
+    throw UsageError(
+        fmt::format("--output {}: a .npy file holds one array and there are five, give a .npz",
+                    options.output));
+  }
   const ModelSource source = find_model(options.model);
   check_output_file(options.output, options.overwrite, {source.file, source.config, options.rays});
   const io::RayList list = io::read_rays(options.rays);

@@ -18,13 +18,12 @@
 #include "io/ply_options.hpp"
 #include "io/ply_origin.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/gaussians.hpp"
 #include "raysplats/io.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats {
 namespace {
-
-constexpr int kMaxShDegree = 4;
 
 std::size_t coefficients(int degree) { return static_cast<std::size_t>(sh_coefficients(degree)); }
 

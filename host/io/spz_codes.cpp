@@ -15,11 +15,11 @@
 #include "io/gaussian_codes.hpp"
 #include "io/model_formats.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/gaussians.hpp"
 
 namespace raysplats::io {
 namespace {
 
-constexpr int kMaxShDegree = 4;
 constexpr int kUsualFractionalBits = 12;
 constexpr int kMaxFractionalBits = 24;
 constexpr double kScaleStep = 16.0;

@@ -13,6 +13,7 @@
 
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
+#include "raysplats/gaussians.hpp"
 #include "util/atomic_file.hpp"
 #include "util/file_kind.hpp"
 
@@ -31,7 +32,6 @@ constexpr std::uint32_t kMaxSections = 64;
 constexpr std::uint64_t kMaxHeader = 1 << 20;
 constexpr std::size_t kNameBytes = 32;
 constexpr char kFolder[] = "checkpoints";  // of a run
-constexpr int kMaxShDegree = 4;
 // Far above what any device holds, and small enough that sizes made of it cannot overflow.
 constexpr std::uint64_t kMaxGaussians = std::uint64_t{1} << 40;
 constexpr std::int64_t kMaxIterations = std::int64_t{1} << 60;

@@ -29,11 +29,14 @@ void check_finite(const char* name, const std::vector<float>& values) {
 
 }  // namespace
 
+void check_sh_degree(int degree) {
+  if (degree >= 0 && degree <= kMaxShDegree) return;
+  throw UsageError(
+      fmt::format("The Gaussians have SH degree {}: 0 to {} are possible", degree, kMaxShDegree));
+}
+
 void check_sizes(const Gaussians& gaussians) {
-  if (gaussians.sh_degree < 0 || gaussians.sh_degree > 4) {
-    throw UsageError(
-        fmt::format("The Gaussians have SH degree {}: 0 to 4 are possible", gaussians.sh_degree));
-  }
+  check_sh_degree(gaussians.sh_degree);
   const std::size_t n = gaussians.size();
   check_size("means", gaussians.means, 3 * n);
   check_size("quaternions", gaussians.quaternions, 4 * n);

@@ -5,6 +5,9 @@
 
 namespace raysplats {
 
+/// Throws UsageError when the degree is not 0 to kMaxShDegree.
+void check_sh_degree(int degree);
+
 /// Throws UsageError when the arrays do not fit each other or the SH degree is not 0 to 4.
 void check_sizes(const Gaussians& gaussians);
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "scene/gaussian_check.hpp"
+
 namespace raysplats {
 
 void Gaussians::resize(std::size_t count) {
@@ -16,9 +18,10 @@ void Gaussians::resize(std::size_t count) {
 }
 
 Gaussians with_sh_degree(const Gaussians& model, int degree) {
+  check_sh_degree(degree);
   Gaussians out = model;
-  const auto from = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
-  const auto to = static_cast<std::size_t>(3 * sh_coefficients(degree));
+  const auto from = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
+  const auto to = 3 * static_cast<std::size_t>(sh_coefficients(degree));
   out.sh_degree = degree;
   out.sh.assign(model.size() * to, 0.0f);
   for (std::size_t i = 0; i < model.size(); ++i) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "raysplats/gaussians.hpp"
 #include "scene/gaussian_check.hpp"
 #include "scene/gaussian_selection.hpp"
 #include "scene/gaussian_transform.hpp"
@@ -21,7 +22,6 @@
 namespace raysplats {
 namespace {
 
-constexpr int kMaxShDegree = 4;
 constexpr double kLeastScale = 1e-30, kMostScale = 1e30;  // beyond, 32-bit positions are 0 or none
 
 /// The shortest turn of `up` to -y.

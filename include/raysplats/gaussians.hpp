@@ -6,6 +6,9 @@
 
 namespace raysplats {
 
+/// Highest degree of spherical harmonics that a model may have.
+constexpr int kMaxShDegree = 4;
+
 /// Number of spherical-harmonics coefficients per channel of a degree (0..4).
 constexpr int sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }
 
@@ -24,7 +27,8 @@ struct Gaussians {
   void resize(std::size_t count);
 };
 
-/// Adds or drops bands so that the model has `degree`; new coefficients are zero.
+/// Adds or drops bands so that the model has `degree`; new coefficients are zero. Throws UsageError
+/// when the degree is not 0 to 4.
 Gaussians with_sh_degree(const Gaussians& model, int degree);
 
 }  // namespace raysplats

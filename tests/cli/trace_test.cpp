@@ -46,6 +46,14 @@ TEST_CASE("rays of a file are traced into a file") {
   CHECK(alpha[0] == doctest::Approx(0.5).epsilon(1e-4));
   CHECK(alpha[1] == 0.0f);
 
+  std::vector<std::string> one_array = arguments;
+  one_array[5] = folder / "seen.npy";
+  const Outcome of_one = raysplats_program(one_array);
+  CHECK(of_one.code == 2);
+  CHECK(one_sentence(of_one));
+  CHECK(of_one.err.find("give a .npz") != std::string::npos);
+  CHECK(!std::filesystem::exists(folder / "seen.npy"));
+
   // A camera could be near, a ray is where it says.
   std::vector<std::string> near = arguments;
   near.insert(near.end(), {"--near", "1", "--overwrite"});

@@ -68,6 +68,8 @@ TEST_CASE("gaussians: bands are added as zeros and dropped from the end") {
     }
   }
   CHECK(with_sh_degree(numbered(3, 0), 1).sh.empty());
+  CHECK_THROWS_AS(with_sh_degree(numbered(3, 1), -1), UsageError);
+  CHECK_THROWS_AS(with_sh_degree(numbered(3, 1), 9), UsageError);
 }
 
 TEST_CASE("gaussians: what does not fit together is refused before it is changed") {
