@@ -163,7 +163,7 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
     tally_add(p.tally, counters);
     tally_add(stream.tally, counters);
 #endif
-    rs_count(counters + 2, hits);
+    if (hits != 0) rs_count(counters + 2, hits);
     if (capped_rays != 0) atomic_add(counters + 1, capped_rays);
   }
 }

@@ -29,7 +29,7 @@
 // Demand is not counted beyond this: the cursor must not come round to chunks that are taken.
 #define RS_MOST_CHUNKS 0x80000000u
 #define RS_NO_ROW 0xffffffffu
-// Of where a group's stream ends, beside the rows used: it has rows for a launch with CROWDED.
+// Beside the rows used where a group's stream ends: it is for the launch with CROWDED.
 #define RS_STREAM_CROWDED 0x80000000u
 
 typedef struct {
