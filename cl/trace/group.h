@@ -58,11 +58,9 @@
 // Rows of hits that are open at once, and sets of them: a bit each.
 #if CROWDED
 #define OPEN 64
-#define RS_ALL_SLOTS (~0ul)
 typedef ulong RowSet;
 #else
 #define OPEN 32
-#define RS_ALL_SLOTS (~0u)
 typedef uint RowSet;
 #endif
 #define RS_SLOT(slot) ((RowSet)1 << (slot))
@@ -130,8 +128,6 @@ ulong rs_group_bits(__local uint* words, const int lane, const bool flag) {
   return (ulong)words[1] << 32 | words[0];
 #endif
 }
-
-uint rs_lowest_of(const ulong bits) { return 63 - (uint)clz(bits & -bits); }
 
 // Columns and rows of groups that cover a picture.
 uint rs_group_number(const int width, const int px, const int py) {

@@ -208,7 +208,7 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
         }
       }
       if (tied.before > 0.0f) next = tied;
-      const uint slot = rs_first_slot(~open & RS_ALL_SLOTS);
+      const uint slot = rs_first_slot(~open);
       open |= RS_SLOT(slot);
       rs_row_set(memory->before, own.before, slot, lane, before);
       rs_row_set(memory->from_here, own.from_here, slot, lane, next.from_here + mine);

@@ -368,7 +368,7 @@ RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
       before -= before * rs_row_get(rows->alpha, own->alpha, other, lane);
     }
   }
-  const RowSet free = ~(progress->open | progress->closed) & RS_ALL_SLOTS;
+  const RowSet free = ~(progress->open | progress->closed);
   const bool fits = free != 0;
   const uint slot = fits ? rs_first_slot(free) : 0;
   const uint settling = (uint)popcount(closing);
