@@ -32,13 +32,13 @@ struct Options {
 };
 
 void run(const Options& options) {
+  const ModelSource source = find_model(options.model);
+  check_output_file(options.output, options.overwrite, {source.file, source.config, options.rays});
   if (std::filesystem::path(options.output).extension() == ".npy") {
     throw UsageError(
         fmt::format("--output {}: a .npy file holds one array and there are five, give a .npz",
                     options.output));
   }
-  const ModelSource source = find_model(options.model);
-  check_output_file(options.output, options.overwrite, {source.file, source.config, options.rays});
   const io::RayList list = io::read_rays(options.rays);
   const Gaussians gaussians = in_morton_order(read_model(source.file));
   const TraceOptions trace = options.trace.over(trace_options(source));
